@@ -1,0 +1,194 @@
+//! A machine as typed values in SI units.
+//!
+//! The values come out of [`Parameters`](super::Parameters) only, which has checked each against
+//! the schema: a `MachineConfig` that exists is valid.
+
+use crate::units::Nanoseconds;
+
+/// One machine: its axes and its sampling periods.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MachineConfig {
+    pub(crate) name: String,
+    pub(crate) periods: Periods,
+    pub(crate) axes: Vec<AxisConfig>,
+}
+
+/// Sampling periods of the three loops; each is an integer multiple of the next ([P] Appendix 2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Periods {
+    /// Tsp, position loop, ns.
+    pub position: Nanoseconds,
+    /// Tsv, velocity loop, ns.
+    pub velocity: Nanoseconds,
+    /// Tsi, current loop, ns: one tick of the simulation.
+    pub current: Nanoseconds,
+}
+
+/// Whether an axis counts in metres or in radians.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisKind {
+    /// Position in m.
+    Linear,
+    /// Position in rad.
+    Rotary,
+}
+
+/// One axis, SI units; "motor" quantities are in rad and N·m, or in m and N for a linear motor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisConfig {
+    pub(crate) name: String,
+    pub(crate) kind: AxisKind,
+    /// r: m or rad of the axis per rad (or m) of the motor.
+    pub(crate) transmission_ratio: f64,
+    pub(crate) motor: MotorConfig,
+    pub(crate) friction: FrictionConfig,
+    pub(crate) gravity: GravityConfig,
+    pub(crate) position_loop: PositionLoopConfig,
+    pub(crate) velocity_loop: PiConfig,
+    pub(crate) current_loop: PiConfig,
+    pub(crate) feedforward: FeedforwardConfig,
+    pub(crate) delays: DelaysConfig,
+    pub(crate) limits: LimitsConfig,
+}
+
+/// A direct-current motor equivalent to the servo motor ([P] eq. 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorConfig {
+    /// Jeq, kg·m² at the motor (kg for a linear motor).
+    pub inertia: f64,
+    /// Kt, N·m/A (N/A).
+    pub torque_constant: f64,
+    /// Ke, V·s/rad (V·s/m).
+    pub emf_constant: f64,
+    /// R, Ω.
+    pub resistance: f64,
+    /// L, H.
+    pub inductance: f64,
+    /// Limit of the current set-point, A.
+    pub max_current: f64,
+    /// Limit of the voltage, V.
+    pub max_voltage: f64,
+    /// Limit of the velocity set-point, rad/s (m/s).
+    pub max_speed: f64,
+}
+
+/// Double-exponential friction law ([P] eq. 3); V is in m/min or rev/min of the axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionConfig {
+    /// a, A.
+    pub a: f64,
+    /// b, min/m or min/rev.
+    pub b: f64,
+    /// c, A.
+    pub c: f64,
+    /// d, min/m or min/rev.
+    pub d: f64,
+    /// i0, breakaway current, A.
+    pub i0: f64,
+}
+
+/// C_gravity = r (weight + tilt sin(position + phase)).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GravityConfig {
+    /// W, N (N·m on a rotary axis).
+    pub weight: f64,
+    /// k, N·m.
+    pub tilt: f64,
+    /// φ, rad.
+    pub phase: f64,
+}
+
+/// Position controller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PositionLoopConfig {
+    /// Which controller, and its gains.
+    pub controller: PositionControllerConfig,
+}
+
+/// The position controllers that there are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PositionControllerConfig {
+    /// Proportional, with the feedforward of the cascade; Kp in s⁻¹.
+    Cascade {
+        /// Kp, s⁻¹.
+        gain: f64,
+    },
+}
+
+/// Gain and integral time of a PI controller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PiConfig {
+    /// Kv, N·m/(rad/s), or Ki, V/A.
+    pub gain: f64,
+    /// Tv or Ti, s.
+    pub integral_time: f64,
+}
+
+/// Weights of the feedforward ([P] eqs. 6 and 7); zero is off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FeedforwardConfig {
+    /// VFFW, 1.
+    pub velocity: f64,
+    /// TFFW, kg·m² at the motor (kg).
+    pub torque: f64,
+}
+
+/// Delays of the set-point, ns, before rounding to a tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DelaysConfig {
+    /// α, before the position comparator.
+    pub alpha: Nanoseconds,
+    /// β, behind the velocity feedforward.
+    pub beta: Nanoseconds,
+    /// γ, behind the torque feedforward.
+    pub gamma: Nanoseconds,
+}
+
+/// What trajectories may ask of an axis; m or rad, and seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LimitsConfig {
+    /// Vmax, m/s or rad/s.
+    pub velocity: f64,
+    /// Amax, m/s² or rad/s².
+    pub acceleration: f64,
+    /// Jmax, m/s³ or rad/s³.
+    pub jerk: f64,
+    /// Lower end of the stroke, m or rad; −∞ where there is none.
+    pub stroke_min: f64,
+    /// Upper end of the stroke, m or rad; +∞ where there is none.
+    pub stroke_max: f64,
+}
+
+impl MachineConfig {
+    /// Name of the machine.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Sampling periods.
+    pub fn periods(&self) -> Periods {
+        self.periods
+    }
+
+    /// Axes, in the order of `joints`.
+    pub fn axes(&self) -> &[AxisConfig] {
+        &self.axes
+    }
+}
+
+impl AxisConfig {
+    /// Name of the joint, without prefix.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Linear or rotary.
+    pub fn kind(&self) -> AxisKind {
+        self.kind
+    }
+
+    /// Limits for trajectories.
+    pub fn limits(&self) -> &LimitsConfig {
+        &self.limits
+    }
+}

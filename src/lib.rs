@@ -1,0 +1,13 @@
+//! Virtual machine-tool axes.
+//!
+//! The library knows physics, controllers and trajectories, and no ROS; the node is a thin shell
+//! around [`machine::Machine`] in the room `ros` (cargo feature `ros`).
+//!
+//! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
+//! [`units`], [`config`] → [`drive`] → [`control`] → [`machine`] → [`trajectory`] → [`assess`] → `ros`.
+
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod config;
+pub mod units;
