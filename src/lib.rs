@@ -10,4 +10,7 @@
 #![warn(missing_docs)]
 
 pub mod config;
+pub mod control;
+pub mod drive;
+pub mod machine;
 pub mod units;

@@ -24,6 +24,18 @@ pub struct Periods {
     pub current: Nanoseconds,
 }
 
+impl Periods {
+    /// Ticks of the current loop in a position period.
+    pub fn ticks_per_position(&self) -> u64 {
+        (self.position / self.current) as u64
+    }
+
+    /// Ticks of the current loop in a velocity period.
+    pub fn ticks_per_velocity(&self) -> u64 {
+        (self.velocity / self.current) as u64
+    }
+}
+
 /// Whether an axis counts in metres or in radians.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AxisKind {

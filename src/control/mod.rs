@@ -1,0 +1,12 @@
+//! Controllers of one feed drive. Knows no plant.
+//!
+//! ([P] fig. 3) Three nested loops, position → velocity → current, with velocity and torque
+//! feedforward of the delayed set-point.
+
+mod pi;
+mod position;
+mod setpoint;
+
+pub use pi::{Pi, PiState};
+pub use position::PositionController;
+pub use setpoint::{Delays, Feedforward, SetpointHistory};

@@ -1,0 +1,177 @@
+//! One axis: a plant, its cascade, and the state of both.
+
+use crate::config::{AxisConfig, Periods};
+use crate::control::{Delays, Feedforward, Pi, PiState, PositionController, SetpointHistory};
+use crate::drive::{DriveError, MotorState, Plant, Torques};
+use crate::units::seconds;
+
+use super::AxisSample;
+
+/// Everything immutable about one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisParameters {
+    plant: Plant,
+    position: PositionController,
+    velocity: Pi,
+    current: Pi,
+    feedforward: Feedforward,
+    delays: Delays,
+    ratio: f64,
+    torque_constant: f64,
+    resistance: f64,
+    max_speed: f64,
+    ticks_per_position: u64,
+    ticks_per_velocity: u64,
+}
+
+impl AxisParameters {
+    /// Discretises an axis.
+    ///
+    /// # Errors
+    /// [`DriveError`] if the motor cannot be stepped over the current period.
+    pub fn new(axis: &AxisConfig, periods: &Periods) -> Result<Self, DriveError> {
+        let motor = &axis.motor;
+        let tick = seconds(periods.current);
+        Ok(AxisParameters {
+            plant: Plant::new(axis, tick)?,
+            position: PositionController::new(&axis.position_loop.controller),
+            velocity: Pi::new(
+                &axis.velocity_loop,
+                seconds(periods.velocity),
+                motor.torque_constant,
+                motor.max_current,
+            ),
+            current: Pi::new(&axis.current_loop, tick, 1.0, motor.max_voltage),
+            feedforward: Feedforward::new(
+                &axis.feedforward,
+                seconds(periods.position),
+                axis.transmission_ratio,
+            ),
+            delays: Delays::new(&axis.delays, periods.current),
+            ratio: axis.transmission_ratio,
+            torque_constant: motor.torque_constant,
+            resistance: motor.resistance,
+            max_speed: motor.max_speed,
+            ticks_per_position: periods.ticks_per_position(),
+            ticks_per_velocity: periods.ticks_per_velocity(),
+        })
+    }
+}
+
+/// State of one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    motor: MotorState,
+    torques: Torques,
+    load: f64,
+    psec: SetpointHistory,
+    velocity_pi: PiState,
+    current_pi: PiState,
+    speed_limited: bool,
+    sample: AxisSample,
+}
+
+impl Axis {
+    /// At rest at `position` (m or rad), held against gravity.
+    pub fn at_rest(p: &AxisParameters, position: f64) -> Self {
+        let motor = MotorState { current: 0.0, speed: 0.0, angle: position / p.ratio };
+        let gravity = p.plant.gravity(&motor);
+        let current = gravity / p.torque_constant;
+        let voltage = p.resistance * current;
+        let mut axis = Axis {
+            motor: MotorState { current, ..motor },
+            torques: Torques { friction: 0.0, gravity, load: 0.0 },
+            load: 0.0,
+            psec: SetpointHistory::new(position, p.ticks_per_position, p.delays.longest()),
+            velocity_pi: PiState { integral: gravity, limited: false },
+            current_pi: PiState { integral: voltage, limited: false },
+            speed_limited: false,
+            sample: AxisSample {
+                psec: position,
+                delayed_psec: position,
+                current_setpoint: current,
+                voltage,
+                ..AxisSample::default()
+            },
+        };
+        axis.observe(p);
+        axis
+    }
+
+    /// Takes over changed parameters; the state goes on.
+    pub(super) fn adopt(&mut self, p: &AxisParameters) {
+        self.psec.lengthen(p.delays.longest());
+    }
+
+    /// The set-point of the position period that begins.
+    pub(super) fn begin_period(&mut self, psec: f64) {
+        self.psec.push(psec);
+        self.sample.psec = psec;
+    }
+
+    pub(super) fn set_load(&mut self, load: f64) {
+        self.load = load;
+    }
+
+    /// The loops that are due at `tick`: position, then velocity, then current.
+    #[inline]
+    pub(super) fn control(&mut self, p: &AxisParameters, tick: u64, tick_in_period: u64) {
+        if tick_in_period == 0 {
+            self.control_position(p, tick);
+        }
+        if tick_in_period.is_multiple_of(p.ticks_per_velocity) {
+            self.control_velocity(p, tick);
+        }
+        let error = self.sample.current_setpoint - self.motor.current;
+        self.sample.voltage = p.current.update(&mut self.current_pi, error, 0.0);
+        self.observe(p);
+    }
+
+    fn control_position(&mut self, p: &AxisParameters, tick: u64) {
+        self.sample.delayed_psec = self.psec.delayed(tick, p.delays.position);
+        let wanted = p.position.update(self.sample.delayed_psec / p.ratio, self.motor.angle);
+        self.sample.velocity_setpoint = wanted.clamp(-p.max_speed, p.max_speed);
+        self.speed_limited = wanted != self.sample.velocity_setpoint;
+    }
+
+    fn control_velocity(&mut self, p: &AxisParameters, tick: u64) {
+        let s = &mut self.sample;
+        let velocity_index = self.psec.index(tick, p.delays.velocity);
+        let torque_index = self.psec.index(tick, p.delays.torque);
+        s.velocity_feedforward = p.feedforward.velocity(&self.psec, velocity_index);
+        s.torque_feedforward = p.feedforward.torque(&self.psec, torque_index);
+        let error = s.velocity_setpoint + s.velocity_feedforward - self.motor.speed;
+        s.current_setpoint = p.velocity.update(&mut self.velocity_pi, error, s.torque_feedforward);
+    }
+
+    /// Moves the plant by one tick.
+    #[inline]
+    pub(super) fn step(&mut self, p: &AxisParameters) {
+        self.torques = p.plant.step(&mut self.motor, self.sample.voltage, self.load);
+    }
+
+    /// Copies the plant's state into the sample.
+    #[inline]
+    fn observe(&mut self, p: &AxisParameters) {
+        let s = &mut self.sample;
+        s.position = p.plant.position(&self.motor);
+        s.velocity = p.plant.velocity(&self.motor);
+        s.current = self.motor.current;
+        s.friction_current = self.torques.friction / p.torque_constant;
+        s.gravity_current = self.torques.gravity / p.torque_constant;
+        s.load_current = self.torques.load / p.torque_constant;
+        s.effort = p.torque_constant * self.motor.current / p.ratio;
+        s.saturated = self.speed_limited || self.velocity_pi.limited || self.current_pi.limited;
+        s.friction_extrapolated = p.plant.friction_is_extrapolated(&self.motor);
+    }
+
+    /// The signals of the tick that the controllers have last acted on.
+    pub fn sample(&self) -> &AxisSample {
+        &self.sample
+    }
+
+    /// Name of the position controller that is active.
+    pub fn controller(p: &AxisParameters) -> &'static str {
+        p.position.name()
+    }
+}
