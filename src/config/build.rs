@@ -1,0 +1,252 @@
+//! From checked parameters in CNC units to typed values in SI units.
+
+use std::f64::consts::TAU;
+
+use super::check::to_ns;
+use super::definition::MotorKind;
+use super::error::{ConfigError, Source};
+use super::layout::Joint;
+use super::machine::{
+    AxisConfig, AxisKind, DelaysConfig, FeedforwardConfig, FrictionConfig, GravityConfig,
+    LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig,
+    PositionLoopConfig,
+};
+use super::parameters::Parameters;
+use super::value::Value;
+use crate::units::{
+    DEGREE, METRE_PER_MINUTE, MICROSECOND_NS, MILLIHENRY, MILLIMETRE, MILLISECOND, MILLISECOND_NS,
+    Nanoseconds, POSITION_GAIN, REVOLUTION, RPM, SECOND_NS,
+};
+
+/// What the node's clock follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeMode {
+    /// Real time.
+    Real,
+    /// As fast as the machine and its subscribers can take it; publishes `/clock`.
+    Fast,
+    /// `/clock` of somebody else (`use_sim_time`).
+    SimTime,
+}
+
+/// Parameters of the node itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeConfig {
+    /// What the clock follows.
+    pub time: TimeMode,
+    /// Rate of `joint_states`, Hz; `None` is every position period.
+    pub publish_rate: Option<f64>,
+    /// Text before the joint names in messages.
+    pub joint_prefix: String,
+    /// Time after which a load that is not renewed is zero again, ns.
+    pub load_timeout: Nanoseconds,
+    /// Largest number of points of a trajectory.
+    pub max_points: usize,
+    /// Whether a trajectory may end with a velocity.
+    pub allow_nonzero_velocity_at_trajectory_end: bool,
+}
+
+impl Parameters {
+    /// The machine in SI units.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError::Missing`], which the checks on the way in leave no room for.
+    pub fn machine_config(&self) -> Result<MachineConfig, ConfigError> {
+        let period = |key, factor| Ok(to_ns(self.number(key)?, factor));
+        Ok(MachineConfig {
+            name: self.text("machine"),
+            periods: Periods {
+                position: period("periods.position_ms", MILLISECOND_NS)?,
+                velocity: period("periods.velocity_us", MICROSECOND_NS)?,
+                current: period("periods.current_us", MICROSECOND_NS)?,
+            },
+            axes: self
+                .layout()
+                .joints
+                .iter()
+                .map(|joint| Axis { set: self, joint }.config())
+                .collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// The parameters of the node itself.
+    pub fn node_config(&self) -> NodeConfig {
+        let time = if self.flag("use_sim_time") {
+            TimeMode::SimTime
+        } else if self.text("time") == "fast" {
+            TimeMode::Fast
+        } else {
+            TimeMode::Real
+        };
+        // Each has a default, so that the fallbacks here are never used.
+        let number = |key: &str| self.number(key).unwrap_or_default();
+        let rate = number("publish_rate");
+        let max_points = match self.get("max_points") {
+            Some(Value::Integer(points)) => usize::try_from(points).unwrap_or(usize::MAX),
+            _ => usize::MAX,
+        };
+        NodeConfig {
+            time,
+            publish_rate: (rate > 0.0).then_some(rate),
+            joint_prefix: self.text("joint_prefix"),
+            load_timeout: to_ns(number("load_timeout"), SECOND_NS),
+            max_points,
+            allow_nonzero_velocity_at_trajectory_end: self
+                .flag("allow_nonzero_velocity_at_trajectory_end"),
+        }
+    }
+
+    fn number(&self, key: &str) -> Result<f64, ConfigError> {
+        match self.get(key) {
+            Some(Value::Double(number)) => Ok(number),
+            _ => Err(ConfigError::Missing {
+                at: Source::named("parameters"),
+                key: key.to_owned(),
+                wanted: "number".to_owned(),
+            }),
+        }
+    }
+
+    fn text(&self, key: &str) -> String {
+        match self.get(key) {
+            Some(Value::Text(text)) => text,
+            _ => String::new(),
+        }
+    }
+
+    fn flag(&self, key: &str) -> bool {
+        self.get(key) == Some(Value::Bool(true))
+    }
+}
+
+/// One axis of a set of parameters.
+struct Axis<'a> {
+    set: &'a Parameters,
+    joint: &'a Joint,
+}
+
+impl Axis<'_> {
+    fn key(&self, suffix: &str) -> String {
+        format!("{}.{suffix}", self.joint.name)
+    }
+
+    fn number(&self, suffix: &str) -> Result<f64, ConfigError> {
+        self.set.number(&self.key(suffix))
+    }
+
+    /// The number times its unit's factor.
+    fn scaled(&self, suffix: &str, factor: f64) -> Result<f64, ConfigError> {
+        Ok(self.number(suffix)? * factor)
+    }
+
+    /// 0 where the parameter does not apply: gravity acts on a linear axis in one way, on a rotary
+    /// one in another.
+    fn or_zero(&self, suffix: &str) -> f64 {
+        self.number(suffix).unwrap_or_default()
+    }
+
+    fn config(&self) -> Result<AxisConfig, ConfigError> {
+        let pi = |name: &str| -> Result<PiConfig, ConfigError> {
+            Ok(PiConfig {
+                gain: self.number(&format!("{name}.gain"))?,
+                integral_time: self.scaled(&format!("{name}.integral_time_ms"), MILLISECOND)?,
+            })
+        };
+        let delay = |suffix| Ok(to_ns(self.number(suffix)?, MILLISECOND_NS));
+        Ok(AxisConfig {
+            name: self.joint.name.clone(),
+            kind: self.joint.axis,
+            transmission_ratio: self.transmission_ratio()?,
+            motor: self.motor()?,
+            friction: FrictionConfig {
+                a: self.number("friction.a")?,
+                b: self.number("friction.b")?,
+                c: self.number("friction.c")?,
+                d: self.number("friction.d")?,
+                i0: self.number("friction.i0")?,
+            },
+            gravity: GravityConfig {
+                weight: self.or_zero("gravity.weight_n"),
+                tilt: self.or_zero("gravity.tilt_nm"),
+                phase: self.or_zero("gravity.tilt_phase_deg") * DEGREE,
+            },
+            position_loop: PositionLoopConfig {
+                controller: PositionControllerConfig::Cascade {
+                    gain: self.scaled("position_loop.gain", POSITION_GAIN)?,
+                },
+            },
+            velocity_loop: pi("velocity_loop")?,
+            current_loop: pi("current_loop")?,
+            feedforward: FeedforwardConfig {
+                velocity: self.number("feedforward.velocity")?,
+                torque: self
+                    .number(self.by_motor("feedforward.torque_kg_m2", "feedforward.torque_kg"))?,
+            },
+            delays: DelaysConfig {
+                alpha: delay("delays.alpha_ms")?,
+                beta: delay("delays.beta_ms")?,
+                gamma: delay("delays.gamma_ms")?,
+            },
+            limits: self.limits()?,
+        })
+    }
+
+    fn by_motor<T>(&self, rotating: T, linear: T) -> T {
+        match self.joint.motor {
+            MotorKind::Rotating => rotating,
+            MotorKind::Linear => linear,
+        }
+    }
+
+    /// r: m or rad of the axis per rad (or m) of the motor.
+    fn transmission_ratio(&self) -> Result<f64, ConfigError> {
+        let direct = self.set.flag(&self.key("transmission.direct"));
+        Ok(match self.joint.axis {
+            _ if direct => 1.0,
+            AxisKind::Linear => self.scaled("transmission.screw_lead_mm", MILLIMETRE)? / TAU,
+            AxisKind::Rotary => 1.0 / self.number("transmission.gear_ratio")?,
+        })
+    }
+
+    fn motor(&self) -> Result<MotorConfig, ConfigError> {
+        let inertia = self.by_motor("motor.inertia_kg_m2", "motor.mass_kg");
+        let torque = self.by_motor("motor.torque_constant_nm_a", "motor.force_constant_n_a");
+        let emf = self.by_motor("motor.emf_constant_v_s_rad", "motor.emf_constant_v_s_m");
+        let (speed, speed_unit) = self.by_motor(
+            ("motor.max_speed_rpm", RPM),
+            ("motor.max_speed_m_min", METRE_PER_MINUTE),
+        );
+        Ok(MotorConfig {
+            inertia: self.number(inertia)?,
+            torque_constant: self.number(torque)?,
+            emf_constant: self.number(emf)?,
+            resistance: self.number("motor.resistance_ohm")?,
+            inductance: self.scaled("motor.inductance_mh", MILLIHENRY)?,
+            max_current: self.number("motor.max_current_a")?,
+            max_voltage: self.number("motor.max_voltage_v")?,
+            max_speed: self.scaled(speed, speed_unit)?,
+        })
+    }
+
+    fn limits(&self) -> Result<LimitsConfig, ConfigError> {
+        // A stroke that is left out is unlimited.
+        let end = |suffix, unit, none: f64| self.scaled(suffix, unit).unwrap_or(none);
+        Ok(match self.joint.axis {
+            AxisKind::Linear => LimitsConfig {
+                velocity: self.scaled("limits.velocity_m_min", METRE_PER_MINUTE)?,
+                acceleration: self.number("limits.acceleration_m_s2")?,
+                jerk: self.number("limits.jerk_m_s3")?,
+                stroke_min: end("limits.stroke_min_mm", MILLIMETRE, f64::NEG_INFINITY),
+                stroke_max: end("limits.stroke_max_mm", MILLIMETRE, f64::INFINITY),
+            },
+            AxisKind::Rotary => LimitsConfig {
+                velocity: self.scaled("limits.velocity_rpm", RPM)?,
+                acceleration: self.scaled("limits.acceleration_rev_s2", REVOLUTION)?,
+                jerk: self.scaled("limits.jerk_rev_s3", REVOLUTION)?,
+                stroke_min: end("limits.stroke_min_deg", DEGREE, f64::NEG_INFINITY),
+                stroke_max: end("limits.stroke_max_deg", DEGREE, f64::INFINITY),
+            },
+        })
+    }
+}

@@ -1,0 +1,265 @@
+//! The schema: one table of parameters from which the check of files, the typed configuration,
+//! the ROS descriptors and the table of the README are derived.
+//!
+//! Equation numbers are those of [P] (Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling
+//! for the simulation of tool path tracking in multi-axis High Speed Machining*).
+
+use super::definition::DefaultValue::{Flag, Integer, Number, Text};
+use super::definition::MotorKind::{Linear as LinearMotor, Rotating as RotatingMotor};
+use super::definition::{Definition, Kind};
+use super::machine::AxisKind::{Linear, Rotary};
+
+/// Shortest and longest sampling period, ms; the node's pacing knows nothing below 1 µs.
+const PERIOD_MS: (f64, f64) = (1e-3, 50.0);
+/// The same range in µs.
+const PERIOD_US: (f64, f64) = (1.0, 50e3);
+/// Longest delay of a set-point, ms.
+const DELAY_MS: f64 = 100.0;
+/// Largest current, A, of a motor and of its friction.
+const CURRENT: f64 = 1e4;
+/// Exponents of the friction law, min/m or min/rev: the fall after breakaway can be steep, a rise
+/// steeper than e^V has no bearing that makes it.
+const FRICTION_EXPONENT: (f64, f64) = (-100.0, 1.0);
+/// Smallest value of what is divided by, or what has no sense at zero.
+const POSITIVE: f64 = 1e-9;
+/// Largest gain of a loop, in its unit.
+const GAIN: f64 = 1e9;
+/// Shortest and longest integral time, ms; zero would divide by zero.
+const INTEGRAL_TIME_MS: (f64, f64) = (1e-3, 1e6);
+
+/// A coefficient of the friction law, A.
+const fn friction_current(key: &'static str) -> Definition {
+    Definition::number(key, "A", -CURRENT, CURRENT).of_axis()
+}
+
+/// An exponent of the friction law.
+const fn friction_exponent(key: &'static str, unit: &'static str) -> Definition {
+    Definition::number(key, unit, FRICTION_EXPONENT.0, FRICTION_EXPONENT.1)
+}
+
+/// A gain, live.
+const fn gain(key: &'static str, unit: &'static str) -> Definition {
+    Definition::number(key, unit, 0.0, GAIN).of_axis().live()
+}
+
+/// An integral time, live.
+const fn integral_time(key: &'static str) -> Definition {
+    Definition::number(key, "ms", INTEGRAL_TIME_MS.0, INTEGRAL_TIME_MS.1)
+        .of_axis()
+        .live()
+}
+
+/// A delay of the set-point, live.
+const fn delay(key: &'static str) -> Definition {
+    Definition::number(key, "ms", 0.0, DELAY_MS)
+        .of_axis()
+        .default(Number(0.0))
+        .live()
+}
+
+/// Every parameter there is. A key stands twice where its unit depends on the axis or the motor.
+pub static DEFINITIONS: &[Definition] = &[
+    // Machine.
+    Definition::new("machine", "", Kind::Text).is("Name of the machine."),
+    Definition::new("joints", "", Kind::TextList)
+        .is("Names of the axes, in the order of messages and tables."),
+    Definition::number("periods.position_ms", "ms", PERIOD_MS.0, PERIOD_MS.1)
+        .is("Tsp, sampling period of the position loop, a multiple of periods.velocity_us."),
+    Definition::number("periods.velocity_us", "µs", PERIOD_US.0, PERIOD_US.1)
+        .is("Tsv, sampling period of the velocity loop, a multiple of periods.current_us."),
+    Definition::number("periods.current_us", "µs", PERIOD_US.0, PERIOD_US.1)
+        .is("Tsi, sampling period of the current loop: one tick of the simulation."),
+    // Axis and transmission.
+    Definition::new("type", "", Kind::Choice(&["linear", "rotary"]))
+        .of_axis()
+        .is("Whether the axis counts in metres or in radians."),
+    Definition::number("transmission.screw_lead_mm", "mm", 1e-3, 1e3)
+        .on(Linear)
+        .optional()
+        .is("Lead of the ball screw, axis travel per motor revolution."),
+    Definition::number("transmission.gear_ratio", "", 1e-3, 1e6)
+        .on(Rotary)
+        .optional()
+        .is("Gear ratio, motor revolutions per axis revolution."),
+    Definition::new("transmission.direct", "", Kind::Flag)
+        .of_axis()
+        .optional()
+        .is("Direct drive: a torque motor on a rotary axis, a linear motor on a linear one."),
+    // Motor.
+    Definition::number("motor.inertia_kg_m2", "kg·m²", POSITIVE, 1e3)
+        .driven_by(RotatingMotor)
+        .is("Jeq, equivalent inertia at the motor shaft ([P] eqs. 1 and 5)."),
+    Definition::number("motor.mass_kg", "kg", 1e-6, 1e6)
+        .driven_by(LinearMotor)
+        .is("Moving mass, in the place of Jeq ([P] eq. 1)."),
+    Definition::number("motor.torque_constant_nm_a", "N·m/A", POSITIVE, 1e4)
+        .driven_by(RotatingMotor)
+        .is("Kt, torque constant ([P] eq. 1)."),
+    Definition::number("motor.force_constant_n_a", "N/A", POSITIVE, 1e5)
+        .driven_by(LinearMotor)
+        .is("Force constant, in the place of Kt ([P] eq. 1)."),
+    Definition::number("motor.emf_constant_v_s_rad", "V·s/rad", 0.0, 1e4)
+        .driven_by(RotatingMotor)
+        .is("Ke, back-EMF constant ([P] eq. 1)."),
+    Definition::number("motor.emf_constant_v_s_m", "V·s/m", 0.0, 1e5)
+        .driven_by(LinearMotor)
+        .is("Ke, back-EMF constant ([P] eq. 1)."),
+    Definition::number("motor.resistance_ohm", "Ω", 0.0, 1e4)
+        .of_axis()
+        .is("R, winding resistance ([P] eq. 1)."),
+    Definition::number("motor.inductance_mh", "mH", 1e-6, 1e5)
+        .of_axis()
+        .is("L, winding inductance ([P] eq. 1)."),
+    Definition::number("motor.max_current_a", "A", POSITIVE, CURRENT)
+        .of_axis()
+        .is("imax, limit of the current set-point."),
+    Definition::number("motor.max_voltage_v", "V", POSITIVE, 1e5)
+        .of_axis()
+        .is("umax, limit of the motor voltage."),
+    Definition::number("motor.max_speed_rpm", "rpm", 1e-6, 1e6)
+        .driven_by(RotatingMotor)
+        .is("Maximum motor speed, limit of the velocity set-point."),
+    Definition::number("motor.max_speed_m_min", "m/min", 1e-6, 1e5)
+        .driven_by(LinearMotor)
+        .is("Maximum motor speed, limit of the velocity set-point."),
+    // Friction.
+    friction_current("friction.a")
+        .is("Amplitude a of the friction law a·exp(b·V) + c·exp(d·V) ([P] eq. 3)."),
+    friction_exponent("friction.b", "min/m")
+        .on(Linear)
+        .is("Exponent b of the friction law, V in m/min ([P] eq. 3)."),
+    friction_exponent("friction.b", "min/rev")
+        .on(Rotary)
+        .is("Exponent b of the friction law, V in rev/min of the axis ([P] eq. 3)."),
+    friction_current("friction.c")
+        .is("Amplitude c of the friction law; a + c, its value towards standstill, is not negative ([P] eq. 3)."),
+    friction_exponent("friction.d", "min/m")
+        .on(Linear)
+        .is("Exponent d of the friction law, V in m/min ([P] eq. 3)."),
+    friction_exponent("friction.d", "min/rev")
+        .on(Rotary)
+        .is("Exponent d of the friction law, V in rev/min of the axis ([P] eq. 3)."),
+    Definition::number("friction.i0", "A", 0.0, CURRENT)
+        .of_axis()
+        .is("Breakaway current i0, bound of static friction ([P] eq. 3)."),
+    // Gravity.
+    Definition::number("gravity.weight_n", "N", -1e6, 1e6)
+        .on(Linear)
+        .default(Number(0.0))
+        .is("Net weight of a vertical axis, what its counterbalance leaves; positive resists motion towards plus."),
+    Definition::number("gravity.tilt_nm", "N·m", -1e6, 1e6)
+        .on(Rotary)
+        .default(Number(0.0))
+        .is("Gravity torque amplitude k of a tilting axis, k·sin(position + phase)."),
+    Definition::number("gravity.tilt_phase_deg", "°", -360.0, 360.0)
+        .on(Rotary)
+        .default(Number(0.0))
+        .is("Phase of the gravity torque of a tilting axis."),
+    // Control.
+    Definition::new("position_loop.controller", "", Kind::Choice(&["cascade"]))
+        .of_axis()
+        .default(Text("cascade"))
+        .live()
+        .is("Position controller: proportional with feedforward ([P] fig. 3)."),
+    gain("position_loop.gain", "(m/min)/mm")
+        .on(Linear)
+        .is("Kp, position-loop gain; 1 (m/min)/mm is 16.667 s⁻¹ ([P] Appendix 2)."),
+    gain("position_loop.gain", "(1000 °/min)/°")
+        .on(Rotary)
+        .is("Kp, position-loop gain; 1 (1000 °/min)/° is 16.667 s⁻¹ ([P] Appendix 2)."),
+    gain("velocity_loop.gain", "N·m/(rad/s)")
+        .driven_by(RotatingMotor)
+        .is("Kv, proportional gain of the velocity loop ([P] Appendix 2)."),
+    gain("velocity_loop.gain", "N/(m/s)")
+        .driven_by(LinearMotor)
+        .is("Kv, proportional gain of the velocity loop ([P] Appendix 2)."),
+    integral_time("velocity_loop.integral_time_ms")
+        .is("Tv, integral time of the velocity loop ([P] Appendix 2)."),
+    gain("current_loop.gain", "V/A")
+        .is("Ki, proportional gain of the current loop ([P] Appendix 2)."),
+    integral_time("current_loop.integral_time_ms")
+        .is("Ti, integral time of the current loop ([P] Appendix 2)."),
+    Definition::number("feedforward.velocity", "", 0.0, 2.0)
+        .of_axis()
+        .default(Number(0.0))
+        .live()
+        .is("VFFW, weight of the velocity feedforward; 0 is off ([P] eq. 6)."),
+    Definition::number("feedforward.torque_kg_m2", "kg·m²", 0.0, 1e3)
+        .driven_by(RotatingMotor)
+        .default(Number(0.0))
+        .live()
+        .is("TFFW, weight of the torque feedforward at the motor; 0 is off ([P] eq. 7)."),
+    Definition::number("feedforward.torque_kg", "kg", 0.0, 1e6)
+        .driven_by(LinearMotor)
+        .default(Number(0.0))
+        .live()
+        .is("TFFW, weight of the force feedforward; 0 is off ([P] eq. 7)."),
+    delay("delays.alpha_ms").is("α, delay of the set-point before the position comparator ([P] fig. 3)."),
+    delay("delays.beta_ms").is("β, delay of the velocity feedforward ([P] fig. 3)."),
+    delay("delays.gamma_ms").is("γ, delay of the torque feedforward ([P] fig. 3)."),
+    // Limits.
+    Definition::number("limits.velocity_m_min", "m/min", 1e-6, 1e5)
+        .on(Linear)
+        .is("Vmax, largest velocity that a trajectory may ask for."),
+    Definition::number("limits.velocity_rpm", "rpm", 1e-6, 1e6)
+        .on(Rotary)
+        .is("Vmax, largest velocity of the axis that a trajectory may ask for."),
+    Definition::number("limits.acceleration_m_s2", "m/s²", 1e-6, 1e5)
+        .on(Linear)
+        .is("Amax, largest acceleration that a trajectory may ask for."),
+    Definition::number("limits.acceleration_rev_s2", "rev/s²", 1e-6, 1e5)
+        .on(Rotary)
+        .is("Amax, largest acceleration that a trajectory may ask for."),
+    Definition::number("limits.jerk_m_s3", "m/s³", 1e-6, 1e7)
+        .on(Linear)
+        .is("Jmax, largest jerk that a trajectory may ask for."),
+    Definition::number("limits.jerk_rev_s3", "rev/s³", 1e-6, 1e7)
+        .on(Rotary)
+        .is("Jmax, largest jerk that a trajectory may ask for."),
+    Definition::number("limits.stroke_min_mm", "mm", -1e6, 0.0)
+        .on(Linear)
+        .optional()
+        .is("Lower end of the stroke; none when left out. Home is 0."),
+    Definition::number("limits.stroke_max_mm", "mm", 0.0, 1e6)
+        .on(Linear)
+        .optional()
+        .is("Upper end of the stroke; none when left out. Home is 0."),
+    Definition::number("limits.stroke_min_deg", "°", -1e6, 0.0)
+        .on(Rotary)
+        .optional()
+        .is("Lower end of the stroke; none when left out. Home is 0."),
+    Definition::number("limits.stroke_max_deg", "°", 0.0, 1e6)
+        .on(Rotary)
+        .optional()
+        .is("Upper end of the stroke; none when left out. Home is 0."),
+    // Node.
+    Definition::new("time", "", Kind::Choice(&["real", "fast"]))
+        .of_node()
+        .default(Text("real"))
+        .is("Pace of the simulation: real time, or as fast as it goes with its own /clock."),
+    Definition::number("publish_rate", "Hz", 0.0, 1e6)
+        .of_node()
+        .default(Number(0.0))
+        .is("Rate of joint_states, at most one per position period; 0 is every position period."),
+    Definition::new("joint_prefix", "", Kind::Text)
+        .of_node()
+        .default(Text(""))
+        .is("Text before the joint names in messages."),
+    Definition::number("load_timeout", "s", 1e-3, 3600.0)
+        .of_node()
+        .default(Number(0.1))
+        .is("Time after which an external load that is not renewed is zero again."),
+    Definition::new("max_points", "", Kind::Integer { min: 1, max: 100_000_000 })
+        .of_node()
+        .default(Integer(1_000_000))
+        .is("Largest number of points of a trajectory."),
+    Definition::new("allow_nonzero_velocity_at_trajectory_end", "", Kind::Flag)
+        .of_node()
+        .default(Flag(false))
+        .live()
+        .is("Accept trajectories whose last point has a velocity."),
+    Definition::new("use_sim_time", "", Kind::Flag)
+        .of_node()
+        .default(Flag(false))
+        .is("Follow /clock."),
+];

@@ -1,0 +1,73 @@
+//! A parameter's value, with the kinds that ROS 2 parameters and YAML have.
+
+use std::fmt;
+
+use super::error::shortened;
+
+/// The value of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// `bool`.
+    Bool(bool),
+    /// `integer`.
+    Integer(i64),
+    /// `double`.
+    Double(f64),
+    /// `string`.
+    Text(String),
+    /// `bool_array`.
+    BoolList(Vec<bool>),
+    /// `integer_array`.
+    IntegerList(Vec<i64>),
+    /// `double_array`.
+    DoubleList(Vec<f64>),
+    /// `string_array`.
+    TextList(Vec<String>),
+}
+
+impl Value {
+    /// Kind and value for a message: `text "abc"`.
+    pub(super) fn described(&self) -> String {
+        match self {
+            Self::Bool(_) => format!("flag {self}"),
+            Self::Integer(_) => format!("integer {self}"),
+            Self::Double(_) => format!("number {self}"),
+            Self::Text(text) => format!("text \"{}\"", shortened(text)),
+            Self::BoolList(_) => format!("a list of flags {self}"),
+            Self::IntegerList(_) => format!("a list of integers {self}"),
+            Self::DoubleList(_) => format!("a list of numbers {self}"),
+            Self::TextList(_) => format!("a list of texts {self}"),
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bool(value) => write!(f, "{value}"),
+            Self::Integer(value) => write!(f, "{value}"),
+            Self::Double(value) => f.write_str(&number_text(*value)),
+            Self::Text(value) => f.write_str(&shortened(value)),
+            Self::BoolList(values) => list_text(f, values.iter().map(bool::to_string)),
+            Self::IntegerList(values) => list_text(f, values.iter().map(i64::to_string)),
+            Self::DoubleList(values) => list_text(f, values.iter().map(|v| number_text(*v))),
+            Self::TextList(values) => list_text(f, values.iter().cloned()),
+        }
+    }
+}
+
+fn list_text(f: &mut fmt::Formatter<'_>, items: impl Iterator<Item = String>) -> fmt::Result {
+    let items: Vec<String> = items.collect();
+    write!(f, "[{}]", shortened(&items.join(", ")))
+}
+
+/// A number as short as it can be written exactly: `0.028`, `1e-9`, `1e3`.
+pub(super) fn number_text(value: f64) -> String {
+    let plain = format!("{value}");
+    let exponent = format!("{value:e}");
+    if exponent.len() < plain.len() {
+        exponent
+    } else {
+        plain
+    }
+}
