@@ -13,14 +13,8 @@ use super::yaml::{self, Assignment, parse_assignment};
 
 /// Shipped machines: name and parameter file, the default first.
 const BUILTIN: &[(&str, &str)] = &[
-    (
-        "mikron_ucp710",
-        include_str!("../../config/mikron_ucp710.yaml"),
-    ),
-    (
-        "linear_motor_center",
-        include_str!("../../config/linear_motor_center.yaml"),
-    ),
+    ("mikron_ucp710", include_str!("../../config/mikron_ucp710.yaml")),
+    ("linear_motor_center", include_str!("../../config/linear_motor_center.yaml")),
 ];
 /// Name of the machine that runs when none is given.
 pub const DEFAULT_MACHINE: &str = "mikron_ucp710";
@@ -145,13 +139,8 @@ impl Parameters {
                 plain_definition(key).is_some_and(|definition| definition.scope == Scope::Node)
             });
         }
-        *self = Self::from_assignments(base, file.assignments, &source).map_err(|error| {
-            if report.machine_replaced {
-                explain_replacement(error)
-            } else {
-                error
-            }
-        })?;
+        *self = Self::from_assignments(base, file.assignments, &source)
+            .map_err(|error| if report.machine_replaced { explain_replacement(error) } else { error })?;
         Ok(report)
     }
 
@@ -175,11 +164,7 @@ impl Parameters {
     ///
     /// Any [`ConfigError`] but those of reading; nothing is changed then.
     pub fn set(&mut self, key: &str, value: Value, source: &Source) -> Result<(), ConfigError> {
-        self.set_all(vec![Assignment {
-            key: key.to_owned(),
-            value,
-            source: source.clone(),
-        }])
+        self.set_all(vec![Assignment { key: key.to_owned(), value, source: source.clone() }])
     }
 
     /// Sets one parameter from `KEY=VALUE` or `KEY:=VALUE`, the value by the rules of YAML.
@@ -271,8 +256,7 @@ impl Parameters {
     /// Every parameter that has a value, set or by default, in the order of
     /// [`definitions`](Self::definitions).
     pub fn iter(&self) -> impl Iterator<Item = (String, Value)> + '_ {
-        self.definitions()
-            .filter_map(|(key, _)| self.get(&key).map(|value| (key, value)))
+        self.definitions().filter_map(|(key, _)| self.get(&key).map(|value| (key, value)))
     }
 
     pub(super) fn layout(&self) -> &Layout {
@@ -297,18 +281,14 @@ fn explain_replacement(error: ConfigError) -> ConfigError {
 
 /// The text of a file of sensible size.
 fn read_text(path: &Path) -> Result<String, ConfigError> {
-    let unreadable = |reason: String| ConfigError::Unreadable {
-        path: path.to_string_lossy().into_owned(),
-        reason,
-    };
+    let unreadable =
+        |reason: String| ConfigError::Unreadable { path: path.to_string_lossy().into_owned(), reason };
     let mut bytes = Vec::new();
     File::open(path)
         .and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|error| unreadable(error.to_string()))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(unreadable(format!(
-            "it is larger than {MAX_FILE_BYTES} bytes"
-        )));
+        return Err(unreadable(format!("it is larger than {MAX_FILE_BYTES} bytes")));
     }
     String::from_utf8(bytes).map_err(|error| {
         let position = error.utf8_error().valid_up_to();

@@ -12,8 +12,7 @@ use super::value::Value;
 /// The key under which a node's parameters stand.
 const PARAMETERS_KEY: &str = "ros__parameters";
 /// How a parameter file begins, for messages.
-const BEGINNING: &str =
-    "a file begins with `/**:`, below it `ros__parameters:`, below that the keys";
+const BEGINNING: &str = "a file begins with `/**:`, below it `ros__parameters:`, below that the keys";
 
 /// One parameter to set, and where that was asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,11 +37,7 @@ pub(super) struct ParameterFile {
 
 /// Reads the parameters that `text` holds for the node `node` (fully qualified, `/ns/name`).
 /// `None` stands for no node in particular: the only section, or those for any node.
-pub(super) fn read(
-    text: &str,
-    source: &Source,
-    node: Option<&str>,
-) -> Result<ParameterFile, ConfigError> {
+pub(super) fn read(text: &str, source: &Source, node: Option<&str>) -> Result<ParameterFile, ConfigError> {
     let root = parse(text, source)?;
     let Node::Map(entries) = root.value else {
         return Err(not_a_parameter_file(
@@ -53,18 +48,11 @@ pub(super) fn read(
     let mut sections = Vec::new();
     collect_sections(entries, "", source, &mut sections)?;
     if sections.is_empty() {
-        return Err(not_a_parameter_file(
-            source,
-            format!("it is empty; {BEGINNING}"),
-        ));
+        return Err(not_a_parameter_file(source, format!("it is empty; {BEGINNING}")));
     }
 
     let only = sections.len() == 1 && node.is_none();
-    let mut file = ParameterFile {
-        assignments: Vec::new(),
-        skipped: Vec::new(),
-        matched: 0,
-    };
+    let mut file = ParameterFile { assignments: Vec::new(), skipped: Vec::new(), matched: 0 };
     for section in sections {
         if only || matches(&section.path, node.unwrap_or(ANY_NODE)) {
             file.matched += 1;
@@ -85,10 +73,7 @@ const ANY_NODE: &str = "/virtual_axes";
 ///
 /// [`ConfigError::NotAnAssignment`] and [`ConfigError::WrongKind`].
 pub fn parse_assignment(text: &str, source: &Source) -> Result<Assignment, ConfigError> {
-    let not_an_assignment = || ConfigError::NotAnAssignment {
-        at: source.clone(),
-        text: shortened(text),
-    };
+    let not_an_assignment = || ConfigError::NotAnAssignment { at: source.clone(), text: shortened(text) };
     let (key, value) = text.split_once('=').ok_or_else(not_an_assignment)?;
     let key = key.strip_suffix(':').unwrap_or(key).trim();
     if key.is_empty() {
@@ -103,11 +88,7 @@ pub fn parse_assignment(text: &str, source: &Source) -> Result<Assignment, Confi
             other => return Err(no_value(source, key, &other)),
         }
     };
-    Ok(Assignment {
-        key: key.to_owned(),
-        value,
-        source: source.clone(),
-    })
+    Ok(Assignment { key: key.to_owned(), value, source: source.clone() })
 }
 
 fn parse(text: &str, source: &Source) -> Result<Spanned<Node>, ConfigError> {
@@ -131,17 +112,12 @@ fn syntax_message(error: &serde_saphyr::Error) -> String {
         return format!("{} stands twice in one mapping", shortened(key));
     }
     let text = error.to_string();
-    let message = text
-        .rsplit_once(" at line ")
-        .map_or(text.as_str(), |(message, _)| message);
+    let message = text.rsplit_once(" at line ").map_or(text.as_str(), |(message, _)| message);
     format!("not YAML: {}", shortened(message))
 }
 
 fn not_a_parameter_file(at: &Source, reason: String) -> ConfigError {
-    ConfigError::NotAParameterFile {
-        at: at.clone(),
-        reason,
-    }
+    ConfigError::NotAParameterFile { at: at.clone(), reason }
 }
 
 fn no_value(at: &Source, key: &str, found: &Node) -> ConfigError {
@@ -282,10 +258,7 @@ impl Section {
             Node::Null => Ok(()),
             other => Err(not_a_parameter_file(
                 &source.at_line(self.line),
-                format!(
-                    "`{PARAMETERS_KEY}` holds {}, not a mapping",
-                    other.described()
-                ),
+                format!("`{PARAMETERS_KEY}` holds {}, not a mapping", other.described()),
             )),
         }
     }
@@ -301,11 +274,7 @@ fn flatten(
     for (name, node) in entries {
         let line = name.referenced.line();
         let at = source.at_line(line);
-        let key = if prefix.is_empty() {
-            name.value
-        } else {
-            format!("{prefix}.{}", name.value)
-        };
+        let key = if prefix.is_empty() { name.value } else { format!("{prefix}.{}", name.value) };
         match node.value {
             Node::Map(entries) => flatten(entries, &key, source, lines, out)?,
             Node::Scalar(value) => {
@@ -316,11 +285,7 @@ fn flatten(
                         first: source.at_line(first),
                     });
                 }
-                out.push(Assignment {
-                    key,
-                    value,
-                    source: at,
-                });
+                out.push(Assignment { key, value, source: at });
             }
             other => return Err(no_value(&at, &key, &other)),
         }
@@ -343,21 +308,14 @@ fn collect_sections(
                     format!("`{PARAMETERS_KEY}` stands below no node; {BEGINNING}"),
                 ));
             }
-            out.push(Section {
-                path: namespace.to_owned(),
-                line,
-                parameters: node,
-            });
+            out.push(Section { path: namespace.to_owned(), line, parameters: node });
             continue;
         }
         let Node::Map(entries) = node.value else {
             return Err(not_a_parameter_file(
                 &source.at_line(line),
                 match namespace {
-                    "" => format!(
-                        "no `{PARAMETERS_KEY}` below `{}`; {BEGINNING}",
-                        shortened(&name.value)
-                    ),
+                    "" => format!("no `{PARAMETERS_KEY}` below `{}`; {BEGINNING}", shortened(&name.value)),
                     _ => format!(
                         "`{}` stands below `{}`, not below `{PARAMETERS_KEY}`; {BEGINNING}",
                         shortened(&name.value),
@@ -375,10 +333,7 @@ fn collect_sections(
 /// Whether `pattern` names `node` by the rules of ROS 2: `*` is one name, `**` any number of them.
 fn matches(pattern: &str, node: &str) -> bool {
     let parts = |text: &'_ str| -> Vec<String> {
-        text.split('/')
-            .filter(|part| !part.is_empty())
-            .map(str::to_owned)
-            .collect()
+        text.split('/').filter(|part| !part.is_empty()).map(str::to_owned).collect()
     };
     let names = parts(node);
     // reached[i]: the pattern so far can have used up the first i names.

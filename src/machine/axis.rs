@@ -25,6 +25,11 @@ pub struct AxisParameters {
 }
 
 impl AxisParameters {
+    /// The longest of α, β and γ, ticks.
+    pub fn longest_delay(&self) -> u64 {
+        self.delays.longest()
+    }
+
     /// Discretises an axis.
     ///
     /// # Errors
@@ -159,19 +164,15 @@ impl Axis {
         s.current = self.motor.current;
         s.friction_current = self.torques.friction / p.torque_constant;
         s.gravity_current = self.torques.gravity / p.torque_constant;
-        s.load_current = self.torques.load / p.torque_constant;
+        s.load_current = -self.torques.load / p.torque_constant;
         s.effort = p.torque_constant * self.motor.current / p.ratio;
         s.saturated = self.speed_limited || self.velocity_pi.limited || self.current_pi.limited;
+        s.controller = p.position.name();
         s.friction_extrapolated = p.plant.friction_is_extrapolated(&self.motor);
     }
 
     /// The signals of the tick that the controllers have last acted on.
     pub fn sample(&self) -> &AxisSample {
         &self.sample
-    }
-
-    /// Name of the position controller that is active.
-    pub fn controller(p: &AxisParameters) -> &'static str {
-        p.position.name()
     }
 }

@@ -66,7 +66,7 @@ impl MachineParameters {
 /// ```
 /// use virtual_axes::{config::Parameters, machine::{Machine, MachineParameters}};
 ///
-/// let config = Parameters::embedded_default().machine_config()?;
+/// let config = Parameters::embedded_default()?.machine_config()?;
 /// let mut machine = Machine::new(MachineParameters::new(&config)?.into());
 /// // 1 mm in X, then a second of standstill: the axis arrives, but for what friction holds.
 /// for _ in 0..167 {
@@ -148,6 +148,11 @@ impl Machine {
     /// Sampling periods.
     pub fn periods(&self) -> Periods {
         self.parameters.periods
+    }
+
+    /// The longest delay of a set-point on any axis, ticks.
+    pub fn longest_delay(&self) -> u64 {
+        self.parameters.axes.iter().map(AxisParameters::longest_delay).max().unwrap_or(0)
     }
 
     /// External force or torque on one axis (N or N·m, positive towards plus) from the next tick on.

@@ -29,10 +29,13 @@ pub struct AxisSample {
     pub friction_current: f64,
     /// Gravity over the tick before, as motor current, A.
     pub gravity_current: f64,
-    /// Load over the tick before, as motor current, A.
+    /// What the load over the tick before asks of the motor, A: like friction and gravity positive
+    /// when it opposes motion towards plus.
     pub load_current: f64,
     /// What the motor exerts at the axis, `Kt i / r`, N or N·m.
     pub effort: f64,
+    /// Name of the position controller that is active.
+    pub controller: &'static str,
     /// Whether speed, current or voltage set-point is at its limit.
     pub saturated: bool,
     /// Whether the friction law is used beyond the range that it was fitted for.

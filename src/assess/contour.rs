@@ -1,0 +1,105 @@
+//! Distance from the simulated point to the path of its set-points.
+
+/// Set-points that are remembered: how far the axes may lag behind before the oldest is forgotten.
+const CAPACITY: usize = 512;
+/// Segments looked at behind the nearest one so far, for a point that swings back.
+const LOOK_BACK: u64 = 8;
+
+/// Contour error along a path that becomes known set-point by set-point.
+///
+/// The path is the polyline through the set-points of the linear axes. The nearest point is sought
+/// from a few segments behind the last nearest one up to the newest set-point, so that a path that
+/// crosses itself is followed in order.
+#[derive(Debug, Clone)]
+pub struct ContourTracker {
+    dimension: usize,
+    /// Ring of points, `dimension` numbers each.
+    ring: Box<[f64]>,
+    count: u64,
+    nearest: u64,
+}
+
+impl ContourTracker {
+    /// A tracker for `dimension` linear axes.
+    pub fn new(dimension: usize) -> Self {
+        ContourTracker {
+            dimension,
+            ring: vec![0.0; dimension * CAPACITY].into_boxed_slice(),
+            count: 0,
+            nearest: 0,
+        }
+    }
+
+    /// Adds a set-point, m per axis.
+    pub fn push(&mut self, point: impl Iterator<Item = f64>) {
+        let start = (self.count % CAPACITY as u64) as usize * self.dimension;
+        for (place, value) in self.ring[start..start + self.dimension].iter_mut().zip(point) {
+            *place = value;
+        }
+        self.count += 1;
+    }
+
+    fn point(&self, k: u64) -> &[f64] {
+        let start = (k % CAPACITY as u64) as usize * self.dimension;
+        &self.ring[start..start + self.dimension]
+    }
+
+    /// Distance of `position` from the path, m; zero before the first set-point.
+    pub fn distance(&mut self, position: &[f64]) -> f64 {
+        if self.count == 0 {
+            return 0.0;
+        }
+        let oldest = self.count.saturating_sub(CAPACITY as u64);
+        let from = self.nearest.saturating_sub(LOOK_BACK).max(oldest);
+        let mut best = square_distance_to_segment(position, self.point(from), self.point(from));
+        self.nearest = from;
+        for k in from..self.count - 1 {
+            let d = square_distance_to_segment(position, self.point(k), self.point(k + 1));
+            if d < best {
+                best = d;
+                self.nearest = k;
+            }
+        }
+        best.sqrt()
+    }
+}
+
+/// Squared distance of `p` from the segment between `a` and `b`.
+fn square_distance_to_segment(p: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    let (mut along, mut length) = (0.0, 0.0);
+    for ((p, a), b) in p.iter().zip(a).zip(b) {
+        along += (p - a) * (b - a);
+        length += (b - a) * (b - a);
+    }
+    let t = if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 };
+    p.iter().zip(a).zip(b).map(|((p, a), b)| (p - a - t * (b - a)).powi(2)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_corner_is_measured_from_the_nearer_leg() {
+        let mut contour = ContourTracker::new(2);
+        for k in 0..=10 {
+            contour.push([f64::from(k) * 0.1, 0.0].into_iter());
+        }
+        for k in 1..=10 {
+            contour.push([1.0, f64::from(k) * 0.1].into_iter());
+        }
+        assert!((contour.distance(&[0.5, 0.02]) - 0.02).abs() < 1e-15);
+        // 0.3 from the first leg, 0.1 from the second.
+        assert!((contour.distance(&[0.9, 0.3]) - 0.1).abs() < 1e-15);
+        assert!((contour.distance(&[1.0, 1.25]) - 0.25).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_lag_longer_than_the_memory_is_measured_from_the_oldest_point() {
+        let mut contour = ContourTracker::new(1);
+        for k in 0..=CAPACITY {
+            contour.push([k as f64].into_iter());
+        }
+        assert_eq!(contour.distance(&[0.0]), 1.0);
+    }
+}
