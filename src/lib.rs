@@ -10,4 +10,5 @@
 #![warn(missing_docs)]
 
 pub mod config;
+pub mod trajectory;
 pub mod units;
