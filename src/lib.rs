@@ -1,10 +1,11 @@
 //! Virtual machine-tool axes.
 //!
 //! The library knows physics, controllers and trajectories, and no ROS; the node is a thin shell
-//! around [`machine::Machine`] in the room `ros` (cargo feature `ros`).
+//! around [`simulation::Simulation`] in the room `ros` (cargo feature `ros`).
 //!
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
-//! [`units`], [`config`] → [`drive`] → [`control`] → [`machine`] → [`trajectory`] → [`assess`] → `ros`.
+//! [`units`], [`config`] → [`drive`] → [`control`] → [`machine`] → [`trajectory`] → [`assess`] →
+//! [`simulation`] → `ros`.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -14,4 +15,6 @@ pub mod config;
 pub mod control;
 pub mod drive;
 pub mod machine;
+pub mod simulation;
+pub mod trajectory;
 pub mod units;

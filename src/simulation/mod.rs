@@ -1,0 +1,249 @@
+//! The machine under way: trajectories in, samples and figures out, one position period at a time.
+//!
+//! The node and the offline command run the same [`Simulation`]; the node paces it and computes
+//! nothing that the offline run does not.
+
+mod load;
+mod motion;
+
+pub use motion::{MotionEnd, Outcome};
+
+use std::sync::Arc;
+
+use crate::config::{AxisKind, MachineConfig, Periods};
+use crate::machine::{AxisSample, Machine, MachineError, MachineParameters};
+use crate::trajectory::{
+    Admission, Event, JointLimits, MotionId, Rejection, Timeline, TimelineError, Trajectory,
+};
+use crate::units::{Nanoseconds, SECOND_NS, seconds};
+
+use load::Loads;
+use motion::Motions;
+
+/// How long after the last motion the axes count as settling.
+const SETTLING: Nanoseconds = SECOND_NS;
+
+/// Why there is no simulation of a machine.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// An axis cannot be discretised.
+    #[error(transparent)]
+    Machine(#[from] MachineError),
+    /// Number of joints or position period out of range.
+    #[error(transparent)]
+    Timeline(#[from] TimelineError),
+}
+
+/// A machine with the trajectories that it has been given.
+///
+/// Position instant k is at `origin + k·Tsp`; the first is k = 0. Until the first trajectory starts or
+/// the first load acts, the machine stands still at its start position, exactly: what a trajectory
+/// does afterwards does not depend on how long it was waited for.
+#[derive(Debug)]
+pub struct Simulation {
+    machine: Machine,
+    timeline: Timeline,
+    origin: Nanoseconds,
+    period: Nanoseconds,
+    /// The position instant that the next step computes.
+    next: i64,
+    /// Whether anything has moved the machine since it was last put at rest.
+    awake: bool,
+    loads: Loads,
+    motions: Motions,
+    /// The instant after which nothing is settling any more.
+    settled_from: i64,
+    samples: Vec<AxisSample>,
+    /// Whether an axis was at a limit at any tick since the last sample.
+    saturated: Vec<bool>,
+    ends: Vec<MotionEnd>,
+}
+
+impl Simulation {
+    /// The machine of `config` at rest at home, its first position instant at `origin` (ns), for
+    /// trajectories checked against `joints` (see [`joints`]).
+    ///
+    /// # Errors
+    /// [`SimulationError`] if an axis cannot be discretised or there are too many joints.
+    pub fn new(
+        config: &MachineConfig,
+        joints: Vec<JointLimits>,
+        origin: Nanoseconds,
+    ) -> Result<Self, SimulationError> {
+        let parameters = Arc::new(MachineParameters::new(config)?);
+        let machine = Machine::new(parameters);
+        let axes = config.axes();
+        let kinds: Vec<AxisKind> = axes.iter().map(|a| a.kind()).collect();
+        let home = vec![0.0; axes.len()];
+        let samples = machine.axes().iter().map(|a| *a.sample()).collect();
+        let Periods { position: period, current: tick, .. } = config.periods();
+        Ok(Simulation {
+            timeline: Timeline::new(joints, period, &home)?,
+            loads: Loads::new(axes.len()),
+            motions: Motions::new(kinds, seconds(tick)),
+            saturated: vec![false; axes.len()],
+            machine,
+            origin,
+            period,
+            next: 0,
+            awake: false,
+            settled_from: 0,
+            samples,
+            ends: Vec::new(),
+        })
+    }
+
+    /// Time of position instant k, ns.
+    pub fn time_of(&self, k: i64) -> Nanoseconds {
+        self.origin + k * self.period
+    }
+
+    /// The position instant that the next [`step`](Self::step) computes.
+    pub fn next_instant(&self) -> i64 {
+        self.next
+    }
+
+    /// Tsp, ns.
+    pub fn period(&self) -> Nanoseconds {
+        self.period
+    }
+
+    /// The machine.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Gives the axes a trajectory; it takes effect at its start.
+    ///
+    /// # Errors
+    /// [`Rejection`] if it cannot follow what is commanded at its start; nothing changes then.
+    pub fn offer(&mut self, id: MotionId, trajectory: Arc<Trajectory>) -> Result<Admission, Rejection> {
+        let places = trajectory.joints().to_vec();
+        let admission = self.timeline.offer(id, trajectory, self.origin)?;
+        self.motions.accept(id, &places);
+        Ok(admission)
+    }
+
+    /// External force or torque on an axis (N or N·m, positive towards plus) from the next position
+    /// instant on, for `hold` ns.
+    pub fn set_load(&mut self, axis: usize, load: f64, hold: Nanoseconds) {
+        let until = self.next + hold.max(0).div_euclid(self.period).max(1);
+        self.loads.set(axis, load, until);
+    }
+
+    /// Takes over changed gains, weights or delays at the next position instant.
+    ///
+    /// # Errors
+    /// [`MachineError::AnotherMachine`] if joints or periods differ; nothing changes then.
+    pub fn adopt(&mut self, parameters: Arc<MachineParameters>) -> Result<(), MachineError> {
+        self.machine.adopt(parameters)
+    }
+
+    /// Puts the machine back to rest at home; motions under way end as aborted.
+    pub fn reset(&mut self) {
+        let home = vec![0.0; self.machine.axis_count()];
+        self.machine.reset(&home);
+        // Home is finite and has one value per joint: this cannot be refused.
+        let _ = self.timeline.reset(&home);
+        self.loads.clear();
+        self.motions.abort_all(self.time_of(self.next), &mut self.ends);
+        self.saturated.fill(false);
+        self.awake = false;
+        self.settled_from = self.next;
+        self.take_samples();
+    }
+
+    /// Computes the next position instant: its samples, and the ticks up to the one after.
+    pub fn step(&mut self) {
+        let k = self.next;
+        self.timeline.next();
+        self.follow_timeline_events(k);
+        self.awake |= self.motions.any_running() || self.loads.any();
+        if self.awake {
+            self.loads.apply(&mut self.machine, k);
+            self.run_ticks();
+        }
+        self.motions.finish(k, self.origin + k * self.period, &mut self.ends);
+        if self.is_asked() {
+            self.settled_from = k + 1 + SETTLING / self.period;
+        }
+        self.next = k + 1;
+    }
+
+    fn follow_timeline_events(&mut self, k: i64) {
+        let now = self.time_of(k);
+        let delay = self.longest_delay();
+        for event in self.timeline.events() {
+            match *event {
+                Event::Started(id) => self.motions.start(id),
+                Event::Ended(id) => self.motions.finish_at(id, k + delay),
+                Event::Displaced { id, by, .. } => {
+                    self.motions.end(id, Outcome::Displaced { by }, now, &mut self.ends);
+                }
+                Event::Stopped { id, .. } => {
+                    self.motions.end(id, Outcome::Stopped, now, &mut self.ends);
+                }
+            }
+        }
+    }
+
+    /// Position periods until the last set-point has passed every delay.
+    fn longest_delay(&self) -> i64 {
+        let tick = self.machine.periods().current;
+        let delay = self.machine.longest_delay() as Nanoseconds * tick;
+        delay.unsigned_abs().div_ceil(self.period.unsigned_abs()) as i64
+    }
+
+    fn run_ticks(&mut self) {
+        let Simulation { machine, timeline, motions, samples, saturated, .. } = self;
+        let mut position_instant = true;
+        machine.advance_with(timeline.psec(), |m| {
+            for ((axis, sample), saturated) in m.axes().iter().zip(samples.iter_mut()).zip(&mut *saturated) {
+                *saturated |= axis.sample().saturated;
+                if position_instant {
+                    *sample = AxisSample { saturated: *saturated, ..*axis.sample() };
+                    *saturated = false;
+                }
+            }
+            motions.observe(m, position_instant);
+            position_instant = false;
+        });
+    }
+
+    fn take_samples(&mut self) {
+        for (sample, axis) in self.samples.iter_mut().zip(self.machine.axes()) {
+            *sample = *axis.sample();
+        }
+    }
+
+    /// Signals of every axis at the position instant that was computed last.
+    pub fn samples(&self) -> &[AxisSample] {
+        &self.samples
+    }
+
+    /// Motions that have ended since the last call.
+    pub fn take_ends(&mut self) -> impl Iterator<Item = MotionEnd> + '_ {
+        self.ends.drain(..)
+    }
+
+    /// Whether a trajectory waits, runs or has just ended, or a load acts.
+    fn is_asked(&self) -> bool {
+        self.motions.any() || self.timeline.is_moving() || self.timeline.is_waiting() || self.loads.any()
+    }
+
+    /// Whether something is asked of the axes, or they still settle.
+    pub fn is_busy(&self) -> bool {
+        self.is_asked() || self.next < self.settled_from
+    }
+
+    /// Whether the set-points move.
+    pub fn is_moving(&self) -> bool {
+        self.timeline.is_moving()
+    }
+}
+
+/// The joints of a machine as trajectories name and limit them, `prefix` before each name.
+pub fn joints(config: &MachineConfig, prefix: &str) -> Vec<JointLimits> {
+    let with_prefix = |joint: JointLimits| JointLimits { name: format!("{prefix}{}", joint.name), ..joint };
+    config.axes().iter().map(|axis| with_prefix(JointLimits::of_axis(axis))).collect()
+}

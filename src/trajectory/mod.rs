@@ -1,0 +1,29 @@
+//! Trajectories: from requested points to one position set-point (PSEC) per period and joint.
+//!
+//! A [`Request`] holds what was asked for. [`Trajectory::new`] checks it against the machine, on
+//! the side of whoever asks: that is where the work is. The [`Timeline`] belongs to the thread that
+//! moves the machine; it takes checked trajectories, looks at the junction with what is being
+//! commanded only, and hands out set-points, one position instant after another.
+
+pub mod event;
+pub mod limits;
+pub mod path;
+pub mod rejection;
+pub mod request;
+pub mod spline;
+pub mod stop;
+pub mod timeline;
+
+mod check;
+mod motions;
+mod offer;
+mod plan;
+
+pub use event::{Event, JointSet, MotionId};
+pub use limits::JointLimits;
+pub use offer::Admission;
+pub use path::{Context, Trajectory};
+pub use rejection::{Code, Rejection};
+pub use request::{Request, Row, Start};
+pub use spline::State;
+pub use timeline::{Timeline, TimelineError};

@@ -1,0 +1,93 @@
+//! Why a trajectory was refused, with the numbers.
+
+use std::fmt;
+
+/// Reason of a refusal; the numbers are those of the message `TrajectoryResult` and never change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Code {
+    /// A joint that the machine does not have.
+    UnknownJoint = 1,
+    /// A joint that is named twice.
+    DuplicateJoint = 2,
+    /// An array with the wrong number of values.
+    WrongSize = 3,
+    /// A point that is not later than the one before it.
+    TimesNotIncreasing = 4,
+    /// A first point before the start of its own trajectory.
+    NegativeTime = 5,
+    /// NaN or infinity.
+    NotFinite = 6,
+    /// A position beyond the stroke.
+    OutsideStroke = 7,
+    /// A first set-point further from the present one than the axis moves in one period.
+    Jump = 8,
+    /// A speed beyond that of the axis.
+    Speed = 9,
+    /// A trajectory whose last instant is over.
+    EndedInThePast = 10,
+    /// More points than allowed.
+    TooManyPoints = 11,
+    /// A last point that asks for a velocity, which is not allowed by default.
+    VelocityAtEnd = 12,
+    /// A time that cannot be counted in 64-bit nanoseconds.
+    InvalidTime = 13,
+    /// Too many trajectories wait for the same joint.
+    QueueFull = 14,
+}
+
+/// A refused trajectory: what broke which limit, where.
+///
+/// [`fmt::Display`] prints `text`, which names joint, point, value and limit with their units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rejection {
+    /// Reason.
+    pub code: Code,
+    /// Joint concerned, if it is one.
+    pub joint: Option<String>,
+    /// Index of the point concerned, if it is one.
+    pub index: Option<usize>,
+    /// What was found, in the unit that `text` names; 0 where there is no number.
+    pub value: f64,
+    /// The limit that `value` broke, same unit; 0 where there is no number.
+    pub limit: f64,
+    /// One sentence for a person.
+    pub text: String,
+}
+
+impl Rejection {
+    /// A refusal with `code` and the sentence `text`; the rest is filled in by the methods below.
+    pub fn new(code: Code, text: impl Into<String>) -> Self {
+        Self { code, joint: None, index: None, value: 0.0, limit: 0.0, text: text.into() }
+    }
+
+    /// Names the joint.
+    #[must_use]
+    pub fn joint(mut self, name: &str) -> Self {
+        self.joint = Some(name.to_owned());
+        self
+    }
+
+    /// Names the point.
+    #[must_use]
+    pub fn index(mut self, index: usize) -> Self {
+        self.index = Some(index);
+        self
+    }
+
+    /// Gives what was found and what is allowed.
+    #[must_use]
+    pub fn numbers(mut self, value: f64, limit: f64) -> Self {
+        self.value = value;
+        self.limit = limit;
+        self
+    }
+}
+
+impl fmt::Display for Rejection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl std::error::Error for Rejection {}

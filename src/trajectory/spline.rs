@@ -1,0 +1,160 @@
+//! One segment of one joint: a polynomial of degree 1, 3 or 5 between two points.
+
+use crate::units::{Nanoseconds, seconds};
+
+/// Degree of a segment, which is also the highest derivative that a point has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Order {
+    /// Positions only: constant velocity.
+    Linear,
+    /// Positions and velocities.
+    Cubic,
+    /// Positions, velocities and accelerations.
+    Quintic,
+}
+
+/// Position, velocity and acceleration of a joint at one instant.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct State {
+    /// m or rad.
+    pub position: f64,
+    /// m/s or rad/s.
+    pub velocity: f64,
+    /// m/s² or rad/s².
+    pub acceleration: f64,
+}
+
+impl State {
+    /// At rest at `position`, m or rad.
+    pub fn rest(position: f64) -> Self {
+        Self { position, ..Self::default() }
+    }
+}
+
+/// A polynomial between two states that are `duration` apart, in normalised time s = t/h ∈ \[0, 1]:
+///
+/// `p(s) = p0 + c1 s + c2 s² + c3 s³ + c4 s⁴ + c5 s⁵`
+///
+/// Normalised because a segment of a nanosecond and one of an hour are then equally well
+/// conditioned. The ends are returned bit for bit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    start: State,
+    end: State,
+    duration: Nanoseconds,
+    order: Order,
+}
+
+impl Segment {
+    /// The segment from `start` to `end`, `duration` > 0 ns later.
+    pub fn new(start: State, end: State, duration: Nanoseconds, order: Order) -> Self {
+        debug_assert!(duration > 0, "a segment lasts");
+        Self { start, end, duration, order }
+    }
+
+    /// Degree.
+    pub fn order(&self) -> Order {
+        self.order
+    }
+
+    /// c1…c5, with Δ = p1 − p0, m = v h, q = a h².
+    fn coefficients(&self, h: f64) -> [f64; 5] {
+        let (start, end) = (&self.start, &self.end);
+        let delta = end.position - start.position;
+        let (m0, m1) = (start.velocity * h, end.velocity * h);
+        match self.order {
+            Order::Linear => [delta, 0.0, 0.0, 0.0, 0.0],
+            Order::Cubic => [m0, 3.0 * delta - 2.0 * m0 - m1, m0 + m1 - 2.0 * delta, 0.0, 0.0],
+            Order::Quintic => {
+                let (q0, q1) = (start.acceleration * h * h, end.acceleration * h * h);
+                [
+                    m0,
+                    0.5 * q0,
+                    10.0 * delta - 6.0 * m0 - 4.0 * m1 - 1.5 * q0 + 0.5 * q1,
+                    -15.0 * delta + 8.0 * m0 + 7.0 * m1 + 1.5 * q0 - q1,
+                    6.0 * delta - 3.0 * (m0 + m1) + 0.5 * (q1 - q0),
+                ]
+            }
+        }
+    }
+
+    /// Position `elapsed` ns after the start, m or rad; the ends' own beyond them.
+    pub fn position(&self, elapsed: Nanoseconds) -> f64 {
+        if elapsed <= 0 {
+            return self.start.position;
+        }
+        if elapsed >= self.duration {
+            return self.end.position;
+        }
+        let [c1, c2, c3, c4, c5] = self.coefficients(seconds(self.duration));
+        let s = elapsed as f64 / self.duration as f64;
+        self.start.position + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+    }
+
+    /// State `elapsed` ns after the start, clamped to the segment. The derivatives are those of
+    /// the polynomial, so a linear segment has no acceleration.
+    pub fn state(&self, elapsed: Nanoseconds) -> State {
+        let h = seconds(self.duration);
+        let [c1, c2, c3, c4, c5] = self.coefficients(h);
+        let s = elapsed.clamp(0, self.duration) as f64 / self.duration as f64;
+        let dp = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)));
+        let ddp = 2.0 * c2 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5));
+        State { position: self.position(elapsed), velocity: dp / h, acceleration: ddp / (h * h) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::SECOND_NS;
+
+    fn assert_close(a: f64, b: f64, tolerance: f64) {
+        assert!((a - b).abs() <= tolerance, "{a} is not {b}");
+    }
+
+    #[test]
+    fn rest_to_rest_quintic_is_10t3_15t4_6t5() {
+        let segment = Segment::new(State::rest(0.0), State::rest(1.0), SECOND_NS, Order::Quintic);
+        for ms in 0..=1000 {
+            let t = f64::from(ms) * 1e-3;
+            let state = segment.state(i64::from(ms) * 1_000_000);
+            assert_close(state.position, t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t), 1e-15);
+            assert_close(state.velocity, 30.0 * t * t * (1.0 - t).powi(2), 1e-14);
+            assert_close(state.acceleration, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t), 1e-13);
+        }
+    }
+
+    #[test]
+    fn a_cubic_and_a_quintic_reproduce_the_polynomial_they_were_cut_from() {
+        // p = 0.3 − 0.2 t + 0.7 t² − 0.4 t³ on [0, 0.75] s, sampled off its own knots.
+        let exact = |t: f64| State {
+            position: 0.3 + t * (-0.2 + t * (0.7 - t * 0.4)),
+            velocity: -0.2 + t * (1.4 - t * 1.2),
+            acceleration: 1.4 - t * 2.4,
+        };
+        for order in [Order::Cubic, Order::Quintic] {
+            let segment = Segment::new(exact(0.0), exact(0.75), 750_000_000, order);
+            for ns in (0..=750_000_000).step_by(1_234_567) {
+                let (found, wanted) = (segment.state(ns), exact(seconds(ns)));
+                assert_close(found.position, wanted.position, 1e-15);
+                assert_close(found.velocity, wanted.velocity, 1e-14);
+                assert_close(found.acceleration, wanted.acceleration, 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn a_linear_segment_has_velocity_and_no_acceleration() {
+        let segment = Segment::new(State::rest(1.0), State::rest(-1.0), 4 * SECOND_NS, Order::Linear);
+        assert_eq!(segment.state(SECOND_NS), State { position: 0.5, velocity: -0.5, acceleration: 0.0 });
+    }
+
+    #[test]
+    fn both_ends_are_bit_for_bit_even_where_the_polynomial_overflows() {
+        let wild = State { position: 0.1, velocity: f64::MAX, acceleration: f64::MAX };
+        let segment = Segment::new(wild, State::rest(0.3), i64::MAX, Order::Quintic);
+        assert_eq!(segment.position(0), 0.1);
+        assert_eq!(segment.position(i64::MAX), 0.3);
+        assert_eq!(segment.state(i64::MAX).position, 0.3);
+    }
+}

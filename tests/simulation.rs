@@ -1,0 +1,160 @@
+//! Trajectories through the whole simulation: who moves what, when, and the same bits every time.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{Ballbar, assert_near, parameters};
+use virtual_axes::simulation::{MotionEnd, Outcome, Simulation, joints};
+use virtual_axes::trajectory::{Context, JointLimits, MotionId, Request, Row, Start, Trajectory};
+use virtual_axes::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS};
+
+const TSP: Nanoseconds = 6 * MILLISECOND_NS;
+const X: usize = 0;
+const NONE: &[(&str, f64)] = &[];
+
+struct Bench {
+    simulation: Simulation,
+    joints: Vec<JointLimits>,
+    origin: Nanoseconds,
+}
+
+impl Bench {
+    fn new(origin: Nanoseconds) -> Self {
+        let config = parameters(NONE).machine_config().expect("valid");
+        let joints = joints(&config, "");
+        let simulation = Simulation::new(&config, joints.clone(), origin).expect("can be simulated");
+        Bench { simulation, joints, origin }
+    }
+
+    fn trajectory(&self, start: Start, names: &[&str], points: &[(Nanoseconds, &[f64])]) -> Arc<Trajectory> {
+        let mut request = Request::new(start, names.iter().map(|n| n.to_string()).collect());
+        for &(time, positions) in points {
+            request.push(time, Row { positions, ..Row::default() }).expect("well formed");
+        }
+        let context = Context {
+            joints: &self.joints,
+            period: TSP,
+            max_points: 100_000,
+            allow_nonzero_end_velocity: false,
+        };
+        Arc::new(Trajectory::new(request, &context).expect("within limits"))
+    }
+
+    fn ballbar(&self, start: Start) -> Arc<Trajectory> {
+        let trial = Ballbar::paper();
+        let last = (trial.duration() * 1e9 / TSP as f64).ceil() as i64;
+        let points: Vec<_> = (0..=last)
+            .map(|k| {
+                let p = trial.psec(k as f64 * 0.006);
+                (k * TSP, [p[0], p[1]])
+            })
+            .collect();
+        let points: Vec<(i64, &[f64])> = points.iter().map(|(t, p)| (*t, &p[..])).collect();
+        self.trajectory(start, &["x", "y"], &points)
+    }
+
+    /// Steps until nothing is asked; every axis's signals at each instant, and how motions ended.
+    fn run(&mut self) -> (Vec<Vec<u64>>, Vec<MotionEnd>) {
+        let (mut rows, mut ends) = (Vec::new(), Vec::new());
+        while self.simulation.is_busy() {
+            self.simulation.step();
+            let bits = |s: &virtual_axes::machine::AxisSample| {
+                [s.psec, s.position, s.velocity, s.current, s.voltage].map(f64::to_bits)
+            };
+            rows.push(self.simulation.samples().iter().flat_map(bits).collect());
+            ends.extend(self.simulation.take_ends());
+            assert!(rows.len() < 100_000, "it never settles");
+        }
+        (rows, ends)
+    }
+}
+
+#[test]
+fn waiting_before_a_trajectory_changes_no_bit_of_it() {
+    let mut at_once = Bench::new(0);
+    at_once.simulation.offer(MotionId(1), at_once.ballbar(Start::Now)).expect("accepted");
+    let (rows, ends) = at_once.run();
+    assert_eq!(ends.len(), 1);
+
+    let mut later = Bench::new(1_700_000_000 * SECOND_NS);
+    for _ in 0..777 {
+        later.simulation.step();
+    }
+    later.simulation.offer(MotionId(1), later.ballbar(Start::Now)).expect("accepted");
+    assert_eq!(later.run().0, rows);
+
+    later.simulation.reset();
+    for _ in 0..5 {
+        later.simulation.step();
+    }
+    let start = Start::At(later.origin + 4000 * TSP - 1);
+    later.simulation.offer(MotionId(2), later.ballbar(start)).expect("accepted");
+    let (waited, _) = later.run();
+    let wait = waited.len() - rows.len();
+    assert_eq!(wait, 4000 - (777 + rows.len() + 5), "it starts at the instant after its stamp");
+    assert_eq!(waited[wait..], rows[..]);
+}
+
+#[test]
+fn the_report_of_the_ballbar_has_the_reference_numbers() {
+    let mut bench = Bench::new(0);
+    bench.simulation.offer(MotionId(1), bench.ballbar(Start::Now)).expect("accepted");
+    let (_, ends) = bench.run();
+    let end = &ends[0];
+    assert_eq!((end.outcome, end.places.as_slice()), (Outcome::Completed, &[0, 1][..]));
+    let x = end.report.axes[0];
+    // Three millimetres at 15 m/min: the pure delay of two position periods.
+    assert_near("X tracking error, m", x.max_tracking_error, 0.003, 0.0002);
+    assert!(x.saturation_time == 0.0 && x.peak_current > 2.0);
+    // 49 µm outside the circle in steady motion, against the polyline through its points.
+    let contour = end.report.max_contour_error.expect("there are linear axes");
+    assert!((50e-6..90e-6).contains(&contour), "contour error {contour}");
+}
+
+#[test]
+fn a_trajectory_of_one_joint_leaves_the_others_to_theirs() {
+    let mut bench = Bench::new(0);
+    let slow = bench.trajectory(Start::Now, &["x", "y"], &[(0, &[0.0, 0.0]), (SECOND_NS, &[0.05, 0.05])]);
+    let y = bench.trajectory(Start::At(SECOND_NS / 2), &["y"], &[(SECOND_NS, &[0.0])]);
+    bench.simulation.offer(MotionId(1), slow).expect("accepted");
+    bench.simulation.offer(MotionId(2), y).expect("accepted");
+    let (_, ends) = bench.run();
+    let outcomes: Vec<_> = ends.iter().map(|e| (e.id, e.outcome)).collect();
+    assert_eq!(
+        outcomes,
+        [(MotionId(1), Outcome::Displaced { by: MotionId(2) }), (MotionId(2), Outcome::Completed)]
+    );
+    let samples = bench.simulation.samples();
+    assert_near("x", samples[0].position, 0.05, 2e-6);
+    assert_near("y", samples[1].position, 0.0, 2e-6);
+}
+
+#[test]
+fn a_load_acts_for_its_time_and_then_is_gone() {
+    let mut bench = Bench::new(0);
+    bench.simulation.set_load(X, -800.0, SECOND_NS / 10);
+    let mut loaded = 0;
+    for _ in 0..100 {
+        bench.simulation.step();
+        loaded += usize::from(bench.simulation.machine().axis(X).sample().load_current > 0.0);
+    }
+    // 0.1 s are 16 whole position periods.
+    assert_eq!(loaded, 16);
+    assert_near("x is back", bench.simulation.samples()[X].position, 0.0, 2e-6);
+}
+
+#[test]
+fn a_reset_aborts_what_moves_and_forgets_it() {
+    let mut bench = Bench::new(0);
+    bench.simulation.offer(MotionId(1), bench.ballbar(Start::Now)).expect("accepted");
+    for _ in 0..300 {
+        bench.simulation.step();
+    }
+    bench.simulation.reset();
+    let ends: Vec<_> = bench.simulation.take_ends().collect();
+    assert_eq!((ends.len(), ends[0].outcome), (1, Outcome::Aborted));
+    bench.simulation.step();
+    assert_eq!(bench.simulation.samples()[X].position, 0.0);
+    assert!(!bench.simulation.is_moving());
+}
