@@ -1,0 +1,133 @@
+"""The ballbar of the paper's figure 10, driven over ROS 2: with and without feedforward.
+
+    ./demo.sh [--fast] [--out FILE.png]
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from drive import Ballbar, Drive, Node, Recording, ballbar, circular_deviation, joint_trajectory
+from matplotlib.ticker import FuncFormatter
+
+AXES = ("x", "y")
+FEEDFORWARD = [f"{axis}.feedforward.{part}" for axis in AXES for part in ("velocity", "torque_kg_m2")]
+
+PAPER = {"with feedforward": "50 (fig. 10, left)", "without feedforward": "-"}
+MODEL_UM = {"with feedforward": +49.0, "without feedforward": -283.1}
+"""Mean radial deviation that this package's model is specified to have, µm."""
+
+
+def measure(drive: Drive, path: Ballbar) -> Recording:
+    """Run the circle once from home, over the topic `psec`."""
+    drive.reset()
+    drive.forget()
+    return drive.run(joint_trajectory(AXES, path.time, np.column_stack([path.x, path.y])), timeout=60)
+
+
+def report(path: Ballbar, runs: dict[str, Recording]) -> str:
+    """The table of tracking errors, µm."""
+    head = ("ballbar R 150 mm, 15 m/min", "mean", "min", "max", "G", "specified", "paper", "X, Y max |e| synchronised")
+    rows = [head]
+    for title, run in runs.items():
+        deviation = run.radial_deviation(path.centre, path.radius)[run.within(path.steady)] * 1e6
+        error = [np.abs(run.states["synchronized_tracking_error", axis]).max() * 1e6 for axis in AXES]
+        rows.append(
+            (
+                title,
+                f"{deviation.mean():+.1f}",
+                f"{deviation.min():+.1f}",
+                f"{deviation.max():+.1f}",
+                f"{circular_deviation(deviation):.1f}",
+                f"{MODEL_UM[title]:+.1f}",
+                PAPER[title],
+                f"{error[0]:.0f}, {error[1]:.0f}",
+            )
+        )
+    widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
+    lines = [
+        "  ".join(cell.ljust(width) if column == 0 else cell.rjust(width) for column, (cell, width) in enumerate(zip(row, widths)))
+        for row in rows
+    ]
+    lines.insert(1, "  ".join("-" * width for width in widths))
+    return "\n".join(["Radial deviation and tracking errors in µm:", "", *lines])
+
+
+def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
+    """Polar plots of the radial deviation, the deviation magnified as on a ballbar's chart."""
+    figure, plots = plt.subplots(1, len(runs), figsize=(11, 5.8), subplot_kw={"projection": "polar"}, layout="constrained")
+    # Black and one strong colour, solid and dashed: readable on a grey printer too.
+    for plot, (title, run) in zip(np.atleast_1d(plots), runs.items()):
+        steady = run.within(path.steady)
+        x, y = (run.joints["position", axis][steady] for axis in AXES)
+        angle = np.unwrap(np.arctan2(y - path.centre[1], x - path.centre[0]))
+        deviation = run.radial_deviation(path.centre, path.radius)[steady] * 1e6
+        turn = np.linspace(0, 2 * np.pi, 361)
+        step = _round_step(np.abs(deviation).max() / 2)
+        plot.plot(turn, np.zeros_like(turn), color="black", linewidth=1.2, linestyle="--", label="programmed circle, R = 150 mm")
+        plot.plot(angle, deviation, color="#b2182b", linewidth=1.6, label="simulated position")
+        # The circle is drawn as wide as four steps, so that an inward deviation stays off the centre.
+        plot.set_rorigin(-6 * step)
+        plot.set_rlim(-4 * step, 3 * step)
+        plot.set_rticks([factor * step for factor in range(-3, 4)])
+        plot.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:+g}" if value else "0"))
+        # Upright, where labels one above the other have most room.
+        plot.set_rlabel_position(80)
+        for label in plot.get_yticklabels():
+            label.set(fontsize=8, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})
+        plot.grid(color="0.8", linewidth=0.6)
+        plot.set_title(f"{title}\nmean {deviation.mean():+.1f} µm, G = {circular_deviation(deviation):.1f} µm", fontsize=11)
+        plot.legend(loc="lower center", bbox_to_anchor=(0.5, -0.24), fontsize=9, frameon=False)
+    figure.suptitle("Ballbar in X–Y at 15 m/min: radial deviation in µm over the polar angle, magnified", fontsize=12)
+    figure.savefig(file, dpi=150)
+    plt.close(figure)
+
+
+def _round_step(value: float) -> float:
+    """The next of 1, 2, 5 times a power of ten."""
+    power = 10 ** np.floor(np.log10(max(value, 1e-3)))
+    return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= value))
+
+
+def main() -> int:
+    """Run both circles, print, draw."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--fast", action="store_true", help="as fast as the machine can, not in real time")
+    parser.add_argument("--out", type=Path, default=Path(__file__).resolve().parent.parent / ".build" / "ballbar.png")
+    arguments = parser.parse_args()
+    # A polite end for SIGTERM and a closed terminal too, so that the node is stopped.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: sys.exit(1))
+
+    path = ballbar()
+    clock = "fast" if arguments.fast else "real"
+    runs: dict[str, Recording] = {}
+    with Node(["-p", f"time:={clock}"]) as process, Drive(process=process) as drive:
+        print(f"node {process.name}, process {process.pid}, domain {process.domain_id}, time: {clock}")
+        for title, feedforward in (("with feedforward", True), ("without feedforward", False)):
+            if not feedforward:
+                drive.set_parameters({name: 0.0 for name in FEEDFORWARD})
+            print(f"ballbar {title}: {path.time[-1]:.1f} s of motion ...", end=" ", flush=True)
+            began = time.monotonic()
+            runs[title] = measure(drive, path)
+            print(f"{time.monotonic() - began:.1f} s, {len(runs[title].joints)} samples")
+        status = process.stop()
+    print(f"node ended with status {status}\n")
+    print(report(path, runs))
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    draw(path, runs, arguments.out)
+    print(f"\npicture: {arguments.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,143 @@
+#!/usr/bin/env bash
+# Makes what the Python side needs, inside the checkout: .venv (rclpy and the message generators),
+# .build/install (this package's messages) and .build/env.sh, which a shell sources to use both.
+#
+#     tools/setup.sh && source .build/env.sh
+#
+# Run again, it does only what a change of its inputs asks for: each stage ends by writing a stamp
+# with the hash of its inputs, so a stage that was broken off is done anew from nothing.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+root=$PWD
+venv=$root/.venv
+build=$root/.build
+logs=$build/logs
+
+fail() {
+  echo "setup: $*" >&2
+  exit 1
+}
+
+# Runs a step with its output in a log; shows the log's end when the step fails.
+step() {
+  local title=$1 log=$logs/$2.log began=$SECONDS
+  shift 2
+  echo "setup: $title ..." >&2
+  # Not `if ! "$@"`: there bash would ignore `set -e` inside the step.
+  local status
+  set +e
+  (set -e && "$@") >"$log" 2>&1 </dev/null
+  status=$?
+  set -e
+  if [ "$status" -ne 0 ]; then
+    tail -n 30 "$log" >&2
+    fail "$title failed; all of its output: $log"
+  fi
+  echo "setup: $title: $((SECONDS - began)) s" >&2
+}
+
+# Installs Debian packages where that is possible without asking anybody.
+try_apt() {
+  [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null || return 1
+  step "apt-get install $*" apt bash -c 'apt-get update -q && DEBIAN_FRONTEND=noninteractive apt-get install -y -q "$@"' _ "$@"
+}
+
+# The wheels are built for Python 3.11 and 3.12; a shim without a version behind it does not run.
+find_python() {
+  local candidate
+  for candidate in ${PYTHON:-} python3.12 python3.11 python3; do
+    if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null; then
+      "$candidate" -c 'import sys; print(sys.executable)'
+      return 0
+    fi
+  done
+  return 1
+}
+
+missing_header() {
+  ! "$1" -c 'import os, sys, sysconfig; sys.exit(not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")))'
+}
+
+check_tools() {
+  python=$(find_python) || { try_apt python3 python3-venv python3-dev && python=$(find_python); } ||
+    fail "needs Python 3.11 or 3.12 (found: $(python3 --version 2>/dev/null || echo none)); name one with PYTHON=/path/to/python3.12"
+  command -v g++ >/dev/null || try_apt g++ || fail "needs g++ (Debian: apt-get install g++)"
+  "$python" -c 'import venv, ensurepip' 2>/dev/null || try_apt python3-venv ||
+    fail "needs the venv module of $python (Debian: apt-get install python3-venv)"
+  ! missing_header "$python" || { try_apt python3-dev && ! missing_header "$python"; } ||
+    fail "needs the headers of $python (Debian: apt-get install python3-dev)"
+}
+
+# The wheels' CMake files name directories of the machine that they were built on.
+fix_cmake_paths() {
+  local include numpy
+  include=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"))')
+  numpy=$("$venv/bin/python" -c 'import numpy; print(numpy.get_include())')
+  { grep -rlE --include='*.cmake' '/opt/python/cp3[0-9]+' "$venv/share" || true; } | while read -r file; do
+    sed -E -i \
+      -e "s#/opt/python/cp3[0-9]+-cp3[0-9]+/lib/python3\.[0-9]+/site-packages/numpy/_core/include#$numpy#g" \
+      -e "s#/opt/python/cp3[0-9]+-cp3[0-9]+/include/python3\.[0-9]+#$include#g" "$file"
+  done
+}
+
+make_venv() {
+  rm -rf "$venv"
+  "$python" -m venv "$venv"
+  touch "$venv/COLCON_IGNORE"
+  "$venv/bin/python" -m pip install --disable-pip-version-check --prefer-binary -r test_py/requirements.txt
+  fix_cmake_paths
+  "$venv/bin/python" -c 'import matplotlib, numpy, pytest, rclpy'
+}
+
+make_messages() {
+  # From a copy: CMake refuses to export include directories (.venv's) below the source directory.
+  local source=$build/messages/src
+  rm -rf "$build/install" "$build/messages"
+  mkdir -p "$source"
+  cp -r package.xml CMakeLists.txt msg "$source"
+  PATH=$venv/bin:$PATH VIRTUAL_ENV=$venv AMENT_PREFIX_PATH=$venv CMAKE_PREFIX_PATH=$venv PYTHONPATH='' \
+    COLCON_HOME=$build/colcon "$venv/bin/colcon" --log-base "$logs/colcon" build --merge-install \
+    --paths "$source" --build-base "$build/messages/build" --install-base "$build/install" \
+    --cmake-args -G Ninja -DPython3_EXECUTABLE="$venv/bin/python" -DBUILD_TESTING=OFF \
+    -DVIRTUAL_AXES_BUILD_NODE=OFF -DCMAKE_BUILD_TYPE=Release
+  cat >"$build/env.sh" <<END
+# Written by tools/setup.sh: source it to use rclpy and the messages of virtual_axes.
+export PATH="$venv/bin:\$PATH"
+export AMENT_PREFIX_PATH="$build/install:$venv"
+export LD_LIBRARY_PATH="$build/install/lib:$venv/lib\${LD_LIBRARY_PATH:+:\$LD_LIBRARY_PATH}"
+export PYTHONPATH="$(echo "$build"/install/lib/python3*/site-packages)"
+END
+  # shellcheck source=/dev/null
+  (source "$build/env.sh" && python -c 'from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult')
+}
+
+# The checkout's own path is an input: a virtual environment does not survive being moved.
+hash_of() {
+  { printf '%s\0' "$root" "$@"; cat "$@"; } | sha256sum | cut -d' ' -f1
+}
+
+is_done() { # stamp file, hash
+  [ -f "$1" ] && [ "$(cat "$1")" = "$2" ]
+}
+
+venv_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt)
+messages_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt package.xml CMakeLists.txt msg/*.msg)
+venv_stamp=$venv/setup.stamp
+messages_stamp=$build/messages.stamp
+
+mkdir -p "$logs"
+touch "$build/COLCON_IGNORE"
+exec 8>"$build/setup.lock"
+if command -v flock >/dev/null; then flock 8; fi
+
+if ! is_done "$venv_stamp" "$venv_hash" || ! "$venv/bin/python" -c '' 2>/dev/null; then
+  check_tools
+  rm -f "$messages_stamp"
+  step "Python packages into .venv" venv make_venv
+  echo "$venv_hash" >"$venv_stamp"
+fi
+if ! is_done "$messages_stamp" "$messages_hash"; then
+  rm -f "$messages_stamp"
+  step "messages of virtual_axes into .build" messages make_messages
+  echo "$messages_hash" >"$messages_stamp"
+fi
