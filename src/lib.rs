@@ -10,4 +10,6 @@
 #![warn(missing_docs)]
 
 pub mod config;
+#[cfg(feature = "ros")]
+pub mod ros;
 pub mod units;
