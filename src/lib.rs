@@ -15,6 +15,8 @@ pub mod config;
 pub mod control;
 pub mod drive;
 pub mod machine;
+#[cfg(feature = "ros")]
+pub mod ros;
 pub mod simulation;
 pub mod trajectory;
 pub mod units;

@@ -1,0 +1,5 @@
+//! The ROS 2 side of the node.
+
+pub mod environment;
+mod goodbye;
+pub mod participant;

@@ -1,0 +1,98 @@
+//! The DDS participant: opened as the environment asks, closed so that everybody notices.
+
+use std::time::{Duration, Instant};
+
+use ros2_client::Context;
+use rustdds::DomainParticipant;
+
+use super::{environment::Environment, goodbye::Goodbye};
+
+/// The node could not join the network.
+#[derive(Debug, thiserror::Error)]
+pub enum ParticipantError {
+    /// No participant: no free port, mostly.
+    #[error("cannot open a DDS participant in domain {domain_id}: {reason}")]
+    Open {
+        /// The domain asked for.
+        domain_id: u16,
+        /// The middleware's own words.
+        reason: String,
+    },
+    /// The participant is there, but the ROS layer on it is not.
+    #[error("cannot set up ROS on the DDS participant: {reason}")]
+    Context {
+        /// The middleware's own words.
+        reason: String,
+    },
+}
+
+/// Owns the DDS participant and says goodbye for it when it goes.
+///
+/// Drop publishers, subscriptions, the node and the [`Context`] first, then call
+/// [`Self::shutdown`]; dropping the guard does the same. A clone of the participant that lives on
+/// elsewhere keeps announcing it, and it would be discovered again after the goodbye.
+#[derive(Debug)]
+pub struct Participant {
+    participant: Option<DomainParticipant>,
+    environment: Environment,
+}
+
+impl Participant {
+    /// Opens a participant in the domain and on the networks that `environment` names.
+    ///
+    /// # Errors
+    /// [`ParticipantError::Open`] when the sockets or threads cannot be had.
+    pub fn open(environment: &Environment) -> Result<Self, ParticipantError> {
+        let participant =
+            environment
+                .participant_builder()
+                .build()
+                .map_err(|error| ParticipantError::Open {
+                    domain_id: environment.domain_id(),
+                    reason: error.to_string(),
+                })?;
+        Ok(Self {
+            participant: Some(participant),
+            environment: environment.clone(),
+        })
+    }
+
+    /// A ROS context on this participant.
+    ///
+    /// # Errors
+    /// [`ParticipantError::Context`] when the middleware refuses its own topics.
+    pub fn context(&self) -> Result<Context, ParticipantError> {
+        let participant = self
+            .participant
+            .clone()
+            .ok_or_else(|| ParticipantError::Context {
+                reason: "the participant is shut down".to_owned(),
+            })?;
+        Context::from_domain_participant(participant).map_err(|error| ParticipantError::Context {
+            reason: error.to_string(),
+        })
+    }
+
+    /// Leaves the network: disposes of the participant and tells everybody who may know it.
+    /// Returns the time that it took, some 40 ms.
+    pub fn shutdown(mut self) -> Duration {
+        self.leave()
+    }
+
+    fn leave(&mut self) -> Duration {
+        let start = Instant::now();
+        if let Some(participant) = self.participant.take() {
+            let goodbye = Goodbye::of(&participant, self.environment.range());
+            // The other way round, RustDDS might announce itself once more after the goodbye.
+            drop(participant);
+            goodbye.send();
+        }
+        start.elapsed()
+    }
+}
+
+impl Drop for Participant {
+    fn drop(&mut self) {
+        self.leave();
+    }
+}
