@@ -80,9 +80,5 @@ fn check(parameters: &Parameters) -> Result<String, ConfigError> {
             AxisKind::Rotary => format!("{} (rotary)", axis.name()),
         })
         .collect();
-    Ok(format!(
-        "machine: {}\njoints: {}\nvalid\n",
-        machine.name(),
-        joints.join(", ")
-    ))
+    Ok(format!("machine: {}\njoints: {}\nvalid\n", machine.name(), joints.join(", ")))
 }

@@ -7,9 +7,8 @@ use super::definition::MotorKind;
 use super::error::{ConfigError, Source};
 use super::layout::Joint;
 use super::machine::{
-    AxisConfig, AxisKind, DelaysConfig, FeedforwardConfig, FrictionConfig, GravityConfig,
-    LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig,
-    PositionLoopConfig,
+    AxisConfig, AxisKind, DelaysConfig, FeedforwardConfig, FrictionConfig, GravityConfig, LimitsConfig,
+    MachineConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig, PositionLoopConfig,
 };
 use super::parameters::Parameters;
 use super::value::Value;
@@ -92,8 +91,7 @@ impl Parameters {
             joint_prefix: self.text("joint_prefix"),
             load_timeout: to_ns(number("load_timeout"), SECOND_NS),
             max_points,
-            allow_nonzero_velocity_at_trajectory_end: self
-                .flag("allow_nonzero_velocity_at_trajectory_end"),
+            allow_nonzero_velocity_at_trajectory_end: self.flag("allow_nonzero_velocity_at_trajectory_end"),
         }
     }
 
@@ -180,8 +178,7 @@ impl Axis<'_> {
             current_loop: pi("current_loop")?,
             feedforward: FeedforwardConfig {
                 velocity: self.number("feedforward.velocity")?,
-                torque: self
-                    .number(self.by_motor("feedforward.torque_kg_m2", "feedforward.torque_kg"))?,
+                torque: self.number(self.by_motor("feedforward.torque_kg_m2", "feedforward.torque_kg"))?,
             },
             delays: DelaysConfig {
                 alpha: delay("delays.alpha_ms")?,
@@ -213,10 +210,8 @@ impl Axis<'_> {
         let inertia = self.by_motor("motor.inertia_kg_m2", "motor.mass_kg");
         let torque = self.by_motor("motor.torque_constant_nm_a", "motor.force_constant_n_a");
         let emf = self.by_motor("motor.emf_constant_v_s_rad", "motor.emf_constant_v_s_m");
-        let (speed, speed_unit) = self.by_motor(
-            ("motor.max_speed_rpm", RPM),
-            ("motor.max_speed_m_min", METRE_PER_MINUTE),
-        );
+        let (speed, speed_unit) =
+            self.by_motor(("motor.max_speed_rpm", RPM), ("motor.max_speed_m_min", METRE_PER_MINUTE));
         Ok(MotorConfig {
             inertia: self.number(inertia)?,
             torque_constant: self.number(torque)?,

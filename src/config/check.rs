@@ -12,6 +12,10 @@ use crate::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, SECOND_NS};
 /// How much faster than the position periods `publish_rate` may be, so that 166.7 Hz fits 6 ms.
 const RATE_TOLERANCE: f64 = 1e-2;
 
+/// The keys that decide which others a joint has.
+const TYPE: &str = "type";
+const DIRECT: &str = "transmission.direct";
+
 /// A value and where it was set.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Entry {
@@ -44,11 +48,7 @@ pub(super) fn check(
             return Err(missing(origin, &key, definition.wanted()));
         }
     }
-    let set = Set {
-        entries,
-        changed,
-        layout: &layout,
-    };
+    let set = Set { entries, changed, layout: &layout };
     set.check_periods()?;
     set.check_publish_rate()?;
     set.check_clock()?;
@@ -67,27 +67,13 @@ fn check_entry(layout: &Layout, key: &str, entry: &mut Entry) -> Result<(), Conf
 }
 
 fn missing(at: &Source, key: &str, wanted: String) -> ConfigError {
-    ConfigError::Missing {
-        at: at.clone(),
-        key: key.to_owned(),
-        wanted,
-    }
+    ConfigError::Missing { at: at.clone(), key: key.to_owned(), wanted }
 }
 
 /// The joints with their types; refuses misspelt keys before it says that something is missing.
 fn layout(entries: &Entries, changed: &[String], origin: &Source) -> Result<Layout, ConfigError> {
     let names = joint_names(entries)?;
-    let mut layout = Layout {
-        joints: names
-            .iter()
-            .map(|name| Joint {
-                name: name.clone(),
-                // Known below; the names of keys do not depend on it.
-                axis: AxisKind::Linear,
-                motor: MotorKind::Rotating,
-            })
-            .collect(),
-    };
+    let layout = Layout { joints: names.iter().map(|name| joint(entries, name)).collect() };
     for key in changed {
         if let Some(entry) = entries.get(key)
             // Without joints, keys with a dot cannot be told apart yet.
@@ -100,37 +86,36 @@ fn layout(entries: &Entries, changed: &[String], origin: &Source) -> Result<Layo
         let wanted = plain_definition("joints").map(|definition| definition.wanted());
         return Err(missing(origin, "joints", wanted.unwrap_or_default()));
     }
-    let rough = layout.clone();
-    for joint in &mut layout.joints {
-        let text = |suffix: &str| -> Result<Option<Value>, ConfigError> {
-            let key = format!("{}.{suffix}", joint.name);
-            let Some(entry) = entries.get(&key) else {
-                return Ok(None);
-            };
-            let definition = rough.find(&key, &entry.source)?;
-            Ok(Some(definition.checked(
-                &key,
-                &entry.value,
-                &entry.source,
-            )?))
-        };
-        joint.axis = match text("type")? {
-            Some(Value::Text(kind)) if kind == "rotary" => AxisKind::Rotary,
-            Some(_) => AxisKind::Linear,
-            None => {
-                let key = format!("{}.type", joint.name);
-                let wanted = rough.find(&key, origin)?.wanted();
-                return Err(missing(origin, &key, wanted));
+    for name in &names {
+        // What decides which keys apply is checked before the others are.
+        for (suffix, required) in [(TYPE, true), (DIRECT, false)] {
+            let key = format!("{name}.{suffix}");
+            let at = entries.get(&key).map_or(origin, |entry| &entry.source);
+            let definition = layout.find(&key, at)?;
+            match entries.get(&key) {
+                Some(entry) => {
+                    definition.checked(&key, &entry.value, at)?;
+                }
+                None if required => return Err(missing(at, &key, definition.wanted())),
+                None => {}
             }
-        };
-        let direct = text("transmission.direct")? == Some(Value::Bool(true));
-        joint.motor = if direct && joint.axis == AxisKind::Linear {
-            MotorKind::Linear
-        } else {
-            MotorKind::Rotating
-        };
+        }
     }
     Ok(layout)
+}
+
+/// The joint `name` as its keys describe it, taken for linear with a screw where they do not.
+fn joint(entries: &Entries, name: &str) -> Joint {
+    let is = |suffix: &str, wanted: Value| {
+        entries.get(&format!("{name}.{suffix}")).is_some_and(|entry| entry.value == wanted)
+    };
+    let rotary = is(TYPE, Value::Text("rotary".to_owned()));
+    let direct = is(DIRECT, Value::Bool(true));
+    Joint {
+        name: name.to_owned(),
+        axis: if rotary { AxisKind::Rotary } else { AxisKind::Linear },
+        motor: if direct && !rotary { MotorKind::Linear } else { MotorKind::Rotating },
+    }
 }
 
 /// The value of `joints`, empty when there is none; every name is usable and stands once.
@@ -157,10 +142,7 @@ pub(super) fn joint_names(entries: &Entries) -> Result<Vec<String>, ConfigError>
             return Err(refused(allowed));
         }
         if !seen.insert(name) {
-            return Err(refused(format!(
-                "hold each name once, not {} twice",
-                shortened(name)
-            )));
+            return Err(refused(format!("hold each name once, not {} twice", shortened(name))));
         }
     }
     Ok(names)
@@ -178,10 +160,7 @@ impl Set<'_> {
     fn refused(&self, keys: &[&str], allowed: String) -> ConfigError {
         let set = |key: &&&str| self.entries.contains_key(**key);
         let newest = keys.iter().filter(set).max_by_key(|key| {
-            self.changed
-                .iter()
-                .rposition(|changed| changed == **key)
-                .map_or(0, |position| position + 1)
+            self.changed.iter().rposition(|changed| changed == **key).map_or(0, |position| position + 1)
         });
         let key = newest.or(keys.first()).copied().unwrap_or_default();
         match self.entries.get(key) {
@@ -206,20 +185,12 @@ impl Set<'_> {
     fn value(&self, key: &str) -> Option<Value> {
         match self.entries.get(key) {
             Some(entry) => Some(entry.value.clone()),
-            None => self
-                .layout
-                .find(key, &Source::named(""))
-                .ok()?
-                .default_value(),
+            None => self.layout.find(key, &Source::named("")).ok()?.default_value(),
         }
     }
 
     fn check_periods(&self) -> Result<(), ConfigError> {
-        const KEYS: [&str; 3] = [
-            "periods.position_ms",
-            "periods.velocity_us",
-            "periods.current_us",
-        ];
+        const KEYS: [&str; 3] = ["periods.position_ms", "periods.velocity_us", "periods.current_us"];
         const FACTORS: [Nanoseconds; 3] = [MILLISECOND_NS, MICROSECOND_NS, MICROSECOND_NS];
         let period = |i: usize| Some(to_ns(self.number(KEYS[i])?, FACTORS[i]));
         for i in 0..2 {
@@ -240,10 +211,8 @@ impl Set<'_> {
     }
 
     fn check_publish_rate(&self) -> Result<(), ConfigError> {
-        let (Some(rate), Some(period)) = (
-            self.number("publish_rate"),
-            self.number("periods.position_ms"),
-        ) else {
+        let (Some(rate), Some(period)) = (self.number("publish_rate"), self.number("periods.position_ms"))
+        else {
             return Ok(());
         };
         let most = SECOND_NS as f64 / (period * MILLISECOND_NS as f64);
@@ -285,9 +254,7 @@ impl Set<'_> {
         match (is_direct, self.entries.contains_key(&drive)) {
             (true, true) => Err(self.refused(
                 &[&drive, &direct],
-                format!(
-                    "be the only transmission of {name}: {drive} and {direct} = true are given"
-                ),
+                format!("be the only transmission of {name}: {drive} and {direct} = true are given"),
             )),
             (false, false) => Err(missing(
                 origin,
@@ -323,10 +290,9 @@ impl Set<'_> {
         let min_key = format!("{}.limits.stroke_min_{unit}", joint.name);
         let max_key = format!("{}.limits.stroke_max_{unit}", joint.name);
         match (self.number(&min_key), self.number(&max_key)) {
-            (Some(min), Some(max)) if min >= max => Err(self.refused(
-                &[&min_key, &max_key],
-                format!("leave a stroke: {min_key} < {max_key}"),
-            )),
+            (Some(min), Some(max)) if min >= max => {
+                Err(self.refused(&[&min_key, &max_key], format!("leave a stroke: {min_key} < {max_key}")))
+            }
             _ => Ok(()),
         }
     }

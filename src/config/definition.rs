@@ -148,17 +148,12 @@ impl Definition {
 
     /// What a missing parameter would be: description, and unit where there is one.
     pub(super) fn wanted(&self) -> String {
-        format!(
-            "{} ({})",
-            self.description.trim_end_matches('.'),
-            self.range()
-        )
+        format!("{} ({})", self.description.trim_end_matches('.'), self.range())
     }
 
     /// Whether an axis of these kinds has the parameter.
     pub fn applies_to(&self, axis: AxisKind, motor: MotorKind) -> bool {
-        self.axis.is_none_or(|wanted| wanted == axis)
-            && self.motor.is_none_or(|wanted| wanted == motor)
+        self.axis.is_none_or(|wanted| wanted == axis) && self.motor.is_none_or(|wanted| wanted == motor)
     }
 
     /// `value` as this parameter holds it (an integer becomes a number where one is wanted).
@@ -166,12 +161,7 @@ impl Definition {
     /// # Errors
     ///
     /// [`ConfigError::WrongKind`] and [`ConfigError::NotAllowed`], with `key` and `at`.
-    pub(super) fn checked(
-        &self,
-        key: &str,
-        value: &Value,
-        at: &Source,
-    ) -> Result<Value, ConfigError> {
+    pub(super) fn checked(&self, key: &str, value: &Value, at: &Source) -> Result<Value, ConfigError> {
         let kept = match (self.kind, value) {
             (Kind::Number { min, max }, Value::Double(_) | Value::Integer(_)) => {
                 let number = match value {
@@ -180,13 +170,11 @@ impl Definition {
                     _ => f64::NAN,
                 };
                 // NaN lies in no range.
-                (min..=max)
-                    .contains(&number)
-                    .then_some(Value::Double(number))
+                (min..=max).contains(&number).then_some(Value::Double(number))
             }
-            (Kind::Integer { min, max }, Value::Integer(integer)) => (min..=max)
-                .contains(integer)
-                .then_some(Value::Integer(*integer)),
+            (Kind::Integer { min, max }, Value::Integer(integer)) => {
+                (min..=max).contains(integer).then_some(Value::Integer(*integer))
+            }
             (Kind::Choice(choices), Value::Text(text)) => {
                 choices.contains(&text.as_str()).then(|| value.clone())
             }

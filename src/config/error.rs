@@ -22,10 +22,7 @@ pub enum Source {
 impl Source {
     /// A file as a whole.
     pub fn file(name: &str) -> Self {
-        Self::File {
-            name: name.into(),
-            line: None,
-        }
+        Self::File { name: name.into(), line: None }
     }
 
     /// An option of the command line or a service, by its name.
@@ -54,10 +51,7 @@ impl Source {
 impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::File {
-                name,
-                line: Some(line),
-            } => write!(f, "{name}:{line}"),
+            Self::File { name, line: Some(line) } => write!(f, "{name}:{line}"),
             Self::File { name, line: None } => f.write_str(name),
             Self::Named(name) => f.write_str(name),
         }

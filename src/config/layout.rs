@@ -57,16 +57,16 @@ impl Layout {
             return Err(self.unknown(key, at));
         };
         let candidates = || axis_definitions().filter(|definition| definition.key == suffix);
-        candidates()
-            .find(|definition| definition.applies_to(joint.axis, joint.motor))
-            .ok_or_else(|| match candidates().next() {
+        candidates().find(|definition| definition.applies_to(joint.axis, joint.motor)).ok_or_else(|| {
+            match candidates().next() {
                 Some(definition) => ConfigError::NotApplicable {
                     at: at.clone(),
                     key: key.to_owned(),
                     reason: joint.why_not(definition),
                 },
                 None => self.unknown(key, at),
-            })
+            }
+        })
     }
 
     /// Refuses a key that no machine with these joints, of whatever type, can have.
@@ -86,22 +86,14 @@ impl Layout {
             Some((name, _)) if !self.joints.is_empty() => Err(ConfigError::NotApplicable {
                 at: at.clone(),
                 key: shortened(key),
-                reason: format!(
-                    "there is no joint {}; joints = {}",
-                    shortened(name),
-                    self.names()
-                ),
+                reason: format!("there is no joint {}; joints = {}", shortened(name), self.names()),
             }),
             _ => Err(self.unknown(key, at)),
         }
     }
 
     fn names(&self) -> String {
-        let names: Vec<&str> = self
-            .joints
-            .iter()
-            .map(|joint| joint.name.as_str())
-            .collect();
+        let names: Vec<&str> = self.joints.iter().map(|joint| joint.name.as_str()).collect();
         format!("[{}]", names.join(", "))
     }
 
@@ -147,16 +139,12 @@ impl Joint {
 
 /// Definitions that stand behind a joint's name.
 fn axis_definitions() -> impl Iterator<Item = &'static Definition> {
-    DEFINITIONS
-        .iter()
-        .filter(|definition| definition.scope == Scope::Axis)
+    DEFINITIONS.iter().filter(|definition| definition.scope == Scope::Axis)
 }
 
 /// The machine's or node's definition of that key.
 pub(super) fn plain_definition(key: &str) -> Option<&'static Definition> {
-    DEFINITIONS
-        .iter()
-        .find(|definition| definition.scope != Scope::Axis && definition.key == key)
+    DEFINITIONS.iter().find(|definition| definition.scope != Scope::Axis && definition.key == key)
 }
 
 /// What `joints` must do for `name` to be in it, when it is not allowed.

@@ -53,10 +53,7 @@ pub fn markdown() -> String {
     let _ = writeln!(out, "|{}", "---|".repeat(HEADINGS.len()));
     for [key, range, default, live, owner, description] in rows() {
         // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "| `{key}` | {range} | {default} | {live} | {owner} | {description} |"
-        );
+        let _ = writeln!(out, "| `{key}` | {range} | {default} | {live} | {owner} | {description} |");
     }
     out
 }
@@ -65,12 +62,7 @@ pub fn markdown() -> String {
 pub fn text() -> String {
     let mut rows = rows();
     rows.insert(0, HEADINGS.map(str::to_owned));
-    let width = |column: usize| {
-        rows.iter()
-            .map(|row| row[column].chars().count())
-            .max()
-            .unwrap_or_default()
-    };
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default();
     let widths: Vec<usize> = (0..HEADINGS.len()).map(width).collect();
     let mut out = String::new();
     for row in &rows {

@@ -8,19 +8,13 @@ use super::check::{Entries, Entry, check, joint_names};
 use super::definition::{Definition, Scope};
 use super::error::{ConfigError, Source, shortened};
 use super::layout::{Layout, plain_definition};
+use super::parameter_file::{self, Assignment, parse_assignment};
 use super::value::Value;
-use super::yaml::{self, Assignment, parse_assignment};
 
 /// Shipped machines: name and parameter file, the default first.
 const BUILTIN: &[(&str, &str)] = &[
-    (
-        "mikron_ucp710",
-        include_str!("../../config/mikron_ucp710.yaml"),
-    ),
-    (
-        "linear_motor_center",
-        include_str!("../../config/linear_motor_center.yaml"),
-    ),
+    ("mikron_ucp710", include_str!("../../config/mikron_ucp710.yaml")),
+    ("linear_motor_center", include_str!("../../config/linear_motor_center.yaml")),
 ];
 /// Name of the machine that runs when none is given.
 pub const DEFAULT_MACHINE: &str = "mikron_ucp710";
@@ -87,7 +81,7 @@ impl Parameters {
     /// Any [`ConfigError`] but those of reading.
     pub fn from_yaml(text: &str, source: &str) -> Result<Self, ConfigError> {
         let source = Source::file(source);
-        let file = yaml::read(text, &source, None)?;
+        let file = parameter_file::read(text, &source, None)?;
         Self::from_assignments(Entries::new(), file.assignments, &source)
     }
 
@@ -129,7 +123,7 @@ impl Parameters {
         node: Option<&str>,
     ) -> Result<Overlay, ConfigError> {
         let source = Source::file(source);
-        let file = yaml::read(text, &source, node)?;
+        let file = parameter_file::read(text, &source, node)?;
         let report = Overlay {
             parameters: file.assignments.len(),
             machine_replaced: file
@@ -145,13 +139,8 @@ impl Parameters {
                 plain_definition(key).is_some_and(|definition| definition.scope == Scope::Node)
             });
         }
-        *self = Self::from_assignments(base, file.assignments, &source).map_err(|error| {
-            if report.machine_replaced {
-                explain_replacement(error)
-            } else {
-                error
-            }
-        })?;
+        *self = Self::from_assignments(base, file.assignments, &source)
+            .map_err(|error| if report.machine_replaced { explain_replacement(error) } else { error })?;
         Ok(report)
     }
 
@@ -175,11 +164,7 @@ impl Parameters {
     ///
     /// Any [`ConfigError`] but those of reading; nothing is changed then.
     pub fn set(&mut self, key: &str, value: Value, source: &Source) -> Result<(), ConfigError> {
-        self.set_all(vec![Assignment {
-            key: key.to_owned(),
-            value,
-            source: source.clone(),
-        }])
+        self.set_all(vec![Assignment { key: key.to_owned(), value, source: source.clone() }])
     }
 
     /// Sets one parameter from `KEY=VALUE` or `KEY:=VALUE`, the value by the rules of YAML.
@@ -201,8 +186,7 @@ impl Parameters {
             return Ok(());
         };
         let origin = first.source.clone();
-        let mut next = Self::from_parts(self.entries.clone(), &self.layout, assignments, &origin)?;
-        std::mem::swap(self, &mut next);
+        *self = Self::from_parts(self.entries.clone(), &self.layout, assignments, &origin)?;
         Ok(())
     }
 
@@ -271,8 +255,7 @@ impl Parameters {
     /// Every parameter that has a value, set or by default, in the order of
     /// [`definitions`](Self::definitions).
     pub fn iter(&self) -> impl Iterator<Item = (String, Value)> + '_ {
-        self.definitions()
-            .filter_map(|(key, _)| self.get(&key).map(|value| (key, value)))
+        self.definitions().filter_map(|(key, _)| self.get(&key).map(|value| (key, value)))
     }
 
     pub(super) fn layout(&self) -> &Layout {
@@ -297,18 +280,14 @@ fn explain_replacement(error: ConfigError) -> ConfigError {
 
 /// The text of a file of sensible size.
 fn read_text(path: &Path) -> Result<String, ConfigError> {
-    let unreadable = |reason: String| ConfigError::Unreadable {
-        path: path.to_string_lossy().into_owned(),
-        reason,
-    };
+    let unreadable =
+        |reason: String| ConfigError::Unreadable { path: path.to_string_lossy().into_owned(), reason };
     let mut bytes = Vec::new();
     File::open(path)
         .and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|error| unreadable(error.to_string()))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(unreadable(format!(
-            "it is larger than {MAX_FILE_BYTES} bytes"
-        )));
+        return Err(unreadable(format!("it is larger than {MAX_FILE_BYTES} bytes")));
     }
     String::from_utf8(bytes).map_err(|error| {
         let position = error.utf8_error().valid_up_to();

@@ -44,17 +44,12 @@ const fn gain(key: &'static str, unit: &'static str) -> Definition {
 
 /// An integral time, live.
 const fn integral_time(key: &'static str) -> Definition {
-    Definition::number(key, "ms", INTEGRAL_TIME_MS.0, INTEGRAL_TIME_MS.1)
-        .of_axis()
-        .live()
+    Definition::number(key, "ms", INTEGRAL_TIME_MS.0, INTEGRAL_TIME_MS.1).of_axis().live()
 }
 
 /// A delay of the set-point, live.
 const fn delay(key: &'static str) -> Definition {
-    Definition::number(key, "ms", 0.0, DELAY_MS)
-        .of_axis()
-        .default(Number(0.0))
-        .live()
+    Definition::number(key, "ms", 0.0, DELAY_MS).of_axis().default(Number(0.0)).live()
 }
 
 /// Every parameter there is. A key stands twice where its unit depends on the axis or the motor.

@@ -65,9 +65,5 @@ fn list_text(f: &mut fmt::Formatter<'_>, items: impl Iterator<Item = String>) ->
 pub(super) fn number_text(value: f64) -> String {
     let plain = format!("{value}");
     let exponent = format!("{value:e}");
-    if exponent.len() < plain.len() {
-        exponent
-    } else {
-        plain
-    }
+    if exponent.len() < plain.len() { exponent } else { plain }
 }
