@@ -1,7 +1,7 @@
 //! Units of CNC documentation, and time as an integer.
 //!
 //! Everything inside the library is SI; machine files use the units of CNC documentation
-//! ([P] Appendix 2). The factors below are the only place where the two meet.
+//! (Prévost Appendix 2). The factors below are the only place where the two meet.
 
 use std::f64::consts::{PI, TAU};
 

@@ -12,6 +12,10 @@ use crate::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, SECOND_NS};
 /// How much faster than the position periods `publish_rate` may be, so that 166.7 Hz fits 6 ms.
 const RATE_TOLERANCE: f64 = 1e-2;
 
+/// The keys that decide which others a joint has.
+const TYPE: &str = "type";
+const DIRECT: &str = "transmission.direct";
+
 /// A value and where it was set.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Entry {
@@ -69,17 +73,7 @@ fn missing(at: &Source, key: &str, wanted: String) -> ConfigError {
 /// The joints with their types; refuses misspelt keys before it says that something is missing.
 fn layout(entries: &Entries, changed: &[String], origin: &Source) -> Result<Layout, ConfigError> {
     let names = joint_names(entries)?;
-    let mut layout = Layout {
-        joints: names
-            .iter()
-            .map(|name| Joint {
-                name: name.clone(),
-                // Known below; the names of keys do not depend on it.
-                axis: AxisKind::Linear,
-                motor: MotorKind::Rotating,
-            })
-            .collect(),
-    };
+    let layout = Layout { joints: names.iter().map(|name| joint(entries, name)).collect() };
     for key in changed {
         if let Some(entry) = entries.get(key)
             // Without joints, keys with a dot cannot be told apart yet.
@@ -92,30 +86,36 @@ fn layout(entries: &Entries, changed: &[String], origin: &Source) -> Result<Layo
         let wanted = plain_definition("joints").map(|definition| definition.wanted());
         return Err(missing(origin, "joints", wanted.unwrap_or_default()));
     }
-    let rough = layout.clone();
-    for joint in &mut layout.joints {
-        let text = |suffix: &str| -> Result<Option<Value>, ConfigError> {
-            let key = format!("{}.{suffix}", joint.name);
-            let Some(entry) = entries.get(&key) else {
-                return Ok(None);
-            };
-            let definition = rough.find(&key, &entry.source)?;
-            Ok(Some(definition.checked(&key, &entry.value, &entry.source)?))
-        };
-        joint.axis = match text("type")? {
-            Some(Value::Text(kind)) if kind == "rotary" => AxisKind::Rotary,
-            Some(_) => AxisKind::Linear,
-            None => {
-                let key = format!("{}.type", joint.name);
-                let wanted = rough.find(&key, origin)?.wanted();
-                return Err(missing(origin, &key, wanted));
+    for name in &names {
+        // What decides which keys apply is checked before the others are.
+        for (suffix, required) in [(TYPE, true), (DIRECT, false)] {
+            let key = format!("{name}.{suffix}");
+            let at = entries.get(&key).map_or(origin, |entry| &entry.source);
+            let definition = layout.find(&key, at)?;
+            match entries.get(&key) {
+                Some(entry) => {
+                    definition.checked(&key, &entry.value, at)?;
+                }
+                None if required => return Err(missing(at, &key, definition.wanted())),
+                None => {}
             }
-        };
-        let direct = text("transmission.direct")? == Some(Value::Bool(true));
-        joint.motor =
-            if direct && joint.axis == AxisKind::Linear { MotorKind::Linear } else { MotorKind::Rotating };
+        }
     }
     Ok(layout)
+}
+
+/// The joint `name` as its keys describe it, taken for linear with a screw where they do not.
+fn joint(entries: &Entries, name: &str) -> Joint {
+    let is = |suffix: &str, wanted: Value| {
+        entries.get(&format!("{name}.{suffix}")).is_some_and(|entry| entry.value == wanted)
+    };
+    let rotary = is(TYPE, Value::Text("rotary".to_owned()));
+    let direct = is(DIRECT, Value::Bool(true));
+    Joint {
+        name: name.to_owned(),
+        axis: if rotary { AxisKind::Rotary } else { AxisKind::Linear },
+        motor: if direct && !rotary { MotorKind::Linear } else { MotorKind::Rotating },
+    }
 }
 
 /// The value of `joints`, empty when there is none; every name is usable and stands once.

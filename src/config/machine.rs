@@ -13,7 +13,7 @@ pub struct MachineConfig {
     pub(crate) axes: Vec<AxisConfig>,
 }
 
-/// Sampling periods of the three loops; each is an integer multiple of the next ([P] Appendix 2).
+/// Sampling periods of the three loops; each is an integer multiple of the next (Prévost Appendix 2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Periods {
     /// Tsp, position loop, ns.
@@ -63,7 +63,7 @@ pub struct AxisConfig {
     pub(crate) limits: LimitsConfig,
 }
 
-/// A direct-current motor equivalent to the servo motor ([P] eq. 1).
+/// A direct-current motor equivalent to the servo motor (Prévost eq. 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorConfig {
     /// Jeq, kg·m² at the motor (kg for a linear motor).
@@ -84,7 +84,7 @@ pub struct MotorConfig {
     pub max_speed: f64,
 }
 
-/// Double-exponential friction law ([P] eq. 3); V is in m/min or rev/min of the axis.
+/// Double-exponential friction law (Prévost eq. 3); V is in m/min or rev/min of the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionConfig {
     /// a, A.
@@ -136,7 +136,7 @@ pub struct PiConfig {
     pub integral_time: f64,
 }
 
-/// Weights of the feedforward ([P] eqs. 6 and 7); zero is off.
+/// Weights of the feedforward (Prévost eqs. 6 and 7); zero is off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeedforwardConfig {
     /// VFFW, 1.

@@ -8,8 +8,8 @@ use super::check::{Entries, Entry, check, joint_names};
 use super::definition::{Definition, Scope};
 use super::error::{ConfigError, Source, shortened};
 use super::layout::{Layout, plain_definition};
+use super::parameter_file::{self, Assignment, parse_assignment};
 use super::value::Value;
-use super::yaml::{self, Assignment, parse_assignment};
 
 /// Shipped machines: name and parameter file, the default first.
 const BUILTIN: &[(&str, &str)] = &[
@@ -81,7 +81,7 @@ impl Parameters {
     /// Any [`ConfigError`] but those of reading.
     pub fn from_yaml(text: &str, source: &str) -> Result<Self, ConfigError> {
         let source = Source::file(source);
-        let file = yaml::read(text, &source, None)?;
+        let file = parameter_file::read(text, &source, None)?;
         Self::from_assignments(Entries::new(), file.assignments, &source)
     }
 
@@ -123,7 +123,7 @@ impl Parameters {
         node: Option<&str>,
     ) -> Result<Overlay, ConfigError> {
         let source = Source::file(source);
-        let file = yaml::read(text, &source, node)?;
+        let file = parameter_file::read(text, &source, node)?;
         let report = Overlay {
             parameters: file.assignments.len(),
             machine_replaced: file
@@ -186,8 +186,7 @@ impl Parameters {
             return Ok(());
         };
         let origin = first.source.clone();
-        let mut next = Self::from_parts(self.entries.clone(), &self.layout, assignments, &origin)?;
-        std::mem::swap(self, &mut next);
+        *self = Self::from_parts(self.entries.clone(), &self.layout, assignments, &origin)?;
         Ok(())
     }
 

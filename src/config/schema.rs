@@ -1,7 +1,7 @@
 //! The schema: one table of parameters from which the check of files, the typed configuration,
 //! the ROS descriptors and the table of the README are derived.
 //!
-//! Equation numbers are those of [P] (Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling
+//! Equation numbers are those of Prévost (Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling
 //! for the simulation of tool path tracking in multi-axis High Speed Machining*).
 
 use super::definition::DefaultValue::{Flag, Integer, Number, Text};
@@ -83,28 +83,28 @@ pub static DEFINITIONS: &[Definition] = &[
     // Motor.
     Definition::number("motor.inertia_kg_m2", "kg·m²", POSITIVE, 1e3)
         .driven_by(RotatingMotor)
-        .is("Jeq, equivalent inertia at the motor shaft ([P] eqs. 1 and 5)."),
+        .is("Jeq, equivalent inertia at the motor shaft (Prévost eqs. 1 and 5)."),
     Definition::number("motor.mass_kg", "kg", 1e-6, 1e6)
         .driven_by(LinearMotor)
-        .is("Moving mass, in the place of Jeq ([P] eq. 1)."),
+        .is("Moving mass, in the place of Jeq (Prévost eq. 1)."),
     Definition::number("motor.torque_constant_nm_a", "N·m/A", POSITIVE, 1e4)
         .driven_by(RotatingMotor)
-        .is("Kt, torque constant ([P] eq. 1)."),
+        .is("Kt, torque constant (Prévost eq. 1)."),
     Definition::number("motor.force_constant_n_a", "N/A", POSITIVE, 1e5)
         .driven_by(LinearMotor)
-        .is("Force constant, in the place of Kt ([P] eq. 1)."),
+        .is("Force constant, in the place of Kt (Prévost eq. 1)."),
     Definition::number("motor.emf_constant_v_s_rad", "V·s/rad", 0.0, 1e4)
         .driven_by(RotatingMotor)
-        .is("Ke, back-EMF constant ([P] eq. 1)."),
+        .is("Ke, back-EMF constant (Prévost eq. 1)."),
     Definition::number("motor.emf_constant_v_s_m", "V·s/m", 0.0, 1e5)
         .driven_by(LinearMotor)
-        .is("Ke, back-EMF constant ([P] eq. 1)."),
+        .is("Ke, back-EMF constant (Prévost eq. 1)."),
     Definition::number("motor.resistance_ohm", "Ω", 0.0, 1e4)
         .of_axis()
-        .is("R, winding resistance ([P] eq. 1)."),
+        .is("R, winding resistance (Prévost eq. 1)."),
     Definition::number("motor.inductance_mh", "mH", 1e-6, 1e5)
         .of_axis()
-        .is("L, winding inductance ([P] eq. 1)."),
+        .is("L, winding inductance (Prévost eq. 1)."),
     Definition::number("motor.max_current_a", "A", POSITIVE, CURRENT)
         .of_axis()
         .is("imax, limit of the current set-point."),
@@ -119,24 +119,24 @@ pub static DEFINITIONS: &[Definition] = &[
         .is("Maximum motor speed, limit of the velocity set-point."),
     // Friction.
     friction_current("friction.a")
-        .is("Amplitude a of the friction law a·exp(b·V) + c·exp(d·V) ([P] eq. 3)."),
+        .is("Amplitude a of the friction law a·exp(b·V) + c·exp(d·V) (Prévost eq. 3)."),
     friction_exponent("friction.b", "min/m")
         .on(Linear)
-        .is("Exponent b of the friction law, V in m/min ([P] eq. 3)."),
+        .is("Exponent b of the friction law, V in m/min (Prévost eq. 3)."),
     friction_exponent("friction.b", "min/rev")
         .on(Rotary)
-        .is("Exponent b of the friction law, V in rev/min of the axis ([P] eq. 3)."),
+        .is("Exponent b of the friction law, V in rev/min of the axis (Prévost eq. 3)."),
     friction_current("friction.c")
-        .is("Amplitude c of the friction law; a + c, its value towards standstill, is not negative ([P] eq. 3)."),
+        .is("Amplitude c of the friction law; a + c, its value towards standstill, is not negative (Prévost eq. 3)."),
     friction_exponent("friction.d", "min/m")
         .on(Linear)
-        .is("Exponent d of the friction law, V in m/min ([P] eq. 3)."),
+        .is("Exponent d of the friction law, V in m/min (Prévost eq. 3)."),
     friction_exponent("friction.d", "min/rev")
         .on(Rotary)
-        .is("Exponent d of the friction law, V in rev/min of the axis ([P] eq. 3)."),
+        .is("Exponent d of the friction law, V in rev/min of the axis (Prévost eq. 3)."),
     Definition::number("friction.i0", "A", 0.0, CURRENT)
         .of_axis()
-        .is("Breakaway current i0, bound of static friction ([P] eq. 3)."),
+        .is("Breakaway current i0, bound of static friction (Prévost eq. 3)."),
     // Gravity.
     Definition::number("gravity.weight_n", "N", -1e6, 1e6)
         .on(Linear)
@@ -155,43 +155,43 @@ pub static DEFINITIONS: &[Definition] = &[
         .of_axis()
         .default(Text("cascade"))
         .live()
-        .is("Position controller: proportional with feedforward ([P] fig. 3)."),
+        .is("Position controller: proportional with feedforward (Prévost fig. 3)."),
     gain("position_loop.gain", "(m/min)/mm")
         .on(Linear)
-        .is("Kp, position-loop gain; 1 (m/min)/mm is 16.667 s⁻¹ ([P] Appendix 2)."),
+        .is("Kp, position-loop gain; 1 (m/min)/mm is 16.667 s⁻¹ (Prévost Appendix 2)."),
     gain("position_loop.gain", "(1000 °/min)/°")
         .on(Rotary)
-        .is("Kp, position-loop gain; 1 (1000 °/min)/° is 16.667 s⁻¹ ([P] Appendix 2)."),
+        .is("Kp, position-loop gain; 1 (1000 °/min)/° is 16.667 s⁻¹ (Prévost Appendix 2)."),
     gain("velocity_loop.gain", "N·m/(rad/s)")
         .driven_by(RotatingMotor)
-        .is("Kv, proportional gain of the velocity loop ([P] Appendix 2)."),
+        .is("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),
     gain("velocity_loop.gain", "N/(m/s)")
         .driven_by(LinearMotor)
-        .is("Kv, proportional gain of the velocity loop ([P] Appendix 2)."),
+        .is("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),
     integral_time("velocity_loop.integral_time_ms")
-        .is("Tv, integral time of the velocity loop ([P] Appendix 2)."),
+        .is("Tv, integral time of the velocity loop (Prévost Appendix 2)."),
     gain("current_loop.gain", "V/A")
-        .is("Ki, proportional gain of the current loop ([P] Appendix 2)."),
+        .is("Ki, proportional gain of the current loop (Prévost Appendix 2)."),
     integral_time("current_loop.integral_time_ms")
-        .is("Ti, integral time of the current loop ([P] Appendix 2)."),
+        .is("Ti, integral time of the current loop (Prévost Appendix 2)."),
     Definition::number("feedforward.velocity", "", 0.0, 2.0)
         .of_axis()
         .default(Number(0.0))
         .live()
-        .is("VFFW, weight of the velocity feedforward; 0 is off ([P] eq. 6)."),
+        .is("VFFW, weight of the velocity feedforward; 0 is off (Prévost eq. 6)."),
     Definition::number("feedforward.torque_kg_m2", "kg·m²", 0.0, 1e3)
         .driven_by(RotatingMotor)
         .default(Number(0.0))
         .live()
-        .is("TFFW, weight of the torque feedforward at the motor; 0 is off ([P] eq. 7)."),
+        .is("TFFW, weight of the torque feedforward at the motor; 0 is off (Prévost eq. 7)."),
     Definition::number("feedforward.torque_kg", "kg", 0.0, 1e6)
         .driven_by(LinearMotor)
         .default(Number(0.0))
         .live()
-        .is("TFFW, weight of the force feedforward; 0 is off ([P] eq. 7)."),
-    delay("delays.alpha_ms").is("α, delay of the set-point before the position comparator ([P] fig. 3)."),
-    delay("delays.beta_ms").is("β, delay of the velocity feedforward ([P] fig. 3)."),
-    delay("delays.gamma_ms").is("γ, delay of the torque feedforward ([P] fig. 3)."),
+        .is("TFFW, weight of the force feedforward; 0 is off (Prévost eq. 7)."),
+    delay("delays.alpha_ms").is("α, delay of the set-point before the position comparator (Prévost fig. 3)."),
+    delay("delays.beta_ms").is("β, delay of the velocity feedforward (Prévost fig. 3)."),
+    delay("delays.gamma_ms").is("γ, delay of the torque feedforward (Prévost fig. 3)."),
     // Limits.
     Definition::number("limits.velocity_m_min", "m/min", 1e-6, 1e5)
         .on(Linear)

@@ -1,6 +1,6 @@
 //! Controllers of one feed drive. Knows no plant.
 //!
-//! ([P] fig. 3) Three nested loops, position → velocity → current, with velocity and torque
+//! (Prévost fig. 3) Three nested loops, position → velocity → current, with velocity and torque
 //! feedforward of the delayed set-point.
 
 mod pi;

@@ -105,7 +105,7 @@ impl SetpointHistory {
     }
 }
 
-/// Velocity and torque feedforward ([P] eqs. 6 to 8), motor units.
+/// Velocity and torque feedforward (Prévost eqs. 6 to 8), motor units.
 ///
 /// ```text
 /// VFFWS = VFFW (PSEC_k − PSEC_{k−1}) / Tsp / r

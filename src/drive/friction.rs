@@ -3,12 +3,12 @@
 use crate::config::{AxisKind, FrictionConfig};
 use crate::units::{METRE_PER_MINUTE, RPM};
 
-/// Velocity up to which the law was fitted, m/min or rev/min ([P] eq. 3).
+/// Velocity up to which the law was fitted, m/min or rev/min (Prévost eq. 3).
 const FITTED_RANGE: f64 = 20.0;
 
 /// Double-exponential friction law of one axis, seen from its motor.
 ///
-/// ([P] eq. 3) `i_f(V) = a e^{bV} + c e^{dV}` for V > 0, odd in V; at standstill any value within
+/// (Prévost eq. 3) `i_f(V) = a e^{bV} + c e^{dV}` for V > 0, odd in V; at standstill any value within
 /// ±i0. V is in m/min (linear axis) or rev/min (rotary axis). The torque is `Kt i_f`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Friction {

@@ -1,6 +1,6 @@
 //! Physics of one feed drive: motor, friction, gravity, load. Knows no controller.
 //!
-//! ([P] eq. 1)
+//! (Prévost eq. 1)
 //!
 //! ```text
 //! L di/dt = u − R i − Ke ω

@@ -16,7 +16,7 @@ pub struct MotorState {
     pub angle: f64,
 }
 
-/// Zero-order-hold discretisation of [P] eq. 1 over one tick.
+/// Zero-order-hold discretisation of Prévost eq. 1 over one tick.
 ///
 /// With voltage u and torque τ (everything but Kt·i) held,
 ///

@@ -1,6 +1,6 @@
 //! What can be seen of an axis at an instant.
 
-/// Signals of one axis at one tick ([P] fig. 3).
+/// Signals of one axis at one tick (Prévost fig. 3).
 ///
 /// Axis quantities are in m or rad, motor quantities in rad and N·m (m and N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -1,0 +1,141 @@
+//! Faults of files as such: not YAML, not ROS parameters, hostile.
+
+use proptest::prelude::*;
+
+use super::{MIKRON, assert_refused, line_of, mikron_with, refusal};
+use crate::config::{Parameters, Source};
+
+#[test]
+fn key_twice_in_one_mapping() {
+    let text = mikron_with("b: 0.01965", "b: 0.01965\n        b: 3");
+    assert_refused(&text, "b: 3", "my.yaml:{line}: b stands twice in one mapping");
+}
+
+#[test]
+fn key_twice_flat_and_nested() {
+    let text = mikron_with("    periods:", "    x.friction.b: 0.5\n    periods:");
+    let first = line_of(&text, "x.friction.b");
+    assert_refused(
+        &text,
+        "b: 0.01965",
+        &format!("my.yaml:{{line}}: x.friction.b is set a second time; the first is my.yaml:{first}"),
+    );
+}
+
+#[test]
+fn not_yaml() {
+    let text = mikron_with("    x:\n", "    x: [\n");
+    let message = refusal(&text);
+    assert!(message.starts_with("my.yaml:"), "{message}");
+    assert!(message.contains(": not YAML: "), "{message}");
+    assert!(!message.contains('\n'), "{message}");
+}
+
+#[test]
+fn not_a_ros_parameter_file() {
+    let beginning = "a file begins with `/**:`, below it `ros__parameters:`, below that the keys";
+    for (text, expected) in [
+        ("", "my.yaml:1: not a ROS 2 parameter file: it holds no mapping"),
+        ("mill", "my.yaml:1: not a ROS 2 parameter file: it holds no mapping"),
+        ("{}", "my.yaml: not a ROS 2 parameter file: it is empty"),
+        ("\nmachine: mill\n", "my.yaml:2: not a ROS 2 parameter file: no `ros__parameters` below `machine`"),
+        (
+            "/**:\n  ros_parameters:\n    machine: mill\n",
+            "my.yaml:3: not a ROS 2 parameter file: `machine` stands below `/**/ros_parameters`, \
+             not below `ros__parameters`",
+        ),
+        (
+            "ros__parameters:\n  machine: mill\n",
+            "my.yaml:1: not a ROS 2 parameter file: `ros__parameters` stands below no node",
+        ),
+    ] {
+        assert_eq!(refusal(text), format!("{expected}; {beginning}"));
+    }
+}
+
+#[test]
+fn unreadable_files() {
+    let message = |path: &str| match Parameters::from_file(path) {
+        Ok(_) => String::new(),
+        Err(error) => error.to_string(),
+    };
+    assert!(message("no/such.yaml").starts_with("no/such.yaml: cannot be read: "));
+    assert!(message(env!("CARGO_MANIFEST_DIR")).contains(": cannot be read: "));
+}
+
+#[test]
+fn unknown_shipped_machine() {
+    assert_eq!(
+        Parameters::builtin("mikron").map_err(|error| error.to_string()),
+        Err("no machine mikron is shipped; there are mikron_ucp710, linear_motor_center".to_owned())
+    );
+}
+
+#[test]
+fn alias_bomb() {
+    let mut text = String::from("/**:\n  ros__parameters:\n    l0: &l0 [x, x, x, x, x, x, x, x]\n");
+    for level in 1..12 {
+        let below = level - 1;
+        let items = vec![format!("*l{below}"); 8].join(", ");
+        text.push_str(&format!("    l{level}: &l{level} [{items}]\n"));
+    }
+    assert!(refusal(&text).starts_with("my.yaml:"));
+}
+
+#[test]
+fn long_garbage_is_cut_in_messages() {
+    let garbage = "k".repeat(100_000);
+    let message = refusal(&format!("/**:\n  ros__parameters:\n    ? {garbage}\n    : {garbage}\n"));
+    assert!(message.len() < 1000, "{} bytes", message.len());
+    let source = Source::named("--set");
+    for text in [garbage.clone(), format!("machine={garbage}=[")] {
+        let result = super::mikron().set_text(&text, &source);
+        let length = result.err().map_or(0, |error| error.to_string().len());
+        assert!(length < 1000, "{length} bytes");
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_text_panics(text in "\\PC*|[-:\\[\\]{}&*!|>'\"%@`#,? \n\ta-c0-9./_]{0,300}") {
+        let _ = Parameters::from_yaml(&text, "my.yaml");
+        let _ = super::mikron().set_text(&text, &Source::named("--set"));
+    }
+
+    #[test]
+    fn no_damaged_machine_file_panics(
+        position in 0..MIKRON.len(),
+        length in 0_usize..40,
+        patch in "[-:\\[\\]{}&*!|>'\"#,? \nxyzac0-9.e]{0,12}",
+    ) {
+        let mut bytes = MIKRON.as_bytes().to_vec();
+        let end = (position + length).min(bytes.len());
+        bytes.splice(position..end, patch.into_bytes());
+        let text = String::from_utf8_lossy(&bytes);
+        if let Ok(parameters) = Parameters::from_yaml(&text, "my.yaml") {
+            prop_assert!(parameters.machine_config().is_ok());
+        }
+    }
+
+    #[test]
+    fn no_value_for_any_key_leaves_a_broken_machine(
+        index in 0_usize..200,
+        value in prop_oneof![
+            Just("true".to_owned()), Just("0".to_owned()), Just("rotary".to_owned()),
+            Just("[x, a]".to_owned()), Just("fast".to_owned()),
+            any::<f64>().prop_map(|value| value.to_string()), any::<i64>().prop_map(|value| value.to_string()),
+        ],
+    ) {
+        let mut parameters = super::mikron();
+        let keys: Vec<String> = parameters.definitions().map(|(key, _)| key).collect();
+        let before = parameters.clone();
+        let key = &keys[index % keys.len()];
+        match parameters.set_text(&format!("{key}={value}"), &Source::named("--set")) {
+            Ok(()) => prop_assert!(parameters.machine_config().is_ok()),
+            Err(error) => {
+                prop_assert_eq!(&parameters, &before);
+                prop_assert!(error.to_string().starts_with("--set: ") || error.to_string().starts_with("mikron_ucp710.yaml:"), "{}", error);
+            }
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! The shipped machines, number by number.
+
+use std::f64::consts::{PI, TAU};
+
+use super::{MIKRON, mikron};
+use crate::config::{AxisConfig, AxisKind, MachineConfig, Parameters, PositionControllerConfig};
+
+/// Relative difference that the conversion of units may leave.
+const ROUNDING: f64 = 1e-12;
+
+fn assert_near(actual: f64, expected: f64, what: &str) {
+    let tolerance = ROUNDING * expected.abs();
+    assert!(
+        actual == expected || (actual - expected).abs() <= tolerance,
+        "{what}: {actual}, expected {expected}"
+    );
+}
+
+fn machine(name: &str) -> MachineConfig {
+    let parameters = Parameters::builtin(name).expect("a shipped machine");
+    parameters.machine_config().expect("a valid machine")
+}
+
+/// One column of the table of the model, in SI units.
+struct Column {
+    name: &'static str,
+    kind: AxisKind,
+    ratio: f64,
+    inertia: f64,
+    position_gain: f64,
+    velocity: (f64, f64),
+    current: (f64, f64),
+    friction: [f64; 5],
+    torque_feedforward: f64,
+    /// Kt, Ke, R, L, imax, umax, maximum speed.
+    motor: [f64; 7],
+    /// W, k, φ.
+    gravity: [f64; 3],
+    /// Vmax, Amax, Jmax.
+    limits: [f64; 3],
+    stroke: (f64, f64),
+}
+
+/// 1FT7086-AC7, 2000 rpm.
+const LARGE: [f64; 7] = [2.64, 0.88, 0.46, 0.0085, 54.0, 245.0, 2000.0 * TAU / 60.0];
+/// 1FT7044-AK7, 6000 rpm.
+const SMALL: [f64; 7] = [0.88, 0.293, 0.61, 0.0042, 30.0, 245.0, 6000.0 * TAU / 60.0];
+const ROTARY_FRICTION: [f64; 5] = [0.6, 0.019, -0.2, -0.3, 0.4];
+const LEAD: f64 = 0.020;
+
+fn columns() -> [Column; 5] {
+    let turn = PI / 180.0;
+    [
+        Column {
+            name: "x",
+            kind: AxisKind::Linear,
+            ratio: LEAD / TAU,
+            inertia: 0.028,
+            position_gain: 25.0,
+            velocity: (5.0, 0.004),
+            current: (13.0, 0.002),
+            friction: [1.576, 0.01965, -0.5332, -0.2801, 1.043],
+            torque_feedforward: 0.002034,
+            motor: LARGE,
+            gravity: [0.0; 3],
+            limits: [0.5, 2.5, 50.0],
+            stroke: (-0.355, 0.355),
+        },
+        Column {
+            name: "y",
+            kind: AxisKind::Linear,
+            ratio: LEAD / TAU,
+            inertia: 0.024,
+            position_gain: 25.0,
+            velocity: (4.5, 0.006),
+            current: (12.0, 0.002),
+            friction: [1.253, 0.01895, -0.3629, -0.4026, 0.890],
+            torque_feedforward: 0.002030,
+            motor: LARGE,
+            gravity: [0.0; 3],
+            limits: [0.5, 3.0, 50.0],
+            stroke: (-0.275, 0.275),
+        },
+        Column {
+            name: "z",
+            kind: AxisKind::Linear,
+            ratio: LEAD / TAU,
+            inertia: 0.0225,
+            position_gain: 3.5 * 1000.0 / 60.0,
+            velocity: (5.5, 0.004),
+            current: (12.0, 0.002),
+            friction: [1.420, 0.01650, -0.6301, -0.2625, 0.790],
+            torque_feedforward: 0.002030,
+            motor: LARGE,
+            gravity: [400.0, 0.0, 0.0],
+            limits: [0.5, 2.1, 50.0],
+            stroke: (-0.250, 0.250),
+        },
+        Column {
+            name: "a",
+            kind: AxisKind::Rotary,
+            ratio: 1.0 / 180.0,
+            inertia: 0.001,
+            position_gain: 25.0,
+            velocity: (0.18, 0.006),
+            current: (6.0, 0.002),
+            friction: ROTARY_FRICTION,
+            torque_feedforward: 0.0,
+            motor: SMALL,
+            gravity: [0.0, 30.0, 0.0],
+            limits: [15.0 * TAU / 60.0, 0.83 * TAU, 50.0 * TAU],
+            stroke: (-30.0 * turn, 120.0 * turn),
+        },
+        Column {
+            name: "c",
+            kind: AxisKind::Rotary,
+            ratio: 1.0 / 120.0,
+            inertia: 0.001,
+            position_gain: 25.0,
+            velocity: (0.18, 0.006),
+            current: (6.0, 0.002),
+            friction: ROTARY_FRICTION,
+            torque_feedforward: 0.0,
+            motor: SMALL,
+            gravity: [0.0; 3],
+            limits: [20.0 * TAU / 60.0, 0.83 * TAU, 50.0 * TAU],
+            stroke: (f64::NEG_INFINITY, f64::INFINITY),
+        },
+    ]
+}
+
+impl Column {
+    fn check(&self, axis: &AxisConfig) {
+        assert_eq!(axis.name, self.name);
+        assert_eq!(axis.kind, self.kind);
+        let PositionControllerConfig::Cascade { gain } = axis.position_loop.controller;
+        let motor = &axis.motor;
+        let pairs = [
+            ("r", axis.transmission_ratio, self.ratio),
+            ("Jeq", motor.inertia, self.inertia),
+            ("Kt", motor.torque_constant, self.motor[0]),
+            ("Ke", motor.emf_constant, self.motor[1]),
+            ("R", motor.resistance, self.motor[2]),
+            ("L", motor.inductance, self.motor[3]),
+            ("imax", motor.max_current, self.motor[4]),
+            ("umax", motor.max_voltage, self.motor[5]),
+            ("speed", motor.max_speed, self.motor[6]),
+            ("Kp", gain, self.position_gain),
+            ("Kv", axis.velocity_loop.gain, self.velocity.0),
+            ("Tv", axis.velocity_loop.integral_time, self.velocity.1),
+            ("Ki", axis.current_loop.gain, self.current.0),
+            ("Ti", axis.current_loop.integral_time, self.current.1),
+            ("a", axis.friction.a, self.friction[0]),
+            ("b", axis.friction.b, self.friction[1]),
+            ("c", axis.friction.c, self.friction[2]),
+            ("d", axis.friction.d, self.friction[3]),
+            ("i0", axis.friction.i0, self.friction[4]),
+            ("VFFW", axis.feedforward.velocity, 1.0),
+            ("TFFW", axis.feedforward.torque, self.torque_feedforward),
+            ("W", axis.gravity.weight, self.gravity[0]),
+            ("k", axis.gravity.tilt, self.gravity[1]),
+            ("φ", axis.gravity.phase, self.gravity[2]),
+            ("Vmax", axis.limits.velocity, self.limits[0]),
+            ("Amax", axis.limits.acceleration, self.limits[1]),
+            ("Jmax", axis.limits.jerk, self.limits[2]),
+            ("stroke min", axis.limits.stroke_min, self.stroke.0),
+            ("stroke max", axis.limits.stroke_max, self.stroke.1),
+        ];
+        for (what, actual, expected) in pairs {
+            assert_near(actual, expected, &format!("{} {what}", self.name));
+        }
+        let delays = (axis.delays.alpha, axis.delays.beta, axis.delays.gamma);
+        assert_eq!(delays, (9_000_000, 9_000_000, 9_000_000));
+    }
+}
+
+#[test]
+fn mikron_has_every_value_of_the_model() {
+    let machine = machine("mikron_ucp710");
+    assert_eq!(machine.name(), "Mikron UCP 710");
+    let periods = machine.periods();
+    assert_eq!((periods.position, periods.velocity, periods.current), (6_000_000, 250_000, 125_000));
+    assert_eq!(machine.axes().len(), 5);
+    for (column, axis) in columns().iter().zip(machine.axes()) {
+        column.check(axis);
+    }
+}
+
+#[test]
+fn linear_motors_count_in_metres_and_newtons() {
+    let machine = machine("linear_motor_center");
+    let x = &machine.axes()[0];
+    assert_eq!((x.kind, x.transmission_ratio), (AxisKind::Linear, 1.0));
+    assert_near(x.motor.inertia, 250.0, "mass");
+    assert_near(x.motor.torque_constant, 70.0, "force constant");
+    assert_near(x.motor.max_speed, 2.0, "120 m/min");
+    assert_near(x.feedforward.torque, 250.0, "TFFW");
+    assert_near(x.limits.acceleration, 18.0, "Amax");
+    let a = &machine.axes()[3];
+    assert_eq!((a.kind, a.transmission_ratio), (AxisKind::Rotary, 1.0));
+    assert_near(a.motor.max_speed, 72.0 * TAU / 60.0, "72 rpm");
+    assert_eq!(machine.periods().current, 62_500);
+}
+
+#[test]
+fn every_shipped_machine_is_valid_and_the_default_is_the_first() {
+    let names: Vec<&str> = Parameters::builtin_names().collect();
+    assert_eq!(names, ["mikron_ucp710", "linear_motor_center"]);
+    for name in names {
+        assert_eq!(machine(name).axes().len(), 5);
+    }
+    assert_eq!(Parameters::builtin("mikron_ucp710"), Ok(mikron()));
+}
+
+#[test]
+fn every_value_that_no_paper_prints_is_marked_assumed() {
+    let unmarked = |text: &str, axis: &str, key: &str| {
+        let line = text
+            .split_once(&format!("\n    {axis}:\n"))
+            .and_then(|(_, rest)| rest.lines().find(|line| line.trim_start().starts_with(key)))
+            .map(str::to_owned);
+        line.is_none_or(|line| !line.contains("# assumed: "))
+    };
+    for axis in ["x", "y", "z", "a", "c"] {
+        for key in ["torque_constant_nm_a", "resistance_ohm", "max_speed", "velocity_"] {
+            let key = if key == "velocity_" && ["x", "y", "z"].contains(&axis) {
+                "velocity_m_min"
+            } else if key == "velocity_" {
+                "velocity_rpm"
+            } else {
+                key
+            };
+            assert!(!unmarked(MIKRON, axis, key), "{axis} {key}");
+        }
+    }
+    // A value of the linear-motor machine without a mark would pass for a measured one.
+    let other = include_str!("../../../config/linear_motor_center.yaml");
+    for line in other.lines().skip_while(|line| !line.contains("periods:")) {
+        let has_value = line.split('#').next().and_then(|code| code.split_once(": ")).is_some();
+        let structure = line.contains("type:") || line.contains("controller:");
+        assert!(!has_value || structure || line.contains("# assumed: "), "{line}");
+    }
+}

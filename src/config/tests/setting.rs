@@ -1,0 +1,263 @@
+//! Setting parameters: one at a time, several, from files on top of a machine.
+
+use super::mikron;
+use crate::config::{
+    Assignment, ConfigError, DEFINITIONS, Kind, Parameters, Presence, Scope, Source, TimeMode, Value, listing,
+};
+
+fn source() -> Source {
+    Source::named("--set")
+}
+
+fn set(text: &str) -> Result<Parameters, String> {
+    let mut parameters = mikron();
+    match parameters.set_text(text, &source()) {
+        Ok(()) => Ok(parameters),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn refused(text: &str) -> String {
+    set(text).err().unwrap_or_else(|| "accepted".to_owned())
+}
+
+#[test]
+fn every_live_key_takes_both_ends_of_its_range() {
+    let mut live = 0;
+    for machine in Parameters::builtin_names() {
+        let start = Parameters::builtin(machine).expect("a shipped machine");
+        for (key, definition) in start.definitions().filter(|(_, definition)| definition.live) {
+            live += 1;
+            let values = match definition.kind {
+                Kind::Number { min, max } => vec![Value::Double(min), Value::Double(max)],
+                Kind::Integer { min, max } => vec![Value::Integer(min), Value::Integer(max)],
+                Kind::Flag => vec![Value::Bool(false), Value::Bool(true)],
+                Kind::Choice(choices) => {
+                    choices.iter().map(|choice| Value::Text((*choice).to_owned())).collect()
+                }
+                Kind::Text | Kind::TextList => Vec::new(),
+            };
+            for value in values {
+                let mut parameters = start.clone();
+                assert_eq!(parameters.set(&key, value.clone(), &source()), Ok(()), "{key}");
+                assert_eq!(parameters.get(&key), Some(value), "{key}");
+                assert!(parameters.machine_config().is_ok(), "{key}");
+            }
+            let mut parameters = start.clone();
+            let error = parameters.set(&format!("{key}q"), Value::Double(1.0), &source());
+            assert!(
+                matches!(&error, Err(ConfigError::UnknownKey { nearest: Some(nearest), .. }) if *nearest == key),
+                "{error:?}"
+            );
+            assert_eq!(parameters, start);
+        }
+    }
+    // 11 on each of five axes, and one of the node.
+    assert_eq!(live, 2 * (5 * 11 + 1));
+}
+
+#[test]
+fn a_gain_that_is_set_reaches_the_machine() {
+    let machine = set("x.velocity_loop.gain=4.5").map(|parameters| parameters.machine_config());
+    let gain = machine.map(|machine| machine.map(|machine| machine.axes()[0].velocity_loop.gain));
+    assert_eq!(gain, Ok(Ok(4.5)));
+}
+
+#[test]
+fn an_integer_serves_where_a_number_is_wanted() {
+    let parameters = set("x.velocity_loop.gain:=4");
+    let value = parameters.map(|parameters| parameters.get("x.velocity_loop.gain"));
+    assert_eq!(value, Ok(Some(Value::Double(4.0))));
+}
+
+#[test]
+fn wrong_assignments_say_what_is_wrong() {
+    for (text, expected) in [
+        ("x.velocity_loop.gain", "--set: x.velocity_loop.gain: KEY=VALUE wanted"),
+        ("=1", "--set: =1: KEY=VALUE wanted"),
+        ("x.velocity_loop.gain=", "--set: x.velocity_loop.gain: found text \"\", number wanted"),
+        ("x.velocity_loop.gain=-1", "--set: x.velocity_loop.gain = -1: must lie in 0 … 1e9 N·m/(rad/s)"),
+        (
+            "x.velocity_loop.gian=1",
+            "--set: unknown parameter x.velocity_loop.gian; the nearest known one is \
+             x.velocity_loop.gain",
+        ),
+        (
+            "b.velocity_loop.gain=1",
+            "--set: b.velocity_loop.gain does not apply: there is no joint b; joints = [x, y, z, \
+             a, c]",
+        ),
+        ("time=slow", "--set: time = slow: must be real or fast"),
+        ("max_points=0", "--set: max_points = 0: must lie in 1 … 100000000"),
+        ("x.feedforward.velocity={a: 1}", "--set: x.feedforward.velocity: found a mapping, a value wanted"),
+        ("joints=[x, [y]]", "--set: joints: found a list of unlike or nested items, a value wanted"),
+        ("joint_prefix=7", "--set: joint_prefix: found integer 7, text (in quotation marks) wanted"),
+        (
+            "x.gravity.tilt_nm=3",
+            "--set: x.gravity.tilt_nm does not apply: it is for rotary axes, and x.type = linear",
+        ),
+    ] {
+        assert_eq!(refused(text), expected);
+    }
+}
+
+#[test]
+fn an_error_leaves_all_of_a_batch_unset() {
+    let mut parameters = mikron();
+    let assignment =
+        |key: &str, value| Assignment { key: key.to_owned(), value: Value::Double(value), source: source() };
+    let good = assignment("x.velocity_loop.gain", 4.5);
+    let bad = assignment("y.velocity_loop.gain", -4.5);
+    assert!(parameters.set_all(vec![good, bad]).is_err());
+    assert_eq!(parameters, mikron());
+}
+
+#[test]
+fn a_batch_is_checked_as_a_whole() {
+    let mut parameters = mikron();
+    let assignment =
+        |key: &str, value| Assignment { key: key.to_owned(), value: Value::Double(value), source: source() };
+    // Each alone would break the multiple.
+    let batch = vec![assignment("periods.velocity_us", 300.0), assignment("periods.current_us", 100.0)];
+    assert_eq!(parameters.set_all(batch), Ok(()));
+    assert_eq!(parameters.set_all(Vec::new()), Ok(()));
+}
+
+#[test]
+fn a_joint_left_out_takes_its_parameters_with_it() {
+    let parameters = set("joints=[c, x]").expect("two of five joints");
+    let machine = parameters.machine_config().expect("a valid machine");
+    let names: Vec<&str> = machine.axes().iter().map(|axis| axis.name()).collect();
+    assert_eq!(names, ["c", "x"]);
+    assert_eq!(parameters.get("y.type"), None);
+    assert!(refused("joints=[x, b]").starts_with("--set: b.type is missing: "));
+}
+
+#[test]
+fn defaults_are_listed_and_optional_parameters_are_not() {
+    let parameters = mikron();
+    let listed: Vec<(String, Value)> = parameters.iter().collect();
+    assert!(listed.contains(&("publish_rate".to_owned(), Value::Double(0.0))));
+    assert!(listed.contains(&("x.gravity.weight_n".to_owned(), Value::Double(0.0))));
+    assert!(!listed.iter().any(|(key, _)| key == "c.limits.stroke_min_deg"));
+    assert_eq!(parameters.source("publish_rate"), None);
+    assert_eq!(listed[0].0, "machine");
+    let unit = parameters.definition("a.position_loop.gain").map(|definition| definition.unit);
+    assert_eq!(unit, Some("(1000 °/min)/°"));
+}
+
+#[test]
+fn node_parameters_have_their_defaults_and_units() {
+    let mut parameters = mikron();
+    let node = parameters.node_config();
+    assert_eq!(node.time, TimeMode::Real);
+    assert_eq!((node.publish_rate, node.load_timeout), (None, 100_000_000));
+    assert_eq!((node.joint_prefix.as_str(), node.max_points), ("", 1_000_000));
+    assert!(!node.allow_nonzero_velocity_at_trajectory_end);
+    for text in ["time=fast", "publish_rate=50", "joint_prefix=mill_", "max_points=7"] {
+        assert_eq!(parameters.set_text(text, &source()), Ok(()));
+    }
+    let node = parameters.node_config();
+    assert_eq!((node.time, node.publish_rate), (TimeMode::Fast, Some(50.0)));
+    assert_eq!((node.joint_prefix.as_str(), node.max_points), ("mill_", 7));
+}
+
+#[test]
+fn an_overlay_changes_some_parameters_of_the_node_it_names() {
+    let text = "\
+/**:
+  ros__parameters:
+    x.velocity_loop: {gain: 4}
+    y:
+      velocity_loop.gain: 3
+/cell:
+  mill:
+    ros__parameters: {x.velocity_loop.gain: 2.5}
+other:
+  ros__parameters: {speed: 3}
+";
+    let mut parameters = mikron();
+    let overlay = parameters.overlay_yaml(text, "site.yaml", Some("/cell/mill"));
+    let overlay = overlay.expect("a good file");
+    assert_eq!((overlay.parameters, overlay.sections), (3, 2));
+    assert_eq!(overlay.skipped, ["/other"]);
+    assert!(!overlay.machine_replaced);
+    // The later section wins.
+    assert_eq!(parameters.get("x.velocity_loop.gain"), Some(Value::Double(2.5)));
+    assert_eq!(parameters.get("y.velocity_loop.gain"), Some(Value::Double(3.0)));
+    let at = parameters.source("x.velocity_loop.gain").map(ToString::to_string);
+    assert_eq!(at.as_deref(), Some("site.yaml:8"));
+
+    let mut parameters = mikron();
+    let overlay = parameters.overlay_yaml(text, "site.yaml", Some("/virtual_axes"));
+    assert_eq!(overlay.map(|overlay| overlay.sections), Ok(1));
+    assert_eq!(parameters.get("x.velocity_loop.gain"), Some(Value::Double(4.0)));
+}
+
+#[test]
+fn an_overlay_for_another_node_changes_nothing_and_says_so() {
+    let mut parameters = mikron();
+    let text = "/mill:\n  ros__parameters:\n    nonsense: 1\n";
+    let overlay = parameters.overlay_yaml(text, "site.yaml", Some("/lathe"));
+    let overlay = overlay.expect("nothing for this node");
+    assert_eq!((overlay.sections, overlay.skipped), (0, vec!["/mill".to_owned()]));
+    assert_eq!(parameters, mikron());
+}
+
+#[test]
+fn a_bad_overlay_changes_nothing() {
+    let mut parameters = mikron();
+    let text = "/**:\n  ros__parameters:\n    x.velocity_loop.gain: 4\n    y.velocity_loop.gain: -4\n";
+    let error = parameters.overlay_yaml(text, "site.yaml", None).map_err(|error| error.to_string());
+    assert_eq!(
+        error,
+        Err("site.yaml:4: y.velocity_loop.gain = -4: must lie in 0 … 1e9 N·m/(rad/s)".to_owned())
+    );
+    assert_eq!(parameters, mikron());
+}
+
+#[test]
+fn a_complete_machine_replaces_the_one_before_and_keeps_the_node() {
+    let mut parameters = mikron();
+    assert_eq!(parameters.set_text("joint_prefix=mill_", &source()), Ok(()));
+    let text = include_str!("../../../config/linear_motor_center.yaml");
+    let overlay = parameters.overlay_yaml(text, "other.yaml", None);
+    assert_eq!(overlay.map(|overlay| overlay.machine_replaced), Ok(true));
+    let expected = Parameters::builtin("linear_motor_center").map(|machine| machine.machine_config());
+    assert_eq!(Ok(parameters.machine_config()), expected);
+    assert_eq!(parameters.node_config().joint_prefix, "mill_");
+}
+
+#[test]
+fn half_a_machine_is_refused_with_the_way_out() {
+    let text = "/**:\n  ros__parameters:\n    joints: [x]\n    x.type: linear\n";
+    let error = mikron().overlay_yaml(text, "half.yaml", None).map_err(|error| error.to_string());
+    let message = error.err().unwrap_or_default();
+    assert!(message.starts_with("half.yaml: machine is missing: "), "{message}");
+    assert!(message.ends_with("leave both out to change some parameters of the present one"));
+}
+
+#[test]
+fn definitions_are_sound() {
+    for (index, definition) in DEFINITIONS.iter().enumerate() {
+        let key = definition.key;
+        assert!(definition.description.ends_with('.'), "{key}");
+        if let Kind::Number { min, max } = definition.kind {
+            assert!(min < max && min.is_finite() && max.is_finite(), "{key}");
+        }
+        if let Some(value) = definition.default_value() {
+            assert_eq!(definition.checked(key, &value, &source()), Ok(value), "{key}");
+        }
+        if definition.scope == Scope::Node {
+            // Node parameters are never asked for in a machine file.
+            assert!(matches!(definition.presence, Presence::Default(_)), "{key}");
+        }
+        for other in &DEFINITIONS[index + 1..] {
+            let same_axis = definition.axis.is_none() || definition.axis == other.axis;
+            let same_motor = definition.motor.is_none() || definition.motor == other.motor;
+            assert!(key != other.key || !(same_axis && same_motor), "{key} is ambiguous");
+        }
+    }
+    assert_eq!(listing::rows().len(), DEFINITIONS.len());
+    assert_eq!(listing::markdown().lines().count(), DEFINITIONS.len() + 2);
+}
