@@ -82,9 +82,7 @@ impl Environment {
     /// # Errors
     /// As [`Self::from_lookup`].
     pub fn from_process() -> Result<Self, EnvironmentError> {
-        Self::from_lookup(|name| {
-            std::env::var_os(name).map(|value| value.to_string_lossy().into_owned())
-        })
+        Self::from_lookup(|name| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned()))
     }
 
     /// Reads the variables through `lookup`, which gives a variable's value or `None`.
@@ -145,11 +143,7 @@ impl Environment {
             range
         };
 
-        Ok(Self {
-            domain_id,
-            range,
-            warnings,
-        })
+        Ok(Self { domain_id, range, warnings })
     }
 
     /// The DDS domain, 0 to 232.
@@ -184,22 +178,15 @@ impl Environment {
 }
 
 fn parse_domain(text: &str) -> Result<u16, EnvironmentError> {
-    text.trim()
-        .parse::<u16>()
-        .ok()
-        .filter(|domain| *domain <= LAST_DOMAIN)
-        .ok_or_else(|| EnvironmentError {
-            variable: "ROS_DOMAIN_ID",
-            found: text.to_owned(),
-            allowed: "a whole number from 0 to 232",
-        })
+    text.trim().parse::<u16>().ok().filter(|domain| *domain <= LAST_DOMAIN).ok_or_else(|| EnvironmentError {
+        variable: "ROS_DOMAIN_ID",
+        found: text.to_owned(),
+        allowed: "a whole number from 0 to 232",
+    })
 }
 
 fn parse_range(text: &str) -> Option<DiscoveryRange> {
-    DiscoveryRange::NAMES
-        .iter()
-        .find(|(name, _)| *name == text)
-        .map(|(_, range)| *range)
+    DiscoveryRange::NAMES.iter().find(|(name, _)| *name == text).map(|(_, range)| *range)
 }
 
 fn static_peers_warning(range: DiscoveryRange, peers: &[String]) -> Option<String> {
@@ -209,9 +196,7 @@ fn static_peers_warning(range: DiscoveryRange, peers: &[String]) -> Option<Strin
     let list = peers.join(", ");
     Some(match range {
         DiscoveryRange::Off => {
-            format!(
-                "ROS_STATIC_PEERS ({list}) is ignored, because ROS_AUTOMATIC_DISCOVERY_RANGE is OFF"
-            )
+            format!("ROS_STATIC_PEERS ({list}) is ignored, because ROS_AUTOMATIC_DISCOVERY_RANGE is OFF")
         }
         _ => format!(
             "ROS_STATIC_PEERS ({list}) is not supported by this node's middleware, which cannot go and look for \
@@ -226,10 +211,7 @@ mod tests {
 
     fn read(variables: &[(&str, &str)]) -> Result<Environment, EnvironmentError> {
         Environment::from_lookup(|name| {
-            variables
-                .iter()
-                .find(|(key, _)| *key == name)
-                .map(|(_, value)| (*value).to_owned())
+            variables.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
         })
     }
 
@@ -240,12 +222,8 @@ mod tests {
         assert_eq!(environment.range(), DiscoveryRange::Subnet);
         assert!(environment.warnings().is_empty());
         assert_eq!(
-            read(&[
-                ("ROS_DOMAIN_ID", ""),
-                ("ROS_AUTOMATIC_DISCOVERY_RANGE", ""),
-                ("ROS_LOCALHOST_ONLY", "")
-            ])
-            .unwrap(),
+            read(&[("ROS_DOMAIN_ID", ""), ("ROS_AUTOMATIC_DISCOVERY_RANGE", ""), ("ROS_LOCALHOST_ONLY", "")])
+                .unwrap(),
             environment
         );
     }
@@ -253,25 +231,12 @@ mod tests {
     #[test]
     fn a_domain_outside_0_to_232_is_refused_with_its_value() {
         for (text, domain) in [("0", 0), ("232", 232), (" 7 ", 7), ("007", 7)] {
-            assert_eq!(
-                read(&[("ROS_DOMAIN_ID", text)]).unwrap().domain_id(),
-                domain
-            );
+            assert_eq!(read(&[("ROS_DOMAIN_ID", text)]).unwrap().domain_id(), domain);
         }
-        for text in [
-            "233",
-            "-1",
-            "65536",
-            "1.0",
-            "one",
-            "0x10",
-            "99999999999999999999",
-        ] {
+        for text in ["233", "-1", "65536", "1.0", "one", "0x10", "99999999999999999999"] {
             let message = read(&[("ROS_DOMAIN_ID", text)]).unwrap_err().to_string();
             assert!(
-                message.contains("ROS_DOMAIN_ID")
-                    && message.contains(text)
-                    && message.contains("232"),
+                message.contains("ROS_DOMAIN_ID") && message.contains(text) && message.contains("232"),
                 "{message}"
             );
         }
@@ -321,16 +286,8 @@ mod tests {
         let environment = read(&[("ROS_STATIC_PEERS", " 192.168.0.1 ;;robot.local; ")]).unwrap();
         assert_eq!(environment.warnings().len(), 1);
         assert!(environment.warnings()[0].contains("(192.168.0.1, robot.local)"));
-        let off = [
-            ("ROS_STATIC_PEERS", "a"),
-            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"),
-        ];
+        let off = [("ROS_STATIC_PEERS", "a"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")];
         assert!(read(&off).unwrap().warnings()[0].contains("OFF"));
-        assert!(
-            read(&[("ROS_STATIC_PEERS", ";")])
-                .unwrap()
-                .warnings()
-                .is_empty()
-        );
+        assert!(read(&[("ROS_STATIC_PEERS", ";")]).unwrap().warnings().is_empty());
     }
 }

@@ -95,19 +95,14 @@ impl Goodbye {
 
     /// Sends it; takes about 30 ms. What cannot be reached is left alone: there is nobody to tell.
     pub(super) fn send(&self) {
-        let sockets: Vec<UdpSocket> = self
-            .sources
-            .iter()
-            .filter_map(|source| UdpSocket::bind((*source, 0)).ok())
-            .collect();
+        let sockets: Vec<UdpSocket> =
+            self.sources.iter().filter_map(|source| UdpSocket::bind((*source, 0)).ok()).collect();
         for round in 0..ROUNDS {
             if round > 0 {
                 thread::sleep(ROUND_PERIOD);
             }
             for socket in &sockets {
-                let from_loopback = socket
-                    .local_addr()
-                    .is_ok_and(|from| from.ip().is_loopback());
+                let from_loopback = socket.local_addr().is_ok_and(|from| from.ip().is_loopback());
                 for to in &self.destinations {
                     // Nothing but multicast may go out by both.
                     if to.ip().is_multicast() || to.ip().is_loopback() == from_loopback {
@@ -129,11 +124,9 @@ fn dispose_datagram(guid: &[u8; 16]) -> Vec<u8> {
     // A sequence number is two words, the high one first.
     body.extend(((LAST_SEQUENCE_NUMBER >> 32) as u32).to_le_bytes());
     body.extend((LAST_SEQUENCE_NUMBER as u32).to_le_bytes());
-    for (id, value) in [
-        (PID_KEY_HASH, guid.as_slice()),
-        (PID_STATUS_INFO, &DISPOSED_AND_UNREGISTERED),
-        (PID_SENTINEL, &[]),
-    ] {
+    for (id, value) in
+        [(PID_KEY_HASH, guid.as_slice()), (PID_STATUS_INFO, &DISPOSED_AND_UNREGISTERED), (PID_SENTINEL, &[])]
+    {
         body.extend(id.to_le_bytes());
         body.extend((value.len() as u16).to_le_bytes());
         body.extend(value);
@@ -152,45 +145,27 @@ fn dispose_datagram(guid: &[u8; 16]) -> Vec<u8> {
 
 /// Every place where a participant that may know us listens for discovery: the multicast group,
 /// each participant slot of this machine, and the slots of the endpoints that we have met.
-fn destinations(
-    domain_id: u16,
-    range: DiscoveryRange,
-    endpoints: &[SocketAddr],
-) -> BTreeSet<SocketAddr> {
+fn destinations(domain_id: u16, range: DiscoveryRange, endpoints: &[SocketAddr]) -> BTreeSet<SocketAddr> {
     if range == DiscoveryRange::Off {
         return BTreeSet::new();
     }
     let first_port = PORT_BASE + PORTS_PER_DOMAIN * u32::from(domain_id);
     let first_unicast = first_port + DISCOVERY_UNICAST_OFFSET;
-    let address = |ip: IpAddr, port: u32| {
-        u16::try_from(port)
-            .ok()
-            .map(|port| SocketAddr::new(ip, port))
-    };
+    let address = |ip: IpAddr, port: u32| u16::try_from(port).ok().map(|port| SocketAddr::new(ip, port));
 
     let multicast = address(DISCOVERY_MULTICAST.into(), first_port);
-    let this_machine = (0..PARTICIPANTS_PER_HOST).filter_map(|slot| {
-        address(
-            Ipv4Addr::LOCALHOST.into(),
-            first_unicast + PORTS_PER_PARTICIPANT * slot,
-        )
-    });
+    let this_machine = (0..PARTICIPANTS_PER_HOST)
+        .filter_map(|slot| address(Ipv4Addr::LOCALHOST.into(), first_unicast + PORTS_PER_PARTICIPANT * slot));
     // User traffic goes to the odd port just above the participant's discovery port.
     let met = endpoints.iter().filter_map(|endpoint| {
         let user_port = u32::from(endpoint.port());
         let in_a_slot = (first_unicast + 1..first_port + PORTS_PER_DOMAIN).contains(&user_port)
             && (user_port - first_unicast) % PORTS_PER_PARTICIPANT == 1;
-        let reachable = endpoint.is_ipv4()
-            && (range != DiscoveryRange::Localhost || endpoint.ip().is_loopback());
-        (in_a_slot && reachable)
-            .then(|| address(endpoint.ip(), user_port - 1))
-            .flatten()
+        let reachable =
+            endpoint.is_ipv4() && (range != DiscoveryRange::Localhost || endpoint.ip().is_loopback());
+        (in_a_slot && reachable).then(|| address(endpoint.ip(), user_port - 1)).flatten()
     });
-    multicast
-        .into_iter()
-        .chain(this_machine)
-        .chain(met)
-        .collect()
+    multicast.into_iter().chain(this_machine).chain(met).collect()
 }
 
 #[cfg(test)]
@@ -206,12 +181,7 @@ mod tests {
         assert_eq!(datagram[20..24], [0x15, 0x03, 52, 0]);
         assert_eq!(datagram.len(), 24 + 52);
         // Flags, octets to inline QoS, reader, writer, sequence number 1·2³² + 0.
-        assert_eq!(
-            datagram[24..44],
-            [
-                0, 0, 16, 0, 0, 0, 0, 0, 0, 1, 0, 0xc2, 1, 0, 0, 0, 0, 0, 0, 0
-            ]
-        );
+        assert_eq!(datagram[24..44], [0, 0, 16, 0, 0, 0, 0, 0, 0, 1, 0, 0xc2, 1, 0, 0, 0, 0, 0, 0, 0]);
         assert_eq!(datagram[44..48], [0x70, 0, 16, 0]);
         assert_eq!(datagram[48..64], guid);
         assert_eq!(datagram[64..], [0x71, 0, 4, 0, 0, 0, 0, 3, 1, 0, 0, 0]);
@@ -219,16 +189,9 @@ mod tests {
 
     #[test]
     fn localhost_never_leaves_the_machine() {
-        let met = [
-            "192.0.2.7:17411".parse().unwrap(),
-            "127.0.0.1:17413".parse().unwrap(),
-        ];
+        let met = ["192.0.2.7:17411".parse().unwrap(), "127.0.0.1:17413".parse().unwrap()];
         let places = destinations(40, DiscoveryRange::Localhost, &met);
-        assert!(
-            places
-                .iter()
-                .all(|p| p.ip().is_loopback() || p.ip().is_multicast())
-        );
+        assert!(places.iter().all(|p| p.ip().is_loopback() || p.ip().is_multicast()));
         assert_eq!(places.len(), 1 + 120);
         assert!(places.contains(&"239.255.0.1:17400".parse().unwrap()));
         assert!(places.contains(&"127.0.0.1:17410".parse().unwrap()));

@@ -1,5 +1,7 @@
 //! The ROS 2 side of the node.
 
+pub mod args;
 pub mod environment;
 mod goodbye;
+pub mod names;
 pub mod participant;

@@ -43,18 +43,10 @@ impl Participant {
     /// # Errors
     /// [`ParticipantError::Open`] when the sockets or threads cannot be had.
     pub fn open(environment: &Environment) -> Result<Self, ParticipantError> {
-        let participant =
-            environment
-                .participant_builder()
-                .build()
-                .map_err(|error| ParticipantError::Open {
-                    domain_id: environment.domain_id(),
-                    reason: error.to_string(),
-                })?;
-        Ok(Self {
-            participant: Some(participant),
-            environment: environment.clone(),
-        })
+        let participant = environment.participant_builder().build().map_err(|error| {
+            ParticipantError::Open { domain_id: environment.domain_id(), reason: error.to_string() }
+        })?;
+        Ok(Self { participant: Some(participant), environment: environment.clone() })
     }
 
     /// A ROS context on this participant.
@@ -65,12 +57,9 @@ impl Participant {
         let participant = self
             .participant
             .clone()
-            .ok_or_else(|| ParticipantError::Context {
-                reason: "the participant is shut down".to_owned(),
-            })?;
-        Context::from_domain_participant(participant).map_err(|error| ParticipantError::Context {
-            reason: error.to_string(),
-        })
+            .ok_or_else(|| ParticipantError::Context { reason: "the participant is shut down".to_owned() })?;
+        Context::from_domain_participant(participant)
+            .map_err(|error| ParticipantError::Context { reason: error.to_string() })
     }
 
     /// Leaves the network: disposes of the participant and tells everybody who may know it.
