@@ -4,4 +4,5 @@ pub mod args;
 pub mod environment;
 mod goodbye;
 pub mod names;
+pub mod parameter_services;
 pub mod participant;
