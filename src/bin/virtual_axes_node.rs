@@ -1,2 +1,82 @@
-//! The ROS 2 node.
-fn main() {}
+//! The ROS 2 node: virtual machine-tool axes.
+
+use std::process::ExitCode;
+
+use virtual_axes::config::{Parameters, Source, parse_assignment};
+use virtual_axes::ros::args::{Command, ParameterSource, RosArgs};
+use virtual_axes::ros::environment::Environment;
+use virtual_axes::ros::node;
+
+/// Exit status of a wrong command line, environment or machine file.
+const USAGE: u8 = 2;
+
+const HELP: &str = "\
+virtual_axes_node: the feed drives of a machine tool as a ROS 2 node
+
+    virtual_axes_node [--ros-args ...]
+
+Without arguments it runs the embedded Mikron UCP 710 in real time.
+    --ros-args -p NAME:=VALUE        a parameter; `virtual_axes parameters` lists them
+               --params-file FILE    a machine, or some of its parameters
+               -r FROM:=TO           another name for a topic or service
+               -r __ns:=/NAMESPACE   -r __node:=NAME
+               --log-level LEVEL     debug, info, warn, error or fatal
+    --help, --version";
+
+fn main() -> ExitCode {
+    match Command::parse(std::env::args().skip(1), "virtual_axes") {
+        Ok(Command::Help) => println!("{HELP}"),
+        Ok(Command::Version) => println!("virtual_axes_node {}", env!("CARGO_PKG_VERSION")),
+        Ok(Command::Run(args)) => return run(&args),
+        Err(error) => return refuse(&error),
+    }
+    ExitCode::SUCCESS
+}
+
+fn refuse(error: &dyn std::error::Error) -> ExitCode {
+    eprintln!("virtual_axes_node: {error}");
+    ExitCode::from(USAGE)
+}
+
+fn run(args: &RosArgs) -> ExitCode {
+    let environment = match Environment::from_process() {
+        Ok(environment) => environment,
+        Err(error) => return refuse(&error),
+    };
+    let parameters = match parameters(args) {
+        Ok(parameters) => parameters,
+        Err(error) => return refuse(error.as_ref()),
+    };
+    match node::run(args, &environment, parameters) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("virtual_axes_node: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The embedded machine, with what the command line puts in its place, in the order of the command line.
+///
+/// Values that stand side by side are taken together, so that what fits only together can be set.
+fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> {
+    let mut parameters = Parameters::embedded_default()?;
+    let node = args.node().to_string();
+    let mut together = Vec::new();
+    for source in args.parameters() {
+        match source {
+            ParameterSource::Value { name, text, .. } => {
+                together.push(parse_assignment(&format!("{name}:={text}"), &Source::named("-p"))?);
+            }
+            ParameterSource::File(path) => {
+                parameters.set_all(std::mem::take(&mut together))?;
+                let overlay = parameters.overlay_file(path, Some(&node))?;
+                if overlay.sections == 0 {
+                    eprintln!("virtual_axes_node: {} has nothing for {node}", path.display());
+                }
+            }
+        }
+    }
+    parameters.set_all(together)?;
+    Ok(parameters)
+}

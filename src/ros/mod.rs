@@ -1,8 +1,23 @@
-//! The ROS 2 side of the node.
+//! The ROS 2 side: the door through which messages come in, and the thread that paces the machine.
+//!
+//! [`pace`] owns the simulation and the clock and never waits for the network in real time; the rest
+//! runs on tokio and talks to it through bounded channels.
 
 pub mod args;
+mod convert;
+mod diagnostics;
+mod endpoints;
 pub mod environment;
 mod goodbye;
+mod inputs;
+pub mod messages;
 pub mod names;
+pub mod node;
+mod outputs;
+mod pace;
+mod parameter_host;
 pub mod parameter_services;
 pub mod participant;
+mod results;
+mod service;
+mod trigger;

@@ -9,18 +9,14 @@ mod list;
 mod types;
 mod wire;
 
-use std::{future::Future, time::Duration};
+use std::future::Future;
 
 use futures::{
-    FutureExt, StreamExt,
+    StreamExt,
     future::BoxFuture,
     stream::{BoxStream, FuturesUnordered, select_all},
 };
-use ros2_client::{
-    Message, MessageTypeName, Name, Node, Publisher, Server, ServiceMapping, ServiceTypeName,
-    qos::{History, QosProfile, WhenFull},
-    service::RmwRequestId,
-};
+use ros2_client::{Message, MessageTypeName, Name, Node, Publisher, ServiceTypeName, service::RmwRequestId};
 use ros2_interfaces_jazzy_serde::{
     builtin_interfaces::msg::Time,
     rcl_interfaces::{
@@ -37,30 +33,11 @@ use rustdds::DomainParticipant;
 
 pub use self::types::{Descriptor, ParameterHost, ParameterType, ParameterValue, Range};
 use super::args::RosArgs;
+use super::service::{Service, ServiceError, profile};
 
 /// rmw's profile for parameter services and events keeps this many, so that a client may send that
 /// many requests at once.
 const QUEUE_DEPTH: usize = 1000;
-/// How long a write may wait for a slow reader.
-const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
-/// A client's request can arrive before its response reader is known here, and a response that is
-/// written then reaches nobody. So long a response is held back,
-const CLIENT_TIMEOUT: Duration = Duration::from_secs(1);
-/// and so often it is looked whether the reader has come.
-const CLIENT_POLL: Duration = Duration::from_millis(5);
-/// From a reader's discovery until the writer serves it.
-const CLIENT_SETTLE: Duration = Duration::from_millis(10);
-
-/// A service or topic of the parameter interface could not be created.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot create '{name}': {reason}")]
-pub struct ParameterServicesError {
-    /// Its name.
-    pub name: String,
-    /// Why not.
-    pub reason: String,
-}
-
 enum Request {
     Get(RmwRequestId, GetParametersRequest),
     Types(RmwRequestId, GetParameterTypesRequest),
@@ -68,15 +45,7 @@ enum Request {
     SetAtomically(RmwRequestId, SetParametersAtomicallyRequest),
     List(RmwRequestId, ListParametersRequest),
     Describe(RmwRequestId, DescribeParametersRequest),
-    Unreadable(&'static str, String),
-}
-
-/// One service: its server, and the DDS topic on which its responses go out.
-struct Service<Q: Message, A: Message> {
-    label: &'static str,
-    server: Server<Q, A>,
-    response_topic: String,
-    participant: DomainParticipant,
+    Unreadable(String),
 }
 
 /// The services of one node, ready to [`Self::serve`].
@@ -101,7 +70,7 @@ impl ParameterServices {
         node: &mut Node,
         participant: &DomainParticipant,
         args: &RosArgs,
-    ) -> Result<Self, ParameterServicesError> {
+    ) -> Result<Self, ServiceError> {
         let mut door = Door { node, participant, args };
         Ok(Self {
             get: door.service("get_parameters", "GetParameters")?,
@@ -123,12 +92,12 @@ impl ParameterServices {
         stop: impl Future<Output = ()> + Send,
     ) {
         let mut requests = select_all([
-            self.get.requests(Request::Get),
-            self.types.requests(Request::Types),
-            self.set.requests(Request::Set),
-            self.set_atomically.requests(Request::SetAtomically),
-            self.list.requests(Request::List),
-            self.describe.requests(Request::Describe),
+            stream(&self.get, Request::Get),
+            stream(&self.types, Request::Types),
+            stream(&self.set, Request::Set),
+            stream(&self.set_atomically, Request::SetAtomically),
+            stream(&self.list, Request::List),
+            stream(&self.describe, Request::Describe),
         ]);
         // Responses are sent side by side: one client that is slow to be discovered holds up no other.
         let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
@@ -193,8 +162,8 @@ impl ParameterServices {
                 let descriptors = descriptors.collect();
                 self.describe.respond(id, DescribeParametersResponse { descriptors })
             }
-            Request::Unreadable(label, reason) => {
-                tracing::warn!("a request to {label} could not be read: {reason}");
+            Request::Unreadable(reason) => {
+                tracing::warn!("{reason}");
                 return None;
             }
         })
@@ -230,63 +199,25 @@ impl ParameterServices {
     }
 }
 
-impl<Q, A> Service<Q, A>
+/// Requests of one service among those of the others.
+fn stream<'a, Q, A>(
+    service: &'a Service<Q, A>,
+    wrap: impl Fn(RmwRequestId, Q) -> Request + Send + 'a,
+) -> BoxStream<'a, Request>
 where
     Q: Message + Send + Sync + 'static,
     A: Message + Send + Sync + 'static,
 {
-    fn requests<'a>(
-        &'a self,
-        wrap: impl Fn(RmwRequestId, Q) -> Request + Send + 'a,
-    ) -> BoxStream<'a, Request> {
-        let label = self.label;
-        self.server
-            .receive_request_stream()
-            .map(move |received| match received {
-                Ok((id, request)) => wrap(id, request),
-                Err(error) => Request::Unreadable(label, format!("{error:?}")),
-            })
-            .boxed()
-    }
-
-    fn respond<'a>(&'a self, id: RmwRequestId, response: A) -> BoxFuture<'a, ()> {
-        async move {
-            self.wait_for_client(&id).await;
-            if let Err(error) = self.server.async_send_response(id, response).await {
-                tracing::warn!("the response of {} could not be sent: {error:?}", self.label);
-            }
-        }
-        .boxed()
-    }
-
-    /// Waits until the response reader of the client behind `id` is known.
-    async fn wait_for_client(&self, id: &RmwRequestId) {
-        if self.knows_client(id) {
-            return;
-        }
-        let deadline = tokio::time::Instant::now() + CLIENT_TIMEOUT;
-        while !self.knows_client(id) {
-            if tokio::time::Instant::now() >= deadline {
-                tracing::debug!("the client of {} is gone, or never was discovered", self.label);
-                return;
-            }
-            tokio::time::sleep(CLIENT_POLL).await;
-        }
-        tokio::time::sleep(CLIENT_SETTLE).await;
-    }
-
-    fn knows_client(&self, id: &RmwRequestId) -> bool {
-        // Requests carry an endpoint of the client: its writer, or with Fast DDS its response reader.
-        // What they have in common is the participant.
-        let client = id.writer_gid.to_bytes16();
-        self.participant.discovered_readers().iter().any(|reader| {
-            reader.subscription_topic_data.topic_name() == &self.response_topic
-                && reader.reader_proxy.remote_reader_guid.to_bytes()[..12] == client[..12]
+    service
+        .requests()
+        .map(move |received| match received {
+            Ok((id, request)) => wrap(id, request),
+            Err(reason) => Request::Unreadable(reason),
         })
-    }
+        .boxed()
 }
 
-/// Where services and topics are created.
+/// Creates the services under the node's name, reliable and with rmw's depth.
 struct Door<'a> {
     node: &'a mut Node,
     participant: &'a DomainParticipant,
@@ -294,45 +225,23 @@ struct Door<'a> {
 }
 
 impl Door<'_> {
-    fn profile() -> QosProfile {
-        QosProfile::publisher_default()
-            .reliability_reliable(WhenFull::Wait(WRITE_TIMEOUT))
-            .history(History::KeepLast { depth: QUEUE_DEPTH })
-    }
-
     fn service<Q: Message + Clone + 'static, A: Message + 'static>(
         &mut self,
         label: &'static str,
         type_name: &str,
-    ) -> Result<Service<Q, A>, ParameterServicesError> {
-        let error = |reason: String| ParameterServicesError { name: label.to_owned(), reason };
-        let resolved = self.args.resolve_service(&format!("~/{label}")).map_err(|e| error(e.to_string()))?;
-        let name = Name::parse(&resolved).map_err(|e| error(e.to_string()))?;
-        let server = self
-            .node
-            .create_server(
-                ServiceMapping::Enhanced,
-                &name,
-                &ServiceTypeName::new("rcl_interfaces", type_name),
-                Self::profile(),
-                Self::profile(),
-            )
-            .map_err(|e| error(e.to_string()))?;
-        Ok(Service {
-            label,
-            server,
-            response_topic: format!("rr{resolved}Reply"),
-            participant: self.participant.clone(),
-        })
+    ) -> Result<Service<Q, A>, ServiceError> {
+        let type_name = ServiceTypeName::new("rcl_interfaces", type_name);
+        Service::new(self.node, self.participant, self.args, label, &type_name, QUEUE_DEPTH)
     }
 
-    fn events(&mut self) -> Result<Publisher<msg::ParameterEvent>, ParameterServicesError> {
-        let error = |reason: String| ParameterServicesError { name: "/parameter_events".to_owned(), reason };
+    fn events(&mut self) -> Result<Publisher<msg::ParameterEvent>, ServiceError> {
+        let error = |reason: String| ServiceError { name: "/parameter_events".to_owned(), reason };
         let resolved = self.args.resolve_topic("/parameter_events").map_err(|e| error(e.to_string()))?;
         let name = Name::parse(&resolved).map_err(|e| error(e.to_string()))?;
+        let type_name = MessageTypeName::new("rcl_interfaces", "ParameterEvent");
         let topic = self
             .node
-            .create_topic(&name, MessageTypeName::new("rcl_interfaces", "ParameterEvent"), &Self::profile())
+            .create_topic(&name, type_name, &profile(QUEUE_DEPTH))
             .map_err(|e| error(e.to_string()))?;
         self.node.create_publisher(&topic, None).map_err(|e| error(e.to_string()))
     }

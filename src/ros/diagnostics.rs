@@ -1,0 +1,122 @@
+//! `/diagnostics` once a second (REP-107), readable with stock types.
+
+use std::fmt::Display;
+
+use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
+
+use super::convert::header;
+use super::pace::{AxisHealth, Health};
+use crate::units::Nanoseconds;
+
+/// What stays the same from message to message.
+#[derive(Debug, Clone)]
+pub struct Diagnostics {
+    /// Fully qualified name of the node.
+    pub node: String,
+    /// Name of the machine.
+    pub machine: String,
+    /// Joints, with prefix.
+    pub joints: Vec<String>,
+    /// `real` or `fast`.
+    pub time_mode: &'static str,
+}
+
+fn value(key: &str, value: impl Display) -> KeyValue {
+    KeyValue { key: key.to_owned(), value: value.to_string() }
+}
+
+impl Diagnostics {
+    /// The message at `time` (ns): what has happened between `before` and `now`.
+    ///
+    /// `outputs_dropped` counts messages that a slow subscriber made the node drop since the start.
+    pub fn message(
+        &self,
+        time: Nanoseconds,
+        before: &Health,
+        now: &Health,
+        outputs_dropped: (u64, u64),
+    ) -> DiagnosticArray {
+        let axes = self.joints.iter().enumerate().map(|(place, joint)| {
+            let at = |health: &Health| health.axes.get(place).copied().unwrap_or_default();
+            self.axis(joint, at(before), at(now))
+        });
+        let status = std::iter::once(self.node_status(before, now, outputs_dropped)).chain(axes).collect();
+        DiagnosticArray { header: header(time), status }
+    }
+
+    fn status(&self, name: String, problems: &[&str], fine: &str, values: Vec<KeyValue>) -> DiagnosticStatus {
+        let level = if problems.is_empty() { DiagnosticStatus::OK } else { DiagnosticStatus::WARN };
+        let message = if problems.is_empty() { fine.to_owned() } else { problems.join("; ") };
+        DiagnosticStatus { level, name, message, hardware_id: self.machine.clone(), values }
+    }
+
+    fn node_status(&self, before: &Health, now: &Health, (old, new): (u64, u64)) -> DiagnosticStatus {
+        let periods = now.periods - before.periods;
+        let missed = now.missed - before.missed;
+        let dropped = (now.dropped - before.dropped) + (new - old);
+        let mean =
+            if periods == 0 { 0.0 } else { (now.total_lateness - before.total_lateness) / periods as f64 };
+        let mut problems = Vec::new();
+        if missed > 0 {
+            problems.push("position periods were released late");
+        }
+        if dropped > 0 {
+            problems.push("samples were dropped: a subscriber is slow");
+        }
+        let fine = if now.moving {
+            "running"
+        } else if now.busy {
+            "settling"
+        } else {
+            "holding"
+        };
+        let values = vec![
+            value("state", fine),
+            value("time", self.time_mode),
+            value("position_periods", now.periods),
+            value("missed_periods", now.missed),
+            value("missed_periods_last_second", missed),
+            value("dropped_samples", now.dropped + new),
+            value("mean_lateness_ms", format!("{:.3}", mean * 1e3)),
+            value("max_lateness_ms", format!("{:.3}", now.max_lateness * 1e3)),
+        ];
+        self.status(format!("{}: axes", self.node), &problems, fine, values)
+    }
+
+    fn axis(&self, joint: &str, before: AxisHealth, now: AxisHealth) -> DiagnosticStatus {
+        let mut problems = Vec::new();
+        if now.saturated > before.saturated {
+            problems.push("speed, current or voltage set-point at its limit");
+        }
+        if now.extrapolated > before.extrapolated {
+            problems.push("friction law used beyond its fitted range of 20 m/min or rev/min");
+        }
+        let values = vec![
+            value("saturated_periods", now.saturated),
+            value("friction_extrapolated_periods", now.extrapolated),
+        ];
+        self.status(format!("{}: {joint}", self.node), &problems, "ok", values)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_names_what_happened_in_the_last_second_only() {
+        let diagnostics = Diagnostics {
+            node: "/virtual_axes".into(),
+            machine: "m".into(),
+            joints: vec!["x".into()],
+            time_mode: "real",
+        };
+        let before = Health { axes: vec![AxisHealth::default()], ..Health::default() };
+        let mut now = before.clone();
+        now.axes[0].saturated = 3;
+        let first = diagnostics.message(0, &before, &now, (0, 0));
+        assert_eq!((first.status[0].level, first.status[1].level), (0, 1));
+        let second = diagnostics.message(0, &now, &now, (0, 0));
+        assert_eq!(second.status[1].level, 0);
+    }
+}

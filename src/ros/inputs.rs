@@ -1,0 +1,105 @@
+//! What the node listens to: `psec` and `load`.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use futures::StreamExt;
+use ros2_client::{MessageInfo, Subscription};
+use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
+use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
+use tokio::sync::{mpsc, watch};
+use tracing::warn;
+
+use super::convert;
+use super::pace::{Command, Health};
+use super::parameter_host::LiveNodeParameters;
+use super::results::{Origin, Results};
+use crate::config::NodeConfig;
+use crate::trajectory::{Context, JointLimits, MotionId, Rejection, Trajectory};
+use crate::units::Nanoseconds;
+
+/// Takes trajectories in, makes the checks that need no state, and hands them to the simulation.
+pub struct PsecInput {
+    /// Joints that trajectories may name, with their limits.
+    pub joints: Vec<JointLimits>,
+    /// Tsp, ns.
+    pub period: Nanoseconds,
+    /// Parameters of the node.
+    pub node: NodeConfig,
+    /// Those of them that can be set.
+    pub live: Arc<LiveNodeParameters>,
+    /// To the simulation.
+    pub commands: mpsc::Sender<Command>,
+    /// Where decisions are published.
+    pub results: Arc<Results>,
+    /// What time it is in the simulation.
+    pub health: watch::Receiver<Health>,
+    /// Names of motions.
+    pub ids: Arc<AtomicU64>,
+}
+
+/// A motion's next name.
+pub fn next_id(ids: &AtomicU64) -> MotionId {
+    MotionId(ids.fetch_add(1, Ordering::Relaxed))
+}
+
+impl PsecInput {
+    /// Takes messages until the node shuts down.
+    pub async fn run(self, subscription: Subscription<JointTrajectory>) {
+        let mut messages = std::pin::pin!(subscription.async_stream());
+        while let Some(received) = messages.next().await {
+            match received {
+                Ok((message, info)) => self.take(message, &info).await,
+                Err(error) => warn!("a message on psec could not be read: {error:?}"),
+            }
+        }
+    }
+
+    async fn take(&self, message: JointTrajectory, info: &MessageInfo) {
+        let origin = Origin::of(&message.header.stamp, info);
+        // A large trajectory takes a while to check; other tasks go on meanwhile.
+        let checked = tokio::task::block_in_place(|| self.check(&message));
+        match checked {
+            Ok(trajectory) => {
+                let id = next_id(&self.ids);
+                let trajectory = Arc::new(trajectory);
+                self.results.expect(id, origin, Arc::clone(&trajectory)).await;
+                // The simulation is gone only when the node shuts down.
+                let _ = self.commands.send(Command::Offer { id, trajectory }).await;
+            }
+            Err(rejection) => {
+                let now = self.health.borrow().time;
+                self.results.rejected(&origin, now, &rejection).await;
+            }
+        }
+    }
+
+    fn check(&self, message: &JointTrajectory) -> Result<Trajectory, Rejection> {
+        let request = convert::request(message, self.node.max_points)?;
+        let context = Context {
+            joints: &self.joints,
+            period: self.period,
+            max_points: self.node.max_points,
+            allow_nonzero_end_velocity: self.live.allow_nonzero_end_velocity.load(Ordering::Relaxed),
+        };
+        Trajectory::new(request, &context)
+    }
+}
+
+/// Takes loads in until the node shuts down; each holds for `hold` ns.
+pub async fn take_loads(
+    subscription: Subscription<JointState>,
+    joints: Vec<String>,
+    hold: Nanoseconds,
+    commands: mpsc::Sender<Command>,
+) {
+    let mut messages = std::pin::pin!(subscription.async_stream());
+    while let Some(received) = messages.next().await {
+        match received.map_err(|e| format!("{e:?}")).and_then(|(m, _)| convert::loads(&m, &joints)) {
+            Ok(loads) => {
+                let _ = commands.send(Command::Load { loads, hold }).await;
+            }
+            Err(reason) => warn!("a message on load is left out: {reason}"),
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! The schema's parameters as the parameter services see them.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use tokio::sync::mpsc;
+
+use super::pace::Command;
+use super::parameter_services::{Descriptor, ParameterHost, ParameterType, ParameterValue, Range};
+use crate::config::{Assignment, Definition, Kind, Parameters, Source, Value};
+use crate::machine::MachineParameters;
+
+/// Node parameters that other tasks read while they can be set.
+#[derive(Debug, Default)]
+pub struct LiveNodeParameters {
+    /// `allow_nonzero_velocity_at_trajectory_end`.
+    pub allow_nonzero_end_velocity: AtomicBool,
+}
+
+/// Checks what is set against the schema, and hands it to the simulation as a command.
+pub struct Host {
+    parameters: Parameters,
+    commands: mpsc::Sender<Command>,
+    live: Arc<LiveNodeParameters>,
+}
+
+impl Host {
+    /// A host of `parameters` whose changes go to `commands` and `live`.
+    pub fn new(
+        parameters: Parameters,
+        commands: mpsc::Sender<Command>,
+        live: Arc<LiveNodeParameters>,
+    ) -> Self {
+        let host = Host { parameters, commands, live };
+        host.update_live();
+        host
+    }
+
+    fn update_live(&self) {
+        let allow = self.parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
+        self.live.allow_nonzero_end_velocity.store(allow, Ordering::Relaxed);
+    }
+}
+
+impl ParameterHost for Host {
+    fn names(&self) -> Vec<String> {
+        self.parameters.definitions().map(|(name, _)| name).collect()
+    }
+
+    fn get(&self, name: &str) -> Option<ParameterValue> {
+        self.parameters.get(name).map(to_ros)
+    }
+
+    fn describe(&self, name: &str) -> Option<Descriptor> {
+        self.parameters.definition(name).map(descriptor)
+    }
+
+    fn set(&mut self, changes: Vec<(String, ParameterValue)>) -> Result<(), String> {
+        let source = Source::named("parameter");
+        let mut assignments = Vec::with_capacity(changes.len());
+        for (key, value) in changes {
+            if self.parameters.definition(&key).is_some_and(|d| !d.live) {
+                return Err(format!(
+                    "{key} cannot be set while the node runs; set it at the start, with -p or --params-file"
+                ));
+            }
+            let value =
+                from_ros(value).ok_or_else(|| format!("{key}: byte arrays are not parameters here"))?;
+            assignments.push(Assignment { key, value, source: source.clone() });
+        }
+        let mut changed = self.parameters.clone();
+        changed.set_all(assignments).map_err(|error| error.to_string())?;
+        let config = changed.machine_config().map_err(|error| error.to_string())?;
+        let machine = MachineParameters::new(&config).map_err(|error| error.to_string())?;
+        self.commands
+            .try_send(Command::Adopt(Arc::new(machine)))
+            .map_err(|_| "too many commands wait for the next position period; try again".to_owned())?;
+        self.parameters = changed;
+        self.update_live();
+        Ok(())
+    }
+}
+
+fn to_ros(value: Value) -> ParameterValue {
+    match value {
+        Value::Bool(v) => ParameterValue::Bool(v),
+        Value::Integer(v) => ParameterValue::Integer(v),
+        Value::Double(v) => ParameterValue::Double(v),
+        Value::Text(v) => ParameterValue::String(v),
+        Value::BoolList(v) => ParameterValue::BoolArray(v),
+        Value::IntegerList(v) => ParameterValue::IntegerArray(v),
+        Value::DoubleList(v) => ParameterValue::DoubleArray(v),
+        Value::TextList(v) => ParameterValue::StringArray(v),
+    }
+}
+
+fn from_ros(value: ParameterValue) -> Option<Value> {
+    Some(match value {
+        ParameterValue::Bool(v) => Value::Bool(v),
+        ParameterValue::Integer(v) => Value::Integer(v),
+        ParameterValue::Double(v) => Value::Double(v),
+        ParameterValue::String(v) => Value::Text(v),
+        ParameterValue::BoolArray(v) => Value::BoolList(v),
+        ParameterValue::IntegerArray(v) => Value::IntegerList(v),
+        ParameterValue::DoubleArray(v) => Value::DoubleList(v),
+        ParameterValue::StringArray(v) => Value::TextList(v),
+        ParameterValue::ByteArray(_) => return None,
+    })
+}
+
+fn descriptor(definition: &Definition) -> Descriptor {
+    let (kind, range) = match definition.kind {
+        Kind::Number { min, max } => {
+            (ParameterType::Double, Some(Range::Double { from: min, to: max, step: 0.0 }))
+        }
+        Kind::Integer { min, max } => {
+            (ParameterType::Integer, Some(Range::Integer { from: min, to: max, step: 0 }))
+        }
+        Kind::Flag => (ParameterType::Bool, None),
+        Kind::Text | Kind::Choice(_) => (ParameterType::String, None),
+        Kind::TextList => (ParameterType::StringArray, None),
+    };
+    let description = if definition.unit.is_empty() {
+        definition.description.to_owned()
+    } else {
+        format!("{} Unit: {}.", definition.description, definition.unit)
+    };
+    let choices = match definition.kind {
+        Kind::Choice(_) => format!("must {}", definition.allowed()),
+        _ => String::new(),
+    };
+    Descriptor {
+        kind,
+        description,
+        additional_constraints: choices,
+        read_only: !definition.live,
+        dynamic_typing: false,
+        range,
+    }
+}

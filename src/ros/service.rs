@@ -1,0 +1,133 @@
+//! Services under their resolved names, whose responses wait for the client to be known.
+
+use std::time::Duration;
+
+use futures::{FutureExt, StreamExt, future::BoxFuture, stream::BoxStream};
+use ros2_client::qos::{History, QosProfile, WhenFull};
+use ros2_client::service::RmwRequestId;
+use ros2_client::{Message, Name, Node, Server, ServiceMapping, ServiceTypeName};
+use rustdds::DomainParticipant;
+
+use super::args::RosArgs;
+
+/// How long a write may wait for a slow reader.
+const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
+/// A client's request can arrive before its response reader is known here, and a response that is
+/// written then reaches nobody. So long a response is held back,
+const CLIENT_TIMEOUT: Duration = Duration::from_secs(1);
+/// and so often it is looked whether the reader has come.
+const CLIENT_POLL: Duration = Duration::from_millis(5);
+/// From a reader's discovery until the writer serves it.
+const CLIENT_SETTLE: Duration = Duration::from_millis(10);
+
+/// A service, or a topic that goes with one, could not be created.
+#[derive(Debug, thiserror::Error)]
+#[error("service {name} cannot be created: {reason}")]
+pub struct ServiceError {
+    /// Its name.
+    pub name: String,
+    /// Why not.
+    pub reason: String,
+}
+
+/// Reliable, volatile, keep last `depth`.
+pub fn profile(depth: usize) -> QosProfile {
+    QosProfile::publisher_default()
+        .reliability_reliable(WhenFull::Wait(WRITE_TIMEOUT))
+        .history(History::KeepLast { depth })
+}
+
+/// One service: its server, and the DDS topic on which its responses go out.
+pub struct Service<Q: Message, A: Message> {
+    label: &'static str,
+    server: Server<Q, A>,
+    response_topic: String,
+    participant: DomainParticipant,
+}
+
+impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
+    /// The service `~/label`; `participant` is the one that `node` lives on.
+    ///
+    /// # Errors
+    /// [`ServiceError`] when the middleware refuses it.
+    pub fn new(
+        node: &mut Node,
+        participant: &DomainParticipant,
+        args: &RosArgs,
+        label: &'static str,
+        type_name: &ServiceTypeName,
+        depth: usize,
+    ) -> Result<Self, ServiceError>
+    where
+        Q: Clone,
+    {
+        let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
+        let resolved = args.resolve_service(&format!("~/{label}")).map_err(|e| failed(e.to_string()))?;
+        let name = Name::parse(&resolved).map_err(|e| failed(e.to_string()))?;
+        let server = node
+            .create_server(ServiceMapping::Enhanced, &name, type_name, profile(depth), profile(depth))
+            .map_err(|e| failed(e.to_string()))?;
+        Ok(Service {
+            label,
+            server,
+            response_topic: format!("rr{resolved}Reply"),
+            participant: participant.clone(),
+        })
+    }
+
+    /// Requests as they come, or why one could not be read.
+    pub fn requests(&self) -> BoxStream<'_, Result<(RmwRequestId, Q), String>>
+    where
+        Q: Send + Sync,
+        A: Send + Sync,
+    {
+        let label = self.label;
+        self.server
+            .receive_request_stream()
+            .map(move |received| {
+                received.map_err(|error| format!("a request to {label} could not be read: {error:?}"))
+            })
+            .boxed()
+    }
+
+    /// Sends the response to a request, once its client is known.
+    pub fn respond<'a>(&'a self, id: RmwRequestId, response: A) -> BoxFuture<'a, ()>
+    where
+        Q: Send + Sync,
+        A: Send + Sync,
+    {
+        async move {
+            self.wait_for_client(&id).await;
+            if let Err(error) = self.server.async_send_response(id, response).await {
+                tracing::warn!("the response of {} could not be sent: {error:?}", self.label);
+            }
+        }
+        .boxed()
+    }
+
+    /// Waits until the response reader of the client behind `id` is known.
+    async fn wait_for_client(&self, id: &RmwRequestId) {
+        if self.knows_client(id) {
+            return;
+        }
+        let deadline = tokio::time::Instant::now() + CLIENT_TIMEOUT;
+        while !self.knows_client(id) {
+            if tokio::time::Instant::now() >= deadline {
+                tracing::debug!("the client of {} is gone, or never was discovered", self.label);
+                return;
+            }
+            tokio::time::sleep(CLIENT_POLL).await;
+        }
+        tokio::time::sleep(CLIENT_SETTLE).await;
+    }
+
+    fn knows_client(&self, id: &RmwRequestId) -> bool {
+        // Requests carry an endpoint of the client: its writer, or with Fast DDS its response reader.
+        // What they have in common is the participant.
+        let client = id.writer_gid.to_bytes16();
+        self.participant.discovered_readers().iter().any(|reader| {
+            reader.subscription_topic_data.topic_name() == &self.response_topic
+                && reader.reader_proxy.remote_reader_guid.to_bytes()[..12] == client[..12]
+        })
+    }
+}

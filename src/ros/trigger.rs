@@ -1,0 +1,51 @@
+//! The services `~/stop` and `~/reset`.
+
+use futures::StreamExt;
+use ros2_client::{Node, ServiceTypeName};
+use ros2_interfaces_jazzy_serde::std_srvs::srv::{TriggerRequest, TriggerResponse};
+use rustdds::DomainParticipant;
+
+use super::args::RosArgs;
+use super::service::{Service, ServiceError};
+
+/// Requests that may wait.
+const DEPTH: usize = 10;
+
+/// A `std_srvs/Trigger` service.
+pub struct Trigger(Service<TriggerRequest, TriggerResponse>);
+
+impl Trigger {
+    /// The service `~/label`.
+    ///
+    /// # Errors
+    /// [`ServiceError`] when the middleware refuses it.
+    pub fn new(
+        node: &mut Node,
+        participant: &DomainParticipant,
+        args: &RosArgs,
+        label: &'static str,
+    ) -> Result<Self, ServiceError> {
+        let type_name = ServiceTypeName::new("std_srvs", "Trigger");
+        Service::new(node, participant, args, label, &type_name, DEPTH).map(Trigger)
+    }
+
+    /// Serves until the node shuts down: `act` does what is asked and says what it did.
+    pub async fn serve<F>(self, act: impl Fn() -> F + Send)
+    where
+        F: Future<Output = Result<String, String>> + Send,
+    {
+        let mut requests = self.0.requests();
+        while let Some(received) = requests.next().await {
+            match received {
+                Ok((id, _)) => {
+                    let (success, message) = match act().await {
+                        Ok(message) => (true, message),
+                        Err(message) => (false, message),
+                    };
+                    self.0.respond(id, TriggerResponse { success, message }).await;
+                }
+                Err(reason) => tracing::warn!("{reason}"),
+            }
+        }
+    }
+}
