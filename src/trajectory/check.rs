@@ -18,12 +18,7 @@ pub(super) fn check(trajectory: &Trajectory, context: &Context<'_>) -> Result<()
     }
     let share = (BUDGET / trajectory.segments().max(1)).max(MIN_SHARE) as i64;
     for (column, &joint) in trajectory.joints().iter().enumerate() {
-        let check = ColumnCheck {
-            trajectory,
-            column,
-            joint: &context.joints[joint],
-            period: context.period,
-        };
+        let check = ColumnCheck { trajectory, column, joint: &context.joints[joint], period: context.period };
         check.points()?;
         check.end(context.allow_nonzero_end_velocity)?;
         check.grid(share)?;
@@ -100,12 +95,7 @@ impl ColumnCheck<'_> {
         Ok(())
     }
 
-    fn step(
-        &self,
-        point: usize,
-        previous: &mut Option<f64>,
-        position: f64,
-    ) -> Result<(), Rejection> {
+    fn step(&self, point: usize, previous: &mut Option<f64>, position: f64) -> Result<(), Rejection> {
         self.joint.check_stroke(point, position)?;
         if let Some(before) = previous.replace(position) {
             let speed = (position - before) / seconds(self.period);
@@ -134,11 +124,7 @@ pub(super) fn check_samples(
     interval: (Nanoseconds, Nanoseconds),
     samples: i64,
 ) -> Result<(), Rejection> {
-    let samples = if segment.order() == Order::Linear {
-        1
-    } else {
-        samples
-    };
+    let samples = if segment.order() == Order::Linear { 1 } else { samples };
     for i in 0..=samples {
         let span = i128::from(interval.1) - i128::from(interval.0);
         let offset = span * i128::from(i) / i128::from(samples);

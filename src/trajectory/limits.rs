@@ -22,11 +22,7 @@ pub struct JointLimits {
 impl JointLimits {
     /// The joint of an axis, named after it.
     pub fn of_axis(axis: &AxisConfig) -> Self {
-        Self {
-            name: axis.name().to_owned(),
-            kind: axis.kind(),
-            limits: *axis.limits(),
-        }
+        Self { name: axis.name().to_owned(), kind: axis.kind(), limits: *axis.limits() }
     }
 
     /// Unit of positions.
@@ -70,12 +66,7 @@ impl JointLimits {
     ///
     /// # Errors
     /// [`Code::Speed`]; NaN is too fast too.
-    pub(super) fn check_speed(
-        &self,
-        index: usize,
-        velocity: f64,
-        what: &str,
-    ) -> Result<(), Rejection> {
+    pub(super) fn check_speed(&self, index: usize, velocity: f64, what: &str) -> Result<(), Rejection> {
         let speed = velocity.abs();
         if speed <= self.speed_bound() {
             return Ok(());

@@ -48,13 +48,7 @@ impl Motions {
     }
 
     pub fn open(&mut self, id: MotionId, joints: usize) -> usize {
-        let motion = Some(Motion {
-            id,
-            remaining: joints,
-            started: false,
-            outcome: None,
-            closed: false,
-        });
+        let motion = Some(Motion { id, remaining: joints, started: false, outcome: None, closed: false });
         match self.free.pop() {
             Some(slot) => {
                 self.slots[slot] = motion;

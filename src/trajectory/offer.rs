@@ -80,8 +80,7 @@ impl Timeline {
             self.follow(id, &trajectory, origin)?
         };
         // What can be told before the next offer fits without allocating: a start and an end each.
-        self.events
-            .reserve(self.pending.len() + 2 * self.motions.capacity());
+        self.events.reserve(self.pending.len() + 2 * self.motions.capacity());
         Ok(admission)
     }
 
@@ -104,19 +103,11 @@ impl Timeline {
                 end_k,
                 nominal_start: begin,
                 nominal_end: i128::from(end_k) * i128::from(self.period),
-                kind: Kind::Stop {
-                    from_k: join_k - 1,
-                    stop,
-                },
+                kind: Kind::Stop { from_k: join_k - 1, stop },
             });
         }
         self.motions.settle(&mut self.pending);
-        Admission {
-            start_k: join_k,
-            join_k,
-            end_k: last_k,
-            joined_late: false,
-        }
+        Admission { start_k: join_k, join_k, end_k: last_k, joined_late: false }
     }
 
     fn follow(
@@ -153,11 +144,7 @@ impl Timeline {
         Ok(schedule.admission)
     }
 
-    fn schedule(
-        &self,
-        trajectory: &Trajectory,
-        origin: Nanoseconds,
-    ) -> Result<Schedule, Rejection> {
+    fn schedule(&self, trajectory: &Trajectory, origin: Nanoseconds) -> Result<Schedule, Rejection> {
         let period = i128::from(self.period);
         let nominal_start = match trajectory.start() {
             Start::Now => i128::from(self.next_k) * period,
@@ -185,18 +172,9 @@ impl Timeline {
         let join_k = start_k.max(self.next_k);
         let joined_late = join_k > start_k;
         Ok(Schedule {
-            admission: Admission {
-                start_k,
-                join_k,
-                end_k,
-                joined_late,
-            },
+            admission: Admission { start_k, join_k, end_k, joined_late },
             // Whoever joins in late takes nothing from those that ended before.
-            nominal_start: if joined_late {
-                i128::from(join_k) * period
-            } else {
-                nominal_start
-            },
+            nominal_start: if joined_late { i128::from(join_k) * period } else { nominal_start },
             nominal_end,
         })
     }
@@ -209,19 +187,14 @@ impl Timeline {
         admission: &Admission,
     ) -> Result<Path, Rejection> {
         let joint = trajectory.joints()[column];
-        let Admission {
-            start_k, join_k, ..
-        } = *admission;
+        let Admission { start_k, join_k, .. } = *admission;
         let limits = &self.joints[joint];
         let queue = &self.tracks[joint].queue;
         let before = queue.partition_point(|plan| plan.join_k < join_k);
         if before > MAX_WAITING {
             return Err(Rejection::new(
                 Code::QueueFull,
-                format!(
-                    "{}: {MAX_WAITING} trajectories wait for it already",
-                    limits.name
-                ),
+                format!("{}: {MAX_WAITING} trajectories wait for it already", limits.name),
             )
             .joint(&limits.name)
             .numbers(before as f64, MAX_WAITING as f64));
@@ -250,9 +223,7 @@ impl Timeline {
             let index = trajectory.locate(begin, 0);
             limits.check_jump(index, before, first, seconds(self.period))?;
         }
-        path.tail = trajectory
-            .moving_end(column)
-            .map(|end| self.planner.plan(end, &limits.limits));
+        path.tail = trajectory.moving_end(column).map(|end| self.planner.plan(end, &limits.limits));
         Ok(path)
     }
 
@@ -270,11 +241,7 @@ impl Timeline {
         let step = |k: i64| {
             let (before, position) = (at(k - 1), at(k));
             limits.check_stroke(0, position)?;
-            limits.check_speed(
-                0,
-                (position - before) / seconds(period),
-                "speed on the way to it",
-            )
+            limits.check_speed(0, (position - before) / seconds(period), "speed on the way to it")
         };
         let join = begin / period;
         let first_time = path.trajectory.first_time();
@@ -282,13 +249,7 @@ impl Timeline {
         if last - join <= APPROACH_SAMPLES {
             return (join + 1..=last).try_for_each(step);
         }
-        check_samples(
-            limits,
-            0,
-            segment,
-            (0, first_time - begin),
-            APPROACH_SAMPLES,
-        )?;
+        check_samples(limits, 0, segment, (0, first_time - begin), APPROACH_SAMPLES)?;
         step(last)
     }
 }

@@ -132,9 +132,7 @@ impl Trajectory {
     /// Positions of point `index`, m or rad, one per column; nothing beyond the last point.
     pub fn positions(&self, index: usize) -> Option<&[f64]> {
         let columns = self.joints.len();
-        self.positions
-            .get(index.checked_mul(columns)?..)?
-            .get(..columns)
+        self.positions.get(index.checked_mul(columns)?..)?.get(..columns)
     }
 
     /// Highest derivative that point `index` has.
@@ -161,8 +159,7 @@ impl Trajectory {
     /// there and one further are tried first, so that walking along costs no search.
     pub(super) fn locate(&self, time: Nanoseconds, hint: usize) -> usize {
         let holds = |i: usize| {
-            self.times.get(i).is_some_and(|&t| t <= time)
-                && self.times.get(i + 1).is_none_or(|&t| time < t)
+            self.times.get(i).is_some_and(|&t| t <= time) && self.times.get(i + 1).is_none_or(|&t| time < t)
         };
         if holds(hint) {
             hint
@@ -186,8 +183,7 @@ impl Trajectory {
 
     /// Position of `column` at local `time`, ns, likewise; `None` for a stop or an unknown column.
     pub fn position(&self, column: usize, time: Nanoseconds) -> Option<f64> {
-        (!self.is_stop() && column < self.joints.len())
-            .then(|| self.state_near(column, time, 0).position)
+        (!self.is_stop() && column < self.joints.len()).then(|| self.state_near(column, time, 0).position)
     }
 
     /// State at the end, if the last point asks for a velocity there.
@@ -216,17 +212,12 @@ fn find_joints(names: &[String], machine: &[JointLimits]) -> Result<Vec<usize>, 
             let known: Vec<_> = machine.iter().map(|joint| joint.name.as_str()).collect();
             return Err(Rejection::new(
                 Code::UnknownJoint,
-                format!(
-                    "{name:?} is not a joint of this machine; it has {}",
-                    known.join(", ")
-                ),
+                format!("{name:?} is not a joint of this machine; it has {}", known.join(", ")),
             )
             .joint(name));
         };
         if found.contains(&index) {
-            return Err(
-                Rejection::new(Code::DuplicateJoint, format!("{name} is named twice")).joint(name),
-            );
+            return Err(Rejection::new(Code::DuplicateJoint, format!("{name} is named twice")).joint(name));
         }
         found.push(index);
     }

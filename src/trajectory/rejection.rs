@@ -58,14 +58,7 @@ pub struct Rejection {
 impl Rejection {
     /// A refusal with `code` and the sentence `text`; the rest is filled in by the methods below.
     pub fn new(code: Code, text: impl Into<String>) -> Self {
-        Self {
-            code,
-            joint: None,
-            index: None,
-            value: 0.0,
-            limit: 0.0,
-            text: text.into(),
-        }
+        Self { code, joint: None, index: None, value: 0.0, limit: 0.0, text: text.into() }
     }
 
     /// Names the joint.

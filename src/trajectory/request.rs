@@ -59,8 +59,7 @@ impl Request {
     pub fn reserve(&mut self, points: usize) {
         self.times.reserve(points);
         self.orders.reserve(points);
-        self.positions
-            .reserve(points.saturating_mul(self.joints.len()));
+        self.positions.reserve(points.saturating_mul(self.joints.len()));
     }
 
     /// When it starts.
@@ -92,11 +91,7 @@ impl Request {
         self.times.push(time);
         self.positions.extend_from_slice(row.positions);
         append(&mut self.velocities, row.velocities, self.positions.len());
-        append(
-            &mut self.accelerations,
-            row.accelerations,
-            self.positions.len(),
-        );
+        append(&mut self.accelerations, row.accelerations, self.positions.len());
         self.orders.push(match (row.velocities, row.accelerations) {
             ([], _) => Order::Linear,
             (_, []) => Order::Cubic,
@@ -108,9 +103,7 @@ impl Request {
     fn check_sizes(&self, row: Row<'_>) -> Result<(), Rejection> {
         let (index, joints) = (self.points(), self.joints.len());
         let wrong = |text: String, found: usize| {
-            Rejection::new(Code::WrongSize, text)
-                .index(index)
-                .numbers(found as f64, joints as f64)
+            Rejection::new(Code::WrongSize, text).index(index).numbers(found as f64, joints as f64)
         };
         if joints == 0 {
             return Err(wrong(
@@ -127,17 +120,11 @@ impl Request {
         for (name, values, may_be_empty) in optional {
             if values.len() != joints && !(may_be_empty && values.is_empty()) {
                 let found = values.len();
-                return Err(wrong(
-                    format!("point {index}: {found} {name} for {joints} joints"),
-                    found,
-                ));
+                return Err(wrong(format!("point {index}: {found} {name} for {joints} joints"), found));
             }
         }
         if row.velocities.is_empty() && !row.accelerations.is_empty() {
-            return Err(wrong(
-                format!("point {index}: accelerations are given without velocities"),
-                0,
-            ));
+            return Err(wrong(format!("point {index}: accelerations are given without velocities"), 0));
         }
         Ok(())
     }
@@ -222,11 +209,7 @@ mod tests {
     #[test]
     fn a_field_given_late_does_not_shift_into_earlier_points() {
         let mut request = request();
-        let row = |positions, velocities| Row {
-            positions,
-            velocities,
-            ..Row::default()
-        };
+        let row = |positions, velocities| Row { positions, velocities, ..Row::default() };
         request.push(0, row(&[1.0, 2.0], &[])).unwrap();
         request.push(1, row(&[3.0, 4.0], &[5.0, 6.0])).unwrap();
         request.push(2, row(&[7.0, 8.0], &[])).unwrap();
@@ -239,56 +222,15 @@ mod tests {
         let two = [0.0, 0.0];
         let cases: [(Row<'_>, Code); 6] = [
             (Row::default(), Code::WrongSize),
-            (
-                Row {
-                    positions: &[0.0],
-                    ..Row::default()
-                },
-                Code::WrongSize,
-            ),
-            (
-                Row {
-                    positions: &two,
-                    velocities: &[0.0; 3],
-                    ..Row::default()
-                },
-                Code::WrongSize,
-            ),
-            (
-                Row {
-                    positions: &two,
-                    accelerations: &two,
-                    ..Row::default()
-                },
-                Code::WrongSize,
-            ),
-            (
-                Row {
-                    positions: &two,
-                    effort: &[1.0],
-                    ..Row::default()
-                },
-                Code::WrongSize,
-            ),
-            (
-                Row {
-                    positions: &[0.0, f64::NAN],
-                    ..Row::default()
-                },
-                Code::NotFinite,
-            ),
+            (Row { positions: &[0.0], ..Row::default() }, Code::WrongSize),
+            (Row { positions: &two, velocities: &[0.0; 3], ..Row::default() }, Code::WrongSize),
+            (Row { positions: &two, accelerations: &two, ..Row::default() }, Code::WrongSize),
+            (Row { positions: &two, effort: &[1.0], ..Row::default() }, Code::WrongSize),
+            (Row { positions: &[0.0, f64::NAN], ..Row::default() }, Code::NotFinite),
         ];
         for (row, code) in cases {
             let mut request = request();
-            request
-                .push(
-                    0,
-                    Row {
-                        positions: &two,
-                        ..Row::default()
-                    },
-                )
-                .unwrap();
+            request.push(0, Row { positions: &two, ..Row::default() }).unwrap();
             let rejection = request.push(1, row).unwrap_err();
             assert_eq!((rejection.code, rejection.index), (code, Some(1)));
             assert_eq!(request.points(), 1, "a refused point leaves no trace");
@@ -298,10 +240,7 @@ mod tests {
     #[test]
     fn points_for_no_joint_are_refused() {
         let mut request = Request::new(Start::Now, Vec::new());
-        assert_eq!(
-            request.push(0, Row::default()).unwrap_err().code,
-            Code::WrongSize
-        );
+        assert_eq!(request.push(0, Row::default()).unwrap_err().code, Code::WrongSize);
     }
 
     #[test]
@@ -312,18 +251,9 @@ mod tests {
             request.times = times.to_vec();
             request.check_times().map_err(|r| (r.code, r.index))
         };
-        assert_eq!(
-            times(Start::Now, &[-1, 3]),
-            Err((Code::NegativeTime, Some(0)))
-        );
-        assert_eq!(
-            times(Start::Now, &[0, 3, 3]),
-            Err((Code::TimesNotIncreasing, Some(2)))
-        );
+        assert_eq!(times(Start::Now, &[-1, 3]), Err((Code::NegativeTime, Some(0))));
+        assert_eq!(times(Start::Now, &[0, 3, 3]), Err((Code::TimesNotIncreasing, Some(2))));
         assert_eq!(times(Start::Now, &[0, i64::MAX]), Ok(()));
-        assert_eq!(
-            times(Start::At(1), &[0, i64::MAX]),
-            Err((Code::InvalidTime, Some(1)))
-        );
+        assert_eq!(times(Start::At(1), &[0, i64::MAX]), Err((Code::InvalidTime, Some(1))));
     }
 }

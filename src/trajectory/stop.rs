@@ -3,8 +3,7 @@
 use super::spline::State;
 use crate::config::LimitsConfig;
 use rsruckig::prelude::{
-    ControlInterface, DataArrayOrVec, InputParameter, Profile, Ruckig, ThrowErrorHandler,
-    Trajectory,
+    ControlInterface, DataArrayOrVec, InputParameter, Profile, Ruckig, ThrowErrorHandler, Trajectory,
 };
 
 /// Jerk, constant acceleration, jerk back: no stop has more phases.
@@ -22,11 +21,7 @@ struct Phase {
 
 impl Phase {
     fn state(&self, t: f64) -> State {
-        let State {
-            position,
-            velocity,
-            acceleration,
-        } = self.start;
+        let State { position, velocity, acceleration } = self.start;
         State {
             position: position + t * (velocity + t * (acceleration / 2.0 + t * self.jerk / 6.0)),
             velocity: velocity + t * (acceleration + t * self.jerk / 2.0),
@@ -117,10 +112,7 @@ impl StopPlanner {
             .unwrap_or_else(|| constant_deceleration(state, limits));
         let last = phases[PHASES - 1];
         // An axis outside its stroke is not thrown back into it by a stop.
-        let range = (
-            limits.stroke_min.min(state.position),
-            limits.stroke_max.max(state.position),
-        );
+        let range = (limits.stroke_min.min(state.position), limits.stroke_max.max(state.position));
         Stop {
             end: last.state(last.duration).position.clamp(range.0, range.1),
             duration: phases.iter().map(|phase| phase.duration).sum(),
@@ -156,20 +148,12 @@ fn phases_of(profile: &Profile) -> Option<[Phase; PHASES]> {
     for (i, phase) in phases.iter_mut().enumerate() {
         *phase = Phase {
             duration: profile.t[i],
-            start: State {
-                position: profile.p[i],
-                velocity: profile.v[i],
-                acceleration: profile.a[i],
-            },
+            start: State { position: profile.p[i], velocity: profile.v[i], acceleration: profile.a[i] },
             jerk: profile.j[i],
         };
     }
     let finite = |phase: &Phase| {
-        let State {
-            position,
-            velocity,
-            acceleration,
-        } = phase.start;
+        let State { position, velocity, acceleration } = phase.start;
         (phase.duration + position + velocity + acceleration + phase.jerk).is_finite()
     };
     phases.iter().all(finite).then_some(phases)
@@ -179,17 +163,11 @@ fn phases_of(profile: &Profile) -> Option<[Phase; PHASES]> {
 fn constant_deceleration(state: State, limits: &LimitsConfig) -> [Phase; PHASES] {
     let braking = Phase {
         duration: state.velocity.abs() / limits.acceleration,
-        start: State {
-            acceleration: -limits.acceleration.copysign(state.velocity),
-            ..state
-        },
+        start: State { acceleration: -limits.acceleration.copysign(state.velocity), ..state },
         jerk: 0.0,
     };
-    let rest = Phase {
-        duration: 0.0,
-        start: State::rest(braking.state(braking.duration).position),
-        jerk: 0.0,
-    };
+    let rest =
+        Phase { duration: 0.0, start: State::rest(braking.state(braking.duration).position), jerk: 0.0 };
     [braking, rest, rest]
 }
 
@@ -210,11 +188,7 @@ mod tests {
 
     #[test]
     fn a_stop_from_constant_velocity_takes_v_over_a_plus_a_over_j() {
-        let state = State {
-            position: 0.1,
-            velocity: 0.5,
-            acceleration: 0.0,
-        };
+        let state = State { position: 0.1, velocity: 0.5, acceleration: 0.0 };
         let stop = StopPlanner::default().plan(state, &limits());
         assert!((stop.duration() - (0.5 / 2.5 + 2.5 / 50.0)).abs() < 1e-12);
         // Mean velocity of a symmetric stop is half the initial one.
@@ -231,15 +205,8 @@ mod tests {
 
     #[test]
     fn a_stop_does_not_leave_the_stroke() {
-        let narrow = LimitsConfig {
-            stroke_max: 0.11,
-            ..limits()
-        };
-        let state = State {
-            position: 0.1,
-            velocity: 0.5,
-            acceleration: 0.0,
-        };
+        let narrow = LimitsConfig { stroke_max: 0.11, ..limits() };
+        let state = State { position: 0.1, velocity: 0.5, acceleration: 0.0 };
         let stop = StopPlanner::default().plan(state, &narrow);
         for ms in 0..400 {
             assert!(stop.state(f64::from(ms) * 1e-3).position <= 0.11);
@@ -249,21 +216,14 @@ mod tests {
 
     #[test]
     fn an_axis_outside_its_stroke_is_not_thrown_back() {
-        let narrow = LimitsConfig {
-            stroke_max: 0.0,
-            ..limits()
-        };
+        let narrow = LimitsConfig { stroke_max: 0.0, ..limits() };
         let stop = StopPlanner::default().plan(State::rest(0.1), &narrow);
         assert_eq!(stop.state(0.0), State::rest(0.1));
     }
 
     #[test]
     fn the_fallback_stops_too() {
-        let state = State {
-            position: 0.0,
-            velocity: -0.5,
-            acceleration: 1.0,
-        };
+        let state = State { position: 0.0, velocity: -0.5, acceleration: 1.0 };
         let [braking, rest, _] = constant_deceleration(state, &limits());
         assert!(braking.state(braking.duration).velocity.abs() < 1e-15);
         assert!((rest.start.position + 0.05).abs() < 1e-15);

@@ -78,10 +78,7 @@ impl Timeline {
             return Err(TimelineError::Joints(joints.len()));
         }
         if positions.len() != joints.len() {
-            return Err(TimelineError::Positions {
-                positions: positions.len(),
-                joints: joints.len(),
-            });
+            return Err(TimelineError::Positions { positions: positions.len(), joints: joints.len() });
         }
         if period <= 0 {
             return Err(TimelineError::Period(period));
@@ -214,11 +211,8 @@ impl Timeline {
     pub fn reset(&mut self, positions: &[f64]) -> Result<(), Rejection> {
         if positions.len() != self.joints.len() {
             let (found, wanted) = (positions.len(), self.joints.len());
-            return Err(Rejection::new(
-                Code::WrongSize,
-                format!("{found} positions for {wanted} joints"),
-            )
-            .numbers(found as f64, wanted as f64));
+            return Err(Rejection::new(Code::WrongSize, format!("{found} positions for {wanted} joints"))
+                .numbers(found as f64, wanted as f64));
         }
         for (joint, &position) in self.joints.iter().zip(positions) {
             check_finite(joint, position)?;
@@ -274,11 +268,6 @@ fn check_finite(joint: &JointLimits, position: f64) -> Result<(), Rejection> {
     if position.is_finite() {
         return Ok(());
     }
-    let text = format!(
-        "{}: position is {position}, not a finite number",
-        joint.name
-    );
-    Err(Rejection::new(Code::NotFinite, text)
-        .joint(&joint.name)
-        .numbers(position, 0.0))
+    let text = format!("{}: position is {position}, not a finite number", joint.name);
+    Err(Rejection::new(Code::NotFinite, text).joint(&joint.name).numbers(position, 0.0))
 }
