@@ -61,9 +61,9 @@ fn soup() -> impl Strategy<Value = Soup> {
     let acceleration = prop_oneof![2 => Just(0.0), 8 => -3.0..3.0f64, 1 => -1e3..1e3f64];
     (
         prop_oneof![Just(None), (-300_000_000..3_000_000_000i64).prop_map(Some)],
-        0..4usize,
         0..3usize,
-        prop::collection::vec((time, value, velocity, acceleration), 0..6),
+        0..3usize,
+        prop::collection::vec((time, value, velocity, acceleration), 1..6),
     )
         .prop_map(|(start, joints, order, points)| Soup { start, joints, order, points })
 }

@@ -87,9 +87,13 @@ impl ColumnCheck<'_> {
                 previous = Some(at(last));
             }
         }
-        if self.trajectory.duration() % self.period != 0 {
+        let beyond = self.trajectory.duration() % self.period;
+        if beyond != 0 {
             let last = self.trajectory.points() - 1;
-            let end = self.trajectory.point(self.column, last).position;
+            let end = match self.trajectory.tail(self.column) {
+                Some(stop) => stop.state(seconds(self.period - beyond)).position,
+                None => self.trajectory.point(self.column, last).position,
+            };
             self.step(last, &mut previous, end)?;
         }
         Ok(())
