@@ -87,8 +87,8 @@ fn watch(t: &mut virtual_axes::trajectory::Timeline, periods: usize, told: &mut 
         let ahead = [t.psec_ahead(0, 1).unwrap(), t.psec_ahead(1, 1).unwrap()];
         t.next();
         assert_eq!(t.psec(), ahead, "what was foreseen is what is commanded");
-        for joint in 0..2 {
-            let step = (t.psec()[joint] - before[joint]).abs();
+        for (joint, before) in before.iter().enumerate() {
+            let step = (t.psec()[joint] - before).abs();
             assert!(step <= 0.5 * TSP_S * (1.0 + 1e-6), "{step} on {joint}");
         }
         assert!(t.psec()[0].abs() <= 0.355 + 1e-9, "outside the stroke");
@@ -174,9 +174,9 @@ proptest! {
                 .unwrap();
         }
         let checked = check(request, true);
-        prop_assume!(checked.is_ok());
+        let Ok(checked) = checked else { return Ok(()) };
         let mut t = timeline();
-        offer(&mut t, 1, &checked.unwrap()).unwrap();
+        offer(&mut t, 1, &checked).unwrap();
         let (psec, _) = run(&mut t, 1, (start + k) as usize + 1);
         for (time, p, _, _) in rows {
             prop_assert_eq!(psec[(start + time / TSP) as usize].to_bits(), p.to_bits());
@@ -209,7 +209,9 @@ proptest! {
         }
         let mut t = timeline();
         let accepted = check(request, true).and_then(|path| offer(&mut t, 1, &path));
-        prop_assume!(accepted.is_ok());
+        if accepted.is_err() {
+            return Ok(());
+        }
         t.next();
         run(&mut t, 1, after);
         let mut psec = vec![t.psec()[1]];

@@ -115,9 +115,10 @@ fn a_jump_is_measured_from_what_will_be_commanded_then() {
 fn a_later_first_point_is_reached_by_the_fields_it_has() {
     let quintic = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
     let cubic = |s: f64| s * s * (3.0 - 2.0 * s);
-    let shapes: [(&[f64], &dyn Fn(f64) -> f64); 3] =
-        [(&[0.1], &|s| s), (&[0.1, 0.0], &cubic), (&[0.1, 0.0, 0.0], &quintic)];
-    for (point, shape) in shapes {
+    let linear = |s: f64| s;
+    let shapes = [linear, cubic, quintic];
+    let points: [&[f64]; 3] = [&[0.1], &[0.1, 0.0], &[0.1, 0.0, 0.0]];
+    for (point, shape) in points.into_iter().zip(shapes) {
         let mut t = timeline();
         run(&mut t, 0, 4);
         offer(&mut t, 1, &path(Start::Now, "x", &[(100, point)])).unwrap();
