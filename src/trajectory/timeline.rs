@@ -226,7 +226,14 @@ impl Timeline {
             self.psec[joint] = position;
         }
         self.motions.settle(&mut self.pending);
+        self.reserve_events();
         Ok(())
+    }
+
+    /// Makes room for all that the next instant can tell, a start and an end of each motion, so
+    /// that it does not allocate.
+    pub(super) fn reserve_events(&mut self) {
+        self.events.reserve(self.pending.len() + 2 * self.motions.capacity());
     }
 
     /// Sets one set-point for the next instant, m or rad, from a stream of them: `true` if it is
