@@ -11,8 +11,9 @@
 //! | `ROS_STATIC_PEERS` | hosts, separated by semicolons | none |
 //!
 //! RustDDS announces itself to multicast and to this machine, and to no host by name, so a node
-//! cannot go and look for its static peers. It does answer a host that looks for it: naming this
-//! machine in the `ROS_STATIC_PEERS` of the others is enough, and a warning says so.
+//! cannot go and look for its static peers. It does answer a host that looks for it: with
+//! `SUBNET`, naming this machine in the `ROS_STATIC_PEERS` of the others is enough, and a warning
+//! says so.
 
 use std::net::{IpAddr, Ipv4Addr};
 
@@ -198,6 +199,10 @@ fn static_peers_warning(range: DiscoveryRange, peers: &[String]) -> Option<Strin
         DiscoveryRange::Off => {
             format!("ROS_STATIC_PEERS ({list}) is ignored, because ROS_AUTOMATIC_DISCOVERY_RANGE is OFF")
         }
+        DiscoveryRange::Localhost => format!(
+            "ROS_STATIC_PEERS ({list}) is not supported by this node's middleware, and with LOCALHOST it meets \
+             this machine only; use SUBNET, and name this machine in the ROS_STATIC_PEERS of the others"
+        ),
         _ => format!(
             "ROS_STATIC_PEERS ({list}) is not supported by this node's middleware, which cannot go and look for \
              a host; name this machine in the ROS_STATIC_PEERS of the others instead"
@@ -286,6 +291,8 @@ mod tests {
         let environment = read(&[("ROS_STATIC_PEERS", " 192.168.0.1 ;;robot.local; ")]).unwrap();
         assert_eq!(environment.warnings().len(), 1);
         assert!(environment.warnings()[0].contains("(192.168.0.1, robot.local)"));
+        let local = [("ROS_STATIC_PEERS", "a"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")];
+        assert!(read(&local).unwrap().warnings()[0].contains("use SUBNET"));
         let off = [("ROS_STATIC_PEERS", "a"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")];
         assert!(read(&off).unwrap().warnings()[0].contains("OFF"));
         assert!(read(&[("ROS_STATIC_PEERS", ";")]).unwrap().warnings().is_empty());

@@ -10,6 +10,7 @@ mod endpoints;
 pub mod environment;
 mod goodbye;
 mod inputs;
+pub mod log;
 pub mod messages;
 pub mod names;
 pub mod node;
