@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use virtual_axes::config::{Parameters, Source, parse_assignment};
 use virtual_axes::ros::args::{Command, ParameterSource, RosArgs};
 use virtual_axes::ros::environment::Environment;
-use virtual_axes::ros::node;
+use virtual_axes::ros::{log, node, rosout};
 
 /// Exit status of a wrong command line, environment or machine file.
 const USAGE: u8 = 2;
@@ -43,11 +43,18 @@ fn run(args: &RosArgs) -> ExitCode {
         Ok(environment) => environment,
         Err(error) => return refuse(&error),
     };
+    let (log_in, log) = tokio::sync::mpsc::channel(rosout::QUEUE);
+    if let Err(error) = log::init(args, Some(log_in)) {
+        return refuse(&error);
+    }
+    for warning in environment.warnings().iter().chain(args.warnings()) {
+        tracing::warn!("{warning}");
+    }
     let parameters = match parameters(args) {
         Ok(parameters) => parameters,
         Err(error) => return refuse(error.as_ref()),
     };
-    match node::run(args, &environment, parameters) {
+    match node::run(args, &environment, parameters, log) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("virtual_axes_node: {error}");
@@ -72,7 +79,7 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
                 parameters.set_all(std::mem::take(&mut together))?;
                 let overlay = parameters.overlay_file(path, Some(&node))?;
                 if overlay.sections == 0 {
-                    eprintln!("virtual_axes_node: {} has nothing for {node}", path.display());
+                    tracing::warn!("{} has nothing for {node}", path.display());
                 }
             }
         }

@@ -20,5 +20,6 @@ mod parameter_host;
 pub mod parameter_services;
 pub mod participant;
 mod results;
+pub mod rosout;
 mod service;
 mod trigger;

@@ -20,6 +20,7 @@ use super::diagnostics::Diagnostics;
 use super::endpoints::{EndpointError, Endpoints, Profile};
 use super::environment::Environment;
 use super::inputs::{PsecInput, next_id, take_loads};
+use super::log::LogRecord;
 use super::messages::{self, DriveStates, MotorCurrents};
 use super::outputs::{Output, WhenFull, queue_length};
 use super::pace::{self, Channels, Command, Frame, Health};
@@ -27,6 +28,7 @@ use super::parameter_host::{Host, LiveNodeParameters};
 use super::parameter_services::ParameterServices;
 use super::participant::{Participant, ParticipantError};
 use super::results::Results;
+use super::rosout;
 use super::service::ServiceError;
 use super::trigger::Trigger;
 use crate::config::{ConfigError, Parameters, TimeMode};
@@ -83,18 +85,23 @@ pub enum NodeError {
     SimTime,
 }
 
-/// Runs the node until SIGINT or SIGTERM.
+/// Runs the node until SIGINT or SIGTERM; what comes through `log` goes to `/rosout`.
 ///
 /// # Errors
 /// [`NodeError`] if it cannot start; nothing is left on the network then.
-pub fn run(args: &RosArgs, environment: &Environment, parameters: Parameters) -> Result<(), NodeError> {
+pub fn run(
+    args: &RosArgs,
+    environment: &Environment,
+    parameters: Parameters,
+    log: mpsc::Receiver<LogRecord>,
+) -> Result<(), NodeError> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build()
         .map_err(|source| NodeError::System { what: "start the runtime", source })?;
     let participant = Participant::open(environment)?;
-    let result = runtime.block_on(serve(args, &participant, parameters));
+    let result = runtime.block_on(serve(args, &participant, parameters, log));
     // Tasks and endpoints are gone; what is left of the runtime is not waited for.
     runtime.shutdown_timeout(Duration::from_millis(50));
     participant.shutdown();
@@ -108,7 +115,12 @@ struct Listing {
     serves: Vec<String>,
 }
 
-async fn serve(args: &RosArgs, participant: &Participant, parameters: Parameters) -> Result<(), NodeError> {
+async fn serve(
+    args: &RosArgs,
+    participant: &Participant,
+    parameters: Parameters,
+    log: mpsc::Receiver<LogRecord>,
+) -> Result<(), NodeError> {
     let config = parameters.machine_config()?;
     let node_config = parameters.node_config();
     if node_config.time == TimeMode::SimTime {
@@ -190,6 +202,8 @@ async fn serve(args: &RosArgs, participant: &Participant, parameters: Parameters
     let ids = Arc::new(AtomicU64::new(1));
     let results = Results::new(Output::start(results, WhenFull::Wait, &dropped, &mut tasks), joints.clone());
     let results = Arc::new(results);
+
+    tasks.spawn(rosout::publish(&node, log));
 
     // What comes in.
     let stop_all = stop_request(&joint_limits, period, node_config.max_points);

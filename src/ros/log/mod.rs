@@ -13,10 +13,10 @@ mod filter;
 use std::{
     fmt::{self, Write as _},
     io::Write as _,
-    sync::mpsc::SyncSender,
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
+use tokio::sync::mpsc;
 use tracing::{
     Event, Level, Subscriber,
     field::{Field, Visit},
@@ -57,7 +57,7 @@ pub struct LogError(String);
 ///
 /// # Errors
 /// [`LogError`] when the process has a log already.
-pub fn init(args: &RosArgs, rosout: Option<SyncSender<LogRecord>>) -> Result<(), LogError> {
+pub fn init(args: &RosArgs, rosout: Option<mpsc::Sender<LogRecord>>) -> Result<(), LogError> {
     let logger = logger_name(&args.node().to_string());
     let levels = LoggerLevels::new(&logger, args.log_level(), args.logger_levels());
     let sinks = args.log_sinks();
@@ -76,7 +76,7 @@ fn logger_name(node: &str) -> String {
 struct RosLayer {
     logger: String,
     terminal: bool,
-    rosout: Option<SyncSender<LogRecord>>,
+    rosout: Option<mpsc::Sender<LogRecord>>,
 }
 
 impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for RosLayer {
@@ -175,8 +175,6 @@ impl Visit for EventText {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::mpsc::{Receiver, sync_channel};
-
     use super::*;
 
     fn capture(
@@ -184,12 +182,12 @@ mod tests {
         loggers: &[(String, LogLevel)],
         log: impl FnOnce(),
     ) -> Vec<LogRecord> {
-        let (sender, receiver): (_, Receiver<LogRecord>) = sync_channel(16);
+        let (sender, mut receiver) = mpsc::channel(16);
         let layer = RosLayer { logger: "cell.mill".to_owned(), terminal: false, rosout: Some(sender) };
         let levels = LoggerLevels::new("cell.mill", level, loggers);
         let subscriber = tracing_subscriber::registry().with(layer.with_filter(levels));
         tracing::subscriber::with_default(subscriber, log);
-        receiver.try_iter().collect()
+        std::iter::from_fn(|| receiver.try_recv().ok()).collect()
     }
 
     #[test]
