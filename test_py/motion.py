@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+
 from drive import TSP_NS, Drive, joint_trajectory, to_ns
 
 TSP = TSP_NS / 1e9
 """Position period, s."""
+RATIO = 0.02 / (2 * math.pi)
+"""Ball screws of the default machine, m of the axis per rad of the motor."""
 
 
 def swing(duration: float, amplitude: float = 0.05, rest: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

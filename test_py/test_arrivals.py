@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from trajectory_msgs.msg import JointTrajectory
+from virtual_axes.msg import TrajectoryResult as R
+
 from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory, to_ns
 from motion import assert_psec, go_home, on_grid, start_swing, swing
-from trajectory_msgs.msg import JointTrajectory
-
-from virtual_axes.msg import TrajectoryResult as R
 
 SPEED_LIMIT_X = 0.5
 ACCELERATION_LIMIT_X = 2.5
@@ -143,9 +143,7 @@ def test_chunks_of_a_long_path_join_without_a_gap(home: Drive):
     for begin in range(0, len(time), size):
         part = slice(begin, begin + size)
         stamp = origin + begin * TSP_NS
-        accepted.append(
-            home.accept(joint_trajectory(["x"], time[part] - time[begin], position[part], stamp=stamp))
-        )
+        accepted.append(home.accept(joint_trajectory(["x"], time[part] - time[begin], position[part], stamp=stamp)))
         assert to_ns(accepted[-1].start) == stamp
     assert len(accepted) == 5
     assert_psec(home, origin, {"x": position})

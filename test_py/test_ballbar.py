@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from drive import Drive, Recording, ballbar, joint_trajectory
 from motion import assert_psec, go_home
 

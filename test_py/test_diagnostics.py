@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
 from drive import NANOSECONDS, Drive, joint_trajectory, to_ns
 from motion import go_home, start_swing
 
@@ -23,7 +24,7 @@ def text_of(array: DiagnosticArray) -> str:
 
 def worst(array: DiagnosticArray) -> int:
     """The worst level in an array."""
-    return max(int.from_bytes(status.level, "little") for status in array.status)
+    return max((int.from_bytes(status.level, "little") for status in array.status), default=-1)
 
 
 OK = int.from_bytes(DiagnosticStatus.OK, "little")

@@ -7,11 +7,10 @@ import time
 
 import numpy as np
 import pytest
-from drive import NANOSECONDS, TSP_NS, Drive
-from motion import go_home
 
-RATIO = 0.02 / (2 * math.pi)
-"""m of the axis per rad of the motor."""
+from drive import NANOSECONDS, TSP_NS, Drive
+from motion import RATIO, go_home
+
 TORQUE_CONSTANT = 2.64
 FORCE = 2000.0
 """N, more than friction holds: 2.41 A against 1.04 A."""

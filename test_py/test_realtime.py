@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from drive import DEEP_QOS, NANOSECONDS, TSP_NS, Drive, to_ns
 from sensor_msgs.msg import JointState
+
+from drive import DEEP_QOS, NANOSECONDS, TSP_NS, Drive, to_ns
 
 
 def test_ten_seconds_are_an_unbroken_grid(real: Drive):

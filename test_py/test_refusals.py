@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from trajectory_msgs.msg import JointTrajectory
+from virtual_axes.msg import TrajectoryResult as R
+
 from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory, to_ns
 from motion import assert_psec, go_home, swing
-from trajectory_msgs.msg import JointTrajectory
-
-from virtual_axes.msg import TrajectoryResult as R
 
 ANY = object()
 
@@ -86,15 +86,9 @@ CASES = {
     "time runs back": Case(
         R.TIMES_NOT_INCREASING, lambda d: line("z", (1, 0), (3, 0), (2.5, 0)), index=2, value=2.5, limit=3
     ),
-    "negative first time": Case(
-        R.NEGATIVE_TIME, lambda d: line("z", (-0.5, 0), (1, 0)), index=0, value=-0.5, limit=0
-    ),
-    "NaN position": Case(
-        R.NOT_FINITE, lambda d: two((0, 0), (0, math.nan)), joint="z", index=1, value=math.nan
-    ),
-    "infinite position": Case(
-        R.NOT_FINITE, lambda d: two((0, 0), (-math.inf, 0)), joint="y", index=1, value=-math.inf
-    ),
+    "negative first time": Case(R.NEGATIVE_TIME, lambda d: line("z", (-0.5, 0), (1, 0)), index=0, value=-0.5, limit=0),
+    "NaN position": Case(R.NOT_FINITE, lambda d: two((0, 0), (0, math.nan)), joint="z", index=1, value=math.nan),
+    "infinite position": Case(R.NOT_FINITE, lambda d: two((0, 0), (-math.inf, 0)), joint="y", index=1, value=-math.inf),
     "NaN velocity": Case(
         R.NOT_FINITE,
         lambda d: joint_trajectory(["z"], [1, 2], [[0], [0]], [[math.nan], [0]]),
@@ -120,9 +114,7 @@ CASES = {
         value=math.radians(-31),
         limit=STROKE_A,
     ),
-    "jump to the first point": Case(
-        R.JUMP, lambda d: line("z", (0, 0.1), (1, 0.1)), joint="z", index=0, value=0.1
-    ),
+    "jump to the first point": Case(R.JUMP, lambda d: line("z", (0, 0.1), (1, 0.1)), joint="z", index=0, value=0.1),
     "jump when joining in": Case(
         R.JUMP,
         lambda d: line("z", (0, 0), (10, 0.2), stamp=d.now() - 5 * NANOSECONDS),

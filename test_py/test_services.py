@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from drive import TSP_NS, Drive
-from motion import go_home, start_swing
-
 from virtual_axes.msg import TrajectoryResult as R
+
+from drive import TSP_NS, Drive, joint_trajectory
+from motion import go_home, start_swing
 
 
 def test_reset_puts_the_axes_back_to_rest_at_the_start(real: Drive):
@@ -55,8 +55,6 @@ def test_after_a_stop_a_new_motion_starts_from_there(real: Drive):
     real.wait_until(start + 125 * TSP_NS, 5)
     real.stop()
     real.wait_until(real.now() + 100 * TSP_NS, 5)
-    from drive import joint_trajectory
-
     recording = real.run(joint_trajectory(["x"], [1.2], [[0.0]], [[0.0]]))
     assert recording.result.status == R.COMPLETED
     assert recording.states["psec", "x"][-1] == 0.0

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 import pytest
+
 from drive import Drive
 from motion import start_swing
 
