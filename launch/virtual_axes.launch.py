@@ -1,6 +1,6 @@
 """Start the virtual axes in a ROS 2 graph.
 
-    ros2 launch virtual_axes virtual_axes.launch.py machine:=my_machine.yaml namespace:=cell time:=fast
+ros2 launch virtual_axes virtual_axes.launch.py machine:=my_machine.yaml namespace:=cell time:=fast
 """
 
 from launch import LaunchContext, LaunchDescription
@@ -12,8 +12,7 @@ from launch_ros.actions import Node
 def start_node(context: LaunchContext) -> list[Node]:
     """Make the node; without a machine file it runs the embedded machine."""
     argument = {
-        key: LaunchConfiguration(key).perform(context)
-        for key in ("machine", "namespace", "name", "time", "log_level")
+        key: LaunchConfiguration(key).perform(context) for key in ("machine", "namespace", "name", "time", "log_level")
     }
     parameters: list[object] = [argument["machine"]] if argument["machine"] else []
     # `use_sim_time` is a parameter of its own; the other clocks are values of `time`.

@@ -1,6 +1,6 @@
 """The ballbar of the paper's figure 10, driven over ROS 2: with and without feedforward.
 
-    ./demo.sh [--fast] [--out FILE.png]
+./demo.sh [--fast] [--out FILE.png]
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from drive import Ballbar, Drive, Node, Recording, ballbar, circular_deviation, joint_trajectory
 from matplotlib.ticker import FuncFormatter
+
+from drive import Ballbar, Drive, Node, Recording, ballbar, circular_deviation, joint_trajectory
 
 AXES = ("x", "y")
 FEEDFORWARD = [f"{axis}.feedforward.{part}" for axis in AXES for part in ("velocity", "torque_kg_m2")]
@@ -55,7 +56,10 @@ def report(path: Ballbar, runs: dict[str, Recording]) -> str:
         )
     widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
     lines = [
-        "  ".join(cell.ljust(width) if column == 0 else cell.rjust(width) for column, (cell, width) in enumerate(zip(row, widths)))
+        "  ".join(
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths))
+        )
         for row in rows
     ]
     lines.insert(1, "  ".join("-" * width for width in widths))
@@ -64,7 +68,9 @@ def report(path: Ballbar, runs: dict[str, Recording]) -> str:
 
 def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
     """Polar plots of the radial deviation, the deviation magnified as on a ballbar's chart."""
-    figure, plots = plt.subplots(1, len(runs), figsize=(11, 5.8), subplot_kw={"projection": "polar"}, layout="constrained")
+    figure, plots = plt.subplots(
+        1, len(runs), figsize=(11, 5.8), subplot_kw={"projection": "polar"}, layout="constrained"
+    )
     # Black and one strong colour, solid and dashed: readable on a grey printer too.
     for plot, (title, run) in zip(np.atleast_1d(plots), runs.items()):
         steady = run.within(path.steady)
@@ -73,7 +79,14 @@ def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
         deviation = run.radial_deviation(path.centre, path.radius)[steady] * 1e6
         turn = np.linspace(0, 2 * np.pi, 361)
         step = _round_step(np.abs(deviation).max() / 2)
-        plot.plot(turn, np.zeros_like(turn), color="black", linewidth=1.2, linestyle="--", label="programmed circle, R = 150 mm")
+        plot.plot(
+            turn,
+            np.zeros_like(turn),
+            color="black",
+            linewidth=1.2,
+            linestyle="--",
+            label="programmed circle, R = 150 mm",
+        )
         plot.plot(angle, deviation, color="#b2182b", linewidth=1.6, label="simulated position")
         # The circle is drawn as wide as four steps, so that an inward deviation stays off the centre.
         plot.set_rorigin(-6 * step)
@@ -85,7 +98,9 @@ def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
         for label in plot.get_yticklabels():
             label.set(fontsize=8, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})
         plot.grid(color="0.8", linewidth=0.6)
-        plot.set_title(f"{title}\nmean {deviation.mean():+.1f} µm, G = {circular_deviation(deviation):.1f} µm", fontsize=11)
+        plot.set_title(
+            f"{title}\nmean {deviation.mean():+.1f} µm, G = {circular_deviation(deviation):.1f} µm", fontsize=11
+        )
         plot.legend(loc="lower center", bbox_to_anchor=(0.5, -0.24), fontsize=9, frameon=False)
     figure.suptitle("Ballbar in X–Y at 15 m/min: radial deviation in µm over the polar angle, magnified", fontsize=12)
     figure.savefig(file, dpi=150)

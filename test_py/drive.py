@@ -47,7 +47,6 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
 from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult
 
 NANOSECONDS = 1_000_000_000
@@ -337,9 +336,7 @@ class Drive:
             )
         )
         self._subscriptions.append(
-            self.node.create_subscription(
-                DiagnosticArray, "/diagnostics", self._keep(self._diagnostics), DEEP_QOS
-            )
+            self.node.create_subscription(DiagnosticArray, "/diagnostics", self._keep(self._diagnostics), DEEP_QOS)
         )
         self._clients: dict[str, Any] = {}
         self._executor = SingleThreadedExecutor(context=self._context)
@@ -688,7 +685,7 @@ class Node:
 
     def __exit__(self, *_: object) -> None:
         """Stop, by force if need be."""
-        if self.poll() is None:
+        if self._process is not None and self.poll() is None:
             self.stop()
         if self._own_domain is not None:
             self._own_domain.release()

@@ -137,6 +137,7 @@ if ! is_done "$venv_stamp" "$venv_hash" || ! "$venv/bin/python" -c '' 2>/dev/nul
   echo "$venv_hash" >"$venv_stamp"
 fi
 if ! is_done "$messages_stamp" "$messages_hash"; then
+  check_tools
   rm -f "$messages_stamp"
   step "messages of virtual_axes into .build" messages make_messages
   echo "$messages_hash" >"$messages_stamp"

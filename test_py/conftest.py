@@ -1,0 +1,52 @@
+"""Fixtures: nodes to test, each in a domain of its own on this machine only.
+
+Needs the environment of .build/env.sh (`./test.sh` sees to it) and the node's program: by default
+target/release/virtual_axes_node, another with VIRTUAL_AXES_NODE.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+# Before rclpy makes its first context: nothing leaves this machine.
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
+    os.environ.pop(variable, None)
+
+from drive import Drive, Node, node_binary  # noqa: E402
+
+
+def pytest_sessionstart() -> None:
+    """Say at once what is missing, not once per test."""
+    if not node_binary().exists():
+        pytest.exit(f"no node to test at {node_binary()}: cargo build --release, or set VIRTUAL_AXES_NODE", 2)
+
+
+@pytest.fixture(scope="module")
+def real() -> Iterator[Drive]:
+    """Axes in real time, shared by a module; the motions there are at most 20 000 points long."""
+    with Node(["-p", "time:=real", "-p", "max_points:=20000"]) as process, Drive(process=process) as drive:
+        yield drive
+
+
+@pytest.fixture(scope="module")
+def fast() -> Iterator[Drive]:
+    """Axes as fast as they can, shared by a module."""
+    with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
+        yield drive
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[..., Drive]]:
+    """Start nodes for one test: start(*ros_args, name=...) gives a connected Drive."""
+    with ExitStack() as stack:
+
+        def start_one(*ros_args: str, **options: object) -> Drive:
+            process = stack.enter_context(Node(ros_args, **options))
+            return stack.enter_context(Drive(process=process))
+
+        yield start_one

@@ -1,0 +1,76 @@
+"""Motions that several tests share, and how psec is compared with what was planned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from drive import TSP_NS, Drive, joint_trajectory, to_ns
+
+TSP = TSP_NS / 1e9
+"""Position period, s."""
+RATIO = 0.02 / (2 * math.pi)
+"""Ball screws of the default machine, m of the axis per rad of the motor."""
+
+
+def swing(duration: float, amplitude: float = 0.05, rest: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Times on the position grid and positions of one gentle swing 0 -> amplitude -> 0, after a rest."""
+    periods = round((duration + rest) / TSP)
+    time = np.arange(periods + 1) * TSP_NS / 1e9
+    phase = np.clip((time - rest) / (periods * TSP - rest), 0, 1)
+    return time, amplitude / 2 * (1 - np.cos(2 * np.pi * phase))
+
+
+def on_grid(drive: Drive, instant: int) -> int:
+    """The first position instant at or after `instant`, ns."""
+    return grid_after(drive.now(), instant)
+
+
+def assert_psec(
+    drive: Drive,
+    start: int,
+    plan: Mapping[str, Sequence[float]],
+    first: int | None = None,
+    last: int | None = None,
+) -> int:
+    """psec was the plan, bit for bit, at every instant from `first` to `last` (ns), none missing.
+
+    `start` is when the plan begins; returns the number of instants.
+    """
+    length = len(next(iter(plan.values())))
+    first = start if first is None else first
+    last = start + (length - 1) * TSP_NS if last is None else last
+    drive.wait_until(last, 30)
+    states = drive.record(first, last).states
+    expected = np.arange(grid_after(start, first), last + 1, TSP_NS)
+    assert np.array_equal(states.stamp, expected), "instants missing or twice"
+    index = (states.stamp - start) // TSP_NS
+    for joint, positions in plan.items():
+        wanted = np.asarray(positions)[index]
+        different = np.flatnonzero(states["psec", joint] != wanted)
+        assert different.size == 0, (
+            f"psec of {joint} differs at {different.size} of {index.size} instants, first at point "
+            f"{index[different[0]]}: {states['psec', joint][different[0]]!r}, planned {wanted[different[0]]!r}"
+        )
+    return index.size
+
+
+def grid_after(start: int, instant: int) -> int:
+    """The first position instant at or after `instant` on the grid through `start`, ns."""
+    return start + -(-(instant - start) // TSP_NS) * TSP_NS
+
+
+def start_swing(drive: Drive, joints: Sequence[str] = ("x",), duration: float = 6.0, **options: float):
+    """Begin a swing on `joints`; returns its acceptance, its start and its plan."""
+    time, position = swing(duration, **options)
+    accepted = drive.accept(joint_trajectory(joints, time, np.column_stack([position] * len(joints))))
+    return accepted, to_ns(accepted.start), {joint: position for joint in joints}
+
+
+def go_home(drive: Drive) -> None:
+    """Rest at the start position, old samples dropped."""
+    drive.reset()
+    drive.wait_until(drive.now() + 2 * TSP_NS, 5)
+    drive.forget()

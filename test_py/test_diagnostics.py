@@ -1,0 +1,63 @@
+"""/diagnostics: what an operator is told, once a second."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from drive import NANOSECONDS, Drive, joint_trajectory, to_ns
+from motion import go_home, start_swing
+
+
+def next_one(drive: Drive, timeout: float = 5.0) -> DiagnosticArray:
+    """The diagnostics after now, past what is on its way."""
+    seen = len(drive.diagnostics())
+    return drive.wait_for(lambda: drive.diagnostics()[seen + 1 :], timeout, "diagnostics")[0]
+
+
+def text_of(array: DiagnosticArray) -> str:
+    """All that an array says, in lower case."""
+    words = []
+    for status in array.status:
+        words += [status.name, status.message, *(f"{value.key} {value.value}" for value in status.values)]
+    return " ".join(words).lower()
+
+
+def worst(array: DiagnosticArray) -> int:
+    """The worst level in an array."""
+    return max((int.from_bytes(status.level, "little") for status in array.status), default=-1)
+
+
+OK = int.from_bytes(DiagnosticStatus.OK, "little")
+WARN = int.from_bytes(DiagnosticStatus.WARN, "little")
+
+
+def test_once_a_second_by_the_nodes_clock(real: Drive):
+    """REP-107 wants 1 Hz."""
+    seen = len(real.diagnostics())
+    arrays = real.wait_for(lambda: real.diagnostics()[seen:][3:] and real.diagnostics()[seen:], 8, "four diagnostics")
+    stamps = [to_ns(array.header.stamp) for array in arrays[:4]]
+    assert [round((b - a) / NANOSECONDS) for a, b in zip(stamps, stamps[1:])] == [1, 1, 1]
+
+
+def test_at_rest_and_moving(real: Drive):
+    """Holding or running; at rest everything is well."""
+    go_home(real)
+    at_rest = next_one(real)
+    assert "holding" in text_of(at_rest)
+    assert worst(at_rest) == OK
+    start_swing(real, duration=6.0)
+    assert "running" in text_of(next_one(real))
+    real.stop()
+
+
+def test_friction_law_beyond_its_range_is_a_warning(real: Drive):
+    """It is fitted up to 20 m/min; 24 m/min is beyond."""
+    go_home(real)
+    real.accept(joint_trajectory(["x"], [0.0, 0.4, 1.0, 1.4], [[0.0], [0.08], [0.32], [0.34]]))
+    seen = len(real.diagnostics())
+
+    def warned() -> bool:
+        return any(worst(a) >= WARN and "friction" in text_of(a) for a in real.diagnostics()[seen:])
+
+    real.wait_for(warned, 5, "warning about the friction law")
+    go_home(real)

@@ -1,0 +1,150 @@
+"""Parameters: described, checked, and live where they are said to be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from rcl_interfaces.msg import ParameterType
+
+from drive import TSP_NS, Drive, Node, ParameterRefused
+from motion import RATIO, TSP, go_home, start_swing
+
+GAIN = "x.velocity_loop.gain"
+NUMBERS = {ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER}
+MACHINE_KEYS = [
+    "x.motor.inertia_kg_m2",
+    "x.transmission.screw_lead_mm",
+    "c.transmission.gear_ratio",
+    "x.position_loop.gain",
+    "x.current_loop.integral_time_ms",
+    "x.friction.i0",
+    "x.feedforward.torque_kg_m2",
+    "x.delays.alpha_ms",
+    "periods.position_ms",
+    "max_points",
+    "time",
+]
+
+
+def test_every_parameter_is_described(real: Drive):
+    """Type, text, and for numbers a range."""
+    names = real.list_parameters()
+    assert not [key for key in [GAIN, *MACHINE_KEYS] if key not in names]
+    for descriptor in real.describe(names):
+        assert descriptor.type != ParameterType.PARAMETER_NOT_SET, descriptor.name
+        assert descriptor.description.strip(), descriptor.name
+        assert "missing" not in descriptor.description, descriptor.name
+        if descriptor.type in NUMBERS:
+            ranges = [*descriptor.floating_point_range, *descriptor.integer_range]
+            assert len(ranges) == 1, descriptor.name
+            assert ranges[0].from_value < ranges[0].to_value, descriptor.name
+
+
+def test_values_are_those_of_the_default_machine(real: Drive):
+    """In the units of CNC documentation."""
+    assert real.get_parameters(
+        [GAIN, "x.position_loop.gain", "x.transmission.screw_lead_mm", "periods.position_ms"]
+    ) == {
+        GAIN: 5.0,
+        "x.position_loop.gain": 1.5,
+        "x.transmission.screw_lead_mm": 20.0,
+        "periods.position_ms": 6.0,
+    }
+
+
+@pytest.mark.parametrize("value", [-1.0, 1e12, float("nan"), float("inf")])
+def test_gain_out_of_range_is_refused_with_a_reason(real: Drive, value: float):
+    """And the old one stays."""
+    with pytest.raises(ParameterRefused, match=r"gain"):
+        real.set_parameters({GAIN: value})
+    assert real.get_parameters([GAIN]) == {GAIN: 5.0}
+
+
+@pytest.mark.parametrize("value", ["5.0", True, [5.0]], ids=["string", "bool", "array"])
+def test_wrong_type_is_refused_with_a_reason(real: Drive, value: object):
+    """And the old value stays."""
+    with pytest.raises(ParameterRefused, match=r"\w"):
+        real.set_parameters({GAIN: value})
+    assert real.get_parameters([GAIN]) == {GAIN: 5.0}
+
+
+def test_unknown_parameter_is_refused_with_a_reason(real: Drive):
+    """Not taken in silently."""
+    with pytest.raises(ParameterRefused, match=r"\w"):
+        real.set_parameters({"x.velocity_loop.gian": 5.0})
+
+
+@pytest.mark.parametrize("name", ["periods.position_ms", "time"])
+def test_what_is_not_live_is_refused_with_a_reason(real: Drive, name: str):
+    """Fixed from the start on; the reason names the parameter."""
+    before = real.get_parameters([name])
+    with pytest.raises(ParameterRefused, match=name.rsplit(".", 1)[-1]):
+        real.set_parameters({name: 12.0 if name.endswith("_ms") else "fast"})
+    assert real.get_parameters([name]) == before
+
+
+def test_live_gain_takes_effect(real: Drive):
+    """An integer serves where a double is wanted, and the node works with the new value."""
+    real.set_parameters({GAIN: 4})
+    assert real.get_parameters([GAIN]) == {GAIN: 4.0}
+    real.set_parameters({GAIN: 5.0})
+    assert real.get_parameters([GAIN]) == {GAIN: 5.0}
+
+
+def test_feedforward_can_be_halved_while_moving(real: Drive):
+    """From one position period on, VFFWS is half of what it was."""
+    go_home(real)
+    sent, start, plan = start_swing(real, duration=6.0)
+    real.wait_until(start + 100 * TSP_NS, 5)
+    real.set_parameters({"x.feedforward.velocity": 0.5})
+    try:
+        real.end(sent.sequence_number, 10)
+        states = real.record(start, start + 1000 * TSP_NS).states
+    finally:
+        real.set_parameters({"x.feedforward.velocity": 1.0})
+    forward = np.abs(states["velocity_feedforward", "x"])
+    peak = np.abs(np.diff(plan["x"])).max() / TSP / RATIO
+    assert forward[:100].max() > 0
+    # The way back, fastest at point 750, has the same speeds as the way there.
+    assert forward[600:].max() == pytest.approx(peak / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["-p", "x.velocity_loop.gain:=-1"], "x.velocity_loop.gain"),
+        (["-p", "x.velocity_loop.gian:=1"], "x.velocity_loop.gian"),
+        (["-p", "x.velocity_loop.gain"], "x.velocity_loop.gain"),
+        (["--params-file", "/nowhere/to/be/found.yaml"], "found.yaml"),
+        (["--no-such-option"], "--no-such-option"),
+        (["-p", "time:=slow"], "time"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_arguments_are_refused_with_a_message(arguments: list[str], named: str):
+    """One that names what is wrong; the program ends with a status that is not zero."""
+    with Node(arguments) as process:
+        assert process.wait(10) not in (0, 101, -6)
+        assert named in process.output()
+
+
+def test_arguments_are_honoured(start: Callable[..., Drive], tmp_path):
+    """-p, --params-file, names and namespaces, and -- which ends them."""
+    file = tmp_path / "machine.yaml"
+    file.write_text("/**:\n  ros__parameters:\n    y:\n      velocity_loop:\n        gain: 4.25\n")
+    drive = start(
+        "-r",
+        "__ns:=/cell",
+        "-r",
+        "__node:=axes",
+        "-p",
+        f"{GAIN}:=4",
+        "--params-file",
+        str(file),
+        "--",
+        name="/cell/axes",
+    )
+    assert drive.sees("/cell/axes")
+    assert drive.get_parameters([GAIN, "y.velocity_loop.gain"]) == {GAIN: 4.0, "y.velocity_loop.gain": 4.25}

@@ -1,0 +1,31 @@
+"""The node ends when it is asked to, and says goodbye."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable
+
+import pytest
+
+from drive import Drive
+from motion import start_swing
+
+
+@pytest.mark.parametrize("moving", [False, True], ids=["at rest", "moving"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+def test_ends_within_a_second_and_says_goodbye(start: Callable[..., Drive], number: signal.Signals, moving: bool):
+    """Status 0 within 1 s; out of rclpy's graph within 2 s, not after the lease of 50 s."""
+    drive = start()
+    drive.wait_for(drive.sees, 5, "node in the graph")
+    if moving:
+        start_swing(drive)
+    process, drive.process = drive.process, None
+    began = time.monotonic()
+    status = process.stop(number, timeout=5)
+    took = time.monotonic() - began
+    assert status == 0, process.output()
+    assert took <= 1.0
+    drive.wait_for(lambda: not drive.sees(), 2, "goodbye")
+    assert "ERROR" not in process.output()
+    assert "panicked" not in process.output()

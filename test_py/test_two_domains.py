@@ -1,0 +1,31 @@
+"""Two machines on one computer, apart by ROS_DOMAIN_ID alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from drive import TSP_NS, Drive
+from motion import assert_psec, start_swing
+
+
+def test_domains_do_not_hear_each_other(start: Callable[..., Drive]):
+    """A motion in one domain leaves the other at rest, without a result."""
+    moved, still = start(), start()
+    assert moved.process.domain_id != still.process.domain_id
+    before = still.latest("position")
+    _, begin, plan = start_swing(moved, duration=1.2)
+    assert_psec(moved, begin, plan)
+    still.wait_until(still.now() + 10 * TSP_NS, 5)
+    assert still.latest("position") == before
+    assert still.results() == []
+    assert len(moved.results()) >= 1
+
+
+def test_two_namespaces_share_a_domain(start: Callable[..., Drive]):
+    """The names keep them apart where the domain does not."""
+    left = start("-r", "__ns:=/left", name="/left/virtual_axes")
+    right = start("-r", "__ns:=/right", name="/right/virtual_axes", domain_id=left.process.domain_id)
+    _, begin, plan = start_swing(left, duration=1.2)
+    assert_psec(left, begin, plan)
+    assert right.latest("psec")["x"] == 0.0
+    assert right.results() == []
