@@ -165,7 +165,8 @@ pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
 }
 
 fn obey(simulation: &mut Simulation, command: Command, reports: &mpsc::UnboundedSender<Report>) {
-    let now = simulation.time_of(simulation.next_instant());
+    // Between two instants, the time is that of the first.
+    let now = simulation.time_of(simulation.next_instant() - 1);
     match command {
         Command::Offer { id, trajectory } => {
             let decision = simulation.offer(id, trajectory).map(|admission| Accepted {
