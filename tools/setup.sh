@@ -47,7 +47,8 @@ find_python() {
   local candidate
   for candidate in ${PYTHON:-} python3.12 python3.11 python3; do
     if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null; then
-      "$candidate" -c 'import sys; print(sys.executable)'
+      # Not a virtual environment's: that may be .venv itself, about to be made anew.
+      "$candidate" -c 'import sys; print(sys._base_executable)'
       return 0
     fi
   done
