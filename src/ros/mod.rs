@@ -1,6 +1,6 @@
 //! The ROS 2 side: the door through which messages come in, and the thread that paces the machine.
 //!
-//! [`pace`] owns the simulation and the clock and never waits for the network in real time; the rest
+//! `pace` owns the simulation and the clock and never waits for the network in real time; the rest
 //! runs on tokio and talks to it through bounded channels.
 
 pub mod args;
