@@ -201,16 +201,16 @@ pub static DEFINITIONS: &[Definition] = &[
         .is("Vmax, largest velocity of the axis that a trajectory may ask for."),
     Definition::number("limits.acceleration_m_s2", "m/s²", 1e-6, 1e5)
         .on(Linear)
-        .is("Amax, largest acceleration that a trajectory may ask for."),
+        .is("Amax, acceleration of a controlled stop; set-points are not checked against it."),
     Definition::number("limits.acceleration_rev_s2", "rev/s²", 1e-6, 1e5)
         .on(Rotary)
-        .is("Amax, largest acceleration that a trajectory may ask for."),
+        .is("Amax, acceleration of a controlled stop; set-points are not checked against it."),
     Definition::number("limits.jerk_m_s3", "m/s³", 1e-6, 1e7)
         .on(Linear)
-        .is("Jmax, largest jerk that a trajectory may ask for."),
+        .is("Jmax, jerk of a controlled stop; set-points are not checked against it."),
     Definition::number("limits.jerk_rev_s3", "rev/s³", 1e-6, 1e7)
         .on(Rotary)
-        .is("Jmax, largest jerk that a trajectory may ask for."),
+        .is("Jmax, jerk of a controlled stop; set-points are not checked against it."),
     Definition::number("limits.stroke_min_mm", "mm", -1e6, 0.0)
         .on(Linear)
         .optional()

@@ -5,8 +5,11 @@ use std::io::{self, Write};
 use crate::machine::AxisSample;
 use crate::units::{Nanoseconds, seconds};
 
+/// Name of a column, and what stands in it.
+type Signal = (&'static str, fn(&AxisSample) -> f64);
+
 /// The signals of an axis in a trace, in the order of the columns.
-const SIGNALS: [(&str, fn(&AxisSample) -> f64); 7] = [
+const SIGNALS: [Signal; 7] = [
     ("psec", |s| s.psec),
     ("position", |s| s.position),
     ("velocity", |s| s.velocity),

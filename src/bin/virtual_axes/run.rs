@@ -30,6 +30,9 @@ pub struct Arguments {
     trace: Option<PathBuf>,
 }
 
+/// Places of the axes that moved, and the figures of the motion.
+type Figures = (Vec<usize>, MotionReport);
+
 /// Runs it; the text is the table of errors.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let mut parameters = Parameters::load(&arguments.machine)?;
@@ -65,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
 fn execute(
     simulation: &mut Simulation,
     mut show: impl FnMut(&Simulation) -> std::io::Result<()>,
-) -> Result<Option<(Vec<usize>, MotionReport)>, Box<dyn Error>> {
+) -> Result<Option<Figures>, Box<dyn Error>> {
     let mut report = None;
     while simulation.is_busy() {
         simulation.step();
@@ -84,7 +87,7 @@ fn traced(
     simulation: &mut Simulation,
     path: &Path,
     limits: &[JointLimits],
-) -> Result<Option<(Vec<usize>, MotionReport)>, Box<dyn Error>> {
+) -> Result<Option<Figures>, Box<dyn Error>> {
     let failed = |error: std::io::Error| format!("{}: {error}", path.display());
     let names: Vec<String> = limits.iter().map(|joint| joint.name.clone()).collect();
     // A device or a pipe is written to as it is; a file is put in place at the end.
@@ -109,7 +112,7 @@ fn traced(
 }
 
 /// Errors in µm or mdeg, currents in A.
-fn table(report: &Option<(Vec<usize>, MotionReport)>, limits: &[JointLimits]) -> String {
+fn table(report: &Option<Figures>, limits: &[JointLimits]) -> String {
     let Some((places, report)) = report else { return "the motion was not completed\n".to_owned() };
     let mut text = String::from(
         "axis  unit   tracking error      synchronised error  peak current  saturated\n\
