@@ -178,8 +178,9 @@ pub fn run(
     }
 }
 
-/// Asserts that `value` lies within `tolerance` of `wanted`, with a message that shows all three.
+/// Asserts that `value` lies within `tolerance` of `wanted`; shows all three, also with `--nocapture`.
 #[track_caller]
 pub fn assert_near(what: &str, value: f64, wanted: f64, tolerance: f64) {
+    println!("{what}: {value:.4}, reference {wanted} ± {tolerance:.3}");
     assert!((value - wanted).abs() <= tolerance, "{what}: {value}, wanted {wanted} ± {tolerance}");
 }
