@@ -184,9 +184,9 @@ async fn serve(
             .collect(),
         serves: ["~/reset", "~/stop"].iter().filter_map(|s| args.resolve_service(s).ok()).collect(),
     };
-    let reset = Trigger::new(&mut node, &dds, args, "reset")?;
-    let stop = Trigger::new(&mut node, &dds, args, "stop")?;
-    let parameter_services = ParameterServices::new(&mut node, &dds, args)?;
+    let reset = Trigger::new(&mut node, &context, args, "reset")?;
+    let stop = Trigger::new(&mut node, &context, args, "stop")?;
+    let parameter_services = ParameterServices::new(&mut node, &context, args)?;
 
     let simulation = Simulation::new(&config, joint_limits.clone(), pace::grid_origin(period))?;
     let (commands, commands_in) = mpsc::channel(pace::COMMAND_QUEUE);
