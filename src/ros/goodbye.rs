@@ -33,7 +33,7 @@ const DISCOVERY_MULTICAST: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 /// Participants on one machine: with more, the ports would run into the next domain's.
 const PARTICIPANTS_PER_HOST: u32 = 120;
 
-/// 9.3.1.5: the writer of the announcements.
+/// 9.3.1.3: the writer of the announcements.
 const SPDP_WRITER: EntityId = [0x00, 0x01, 0x00, 0xc2];
 const PID_KEY_HASH: u16 = 0x0070;
 const PID_STATUS_INFO: u16 = 0x0071;

@@ -39,6 +39,9 @@ use super::rtps::{CDR_LE, Data, Guid, Message, entity, sequence_number};
 const LARGEST_DATAGRAM: usize = 65_500;
 /// RustDDS sends this many octets unfragmented wherever the MTU is 700 or more.
 const NEVER_FRAGMENTED: usize = 512;
+/// From one datagram to the next of a service: what a client's socket can hold, some 200 KB by
+/// default, must not overflow with this and the useless fragments.
+const PACE: Duration = Duration::from_millis(2);
 /// When the datagram is given again, after the time before.
 const REPEATS: [Duration; 4] = [
     Duration::from_millis(10),
@@ -80,7 +83,7 @@ impl LargeResponses {
         Ok(Self { writer, topic, participant, socket })
     }
 
-    /// Encodes a response, to be given to [`Self::deliver`] once RustDDS has written it; `None` when
+    /// Encodes a response, to be given to [`Self::datagram`] once RustDDS has written it; `None` when
     /// it is so small that RustDDS delivers it.
     ///
     /// # Errors
@@ -98,22 +101,31 @@ impl LargeResponses {
         Ok((payload.len() > NEVER_FRAGMENTED).then_some(payload))
     }
 
-    /// Sends the response that RustDDS wrote as sample `number`, as often as it takes.
-    pub(super) async fn deliver(&self, request: &RmwRequestId, number: i64, payload: &[u8]) {
-        let datagram = datagram(&self.writer, number, request, payload, SystemTime::now());
-        for wait in std::iter::once(Duration::ZERO).chain(REPEATS) {
-            if !wait.is_zero() {
-                tokio::time::sleep(wait).await;
-            }
-            // Anew each time: a client may have come that counts this sample among its own.
-            for client in self.clients() {
-                if let Err(error) = self.socket.send_to(&datagram, client) {
-                    tracing::warn!(
-                        "a response of {} octets on {} cannot be sent to {client}: {error}",
-                        payload.len(),
-                        self.topic
-                    );
-                }
+    /// The datagram of the response that RustDDS wrote as sample `number`.
+    pub(super) fn datagram(&self, request: &RmwRequestId, number: i64, payload: &[u8]) -> Vec<u8> {
+        datagram(&self.writer, number, request, payload, SystemTime::now())
+    }
+
+    /// Sends a datagram for the first time, and gives its readers the time to take it in.
+    pub(super) async fn send(&self, datagram: &[u8]) {
+        self.send_now(datagram);
+        tokio::time::sleep(PACE).await;
+    }
+
+    /// Sends a datagram again, as often as it takes: about a second.
+    pub(super) async fn repeat(&self, datagram: &[u8]) {
+        for wait in REPEATS {
+            tokio::time::sleep(wait).await;
+            // The clients are looked up anew: one may have come that has to account for this sample.
+            self.send_now(datagram);
+        }
+    }
+
+    fn send_now(&self, datagram: &[u8]) {
+        for client in self.clients() {
+            if let Err(error) = self.socket.send_to(datagram, client) {
+                let (length, topic) = (datagram.len(), &self.topic);
+                tracing::warn!("a response of {length} octets on {topic} cannot go to {client}: {error}");
             }
         }
     }

@@ -12,16 +12,16 @@ const VENDOR: [u8; 2] = [0x01, 0x12];
 /// 9.4.5.1.1: kinds of submessages.
 const SUBMESSAGE_INFO_TS: u8 = 0x09;
 const SUBMESSAGE_DATA: u8 = 0x15;
-/// 9.4.5.1.2, and 9.4.5.4 for those of DATA.
+/// 9.4.5.1.2, and 9.4.5.3.1 for those of DATA.
 const FLAG_LITTLE_ENDIAN: u8 = 0x01;
 const FLAG_INLINE_QOS: u8 = 0x02;
 const FLAG_DATA: u8 = 0x04;
-/// 9.4.5.4.3: from the field itself to the inline QoS: reader id, writer id, sequence number.
+/// 9.4.5.3: from the field itself to the inline QoS: reader id, writer id, sequence number.
 const OCTETS_TO_INLINE_QOS: u16 = 16;
 /// 9.4.2.11: the end of a parameter list.
 const PID_SENTINEL: u16 = 0x0001;
 
-/// 10.2.1.2: the encapsulation CDR_LE, with options 0.
+/// 10.2: the encapsulation CDR_LE, with options 0.
 pub(super) const CDR_LE: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 
 const HEADER: usize = 20;
@@ -93,7 +93,7 @@ impl Message {
         Message(octets)
     }
 
-    /// When the samples that follow were made: INFO_TS (8.3.8.10), in seconds and 2⁻³² s (9.3.2.1).
+    /// When the samples that follow were made: INFO_TS (8.3.8.11), in seconds and 2⁻³² s (9.3.2.1).
     pub(super) fn timestamp(mut self, time: SystemTime) -> Self {
         let since = time.duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO);
         let fraction = (u64::from(since.subsec_nanos()) << 32) / 1_000_000_000;

@@ -114,12 +114,9 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
                 }
             };
             self.wait_for_client(&id).await;
-            match self.write(id, response).await {
-                Ok(number) => {
-                    if let Some(payload) = large {
-                        self.large.deliver(&id, number, &payload).await;
-                    }
-                }
+            match self.write(id, response, large).await {
+                Ok(None) => {}
+                Ok(Some(datagram)) => self.large.repeat(&datagram).await,
                 Err(reason) => {
                     tracing::warn!("the response of {} could not be sent: {reason}", self.label);
                 }
@@ -128,13 +125,23 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         .boxed()
     }
 
-    /// Hands a response to RustDDS; comes back with its sequence number.
-    async fn write(&self, id: RmwRequestId, response: A) -> Result<i64, String> {
-        // Held while writing, so that the count keeps the order of the writer.
+    /// Hands a response to RustDDS, and sends it ourselves when it is `large`; comes back with the
+    /// datagram of that.
+    async fn write(
+        &self,
+        id: RmwRequestId,
+        response: A,
+        large: Option<Vec<u8>>,
+    ) -> Result<Option<Vec<u8>>, String> {
+        // Held while writing, so that the count keeps the order of the writer, and while a large one
+        // is sent, so that many of them do not come at once.
         let mut written = self.written.lock().await;
         self.server.async_send_response(id, response).await.map_err(|error| format!("{error:?}"))?;
         *written += 1;
-        Ok(*written)
+        let Some(payload) = large else { return Ok(None) };
+        let datagram = self.large.datagram(&id, *written, &payload);
+        self.large.send(&datagram).await;
+        Ok(Some(datagram))
     }
 
     /// Waits until the response reader of the client behind `id` is known.
