@@ -6,7 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use ros2_client::{NodeName, NodeOptions};
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 use tracing::{info, warn};
@@ -31,8 +31,8 @@ use super::topics::Topics;
 use super::trigger::Trigger;
 use crate::config::{ConfigError, Parameters, TimeMode};
 use crate::simulation::{self, Simulation, SimulationError};
-use crate::trajectory::{Context, Request, Start, Trajectory};
-use crate::units::seconds;
+use crate::trajectory::{Context, JointLimits, MotionId, Request, Start, Trajectory};
+use crate::units::{Nanoseconds, seconds};
 
 /// How long the end of the simulation's thread is waited for.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(300);
@@ -108,6 +108,7 @@ async fn serve(
     parameters: Parameters,
     log: mpsc::Receiver<LogRecord>,
 ) -> Result<(), NodeError> {
+    let signals = Signals::new()?;
     let config = parameters.machine_config()?;
     let node_config = parameters.node_config();
     if node_config.time == TimeMode::SimTime {
@@ -168,27 +169,10 @@ async fn serve(
     let now = move || convert::stamp(clock_health.borrow().time);
     let host = Host::new(parameters, commands.clone(), live);
     tasks.spawn(parameter_services.serve(host, now, std::future::pending()));
-    let stop_commands = commands.clone();
-    tasks.spawn(stop.serve(move || {
-        let (commands, id, trajectory) = (stop_commands.clone(), next_id(&ids), stop_all.clone());
-        async move {
-            let trajectory = trajectory.ok_or("this machine has no joint to stop")?;
-            let command = Command::Offer { id, trajectory };
-            commands.send(command).await.map_err(|_| "the node is shutting down".to_owned())?;
-            Ok("stopping every axis within its limits".to_owned())
-        }
-    }));
-    let reset_commands = commands.clone();
-    tasks.spawn(reset.serve(move || {
-        let commands = reset_commands.clone();
-        async move {
-            let gone = || "the node is shutting down".to_owned();
-            let (done, is_done) = oneshot::channel();
-            commands.send(Command::Reset(done)).await.map_err(|_| gone())?;
-            is_done.await.map_err(|_| gone())?;
-            Ok("at rest at home".to_owned())
-        }
-    }));
+    let to_stop = commands.clone();
+    tasks.spawn(stop.serve(move || stop_axes(to_stop.clone(), next_id(&ids), stop_all.clone())));
+    let to_reset = commands.clone();
+    tasks.spawn(reset.serve(move || reset_axes(to_reset.clone())));
 
     // What goes out.
     let diagnostics_text = Diagnostics {
@@ -229,7 +213,7 @@ async fn serve(
         })
         .map_err(|source| NodeError::System { what: "start the axes' thread", source })?;
 
-    wait_for_signal().await?;
+    signals.wait().await;
     // Outputs stop taking, so that the thread cannot wait for them; then the thread, then the rest.
     let _ = tokio::time::timeout(SHUTDOWN_TIMEOUT, commands.send(Command::Shutdown)).await;
     tasks.shutdown().await;
@@ -242,24 +226,55 @@ async fn serve(
     Ok(())
 }
 
-async fn wait_for_signal() -> Result<(), NodeError> {
-    let handler = |kind| signal(kind).map_err(|source| NodeError::System { what: "handle signals", source });
-    let (mut interrupt, mut terminate) =
-        (handler(SignalKind::interrupt())?, handler(SignalKind::terminate())?);
-    let name = tokio::select! {
-        _ = interrupt.recv() => "SIGINT",
-        _ = terminate.recv() => "SIGTERM",
-    };
-    info!("{name}: shutting down");
-    Ok(())
+/// The signals that end the node; from the moment that this exists, they end it in order.
+struct Signals {
+    interrupt: Signal,
+    terminate: Signal,
+}
+
+impl Signals {
+    fn new() -> Result<Self, NodeError> {
+        let handler =
+            |kind| signal(kind).map_err(|source| NodeError::System { what: "handle signals", source });
+        let (interrupt, terminate) = (SignalKind::interrupt(), SignalKind::terminate());
+        Ok(Signals { interrupt: handler(interrupt)?, terminate: handler(terminate)? })
+    }
+
+    async fn wait(mut self) {
+        let name = tokio::select! {
+            _ = self.interrupt.recv() => "SIGINT",
+            _ = self.terminate.recv() => "SIGTERM",
+        };
+        info!("{name}: shutting down");
+    }
+}
+
+/// What a service says that came too late.
+fn shutting_down<E>(_: E) -> String {
+    "the node is shutting down".to_owned()
+}
+
+/// `~/stop`.
+async fn stop_axes(
+    commands: mpsc::Sender<Command>,
+    id: MotionId,
+    stop: Option<Arc<Trajectory>>,
+) -> Result<String, String> {
+    let trajectory = stop.ok_or("this machine has no joint to stop")?;
+    commands.send(Command::Offer { id, trajectory }).await.map_err(shutting_down)?;
+    Ok("stopping every axis within its limits".to_owned())
+}
+
+/// `~/reset`.
+async fn reset_axes(commands: mpsc::Sender<Command>) -> Result<String, String> {
+    let (done, is_done) = oneshot::channel();
+    commands.send(Command::Reset(done)).await.map_err(shutting_down)?;
+    is_done.await.map_err(shutting_down)?;
+    Ok("at rest at home".to_owned())
 }
 
 /// A controlled stop of every joint.
-fn stop_request(
-    joints: &[crate::trajectory::JointLimits],
-    period: crate::units::Nanoseconds,
-    max_points: usize,
-) -> Option<Arc<Trajectory>> {
+fn stop_request(joints: &[JointLimits], period: Nanoseconds, max_points: usize) -> Option<Arc<Trajectory>> {
     let context = Context { joints, period, max_points, allow_nonzero_end_velocity: false };
     Trajectory::new(Request::new(Start::Now, Vec::new()), &context).ok().map(Arc::new)
 }
