@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from drive import DomainId, Drive, Node, joint_trajectory, node_binary
 
@@ -55,6 +56,23 @@ def test_the_linear_motor_machine_moves(start: Callable[..., Drive]):
     position = drive.latest("position")
     assert position["x"] == pytest.approx(0.1, abs=2e-6)
     assert position["y"] == pytest.approx(-0.05, abs=2e-6)
+
+
+def test_quality_of_service_by_parameter(start: Callable[..., Drive]):
+    """What is set is what the graph shows; the rest stays as documented."""
+    drive = start("-p", "qos.drive_states.reliability:=best_effort", "-p", "qos.psec.depth:=5", connect=False)
+
+    def offered(topic: str) -> tuple[ReliabilityPolicy, DurabilityPolicy] | None:
+        found = drive.node.get_publishers_info_by_topic(topic)
+        return (found[0].qos_profile.reliability, found[0].qos_profile.durability) if found else None
+
+    topics = {
+        "/virtual_axes/drive_states": (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE),
+        "/virtual_axes/trajectory_result": (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL),
+        "/joint_states": (ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE),
+    }
+    for topic, wanted in topics.items():
+        assert drive.wait_for(lambda: offered(topic), 10, f"publisher of {topic}") == wanted
 
 
 def test_publish_rate_thins_the_grid_and_stays_on_it(start: Callable[..., Drive]):

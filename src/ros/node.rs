@@ -128,7 +128,7 @@ async fn serve(
     let options = NodeOptions::new().start_parameter_services(false).enable_rosout(args.log_sinks().rosout);
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
-    let topics = Topics::create(&mut node, args, fast)?;
+    let topics = Topics::create(&mut node, args, &parameters, fast)?;
     let reset = Trigger::new(&mut node, &context, args, "reset")?;
     let stop = Trigger::new(&mut node, &context, args, "stop")?;
     let parameter_services = ParameterServices::new(&mut node, &context, args)?;

@@ -9,9 +9,9 @@ use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 
 use super::args::RosArgs;
-use super::endpoints::{EndpointError, Endpoints, Profile};
+use super::endpoints::{EndpointError, Endpoints};
 use super::messages::{self, DriveStates, MotorCurrents, TrajectoryResult};
-use crate::config::TimeMode;
+use crate::config::{Parameters, TimeMode};
 
 /// Every topic of the node.
 pub struct Topics {
@@ -47,28 +47,29 @@ impl Topics {
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic that the middleware refuses.
-    pub fn create(node: &mut Node, args: &RosArgs, fast: bool) -> Result<Self, EndpointError> {
-        let mut endpoints = Endpoints { node, args };
+    pub fn create(
+        node: &mut Node,
+        args: &RosArgs,
+        parameters: &Parameters,
+        fast: bool,
+    ) -> Result<Self, EndpointError> {
+        let mut endpoints = Endpoints { node, args, parameters };
         let joint_state = || MessageTypeName::new("sensor_msgs", "JointState");
         let trajectory = MessageTypeName::new("trajectory_msgs", "JointTrajectory");
         let diagnostic = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");
         let own = messages::type_name;
 
-        let (psec, psec_name) = endpoints.subscription("psec", trajectory, Profile::Psec)?;
-        let (load, load_name) = endpoints.subscription("load", joint_state(), Profile::Load)?;
-        let (joint_states, joint_states_name) =
-            endpoints.publisher("joint_states", joint_state(), Profile::Output)?;
+        let (psec, psec_name) = endpoints.subscription("psec", trajectory)?;
+        let (load, load_name) = endpoints.subscription("load", joint_state())?;
+        let (joint_states, joint_states_name) = endpoints.publisher("joint_states", joint_state())?;
         let (motor_currents, currents_name) =
-            endpoints.publisher("~/motor_currents", own("MotorCurrents"), Profile::Output)?;
-        let (drive_states, states_name) =
-            endpoints.publisher("~/drive_states", own("DriveStates"), Profile::Output)?;
-        let (results, results_name) =
-            endpoints.publisher("~/trajectory_result", own("TrajectoryResult"), Profile::Result)?;
-        let (diagnostics, diagnostics_name) =
-            endpoints.publisher("/diagnostics", diagnostic, Profile::Output)?;
+            endpoints.publisher("~/motor_currents", own("MotorCurrents"))?;
+        let (drive_states, states_name) = endpoints.publisher("~/drive_states", own("DriveStates"))?;
+        let (results, results_name) = endpoints.publisher("~/trajectory_result", own("TrajectoryResult"))?;
+        let (diagnostics, diagnostics_name) = endpoints.publisher("/diagnostics", diagnostic)?;
         let clock = if fast {
             let clock_type = MessageTypeName::new("rosgraph_msgs", "Clock");
-            Some(endpoints.publisher("/clock", clock_type, Profile::Output)?)
+            Some(endpoints.publisher("/clock", clock_type)?)
         } else {
             None
         };
