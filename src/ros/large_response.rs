@@ -17,8 +17,9 @@
 //!
 //! A reader takes the first copy that it can read, acknowledges it, and passes over the others. The
 //! datagram goes to every client of the service, for each has to account for each sample. It is
-//! given several times over a second, for RustDDS cannot repair its loss. On a network with a smaller
-//! MTU, IP fragments it.
+//! given several times over some seconds, for RustDDS cannot repair its loss, and a GAP in the end
+//! lets those go on whom it never reached: they miss one response, not all that follow. On a network
+//! with a smaller MTU, IP fragments it.
 //!
 //! The limit is [`LARGEST_DATAGRAM`]. A longer response must not be handed to RustDDS either, or its
 //! fragments would block the clients for good.
@@ -43,12 +44,15 @@ const NEVER_FRAGMENTED: usize = 512;
 /// default, must not overflow with this and the useless fragments.
 const PACE: Duration = Duration::from_millis(2);
 /// When the datagram is given again, after the time before.
-const REPEATS: [Duration; 4] = [
+const REPEATS: [Duration; 5] = [
     Duration::from_millis(10),
     Duration::from_millis(40),
     Duration::from_millis(200),
     Duration::from_millis(800),
+    Duration::from_secs(2),
 ];
+/// After those: when a client that still waits for the sample is told to go on without it.
+const GIVE_UP: [Duration; 3] = [Duration::from_secs(1), Duration::from_secs(2), Duration::from_secs(4)];
 
 /// RTPS 2.5, 9.6.4: PID_RELATED_SAMPLE_IDENTITY,
 const PID_RELATED_SAMPLE_IDENTITY: u16 = 0x0083;
@@ -112,12 +116,19 @@ impl LargeResponses {
         tokio::time::sleep(PACE).await;
     }
 
-    /// Sends a datagram again, as often as it takes: about a second.
-    pub(super) async fn repeat(&self, datagram: &[u8]) {
+    /// Sends the datagram of sample `number` again, as often as it takes; then frees whoever never
+    /// got it.
+    pub(super) async fn repeat(&self, datagram: Vec<u8>, number: i64) {
         for wait in REPEATS {
             tokio::time::sleep(wait).await;
             // The clients are looked up anew: one may have come that has to account for this sample.
-            self.send_now(datagram);
+            self.send_now(&datagram);
+        }
+        drop(datagram);
+        let gap = Message::from(&self.writer).gap(entity(&self.writer), number);
+        for wait in GIVE_UP {
+            tokio::time::sleep(wait).await;
+            self.send_now(&gap);
         }
     }
 
@@ -125,7 +136,7 @@ impl LargeResponses {
         for client in self.clients() {
             if let Err(error) = self.socket.send_to(datagram, client) {
                 let (length, topic) = (datagram.len(), &self.topic);
-                tracing::warn!("a response of {length} octets on {topic} cannot go to {client}: {error}");
+                tracing::warn!("a message of {length} octets on {topic} cannot go to {client}: {error}");
             }
         }
     }

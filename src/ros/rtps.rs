@@ -1,4 +1,4 @@
-//! RTPS messages, as far as this node writes them itself: header, INFO_TS, DATA with inline QoS.
+//! RTPS messages, as far as this node writes them itself: header, INFO_TS, DATA with inline QoS, GAP.
 //!
 //! Everything is little endian. Sections are those of RTPS 2.5.
 
@@ -10,6 +10,7 @@ const PROTOCOL_VERSION: [u8; 2] = [2, 4];
 const VENDOR: [u8; 2] = [0x01, 0x12];
 
 /// 9.4.5.1.1: kinds of submessages.
+const SUBMESSAGE_GAP: u8 = 0x08;
 const SUBMESSAGE_INFO_TS: u8 = 0x09;
 const SUBMESSAGE_DATA: u8 = 0x15;
 /// 9.4.5.1.2, and 9.4.5.3.1 for those of DATA.
@@ -103,6 +104,20 @@ impl Message {
         self
     }
 
+    /// The last submessage: there is nothing, or no more, to be had of this one sample of `writer`
+    /// (GAP, 8.3.8.4). A reader that has the sample keeps it.
+    pub(super) fn gap(mut self, writer: EntityId, number: i64) -> Vec<u8> {
+        let octets = &mut self.0;
+        octets.extend([SUBMESSAGE_GAP, FLAG_LITTLE_ENDIAN, 28, 0]);
+        octets.extend(ANY_READER);
+        octets.extend(writer);
+        octets.extend(sequence_number(number));
+        // A set that begins behind the gap, of no numbers (9.4.2.6).
+        octets.extend(sequence_number(number + 1));
+        octets.extend([0; 4]);
+        self.0
+    }
+
     /// The last submessage. Its length is right up to 65 535 octets, more than a datagram holds.
     pub(super) fn data(mut self, data: &Data<'_>) -> Vec<u8> {
         let octets = &mut self.0;
@@ -168,6 +183,13 @@ mod tests {
         assert_eq!(message[20..24], [0x15, 0x03, 24, 0]);
         // The sequence number, then nothing but the sentinel.
         assert_eq!(message[36..], [0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
+    }
+
+    #[test]
+    fn a_gap_is_one_sample_wide() {
+        let message = Message::from(&GUID).gap(entity(&GUID), 9);
+        assert_eq!(message[20..32], [0x08, 0x01, 28, 0, 0, 0, 0, 0, 0, 0, 0x0f, 0x03]);
+        assert_eq!(message[32..], [0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0, 10, 0, 0, 0, 0, 0, 0, 0]);
     }
 
     #[test]

@@ -116,7 +116,7 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
             self.wait_for_client(&id).await;
             match self.write(id, response, large).await {
                 Ok(None) => {}
-                Ok(Some(datagram)) => self.large.repeat(&datagram).await,
+                Ok(Some((datagram, number))) => self.large.repeat(datagram, number).await,
                 Err(reason) => {
                     tracing::warn!("the response of {} could not be sent: {reason}", self.label);
                 }
@@ -126,13 +126,13 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
     }
 
     /// Hands a response to RustDDS, and sends it ourselves when it is `large`; comes back with the
-    /// datagram of that.
+    /// datagram of that and its sequence number.
     async fn write(
         &self,
         id: RmwRequestId,
         response: A,
         large: Option<Vec<u8>>,
-    ) -> Result<Option<Vec<u8>>, String> {
+    ) -> Result<Option<(Vec<u8>, i64)>, String> {
         // Held while writing, so that the count keeps the order of the writer, and while a large one
         // is sent, so that many of them do not come at once.
         let mut written = self.written.lock().await;
@@ -141,7 +141,7 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         let Some(payload) = large else { return Ok(None) };
         let datagram = self.large.datagram(&id, *written, &payload);
         self.large.send(&datagram).await;
-        Ok(Some(datagram))
+        Ok(Some((datagram, *written)))
     }
 
     /// Waits until the response reader of the client behind `id` is known.
