@@ -15,11 +15,7 @@ def start_node(context: LaunchContext) -> list[Node]:
         key: LaunchConfiguration(key).perform(context) for key in ("machine", "namespace", "name", "time", "log_level")
     }
     parameters: list[object] = [argument["machine"]] if argument["machine"] else []
-    # `use_sim_time` is a parameter of its own; the other clocks are values of `time`.
-    if argument["time"] == "use_sim_time":
-        parameters.append({"use_sim_time": True})
-    else:
-        parameters.append({"time": argument["time"]})
+    parameters.append({"time": argument["time"]})
     return [
         Node(
             package="virtual_axes",
@@ -45,8 +41,8 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "time",
                 default_value="real",
-                choices=["real", "fast", "use_sim_time"],
-                description="real time; as fast as possible, publishing /clock; or following /clock",
+                choices=["real", "fast"],
+                description="Real time, or as fast as possible with a /clock of its own",
             ),
             DeclareLaunchArgument("log_level", default_value="info", description="Level of the node's log"),
             OpaqueFunction(function=start_node),

@@ -5,7 +5,7 @@
 //!
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
 //! [`units`], [`config`] → [`drive`] → [`control`] → [`machine`] → [`trajectory`] → [`assess`] →
-//! [`simulation`] → `ros`.
+//! [`simulation`], [`files`] → `ros`.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -14,6 +14,7 @@ pub mod assess;
 pub mod config;
 pub mod control;
 pub mod drive;
+pub mod files;
 pub mod machine;
 #[cfg(feature = "ros")]
 pub mod ros;

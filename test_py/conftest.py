@@ -45,8 +45,8 @@ def start() -> Iterator[Callable[..., Drive]]:
     """Start nodes for one test: start(*ros_args, name=...) gives a connected Drive."""
     with ExitStack() as stack:
 
-        def start_one(*ros_args: str, **options: object) -> Drive:
+        def start_one(*ros_args: str, connect: bool = True, **options: object) -> Drive:
             process = stack.enter_context(Node(ros_args, **options))
-            return stack.enter_context(Drive(process=process))
+            return stack.enter_context(Drive(process=process, connect=connect))
 
         yield start_one

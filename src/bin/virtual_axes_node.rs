@@ -1,5 +1,6 @@
 //! The ROS 2 node: virtual machine-tool axes.
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use virtual_axes::config::{Parameters, Source, parse_assignment};
@@ -25,11 +26,16 @@ Without arguments it runs the embedded Mikron UCP 710 in real time.
 
 fn main() -> ExitCode {
     match Command::parse(std::env::args().skip(1), "virtual_axes") {
-        Ok(Command::Help) => println!("{HELP}"),
-        Ok(Command::Version) => println!("virtual_axes_node {}", env!("CARGO_PKG_VERSION")),
-        Ok(Command::Run(args)) => return run(&args),
-        Err(error) => return refuse(&error),
+        Ok(Command::Help) => say(HELP),
+        Ok(Command::Version) => say(concat!("virtual_axes_node ", env!("CARGO_PKG_VERSION"))),
+        Ok(Command::Run(args)) => run(&args),
+        Err(error) => refuse(&error),
     }
+}
+
+fn say(text: &str) -> ExitCode {
+    // A reader that has gone away is no fault.
+    let _ = writeln!(std::io::stdout(), "{text}");
     ExitCode::SUCCESS
 }
 

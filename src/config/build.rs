@@ -28,6 +28,17 @@ pub enum TimeMode {
     SimTime,
 }
 
+/// Quality of service of a topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QosConfig {
+    /// Lost samples are sent again.
+    pub reliable: bool,
+    /// Late joiners get the last samples.
+    pub transient_local: bool,
+    /// Samples that are kept.
+    pub depth: usize,
+}
+
 /// Parameters of the node itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeConfig {
@@ -43,6 +54,19 @@ pub struct NodeConfig {
     pub max_points: usize,
     /// Whether a trajectory may end with a velocity.
     pub allow_nonzero_velocity_at_trajectory_end: bool,
+}
+
+impl Parameters {
+    /// Quality of service of a topic, by its own name: `psec`, `motor_currents`; `None` for one that
+    /// the schema does not have.
+    pub fn qos(&self, topic: &str) -> Option<QosConfig> {
+        let Some(Value::Integer(depth)) = self.get(&format!("qos.{topic}.depth")) else { return None };
+        Some(QosConfig {
+            reliable: self.text(&format!("qos.{topic}.reliability")) == "reliable",
+            transient_local: self.text(&format!("qos.{topic}.durability")) == "transient_local",
+            depth: usize::try_from(depth).unwrap_or(1),
+        })
+    }
 }
 
 impl Parameters {

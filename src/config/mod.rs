@@ -28,7 +28,7 @@ mod yaml;
 #[cfg(test)]
 mod tests;
 
-pub use build::{NodeConfig, TimeMode};
+pub use build::{NodeConfig, QosConfig, TimeMode};
 pub use definition::{DefaultValue, Definition, Kind, MotorKind, Presence, Scope};
 pub use error::{ConfigError, Source};
 pub use machine::*;

@@ -52,6 +52,30 @@ const fn delay(key: &'static str) -> Definition {
     Definition::number(key, "ms", 0.0, DELAY_MS).of_axis().default(Number(0.0)).live()
 }
 
+/// Whether samples of a topic are repeated until they have arrived.
+const fn qos_reliability(key: &'static str, default: &'static str) -> Definition {
+    Definition::new(key, "", Kind::Choice(&["reliable", "best_effort"]))
+        .of_node()
+        .default(Text(default))
+        .is("Whether lost samples of the topic are sent again.")
+}
+
+/// Whether a late joiner gets the last samples of a topic.
+const fn qos_durability(key: &'static str, default: &'static str) -> Definition {
+    Definition::new(key, "", Kind::Choice(&["volatile", "transient_local"]))
+        .of_node()
+        .default(Text(default))
+        .is("Whether late joiners of the topic get its last samples.")
+}
+
+/// How many samples of a topic are kept.
+const fn qos_depth(key: &'static str, default: i64) -> Definition {
+    Definition::new(key, "", Kind::Integer { min: 1, max: 100_000 })
+        .of_node()
+        .default(Integer(default))
+        .is("Samples of the topic that are kept (keep last).")
+}
+
 /// Every parameter there is. A key stands twice where its unit depends on the axis or the motor.
 pub static DEFINITIONS: &[Definition] = &[
     // Machine.
@@ -201,16 +225,16 @@ pub static DEFINITIONS: &[Definition] = &[
         .is("Vmax, largest velocity of the axis that a trajectory may ask for."),
     Definition::number("limits.acceleration_m_s2", "m/s²", 1e-6, 1e5)
         .on(Linear)
-        .is("Amax, largest acceleration that a trajectory may ask for."),
+        .is("Amax, acceleration of a controlled stop; set-points are not checked against it."),
     Definition::number("limits.acceleration_rev_s2", "rev/s²", 1e-6, 1e5)
         .on(Rotary)
-        .is("Amax, largest acceleration that a trajectory may ask for."),
+        .is("Amax, acceleration of a controlled stop; set-points are not checked against it."),
     Definition::number("limits.jerk_m_s3", "m/s³", 1e-6, 1e7)
         .on(Linear)
-        .is("Jmax, largest jerk that a trajectory may ask for."),
+        .is("Jmax, jerk of a controlled stop; set-points are not checked against it."),
     Definition::number("limits.jerk_rev_s3", "rev/s³", 1e-6, 1e7)
         .on(Rotary)
-        .is("Jmax, largest jerk that a trajectory may ask for."),
+        .is("Jmax, jerk of a controlled stop; set-points are not checked against it."),
     Definition::number("limits.stroke_min_mm", "mm", -1e6, 0.0)
         .on(Linear)
         .optional()
@@ -257,4 +281,29 @@ pub static DEFINITIONS: &[Definition] = &[
         .of_node()
         .default(Flag(false))
         .is("Follow /clock."),
+    // Quality of service.
+    qos_reliability("qos.psec.reliability", "reliable"),
+    qos_durability("qos.psec.durability", "volatile"),
+    qos_depth("qos.psec.depth", 64),
+    qos_reliability("qos.load.reliability", "best_effort"),
+    qos_durability("qos.load.durability", "volatile"),
+    qos_depth("qos.load.depth", 10),
+    qos_reliability("qos.joint_states.reliability", "reliable"),
+    qos_durability("qos.joint_states.durability", "volatile"),
+    qos_depth("qos.joint_states.depth", 10),
+    qos_reliability("qos.motor_currents.reliability", "reliable"),
+    qos_durability("qos.motor_currents.durability", "volatile"),
+    qos_depth("qos.motor_currents.depth", 10),
+    qos_reliability("qos.drive_states.reliability", "reliable"),
+    qos_durability("qos.drive_states.durability", "volatile"),
+    qos_depth("qos.drive_states.depth", 10),
+    qos_reliability("qos.trajectory_result.reliability", "reliable"),
+    qos_durability("qos.trajectory_result.durability", "transient_local"),
+    qos_depth("qos.trajectory_result.depth", 50),
+    qos_reliability("qos.diagnostics.reliability", "reliable"),
+    qos_durability("qos.diagnostics.durability", "volatile"),
+    qos_depth("qos.diagnostics.depth", 10),
+    qos_reliability("qos.clock.reliability", "reliable"),
+    qos_durability("qos.clock.durability", "volatile"),
+    qos_depth("qos.clock.depth", 10),
 ];

@@ -1,19 +1,11 @@
 //! Topics of the node under their resolved names, with their QoS profiles.
 
-use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
+use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use ros2_client::{Message, MessageTypeName, Name, Node, Publisher, Subscription};
 use serde::Serialize;
 
 use super::args::RosArgs;
-
-/// Samples that an output keeps.
-const OUTPUT_DEPTH: usize = 10;
-/// Results that a late joiner still gets.
-const RESULT_DEPTH: usize = 50;
-/// Trajectories that may wait to be taken.
-const PSEC_DEPTH: usize = 64;
-/// Loads that may wait to be taken.
-const LOAD_DEPTH: usize = 10;
+use crate::config::{Parameters, QosConfig};
 
 /// A topic that could not be created.
 #[derive(Debug, thiserror::Error)]
@@ -25,32 +17,20 @@ pub struct EndpointError {
     pub reason: String,
 }
 
-/// How a topic is offered or asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Profile {
-    /// Outputs: reliable, volatile, keep last 10.
-    Output,
-    /// Results: reliable, transient local, keep last 50.
-    Result,
-    /// `psec`: reliable, volatile, keep last 64.
-    Psec,
-    /// `load`: best effort, so that both kinds of publisher are heard.
-    Load,
-}
-
-impl Profile {
-    fn qos(self) -> QosProfile {
-        let keep_last = |depth| History::KeepLast { depth };
-        // A task of its own publishes each topic, and may wait for slow readers.
-        let reliable = QosProfile::publisher_default().reliability_reliable(WhenFull::Block);
-        match self {
-            Profile::Output => reliable.history(keep_last(OUTPUT_DEPTH)),
-            Profile::Result => {
-                reliable.durability(Durability::TransientLocal).history(keep_last(RESULT_DEPTH))
-            }
-            Profile::Psec => reliable.history(keep_last(PSEC_DEPTH)),
-            Profile::Load => QosProfile::subscription_default().history(keep_last(LOAD_DEPTH)),
-        }
+/// The profile of a topic as it is configured.
+fn profile(qos: QosConfig) -> QosProfile {
+    // A task of its own publishes each topic, and may wait for slow readers.
+    let reliability = if qos.reliable {
+        Reliability::Reliable { when_full: WhenFull::Block }
+    } else {
+        Reliability::BestEffort
+    };
+    let durability = if qos.transient_local { Durability::TransientLocal } else { Durability::Volatile };
+    QosProfile {
+        reliability,
+        durability,
+        history: History::KeepLast { depth: qos.depth },
+        ..QosProfile::publisher_default()
     }
 }
 
@@ -60,6 +40,8 @@ pub struct Endpoints<'a> {
     pub node: &'a mut Node,
     /// What resolves their names.
     pub args: &'a RosArgs,
+    /// What configures their quality of service.
+    pub parameters: &'a Parameters,
 }
 
 impl Endpoints<'_> {
@@ -67,15 +49,15 @@ impl Endpoints<'_> {
         &mut self,
         name: &str,
         type_name: MessageTypeName,
-        profile: Profile,
     ) -> Result<(rustdds::Topic, String), EndpointError> {
         let failed = |reason: String| EndpointError { name: name.to_owned(), reason };
+        let own_name = name.trim_start_matches(['~', '/']);
+        let qos =
+            self.parameters.qos(own_name).ok_or_else(|| failed("it is not in the schema".to_owned()))?;
         let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
         let ros_name = Name::parse(&resolved).map_err(|e| failed(e.to_string()))?;
-        let topic = self
-            .node
-            .create_topic(&ros_name, type_name, &profile.qos())
-            .map_err(|e| failed(e.to_string()))?;
+        let topic =
+            self.node.create_topic(&ros_name, type_name, &profile(qos)).map_err(|e| failed(e.to_string()))?;
         Ok((topic, resolved))
     }
 
@@ -87,9 +69,8 @@ impl Endpoints<'_> {
         &mut self,
         name: &str,
         type_name: MessageTypeName,
-        profile: Profile,
     ) -> Result<(Publisher<M>, String), EndpointError> {
-        let (topic, resolved) = self.topic(name, type_name, profile)?;
+        let (topic, resolved) = self.topic(name, type_name)?;
         let publisher = self
             .node
             .create_publisher(&topic, None)
@@ -105,9 +86,8 @@ impl Endpoints<'_> {
         &mut self,
         name: &str,
         type_name: MessageTypeName,
-        profile: Profile,
     ) -> Result<(Subscription<M>, String), EndpointError> {
-        let (topic, resolved) = self.topic(name, type_name, profile)?;
+        let (topic, resolved) = self.topic(name, type_name)?;
         let subscription = self
             .node
             .create_subscription(&topic, None)

@@ -22,6 +22,7 @@ use std::{
 use rustdds::{DomainParticipant, RTPSEntity};
 
 use super::environment::DiscoveryRange;
+use super::rtps::{Data, EntityId, Guid, Message};
 
 // RTPS 2.5, 9.6.2.3: the ports of a domain.
 const PORT_BASE: u32 = 7400;
@@ -32,19 +33,10 @@ const DISCOVERY_MULTICAST: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 /// Participants on one machine: with more, the ports would run into the next domain's.
 const PARTICIPANTS_PER_HOST: u32 = 120;
 
-const PROTOCOL_VERSION: [u8; 2] = [2, 4];
-/// RustDDS, in whose name this is sent.
-const VENDOR: [u8; 2] = [0x01, 0x12];
-const SUBMESSAGE_DATA: u8 = 0x15;
-const FLAG_LITTLE_ENDIAN: u8 = 0x01;
-const FLAG_INLINE_QOS: u8 = 0x02;
-/// From the field itself to the inline QoS: reader id, writer id, sequence number.
-const OCTETS_TO_INLINE_QOS: u16 = 16;
-const ANY_READER: [u8; 4] = [0, 0, 0, 0];
-const SPDP_WRITER: [u8; 4] = [0x00, 0x01, 0x00, 0xc2];
+/// 9.3.1.3: the writer of the announcements.
+const SPDP_WRITER: EntityId = [0x00, 0x01, 0x00, 0xc2];
 const PID_KEY_HASH: u16 = 0x0070;
 const PID_STATUS_INFO: u16 = 0x0071;
-const PID_SENTINEL: u16 = 0x0001;
 const DISPOSED_AND_UNREGISTERED: [u8; 4] = [0, 0, 0, 3];
 
 /// Readers keep only what is newer than the last announcement; those count up from 1, one every
@@ -115,32 +107,13 @@ impl Goodbye {
 }
 
 /// The whole datagram for the participant with this GUID.
-fn dispose_datagram(guid: &[u8; 16]) -> Vec<u8> {
-    let mut body = Vec::with_capacity(52);
-    body.extend([0, 0]); // extra flags
-    body.extend(OCTETS_TO_INLINE_QOS.to_le_bytes());
-    body.extend(ANY_READER);
-    body.extend(SPDP_WRITER);
-    // A sequence number is two words, the high one first.
-    body.extend(((LAST_SEQUENCE_NUMBER >> 32) as u32).to_le_bytes());
-    body.extend((LAST_SEQUENCE_NUMBER as u32).to_le_bytes());
-    for (id, value) in
-        [(PID_KEY_HASH, guid.as_slice()), (PID_STATUS_INFO, &DISPOSED_AND_UNREGISTERED), (PID_SENTINEL, &[])]
-    {
-        body.extend(id.to_le_bytes());
-        body.extend((value.len() as u16).to_le_bytes());
-        body.extend(value);
-    }
-
-    let mut datagram = Vec::with_capacity(24 + body.len());
-    datagram.extend(b"RTPS");
-    datagram.extend(PROTOCOL_VERSION);
-    datagram.extend(VENDOR);
-    datagram.extend(&guid[..12]);
-    datagram.extend([SUBMESSAGE_DATA, FLAG_LITTLE_ENDIAN | FLAG_INLINE_QOS]);
-    datagram.extend((body.len() as u16).to_le_bytes());
-    datagram.extend(body);
-    datagram
+fn dispose_datagram(guid: &Guid) -> Vec<u8> {
+    Message::from(guid).data(&Data {
+        writer: SPDP_WRITER,
+        sequence_number: LAST_SEQUENCE_NUMBER,
+        inline_qos: &[(PID_KEY_HASH, guid), (PID_STATUS_INFO, &DISPOSED_AND_UNREGISTERED)],
+        payload: None,
+    })
 }
 
 /// Every place where a participant that may know us listens for discovery: the multicast group,

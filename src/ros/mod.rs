@@ -1,6 +1,6 @@
 //! The ROS 2 side: the door through which messages come in, and the thread that paces the machine.
 //!
-//! [`pace`] owns the simulation and the clock and never waits for the network in real time; the rest
+//! `pace` owns the simulation and the clock and never waits for the network in real time; the rest
 //! runs on tokio and talks to it through bounded channels.
 
 pub mod args;
@@ -9,8 +9,10 @@ mod convert;
 mod diagnostics;
 mod endpoints;
 pub mod environment;
+mod fan_out;
 mod goodbye;
 mod inputs;
+mod large_response;
 pub mod log;
 pub mod messages;
 pub mod names;
@@ -22,5 +24,7 @@ pub mod parameter_services;
 pub mod participant;
 mod results;
 pub mod rosout;
+mod rtps;
 mod service;
+mod topics;
 mod trigger;

@@ -1,14 +1,17 @@
-//! Services under their resolved names, whose responses wait for the client to be known.
+//! Services under their resolved names, whose responses wait for the client to be known and reach it
+//! at (almost) any length.
 
 use std::time::Duration;
 
 use futures::{FutureExt, StreamExt, future::BoxFuture, stream::BoxStream};
 use ros2_client::qos::{History, QosProfile, WhenFull};
 use ros2_client::service::RmwRequestId;
-use ros2_client::{Message, Name, Node, Server, ServiceMapping, ServiceTypeName};
+use ros2_client::{Context, Message, Name, Node, Server, ServiceMapping, ServiceTypeName};
 use rustdds::DomainParticipant;
+use tokio::sync::Mutex;
 
 use super::args::RosArgs;
+use super::large_response::{self, LargeResponses};
 
 /// How long a write may wait for a slow reader.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
@@ -43,16 +46,19 @@ pub struct Service<Q: Message, A: Message> {
     server: Server<Q, A>,
     response_topic: String,
     participant: DomainParticipant,
+    large: LargeResponses,
+    /// How many responses the server has written: the sequence number of the last one.
+    written: Mutex<i64>,
 }
 
 impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
-    /// The service `~/label`; `participant` is the one that `node` lives on.
+    /// The service `~/label`; `context` is the one that `node` lives in.
     ///
     /// # Errors
     /// [`ServiceError`] when the middleware refuses it.
     pub fn new(
         node: &mut Node,
-        participant: &DomainParticipant,
+        context: &Context,
         args: &RosArgs,
         label: &'static str,
         type_name: &ServiceTypeName,
@@ -64,15 +70,18 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
         let resolved = args.resolve_service(&format!("~/{label}")).map_err(|e| failed(e.to_string()))?;
         let name = Name::parse(&resolved).map_err(|e| failed(e.to_string()))?;
+        let before = large_response::writers(context);
         let server = node
             .create_server(ServiceMapping::Enhanced, &name, type_name, profile(depth), profile(depth))
             .map_err(|e| failed(e.to_string()))?;
-        Ok(Service {
-            label,
-            server,
-            response_topic: format!("rr{resolved}Reply"),
-            participant: participant.clone(),
-        })
+        let response_topic = format!("rr{resolved}Reply");
+        let participant = context.domain_participant();
+        // A server has one writer, and keeps its GUID to itself.
+        let writer = large_response::writers(context).difference(&before).next().copied();
+        let writer = writer.ok_or_else(|| failed("its response writer is not announced".to_owned()))?;
+        let large = LargeResponses::new(writer, response_topic.clone(), participant.clone())
+            .map_err(|error| failed(format!("no socket: {error}")))?;
+        Ok(Service { label, server, response_topic, participant, large, written: Mutex::new(0) })
     }
 
     /// Requests as they come, or why one could not be read.
@@ -97,12 +106,42 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         A: Send + Sync,
     {
         async move {
+            let large = match LargeResponses::encode(&response) {
+                Ok(large) => large,
+                Err(error) => {
+                    tracing::error!("the response of {} is not sent: {error}", self.label);
+                    return;
+                }
+            };
             self.wait_for_client(&id).await;
-            if let Err(error) = self.server.async_send_response(id, response).await {
-                tracing::warn!("the response of {} could not be sent: {error:?}", self.label);
+            match self.write(id, response, large).await {
+                Ok(None) => {}
+                Ok(Some(datagram)) => self.large.repeat(&datagram).await,
+                Err(reason) => {
+                    tracing::warn!("the response of {} could not be sent: {reason}", self.label);
+                }
             }
         }
         .boxed()
+    }
+
+    /// Hands a response to RustDDS, and sends it ourselves when it is `large`; comes back with the
+    /// datagram of that.
+    async fn write(
+        &self,
+        id: RmwRequestId,
+        response: A,
+        large: Option<Vec<u8>>,
+    ) -> Result<Option<Vec<u8>>, String> {
+        // Held while writing, so that the count keeps the order of the writer, and while a large one
+        // is sent, so that many of them do not come at once.
+        let mut written = self.written.lock().await;
+        self.server.async_send_response(id, response).await.map_err(|error| format!("{error:?}"))?;
+        *written += 1;
+        let Some(payload) = large else { return Ok(None) };
+        let datagram = self.large.datagram(&id, *written, &payload);
+        self.large.send(&datagram).await;
+        Ok(Some(datagram))
     }
 
     /// Waits until the response reader of the client behind `id` is known.

@@ -1,9 +1,8 @@
 //! The services `~/stop` and `~/reset`.
 
 use futures::StreamExt;
-use ros2_client::{Node, ServiceTypeName};
+use ros2_client::{Context, Node, ServiceTypeName};
 use ros2_interfaces_jazzy_serde::std_srvs::srv::{TriggerRequest, TriggerResponse};
-use rustdds::DomainParticipant;
 
 use super::args::RosArgs;
 use super::service::{Service, ServiceError};
@@ -21,12 +20,12 @@ impl Trigger {
     /// [`ServiceError`] when the middleware refuses it.
     pub fn new(
         node: &mut Node,
-        participant: &DomainParticipant,
+        context: &Context,
         args: &RosArgs,
         label: &'static str,
     ) -> Result<Self, ServiceError> {
         let type_name = ServiceTypeName::new("std_srvs", "Trigger");
-        Service::new(node, participant, args, label, &type_name, DEPTH).map(Trigger)
+        Service::new(node, context, args, label, &type_name, DEPTH).map(Trigger)
     }
 
     /// Serves until the node shuts down: `act` does what is asked and says what it did.

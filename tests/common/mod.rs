@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use virtual_axes::config::{Assignment, Parameters, Source, Value};
 use virtual_axes::machine::{Machine, MachineParameters};
@@ -16,7 +16,9 @@ pub const M_MIN: f64 = 1.0 / 60.0;
 
 /// Parameters of the default machine with some of them changed, all at once.
 pub fn parameters<K: AsRef<str>>(changes: &[(K, f64)]) -> Parameters {
-    let mut parameters = Parameters::embedded_default().expect("the embedded machine is valid");
+    static DEFAULT: LazyLock<Parameters> =
+        LazyLock::new(|| Parameters::embedded_default().expect("the embedded machine is valid"));
+    let mut parameters = DEFAULT.clone();
     let assignments = changes.iter().map(|(key, value)| Assignment {
         key: key.as_ref().to_owned(),
         value: Value::Double(*value),
@@ -178,8 +180,9 @@ pub fn run(
     }
 }
 
-/// Asserts that `value` lies within `tolerance` of `wanted`, with a message that shows all three.
+/// Asserts that `value` lies within `tolerance` of `wanted`; shows all three, also with `--nocapture`.
 #[track_caller]
 pub fn assert_near(what: &str, value: f64, wanted: f64, tolerance: f64) {
+    println!("{what}: {value:.4}, reference {wanted} ± {tolerance:.3}");
     assert!((value - wanted).abs() <= tolerance, "{what}: {value}, wanted {wanted} ± {tolerance}");
 }

@@ -16,7 +16,9 @@ use futures::{
     future::BoxFuture,
     stream::{BoxStream, FuturesUnordered, select_all},
 };
-use ros2_client::{Message, MessageTypeName, Name, Node, Publisher, ServiceTypeName, service::RmwRequestId};
+use ros2_client::{
+    Context, Message, MessageTypeName, Name, Node, Publisher, ServiceTypeName, service::RmwRequestId,
+};
 use ros2_interfaces_jazzy_serde::{
     builtin_interfaces::msg::Time,
     rcl_interfaces::{
@@ -29,7 +31,6 @@ use ros2_interfaces_jazzy_serde::{
         },
     },
 };
-use rustdds::DomainParticipant;
 
 pub use self::types::{Descriptor, ParameterHost, ParameterType, ParameterValue, Range};
 use super::args::RosArgs;
@@ -62,16 +63,12 @@ pub struct ParameterServices {
 
 impl ParameterServices {
     /// Creates the services under the node's name, and the publisher of `/parameter_events`.
-    /// `participant` is the one that `node` lives on.
+    /// `context` is the one that `node` lives in.
     ///
     /// # Errors
     /// The first one that the middleware refuses.
-    pub fn new(
-        node: &mut Node,
-        participant: &DomainParticipant,
-        args: &RosArgs,
-    ) -> Result<Self, ServiceError> {
-        let mut door = Door { node, participant, args };
+    pub fn new(node: &mut Node, context: &Context, args: &RosArgs) -> Result<Self, ServiceError> {
+        let mut door = Door { node, context, args };
         Ok(Self {
             get: door.service("get_parameters", "GetParameters")?,
             types: door.service("get_parameter_types", "GetParameterTypes")?,
@@ -220,7 +217,7 @@ where
 /// Creates the services under the node's name, reliable and with rmw's depth.
 struct Door<'a> {
     node: &'a mut Node,
-    participant: &'a DomainParticipant,
+    context: &'a Context,
     args: &'a RosArgs,
 }
 
@@ -231,7 +228,7 @@ impl Door<'_> {
         type_name: &str,
     ) -> Result<Service<Q, A>, ServiceError> {
         let type_name = ServiceTypeName::new("rcl_interfaces", type_name);
-        Service::new(self.node, self.participant, self.args, label, &type_name, QUEUE_DEPTH)
+        Service::new(self.node, self.context, self.args, label, &type_name, QUEUE_DEPTH)
     }
 
     fn events(&mut self) -> Result<Publisher<msg::ParameterEvent>, ServiceError> {

@@ -2,6 +2,9 @@
 
 #![forbid(unsafe_code)]
 
+mod run;
+
+use std::error::Error;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -22,6 +25,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Run set-points through a machine and print its errors.
+    Run(run::Arguments),
     /// Check a machine file.
     Check {
         /// Machine file: a ROS 2 parameter file.
@@ -38,7 +43,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let text = match run(&Arguments::parse().command) {
+    let text = match text_of(&Arguments::parse().command) {
         Ok(text) => text,
         Err(error) => {
             eprintln!("{error}");
@@ -56,9 +61,10 @@ fn main() -> ExitCode {
 }
 
 /// What the command prints.
-fn run(command: &Command) -> Result<String, ConfigError> {
+fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
     match command {
-        Command::Check { file } => check(&Parameters::from_file(file)?),
+        Command::Run(arguments) => run::run(arguments),
+        Command::Check { file } => Ok(check(&Parameters::from_file(file)?)?),
         Command::Machines => Parameters::builtin_names()
             .map(|name| {
                 let machine = Parameters::builtin(name)?.machine_config()?;

@@ -1,0 +1,117 @@
+//! The node's topics, all of them, and what it says about itself when it starts.
+
+use std::io::Write;
+
+use ros2_client::{MessageTypeName, Node, Publisher, Subscription};
+use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
+use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
+use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
+use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
+
+use super::args::RosArgs;
+use super::endpoints::{EndpointError, Endpoints};
+use super::messages::{self, DriveStates, MotorCurrents, TrajectoryResult};
+use crate::config::{Parameters, TimeMode};
+
+/// Every topic of the node.
+pub struct Topics {
+    /// `psec`.
+    pub psec: Subscription<JointTrajectory>,
+    /// `load`.
+    pub load: Subscription<JointState>,
+    /// `joint_states`.
+    pub joint_states: Publisher<JointState>,
+    /// `~/motor_currents`.
+    pub motor_currents: Publisher<MotorCurrents>,
+    /// `~/drive_states`.
+    pub drive_states: Publisher<DriveStates>,
+    /// `~/trajectory_result`.
+    pub results: Publisher<TrajectoryResult>,
+    /// `/diagnostics`.
+    pub diagnostics: Publisher<DiagnosticArray>,
+    /// `/clock` and its resolved name, in `fast`.
+    pub clock: Option<(Publisher<Clock>, String)>,
+    /// Resolved names.
+    pub names: Names,
+}
+
+/// Names in the graph.
+pub struct Names {
+    subscribed: Vec<String>,
+    published: Vec<String>,
+    served: Vec<String>,
+}
+
+impl Topics {
+    /// Creates them; `/clock` only in `fast`.
+    ///
+    /// # Errors
+    /// [`EndpointError`] naming the topic that the middleware refuses.
+    pub fn create(
+        node: &mut Node,
+        args: &RosArgs,
+        parameters: &Parameters,
+        fast: bool,
+    ) -> Result<Self, EndpointError> {
+        let mut endpoints = Endpoints { node, args, parameters };
+        let joint_state = || MessageTypeName::new("sensor_msgs", "JointState");
+        let trajectory = MessageTypeName::new("trajectory_msgs", "JointTrajectory");
+        let diagnostic = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");
+        let own = messages::type_name;
+
+        let (psec, psec_name) = endpoints.subscription("psec", trajectory)?;
+        let (load, load_name) = endpoints.subscription("load", joint_state())?;
+        let (joint_states, joint_states_name) = endpoints.publisher("joint_states", joint_state())?;
+        let (motor_currents, currents_name) =
+            endpoints.publisher("~/motor_currents", own("MotorCurrents"))?;
+        let (drive_states, states_name) = endpoints.publisher("~/drive_states", own("DriveStates"))?;
+        let (results, results_name) = endpoints.publisher("~/trajectory_result", own("TrajectoryResult"))?;
+        let (diagnostics, diagnostics_name) = endpoints.publisher("/diagnostics", diagnostic)?;
+        let clock = if fast {
+            let clock_type = MessageTypeName::new("rosgraph_msgs", "Clock");
+            Some(endpoints.publisher("/clock", clock_type)?)
+        } else {
+            None
+        };
+        let names = Names {
+            subscribed: vec![psec_name, load_name],
+            published: [joint_states_name, currents_name, states_name, results_name, diagnostics_name]
+                .into_iter()
+                .chain(clock.iter().map(|(_, name)| name.clone()))
+                .collect(),
+            served: ["~/reset", "~/stop"].iter().filter_map(|s| args.resolve_service(s).ok()).collect(),
+        };
+        Ok(Topics {
+            psec,
+            load,
+            joint_states,
+            motor_currents,
+            drive_states,
+            results,
+            diagnostics,
+            clock,
+            names,
+        })
+    }
+}
+
+impl Names {
+    /// One screen for whoever started the node.
+    pub fn print(&self, args: &RosArgs, machine: &str, time: TimeMode) {
+        let time = match time {
+            TimeMode::Fast => "as fast as subscribers take it",
+            TimeMode::Real | TimeMode::SimTime => "real",
+        };
+        let mut screen = format!("{}: {machine}, time: {time}\n", args.node());
+        for (what, names) in
+            [("listens to", &self.subscribed), ("publishes", &self.published), ("serves", &self.served)]
+        {
+            for (place, name) in names.iter().enumerate() {
+                screen += &format!("  {:<11}{name}\n", if place == 0 { what } else { "" });
+            }
+        }
+        screen += "  and the parameter services; stop it with Ctrl-C\n";
+        // The node runs as well without anybody who reads it.
+        let _ = std::io::stdout().write_all(screen.as_bytes());
+    }
+}

@@ -1,0 +1,73 @@
+"""Responses that do not fit in one packet of a network: they arrive, all of them, at every client."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from rcl_interfaces.srv import DescribeParameters
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+
+from drive import SETTLE_S, Drive
+
+TIMES = 20
+
+
+def describe_all(drive: Drive, times: int) -> None:
+    """Ask for every parameter's description, and look that it is there."""
+    names = drive.list_parameters()
+    for _ in range(times):
+        answer = drive.call(
+            DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names), timeout=3
+        )
+        assert len(serialize_message(answer)) > 10_000
+        assert [descriptor.name for descriptor in answer.descriptors] == names
+
+
+def test_many_in_a_row(real: Drive):
+    """Each takes milliseconds, not a retry."""
+    describe_all(real, TIMES)
+
+
+def test_every_value_at_once(real: Drive):
+    """What `ros2 param dump` asks for."""
+    names = real.list_parameters()
+    for _ in range(TIMES):
+        assert len(real.get_parameters(names)) == len(names)
+
+
+def test_two_clients_at_once(real: Drive):
+    """The responses to one are samples that the other has to account for, too."""
+    with Drive(process=real.process) as other, ThreadPoolExecutor() as pool:
+        for done in [pool.submit(describe_all, drive, TIMES) for drive in (real, other)]:
+            done.result()
+        # And one that was there, but had asked for nothing since.
+        describe_all(other, 1)
+        assert len(real.describe(["max_points"])) == 1
+
+
+def test_in_quick_succession(real: Drive):
+    """A hundred on their way at a time, to a client that has room for them."""
+    names = real.list_parameters()
+    client = real.node.create_client(
+        DescribeParameters, f"{real.target}/describe_parameters", qos_profile=QoSProfile(depth=1000)
+    )
+    try:
+        real.wait_for(client.service_is_ready, 5, "service")
+        time.sleep(SETTLE_S)
+        futures = [client.call_async(DescribeParameters.Request(names=names)) for _ in range(100)]
+        real.wait_for(lambda: all(future.done() for future in futures), 10, "a hundred answers")
+    finally:
+        real.node.destroy_client(client)
+    assert all(len(future.result().descriptors) == len(names) for future in futures)
+
+
+def test_what_is_too_long_is_said_and_stops_nothing(real: Drive):
+    """One datagram holds 65 500 octets; the log names the service, and the next response comes."""
+    names = real.list_parameters()
+    with pytest.raises(TimeoutError):
+        real.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names * 4), timeout=1)
+    assert "the response of describe_parameters is not sent" in real.process.output()
+    assert len(real.describe(["max_points"])) == 1

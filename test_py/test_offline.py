@@ -1,0 +1,77 @@
+"""Online equals offline: the node's samples and the trace of `virtual_axes run`, bit for bit."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drive import TSP_NS, Drive, Recording, joint_trajectory, node_binary
+from motion import swing
+
+AXES = ["x", "y", "z", "a", "c"]
+AMPLITUDES = [0.05, -0.03, 0.02, 0.4, 1.0]
+"""m on the linear axes, rad on the rotary ones."""
+
+
+def plan() -> tuple[np.ndarray, np.ndarray]:
+    """All five axes, each at its own tempo, from home and back."""
+    time, base = swing(3.0, amplitude=1.0)
+    turns = [1, 2, 3, 1, 2]
+    phase = np.clip(time / time[-1], 0, 1)
+    columns = [a / 2 * (1 - np.cos(2 * np.pi * n * phase)) for a, n in zip(AMPLITUDES, turns)]
+    return time, np.column_stack(columns)
+
+
+@pytest.fixture(scope="module")
+def offline(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+    """The trace of the command line, by column."""
+    folder = tmp_path_factory.mktemp("offline")
+    psec, trace = folder / "psec.csv", folder / "trace.csv"
+    time, positions = plan()
+    with psec.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time", *AXES])
+        # repr of a float is read back exactly.
+        writer.writerows([repr(float(t)), *map(repr, map(float, row))] for t, row in zip(time, positions))
+    command = [str(Path(node_binary()).with_name("virtual_axes")), "run", str(psec), "--trace", str(trace)]
+    subprocess.run(command, check=True, timeout=60, stdout=subprocess.DEVNULL)
+    with trace.open(newline="") as file:
+        header, *rows = csv.reader(file)
+    values = np.array(rows, dtype=float)
+    return {name: values[:, column] for column, name in enumerate(header)}
+
+
+def record(drive: Drive) -> Recording:
+    """The plan, run by the node from home."""
+    drive.reset()
+    time, positions = plan()
+    return drive.run(joint_trajectory(AXES, time, positions))
+
+
+@pytest.mark.parametrize("mode", ["fast", "real"])
+def test_the_node_computes_what_the_command_line_computes(
+    mode: str, offline: dict[str, np.ndarray], request: pytest.FixtureRequest
+):
+    """Every instant of the motion, every signal that both have."""
+    recording = record(request.getfixturevalue(mode))
+    instants = len(recording.states.stamp)
+    assert instants == len(plan()[0])
+    expected = np.arange(instants) * TSP_NS + recording.start
+    np.testing.assert_array_equal(recording.states.stamp, expected)
+    for axis in AXES:
+        for series, field, signal in [
+            (recording.states, "psec", "psec"),
+            (recording.joints, "position", "position"),
+            (recording.joints, "velocity", "velocity"),
+            (recording.states, "voltage", "voltage"),
+            (recording.currents, "current", "current"),
+            (recording.currents, "current_setpoint", "current_setpoint"),
+            (recording.currents, "friction", "friction_current"),
+        ]:
+            np.testing.assert_array_equal(
+                series[field, axis], offline[f"{axis}.{signal}"][:instants], err_msg=f"{axis} {signal}"
+            )

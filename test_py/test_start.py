@@ -1,0 +1,110 @@
+"""What the node is started with: ROS arguments, machine files, environment."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+from drive import DomainId, Drive, Node, joint_trajectory, node_binary
+
+CONFIG = Path(__file__).resolve().parent.parent / "config"
+
+
+def refusal(*ros_args: str, **env: str) -> str:
+    """Start a node that must refuse to: what it says, in one line, with status 2."""
+    domain = DomainId()
+    try:
+        process = Node(ros_args, domain_id=domain.value, env=env)
+        process.start()
+        assert process.wait(10) == 2, process.output()
+        return process.output()
+    finally:
+        domain.release()
+
+
+def test_names_prefix_and_remapping(start: Callable[..., Drive]):
+    """Namespace, node name, joint prefix and a topic's other name, all at once."""
+    drive = start("-r", "__ns:=/cell", "-r", "__node:=mill", "-p", "joint_prefix:=mill_", name="/cell/mill")
+    assert list(drive.latest("position")) == ["mill_x", "mill_y", "mill_z", "mill_a", "mill_c"]
+    assert drive.run(joint_trajectory(["mill_x"], [0.0, 0.6], [[0.0], [0.01]])).result.name == ["mill_x"]
+    topics = dict(drive.node.get_topic_names_and_types())
+    assert "/cell/mill/motor_currents" in topics and "/cell/joint_states" in topics
+
+
+def test_a_topic_under_another_name(start: Callable[..., Drive]):
+    """The first rule that fits is the one, and nothing is left under the old name."""
+    drive = start("-r", "joint_states:=/axes", "-r", "/axes:=/nothing", connect=False)
+    drive.wait_for(lambda: drive.node.count_publishers("/axes") > 0, 10, "publisher of /axes")
+    assert drive.node.count_publishers("/joint_states") == 0
+
+
+def test_an_integer_serves_where_a_double_is_wanted(start: Callable[..., Drive]):
+    """And the later of two values wins."""
+    drive = start("-p", "x.velocity_loop.gain:=3.5", "-p", "x.velocity_loop.gain:=4")
+    assert drive.get_parameters(["x.velocity_loop.gain"]) == {"x.velocity_loop.gain": 4.0}
+
+
+def test_the_linear_motor_machine_moves(start: Callable[..., Drive]):
+    """Another machine file: other drives, another position period."""
+    file = next(path for path in CONFIG.glob("*.yaml") if "mikron" not in path.name)
+    drive = start("--params-file", str(file), "-p", "time:=fast")
+    drive.run(joint_trajectory(["x", "y"], [0.0, 1.0], [[0.0, 0.0], [0.1, -0.05]]), settle=0.5)
+    position = drive.latest("position")
+    assert position["x"] == pytest.approx(0.1, abs=2e-6)
+    assert position["y"] == pytest.approx(-0.05, abs=2e-6)
+
+
+def test_quality_of_service_by_parameter(start: Callable[..., Drive]):
+    """What is set is what the graph shows; the rest stays as documented."""
+    drive = start("-p", "qos.drive_states.reliability:=best_effort", "-p", "qos.psec.depth:=5", connect=False)
+
+    def offered(topic: str) -> tuple[ReliabilityPolicy, DurabilityPolicy] | None:
+        found = drive.node.get_publishers_info_by_topic(topic)
+        return (found[0].qos_profile.reliability, found[0].qos_profile.durability) if found else None
+
+    topics = {
+        "/virtual_axes/drive_states": (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE),
+        "/virtual_axes/trajectory_result": (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL),
+        "/joint_states": (ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE),
+    }
+    for topic, wanted in topics.items():
+        assert drive.wait_for(lambda: offered(topic), 10, f"publisher of {topic}") == wanted
+
+
+def test_publish_rate_thins_the_grid_and_stays_on_it(start: Callable[..., Drive]):
+    """At 1/12 ms every second instant is published."""
+    drive = start("-p", f"publish_rate:={1 / 0.012}", "-p", "time:=fast")
+    recording = drive.run(joint_trajectory(["x"], [0.0, 0.6], [[0.0], [0.01]]))
+    stamps = recording.joints.stamp
+    assert set(stamps[1:] - stamps[:-1]) == {12_000_000}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["-p", "x.motor.inertia_kg_m2:=-0.028"], ["x.motor.inertia_kg_m2", "-0.028", "kg·m²"]),
+        (["-p", "x.motor.inertia_kgm2:=0.028"], ["x.motor.inertia_kgm2", "x.motor.inertia_kg_m2"]),
+        (["-p", "x.velocity_loop.gain:=high"], ["x.velocity_loop.gain", "high"]),
+        (["--params-file", "/nowhere/machine.yaml"], ["/nowhere/machine.yaml"]),
+        (["-r", "psec"], ["-r psec"]),
+        (["--log-level", "loud"], ["--log-level", "loud"]),
+        (["--frobnicate"], ["--frobnicate"]),
+    ],
+)
+def test_wrong_arguments_are_refused_by_name(arguments: list[str], words: list[str]):
+    """One message that names what was found, and status 2."""
+    text = refusal(*arguments)
+    assert [word for word in words if word not in text] == [], text
+
+
+def test_a_wrong_domain_is_refused():
+    """The environment is checked like an argument."""
+    status = subprocess.run(
+        [str(node_binary())], env={"ROS_DOMAIN_ID": "233"}, capture_output=True, text=True, timeout=10, check=False
+    )
+    assert status.returncode == 2
+    assert "ROS_DOMAIN_ID" in status.stderr and "233" in status.stderr
