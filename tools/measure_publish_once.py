@@ -5,6 +5,7 @@
     tools/measure_publish_once.py --runs 200              # the hardest case, transient local
     tools/measure_publish_once.py --durability volatile --settle 0.3 --keep-alive 0.5
     tools/measure_publish_once.py --poll 0.1 --load 2     # the pace of ros2 topic pub, a busy machine
+    tools/measure_publish_once.py --node-last --runs 20   # publishers that wait for a node yet to start
 
 Every publisher is a participant of its own, does what `ros2 topic pub --once` does, and names a
 joint of its own that does not exist: the refusals tell which trajectories have arrived.
@@ -18,12 +19,13 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from drive import Drive, Node  # noqa: E402
+from drive import DomainId, Drive, Node  # noqa: E402
 
 PUBLISHERS = """
 import sys, time
@@ -71,6 +73,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--keep-alive", type=float, default=0.1, help="s from the sample to the end (0.1)")
     parser.add_argument("--times", type=int, default=1, help="samples, one a second (1)")
     parser.add_argument("--load", type=int, default=0, help="busy processes beside (0)")
+    parser.add_argument("--node-last", action="store_true", help="a new node for each publisher, started after it")
     parser.add_argument("--per-process", type=int, default=1, help="publishers in one process (1)")
     parser.add_argument("--log-level", help="of the node, as for --ros-args; its output goes to --output")
     parser.add_argument("--output", type=Path, help="file for the node's output")
@@ -86,9 +89,30 @@ def publish(args: argparse.Namespace, first: int, runs: int, domain_id: int) -> 
     return {int(number): float(at) for number, at in map(str.split, text.splitlines())}
 
 
+def publish_to_a_node_yet_to_start(args: argparse.Namespace, number: int) -> bool:
+    """Start a publisher, then the node; returns whether it arrived."""
+    domain = DomainId()
+    try:
+        with ThreadPoolExecutor(1) as pool:
+            sent = pool.submit(publish, args, number, 1, domain.value)
+            time.sleep(1.5)
+            with Node(["-p", "time:=real"], domain_id=domain.value) as process:
+                sent.result()
+                with Drive(process=process) as drive:
+                    # Results are kept for late joiners.
+                    time.sleep(1.0)
+                    return any(result.joint == f"once_{number}" for result in drive.results())
+    finally:
+        domain.release()
+
+
 def main() -> int:
     """Measure; the exit status tells whether all arrived, each as often as it was sent."""
     args = arguments()
+    if args.node_last:
+        arrived = sum(publish_to_a_node_yet_to_start(args, number) for number in range(args.runs))
+        print(f"{arrived} of {args.runs} arrived")
+        return int(arrived != args.runs)
     burners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(args.load)]
     sent: dict[int, float] = {}
     try:
