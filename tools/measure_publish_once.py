@@ -34,7 +34,7 @@ from rclpy.context import Context
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-first, runs, durability, poll, settle, keep_alive, times = sys.argv[1:]
+first, runs, durability, poll, settle, keep_alive, times, points = sys.argv[1:]
 profile = QoSProfile(
     depth=1 if durability == "transient_local" else 10,
     reliability=ReliabilityPolicy.RELIABLE,
@@ -45,6 +45,8 @@ for number in range(int(first), int(first) + int(runs)):
     rclpy.init(context=context)
     node = rclpy.create_node(f"once_{number}", context=context)
     publisher = node.create_publisher(JointTrajectory, "/psec", profile)
+    rows = [JointTrajectoryPoint(positions=[0.0]) for _ in range(int(points))]
+    message = JointTrajectory(joint_names=[f"once_{number}"], points=rows)
     deadline = time.monotonic() + 20
     while publisher.get_subscription_count() < 1:
         if time.monotonic() > deadline:
@@ -54,8 +56,7 @@ for number in range(int(first), int(first) + int(runs)):
     for time_ in range(int(times)):
         if time_:
             time.sleep(1.0)
-        joint = f"once_{number}"
-        publisher.publish(JointTrajectory(joint_names=[joint], points=[JointTrajectoryPoint(positions=[0.0])]))
+        publisher.publish(message)
         print(number, time.time(), flush=True)
     time.sleep(float(keep_alive))
     node.destroy_node()
@@ -72,6 +73,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--settle", type=float, default=0.0, help="s from the match to the sample (0)")
     parser.add_argument("--keep-alive", type=float, default=0.1, help="s from the sample to the end (0.1)")
     parser.add_argument("--times", type=int, default=1, help="samples, one a second (1)")
+    parser.add_argument("--points", type=int, default=1, help="points of each trajectory; 2000 need fragments (1)")
     parser.add_argument("--load", type=int, default=0, help="busy processes beside (0)")
     parser.add_argument("--node-last", action="store_true", help="a new node for each publisher, started after it")
     parser.add_argument("--per-process", type=int, default=1, help="publishers in one process (1)")
@@ -83,7 +85,7 @@ def arguments() -> argparse.Namespace:
 def publish(args: argparse.Namespace, first: int, runs: int, domain_id: int) -> dict[int, float]:
     """Run publishers in one process; returns when each sent."""
     command = [sys.executable, "-c", PUBLISHERS, str(first), str(runs), args.durability]
-    command += [str(value) for value in (args.poll, args.settle, args.keep_alive, args.times)]
+    command += [str(value) for value in (args.poll, args.settle, args.keep_alive, args.times, args.points)]
     env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
     text = subprocess.run(command, env=env, check=True, stdout=subprocess.PIPE, text=True).stdout
     return {int(number): float(at) for number, at in map(str.split, text.splitlines())}
