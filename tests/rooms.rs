@@ -4,18 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// As in ARCHITECTURE.md.
-const ORDER: [&str; 10] = [
-    "units",
-    "config",
-    "drive",
-    "control",
-    "machine",
-    "trajectory",
-    "assess",
-    "simulation",
-    "files",
-    "ros",
-];
+const ORDER: [&str; 10] =
+    ["units", "config", "drive", "control", "machine", "trajectory", "assess", "simulation", "files", "ros"];
 
 /// Rooms before a room that it still must not know.
 const APART: [(&str, &str); 2] = [("control", "drive"), ("ros", "files")];

@@ -4,6 +4,7 @@
 //! runs on tokio and talks to it through bounded channels.
 
 pub mod args;
+mod ask_again;
 mod convert;
 mod diagnostics;
 mod endpoints;

@@ -12,6 +12,7 @@ use tokio::task::JoinSet;
 use tracing::{info, warn};
 
 use super::args::RosArgs;
+use super::ask_again;
 use super::convert;
 use super::diagnostics::Diagnostics;
 use super::endpoints::EndpointError;
@@ -152,6 +153,7 @@ async fn serve(
     tasks.spawn(rosout::publish(&node, log));
 
     // What comes in.
+    tasks.spawn(ask_again::run(dds.clone()));
     let stop_all = stop_request(&joint_limits, period, node_config.max_points);
     let psec_input = PsecInput {
         joints: joint_limits,

@@ -1,4 +1,5 @@
-//! RTPS messages, as far as this node writes them itself: header, INFO_TS, DATA with inline QoS, GAP.
+//! RTPS messages, as far as this node writes them itself: header, INFO_TS, INFO_DST, NACK_FRAG, GAP,
+//! DATA with inline QoS.
 //!
 //! Everything is little endian. Sections are those of RTPS 2.5.
 
@@ -12,6 +13,8 @@ const VENDOR: [u8; 2] = [0x01, 0x12];
 /// 9.4.5.1.1: kinds of submessages.
 const SUBMESSAGE_GAP: u8 = 0x08;
 const SUBMESSAGE_INFO_TS: u8 = 0x09;
+const SUBMESSAGE_INFO_DST: u8 = 0x0e;
+const SUBMESSAGE_NACK_FRAG: u8 = 0x12;
 const SUBMESSAGE_DATA: u8 = 0x15;
 /// 9.4.5.1.2, and 9.4.5.3.1 for those of DATA.
 const FLAG_LITTLE_ENDIAN: u8 = 0x01;
@@ -118,6 +121,34 @@ impl Message {
         self.0
     }
 
+    /// For which participant that follows: that of `guid`, INFO_DST (8.3.8.7).
+    pub(super) fn to(mut self, guid: &Guid) -> Self {
+        self.0.extend([SUBMESSAGE_INFO_DST, FLAG_LITTLE_ENDIAN, 12, 0]);
+        self.0.extend(&guid[..12]);
+        self
+    }
+
+    /// The last submessage: `reader` lacks the first fragment of that sample of `writer`
+    /// (8.3.8.10); `count` says how many of these it has sent.
+    pub(super) fn nack_frag(
+        mut self,
+        reader: EntityId,
+        writer: EntityId,
+        sample: i64,
+        count: u32,
+    ) -> Vec<u8> {
+        let octets = &mut self.0;
+        octets.extend([SUBMESSAGE_NACK_FRAG, FLAG_LITTLE_ENDIAN, 32, 0]);
+        octets.extend(reader);
+        octets.extend(writer);
+        octets.extend(sequence_number(sample));
+        // 9.4.2.8, a set: its base, how many bits, the bits from the highest on.
+        for word in [1, 1, 1 << 31, count] {
+            octets.extend(u32::to_le_bytes(word));
+        }
+        self.0
+    }
+
     /// The last submessage. Its length is right up to 65 535 octets, more than a datagram holds.
     pub(super) fn data(mut self, data: &Data<'_>) -> Vec<u8> {
         let octets = &mut self.0;
@@ -174,6 +205,18 @@ mod tests {
         expected.extend([0x00, 0x01, 0x00, 0x00, 1, 2, 3, 4, 5]);
         assert_eq!(message, expected);
         assert_eq!(data.overhead(), message.len() - 5);
+    }
+
+    #[test]
+    fn a_missing_fragment_is_written_as_the_specification_draws_it() {
+        let writer = [1, 0x0f, 21, 22, 23, 24, 25, 26, 0, 0, 0, 0, 0, 0, 0x13, 3];
+        let message = Message::from(&GUID).to(&writer).nack_frag([0, 0, 3, 4], entity(&writer), 1, 7);
+        assert_eq!(message[20..24], [0x0e, 1, 12, 0]);
+        assert_eq!(message[24..36], writer[..12]);
+        assert_eq!(message[36..48], [0x12, 1, 32, 0, 0, 0, 3, 4, 0, 0, 0x13, 3]);
+        // Sample 0·2³² + 1; fragments from 1, one bit, which is set; the count.
+        assert_eq!(message[48..56], [0, 0, 0, 0, 1, 0, 0, 0]);
+        assert_eq!(message[56..], [1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0x80, 7, 0, 0, 0]);
     }
 
     #[test]

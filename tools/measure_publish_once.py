@@ -1,0 +1,144 @@
+#!/usr/bin/env python3
+"""How many trajectories arrive from publishers that send as soon as they are matched, and are gone.
+
+    cargo build --release && source .build/env.sh
+    tools/measure_publish_once.py --runs 200              # the hardest case, transient local
+    tools/measure_publish_once.py --durability volatile --settle 0.3 --keep-alive 0.5
+    tools/measure_publish_once.py --poll 0.1 --load 2     # the pace of ros2 topic pub, a busy machine
+    tools/measure_publish_once.py --node-last --runs 20   # publishers that wait for a node yet to start
+
+Every publisher is a participant of its own, does what `ros2 topic pub --once` does, and names a
+joint of its own that does not exist: the refusals tell which trajectories have arrived.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+from drive import DomainId, Drive, Node  # noqa: E402
+
+PUBLISHERS = """
+import sys, time
+import rclpy
+from rclpy.context import Context
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+first, runs, durability, poll, settle, keep_alive, times, points = sys.argv[1:]
+profile = QoSProfile(
+    depth=1 if durability == "transient_local" else 10,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL if durability == "transient_local" else DurabilityPolicy.VOLATILE,
+)
+for number in range(int(first), int(first) + int(runs)):
+    context = Context()
+    rclpy.init(context=context)
+    node = rclpy.create_node(f"once_{number}", context=context)
+    publisher = node.create_publisher(JointTrajectory, "/psec", profile)
+    rows = [JointTrajectoryPoint(positions=[0.0]) for _ in range(int(points))]
+    message = JointTrajectory(joint_names=[f"once_{number}"], points=rows)
+    deadline = time.monotonic() + 20
+    while publisher.get_subscription_count() < 1:
+        if time.monotonic() > deadline:
+            sys.exit("no subscriber")
+        time.sleep(float(poll))
+    time.sleep(float(settle))
+    for time_ in range(int(times)):
+        if time_:
+            time.sleep(1.0)
+        publisher.publish(message)
+        print(number, time.time(), flush=True)
+    time.sleep(float(keep_alive))
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+"""
+
+
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=100, help="publishers, one after another (100)")
+    parser.add_argument("--durability", choices=["transient_local", "volatile"], default="transient_local")
+    parser.add_argument("--poll", type=float, default=0.001, help="s between looks for a match (0.001)")
+    parser.add_argument("--settle", type=float, default=0.0, help="s from the match to the sample (0)")
+    parser.add_argument("--keep-alive", type=float, default=0.1, help="s from the sample to the end (0.1)")
+    parser.add_argument("--times", type=int, default=1, help="samples, one a second (1)")
+    parser.add_argument("--points", type=int, default=1, help="points of each trajectory; 2000 need fragments (1)")
+    parser.add_argument("--load", type=int, default=0, help="busy processes beside (0)")
+    parser.add_argument("--node-last", action="store_true", help="a new node for each publisher, started after it")
+    parser.add_argument("--per-process", type=int, default=1, help="publishers in one process (1)")
+    parser.add_argument("--log-level", help="of the node, as for --ros-args; its output goes to --output")
+    parser.add_argument("--output", type=Path, help="file for the node's output")
+    return parser.parse_args()
+
+
+def publish(args: argparse.Namespace, first: int, runs: int, domain_id: int) -> dict[int, float]:
+    """Run publishers in one process; returns when each sent."""
+    command = [sys.executable, "-c", PUBLISHERS, str(first), str(runs), args.durability]
+    command += [str(value) for value in (args.poll, args.settle, args.keep_alive, args.times, args.points)]
+    env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
+    text = subprocess.run(command, env=env, check=True, stdout=subprocess.PIPE, text=True).stdout
+    return {int(number): float(at) for number, at in map(str.split, text.splitlines())}
+
+
+def publish_to_a_node_yet_to_start(args: argparse.Namespace, number: int) -> bool:
+    """Start a publisher, then the node; returns whether it arrived."""
+    domain = DomainId()
+    try:
+        with ThreadPoolExecutor(1) as pool:
+            sent = pool.submit(publish, args, number, 1, domain.value)
+            time.sleep(1.5)
+            with Node(["-p", "time:=real"], domain_id=domain.value) as process:
+                sent.result()
+                with Drive(process=process) as drive:
+                    # Results are kept for late joiners.
+                    time.sleep(1.0)
+                    return any(result.joint == f"once_{number}" for result in drive.results())
+    finally:
+        domain.release()
+
+
+def main() -> int:
+    """Measure; the exit status tells whether all arrived, each as often as it was sent."""
+    args = arguments()
+    if args.node_last:
+        arrived = sum(publish_to_a_node_yet_to_start(args, number) for number in range(args.runs))
+        print(f"{arrived} of {args.runs} arrived")
+        return int(arrived != args.runs)
+    burners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(args.load)]
+    sent: dict[int, float] = {}
+    try:
+        log_level = ["--log-level", args.log_level] if args.log_level else []
+        with Node(["-p", "time:=real", *log_level]) as process, Drive(process=process) as drive:
+            print(f"domain {process.domain_id}", flush=True)
+            while len(sent) < args.runs:
+                runs = min(args.per_process, args.runs - len(sent))
+                sent |= publish(args, len(sent), runs, process.domain_id)
+            time.sleep(3.0)
+            arrivals = Counter(result.joint for result in drive.results())
+            if args.output is not None:
+                args.output.write_text(process.output())
+    finally:
+        for burner in burners:
+            burner.kill()
+            burner.wait()
+    lost = [number for number in sent if not arrivals[f"once_{number}"]]
+    for number in lost:
+        print(f"lost: once_{number}, sent at {sent[number]:.6f}")
+    more = sum(max(0, arrivals[f"once_{number}"] - args.times) for number in sent)
+    print(f"{len(sent) - len(lost)} of {len(sent)} arrived, {more} more often than sent")
+    return int(bool(lost or more))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
