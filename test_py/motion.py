@@ -34,6 +34,7 @@ def assert_psec(
     plan: Mapping[str, Sequence[float]],
     first: int | None = None,
     last: int | None = None,
+    timeout: float = 60.0,
 ) -> int:
     """psec was the plan, bit for bit, at every instant from `first` to `last` (ns), none missing.
 
@@ -42,7 +43,7 @@ def assert_psec(
     length = len(next(iter(plan.values())))
     first = start if first is None else first
     last = start + (length - 1) * TSP_NS if last is None else last
-    drive.wait_until(last, 30)
+    drive.wait_until(last, timeout)
     states = drive.record(first, last).states
     expected = np.arange(grid_after(start, first), last + 1, TSP_NS)
     assert np.array_equal(states.stamp, expected), "instants missing or twice"
