@@ -145,6 +145,22 @@ fn a_load_acts_for_its_time_and_then_is_gone() {
 }
 
 #[test]
+fn the_largest_load_leaves_every_number_finite() {
+    let mut bench = Bench::new(0);
+    bench.simulation.set_load(X, f64::INFINITY, SECOND_NS);
+    bench.simulation.set_load(2, f64::NAN, SECOND_NS);
+    for _ in 0..300 {
+        bench.simulation.step();
+        for sample in bench.simulation.samples() {
+            assert!(sample.position.is_finite() && sample.current.is_finite(), "{sample:?}");
+        }
+    }
+    bench.simulation.reset();
+    bench.simulation.step();
+    assert_eq!(bench.simulation.samples()[X].position, 0.0);
+}
+
+#[test]
 fn a_reset_aborts_what_moves_and_forgets_it() {
     let mut bench = Bench::new(0);
     bench.simulation.offer(MotionId(1), bench.ballbar(Start::Now)).expect("accepted");

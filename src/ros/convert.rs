@@ -8,6 +8,7 @@ use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 use super::messages::{DriveStates, MotorCurrents};
 use super::pace::Frame;
 use crate::machine::AxisSample;
+use crate::simulation::MAX_LOAD;
 use crate::trajectory::{Code, Rejection, Request, Row, Start};
 use crate::units::{Nanoseconds, SECOND_NS};
 
@@ -88,8 +89,8 @@ pub fn loads(message: &JointState, joints: &[String]) -> Result<Vec<(usize, f64)
             let Some(place) = joints.iter().position(|j| j == name) else {
                 return Err(format!("unknown joint {name}; there are {}", joints.join(", ")));
             };
-            if !load.is_finite() {
-                return Err(format!("joint {name}: effort is {load}, must be finite"));
+            if load.is_nan() || load.abs() > MAX_LOAD {
+                return Err(format!("joint {name}: effort is {load}, must lie in ±{MAX_LOAD}"));
             }
             Ok((place, load))
         })

@@ -2,6 +2,9 @@
 
 use crate::machine::Machine;
 
+/// Largest load, N or N·m: far beyond any process, and small enough that the drive stays finite.
+pub const MAX_LOAD: f64 = 1e9;
+
 /// Load of one axis.
 #[derive(Debug, Clone, Copy, Default)]
 struct Load {
@@ -23,6 +26,7 @@ impl Loads {
 
     pub(super) fn set(&mut self, axis: usize, value: f64, until: i64) {
         if let Some(load) = self.axes.get_mut(axis) {
+            let value = if value.is_nan() { 0.0 } else { value.clamp(-MAX_LOAD, MAX_LOAD) };
             *load = Load { value, until };
         }
     }

@@ -6,6 +6,7 @@
 mod load;
 mod motion;
 
+pub use load::MAX_LOAD;
 pub use motion::{MotionEnd, Outcome};
 
 use std::sync::Arc;
@@ -125,7 +126,7 @@ impl Simulation {
     }
 
     /// External force or torque on an axis (N or N·m, positive towards plus) from the next position
-    /// instant on, for `hold` ns.
+    /// instant on, for `hold` ns; limited to ±[`MAX_LOAD`], and none if it is NaN.
     pub fn set_load(&mut self, axis: usize, load: f64, hold: Nanoseconds) {
         let until = self.next + hold.max(0).div_euclid(self.period).max(1);
         self.loads.set(axis, load, until);
