@@ -57,7 +57,8 @@ DEFAULT_NODE = "/virtual_axes"
 PSEC_QOS = QoSProfile(depth=64, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 DEEP_QOS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST)
 """Deep enough that a reader which is late by two minutes at 6 ms loses nothing."""
-RESULT_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# Deeper than the node's own 50: a burst of trajectories has two results each.
+RESULT_QOS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 SETTLE_S = 0.2
 """A reliable sample written in the instant after matching can wait for the next heartbeat."""

@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use virtual_axes::config::{Parameters, Source, parse_assignment};
 use virtual_axes::ros::args::{Command, ParameterSource, RosArgs};
 use virtual_axes::ros::environment::Environment;
-use virtual_axes::ros::{log, node, rosout};
+use virtual_axes::ros::node::{self, NodeError};
+use virtual_axes::ros::{log, rosout};
 
 /// Exit status of a wrong command line, environment or machine file.
 const USAGE: u8 = 2;
@@ -40,8 +41,13 @@ fn say(text: &str) -> ExitCode {
 }
 
 fn refuse(error: &dyn std::error::Error) -> ExitCode {
-    eprintln!("virtual_axes_node: {error}");
+    complain(error);
     ExitCode::from(USAGE)
+}
+
+fn complain(error: &dyn std::error::Error) {
+    // That nobody can read it changes nothing.
+    let _ = writeln!(std::io::stderr(), "virtual_axes_node: {error}");
 }
 
 fn run(args: &RosArgs) -> ExitCode {
@@ -62,8 +68,9 @@ fn run(args: &RosArgs) -> ExitCode {
     };
     match node::run(args, &environment, parameters, log) {
         Ok(()) => ExitCode::SUCCESS,
+        Err(error @ NodeError::SimTime) => refuse(&error),
         Err(error) => {
-            eprintln!("virtual_axes_node: {error}");
+            complain(&error);
             ExitCode::FAILURE
         }
     }

@@ -89,6 +89,9 @@ pub fn loads(message: &JointState, joints: &[String]) -> Result<Vec<(usize, f64)
             let Some(place) = joints.iter().position(|j| j == name) else {
                 return Err(format!("unknown joint {name}; there are {}", joints.join(", ")));
             };
+            if message.name.iter().filter(|n| *n == name).count() > 1 {
+                return Err(format!("joint {name} is named twice"));
+            }
             if load.is_nan() || load.abs() > MAX_LOAD {
                 return Err(format!("joint {name}: effort is {load}, must lie in ±{MAX_LOAD}"));
             }

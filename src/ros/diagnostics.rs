@@ -91,9 +91,13 @@ impl Diagnostics {
         if now.extrapolated > before.extrapolated {
             problems.push("friction law used beyond its fitted range of 20 m/min or rev/min");
         }
+        if now.outside > before.outside {
+            problems.push("outside its stroke");
+        }
         let values = vec![
             value("saturated_periods", now.saturated),
             value("friction_extrapolated_periods", now.extrapolated),
+            value("outside_stroke_periods", now.outside),
         ];
         self.status(format!("{}: {joint}", self.node), &problems, "ok", values)
     }

@@ -80,7 +80,7 @@ pub enum NodeError {
     SimTime,
 }
 
-/// Runs the node until SIGINT or SIGTERM; what comes through `log` goes to `/rosout`.
+/// Runs the node until SIGINT, SIGTERM or SIGHUP; what comes through `log` goes to `/rosout`.
 ///
 /// # Errors
 /// [`NodeError`] if it cannot start; nothing is left on the network then.
@@ -232,20 +232,25 @@ async fn serve(
 struct Signals {
     interrupt: Signal,
     terminate: Signal,
+    hangup: Signal,
 }
 
 impl Signals {
     fn new() -> Result<Self, NodeError> {
         let handler =
             |kind| signal(kind).map_err(|source| NodeError::System { what: "handle signals", source });
-        let (interrupt, terminate) = (SignalKind::interrupt(), SignalKind::terminate());
-        Ok(Signals { interrupt: handler(interrupt)?, terminate: handler(terminate)? })
+        Ok(Signals {
+            interrupt: handler(SignalKind::interrupt())?,
+            terminate: handler(SignalKind::terminate())?,
+            hangup: handler(SignalKind::hangup())?,
+        })
     }
 
     async fn wait(mut self) {
         let name = tokio::select! {
             _ = self.interrupt.recv() => "SIGINT",
             _ = self.terminate.recv() => "SIGTERM",
+            _ = self.hangup.recv() => "SIGHUP",
         };
         info!("{name}: shutting down");
     }

@@ -105,6 +105,8 @@ pub struct AxisHealth {
     pub saturated: u64,
     /// Position instants at which its friction law was extrapolated.
     pub extrapolated: u64,
+    /// Position instants at which it stood outside its stroke.
+    pub outside: u64,
 }
 
 /// The thread's ends of the channels.
@@ -199,13 +201,14 @@ impl Health {
         let lateness = lateness.as_secs_f64();
         self.time = simulation.time_of(simulation.next_instant() - 1);
         self.moving = simulation.is_moving();
-        self.busy = simulation.is_busy();
+        self.busy = simulation.is_busy() || simulation.is_in_motion();
         self.periods += 1;
         self.missed += u64::from(missed);
         self.dropped += u64::from(dropped);
         self.max_lateness = self.max_lateness.max(lateness);
         self.total_lateness += lateness;
-        for (axis, sample) in self.axes.iter_mut().zip(simulation.samples()) {
+        for (place, (axis, sample)) in self.axes.iter_mut().zip(simulation.samples()).enumerate() {
+            axis.outside += u64::from(simulation.is_outside_stroke(place));
             axis.saturated += u64::from(sample.saturated);
             axis.extrapolated += u64::from(sample.friction_extrapolated);
         }

@@ -2,8 +2,8 @@
 
 use crate::machine::Machine;
 
-/// Largest load, N or N·m: far beyond any process, and small enough that the drive stays finite.
-pub const MAX_LOAD: f64 = 1e9;
+/// Largest load, N or N·m: beyond any process, and small enough that the drive stays finite.
+pub const MAX_LOAD: f64 = 1e6;
 
 /// Load of one axis.
 #[derive(Debug, Clone, Copy, Default)]

@@ -21,6 +21,10 @@ use crate::units::{Nanoseconds, SECOND_NS, seconds};
 use load::Loads;
 use motion::Motions;
 
+/// Velocity below which an axis counts as standing, m/s or rad/s.
+const STANDSTILL: f64 = 1e-4;
+/// How far an axis may overshoot its stroke before that is said, m or rad.
+const OVERSHOOT: f64 = 1e-3;
 /// How long after the last motion the axes count as settling.
 const SETTLING: Nanoseconds = SECOND_NS;
 
@@ -235,6 +239,20 @@ impl Simulation {
     /// Whether something is asked of the axes, or they still settle.
     pub fn is_busy(&self) -> bool {
         self.is_asked() || self.next < self.settled_from
+    }
+
+    /// Whether an axis really moves, faster than it creeps to rest.
+    pub fn is_in_motion(&self) -> bool {
+        self.samples.iter().any(|s| s.velocity.abs() > STANDSTILL)
+    }
+
+    /// Whether an axis stands outside its stroke, which a load or a step can make it do.
+    pub fn is_outside_stroke(&self, place: usize) -> bool {
+        let (Some(sample), Some(joint)) = (self.samples.get(place), self.timeline.joints().get(place)) else {
+            return false;
+        };
+        let inside = joint.limits.stroke_min - OVERSHOOT..=joint.limits.stroke_max + OVERSHOOT;
+        !inside.contains(&sample.position)
     }
 
     /// Whether the set-points move.

@@ -5,6 +5,7 @@
 mod run;
 
 use std::error::Error;
+use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -46,18 +47,23 @@ fn main() -> ExitCode {
     let text = match text_of(&Arguments::parse().command) {
         Ok(text) => text,
         Err(error) => {
-            eprintln!("{error}");
+            complain(&*error);
             return ExitCode::from(BAD_INPUT);
         }
     };
     match io::stdout().write_all(text.as_bytes()) {
         // A reader that has seen enough (`| head`) is no fault.
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            eprintln!("standard output: {error}");
+            complain(&format!("standard output: {error}"));
             ExitCode::FAILURE
         }
         _ => ExitCode::SUCCESS,
     }
+}
+
+/// Says what is wrong; that nobody can read it changes nothing.
+fn complain(what: &(impl Display + ?Sized)) {
+    let _ = writeln!(io::stderr(), "{what}");
 }
 
 /// What the command prints.

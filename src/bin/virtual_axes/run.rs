@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt::Write as _;
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -57,6 +57,11 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let mut simulation = Simulation::new(&config, limits.clone(), 0)?;
     simulation.offer(MotionId(1), trajectory).map_err(refused)?;
 
+    if let Some(trace) = &arguments.trace
+        && fs::canonicalize(trace).is_ok_and(|t| fs::canonicalize(&arguments.file).is_ok_and(|f| f == t))
+    {
+        return Err(format!("{}: the trace would replace the set-points", trace.display()).into());
+    }
     let report = match &arguments.trace {
         None => execute(&mut simulation, |_| Ok(()))?,
         Some(path) => traced(&mut simulation, path, &limits)?,
@@ -90,25 +95,37 @@ fn traced(
 ) -> Result<Option<Figures>, Box<dyn Error>> {
     let failed = |error: std::io::Error| format!("{}: {error}", path.display());
     let names: Vec<String> = limits.iter().map(|joint| joint.name.clone()).collect();
-    // A device or a pipe is written to as it is; a file is put in place at the end.
-    let in_place = fs::metadata(path).is_ok_and(|m| !m.is_file());
-    let partial = if in_place { path.to_owned() } else { path.with_extension("partial") };
+    // Where there is something already, links are followed; a device or a pipe is written to as it is.
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let in_place = fs::metadata(&target).is_ok_and(|m| !m.is_file());
+    let partial = if in_place { target.clone() } else { partial_name(&target) };
+    let file = if in_place {
+        File::options().write(true).open(&partial)
+    } else {
+        File::options().write(true).create_new(true).open(&partial)
+    };
+    let file = BufWriter::new(file.map_err(failed)?);
     let written = (|| -> Result<_, Box<dyn Error>> {
-        let file = BufWriter::new(File::create(&partial).map_err(failed)?);
         let mut trace = TraceCsv::new(file, &names).map_err(failed)?;
         let report = execute(simulation, |s| trace.row(s.time_of(s.next_instant() - 1), s.samples()))
             .map_err(|error| format!("{}: {error}", path.display()))?;
-        trace.finish().map_err(failed)?.flush().map_err(failed)?;
+        trace.finish().map_err(failed)?;
         if !in_place {
-            fs::rename(&partial, path).map_err(failed)?;
+            fs::rename(&partial, &target).map_err(failed)?;
         }
         Ok(report)
     })();
     if written.is_err() && !in_place {
-        // What could not be written could perhaps not be made either.
+        // It was made here, and is of no use to anybody.
         let _ = fs::remove_file(&partial);
     }
     written
+}
+
+/// A name beside `target` that no other run uses.
+fn partial_name(target: &Path) -> PathBuf {
+    let name = target.file_name().unwrap_or_default().to_string_lossy();
+    target.with_file_name(format!(".{name}.{}.partial", std::process::id()))
 }
 
 /// Errors in µm or mdeg, currents in A.
