@@ -19,7 +19,7 @@ impl Command {
     /// root namespace unless the arguments say otherwise.
     ///
     /// # Errors
-    /// The first argument that cannot be used.
+    /// The first argument that cannot be used; also a `default_name` that is no node name.
     ///
     /// ```
     /// use virtual_axes::ros::args::Command;
@@ -30,9 +30,6 @@ impl Command {
     /// assert_eq!(args.resolve_topic("psec").unwrap(), "/setpoints");
     /// assert_eq!(args.resolve_topic("~/tool_pose").unwrap(), "/cell/mill/tool_pose");
     /// ```
-    ///
-    /// # Panics
-    /// When `default_name` is not a valid node name.
     pub fn parse<S: AsRef<str>>(
         arguments: impl IntoIterator<Item = S>,
         default_name: &str,
@@ -54,7 +51,10 @@ impl Command {
                 }
             }
         }
-        Ok(asked_for.unwrap_or_else(|| Self::Run(draft.finish(default_name))))
+        match asked_for {
+            Some(command) => Ok(command),
+            None => draft.finish(default_name).map(Self::Run),
+        }
     }
 }
 
@@ -208,7 +208,7 @@ impl Draft {
         Ok(())
     }
 
-    fn finish(self, default_name: &str) -> RosArgs {
+    fn finish(self, default_name: &str) -> Result<RosArgs, ArgsError> {
         // As in rcl, the first rule wins, and a prefix means the name that the program gave.
         let first = |rules: &[Identity]| {
             rules
@@ -218,9 +218,13 @@ impl Draft {
         };
         let name = first(&self.names).unwrap_or_else(|| default_name.to_owned());
         let namespace = first(&self.namespaces).unwrap_or_else(|| "/".to_owned());
-        let node =
-            NodeFqn::new(&namespace, &name).expect("the rules are checked, and so is the program's own name");
-        RosArgs {
+        let node = NodeFqn::new(&namespace, &name).map_err(|error| ArgsError::BadValue {
+            flag: "-r".to_owned(),
+            found: format!("__ns:={namespace} __node:={name}"),
+            reason: error.to_string(),
+            allowed: "a valid namespace and node name",
+        })?;
+        Ok(RosArgs {
             node,
             parameters: self.parameters,
             remaps: self.remaps,
@@ -228,7 +232,7 @@ impl Draft {
             logger_levels: self.logger_levels,
             log_sinks: self.log_sinks,
             warnings: self.warnings,
-        }
+        })
     }
 }
 
