@@ -4,8 +4,9 @@
 //! around [`simulation::Simulation`] in the room `ros` (cargo feature `ros`).
 //!
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
-//! [`units`], [`config`] → [`drive`] → [`control`] → [`machine`] → [`trajectory`] → [`assess`] →
-//! [`simulation`], [`files`] → `ros`.
+//! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`machine`] → [`trajectory`],
+//! [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] → [`messages`], [`files`], [`report`] →
+//! `ros`.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -15,9 +16,15 @@ pub mod config;
 pub mod control;
 pub mod drive;
 pub mod files;
+pub mod kinematics;
 pub mod machine;
+pub mod messages;
+pub mod path;
+pub mod report;
 #[cfg(feature = "ros")]
 pub mod ros;
+pub mod scenario;
 pub mod simulation;
 pub mod trajectory;
+pub mod trial;
 pub mod units;

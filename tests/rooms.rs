@@ -4,11 +4,34 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// As in ARCHITECTURE.md.
-const ORDER: [&str; 10] =
-    ["units", "config", "drive", "control", "machine", "trajectory", "assess", "simulation", "files", "ros"];
+const ORDER: [&str; 16] = [
+    "units",
+    "config",
+    "kinematics",
+    "drive",
+    "control",
+    "machine",
+    "trajectory",
+    "path",
+    "assess",
+    "simulation",
+    "scenario",
+    "trial",
+    "messages",
+    "files",
+    "report",
+    "ros",
+];
 
 /// Rooms before a room that it still must not know.
-const APART: [(&str, &str); 2] = [("control", "drive"), ("ros", "files")];
+const APART: [(&str, &str); 6] = [
+    ("control", "drive"),
+    ("report", "files"),
+    ("report", "messages"),
+    ("ros", "files"),
+    ("ros", "report"),
+    ("ros", "trial"),
+];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).expect("the sources are there");

@@ -2,6 +2,8 @@
 
 mod contour;
 mod motion;
+mod recording;
 
 pub use contour::ContourTracker;
 pub use motion::{AxisReport, MotionAssessor, MotionReport};
+pub use recording::{AxisTrace, CircleTrace, Recording, ToolTrace};

@@ -5,9 +5,9 @@ use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 
-use super::messages::{DriveStates, MotorCurrents};
 use super::pace::Frame;
 use crate::machine::AxisSample;
+use crate::messages::{DriveStates, MotorCurrents};
 use crate::simulation::MAX_LOAD;
 use crate::trajectory::{Code, Rejection, Request, Row, Start};
 use crate::units::{Nanoseconds, SECOND_NS};

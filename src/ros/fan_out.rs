@@ -14,9 +14,9 @@ use tracing::info;
 
 use super::convert;
 use super::diagnostics::Diagnostics;
-use super::messages::{DriveStates, MotorCurrents};
 use super::outputs::Output;
 use super::pace::{Frame, Health};
+use crate::messages::{DriveStates, MotorCurrents};
 
 /// Period of `/diagnostics` (REP-107).
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);

@@ -14,7 +14,6 @@ mod goodbye;
 mod inputs;
 mod large_response;
 pub mod log;
-pub mod messages;
 pub mod names;
 pub mod node;
 mod outputs;

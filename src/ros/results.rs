@@ -9,10 +9,10 @@ use tokio::sync::Mutex;
 use tracing::{info, warn};
 
 use super::convert::{header, stamp};
-use super::messages::{Source, Status, TrajectoryResult};
 use super::outputs::Output;
 use super::pace::{Accepted, Report};
 use crate::assess::AxisReport;
+use crate::messages::{Source, Status, TrajectoryResult};
 use crate::simulation::{MotionEnd, Outcome};
 use crate::trajectory::{MotionId, Rejection, Trajectory};
 use crate::units::{Nanoseconds, seconds};

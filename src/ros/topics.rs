@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use ros2_client::{MessageTypeName, Node, Publisher, Subscription};
+use ros2_client::{Message, MessageTypeName, Node, Publisher, Subscription};
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
 use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
@@ -10,8 +10,12 @@ use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 
 use super::args::RosArgs;
 use super::endpoints::{EndpointError, Endpoints};
-use super::messages::{self, DriveStates, MotorCurrents, TrajectoryResult};
 use crate::config::{Parameters, TimeMode};
+use crate::messages::{DriveStates, MotorCurrents, PACKAGE, TrajectoryResult};
+
+impl Message for MotorCurrents {}
+impl Message for DriveStates {}
+impl Message for TrajectoryResult {}
 
 /// Every topic of the node.
 pub struct Topics {
@@ -57,7 +61,7 @@ impl Topics {
         let joint_state = || MessageTypeName::new("sensor_msgs", "JointState");
         let trajectory = MessageTypeName::new("trajectory_msgs", "JointTrajectory");
         let diagnostic = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");
-        let own = messages::type_name;
+        let own = |name: &str| MessageTypeName::new(PACKAGE, name);
 
         let (psec, psec_name) = endpoints.subscription("psec", trajectory)?;
         let (load, load_name) = endpoints.subscription("load", joint_state())?;

@@ -1,17 +1,11 @@
 //! This package's own messages, field by field as in `msg/`.
 
-use ros2_client::{Message, MessageTypeName};
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
 use serde::{Deserialize, Serialize};
 
 /// Name of this ROS package.
 pub const PACKAGE: &str = "virtual_axes";
-
-/// A message type of this package.
-pub fn type_name(name: &str) -> MessageTypeName {
-    MessageTypeName::new(PACKAGE, name)
-}
 
 /// `msg/MotorCurrents.msg`; units there.
 #[allow(missing_docs, reason = "documented in msg/MotorCurrents.msg")]
@@ -129,7 +123,3 @@ impl Default for TrajectoryResult {
         }
     }
 }
-
-impl Message for MotorCurrents {}
-impl Message for DriveStates {}
-impl Message for TrajectoryResult {}

@@ -1,0 +1,1 @@
+//! Geometric paths, and set-points along them at a limited feed.

@@ -1,0 +1,1 @@
+//! Scenarios: trials described in data files.

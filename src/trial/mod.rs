@@ -1,0 +1,1 @@
+//! One trial, offline: set-points through the simulation, its figures and its recording.
