@@ -7,8 +7,9 @@ use super::definition::MotorKind;
 use super::error::{ConfigError, Source};
 use super::layout::Joint;
 use super::machine::{
-    AxisConfig, AxisKind, DelaysConfig, FeedforwardConfig, FrictionConfig, GravityConfig, LimitsConfig,
-    MachineConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig, PositionLoopConfig,
+    AxisConfig, AxisKind, DelaysConfig, FeedforwardConfig, FrictionConfig, GravityConfig, KinematicsConfig,
+    LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig,
+    PositionLoopConfig,
 };
 use super::parameters::Parameters;
 use super::value::Value;
@@ -84,12 +85,23 @@ impl Parameters {
                 velocity: period("periods.velocity_us", MICROSECOND_NS)?,
                 current: period("periods.current_us", MICROSECOND_NS)?,
             },
+            kinematics: self.kinematics_config()?,
             axes: self
                 .layout()
                 .joints
                 .iter()
                 .map(|joint| Axis { set: self, joint }.config())
                 .collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn kinematics_config(&self) -> Result<KinematicsConfig, ConfigError> {
+        let distance = |name: &str| Ok(self.number(&format!("kinematics.{name}_mm"))? * MILLIMETRE);
+        Ok(KinematicsConfig {
+            tool_length: distance("tool_length")?,
+            pivot_a: [distance("pivot_a_y")?, distance("pivot_a_z")?],
+            pivot_c: [distance("pivot_c_x")?, distance("pivot_c_y")?],
+            workpiece: [distance("workpiece_x")?, distance("workpiece_y")?, distance("workpiece_z")?],
         })
     }
 

@@ -5,8 +5,8 @@ use super::error::{ConfigError, Source, shortened};
 use super::machine::AxisKind;
 use super::schema::DEFINITIONS;
 
-/// Joint names that are, or may become, first parts of other parameters' names.
-const RESERVED: &[&str] = &["kinematics", "qos", "qos_overrides", "ros__parameters"];
+/// First parts of names in ROS parameter files that are in no row of the schema, and no joint's either.
+const RESERVED: &[&str] = &["qos_overrides", "ros__parameters"];
 /// Similarity (Jaro-Winkler) below which a known key is no help.
 const NEAR_ENOUGH: f64 = 0.7;
 /// Longest key for which a similar one is looked up, characters.

@@ -10,6 +10,7 @@ use crate::units::Nanoseconds;
 pub struct MachineConfig {
     pub(crate) name: String,
     pub(crate) periods: Periods,
+    pub(crate) kinematics: KinematicsConfig,
     pub(crate) axes: Vec<AxisConfig>,
 }
 
@@ -34,6 +35,20 @@ impl Periods {
     pub fn ticks_per_velocity(&self) -> u64 {
         (self.velocity / self.current) as u64
     }
+}
+
+/// Where the parts of the chain workpiece–C–A–X/Y/Z–tool stand: coordinates in m of the machine frame
+/// with every axis at home.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct KinematicsConfig {
+    /// From the point that X, Y and Z move, which is in the origin at home, down to the tool tip.
+    pub tool_length: f64,
+    /// (Y, Z) of the line, parallel to X, about which A turns.
+    pub pivot_a: [f64; 2],
+    /// (X, Y) of the line, parallel to Z while A is at 0, about which C turns.
+    pub pivot_c: [f64; 2],
+    /// (X, Y, Z) of the workpiece frame's origin.
+    pub workpiece: [f64; 3],
 }
 
 /// Whether an axis counts in metres or in radians.
@@ -180,6 +195,11 @@ impl MachineConfig {
     /// Sampling periods.
     pub fn periods(&self) -> Periods {
         self.periods
+    }
+
+    /// Pivots, tool length and workpiece frame.
+    pub fn kinematics(&self) -> &KinematicsConfig {
+        &self.kinematics
     }
 
     /// Axes, in the order of `joints`.

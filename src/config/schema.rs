@@ -15,6 +15,8 @@ const PERIOD_MS: (f64, f64) = (1e-3, 50.0);
 const PERIOD_US: (f64, f64) = (1.0, 50e3);
 /// Longest delay of a set-point, ms.
 const DELAY_MS: f64 = 100.0;
+/// Largest distance between two points of a machine, mm; the largest gantries have some tens of metres.
+const DISTANCE_MM: f64 = 1e5;
 /// Largest current, A, of a motor and of its friction.
 const CURRENT: f64 = 1e4;
 /// Exponents of the friction law, min/m or min/rev: the fall after breakaway can be steep, a rise
@@ -50,6 +52,11 @@ const fn integral_time(key: &'static str) -> Definition {
 /// A delay of the set-point, live.
 const fn delay(key: &'static str) -> Definition {
     Definition::number(key, "ms", 0.0, DELAY_MS).of_axis().default(Number(0.0)).live()
+}
+
+/// A coordinate of a point of the machine, home in the origin.
+const fn coordinate(key: &'static str) -> Definition {
+    Definition::number(key, "mm", -DISTANCE_MM, DISTANCE_MM).default(Number(0.0))
 }
 
 /// Whether samples of a topic are repeated until they have arrived.
@@ -88,6 +95,17 @@ pub static DEFINITIONS: &[Definition] = &[
         .is("Tsv, sampling period of the velocity loop, a multiple of periods.current_us."),
     Definition::number("periods.current_us", "µs", PERIOD_US.0, PERIOD_US.1)
         .is("Tsi, sampling period of the current loop: one tick of the simulation."),
+    // Kinematics, chain workpiece-C-A-X/Y/Z-tool; coordinates of the machine with every axis at home.
+    Definition::number("kinematics.tool_length_mm", "mm", 0.0, DISTANCE_MM)
+        .default(Number(0.0))
+        .is("Tool length, from the point that X, Y and Z move (the origin at home) down to the tool tip."),
+    coordinate("kinematics.pivot_a_y_mm").is("Y of the line about which A turns, which is parallel to X."),
+    coordinate("kinematics.pivot_a_z_mm").is("Z of the line about which A turns, which is parallel to X."),
+    coordinate("kinematics.pivot_c_x_mm").is("X of the line about which C turns, parallel to Z while A is at 0."),
+    coordinate("kinematics.pivot_c_y_mm").is("Y of the line about which C turns, parallel to Z while A is at 0."),
+    coordinate("kinematics.workpiece_x_mm").is("X of the workpiece frame's origin."),
+    coordinate("kinematics.workpiece_y_mm").is("Y of the workpiece frame's origin."),
+    coordinate("kinematics.workpiece_z_mm").is("Z of the workpiece frame's origin."),
     // Axis and transmission.
     Definition::new("type", "", Kind::Choice(&["linear", "rotary"]))
         .of_axis()

@@ -14,6 +14,16 @@ fn negative_inertia() {
 }
 
 #[test]
+fn negative_tool_length() {
+    let text = mikron_with("tool_length_mm: 100.0", "tool_length_mm: -100.0");
+    assert_refused(
+        &text,
+        "tool_length_mm",
+        "my.yaml:{line}: kinematics.tool_length_mm = -100: must lie in 0 … 1e5 mm",
+    );
+}
+
+#[test]
 fn misspelt_key() {
     let text = mikron_with("inertia_kg_m2: 0.028", "inertia_kgm2: 0.028");
     assert_refused(
@@ -176,7 +186,7 @@ fn joint_twice() {
 
 #[test]
 fn joint_with_the_name_of_another_parameter() {
-    for name in ["time", "periods", "machine", "publish_rate", "kinematics"] {
+    for name in ["time", "periods", "machine", "publish_rate", "kinematics", "qos"] {
         let text = mikron_with("\"a\", \"c\"]", &format!("\"a\", \"{name}\"]"));
         assert_refused(
             &text,

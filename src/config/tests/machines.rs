@@ -3,7 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{MIKRON, mikron};
-use crate::config::{AxisConfig, AxisKind, MachineConfig, Parameters, PositionControllerConfig};
+use crate::config::{
+    AxisConfig, AxisKind, KinematicsConfig, MachineConfig, Parameters, PositionControllerConfig, Source,
+};
 
 /// Relative difference that the conversion of units may leave.
 const ROUNDING: f64 = 1e-12;
@@ -180,6 +182,8 @@ fn mikron_has_every_value_of_the_model() {
     assert_eq!(machine.name(), "Mikron UCP 710");
     let periods = machine.periods();
     assert_eq!((periods.position, periods.velocity, periods.current), (6_000_000, 250_000, 125_000));
+    let kinematics = KinematicsConfig { tool_length: 0.1, ..KinematicsConfig::default() };
+    assert_eq!(machine.kinematics(), &kinematics);
     assert_eq!(machine.axes().len(), 5);
     for (column, axis) in columns().iter().zip(machine.axes()) {
         column.check(axis);
@@ -200,6 +204,42 @@ fn linear_motors_count_in_metres_and_newtons() {
     assert_eq!((a.kind, a.transmission_ratio), (AxisKind::Rotary, 1.0));
     assert_near(a.motor.max_speed, 72.0 * TAU / 60.0, "72 rpm");
     assert_eq!(machine.periods().current, 62_500);
+}
+
+#[test]
+fn each_part_of_the_kinematics_has_its_key() {
+    let mut parameters = mikron();
+    let keys = [
+        "tool_length",
+        "pivot_a_y",
+        "pivot_a_z",
+        "pivot_c_x",
+        "pivot_c_y",
+        "workpiece_x",
+        "workpiece_y",
+        "workpiece_z",
+    ];
+    for (index, key) in keys.iter().enumerate() {
+        let text = format!("kinematics.{key}_mm={}", 1000 * (index + 1));
+        assert_eq!(parameters.set_text(&text, &Source::named("--set")), Ok(()));
+    }
+    let machine = parameters.machine_config().expect("a valid machine");
+    let expected = KinematicsConfig {
+        tool_length: 1.0,
+        pivot_a: [2.0, 3.0],
+        pivot_c: [4.0, 5.0],
+        workpiece: [6.0, 7.0, 8.0],
+    };
+    assert_eq!(machine.kinematics(), &expected);
+}
+
+#[test]
+fn a_file_that_says_nothing_of_kinematics_has_a_tool_without_length() {
+    let (before, rest) = MIKRON.split_once("    kinematics:\n").expect("the section");
+    let (_, after) = rest.split_once("\n\n").expect("an empty line behind it");
+    let parameters = Parameters::from_yaml(&format!("{before}\n{after}"), "my.yaml").expect("a machine");
+    let machine = parameters.machine_config().expect("a valid machine");
+    assert_eq!(machine.kinematics(), &KinematicsConfig::default());
 }
 
 #[test]
