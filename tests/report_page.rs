@@ -5,15 +5,12 @@ mod report_common;
 
 use std::sync::LazyLock;
 
-use report_common::{NO_FEEDFORWARD, ballbar, five_axes, report_run};
+use report_common::{NO_FEEDFORWARD, PERIOD, ballbar, five_axes, report_run};
 use virtual_axes::assess::Recording;
 use virtual_axes::report::{Report, ReportRun};
 
-/// Position period in ticks.
-const PERIOD: u64 = 48;
-
 static BALLBAR: LazyLock<[Recording; 2]> =
-    LazyLock::new(|| [ballbar(&[], 8, false), ballbar(&NO_FEEDFORWARD, 8, false)]);
+    LazyLock::new(|| [ballbar(&[], PERIOD, false), ballbar(&NO_FEEDFORWARD, PERIOD, false)]);
 
 fn page(title: &str, runs: Vec<ReportRun>) -> String {
     let mut bytes = Vec::new();
@@ -47,6 +44,8 @@ fn pages_to_look_at() {
     write("ballbar-3", runs.clone(), circle);
     runs.push(report_run("cascade x.position_loop.gain=3", &stiff));
     write("ballbar-4", runs, circle);
-    let five = five_axes(1);
+    let five = five_axes(PERIOD);
     write("five-axes", vec![report_run("cascade", &five)], "All five axes swing.");
+    let every_tick = five_axes(1);
+    write("five-axes-every-tick", vec![report_run("cascade", &every_tick)], "All five axes swing.");
 }

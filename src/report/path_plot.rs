@@ -17,6 +17,8 @@ const TOP: f64 = 10.0;
 const BELOW: f64 = 44.0;
 /// Height of the area over its width: what the path asks for, within these.
 const ASPECT: [f64; 2] = [0.35, 1.0];
+/// Room about the path, part of its range.
+const MARGIN: f64 = 0.04;
 /// Steps between ticks, about.
 const STEPS: f64 = 5.0;
 /// The largest error takes this part of the path's extent.
@@ -131,11 +133,7 @@ impl PathPlot<'_> {
 
     /// The picture; `title` says what it shows.
     pub(super) fn draw(&self, id: &str, title: &str) -> String {
-        let [across, up] = self.range.map(|e| {
-            let e = e.in_unit(&Unit::MILLIMETRE);
-            let margin = 0.04 * e.span();
-            Extent { min: e.min - margin, max: e.max + margin }
-        });
+        let [across, up] = self.range.map(|e| e.in_unit(&Unit::MILLIMETRE).with_margin(MARGIN));
         let least = Unit::MILLIMETRE.least_range;
         let width = across.span().max(up.span() / ASPECT[1]).max(least);
         let aspect = (up.span() / width).clamp(ASPECT[0], ASPECT[1]);

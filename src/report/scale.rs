@@ -117,6 +117,12 @@ impl Extent {
         Extent { min: middle - span / 2.0, max: middle + span / 2.0 }
     }
 
+    /// Widened at both ends by a part of its span.
+    pub(super) fn with_margin(self, part: f64) -> Extent {
+        let margin = part * self.span();
+        Extent { min: self.min - margin, max: self.max + margin }
+    }
+
     /// In a unit instead of SI.
     pub(super) fn in_unit(self, unit: &Unit) -> Extent {
         Extent { min: self.min / unit.size, max: self.max / unit.size }

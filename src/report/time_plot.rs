@@ -13,7 +13,9 @@ const TOP: f64 = 8.0;
 const BOTTOM: f64 = HEIGHT - 42.0;
 /// Steps between ticks, about: a label each 90 pixels, a line of text each 35.
 const TIME_STEPS: f64 = 10.0;
-const VALUE_STEPS: f64 = 4.0;
+const VALUE_STEPS: f64 = 5.0;
+/// Room above and below the lines, part of their range.
+const MARGIN: f64 = 0.06;
 
 /// One line.
 #[derive(Debug, Clone)]
@@ -50,7 +52,8 @@ impl TimePlot<'_> {
         let values = self.series.iter().map(|s| Extent::of(s.values.iter().copied()));
         let values = values.fold(self.at_least, Extent::join).unwrap_or(Extent { min: 0.0, max: 0.0 });
         let values = if self.from_zero { values.including(0.0) } else { values };
-        let vertical = Scale::outward(values.in_unit(&self.unit), self.unit.least_range, VALUE_STEPS);
+        let values = values.in_unit(&self.unit).at_least(self.unit.least_range).with_margin(MARGIN);
+        let vertical = Scale::within(values, self.unit.least_range, VALUE_STEPS);
         let horizontal = Scale::within(self.time, Unit::SECOND.least_range, TIME_STEPS);
         let (x, y) = (horizontal.onto(LEFT, RIGHT), vertical.onto(BOTTOM, TOP));
 

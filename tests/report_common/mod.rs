@@ -16,6 +16,11 @@ const JOINTS: [(&str, AxisKind); AXES] = [
     ("c", AxisKind::Rotary),
 ];
 
+/// A position period of the default machine, ticks.
+pub const PERIOD: u64 = 48;
+/// Ticks between two points of a circle.
+const CIRCLE_TICKS: u64 = 4;
+
 /// Velocity feedforward of X and Y off.
 pub const NO_FEEDFORWARD: [(&str, f64); 4] = [
     ("x.feedforward.velocity", 0.0),
@@ -102,13 +107,15 @@ pub fn ballbar(changes: &[(&str, f64)], every: u64, one_way: bool) -> Recording 
         [radius * (angle.cos() - 1.0), radius * angle.sin(), 0.0]
     };
     let mut recording = record(changes, trial.duration(), |t| trial.psec(t), nearest, every);
-    recording.circles.push(circle(&recording, trial, true));
+    // A circle is judged at every tick; a few are enough to draw it.
+    let finer = record(changes, trial.duration(), |t| trial.psec(t), nearest, CIRCLE_TICKS);
+    recording.circles.push(circle(&finer, trial, true));
     if !one_way {
         let backwards = |t: f64| {
             let [x, y, z, a, c] = trial.psec(t);
             [x, -y, z, a, c]
         };
-        let other = record(changes, trial.duration(), backwards, nearest, every);
+        let other = record(changes, trial.duration(), backwards, nearest, CIRCLE_TICKS);
         recording.circles.push(circle(&other, trial, false));
     }
     recording
