@@ -45,23 +45,19 @@ pub(super) fn sections(page: &mut Page) {
         page.close_section();
     }
     if !standing.is_empty() {
-        let names: Vec<String> = standing.iter().map(|axis| axis.name.clone()).collect();
-        let held: Vec<String> = standing.iter().map(held).collect();
-        let verb = if names.len() == 1 { "stands still and holds" } else { "stand still and hold" };
+        let held: Vec<String> = standing.iter().enumerate().map(|(i, axis)| held(axis, i == 0)).collect();
+        let verb = if held.len() == 1 { "stands" } else { "stand" };
         page.open_section("standing", "Axes that stand still");
-        page.paragraph(
-            &format!("{} {verb} their set-points within {}.", listed(&names), listed(&held))
-                .replace("holds their set-points", "holds its set-point"),
-        );
+        page.paragraph(&format!("{} {verb} still.", listed(&held)));
         page.close_section();
     }
 }
 
-/// How far an axis that stands still is from its set-point at most.
-fn held(axis: &Axis) -> String {
+/// An axis that stands still, and how far it is from its set-point at most.
+fn held(axis: &Axis, explained: bool) -> String {
     let errors = axis.traces.iter().flat_map(|(_, _, t)| t.tracking_error.iter().copied());
-    let unit = Unit::error(axis.traces[0].2.kind);
-    unit.show(Extent::of(errors).map_or(0.0, |e| e.peak()))
+    let error = Unit::error(axis.traces[0].2.kind).show(Extent::of(errors).map_or(0.0, |e| e.peak()));
+    format!("{} ({}{error})", axis.name, if explained { "largest tracking error " } else { "" })
 }
 
 /// Every axis by name, in the order in which the runs have them.
@@ -157,11 +153,7 @@ fn position(page: &mut Page, axis: &Axis, time: Extent) {
     let setpoints = series.len();
     for &(run, time, trace) in &axis.traces {
         let one = run_series(page, run, time, &trace.position);
-        let label = if page.is_comparison() {
-            format!("position (SP), {}", one.label)
-        } else {
-            "position (SP)".to_owned()
-        };
+        let label = if page.is_comparison() { one.label.clone() } else { "position (SP)".to_owned() };
         series.push(Series { label, ..one });
     }
     let mut legend = legend(&series);

@@ -28,7 +28,7 @@ const LEAST_ERROR: f64 = 1e-7;
 /// A coordinate that varies by less stands still, m.
 const STANDSTILL: f64 = 1e-6;
 /// Lines from the path to the magnified point.
-const WHISKERS: usize = 160;
+const WHISKERS: usize = 100;
 
 /// What is common to the plots of some runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -169,7 +169,7 @@ impl PathPlot<'_> {
         let whiskers: Vec<_> = kept.iter().step_by(every).map(|&i| vec![points[i].0, points[i].1]).collect();
         svg.path("reference", &[kept.iter().map(|&i| points[i].0).collect()]);
         svg.path(&format!("whisker {}", self.class), &whiskers);
-        svg.path(&format!("line {}", self.class), &[kept.iter().map(|&i| points[i].1).collect()]);
+        svg.path(&format!("line solid {}", self.class), &[kept.iter().map(|&i| points[i].1).collect()]);
         if let Some((start, _)) = points.first() {
             svg.circle("start", *start, 4.0);
         }

@@ -1,6 +1,6 @@
 //! Radial deviation on circles, magnified about the nominal radius, as a ballbar shows it.
 
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::f64::consts::{FRAC_PI_4, FRAC_PI_8, PI};
 
 use crate::assess::CircleTrace;
 
@@ -17,8 +17,8 @@ const INNER: f64 = 56.0;
 const OUTER: f64 = 200.0;
 /// Rings beside the smallest, about.
 const RINGS: f64 = 4.0;
-/// Between two spokes: where the rings are labelled.
-const LABEL_ANGLE: f64 = PI / 8.0;
+/// Where the rings are labelled: between two spokes, and steep so that the labels stand apart.
+const LABEL_ANGLE: f64 = 3.0 * FRAC_PI_8;
 /// A smaller range, µm, is drawn as large.
 const LEAST_RANGE: f64 = 1.0;
 

@@ -137,6 +137,27 @@ fn circle(recording: &Recording, trial: Ballbar, counterclockwise: bool) -> Circ
     }
 }
 
+/// The nearest point of a motion's tip, sought forward from the last one.
+fn nearest_on(psec: impl Fn(f64) -> [f64; AXES], duration: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
+    let step = 2e-4;
+    let count = (duration / step).ceil() as u32;
+    let path: Vec<[f64; 3]> = (0..=count)
+        .map(|i| {
+            let [x, y, z, ..] = psec(f64::from(i) * step);
+            [x, y, z]
+        })
+        .collect();
+    let last = std::cell::Cell::new(0);
+    move |tip| {
+        let distance = |i: usize| (0..3).map(|k| (path[i][k] - tip[k]).powi(2)).sum::<f64>();
+        let from = last.get();
+        let near = from..(from + 300).min(path.len());
+        let best = near.min_by(|&i, &j| distance(i).total_cmp(&distance(j))).unwrap_or(from);
+        last.set(best);
+        path[best]
+    }
+}
+
 /// All five axes swing, each at its own tempo.
 pub fn five_axes(every: u64) -> Recording {
     let amplitudes = [0.05, -0.03, 0.02, 0.4, 1.0];
@@ -152,7 +173,7 @@ pub fn five_axes(every: u64) -> Recording {
         }
         values
     };
-    let mut recording = record(&[], duration, psec, |tip| tip.map(|v| (v * 1e5).round() / 1e5), every);
+    let mut recording = record(&[], duration, psec, nearest_on(psec, duration), every);
     if let Some(tool) = &mut recording.tool {
         let c = &recording.axes[4].synchronized_tracking_error;
         tool.orientation_error = c.iter().map(|e| e.abs()).collect();
