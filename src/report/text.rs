@@ -1,0 +1,125 @@
+//! Text as it stands in the page: escaped, and numbers as a reader expects them.
+
+use std::fmt::{self, Display, Write as _};
+
+/// Text from outside, so written that it is nothing but text in HTML and in quoted attributes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Text<'a>(pub &'a str);
+
+impl Display for Text<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for c in self.0.chars() {
+            match c {
+                '&' => f.write_str("&amp;")?,
+                '<' => f.write_str("&lt;")?,
+                '>' => f.write_str("&gt;")?,
+                '"' => f.write_str("&quot;")?,
+                '\'' => f.write_str("&#39;")?,
+                '\n' | '\t' => f.write_char(' ')?,
+                // Not allowed in HTML.
+                c if c.is_control() => f.write_char(char::REPLACEMENT_CHARACTER)?,
+                c => f.write_char(c)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Between groups of three digits.
+const THIN_SPACE: char = '\u{202f}';
+/// The minus sign, as wide as the plus sign.
+const MINUS: char = '−';
+
+/// A finite number with so many decimals, a true minus sign and thin spaces between thousands.
+pub(super) fn number(value: f64, decimals: usize) -> String {
+    let plain = format!("{:.decimals$}", value.abs());
+    let (whole, fraction) = plain.split_once('.').map_or((plain.as_str(), None), |(w, f)| (w, Some(f)));
+    let mut text = String::with_capacity(plain.len() + 4);
+    // What rounds to zero has no sign.
+    if value < 0.0 && plain.bytes().any(|b| (b'1'..=b'9').contains(&b)) {
+        text.push(MINUS);
+    }
+    for (place, digit) in whole.chars().enumerate() {
+        if place > 0 && (whole.len() - place).is_multiple_of(3) {
+            text.push(THIN_SPACE);
+        }
+        text.push(digit);
+    }
+    if let Some(fraction) = fraction {
+        text.push('.');
+        text.push_str(fraction);
+    }
+    text
+}
+
+/// A number with about three significant digits.
+pub(super) fn rounded(value: f64) -> String {
+    let decimals = match value.abs() {
+        v if v >= 100.0 => 0,
+        v if v >= 10.0 => 1,
+        _ => 2,
+    };
+    number(value, decimals)
+}
+
+/// Whether a table's cell is a number, which then stands to the right.
+pub(super) fn is_number(cell: &str) -> bool {
+    let digits: String = cell.chars().filter(|c| !c.is_whitespace()).collect();
+    digits.replacen(MINUS, "-", 1).parse::<f64>().is_ok()
+}
+
+/// A table's cell with a true minus sign before a number.
+pub(super) fn cell(text: &str) -> String {
+    match text.trim().strip_prefix('-') {
+        Some(rest) if is_number(rest) => format!("{MINUS}{rest}"),
+        _ => text.trim().to_owned(),
+    }
+}
+
+/// "a", "a and b", "a, b and c".
+pub(super) fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [before @ .., last] => format!("{} and {last}", before.join(", ")),
+    }
+}
+
+/// With a capital first letter.
+pub(super) fn capital(text: &str) -> String {
+    let mut rest = text.chars();
+    rest.next().map_or(String::new(), |first| first.to_uppercase().chain(rest).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_from_outside_is_inert() {
+        let text = Text("</title><script>alert('1')</script> \"&\"\u{0}").to_string();
+        assert_eq!(
+            text,
+            "&lt;/title&gt;&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt; &quot;&amp;&quot;\u{fffd}"
+        );
+    }
+
+    #[test]
+    fn numbers_have_a_minus_sign_and_thin_spaces() {
+        assert_eq!(number(-1234567.0, 0), "−1\u{202f}234\u{202f}567");
+        assert_eq!(number(-0.25, 2), "−0.25");
+        assert_eq!(number(-0.04, 1), "0.0");
+        assert_eq!(number(999.0, 0), "999");
+        assert_eq!(cell("-12.5"), "−12.5");
+        assert_eq!(cell("-Z"), "-Z");
+        assert!(is_number("−1\u{202f}000.5") && !is_number("X") && !is_number(""));
+    }
+
+    #[test]
+    fn lists_read_as_sentences() {
+        let names = ["Z".to_owned(), "A".to_owned(), "C".to_owned()];
+        assert_eq!(listed(&names), "Z, A and C");
+        assert_eq!(listed(&names[..1]), "Z");
+        assert_eq!(listed(&[]), "");
+    }
+}

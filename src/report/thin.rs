@@ -1,0 +1,179 @@
+//! Lines with no more points than can be seen.
+//!
+//! A signal over time keeps the smallest and the largest value of each column of pixels, so that no
+//! peak is lost. After that, and for curves in a plane, a point that lies on the line between its
+//! neighbours is dropped.
+
+use super::scale::is_drawable;
+
+/// A point in pixels.
+pub(super) type Point = [f64; 2];
+
+/// How far a dropped point may lie from the line that is drawn, pixels.
+const TOLERANCE: f64 = 0.08;
+/// Steps of a curve below this are not seen, pixels.
+const SHORTEST_STEP: f64 = 0.25;
+/// Points of a curve at most; beyond, steps are made longer.
+const MOST_POINTS: usize = 6000;
+
+/// Places of the smallest and the largest value in each column, in order; one list for each part
+/// between values that cannot be drawn.
+///
+/// `column(i)` is the column of sample i, not falling. A gap inside a column is not seen, and closed.
+pub(super) fn extremes(values: &[f64], column: impl Fn(usize) -> i64) -> Vec<Vec<usize>> {
+    let mut parts: Vec<Vec<usize>> = Vec::new();
+    // Column, smallest, largest.
+    let mut open: Option<(i64, usize, usize)> = None;
+    let mut gap = true;
+    let mut previous = 0;
+    for (i, &value) in values.iter().enumerate() {
+        if !is_drawable(value) {
+            gap = true;
+            continue;
+        }
+        match &mut open {
+            Some((c, low, high)) if *c == column(i) => {
+                if value < values[*low] {
+                    *low = i;
+                }
+                if value > values[*high] {
+                    *high = i;
+                }
+            }
+            _ => {
+                close(&mut parts, open, previous);
+                if gap {
+                    parts.push(vec![i]);
+                } else if let Some(part) = parts.last_mut() {
+                    part.push(i);
+                }
+                open = Some((column(i), i, i));
+            }
+        }
+        gap = false;
+        previous = i;
+    }
+    close(&mut parts, open, previous);
+    parts
+}
+
+/// Ends a column: its extremes after its first sample, and its last.
+fn close(parts: &mut [Vec<usize>], open: Option<(i64, usize, usize)>, last: usize) {
+    let (Some((_, low, high)), Some(part)) = (open, parts.last_mut()) else { return };
+    for place in [low.min(high), low.max(high), last] {
+        if part.last().is_none_or(|&l| l < place) {
+            part.push(place);
+        }
+    }
+}
+
+/// Places of the points of a curve that differ visibly from the one before; `same` says whether the
+/// curve's points i and j look the same within so many pixels.
+pub(super) fn steps(length: usize, same: impl Fn(usize, usize, f64) -> bool) -> Vec<usize> {
+    let mut within = SHORTEST_STEP;
+    loop {
+        let mut kept: Vec<usize> = Vec::new();
+        for i in 0..length {
+            if i + 1 == length || kept.last().is_none_or(|&last| !same(last, i, within)) {
+                kept.push(i);
+            }
+        }
+        // Nothing on a page is larger than this; more points than it allows cannot be had by steps.
+        if kept.len() <= MOST_POINTS || within > 1e4 {
+            return kept;
+        }
+        within *= 2.0;
+    }
+}
+
+/// The line without points that lie on it (Ramer, Douglas and Peucker).
+pub(super) fn simplified(points: &[Point]) -> Vec<Point> {
+    let Some(last) = points.len().checked_sub(1).filter(|&last| last > 1) else { return points.to_vec() };
+    let mut kept = vec![false; points.len()];
+    kept[0] = true;
+    kept[last] = true;
+    let mut pending = vec![(0, last)];
+    while let Some((from, to)) = pending.pop() {
+        let farthest = (from + 1..to)
+            .map(|i| (i, distance(points[i], points[from], points[to])))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((i, d)) = farthest
+            && d > TOLERANCE
+        {
+            kept[i] = true;
+            pending.extend([(from, i), (i, to)]);
+        }
+    }
+    points.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(point, _)| *point).collect()
+}
+
+/// Distance of `p` from the line between `a` and `b`.
+fn distance(p: Point, a: Point, b: Point) -> f64 {
+    let (along, off) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+    let length = along[0] * along[0] + along[1] * along[1];
+    let dot = along[0] * off[0] + along[1] * off[1];
+    let t = if length > 0.0 { (dot / length).clamp(0.0, 1.0) } else { 0.0 };
+    (off[0] - t * along[0]).hypot(off[1] - t * along[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_extremes_of_every_column_survive(
+            values in prop::collection::vec(-1e3..1e3f64, 1..400), per_column in 1usize..50
+        ) {
+            let parts = extremes(&values, |i| (i / per_column) as i64);
+            prop_assert_eq!(parts.len(), 1);
+            let kept = &parts[0];
+            prop_assert!(kept.windows(2).all(|w| w[0] < w[1]));
+            prop_assert!(kept.len() <= 4 * values.len().div_ceil(per_column));
+            for (c, column) in values.chunks(per_column).enumerate() {
+                let seen = kept.iter().filter(|&&i| i / per_column == c).map(|&i| values[i]);
+                let (low, high) = seen.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+                prop_assert_eq!(low, column.iter().copied().fold(f64::MAX, f64::min));
+                prop_assert_eq!(high, column.iter().copied().fold(f64::MIN, f64::max));
+            }
+            prop_assert_eq!((kept[0], kept[kept.len() - 1]), (0, values.len() - 1));
+        }
+
+        #[test]
+        fn a_dropped_point_lies_on_the_line(points in prop::collection::vec(prop::array::uniform2(-50.0..50.0f64), 2..60)) {
+            let line = simplified(&points);
+            for p in &points {
+                let d = line.windows(2).map(|w| distance(*p, w[0], w[1])).fold(f64::MAX, f64::min);
+                prop_assert!(d <= TOLERANCE, "{p:?} is {d} away");
+            }
+        }
+
+        #[test]
+        fn whatever_cannot_be_drawn_makes_few_parts(
+            values in prop::collection::vec(prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(1.0)], 0..400)
+        ) {
+            let parts = extremes(&values, |i| (i / 10) as i64);
+            prop_assert!(parts.len() <= values.len().div_ceil(10));
+            prop_assert!(parts.iter().flatten().all(|&i| values[i] == 1.0));
+        }
+    }
+
+    #[test]
+    fn a_gap_breaks_the_line() {
+        let values = [1.0, 2.0, f64::NAN, f64::NAN, 3.0, f64::INFINITY];
+        assert_eq!(extremes(&values, |i| i as i64), [vec![0, 1], vec![4]]);
+    }
+
+    #[test]
+    fn a_curve_has_a_bounded_number_of_points() {
+        let kept = steps(100_000, |i, j, within| ((i as f64) - (j as f64)).abs() < within);
+        assert!(kept.len() <= MOST_POINTS && kept.contains(&99_999));
+    }
+
+    #[test]
+    fn a_straight_line_needs_two_points() {
+        let points: Vec<Point> = (0..100).map(|i| [f64::from(i), 2.0 * f64::from(i)]).collect();
+        assert_eq!(simplified(&points), [[0.0, 0.0], [99.0, 198.0]]);
+    }
+}

@@ -1,0 +1,173 @@
+//! Sections of the tool: its path, contour and orientation errors, circles.
+
+use crate::assess::{CircleTrace, ToolTrace};
+
+use super::axes::{COMPARABLE, axis_name, over_time_of, peak, run_series, smaller, time};
+use super::page::{Caption, Page, run_class};
+use super::path_plot::{PathPlot, View};
+use super::polar::{DIRECTIONS, PolarPlot, range};
+use super::scale::{Extent, Unit};
+use super::text::rounded;
+use super::time_plot::Series;
+
+/// Different circles that are drawn; the figures name them all.
+const MOST_CIRCLES: usize = 6;
+/// Radii that differ by less belong to one circle, m.
+const SAME_RADIUS: f64 = 1e-6;
+/// A smaller orientation error is none, rad: 0.01 mdeg.
+const NO_ORIENTATION_ERROR: f64 = 1.7e-7;
+
+/// Path, errors over time, circles.
+pub(super) fn sections(page: &mut Page) {
+    let tools: Vec<(usize, &ToolTrace)> =
+        page.runs.iter().enumerate().filter_map(|(i, run)| Some((i, run.recording.tool.as_ref()?))).collect();
+    let circles = circles(page);
+    if tools.is_empty() && circles.is_empty() {
+        return;
+    }
+    page.open_section("tool", "Tool in the workpiece frame");
+    // Square pictures of one run fit side by side.
+    let pictures = if page.is_comparison() { page.runs.len() } else { 1 + circles.len().min(MOST_CIRCLES) };
+    page.open_row(pictures);
+    let has_path = paths(page, &tools);
+    if page.is_comparison() {
+        page.close_row();
+    }
+    for circle in circles.iter().take(MOST_CIRCLES) {
+        if page.is_comparison() {
+            page.open_row(pictures);
+        }
+        polar_plots(page, circle);
+        if page.is_comparison() {
+            page.close_row();
+        }
+    }
+    if !page.is_comparison() {
+        page.close_row();
+    }
+    if !tools.is_empty() && !has_path {
+        page.paragraph("The path of the tool tip is a point.");
+    }
+    if circles.len() > MOST_CIRCLES {
+        page.paragraph(&format!("{} more circles are not drawn.", circles.len() - MOST_CIRCLES));
+    }
+    if let Some(time) = time(page) {
+        let note = "distance of the tool tip from the path";
+        errors(page, time, ["Contour error", note], Unit::MICROMETRE, &tools, |t| &t.contour_error);
+        if tools.iter().any(|(_, t)| peak(&t.orientation_error) > NO_ORIENTATION_ERROR) {
+            let note = "angle between the tool axis and that of the path";
+            errors(page, time, ["Orientation error", note], Unit::MILLIDEGREE, &tools, |t| {
+                &t.orientation_error
+            });
+        }
+    }
+    page.close_section();
+}
+
+/// An error of all runs over time; those that are much smaller once more on their own scale.
+fn errors(
+    page: &mut Page,
+    time: Extent,
+    title: [&'static str; 2],
+    unit: Unit,
+    tools: &[(usize, &ToolTrace)],
+    signal: fn(&ToolTrace) -> &[f64],
+) {
+    let runs = page.runs;
+    let series: Vec<Series> = tools
+        .iter()
+        .filter_map(|&(run, tool)| Some((run, runs.get(run)?, signal(tool))))
+        .map(|(run, one, values)| run_series(page, run, &one.recording.time, values))
+        .collect();
+    if series.iter().all(|s| s.values.is_empty()) {
+        return;
+    }
+    let small = smaller(&series.iter().map(|s| peak(s.values)).collect::<Vec<_>>());
+    let small: Vec<Series> = small.into_iter().map(|i| series[i].clone()).collect();
+    over_time_of(page, title, "Error", unit, time, series);
+    if !small.is_empty() {
+        let note = "enlarged: without the runs of larger error";
+        over_time_of(page, [title[0], note], "Error", unit, time, small);
+    }
+}
+
+/// The path of each run at one scale; whether there is any.
+fn paths(page: &mut Page, tools: &[(usize, &ToolTrace)]) -> bool {
+    let traces: Vec<&ToolTrace> = tools.iter().map(|(_, tool)| *tool).collect();
+    let Some(view) = View::of(&traces) else { return false };
+    // An error that one magnification for all would hide has its own.
+    let peaks: Vec<f64> = traces.iter().map(|tool| view.error(tool)).collect();
+    let largest = peaks.iter().copied().fold(0.0, f64::max);
+    let magnification =
+        |peak: f64| view.magnification(&traces, if peak * COMPARABLE < largest { peak } else { largest });
+    let ranges = tools.iter().zip(&peaks).filter_map(|((_, tool), &p)| view.range(tool, magnification(p)));
+    let range = ranges
+        .fold([None, None], |all, [u, v]| [Extent::join(all[0], Some(u)), Extent::join(all[1], Some(v))]);
+    let [Some(across), Some(up)] = range else { return false };
+    for (&(run, tool), &peak) in tools.iter().zip(&peaks) {
+        let class = run_class(run);
+        let legend = vec![
+            ("reference".to_owned(), "path".to_owned()),
+            (format!("line solid {class}"), "tool tip".to_owned()),
+            ("start".to_owned(), "start".to_owned()),
+        ];
+        let plot = PathPlot { view, tool, magnification: magnification(peak), range: [across, up], class };
+        let title = page.of_run(&format!("{} path", view.name()), run);
+        let caption = Caption { title: title.clone(), note: plot.note(), legend };
+        page.figure("plane", &caption, &title, |id, title| plot.draw(id, title));
+    }
+    true
+}
+
+/// Circles of one plane and radius, and the runs that have them.
+struct Circles<'a> {
+    plane: &'a [String; 2],
+    radius: f64,
+    runs: Vec<(usize, Vec<&'a CircleTrace>)>,
+}
+
+/// Every different circle of the runs, in their order.
+fn circles<'a>(page: &Page<'a>) -> Vec<Circles<'a>> {
+    let mut all: Vec<Circles> = Vec::new();
+    for (i, run) in page.runs.iter().enumerate() {
+        for circle in &run.recording.circles {
+            let is_it =
+                |c: &Circles| *c.plane == circle.plane && (c.radius - circle.radius).abs() < SAME_RADIUS;
+            let place = all.iter().position(is_it).unwrap_or_else(|| {
+                all.push(Circles { plane: &circle.plane, radius: circle.radius, runs: Vec::new() });
+                all.len() - 1
+            });
+            match all[place].runs.last_mut() {
+                Some((run, list)) if *run == i => list.push(circle),
+                _ => all[place].runs.push((i, vec![circle])),
+            }
+        }
+    }
+    all
+}
+
+/// A circle in each run, at one scale where that shows all of them.
+fn polar_plots(page: &mut Page, circle: &Circles) {
+    let ranges: Vec<Extent> = circle.runs.iter().map(|(_, list)| range(list.iter().copied())).collect();
+    let small = smaller(&ranges.iter().map(|r| r.span()).collect::<Vec<_>>());
+    let common = (0..ranges.len())
+        .filter(|i| !small.contains(i))
+        .fold(None, |all, i| Extent::join(all, Some(ranges[i])));
+    let [first, second] = circle.plane.clone().map(|name| axis_name(&name));
+    let name =
+        format!("{first}–{second} circle, R {}\u{a0}mm", rounded(circle.radius / Unit::MILLIMETRE.size));
+    for (i, (run, list)) in circle.runs.iter().enumerate() {
+        let own = ranges[i];
+        let range = if small.contains(&i) { own } else { common.unwrap_or(own) };
+        let class = run_class(*run);
+        let legend = DIRECTIONS
+            .iter()
+            .filter(|(label, _)| list.iter().any(|c| c.counterclockwise == (*label == DIRECTIONS[0].0)))
+            .map(|(label, direction)| (format!("line {class} {direction}"), (*label).to_owned()))
+            .collect();
+        let plot = PolarPlot { circles: list.clone(), range, class };
+        let title = page.of_run(&name, *run);
+        let caption = Caption { title: title.clone(), note: plot.note(), legend };
+        page.figure("plane", &caption, &title, |id, title| plot.draw(id, title));
+    }
+}
