@@ -2,8 +2,9 @@
 # Makes what the Python side needs, inside the checkout: .venv (rclpy and the message generators),
 # .build/install (this package's messages) and .build/env.sh, which a shell sources to use both.
 #
-#     tools/setup.sh && source .build/env.sh
+#     tools/setup.sh [--browser] && source .build/env.sh
 #
+# With --browser also Chromium, in which the tests open a report, where apt-get can install it.
 # Run again, it does only what a change of its inputs asks for: each stage ends by writing a stamp
 # with the hash of its inputs, so a stage that was broken off is done anew from nothing.
 set -euo pipefail
@@ -67,6 +68,12 @@ check_tools() {
     fail "needs the venv module of $python (Debian: apt-get install python3-venv)"
   ! missing_header "$python" || { try_apt python3-dev && ! missing_header "$python"; } ||
     fail "needs the headers of $python (Debian: apt-get install python3-dev)"
+}
+
+# Debian's; where it cannot be had, the test that needs it says so.
+install_browser() {
+  command -v chromium chromium-browser google-chrome google-chrome-stable >/dev/null || try_apt chromium ||
+    echo "setup: no Chromium (Debian: apt-get install chromium): the test of the report will fail" >&2
 }
 
 # The wheels' CMake files name directories of the machine that they were built on.
@@ -143,3 +150,4 @@ if ! is_done "$messages_stamp" "$messages_hash"; then
   step "messages of virtual_axes into .build" messages make_messages
   echo "$messages_hash" >"$messages_stamp"
 fi
+if [ "${1:-}" = --browser ]; then install_browser; fi

@@ -22,7 +22,7 @@ const MARGIN: f64 = 0.04;
 /// Steps between ticks, about.
 const STEPS: f64 = 5.0;
 /// The largest error takes this part of the path's extent.
-const SHARE: f64 = 0.10;
+const SHARE: f64 = 0.15;
 /// Below this an error is not magnified further, m: it would be noise.
 const LEAST_ERROR: f64 = 1e-7;
 /// A coordinate that varies by less stands still, m.

@@ -90,7 +90,7 @@ impl PolarPlot<'_> {
         // Over the lines, since they say how large these are.
         for (value, label) in scale.ticks() {
             let [x, y] = at(radius(value), LABEL_ANGLE);
-            svg.text("tick halo", [x, y + 4.5], Anchor::Middle, &format!("{label} µm"));
+            svg.text("tick halo", [x, y + 4.5], Anchor::Middle, &format!("{label}\u{202f}µm"));
         }
         svg.finish(id, title, &self.description())
     }

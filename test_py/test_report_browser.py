@@ -1,0 +1,158 @@
+"""The report in a browser: no errors, nothing from elsewhere, legible in light, dark and print.
+
+VIRTUAL_AXES_REPORT names a page to look at instead of a new one, VIRTUAL_AXES_SCREENSHOTS a folder
+that keeps the pictures.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from browser import Browser, find_browser
+from drive import node_binary
+
+LIGHT, DARK = "light", "dark"
+WIDE, NARROW = 1280, 360
+"""Pixels: a screen on a desk, a telephone."""
+
+OVERLAPPING_TEXTS = """
+[...document.querySelectorAll('svg[role=img]')].flatMap(svg => {
+    const frame = svg.getBoundingClientRect();
+    const texts = [...svg.querySelectorAll('text')].map(text => [text.textContent, text.getBoundingClientRect()]);
+    const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+    const pairs = texts.flatMap(([t, a], i) => texts.slice(i + 1).filter(([, b]) => meet(a, b)).map(([u]) => [t, u]));
+    const outside = texts.filter(([, a]) => a.left < frame.left - 1 || a.right > frame.right + 1
+        || a.top < frame.top - 1 || a.bottom > frame.bottom + 1).map(([t]) => [t, 'the edge']);
+    return [...pairs, ...outside].map(pair => [svg.querySelector('title').textContent, ...pair]);
+})
+"""
+"""Texts of a picture that lie on each other or outside of it."""
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two runs of the ballbar trial."""
+    if given := os.environ.get("VIRTUAL_AXES_REPORT"):
+        return Path(given).resolve()
+    page = tmp_path_factory.mktemp("report") / "ballbar.html"
+    program = Path(node_binary()).with_name("virtual_axes")
+    runs = ["--controller", "cascade", "--controller", "cascade-noff"]
+    command = [str(program), "run", "ballbar", *runs, "--report", str(page)]
+    subprocess.run(command, check=True, timeout=120, stdout=subprocess.DEVNULL)
+    return page
+
+
+@pytest.fixture(scope="module")
+def browser(report: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A browser that shows the report."""
+    program = find_browser()
+    if program is None:
+        missing = "no Chromium to open the report in (Debian: apt-get install chromium)"
+        if os.environ.get("VIRTUAL_AXES_NEEDS_BROWSER"):
+            pytest.fail(missing)
+        pytest.skip(missing)
+    with Browser(program, tmp_path_factory.mktemp("profile")) as browser:
+        browser.show_as()
+        browser.open(report.as_uri())
+        yield browser
+
+
+def test_it_says_nothing_wrong_and_asks_nobody(browser: Browser, report: Path):
+    """Console, exceptions, requests."""
+    entries = [event["entry"] for event in browser.events_of("Log.entryAdded")]
+    assert not entries
+    assert not browser.events_of("Runtime.consoleAPICalled", "Runtime.exceptionThrown")
+    requests = [event["request"]["url"] for event in browser.events_of("Network.requestWillBeSent")]
+    assert requests == [report.as_uri()]
+    assert browser.evaluate("document.scripts.length") == 0
+    assert browser.evaluate("document.compatMode") == "CSS1Compat"
+
+
+def test_its_pictures_are_well_formed(browser: Browser, report: Path):
+    """Each picture is XML with a title and a description, and the browser has as many as the file."""
+    text = report.read_text(encoding="utf-8")
+    pictures = ["<svg role" + part.split("</svg>")[0] + "</svg>" for part in text.split("<svg role")[1:]]
+    assert len(pictures) > 10
+    ids = set()
+    for picture in map(ElementTree.fromstring, pictures):
+        title, description = picture.find("title"), picture.find("desc")
+        assert title is not None and title.text and description is not None and description.text
+        assert picture.get("aria-labelledby") == f"{title.get('id')} {description.get('id')}"
+        ids |= {title.get("id"), description.get("id")}
+    assert len(ids) == 2 * len(pictures)
+    assert browser.evaluate("document.querySelectorAll('svg[role=img]').length") == len(pictures)
+
+
+@pytest.mark.parametrize("width", [WIDE, NARROW])
+@pytest.mark.parametrize("scheme", [LIGHT, DARK])
+def test_it_is_seen(browser: Browser, scheme: str, width: int):
+    """A picture that is not blank, on a light or a dark ground."""
+    browser.show_as(scheme=scheme, width=width)
+    image = browser.screenshot(keep(f"{scheme}-{width}.png"))
+    ground = np.median(image.reshape(-1, 3), axis=0)
+    assert (ground.mean() > 0.9) if scheme == LIGHT else (ground.mean() < 0.2)
+    drawn = np.abs(image - ground).max(axis=2) > 0.3
+    assert 0.005 < drawn.mean() < 0.3
+    # From top to bottom there is no long stretch without anything.
+    rows = np.flatnonzero(drawn.any(axis=1))
+    assert np.diff(rows).max() < 200
+    coloured = np.ptp(image, axis=2) > 0.3
+    assert coloured.mean() > 0.0005, "no coloured lines"
+
+
+@pytest.mark.parametrize("width", [WIDE, 700, NARROW])
+def test_its_labels_stand_apart(browser: Browser, width: int):
+    """No text of a picture lies on another, and the page is not wider than its window."""
+    browser.show_as(width=width)
+    assert browser.evaluate(OVERLAPPING_TEXTS) == []
+    assert browser.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_texts_contrast_with_their_ground(browser: Browser):
+    """4.5 : 1 for text and 3 : 1 for lines, as WCAG 2.1 asks, in both schemes."""
+    for scheme in (LIGHT, DARK):
+        browser.show_as(scheme=scheme)
+        colours = {name: luminance(browser, name) for name in TEXTS + LINES + ["--page", "--area"]}
+        for ground in ("--page", "--area"):
+            for names, least in ((TEXTS, 4.5), (LINES, 3.0)):
+                for name in names:
+                    low, high = sorted((colours[name], colours[ground]))
+                    assert (high + 0.05) / (low + 0.05) >= least, f"{name} on {ground}, {scheme}"
+
+
+def test_it_prints_in_light_colours(browser: Browser):
+    """Paper is white whatever the screen is; no sheet is left empty."""
+    browser.show_as(scheme=DARK, media="print")
+    image = browser.screenshot(keep("print.png"))
+    assert np.median(image.reshape(-1, 3), axis=0).mean() > 0.9
+    browser.show_as()
+    pdf = browser.pdf()
+    if path := keep("print.pdf"):
+        path.write_bytes(pdf)
+    assert pdf.startswith(b"%PDF") and len(pdf) > 10_000
+
+
+TEXTS = ["--ink", "--muted"]
+LINES = [*(f"--run-{i}" for i in range(1, 7)), "--friction", "--gravity", "--load"]
+
+
+def luminance(browser: Browser, name: str) -> float:
+    """Relative luminance of a colour of the style (WCAG 2.1)."""
+    value = browser.evaluate(f"getComputedStyle(document.documentElement).getPropertyValue('{name}').trim()")
+    assert isinstance(value, str) and value.startswith("#") and len(value) == 7, value
+    channels = np.array([int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def keep(name: str) -> Path | None:
+    """Where a picture is kept, if it is to be."""
+    folder = os.environ.get("VIRTUAL_AXES_SCREENSHOTS")
+    return Path(folder, name) if folder else None
