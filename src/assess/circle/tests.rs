@@ -4,8 +4,8 @@ use super::*;
 
 const CENTRE: [f64; 2] = [-0.15, 0.02];
 const R: f64 = 0.15;
-/// Width of a bin, rad.
-const WIDTH: f64 = TAU / BINS as f64;
+/// Width of a bin, rad: a tenth of a degree, as documented.
+const WIDTH: f64 = TAU / 3600.0;
 /// Rounding of distances of 0.15 m, m.
 const ROUNDING: f64 = 1e-15;
 
