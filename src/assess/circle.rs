@@ -9,7 +9,7 @@ const BINS: usize = 3600;
 /// Sectors that must each hold a point of a full circle.
 const SECTORS: usize = 36;
 
-/// Collects the points of a circular path in one direction, in memory that does not grow (170 kB).
+/// Collects the points of a circular path in one direction, in memory that does not grow (200 kB).
 ///
 /// Of a circular path with a nominal centre and radius R, positive is outside:
 ///

@@ -4,8 +4,8 @@ use super::*;
 
 const CENTRE: [f64; 2] = [-0.15, 0.02];
 const R: f64 = 0.15;
-/// Width of a bin, rad.
-const WIDTH: f64 = TAU / BINS as f64;
+/// Width of a bin, rad: a tenth of a degree, as documented.
+const WIDTH: f64 = TAU / 3600.0;
 /// Rounding of distances of 0.15 m, m.
 const ROUNDING: f64 = 1e-15;
 
@@ -104,11 +104,17 @@ fn part_of_a_turn_that_is_run_twice_does_not_draw_the_centre() {
     assert_near("G", full.circular_deviation, 0.0, ROUNDING);
 }
 
-/// An ellipse, its half axes R + h and R − h, by its eccentric angle; its centre by symmetry.
+/// An ellipse, its half axes R + h and R − h, by its eccentric angle; its centre by symmetry. It is turned
+/// so that its vertices lie in the middle of a bin: on the edge of one the bins would cost nothing.
 fn ellipse(h: f64, offset: [f64; 2]) -> Vec<[f64; 2]> {
+    let (sin_turn, cos_turn) = (50.5 * WIDTH).sin_cos();
     let point = |k: u32| {
         let (sin, cos) = (TAU * f64::from(k) / 20_000.0).sin_cos();
-        [CENTRE[0] + offset[0] + (R + h) * cos, CENTRE[1] + offset[1] + (R - h) * sin]
+        let (x, y) = ((R + h) * cos, (R - h) * sin);
+        [
+            CENTRE[0] + offset[0] + cos_turn * x - sin_turn * y,
+            CENTRE[1] + offset[1] + sin_turn * x + cos_turn * y,
+        ]
     };
     (0..20_000).map(point).collect()
 }
