@@ -79,7 +79,7 @@ def test_its_pictures_are_well_formed(browser: Browser, report: Path):
     """Each picture is XML with a title and a description, and the browser has as many as the file."""
     text = report.read_text(encoding="utf-8")
     pictures = ["<svg role" + part.split("</svg>")[0] + "</svg>" for part in text.split("<svg role")[1:]]
-    assert len(pictures) > 10
+    assert len(pictures) >= 5
     ids = set()
     for picture in map(ElementTree.fromstring, pictures):
         title, description = picture.find("title"), picture.find("desc")

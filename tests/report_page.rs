@@ -5,7 +5,7 @@ mod report_common;
 
 use std::sync::LazyLock;
 
-use report_common::{NO_FEEDFORWARD, PERIOD, ballbar, empty_axis, five_axes, report_run};
+use report_common::{NO_FEEDFORWARD, PERIOD, ballbar, corner, empty_axis, five_axes, report_run};
 use virtual_axes::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
 use virtual_axes::config::AxisKind;
 use virtual_axes::report::{Column, Report, ReportRun, Table};
@@ -339,6 +339,29 @@ fn the_circle_is_drawn_where_its_deviation_is() {
 }
 
 #[test]
+fn the_error_of_a_path_is_magnified_as_the_caption_says() {
+    // 100 mm along X, 50 µm off towards +Y: a round factor that makes at most 15 % of the path of it.
+    let reference: Vec<[f64; 3]> = (0..=100).map(|i| [f64::from(i) * 1e-3, 0.0, 0.0]).collect();
+    let position = reference.iter().map(|[x, ..]| [*x, 5e-5, 0.0]).collect();
+    let contour_error = vec![5e-5; 101];
+    let recording = Recording {
+        time: (0..=100).map(f64::from).collect(),
+        tool: Some(ToolTrace { reference, position, contour_error, orientation_error: Vec::new() }),
+        ..Recording::default()
+    };
+    let page = page("line", vec![report_run("one", &recording)]);
+    assert!(page.contains("<span class=\"note\">error × 200</span>"));
+    let path = picture(&page, "X–Y path");
+    let line = |before: &str| points(between(path, before, "\"")[0]);
+    let (reference, tip) =
+        (line("<path class=\"reference\" d=\""), line("<path class=\"line solid run-1\" d=\""));
+    let per_millimetre = (reference[reference.len() - 1][0] - reference[0][0]) / 100.0;
+    // Up on the page is towards smaller coordinates; 200 × 50 µm.
+    let shown = (reference[0][1] - tip[0][1]) / per_millimetre;
+    assert!((shown - 10.0).abs() < 0.1, "{shown} mm");
+}
+
+#[test]
 fn figures_of_like_runs_stand_row_by_row() {
     let page_of_two = page("two", two_runs());
     assert_eq!(page_of_two.matches("<caption>Axes</caption>").count(), 1);
@@ -374,6 +397,11 @@ fn pages_to_look_at() {
     write("ballbar-4", runs, circle);
     let five = five_axes(PERIOD);
     write("five-axes", vec![report_run("cascade", &five)], "All five axes swing.");
+    let corners = [90.0, 45.0, 0.0].map(|degrees| corner(degrees, PERIOD));
+    let runs =
+        corners.iter().zip(["90°", "45°", "straight on"]).map(|(c, title)| report_run(title, c)).collect();
+    write("corners", runs, "Two legs of 50 mm at 10 m/min.");
+    write("line", vec![report_run("cascade", &corners[2])], "Two lines of 50 mm, one after the other.");
     let every_tick = five_axes(1);
     write("five-axes-every-tick", vec![report_run("cascade", &every_tick)], "All five axes swing.");
 }

@@ -14,7 +14,7 @@ const WIDTH: f64 = 460.0;
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = WIDTH - 14.0;
 const TOP: f64 = 10.0;
-const BELOW: f64 = 44.0;
+const BELOW: f64 = 48.0;
 /// Height of the area over its width: what the path asks for, within these.
 const ASPECT: [f64; 2] = [0.35, 1.0];
 /// Room about the path, part of its range.
@@ -61,7 +61,8 @@ impl View {
         };
         let error = |axis: usize| {
             let errors = tools.iter().flat_map(|t| errors(t).map(move |e| e[axis]));
-            Extent::of(errors).map_or(0.0, |e| e.peak())
+            // Noise must not choose the plane.
+            Extent::of(errors).map_or(0.0, |e| e.peak()).max(LEAST_ERROR)
         };
         // Those that stand still come last, that with the largest error first.
         let mut order: Vec<(usize, bool, f64)> = (0..3)
@@ -148,11 +149,11 @@ impl PathPlot<'_> {
         svg.rectangle("area", [LEFT, TOP], [RIGHT, bottom]);
         for (value, label) in horizontal.ticks() {
             svg.line("grid", [x(value), TOP], [x(value), bottom]);
-            svg.text("tick", [x(value), bottom + 17.0], Anchor::Middle, &label);
+            svg.text("tick", [x(value), bottom + 20.5], Anchor::Middle, &label);
         }
         for (value, label) in vertical.ticks() {
             svg.line("grid", [LEFT, y(value)], [RIGHT, y(value)]);
-            svg.text("tick", [LEFT - 6.0, y(value) + 4.5], Anchor::End, &label);
+            svg.text("tick", [LEFT - 9.0, y(value) + 4.5], Anchor::End, &label);
         }
         let [first, second] = self.view.plane.map(|axis| format!("{} (mm)", NAMES[axis]));
         svg.text("label", [(LEFT + RIGHT) / 2.0, bottom + BELOW - 7.0], Anchor::Middle, &first);

@@ -6,11 +6,11 @@ use super::thin::extremes;
 
 /// Pixels at natural size; the page scales the picture to its width.
 const WIDTH: f64 = 920.0;
-const HEIGHT: f64 = 196.0;
+const HEIGHT: f64 = 198.0;
 const LEFT: f64 = 78.0;
 const RIGHT: f64 = WIDTH - 16.0;
 const TOP: f64 = 8.0;
-const BOTTOM: f64 = HEIGHT - 42.0;
+const BOTTOM: f64 = HEIGHT - 44.0;
 /// Steps between ticks, about: a label each 90 pixels, a line of text each 35.
 const TIME_STEPS: f64 = 10.0;
 const VALUE_STEPS: f64 = 5.0;
@@ -62,11 +62,11 @@ impl TimePlot<'_> {
         for (value, label) in vertical.ticks() {
             let class = if value == 0.0 { "zero" } else { "grid" };
             svg.line(class, [LEFT, y(value)], [RIGHT, y(value)]);
-            svg.text("tick", [LEFT - 7.0, y(value) + 4.5], Anchor::End, &label);
+            svg.text("tick", [LEFT - 9.0, y(value) + 4.5], Anchor::End, &label);
         }
         for (value, label) in horizontal.ticks() {
             svg.line("grid", [x(value), TOP], [x(value), BOTTOM]);
-            svg.text("tick", [x(value), BOTTOM + 17.0], Anchor::Middle, &label);
+            svg.text("tick", [x(value), BOTTOM + 20.5], Anchor::Middle, &label);
         }
         svg.text("label", [RIGHT, HEIGHT - 6.0], Anchor::End, "Time (s)");
         let label = format!("{} ({})", self.quantity, self.unit.symbol);
