@@ -1,0 +1,65 @@
+//! Rest to rest with cosine ramps: feed v/2 (1 − cos(π t/ramp)), constant, and mirrored.
+
+use std::f64::consts::PI;
+
+/// Below this angle x − sin x is computed by its series: the difference would lose its digits.
+const SERIES_BELOW: f64 = 0.5;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cosine {
+    length: f64,
+    feed: f64,
+    ramp: f64,
+    /// Time at constant feed, s.
+    cruising: f64,
+}
+
+/// Way that both ramps need together.
+pub(super) fn ramps_length(feed: f64, ramp: f64) -> f64 {
+    feed * ramp
+}
+
+impl Cosine {
+    /// `length` must be that of both ramps at least.
+    pub fn new(length: f64, feed: f64, ramp: f64) -> Self {
+        let cruising = ((length - ramps_length(feed, ramp)) / feed).max(0.0);
+        Self { length, feed, ramp, cruising }
+    }
+
+    /// s.
+    pub fn duration(&self) -> f64 {
+        2.0 * self.ramp + self.cruising
+    }
+
+    /// v/2 (t − ramp/π sin(π t/ramp)).
+    fn ramped(&self, t: f64) -> f64 {
+        0.5 * self.feed * self.ramp / PI * minus_sine(PI * t / self.ramp)
+    }
+
+    /// Way after `t` seconds.
+    pub fn at(&self, t: f64) -> f64 {
+        let left = self.duration() - t;
+        if t <= 0.0 {
+            0.0
+        } else if left <= 0.0 {
+            self.length
+        } else if t < self.ramp {
+            self.ramped(t)
+        } else if left < self.ramp {
+            self.length - self.ramped(left)
+        } else {
+            0.5 * self.feed * self.ramp + self.feed * (t - self.ramp)
+        }
+    }
+}
+
+/// x − sin x for x ≥ 0.
+fn minus_sine(x: f64) -> f64 {
+    if x >= SERIES_BELOW {
+        return x - x.sin();
+    }
+    let y = x * x;
+    // The next term, x¹⁵/15!, is below 10⁻¹⁴ of the first one.
+    x * y / 6.0
+        * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (1.0 - y / 110.0 * (1.0 - y / 156.0)))))
+}

@@ -1,0 +1,177 @@
+//! The promise of a program, looked at in its own set-points.
+
+use super::error::Quantity;
+use super::program::Program;
+use crate::config::LimitsConfig;
+use crate::units::{Nanoseconds, seconds};
+
+/// Excess that is let through, relative: what the program promises.
+const TOLERANCE: f64 = 1e-6;
+/// Roundings of a position and of a time that a difference may add up.
+const ROUNDINGS: f64 = 16.0;
+/// Most instants looked at in one span, half of them from its start, half up to its end: in between
+/// the feed is constant.
+const MAX_INSTANTS: u64 = 200_000;
+/// Set-points that the highest difference needs.
+const WINDOW: usize = 4;
+
+/// What the verification must know of a span and of the junction after it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Nature {
+    /// The limits hold by construction: the joints run along a straight line.
+    pub straight: bool,
+    /// The limits need not hold.
+    pub exempt: bool,
+    /// Acceleration jumps at the junction after it.
+    pub jumps: bool,
+    /// Speed jumps there, as permitted.
+    pub corner: bool,
+}
+
+/// The largest excess that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Excess {
+    pub span: usize,
+    /// s.
+    pub time: f64,
+    pub joint: usize,
+    pub quantity: Quantity,
+    /// What was found over what is allowed.
+    pub ratio: f64,
+    pub allowed: f64,
+}
+
+/// By how much spans and junctions are to be slowed; 1 where not at all.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Finding {
+    pub spans: Vec<f64>,
+    pub junctions: Vec<f64>,
+    pub worst: Option<Excess>,
+}
+
+/// Looks at the set-points of `program`, `period` apart, wherever limits do not hold by construction:
+/// three differences of each joint against its limits. What is blamed for an excess is a junction
+/// where acceleration jumps, or else the curves near it, or with `strict` everything near it. The
+/// memory needed is that of the spans, whatever the duration.
+pub(super) fn verify(
+    program: &Program,
+    natures: &[Nature],
+    joints: &[LimitsConfig],
+    period: Nanoseconds,
+    strict: bool,
+) -> Finding {
+    let mut verifier = Verifier {
+        program,
+        natures,
+        joints,
+        period,
+        strict,
+        window: std::array::from_fn(|_| (0, vec![0.0; joints.len()])),
+        finding: Finding {
+            spans: vec![1.0; natures.len()],
+            junctions: vec![1.0; natures.len()],
+            worst: None,
+        },
+    };
+    let mut next = 0;
+    for (span, nature) in program.spans.iter().zip(natures) {
+        if nature.straight && !nature.jumps {
+            continue;
+        }
+        let instant = |t: f64| (t / seconds(period)) as u64;
+        let from = (instant(span.start) + 1).max(next);
+        let to = instant(span.end).saturating_add(WINDOW as u64);
+        if to.saturating_sub(from) > MAX_INSTANTS {
+            verifier.look(from, from + MAX_INSTANTS / 2);
+            verifier.look(to - MAX_INSTANTS / 2, to);
+        } else {
+            verifier.look(from, to);
+        }
+        next = next.max(to);
+    }
+    verifier.finding
+}
+
+struct Verifier<'a> {
+    program: &'a Program,
+    natures: &'a [Nature],
+    joints: &'a [LimitsConfig],
+    period: Nanoseconds,
+    strict: bool,
+    /// Span and set-points of the last instants.
+    window: [(usize, Vec<f64>); WINDOW],
+    finding: Finding,
+}
+
+impl Verifier<'_> {
+    /// Looks at instants `from` to `to`, the latter excluded, with those before.
+    fn look(&mut self, from: u64, to: u64) {
+        for k in (from.saturating_sub(WINDOW as u64 - 1)..to).take_while(|_| from < to) {
+            // An instant that cannot be counted has no set-point.
+            let count = i64::try_from(k).ok().and_then(|k| k.checked_mul(self.period));
+            let Some(t) = count.map(seconds) else { return };
+            self.window.rotate_left(1);
+            let (span, joints) = &mut self.window[WINDOW - 1];
+            *span = self.program.span_at(t);
+            self.program.psec(t, joints);
+            if k == 0 {
+                // Before its first set-point the machine stands there.
+                let first = self.window[WINDOW - 1].clone();
+                self.window.fill(first);
+            }
+            if k >= from {
+                self.compare(t);
+            }
+        }
+    }
+
+    fn compare(&mut self, t: f64) {
+        let period = seconds(self.period);
+        for (joint, limits) in self.joints.iter().enumerate() {
+            let [a, b, c, d] = std::array::from_fn(|i| self.window[i].1[joint]);
+            let rounding = ROUNDINGS * f64::EPSILON * (a.abs().max(d.abs()) + t * ((d - a) / period).abs());
+            let orders = [
+                (Quantity::Speed, d - c, limits.velocity, 1),
+                (Quantity::Acceleration, d - 2.0 * c + b, limits.acceleration, 2),
+                (Quantity::Jerk, d - 3.0 * (c - b) - a, limits.jerk, 3),
+            ];
+            for (quantity, difference, allowed, order) in orders {
+                let found = (difference.abs() - rounding).max(0.0) / period.powi(order);
+                let ratio = found / allowed;
+                if ratio > 1.0 + TOLERANCE {
+                    let (from, to) = (self.window[WINDOW - 1 - order as usize].0, self.window[WINDOW - 1].0);
+                    let excess = Excess { span: to, time: t, joint, quantity, ratio, allowed };
+                    self.blame(from, to, order, excess);
+                }
+            }
+        }
+    }
+
+    /// Notes who is to be slowed for `excess` in the spans `from` to `to`.
+    fn blame(&mut self, from: usize, to: usize, order: i32, excess: Excess) {
+        let natures = self.natures;
+        let exempt = (from..=to).any(|i| natures[i].exempt) || (from..to).any(|i| natures[i].corner);
+        if exempt {
+            return;
+        }
+        if self.finding.worst.is_none_or(|worst| worst.ratio < excess.ratio) {
+            self.finding.worst = Some(excess);
+        }
+        let pace = excess.ratio.powf(-1.0 / f64::from(order));
+        let jumping = (from..to).any(|i| natures[i].jumps);
+        let curved = (from..=to).any(|i| !natures[i].straight);
+        for i in from..to {
+            if natures[i].jumps {
+                self.finding.junctions[i] = self.finding.junctions[i].min(pace);
+            }
+        }
+        if jumping && !self.strict {
+            return;
+        }
+        for i in from..=to {
+            if self.strict || !curved || !natures[i].straight {
+                self.finding.spans[i] = self.finding.spans[i].min(pace);
+            }
+        }
+    }
+}
