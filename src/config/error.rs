@@ -179,7 +179,7 @@ fn nearest_text(nearest: &Option<String>) -> String {
 const QUOTED_LENGTH: usize = 120;
 
 /// `text` on one line, cut to a length that fits in a message.
-pub(super) fn shortened(text: &str) -> String {
+pub(crate) fn shortened(text: &str) -> String {
     let mut out: String = text.chars().take(QUOTED_LENGTH).collect();
     if out.len() < text.len() {
         out.push('…');

@@ -30,6 +30,7 @@ mod tests;
 
 pub use build::{NodeConfig, QosConfig, TimeMode};
 pub use definition::{DefaultValue, Definition, Kind, MotorKind, Presence, Scope};
+pub(crate) use error::shortened;
 pub use error::{ConfigError, Source};
 pub use machine::*;
 pub use parameter_file::{Assignment, parse_assignment};

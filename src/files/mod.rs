@@ -1,7 +1,47 @@
-//! Files of set-points and traces.
+//! Files: set-points and traces, in and out.
+//!
+//! What a file is, is told by its content ([`Input`]) when it is read and by its extension when it is
+//! written. Set-points come from CSV ([`PsecCsv`], a stream), YAML ([`read_psec_yaml`]) and MCAP
+//! recordings ([`Trajectories`]). Traces ([`TraceWriter`]) and set-points ([`PsecWriter`]) go into
+//! [`OutputFile`]s, which stand under their names only when they are whole.
 
+mod cdr;
+mod input;
+mod lines;
+mod mcap_out;
+mod output;
 mod psec_csv;
+mod psec_mcap;
+mod psec_out;
+mod psec_yaml;
+mod trace;
 mod trace_csv;
+mod trace_mcap;
+mod yaml;
 
-pub use psec_csv::{PsecError, read_psec};
+pub use input::{FileKind, Input, InputError};
+pub use output::OutputFile;
+pub use psec_csv::{PsecCsv, PsecError};
+pub use psec_mcap::{RecordingError, Trajectories};
+pub use psec_out::{PsecCsvOut, PsecMcapOut, PsecWriter, PsecYamlOut, psec_writer};
+pub use psec_yaml::{TrajectoryYamlError, read_psec_yaml};
+pub use trace::{TraceWriter, trace_writer};
 pub use trace_csv::TraceCsv;
+pub use trace_mcap::TraceMcap;
+
+use crate::config::shortened;
+
+/// Least similarity (Jaro-Winkler) of a name that is offered in place of an unknown one.
+const NEAR_ENOUGH: f64 = 0.7;
+
+/// The name that looks most like `found`, if one does.
+fn nearest<'a>(found: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+    let similar = known.map(|name| (strsim::jaro_winkler(found, name), name));
+    let (similarity, name) = similar.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (similarity >= NEAR_ENOUGH).then(|| name.to_owned())
+}
+
+/// The end of a message about an unknown name.
+fn nearest_name(nearest: &Option<String>) -> String {
+    nearest.as_ref().map_or_else(String::new, |name| format!("; the nearest is {name}"))
+}

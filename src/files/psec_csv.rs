@@ -1,121 +1,379 @@
-//! PSEC from CSV: `time,x,y,z,a,c` in s, m and rad.
+//! PSEC from CSV: `time,x,y,z,a,c` in s, m and rad, as a stream on the grid of positions.
 
+use std::fs::File;
 use std::io::Read;
+use std::path::Path;
 
-use crate::trajectory::{Rejection, Request, Row, Start};
-use crate::units::{Nanoseconds, SECOND_NS};
+use super::lines::{Lines, fields};
+use super::nearest_name;
+use crate::trajectory::spline::{Order, Segment, State};
+use crate::trajectory::{JointLimits, Rejection};
+use crate::units::{Nanoseconds, SECOND_NS, seconds};
 
 /// The column of times.
-const TIME: &str = "time";
+pub(super) const TIME: &str = "time";
 /// The largest time, s: three years, more than anybody waits for.
 const LONGEST: f64 = 1e8;
 
 /// Why a file of set-points cannot be used; each names file and line.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PsecError {
-    /// The file cannot be read, or is not CSV.
-    #[error("{file}: {reason}")]
+    /// The file cannot be read, or is not text.
+    #[error("{at}: {reason}")]
     Unreadable {
-        /// Name of the file.
-        file: String,
-        /// What the reader says, with the line where there is one.
+        /// File, and line where there is one.
+        at: String,
+        /// What the reader says.
         reason: String,
     },
     /// The first line is not a header that begins with `time` and names joints.
-    #[error("{file}:1: the header is \"{found}\"; it begins with \"{TIME}\", then a joint for each column")]
+    #[error("{at}: the header is \"{found}\"; it begins with \"{TIME}\", then a joint for each column")]
     Header {
-        /// Name of the file.
-        file: String,
+        /// File and line.
+        at: String,
         /// What stands there.
         found: String,
     },
+    /// A column is headed by what is not a joint.
+    #[error("{at}: there is no joint \"{found}\"; there are {known}{}", nearest_name(.nearest))]
+    UnknownJoint {
+        /// File and line.
+        at: String,
+        /// What stands there.
+        found: String,
+        /// The joints, with commas.
+        known: String,
+        /// The joint that looks most like it.
+        nearest: Option<String>,
+    },
+    /// A joint has two columns.
+    #[error("{at}: joint {joint} has two columns")]
+    DuplicateJoint {
+        /// File and line.
+        at: String,
+        /// Its name.
+        joint: String,
+    },
+    /// A line has too many or too few values.
+    #[error("{at}: {found} values, the header names {wanted} columns")]
+    Columns {
+        /// File and line.
+        at: String,
+        /// Values there are.
+        found: usize,
+        /// Columns there are.
+        wanted: usize,
+    },
     /// A field is not a number.
-    #[error("{file}:{line}: {column} is \"{found}\", must be a finite number")]
+    #[error("{at}: {column} is \"{found}\", must be a finite number")]
     Number {
-        /// Name of the file.
-        file: String,
-        /// Line, from 1.
-        line: u64,
+        /// File and line.
+        at: String,
         /// Header of the column.
         column: String,
         /// What stands there.
         found: String,
     },
     /// A time is out of range.
-    #[error("{file}:{line}: {TIME} is {found} s, must lie in ±{LONGEST} s")]
+    #[error("{at}: {TIME} is {found} s, must lie in 0 … {LONGEST} s")]
     Time {
-        /// Name of the file.
-        file: String,
-        /// Line, from 1.
-        line: u64,
+        /// File and line.
+        at: String,
         /// What stands there.
         found: f64,
     },
-    /// A point is refused.
-    #[error("{file}:{line}: {rejection}")]
+    /// A time is not after the one before it.
+    #[error("{at}: {TIME} is {found} s, must be later than {before} s of the line before it")]
+    NotIncreasing {
+        /// File and line.
+        at: String,
+        /// What stands there.
+        found: f64,
+        /// The time before it, s.
+        before: f64,
+    },
+    /// The axes cannot do it.
+    #[error("{at}: {rejection}")]
     Point {
-        /// Name of the file.
-        file: String,
-        /// Line, from 1.
-        line: u64,
+        /// File and line.
+        at: String,
         /// Why.
         rejection: Rejection,
     },
     /// There is no point.
-    #[error("{file}: there is no set-point below the header")]
+    #[error("{at}: there is no set-point below the header")]
     Empty {
-        /// Name of the file.
-        file: String,
+        /// The file.
+        at: String,
     },
 }
 
-/// Reads set-points, s, m and rad, one line each under a header; `file` is for messages.
+/// A row of the file.
+#[derive(Debug, Clone, Default)]
+struct Point {
+    /// ns.
+    time: Nanoseconds,
+    /// m or rad, one per column.
+    positions: Vec<f64>,
+    line: u64,
+    /// Number of the row, from 0.
+    index: usize,
+}
+
+/// PSEC of a file at the instants k·Tsp, k = 0, 1, …, read as they are asked for: two rows are held,
+/// however long the file is.
 ///
-/// # Errors
-/// [`PsecError`], the first fault from the top.
-pub fn read_psec(input: impl Read, file: &str) -> Result<Request, PsecError> {
-    let unreadable =
-        |error: csv::Error| PsecError::Unreadable { file: file.to_owned(), reason: error.to_string() };
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(input);
-    let header = reader.headers().map_err(unreadable)?.clone();
-    let joints: Vec<String> = header.iter().skip(1).map(str::to_owned).collect();
-    if header.get(0) != Some(TIME) || joints.is_empty() || joints.iter().any(String::is_empty) {
-        let found = header.iter().collect::<Vec<_>>().join(",");
-        return Err(PsecError::Header { file: file.to_owned(), found });
+/// Between rows it interpolates linearly, with the arithmetic of a trajectory of positions: rows on
+/// the grid are used bit for bit. The time of the first row may be later than 0: the axes go there in
+/// a straight line from where they stand, at home (0) unless [`starting_at`](Self::starting_at) says
+/// otherwise. The last instant is the first that is not before the last row.
+///
+/// Each row is checked when it is read, each set-point before it is given: strokes, and speeds from
+/// instant to instant, the first from where the axes stand.
+#[derive(Debug)]
+pub struct PsecCsv<R> {
+    lines: Lines<R>,
+    name: String,
+    period: Nanoseconds,
+    columns: Vec<String>,
+    limits: Vec<JointLimits>,
+    places: Vec<usize>,
+    /// The row not after the instant, once the first has been reached; before it, the start at time 0.
+    before: Point,
+    /// The row after it; with the one before it, the segment.
+    after: Point,
+    /// Number of the instant that comes next.
+    next_k: i64,
+    /// What was given last.
+    given: Vec<f64>,
+    first_time: Nanoseconds,
+    /// Whether there is no row after `after`.
+    at_end: bool,
+    done: bool,
+}
+
+impl PsecCsv<File> {
+    /// Opens a file; see [`PsecCsv::new`].
+    ///
+    /// # Errors
+    /// [`PsecError`].
+    pub fn open(path: &Path, period: Nanoseconds, joints: &[JointLimits]) -> Result<Self, PsecError> {
+        let name = path.display().to_string();
+        let unreadable =
+            |error: std::io::Error| PsecError::Unreadable { at: name.clone(), reason: error.to_string() };
+        let file = File::open(path).map_err(unreadable)?;
+        Self::new(file, &name, period, joints)
     }
-    let mut request = Request::new(Start::Now, joints);
-    let mut positions = Vec::with_capacity(header.len());
-    let mut record = csv::StringRecord::new();
-    while reader.read_record(&mut record).map_err(unreadable)? {
-        let line = record.position().map_or(0, csv::Position::line);
-        let number = |column: usize| -> Result<f64, PsecError> {
-            let text = record.get(column).unwrap_or_default();
-            text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| PsecError::Number {
-                file: file.to_owned(),
-                line,
-                column: header.get(column).unwrap_or_default().to_owned(),
-                found: text.to_owned(),
+}
+
+impl<R: Read> PsecCsv<R> {
+    /// Reads the header and the first row; `name` is for messages, `period` (Tsp) more than 0 ns, `joints`
+    /// are the machine's.
+    ///
+    /// # Errors
+    /// [`PsecError`].
+    pub fn new(input: R, name: &str, period: Nanoseconds, joints: &[JointLimits]) -> Result<Self, PsecError> {
+        debug_assert!(period > 0, "a period lasts");
+        let mut psec = PsecCsv {
+            lines: Lines::new(input),
+            name: name.to_owned(),
+            period,
+            columns: Vec::new(),
+            limits: Vec::new(),
+            places: Vec::new(),
+            before: Point::default(),
+            after: Point::default(),
+            next_k: 0,
+            given: Vec::new(),
+            first_time: 0,
+            at_end: false,
+            done: false,
+        };
+        psec.read_header(joints)?;
+        if !psec.read_point()? {
+            return Err(PsecError::Empty { at: psec.name });
+        }
+        psec.first_time = psec.after.time;
+        psec.given = vec![0.0; psec.places.len()];
+        psec.before = Point { positions: psec.given.clone(), ..psec.after.clone() };
+        psec.before.time = 0;
+        Ok(psec)
+    }
+
+    /// Where the axes stand before the first instant, m or rad, one value per joint of the machine.
+    #[must_use]
+    pub fn starting_at(mut self, positions: &[f64]) -> Self {
+        for (column, &place) in self.places.iter().enumerate() {
+            let position = positions.get(place).copied().unwrap_or_default();
+            self.given[column] = position;
+            self.before.positions[column] = position;
+        }
+        self
+    }
+
+    /// The joints that it moves, as places in the machine, one per value of a row.
+    pub fn joints(&self) -> &[usize] {
+        &self.places
+    }
+
+    /// Time of the first row, ns: later than 0 if the axes first go there.
+    pub fn first_time(&self) -> Nanoseconds {
+        self.first_time
+    }
+
+    /// Number of the instant that comes next, from 0.
+    pub fn next_instant(&self) -> i64 {
+        self.next_k
+    }
+
+    /// PSEC at the next instant, m or rad, in the order of [`joints`](Self::joints); `false` after the last.
+    ///
+    /// # Errors
+    /// [`PsecError`], the first fault from the top. There is nothing after it.
+    // An iterator could not lend the row.
+    #[allow(clippy::should_implement_trait)]
+    pub fn next(&mut self, row: &mut [f64]) -> Result<bool, PsecError> {
+        debug_assert_eq!(row.len(), self.places.len(), "a value per joint");
+        if self.done {
+            return Ok(false);
+        }
+        // Faults are told once.
+        self.done = true;
+        let time = self.next_k * self.period;
+        while self.after.time <= time && !self.at_end {
+            self.advance()?;
+        }
+        self.interpolate(time, row);
+        self.check(time, row)?;
+        self.given.copy_from_slice(row);
+        self.next_k += 1;
+        self.done = self.at_end && self.after.time <= time;
+        Ok(true)
+    }
+
+    fn advance(&mut self) -> Result<(), PsecError> {
+        std::mem::swap(&mut self.before, &mut self.after);
+        if !self.read_point()? {
+            // The last row stays where it was.
+            std::mem::swap(&mut self.before, &mut self.after);
+            self.at_end = true;
+        }
+        Ok(())
+    }
+
+    fn interpolate(&self, time: Nanoseconds, row: &mut [f64]) {
+        if time >= self.after.time {
+            row.copy_from_slice(&self.after.positions);
+            return;
+        }
+        let duration = self.after.time - self.before.time;
+        for (value, (&from, &to)) in
+            row.iter_mut().zip(self.before.positions.iter().zip(&self.after.positions))
+        {
+            let segment = Segment::new(State::rest(from), State::rest(to), duration, Order::Linear);
+            *value = segment.position(time - self.before.time);
+        }
+    }
+
+    fn check(&self, time: Nanoseconds, row: &[f64]) -> Result<(), PsecError> {
+        let period = seconds(self.period);
+        // The row that the way to this instant leads to.
+        let point = if self.before.time == time { &self.before } else { &self.after };
+        for ((joint, &position), &before) in self.limits.iter().zip(row).zip(&self.given) {
+            let speed = (position - before) / period;
+            let checked = if time == 0 {
+                joint.check_jump(point.index, before, position, period)
+            } else if time - self.period < self.first_time {
+                joint.check_speed(point.index, speed, "speed on the way to it")
+            } else {
+                joint.check_speed(point.index, speed, "speed")
+            };
+            checked.map_err(|rejection| PsecError::Point { at: self.at(point.line), rejection })?;
+        }
+        Ok(())
+    }
+
+    fn at(&self, line: u64) -> String {
+        format!("{}:{line}", self.name)
+    }
+
+    fn read_header(&mut self, joints: &[JointLimits]) -> Result<(), PsecError> {
+        let name = self.name.clone();
+        let (line, text) = match self.lines.next() {
+            Ok(found) => found.unwrap_or((1, "")),
+            Err((line, reason)) => {
+                return Err(PsecError::Unreadable { at: format!("{name}:{line}"), reason });
+            }
+        };
+        let at = format!("{name}:{line}");
+        let mut header = fields(text);
+        let time = header.next();
+        self.columns = header.map(str::to_owned).collect();
+        if time != Some(TIME) || self.columns.is_empty() || self.columns.iter().any(String::is_empty) {
+            return Err(PsecError::Header { at, found: super::shortened(text) });
+        }
+        for column in &self.columns {
+            let Some(place) = joints.iter().position(|joint| joint.name == *column) else {
+                let names = joints.iter().map(|joint| joint.name.as_str());
+                return Err(PsecError::UnknownJoint {
+                    at,
+                    found: super::shortened(column),
+                    known: names.clone().collect::<Vec<_>>().join(", "),
+                    nearest: super::nearest(column, names),
+                });
+            };
+            if self.places.contains(&place) {
+                return Err(PsecError::DuplicateJoint { at, joint: column.clone() });
+            }
+            self.places.push(place);
+            self.limits.push(joints[place].clone());
+        }
+        Ok(())
+    }
+
+    /// Reads the next row into `after`, checked by itself and against `before`; `false` at the end.
+    fn read_point(&mut self) -> Result<bool, PsecError> {
+        let PsecCsv { lines, name, columns, limits, before, after, .. } = self;
+        let found = lines.next().map_err(|(line, reason)| {
+            let at = format!("{name}:{line}");
+            PsecError::Unreadable { at, reason }
+        })?;
+        let Some((line, text)) = found else { return Ok(false) };
+        let at = || format!("{name}:{line}");
+        let number = |column: &str, text: &str| {
+            text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| PsecError::Number {
+                at: at(),
+                column: column.to_owned(),
+                found: super::shortened(text),
             })
         };
-        let time = number(0)?;
-        if time.abs() > LONGEST {
-            return Err(PsecError::Time { file: file.to_owned(), line, found: time });
+        let wanted = columns.len() + 1;
+        let found = fields(text).count();
+        if found != wanted {
+            return Err(PsecError::Columns { at: at(), found, wanted });
         }
-        positions.clear();
-        for column in 1..header.len() {
-            positions.push(number(column)?);
+        let mut values = fields(text);
+        let time = number(TIME, values.next().unwrap_or_default())?;
+        if !(0.0..=LONGEST).contains(&time) {
+            return Err(PsecError::Time { at: at(), found: time });
         }
-        let row = Row { positions: &positions, ..Row::default() };
-        request.push(nearest_nanosecond(time), row).map_err(|rejection| PsecError::Point {
-            file: file.to_owned(),
-            line,
-            rejection,
-        })?;
+        let first = before.positions.is_empty();
+        after.line = line;
+        after.index = if first { 0 } else { before.index + 1 };
+        after.time = nearest_nanosecond(time);
+        if !first && after.time <= before.time {
+            return Err(PsecError::NotIncreasing { at: at(), found: time, before: seconds(before.time) });
+        }
+        after.positions.clear();
+        for ((column, joint), text) in columns.iter().zip(limits.iter()).zip(values) {
+            let position = number(column, text)?;
+            joint
+                .check_stroke(after.index, position)
+                .map_err(|rejection| PsecError::Point { at: at(), rejection })?;
+            after.positions.push(position);
+        }
+        Ok(true)
     }
-    if request.points() == 0 {
-        return Err(PsecError::Empty { file: file.to_owned() });
-    }
-    Ok(request)
 }
 
 /// A time in s as ns.
@@ -129,24 +387,8 @@ fn nearest_nanosecond(time: f64) -> Nanoseconds {
 mod tests {
     use super::*;
 
-    fn error(text: &str) -> String {
-        read_psec(text.as_bytes(), "p.csv").expect_err("must be refused").to_string()
-    }
-
     #[test]
     fn times_on_the_position_grid_are_whole_nanoseconds() {
         assert_eq!(nearest_nanosecond(0.006 * 1111.0), 6_666_000_000);
-    }
-
-    #[test]
-    fn faults_name_file_line_and_column() {
-        assert_eq!(
-            error("t,x\n0,0\n"),
-            "p.csv:1: the header is \"t,x\"; it begins with \"time\", then a joint for each column"
-        );
-        assert_eq!(error("time,x\n0,0\n0.006,NaN\n"), "p.csv:3: x is \"NaN\", must be a finite number");
-        assert!(error("time,x\n0,0\n2e8,1\n").starts_with("p.csv:3: time is 200000000 s, must lie in"));
-        assert_eq!(error("time,x\n"), "p.csv: there is no set-point below the header");
-        assert!(error("time,x,y\n0,0\n").contains("line: 2"), "{}", error("time,x,y\n0,0\n"));
     }
 }

@@ -42,7 +42,7 @@ impl JointLimits {
     ///
     /// # Errors
     /// [`Code::OutsideStroke`]; NaN is outside too.
-    pub(super) fn check_stroke(&self, index: usize, position: f64) -> Result<(), Rejection> {
+    pub(crate) fn check_stroke(&self, index: usize, position: f64) -> Result<(), Rejection> {
         let (min, max) = (self.limits.stroke_min, self.limits.stroke_max);
         if position >= min - STROKE_TOLERANCE && position <= max + STROKE_TOLERANCE {
             return Ok(());
@@ -66,7 +66,7 @@ impl JointLimits {
     ///
     /// # Errors
     /// [`Code::Speed`]; NaN is too fast too.
-    pub(super) fn check_speed(&self, index: usize, velocity: f64, what: &str) -> Result<(), Rejection> {
+    pub(crate) fn check_speed(&self, index: usize, velocity: f64, what: &str) -> Result<(), Rejection> {
         let speed = velocity.abs();
         if speed <= self.speed_bound() {
             return Ok(());
@@ -89,7 +89,7 @@ impl JointLimits {
     ///
     /// # Errors
     /// [`Code::Jump`], with the distance and Vmax·Tsp in m or rad.
-    pub(super) fn check_jump(
+    pub(crate) fn check_jump(
         &self,
         index: usize,
         before: f64,

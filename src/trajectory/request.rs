@@ -77,6 +77,21 @@ impl Request {
         self.times.len()
     }
 
+    /// Point `index` and its time, ns from the start; nothing beyond the last. Efforts are not kept.
+    pub fn point(&self, index: usize) -> Option<(Nanoseconds, Row<'_>)> {
+        let order = *self.orders.get(index)?;
+        let columns = self.joints.len();
+        let cells = index * columns..(index + 1) * columns;
+        let mut row = Row { positions: self.positions.get(cells.clone())?, ..Row::default() };
+        if order >= Order::Cubic {
+            row.velocities = self.velocities.get(cells.clone())?;
+        }
+        if order >= Order::Quintic {
+            row.accelerations = self.accelerations.get(cells)?;
+        }
+        Some((*self.times.get(index)?, row))
+    }
+
     /// Appends a point at `time` ns from the start.
     ///
     /// # Errors

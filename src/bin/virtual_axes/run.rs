@@ -2,17 +2,16 @@
 
 use std::error::Error;
 use std::fmt::Write as _;
-use std::fs::{self, File};
-use std::io::BufWriter;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use virtual_axes::assess::{AxisReport, MotionReport};
 use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, Parameters, Source, parse_assignment};
-use virtual_axes::files::{TraceCsv, read_psec};
+use virtual_axes::files::{FileKind, Input, PsecCsv, Trajectories, read_psec_yaml, trace_writer};
 use virtual_axes::simulation::{Outcome, Simulation, joints};
-use virtual_axes::trajectory::{Context, JointLimits, MotionId, Trajectory};
-use virtual_axes::units::DEGREE;
+use virtual_axes::trajectory::{Context, JointLimits, MotionId, Request, Row, Start, Trajectory};
+use virtual_axes::units::{DEGREE, Nanoseconds};
 
 /// What to run.
 #[derive(Debug, clap::Args)]
@@ -43,9 +42,8 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let node = parameters.node_config();
 
     let name = arguments.file.display().to_string();
-    let file = File::open(&arguments.file).map_err(|error| format!("{name}: {error}"))?;
-    let request = read_psec(file, &name)?;
     let limits = joints(&config, "");
+    let request = read(&arguments.file, &limits, config.periods().position)?;
     let context = Context {
         joints: &limits,
         period: config.periods().position,
@@ -67,6 +65,34 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         Some(path) => traced(&mut simulation, path, &limits)?,
     };
     Ok(table(&report, &limits))
+}
+
+/// The set-points of a file, whatever it is.
+fn read(path: &Path, limits: &[JointLimits], period: Nanoseconds) -> Result<Request, Box<dyn Error>> {
+    let input = Input::open(path)?;
+    let name = input.name().to_owned();
+    match input.kind() {
+        FileKind::PsecCsv => {
+            let mut psec = PsecCsv::new(input.into_reader(), &name, period, limits)?;
+            let names = psec.joints().iter().map(|&place| limits[place].name.clone());
+            let mut request = Request::new(Start::Now, names.collect());
+            let mut positions = vec![0.0; psec.joints().len()];
+            while psec.next(&mut positions)? {
+                let time = (psec.next_instant() - 1) * period;
+                request.push(time, Row { positions: &positions, ..Row::default() })?;
+            }
+            Ok(request)
+        }
+        FileKind::PsecYaml => {
+            let requests = read_psec_yaml(input.text().unwrap_or_default(), &name)?;
+            Ok(requests.into_iter().next().ok_or("no trajectory")?)
+        }
+        FileKind::Mcap => {
+            let mut trajectories = Trajectories::open(path, None)?;
+            Ok(trajectories.next().ok_or("no trajectory")??.1)
+        }
+        kind => Err(format!("{name}: it is {kind}, not set-points").into()),
+    }
 }
 
 /// Runs until the axes have settled, and shows every position instant.
@@ -93,39 +119,11 @@ fn traced(
     path: &Path,
     limits: &[JointLimits],
 ) -> Result<Option<Figures>, Box<dyn Error>> {
-    let failed = |error: std::io::Error| format!("{}: {error}", path.display());
     let names: Vec<String> = limits.iter().map(|joint| joint.name.clone()).collect();
-    // Where there is something already, links are followed; a device or a pipe is written to as it is.
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let in_place = fs::metadata(&target).is_ok_and(|m| !m.is_file());
-    let partial = if in_place { target.clone() } else { partial_name(&target) };
-    let file = if in_place {
-        File::options().write(true).open(&partial)
-    } else {
-        File::options().write(true).create_new(true).open(&partial)
-    };
-    let file = BufWriter::new(file.map_err(failed)?);
-    let written = (|| -> Result<_, Box<dyn Error>> {
-        let mut trace = TraceCsv::new(file, &names).map_err(failed)?;
-        let report = execute(simulation, |s| trace.row(s.time_of(s.next_instant() - 1), s.samples()))
-            .map_err(|error| format!("{}: {error}", path.display()))?;
-        trace.finish().map_err(failed)?;
-        if !in_place {
-            fs::rename(&partial, &target).map_err(failed)?;
-        }
-        Ok(report)
-    })();
-    if written.is_err() && !in_place {
-        // It was made here, and is of no use to anybody.
-        let _ = fs::remove_file(&partial);
-    }
-    written
-}
-
-/// A name beside `target` that no other run uses.
-fn partial_name(target: &Path) -> PathBuf {
-    let name = target.file_name().unwrap_or_default().to_string_lossy();
-    target.with_file_name(format!(".{name}.{}.partial", std::process::id()))
+    let mut trace = trace_writer(path, &names)?;
+    let report = execute(simulation, |s| trace.row(s.time_of(s.next_instant() - 1), s.samples()))?;
+    trace.finish()?;
+    Ok(report)
 }
 
 /// Errors in µm or mdeg, currents in A.

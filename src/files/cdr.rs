@@ -1,0 +1,67 @@
+//! Messages as bytes: CDR behind its four bytes of header, as on the wire and in recordings.
+
+use byteorder::{BigEndian, LittleEndian};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// What stands before CDR in little-endian order, options zero.
+const CDR_LE: [u8; 4] = [0, 1, 0, 0];
+/// Likewise big-endian, without the options.
+const CDR_BE: [u8; 2] = [0, 0];
+
+/// Puts a message into `bytes`, which are emptied before.
+///
+/// # Errors
+/// What the encoder says; a value that CDR has cannot fail.
+pub(super) fn encode(message: &impl Serialize, bytes: &mut Vec<u8>) -> Result<(), cdr_encoding::Error> {
+    bytes.clear();
+    bytes.extend_from_slice(&CDR_LE);
+    cdr_encoding::to_writer::<_, LittleEndian, _>(bytes, message)
+}
+
+/// A message from its bytes, in either order.
+///
+/// # Errors
+/// A sentence that says what is wrong.
+pub(super) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+    let Some((header, body)) = bytes.split_first_chunk::<4>() else {
+        return Err(format!("{} bytes are too few for a message", bytes.len()));
+    };
+    let decoded = match [header[0], header[1]] {
+        CDR_BE => cdr_encoding::from_bytes::<T, BigEndian>(body),
+        order if order == CDR_LE[..2] => cdr_encoding::from_bytes::<T, LittleEndian>(body),
+        [a, b] => {
+            return Err(format!(
+                "its encoding is {a:#04x} {b:#04x}, must be plain CDR, 0x00 0x00 (big-endian) or \
+                 0x00 0x01 (little-endian)"
+            ));
+        }
+    };
+    decoded.map(|(message, _)| message).map_err(|error| format!("it is not a message of this type: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::builtin_interfaces::msg::Time;
+
+    #[test]
+    fn both_byte_orders_are_read() {
+        let little = [0, 1, 0, 0, 1, 0, 0, 0, 2, 1, 0, 0];
+        let big = [0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 1, 2];
+        let time = Time { sec: 1, nanosec: 258 };
+        assert_eq!(decode::<Time>(&little), Ok(time.clone()));
+        assert_eq!(decode::<Time>(&big), Ok(time.clone()));
+        let mut bytes = vec![9; 3];
+        encode(&time, &mut bytes).expect("a message");
+        assert_eq!(bytes, little);
+    }
+
+    #[test]
+    fn what_is_not_plain_cdr_is_refused() {
+        let error = decode::<Time>(&[0, 7, 0, 0, 1, 0, 0, 0]).expect_err("XCDR2");
+        assert!(error.contains("0x00 0x07") && error.contains("plain CDR"), "{error}");
+        assert!(decode::<Time>(&[0, 1, 0]).expect_err("short").contains("3 bytes"));
+        assert!(decode::<Time>(&[0, 1, 0, 0, 1]).is_err());
+    }
+}
