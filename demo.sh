@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs the ballbar on the virtual axes over ROS 2, prints the errors, writes .build/ballbar.png.
+# Runs the ballbar on the virtual axes over ROS 2, prints the errors, writes .build/ballbar.png, and the
+# same trial offline as a page with plots, .build/ballbar.html.
 #
 #     ./demo.sh [--fast] [--out FILE.png]
 set -euo pipefail
@@ -7,7 +8,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 command -v cargo >/dev/null || { echo "demo: needs cargo, Rust's build tool (https://rustup.rs)" >&2; exit 1; }
 
 "$root/tools/setup.sh"
-(cd "$root" && cargo build --release --locked --bin virtual_axes_node)
+(cd "$root" && cargo build --release --locked --bins)
 # shellcheck source=/dev/null
 source "$root/.build/env.sh"
 
@@ -22,3 +23,13 @@ trap 'kill -TERM "$demo" 2>/dev/null || true; wait "$demo" || true' EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM HUP
 wait "$demo"
+trap - EXIT
+
+page=$root/.build/ballbar.html
+echo
+echo "The same trial without ROS:"
+echo
+"${CARGO_TARGET_DIR:-$root/target}/release/virtual_axes" run ballbar --controller cascade,cascade-noff --report "$page"
+echo
+echo "page with plots: $page"
+python "$root/tools/screenshot.py" "$page" "${page%.html}-page.png" || true

@@ -1,7 +1,7 @@
 //! Distance from the simulated point to the path of its set-points.
 
 /// Set-points that are remembered: how far the axes may lag behind before the oldest is forgotten.
-const CAPACITY: usize = 512;
+pub(super) const CAPACITY: usize = 512;
 /// Segments looked at behind the nearest one so far, for a point that swings back.
 const LOOK_BACK: u64 = 8;
 
@@ -44,35 +44,55 @@ impl ContourTracker {
         &self.ring[start..start + self.dimension]
     }
 
+    /// Set-points that have been added.
+    pub(super) fn count(&self) -> u64 {
+        self.count
+    }
+
     /// Distance of `position` from the path, m; zero before the first set-point.
     pub fn distance(&mut self, position: &[f64]) -> f64 {
+        self.nearest(position).map_or(0.0, |(_, foot)| foot.square_distance.sqrt())
+    }
+
+    /// The segment nearest to `position`, by the set-point that it starts at, and the foot on it;
+    /// none before the first set-point.
+    pub(super) fn nearest(&mut self, position: &[f64]) -> Option<(u64, Foot)> {
         if self.count == 0 {
-            return 0.0;
+            return None;
         }
         let oldest = self.count.saturating_sub(CAPACITY as u64);
         let from = self.nearest.saturating_sub(LOOK_BACK).max(oldest);
-        let mut best = square_distance_to_segment(position, self.point(from), self.point(from));
+        let mut best = foot_on_segment(position, self.point(from), self.point(from));
         self.nearest = from;
         for k in from..self.count - 1 {
-            let d = square_distance_to_segment(position, self.point(k), self.point(k + 1));
-            if d < best {
-                best = d;
+            let foot = foot_on_segment(position, self.point(k), self.point(k + 1));
+            if foot.square_distance < best.square_distance {
+                best = foot;
                 self.nearest = k;
             }
         }
-        best.sqrt()
+        Some((self.nearest, best))
     }
 }
 
-/// Squared distance of `p` from the segment between `a` and `b`.
-fn square_distance_to_segment(p: &[f64], a: &[f64], b: &[f64]) -> f64 {
+/// Nearest point of a segment.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Foot {
+    pub square_distance: f64,
+    /// Where it is, from 0 at the segment's start to 1 at its end.
+    pub along: f64,
+}
+
+/// The point of the segment from `a` to `b` that is nearest to `p`.
+fn foot_on_segment(p: &[f64], a: &[f64], b: &[f64]) -> Foot {
     let (mut along, mut length) = (0.0, 0.0);
     for ((p, a), b) in p.iter().zip(a).zip(b) {
         along += (p - a) * (b - a);
         length += (b - a) * (b - a);
     }
     let t = if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 };
-    p.iter().zip(a).zip(b).map(|((p, a), b)| (p - a - t * (b - a)).powi(2)).sum()
+    let square_distance = p.iter().zip(a).zip(b).map(|((p, a), b)| (p - a - t * (b - a)).powi(2)).sum();
+    Foot { square_distance, along: t }
 }
 
 #[cfg(test)]

@@ -1,11 +1,18 @@
-//! How well the axes follow: tracking, contour and circularity errors, currents, saturation.
+//! How well the axes follow: tracking, contour, orientation and circularity errors, currents,
+//! saturation.
 
+mod axis;
 mod circle;
 mod contour;
 mod motion;
+mod path_tracker;
 mod recording;
+mod setpoint_tracker;
 
+pub use axis::{AxisAssessor, AxisReport};
 pub use circle::{BidirectionalReport, CircleAssessor, CircleReport, FullCircle, bidirectional};
 pub use contour::ContourTracker;
-pub use motion::{AxisReport, MotionAssessor, MotionReport};
+pub use motion::{MotionAssessor, MotionReport};
+pub use path_tracker::{Nearest, PathTracker};
 pub use recording::{AxisTrace, CircleTrace, Recording, ToolTrace};
+pub use setpoint_tracker::SetpointTracker;

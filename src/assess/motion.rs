@@ -4,23 +4,7 @@ use crate::config::AxisKind;
 use crate::machine::Machine;
 
 use super::ContourTracker;
-
-/// Figures of one axis over a motion.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct AxisReport {
-    /// Largest |PSEC − SP| at position instants, m or rad; contains the pure delay.
-    pub max_tracking_error: f64,
-    /// RMS of PSEC − SP at position instants, m or rad.
-    pub rms_tracking_error: f64,
-    /// Largest |PSEC delayed by α − SP| at position instants, m or rad.
-    pub max_synchronized_tracking_error: f64,
-    /// RMS of PSEC delayed by α − SP at position instants, m or rad.
-    pub rms_synchronized_tracking_error: f64,
-    /// Largest |i| at any tick, A.
-    pub peak_current: f64,
-    /// Time with speed, current or voltage set-point at its limit, s.
-    pub saturation_time: f64,
-}
+use super::axis::{AxisAssessor, AxisReport, root_mean};
 
 /// Figures of a motion.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -33,26 +17,17 @@ pub struct MotionReport {
     pub rms_contour_error: Option<f64>,
 }
 
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    report: AxisReport,
-    square_tracking: f64,
-    square_synchronized: f64,
-    saturated_ticks: u64,
-}
-
 /// Gathers the figures of a motion of some axes; nothing is allocated while it runs.
 #[derive(Debug, Clone)]
 pub struct MotionAssessor {
-    /// Places of the axes in the machine, and their sums.
-    axes: Vec<(usize, Sums)>,
+    /// Places of the axes in the machine, and their figures.
+    axes: Vec<(usize, AxisAssessor)>,
     /// Places of the linear ones among them.
     linear: Vec<usize>,
     contour: ContourTracker,
     position: Vec<f64>,
     square_contour: f64,
     max_contour: f64,
-    instants: u64,
     ticks: u64,
     tick: f64,
 }
@@ -64,13 +39,12 @@ impl MotionAssessor {
         let linear: Vec<usize> =
             places.iter().copied().filter(|&p| kinds.get(p) == Some(&AxisKind::Linear)).collect();
         MotionAssessor {
-            axes: places.iter().map(|&p| (p, Sums::default())).collect(),
+            axes: places.iter().map(|&p| (p, AxisAssessor::default())).collect(),
             contour: ContourTracker::new(linear.len()),
             position: vec![0.0; linear.len()],
             linear,
             square_contour: 0.0,
             max_contour: 0.0,
-            instants: 0,
             ticks: 0,
             tick,
         }
@@ -79,19 +53,8 @@ impl MotionAssessor {
     /// Takes a tick into account; `position_instant` tells the first of a position period.
     pub fn observe(&mut self, machine: &Machine, position_instant: bool) {
         let axes = machine.axes();
-        for (place, sums) in &mut self.axes {
-            let s = axes[*place].sample();
-            let report = &mut sums.report;
-            report.peak_current = report.peak_current.max(s.current.abs());
-            sums.saturated_ticks += u64::from(s.saturated);
-            if position_instant {
-                let (tracking, synchronized) = (s.tracking_error(), s.synchronized_tracking_error());
-                report.max_tracking_error = report.max_tracking_error.max(tracking.abs());
-                report.max_synchronized_tracking_error =
-                    report.max_synchronized_tracking_error.max(synchronized.abs());
-                sums.square_tracking += tracking * tracking;
-                sums.square_synchronized += synchronized * synchronized;
-            }
+        for (place, assessor) in &mut self.axes {
+            assessor.observe(axes[*place].sample(), position_instant);
         }
         if !self.linear.is_empty() {
             if position_instant {
@@ -104,28 +67,16 @@ impl MotionAssessor {
             self.max_contour = self.max_contour.max(distance);
             self.square_contour += distance * distance;
         }
-        self.instants += u64::from(position_instant);
         self.ticks += 1;
     }
 
     /// The figures so far.
     pub fn report(&self) -> MotionReport {
-        let rms = |square: f64, count: u64| if count == 0 { 0.0 } else { (square / count as f64).sqrt() };
-        let axes = self
-            .axes
-            .iter()
-            .map(|(_, sums)| AxisReport {
-                rms_tracking_error: rms(sums.square_tracking, self.instants),
-                rms_synchronized_tracking_error: rms(sums.square_synchronized, self.instants),
-                saturation_time: sums.saturated_ticks as f64 * self.tick,
-                ..sums.report
-            })
-            .collect();
         let has_path = !self.linear.is_empty();
         MotionReport {
-            axes,
+            axes: self.axes.iter().map(|(_, assessor)| assessor.report(self.tick)).collect(),
             max_contour_error: has_path.then_some(self.max_contour),
-            rms_contour_error: has_path.then(|| rms(self.square_contour, self.ticks)),
+            rms_contour_error: has_path.then(|| root_mean(self.square_contour, self.ticks)),
         }
     }
 }

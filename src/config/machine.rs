@@ -219,6 +219,11 @@ impl AxisConfig {
         self.kind
     }
 
+    /// α, the delay of the set-point before the position comparator, ns (Prévost fig. 3).
+    pub fn alpha(&self) -> Nanoseconds {
+        self.delays.alpha
+    }
+
     /// Limits for trajectories.
     pub fn limits(&self) -> &LimitsConfig {
         &self.limits

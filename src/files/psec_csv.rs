@@ -211,6 +211,16 @@ impl<R: Read> PsecCsv<R> {
         self
     }
 
+    /// With a first row at time 0 the axes stand there before the first instant.
+    #[must_use]
+    pub fn starting_at_first_row(mut self) -> Self {
+        if self.first_time == 0 {
+            self.given.copy_from_slice(&self.after.positions);
+            self.before.positions.copy_from_slice(&self.after.positions);
+        }
+        self
+    }
+
     /// The joints that it moves, as places in the machine, one per value of a row.
     pub fn joints(&self) -> &[usize] {
         &self.places

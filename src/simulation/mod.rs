@@ -147,26 +147,43 @@ impl Simulation {
     /// Puts the machine back to rest at home; motions under way end as aborted.
     pub fn reset(&mut self) {
         let home = vec![0.0; self.machine.axis_count()];
-        self.machine.reset(&home);
         // Home is finite and has one value per joint: this cannot be refused.
-        let _ = self.timeline.reset(&home);
+        let _ = self.reset_to(&home);
+    }
+
+    /// Puts the machine to rest at `positions` (m or rad, one per joint); motions under way end as
+    /// aborted.
+    ///
+    /// # Errors
+    /// [`Rejection`] for a position that is not finite or not one per joint; nothing changes then.
+    pub fn reset_to(&mut self, positions: &[f64]) -> Result<(), Rejection> {
+        self.timeline.reset(positions)?;
+        self.machine.reset(positions);
         self.loads.clear();
         self.motions.abort_all(self.time_of(self.next), &mut self.ends);
         self.saturated.fill(false);
         self.awake = false;
         self.settled_from = self.next;
         self.take_samples();
+        Ok(())
     }
 
     /// Computes the next position instant: its samples, and the ticks up to the one after.
     pub fn step(&mut self) {
+        self.step_with(|_, _| ());
+    }
+
+    /// Likewise, showing the machine to `observe` at every tick, as [`Machine::advance_with`] does;
+    /// its second argument tells the first tick of the period. A machine that nothing has moved yet
+    /// has no ticks to show.
+    pub fn step_with(&mut self, observe: impl FnMut(&Machine, bool)) {
         let k = self.next;
         self.timeline.next();
         self.follow_timeline_events(k);
         self.awake |= self.motions.any_running() || self.loads.any();
         if self.awake {
             self.loads.apply(&mut self.machine, k);
-            self.run_ticks();
+            self.run_ticks(observe);
         }
         self.motions.finish(k, self.origin + k * self.period, &mut self.ends);
         if self.is_asked() {
@@ -199,7 +216,7 @@ impl Simulation {
         delay.unsigned_abs().div_ceil(self.period.unsigned_abs()) as i64
     }
 
-    fn run_ticks(&mut self) {
+    fn run_ticks(&mut self, mut observe: impl FnMut(&Machine, bool)) {
         let Simulation { machine, timeline, motions, samples, saturated, .. } = self;
         let mut position_instant = true;
         machine.advance_with(timeline.psec(), |m| {
@@ -211,6 +228,7 @@ impl Simulation {
                 }
             }
             motions.observe(m, position_instant);
+            observe(m, position_instant);
             position_instant = false;
         });
     }
@@ -232,7 +250,7 @@ impl Simulation {
     }
 
     /// Whether a trajectory waits, runs or has just ended, or a load acts.
-    fn is_asked(&self) -> bool {
+    pub fn is_asked(&self) -> bool {
         self.motions.any() || self.timeline.is_moving() || self.timeline.is_waiting() || self.loads.any()
     }
 

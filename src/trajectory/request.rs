@@ -67,6 +67,18 @@ impl Request {
         self.start
     }
 
+    /// The same, starting at another time.
+    #[must_use]
+    pub fn starting(self, start: Start) -> Self {
+        Self { start, ..self }
+    }
+
+    /// Time, ns from the start, and positions, m or rad, of the first point.
+    pub fn first_point(&self) -> Option<(Nanoseconds, &[f64])> {
+        let columns = self.positions.len() / self.times.len().max(1);
+        Some((*self.times.first()?, self.positions.get(..columns)?))
+    }
+
     /// Names of the joints, in the order of the columns.
     pub fn joints(&self) -> &[String] {
         &self.joints

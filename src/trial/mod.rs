@@ -1,1 +1,133 @@
 //! One trial, offline: set-points through the simulation, its figures and its recording.
+//!
+//! The trial gives the [`Simulation`](crate::simulation::Simulation) its set-points piece by piece and
+//! looks at every tick, so that its memory does not grow with its length.
+
+mod circle;
+mod corner;
+mod figures;
+mod observer;
+mod recorder;
+mod setpoints;
+mod supply;
+mod windows;
+
+use std::io;
+use std::sync::Arc;
+
+use crate::assess::Recording;
+use crate::config::MachineConfig;
+use crate::machine::Machine;
+use crate::path::Program;
+use crate::simulation::{Simulation, SimulationError, joints};
+use crate::trajectory::Rejection;
+use crate::units::Nanoseconds;
+
+pub use figures::{
+    AxisFigures, BidirectionalFigures, CircleFigures, ContourFigures, CornerFigures, Figures,
+    OrientationFigures, Reference,
+};
+pub use setpoints::{GridSource, ProgramSource, Requests, Setpoints, SourceError, UnreachableError};
+
+use observer::Observer;
+use supply::Supply;
+
+/// What is to be run, besides the set-points.
+#[derive(Debug, Clone)]
+pub struct Trial<'a> {
+    /// The machine.
+    pub machine: &'a MachineConfig,
+    /// Path and law of time that the set-points come from, if these are known: contour errors are
+    /// measured against the path then, otherwise against the polyline through the set-points.
+    pub program: Option<Arc<Program>>,
+    /// Accept trajectories whose last point has a velocity.
+    pub allow_nonzero_end_velocity: bool,
+    /// Whether to keep a [`Recording`].
+    pub record: bool,
+}
+
+/// What came out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Errors, currents, saturation.
+    pub figures: Figures,
+    /// Signals, if they were asked for.
+    pub recording: Option<Recording>,
+}
+
+/// A tick of a trial, after the controllers have acted and before the plants move.
+#[derive(Debug, Clone, Copy)]
+pub struct Tick<'a> {
+    /// Time from the start, ns.
+    pub time: Nanoseconds,
+    /// Whether it is the first of a position period.
+    pub position_instant: bool,
+    /// The machine.
+    pub machine: &'a Machine,
+}
+
+/// Why a trial did not come to its end.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrialError {
+    /// The set-points cannot be read, or are wrong.
+    #[error(transparent)]
+    Source(SourceError),
+    /// The machine cannot do what is asked.
+    #[error("at {time} s: {rejection}")]
+    Rejected {
+        /// Time from the start, s.
+        time: f64,
+        /// Why.
+        rejection: Rejection,
+    },
+    /// There is no simulation of the machine.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// Who watches cannot go on (a trace that cannot be written).
+    #[error(transparent)]
+    Watch(io::Error),
+}
+
+/// Runs `setpoints` until the axes have settled, and shows every tick to `watch`.
+///
+/// The machine starts at rest at the first set-point; a trajectory whose first point is later than 0
+/// is approached from home.
+///
+/// # Errors
+/// [`TrialError`].
+pub fn run(
+    trial: &Trial<'_>,
+    setpoints: Setpoints<'_>,
+    mut watch: impl FnMut(Tick<'_>) -> io::Result<()>,
+) -> Result<Outcome, TrialError> {
+    let limits = joints(trial.machine, "");
+    let mut simulation = Simulation::new(trial.machine, limits.clone(), 0)?;
+    let mut supply = Supply::new(setpoints, &limits, trial)?;
+    let home = vec![0.0; limits.len()];
+    let start = supply.start().unwrap_or(&home).to_vec();
+    simulation.reset_to(&start).map_err(|rejection| TrialError::Rejected { time: 0.0, rejection })?;
+    let mut observer = Observer::new(trial, &start);
+    let tick = trial.machine.periods().current;
+    loop {
+        supply.offer_due(&mut simulation)?;
+        if !simulation.is_busy() && supply.is_empty() {
+            break;
+        }
+        let moving = simulation.is_asked();
+        let mut time = simulation.time_of(simulation.next_instant());
+        let mut failed = None;
+        simulation.step_with(|machine, position_instant| {
+            let tick_now = Tick { time, position_instant, machine };
+            observer.observe(tick_now, moving);
+            if failed.is_none() {
+                failed = watch(tick_now).err();
+            }
+            time += tick;
+        });
+        if let Some(error) = failed {
+            return Err(TrialError::Watch(error));
+        }
+    }
+    Ok(observer.finish())
+}

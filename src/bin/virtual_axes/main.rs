@@ -2,23 +2,33 @@
 
 #![forbid(unsafe_code)]
 
+mod check;
+mod input;
+mod json;
+mod list;
+mod period;
+mod progress;
+mod psec;
+mod report;
 mod run;
+mod table;
+mod variant;
 
 use std::error::Error;
 use std::fmt::Display;
 use std::io::{self, Write};
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
-use virtual_axes::config::{AxisKind, ConfigError, Parameters, listing};
+use clap::{CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+use virtual_axes::config::listing;
 
 /// Exit status of a command that refused its input.
 const BAD_INPUT: u8 = 2;
 
 /// Virtual machine-tool axes.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version, about, after_help = "`virtual_axes run ballbar` is a good beginning.")]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -26,20 +36,37 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run set-points through a machine and print its errors.
+    /// Run a scenario or set-points through a machine and print its errors.
     Run(run::Arguments),
-    /// Check a machine file.
-    Check {
-        /// Machine file: a ROS 2 parameter file.
-        file: PathBuf,
-    },
+    /// Write the set-points of a scenario to a file.
+    Psec(psec::Arguments),
+    /// Check a file: a machine, a scenario, or set-points.
+    Check(check::Arguments),
     /// List the machines that come with the program.
-    Machines,
+    Machines {
+        /// As a JSON list.
+        #[arg(long)]
+        json: bool,
+    },
+    /// List the scenarios that come with the program.
+    Scenarios {
+        /// As a JSON list.
+        #[arg(long)]
+        json: bool,
+        /// Print the file of this one, to begin another from.
+        #[arg(long, value_name = "SCENARIO", conflicts_with = "json")]
+        show: Option<String>,
+    },
     /// List every parameter with its unit, range and default.
     Parameters {
         /// As a Markdown table.
         #[arg(long)]
         markdown: bool,
+    },
+    /// Print completions for a shell.
+    Completions {
+        /// Which shell.
+        shell: Shell,
     },
 }
 
@@ -70,27 +97,18 @@ fn complain(what: &(impl Display + ?Sized)) {
 fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
     match command {
         Command::Run(arguments) => run::run(arguments),
-        Command::Check { file } => Ok(check(&Parameters::from_file(file)?)?),
-        Command::Machines => Parameters::builtin_names()
-            .map(|name| {
-                let machine = Parameters::builtin(name)?.machine_config()?;
-                Ok(format!("{name}: {}\n", machine.name()))
-            })
-            .collect(),
+        Command::Psec(arguments) => psec::run(arguments),
+        Command::Check(arguments) => check::run(arguments),
+        Command::Machines { json } => list::machines(*json),
+        Command::Scenarios { show: Some(name), .. } => list::scenario(name),
+        Command::Scenarios { json, show: None } => list::scenarios(*json),
         Command::Parameters { markdown: true } => Ok(listing::markdown()),
         Command::Parameters { markdown: false } => Ok(listing::text()),
+        Command::Completions { shell } => {
+            let mut text = Vec::new();
+            let name = Arguments::command().get_name().to_owned();
+            clap_complete::generate(*shell, &mut Arguments::command(), name, &mut text);
+            Ok(String::from_utf8(text)?)
+        }
     }
-}
-
-fn check(parameters: &Parameters) -> Result<String, ConfigError> {
-    let machine = parameters.machine_config()?;
-    let joints: Vec<String> = machine
-        .axes()
-        .iter()
-        .map(|axis| match axis.kind() {
-            AxisKind::Linear => format!("{} (linear)", axis.name()),
-            AxisKind::Rotary => format!("{} (rotary)", axis.name()),
-        })
-        .collect();
-    Ok(format!("machine: {}\njoints: {}\nvalid\n", machine.name(), joints.join(", ")))
 }

@@ -1,160 +1,211 @@
-//! `virtual_axes run`: set-points through the simulation, offline.
+//! `virtual_axes run`: a trial, offline.
 
 use std::error::Error;
-use std::fmt::Write as _;
-use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use virtual_axes::assess::{AxisReport, MotionReport};
-use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, Parameters, Source, parse_assignment};
-use virtual_axes::files::{FileKind, Input, PsecCsv, Trajectories, read_psec_yaml, trace_writer};
-use virtual_axes::simulation::{Outcome, Simulation, joints};
-use virtual_axes::trajectory::{Context, JointLimits, MotionId, Request, Row, Start, Trajectory};
-use virtual_axes::units::{DEGREE, Nanoseconds};
+use virtual_axes::config::{DEFAULT_MACHINE, MachineConfig, Parameters};
+use virtual_axes::files::{TraceWriter, trace_writer};
+use virtual_axes::machine::AxisSample;
+use virtual_axes::trial::{Outcome, Tick, Trial, TrialError};
+use virtual_axes::units::{Nanoseconds, seconds};
+
+use crate::input::Input;
+use crate::period::Period;
+use crate::progress::Progress;
+use crate::variant::{self, Controller};
+use crate::{json, report, table};
 
 /// What to run.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Set-points: CSV with the header `time,x,y,…`, in s, m and rad.
-    file: PathBuf,
+    /// A shipped scenario, a scenario file, or a file of set-points: CSV (`time,x,y,…` in s, m, rad),
+    /// MCAP with a JointTrajectory, or the YAML that `ros2 topic pub` takes.
+    #[arg(value_name = "SCENARIO|FILE")]
+    input: String,
     /// A shipped machine or a machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
+    /// Position controller in the place of the machine's; several are run one after the other.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    controller: Vec<Controller>,
     /// A parameter, as in `x.velocity_loop.gain=4.5`; can be given several times.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Where to write a row of signals for each position instant.
-    #[arg(long, value_name = "FILE.csv")]
+    /// One more run with these parameters, to be compared; can be given several times.
+    #[arg(long, value_name = "KEY=VALUE[,KEY=VALUE]…")]
+    compare: Vec<String>,
+    /// Feed in the place of the scenario's, m/min (rpm for a scenario of rotary moves).
+    #[arg(long)]
+    feed: Option<f64>,
+    /// The topic to run, if a recording has several with a JointTrajectory.
+    #[arg(long)]
+    topic: Option<String>,
+    /// Where to write signals over time.
+    #[arg(long, value_name = "FILE.csv|FILE.mcap")]
     trace: Option<PathBuf>,
+    /// Time between two rows of the trace, a multiple of the current loop's period; the position
+    /// loop's if it is not given.
+    #[arg(long, value_name = "125us", requires = "trace")]
+    trace_period: Option<Period>,
+    /// Where to write a page with plots.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Print the figures as one JSON object.
+    #[arg(long)]
+    json: bool,
 }
 
-/// Places of the axes that moved, and the figures of the motion.
-type Figures = (Vec<usize>, MotionReport);
+/// One run of a command.
+#[derive(Debug)]
+pub struct Run {
+    /// Controller of the axes.
+    pub controller: String,
+    /// What was set, as on the command line.
+    pub changes: Vec<String>,
+    /// What came out.
+    pub outcome: Outcome,
+}
 
-/// Runs it; the text is the table of errors.
+impl Run {
+    /// What tells it from the others.
+    pub fn title(&self) -> String {
+        let mut title = self.controller.clone();
+        for change in &self.changes {
+            title.push_str(", ");
+            title.push_str(change);
+        }
+        title
+    }
+}
+
+/// Runs it; the text is the tables of errors, or JSON.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    let mut parameters = Parameters::load(&arguments.machine)?;
-    let source = Source::named("--set");
-    let assignments = arguments.set.iter().map(|text| parse_assignment(text, &source));
-    parameters.set_all(assignments.collect::<Result<_, _>>()?)?;
-    let config = parameters.machine_config()?;
-    let node = parameters.node_config();
+    let machine = Parameters::load(&arguments.machine)?;
+    let mut variants = Vec::new();
+    for controller in controllers(&arguments.controller) {
+        for compared in std::iter::once(None).chain(arguments.compare.iter().map(Some)) {
+            let mut changes = arguments.set.clone();
+            changes.extend(compared.iter().flat_map(|c| c.split(',')).map(|change| change.trim().to_owned()));
+            variants.push((variant::parameters(&machine, controller, &changes)?, changes));
+        }
+    }
+    if arguments.trace.is_some() && variants.len() > 1 {
+        return Err(format!("--trace takes one run, not {}", variants.len()).into());
+    }
+    let input = Input::open(&arguments.input, arguments.topic.as_deref())?;
+    for output in [&arguments.trace, &arguments.report].into_iter().flatten() {
+        input.must_not_be(output)?;
+    }
+    let mut runs = Vec::new();
+    for (parameters, changes) in variants {
+        let config = parameters.machine_config()?;
+        let outcome = trial(arguments, &input, &parameters, &config)?;
+        runs.push(Run { controller: variant::controller_name(&parameters), changes, outcome });
+    }
+    let name = machine.machine_config()?.name().to_owned();
+    if let Some(path) = &arguments.report {
+        report::write(path, &input, &name, &runs)?;
+    }
+    if arguments.json {
+        return Ok(format!("{:#}\n", json::object(&input, &name, &runs)));
+    }
+    Ok(runs.iter().map(|run| text(run, runs.len() > 1)).collect::<Vec<_>>().join("\n"))
+}
 
-    let name = arguments.file.display().to_string();
-    let limits = joints(&config, "");
-    let request = read(&arguments.file, &limits, config.periods().position)?;
-    let context = Context {
-        joints: &limits,
-        period: config.periods().position,
-        max_points: usize::MAX,
-        allow_nonzero_end_velocity: node.allow_nonzero_velocity_at_trajectory_end,
+/// The controllers to run, or that of the machine file.
+fn controllers(given: &[Controller]) -> Vec<Option<Controller>> {
+    if given.is_empty() { vec![None] } else { given.iter().copied().map(Some).collect() }
+}
+
+fn trial(
+    arguments: &Arguments,
+    input: &Input,
+    parameters: &Parameters,
+    config: &MachineConfig,
+) -> Result<Outcome, Box<dyn Error>> {
+    let program = input.program(config, arguments.feed)?;
+    let trial = Trial {
+        machine: config,
+        program: program.clone(),
+        allow_nonzero_end_velocity: parameters.node_config().allow_nonzero_velocity_at_trajectory_end,
+        record: arguments.report.is_some(),
     };
-    let refused = |rejection| format!("{name}: {rejection}");
-    let trajectory = Arc::new(Trajectory::new(request, &context).map_err(refused)?);
-    let mut simulation = Simulation::new(&config, limits.clone(), 0)?;
-    simulation.offer(MotionId(1), trajectory).map_err(refused)?;
-
-    if let Some(trace) = &arguments.trace
-        && fs::canonicalize(trace).is_ok_and(|t| fs::canonicalize(&arguments.file).is_ok_and(|f| f == t))
-    {
-        return Err(format!("{}: the trace would replace the set-points", trace.display()).into());
-    }
-    let report = match &arguments.trace {
-        None => execute(&mut simulation, |_| Ok(()))?,
-        Some(path) => traced(&mut simulation, path, &limits)?,
+    let setpoints = input.setpoints(config, program.as_ref())?;
+    let mut progress = Progress::new(input.name(), program.as_ref().map(|p| p.duration()));
+    let mut trace = match &arguments.trace {
+        Some(path) => Some(Trace::new(path, arguments.trace_period, config)?),
+        None => None,
     };
-    Ok(table(&report, &limits))
+    let result = virtual_axes::trial::run(&trial, setpoints, |tick| {
+        if tick.position_instant {
+            progress.reached(seconds(tick.time));
+        }
+        trace.as_mut().map_or(Ok(()), |trace| trace.observe(tick))
+    });
+    progress.finish();
+    let outcome = result.map_err(|error| named(input, error))?;
+    if let Some(trace) = trace {
+        trace.finish()?;
+    }
+    Ok(outcome)
 }
 
-/// The set-points of a file, whatever it is.
-fn read(path: &Path, limits: &[JointLimits], period: Nanoseconds) -> Result<Request, Box<dyn Error>> {
-    let input = Input::open(path)?;
-    let name = input.name().to_owned();
-    match input.kind() {
-        FileKind::PsecCsv => {
-            let mut psec = PsecCsv::new(input.into_reader(), &name, period, limits)?;
-            let names = psec.joints().iter().map(|&place| limits[place].name.clone());
-            let mut request = Request::new(Start::Now, names.collect());
-            let mut positions = vec![0.0; psec.joints().len()];
-            while psec.next(&mut positions)? {
-                let time = (psec.next_instant() - 1) * period;
-                request.push(time, Row { positions: &positions, ..Row::default() })?;
-            }
-            Ok(request)
-        }
-        FileKind::PsecYaml => {
-            let requests = read_psec_yaml(input.text().unwrap_or_default(), &name)?;
-            Ok(requests.into_iter().next().ok_or("no trajectory")?)
-        }
-        FileKind::Mcap => {
-            let mut trajectories = Trajectories::open(path, None)?;
-            Ok(trajectories.next().ok_or("no trajectory")??.1)
-        }
-        kind => Err(format!("{name}: it is {kind}, not set-points").into()),
+/// The error with the name of the input, where it does not name a file itself.
+pub fn named(input: &Input, error: TrialError) -> Box<dyn Error> {
+    match error {
+        TrialError::Watch(error) => error.into(),
+        TrialError::Source(error) => error,
+        error => format!("{}: {error}", input.name()).into(),
     }
 }
 
-/// Runs until the axes have settled, and shows every position instant.
-fn execute(
-    simulation: &mut Simulation,
-    mut show: impl FnMut(&Simulation) -> std::io::Result<()>,
-) -> Result<Option<Figures>, Box<dyn Error>> {
-    let mut report = None;
-    while simulation.is_busy() {
-        simulation.step();
-        show(simulation)?;
-        for end in simulation.take_ends() {
-            if end.outcome == Outcome::Completed {
-                report = Some((end.places, end.report));
-            }
+/// A trace that is being written.
+struct Trace {
+    writer: Box<dyn TraceWriter>,
+    period: Nanoseconds,
+    samples: Vec<AxisSample>,
+}
+
+impl Trace {
+    fn new(path: &Path, period: Option<Period>, config: &MachineConfig) -> Result<Self, Box<dyn Error>> {
+        let tick = config.periods().current;
+        let period = period.map_or(config.periods().position, |period| period.nanoseconds());
+        if period % tick != 0 {
+            let reason =
+                format!("--trace-period {period} ns: must be a multiple of the current loop's {tick} ns");
+            return Err(reason.into());
         }
+        let names: Vec<String> = config.axes().iter().map(|axis| axis.name().to_owned()).collect();
+        Ok(Trace { writer: trace_writer(path, &names)?, period, samples: Vec::new() })
     }
-    Ok(report)
+
+    fn observe(&mut self, tick: Tick<'_>) -> io::Result<()> {
+        if tick.time % self.period != 0 {
+            return Ok(());
+        }
+        self.samples.clear();
+        self.samples.extend(tick.machine.axes().iter().map(|axis| *axis.sample()));
+        self.writer.row(tick.time, &self.samples)
+    }
+
+    fn finish(self) -> Result<(), Box<dyn Error>> {
+        Ok(self.writer.finish()?)
+    }
 }
 
-/// Runs with a trace that stands under its name only when it is whole.
-fn traced(
-    simulation: &mut Simulation,
-    path: &Path,
-    limits: &[JointLimits],
-) -> Result<Option<Figures>, Box<dyn Error>> {
-    let names: Vec<String> = limits.iter().map(|joint| joint.name.clone()).collect();
-    let mut trace = trace_writer(path, &names)?;
-    let report = execute(simulation, |s| trace.row(s.time_of(s.next_instant() - 1), s.samples()))?;
-    trace.finish()?;
-    Ok(report)
-}
-
-/// Errors in µm or mdeg, currents in A.
-fn table(report: &Option<Figures>, limits: &[JointLimits]) -> String {
-    let Some((places, report)) = report else { return "the motion was not completed\n".to_owned() };
-    let mut text = String::from(
-        "axis  unit   tracking error      synchronised error  peak current  saturated\n\
-         \u{20}             max       RMS       max       RMS       A             s\n",
-    );
-    for (joint, axis) in places.iter().filter_map(|&p| limits.get(p)).zip(&report.axes) {
-        let (unit, scale) = match joint.kind {
-            AxisKind::Linear => ("µm", 1e6),
-            AxisKind::Rotary => ("mdeg", 1e3 / DEGREE),
-        };
-        let AxisReport { max_tracking_error: max, rms_tracking_error: rms, .. } = axis;
-        let (max_s, rms_s) = (axis.max_synchronized_tracking_error, axis.rms_synchronized_tracking_error);
-        // Writing to a text cannot fail.
-        let _ = writeln!(
-            text,
-            "{:<6}{unit:<7} {:<10.1}{:<10.1}{:<10.1}{:<10.1}{:<14.2}{:.3}",
-            joint.name,
-            max * scale,
-            rms * scale,
-            max_s * scale,
-            rms_s * scale,
-            axis.peak_current,
-            axis.saturation_time
-        );
+/// Tables of one run, under its title if there are several.
+fn text(run: &Run, several: bool) -> String {
+    let figures = &run.outcome.figures;
+    let mut text = String::new();
+    if several {
+        text.push_str(&format!("{}\n\n", run.title()));
     }
-    if let (Some(max), Some(rms)) = (report.max_contour_error, report.rms_contour_error) {
-        let _ = writeln!(text, "contour error: max {:.1} µm, RMS {:.1} µm", max * 1e6, rms * 1e6);
+    text.push_str(&table::text(&table::axes(figures)));
+    let path = table::path(figures);
+    if !path.rows.is_empty() {
+        text.push('\n');
+        text.push_str(&table::text(&path));
     }
     text
 }

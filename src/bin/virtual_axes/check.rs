@@ -1,0 +1,59 @@
+//! `virtual_axes check`: whether a file is in order, and what it is.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
+use virtual_axes::files::{self, FileKind};
+use virtual_axes::trial::Trial;
+use virtual_axes::units::seconds;
+
+use crate::input::Input;
+
+/// Which file.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// A machine file (a ROS 2 parameter file), a scenario, or set-points (CSV, MCAP, YAML).
+    file: PathBuf,
+    /// The machine that a scenario or set-points are for.
+    #[arg(long, default_value = DEFAULT_MACHINE)]
+    machine: String,
+}
+
+/// Says what it is and that it is valid, or what is wrong.
+pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+    let file: &Path = &arguments.file;
+    if !file.exists() || files::Input::open(file)?.kind() == FileKind::Machine {
+        return Ok(machine(&Parameters::from_file(file)?.machine_config()?));
+    }
+    let config = Parameters::load(&arguments.machine)?.machine_config()?;
+    let input = Input::open(&file.to_string_lossy(), None)?;
+    let program = input.program(&config, None)?;
+    let kind = if program.is_some() { "scenario" } else { "set-points" };
+    let trial = Trial {
+        machine: &config,
+        program: program.clone(),
+        allow_nonzero_end_velocity: false,
+        record: false,
+    };
+    let mut end = 0;
+    // The surest check is to run it.
+    virtual_axes::trial::run(&trial, input.setpoints(&config, program.as_ref())?, |tick| {
+        end = tick.time;
+        Ok(())
+    })
+    .map_err(|error| crate::run::named(&input, error))?;
+    Ok(format!("{kind} for {}: {:.3} s\nvalid\n", config.name(), seconds(end)))
+}
+
+fn machine(machine: &MachineConfig) -> String {
+    let joints: Vec<String> = machine
+        .axes()
+        .iter()
+        .map(|axis| match axis.kind() {
+            AxisKind::Linear => format!("{} (linear)", axis.name()),
+            AxisKind::Rotary => format!("{} (rotary)", axis.name()),
+        })
+        .collect();
+    format!("machine: {}\njoints: {}\nvalid\n", machine.name(), joints.join(", "))
+}

@@ -1,0 +1,112 @@
+//! `--json`: the figures of the table as one object.
+//!
+//! Units stand in the keys; those of an axis in its `unit`: um and mdeg.
+
+use serde_json::{Map, Value, json};
+use virtual_axes::trial::{
+    AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
+};
+use virtual_axes::units::{DEGREE, MILLIMETRE};
+
+use crate::input::Input;
+use crate::run::Run;
+use crate::table::{MICROMETRE, MILLIDEGREE, scale};
+
+/// The object of a command's runs.
+pub fn object(input: &Input, machine: &str, runs: &[Run]) -> Value {
+    json!({
+        "input": input.name(),
+        "description": input.description(),
+        "machine": machine,
+        "runs": runs.iter().map(run).collect::<Vec<_>>(),
+    })
+}
+
+fn run(run: &Run) -> Value {
+    let figures = &run.outcome.figures;
+    let mut object = Map::new();
+    object.insert("controller".to_owned(), json!(run.controller));
+    object.insert("changes".to_owned(), json!(run.changes));
+    object.insert("duration_s".to_owned(), json!(figures.duration));
+    let axes = figures.axes.iter().map(|axis| (axis.name.clone(), self::axis(axis)));
+    object.insert("axes".to_owned(), Value::Object(axes.collect()));
+    object.insert("contour_error_um".to_owned(), contour(figures));
+    object.insert("orientation_error_mdeg".to_owned(), orientation(figures));
+    object.insert("circles".to_owned(), figures.circles.iter().map(circle).collect());
+    object.insert("bidirectional".to_owned(), figures.bidirectional.iter().map(bidirectional).collect());
+    object.insert("corners".to_owned(), figures.corners.iter().map(corner).collect());
+    Value::Object(object)
+}
+
+fn axis(axis: &AxisFigures) -> Value {
+    let (_, unit, scale) = scale(axis.kind);
+    let report = &axis.report;
+    json!({
+        "unit": unit,
+        "moves": axis.moves,
+        "tracking_error": {
+            "max": report.max_tracking_error / scale,
+            "rms": report.rms_tracking_error / scale,
+        },
+        "synchronized_tracking_error": {
+            "max": report.max_synchronized_tracking_error / scale,
+            "rms": report.rms_synchronized_tracking_error / scale,
+        },
+        "peak_current_a": report.peak_current,
+        "saturation_s": report.saturation_time,
+        "friction_extrapolated": axis.friction_extrapolated,
+    })
+}
+
+fn contour(figures: &Figures) -> Value {
+    figures.contour.map_or(Value::Null, |contour| {
+        json!({
+            "reference": match contour.reference {
+                Reference::Path => "path",
+                Reference::Setpoints => "set-points",
+            },
+            "max": contour.max / MICROMETRE,
+            "rms": contour.rms / MICROMETRE,
+            "max_within_ends": contour.max_within_ends / MICROMETRE,
+            "rms_within_ends": contour.rms_within_ends / MICROMETRE,
+        })
+    })
+}
+
+fn orientation(figures: &Figures) -> Value {
+    figures.orientation.map_or(
+        Value::Null,
+        |orientation| json!({ "max": orientation.max / MILLIDEGREE, "rms": orientation.rms / MILLIDEGREE }),
+    )
+}
+
+fn circle(circle: &CircleFigures) -> Value {
+    json!({
+        "move": circle.index,
+        "plane": circle.plane,
+        "direction": if circle.counterclockwise { "counterclockwise" } else { "clockwise" },
+        "radius_mm": circle.radius / MILLIMETRE,
+        "radial_deviation_um": {
+            "mean": circle.mean / MICROMETRE,
+            "min": circle.min / MICROMETRE,
+            "max": circle.max / MICROMETRE,
+        },
+        "circular_deviation_um": circle.circular_deviation.map(|g| g / MICROMETRE),
+    })
+}
+
+fn bidirectional(pair: &BidirectionalFigures) -> Value {
+    json!({
+        "moves": pair.moves,
+        "circular_deviation_um": pair.circular_deviation / MICROMETRE,
+        "mean_radial_deviation_um": pair.mean_radial_deviation / MICROMETRE,
+    })
+}
+
+fn corner(corner: &CornerFigures) -> Value {
+    json!({
+        "move": corner.index,
+        "turn_deg": corner.turn / DEGREE,
+        "max_contour_error_um": corner.max_contour_error / MICROMETRE,
+    })
+}

@@ -1,0 +1,60 @@
+//! Progress on standard error, for work that takes more than a second.
+
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Work shorter than this shows nothing.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// Position instants between two looks at the clock.
+const LOOK: u32 = 256;
+/// Steps of the bar in a simulated second.
+const RESOLUTION: f64 = 1000.0;
+
+/// A bar, or a counter where the end is not known; neither where nobody looks.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+    began: Instant,
+    instants: u32,
+    shown: bool,
+}
+
+impl Progress {
+    /// For `name`, which takes `duration` s of simulated time if that is known.
+    pub fn new(name: &str, duration: Option<f64>) -> Self {
+        let bar = ProgressBar::with_draw_target(
+            duration.map(|duration| (duration * RESOLUTION) as u64),
+            ProgressDrawTarget::hidden(),
+        );
+        let template = match duration {
+            Some(_) => "{prefix} {wide_bar} {percent} %, {eta} left",
+            None => "{prefix} {spinner} {msg}",
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_prefix(name.to_owned());
+        Progress { bar, began: Instant::now(), instants: 0, shown: false }
+    }
+
+    /// Tells that `time` s have been simulated.
+    pub fn reached(&mut self, time: f64) {
+        self.instants = (self.instants + 1) % LOOK;
+        if self.instants != 0 || self.began.elapsed() < PATIENCE {
+            return;
+        }
+        if !self.shown {
+            // Hidden still where standard error is no terminal.
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+            self.shown = true;
+        }
+        self.bar.set_position((time * RESOLUTION) as u64);
+        self.bar.set_message(format!("{time:.0} s simulated"));
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,60 @@
+//! `virtual_axes psec`: the set-points of a scenario as a file.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
+use virtual_axes::files::psec_writer;
+use virtual_axes::simulation::joints;
+use virtual_axes::trial::Setpoints;
+
+use crate::input::Input;
+use crate::variant;
+
+/// Which set-points, and where to.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// A shipped scenario or a scenario file.
+    scenario: String,
+    /// The file: CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory on `/psec`, or the YAML
+    /// that `ros2 topic pub` takes.
+    #[arg(long, value_name = "FILE.csv|FILE.mcap|FILE.yaml")]
+    out: PathBuf,
+    /// A shipped machine or a machine file, whose limits and sampling period they are for.
+    #[arg(long, default_value = DEFAULT_MACHINE)]
+    machine: String,
+    /// A parameter, as in `x.limits.jerk_m_s3=20`; can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Feed in the place of the scenario's, m/min (rpm for a scenario of rotary moves).
+    #[arg(long)]
+    feed: Option<f64>,
+}
+
+/// Writes them; says nothing.
+pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+    let machine = Parameters::load(&arguments.machine)?;
+    let config = variant::parameters(&machine, None, &arguments.set)?.machine_config()?;
+    let input = Input::open(&arguments.scenario, None)?;
+    input.must_not_be(&arguments.out)?;
+    let program = input.program(&config, arguments.feed)?;
+    let Setpoints::Grid(mut source) = input.setpoints(&config, program.as_ref())? else {
+        return Err(format!("{}: trajectories already; psec wants a scenario", arguments.scenario).into());
+    };
+    let limits = joints(&config, "");
+    let names: Vec<String> = source
+        .joints()
+        .iter()
+        .filter_map(|&place| limits.get(place))
+        .map(|joint| joint.name.clone())
+        .collect();
+    let mut writer = psec_writer(&arguments.out, &names)?;
+    let mut row = vec![0.0; names.len()];
+    let mut time = 0;
+    while source.next(&mut row).map_err(|error| -> Box<dyn Error> { error })? {
+        writer.row(time, &row)?;
+        time += config.periods().position;
+    }
+    writer.finish()?;
+    Ok(String::new())
+}

@@ -1,0 +1,36 @@
+//! `--report`: the runs of a command as a page with plots.
+
+use std::error::Error;
+use std::path::Path;
+
+use virtual_axes::assess::Recording;
+use virtual_axes::files::OutputFile;
+use virtual_axes::report::{Report, ReportRun};
+
+use crate::input::Input;
+use crate::run::Run;
+use crate::table;
+
+/// Writes the page; it stands under its name only when it is whole.
+pub fn write(path: &Path, input: &Input, machine: &str, runs: &[Run]) -> Result<(), Box<dyn Error>> {
+    let titles: Vec<String> = runs.iter().map(Run::title).collect();
+    let empty = Recording::default();
+    let runs = runs.iter().zip(&titles).map(|(run, title)| {
+        let figures = &run.outcome.figures;
+        let mut facts = vec![
+            ("machine".to_owned(), machine.to_owned()),
+            ("controller".to_owned(), run.controller.clone()),
+        ];
+        facts.extend(run.changes.iter().map(|change| ("set".to_owned(), change.clone())));
+        ReportRun {
+            title,
+            facts,
+            tables: vec![table::axes(figures), table::path(figures)],
+            recording: run.outcome.recording.as_ref().unwrap_or(&empty),
+        }
+    });
+    let report = Report { title: input.name(), description: input.description(), runs: runs.collect() };
+    let mut file = OutputFile::create(path)?;
+    report.write(&mut file)?;
+    Ok(file.finish()?)
+}

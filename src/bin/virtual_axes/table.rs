@@ -1,0 +1,156 @@
+//! Figures as tables: on the terminal and in reports.
+
+use virtual_axes::config::AxisKind;
+use virtual_axes::report::{Column, Table};
+use virtual_axes::trial::{Figures, Reference};
+use virtual_axes::units::{DEGREE, MILLIMETRE};
+
+/// Metres in a micrometre.
+pub const MICROMETRE: f64 = 1e-6;
+/// Radians in a thousandth of a degree.
+pub const MILLIDEGREE: f64 = 1e-3 * DEGREE;
+
+/// Unit of an axis's errors for people and for programs, and its value in SI.
+pub fn scale(kind: AxisKind) -> (&'static str, &'static str, f64) {
+    match kind {
+        AxisKind::Linear => ("µm", "um", MICROMETRE),
+        AxisKind::Rotary => ("mdeg", "mdeg", MILLIDEGREE),
+    }
+}
+
+/// A table for a terminal: the first column to the left, the others to the right.
+pub fn text(table: &Table) -> String {
+    let header: Vec<String> = table.columns.iter().map(heading).collect();
+    let all = || std::iter::once(&header).chain(&table.rows);
+    let width = |column: usize| all().filter_map(|row| row.get(column)).map(|c| c.chars().count()).max();
+    let mut text = String::new();
+    for row in all() {
+        let mut line = String::new();
+        for (column, cell) in row.iter().enumerate() {
+            let pad = " ".repeat(width(column).unwrap_or(0) - cell.chars().count());
+            match column {
+                0 => line.extend([cell.as_str(), &pad]),
+                _ => line.extend(["  ", &pad, cell]),
+            }
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+fn heading(column: &Column) -> String {
+    match column.unit.as_str() {
+        "" => column.name.clone(),
+        unit => format!("{}, {unit}", column.name),
+    }
+}
+
+fn table(caption: &str, columns: &[(&str, &str)]) -> Table {
+    let columns = columns.iter().map(|&(name, unit)| Column::new(name, unit)).collect();
+    Table { caption: caption.to_owned(), columns, rows: Vec::new() }
+}
+
+/// Tracking errors, currents and saturation of each axis.
+pub fn axes(figures: &Figures) -> Table {
+    let columns = [
+        ("axis", ""),
+        ("unit", ""),
+        ("tracking error max", ""),
+        ("RMS", ""),
+        ("synchronised max", ""),
+        ("RMS", ""),
+        ("peak current", "A"),
+        ("saturated", "s"),
+        ("remarks", ""),
+    ];
+    let mut table = table("Axes", &columns);
+    for axis in &figures.axes {
+        let (unit, _, scale) = scale(axis.kind);
+        let r = &axis.report;
+        let errors = [
+            r.max_tracking_error,
+            r.rms_tracking_error,
+            r.max_synchronized_tracking_error,
+            r.rms_synchronized_tracking_error,
+        ];
+        let mut row = vec![axis.name.clone(), unit.to_owned()];
+        row.extend(errors.iter().map(|error| format!("{:.1}", error / scale)));
+        row.push(format!("{:.2}", r.peak_current));
+        row.push(format!("{:.3}", r.saturation_time));
+        let mut remarks = Vec::new();
+        if !axis.moves {
+            remarks.push("stands still");
+        }
+        if axis.friction_extrapolated {
+            remarks.push("friction law extrapolated");
+        }
+        row.push(remarks.join("; "));
+        table.rows.push(row);
+    }
+    table
+}
+
+/// Contour, orientation, circles and corners; empty where there is nothing of these.
+pub fn path(figures: &Figures) -> Table {
+    let mut table = table("Path", &[("error of the path", ""), ("value", ""), ("unit", "")]);
+    let mut add = |name: String, value: f64, unit: &str, scale: f64| {
+        table.rows.push(vec![name, signed(value / scale), unit.to_owned()]);
+    };
+    if let Some(contour) = &figures.contour {
+        let reference = match contour.reference {
+            Reference::Path => "",
+            Reference::Setpoints => " (from the polyline of the set-points)",
+        };
+        let parts = [
+            ("contour error, max", contour.max, contour.max_within_ends),
+            ("contour error, RMS", contour.rms, contour.rms_within_ends),
+        ];
+        for (name, whole, within_ends) in parts {
+            add(format!("{name}{reference}"), whole, "µm", MICROMETRE);
+            // Twice only where the two differ in print.
+            if signed(whole / MICROMETRE) != signed(within_ends / MICROMETRE) {
+                add(format!("{name}, without overshoot of the path's ends"), within_ends, "µm", MICROMETRE);
+            }
+        }
+    }
+    if let Some(orientation) = &figures.orientation
+        && orientation.max > 0.0
+    {
+        add("orientation error, max".to_owned(), orientation.max, "mdeg", MILLIDEGREE);
+        add("orientation error, RMS".to_owned(), orientation.rms, "mdeg", MILLIDEGREE);
+    }
+    for circle in &figures.circles {
+        let plane = circle.plane.join("–");
+        let direction = if circle.counterclockwise { "counterclockwise" } else { "clockwise" };
+        let name = format!("circle R {} mm in {plane}, {direction}", millimetres(circle.radius));
+        add(format!("{name}: radial deviation, mean"), circle.mean, "µm", MICROMETRE);
+        add(format!("{name}: radial deviation, min"), circle.min, "µm", MICROMETRE);
+        add(format!("{name}: radial deviation, max"), circle.max, "µm", MICROMETRE);
+        if let Some(deviation) = circle.circular_deviation {
+            add(format!("{name}: circular deviation G"), deviation, "µm", MICROMETRE);
+        }
+    }
+    for pair in &figures.bidirectional {
+        add("both directions: circular deviation G(b)".to_owned(), pair.circular_deviation, "µm", MICROMETRE);
+        let mean = pair.mean_radial_deviation;
+        add("both directions: mean radial deviation D".to_owned(), mean, "µm", MICROMETRE);
+    }
+    for corner in &figures.corners {
+        let name =
+            format!("corner behind move {}, {:.0}°: contour error, max", corner.index, corner.turn / DEGREE);
+        add(name, corner.max_contour_error, "µm", MICROMETRE);
+    }
+    table
+}
+
+fn signed(value: f64) -> String {
+    // No "-0.0".
+    let text = format!("{value:.1}");
+    if text == "-0.0" { "0.0".to_owned() } else { text }
+}
+
+fn millimetres(value: f64) -> String {
+    // To a µm, so that 0.15 m is 150 and not 150.00000000000003.
+    format!("{}", (value / MILLIMETRE * 1e3).round() / 1e3)
+}

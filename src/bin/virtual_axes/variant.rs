@@ -1,0 +1,66 @@
+//! The machine as each run of a command has it.
+
+use std::error::Error;
+
+use virtual_axes::config::{Assignment, Parameters, Source, Value, parse_assignment};
+
+/// Position controllers that a run can be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Controller {
+    /// Proportional, with the feedforward of the machine file.
+    Cascade,
+    /// Proportional, without feedforward.
+    CascadeNoff,
+}
+
+impl Controller {
+    /// The parameters that it sets on each axis of `parameters`.
+    fn assignments(self, parameters: &Parameters) -> Vec<Assignment> {
+        let set = |key: String, value| Assignment { key, value, source: Source::named("--controller") };
+        let of_key = |(key, _): (String, Value)| {
+            if key.ends_with(".position_loop.controller") {
+                Some(set(key, Value::Text("cascade".to_owned())))
+            } else if self == Controller::CascadeNoff && key.contains(".feedforward.") {
+                Some(set(key, Value::Double(0.0)))
+            } else {
+                None
+            }
+        };
+        parameters.iter().filter_map(of_key).collect()
+    }
+}
+
+/// Name of the controller that the axes of `parameters` have.
+pub fn controller_name(parameters: &Parameters) -> String {
+    let mut names: Vec<String> = Vec::new();
+    let mut feedforward = false;
+    for (key, value) in parameters.iter() {
+        match value {
+            Value::Text(name) if key.ends_with(".position_loop.controller") && !names.contains(&name) => {
+                names.push(name);
+            }
+            Value::Double(weight) if key.contains(".feedforward.") => feedforward |= weight != 0.0,
+            _ => {}
+        }
+    }
+    match names.as_slice() {
+        [name] if name == "cascade" && !feedforward => "cascade-noff".to_owned(),
+        _ => names.join("+"),
+    }
+}
+
+/// One machine: the controller, then the changes, over the machine file.
+pub fn parameters(
+    machine: &Parameters,
+    controller: Option<Controller>,
+    changes: &[String],
+) -> Result<Parameters, Box<dyn Error>> {
+    let mut parameters = machine.clone();
+    if let Some(controller) = controller {
+        parameters.set_all(controller.assignments(machine))?;
+    }
+    let source = Source::named("--set");
+    let assignments = changes.iter().map(|text| parse_assignment(text, &source));
+    parameters.set_all(assignments.collect::<Result<_, _>>()?)?;
+    Ok(parameters)
+}

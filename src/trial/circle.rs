@@ -1,0 +1,132 @@
+//! Circularity of the circles of a program.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use crate::assess::{CircleAssessor, CircleTrace, bidirectional};
+use crate::config::{AxisKind, MachineConfig};
+use crate::path::{Circle, Program};
+
+use super::figures::{BidirectionalFigures, CircleFigures};
+use super::windows::steady_circle;
+
+/// Most circles that are told one by one.
+const MOST: usize = 100;
+/// Points of a circle that are kept for its polar plot.
+const TRACE: usize = 1 << 14;
+/// Circles within this of each other are the same one, m.
+const SAME: f64 = 1e-9;
+
+/// One circle at steady feed.
+#[derive(Debug, Clone)]
+struct Steady {
+    /// Move, from 0.
+    index: usize,
+    window: Range<f64>,
+    circle: Circle,
+    assessor: CircleAssessor,
+    trace: CircleTrace,
+}
+
+/// The circles of a program, in order.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Circles {
+    list: Vec<Steady>,
+    /// The first whose window is not over.
+    next: usize,
+}
+
+impl Circles {
+    pub(super) fn of(program: &Program, machine: &MachineConfig) -> Self {
+        let axes = machine.axes();
+        let blocks = program.path().blocks().iter().enumerate();
+        let circles = blocks.filter_map(|(index, block)| {
+            let circle = block.circle()?;
+            let plane = circle.plane;
+            if plane.iter().any(|&place| axes[place].kind() != AxisKind::Linear) {
+                return None;
+            }
+            let window = steady_circle(program, index)?;
+            let trace = CircleTrace {
+                plane: plane.map(|place| axes[place].name().to_owned()),
+                radius: circle.radius,
+                counterclockwise: circle.sweep > 0.0,
+                angle: Vec::new(),
+                deviation: Vec::new(),
+            };
+            let assessor = CircleAssessor::new(circle.centre, circle.radius);
+            Some(Steady { index, window, circle, assessor, trace })
+        });
+        Circles { list: circles.take(MOST).collect(), next: 0 }
+    }
+
+    /// Takes the programmed coordinates of where the axes are at `time`, s, into account.
+    pub(super) fn observe(&mut self, time: f64, coordinates: &[f64], record: bool) {
+        while self.list.get(self.next).is_some_and(|steady| time >= steady.window.end) {
+            self.next += 1;
+        }
+        let Some(steady) = self.list.get_mut(self.next).filter(|s| s.window.contains(&time)) else {
+            return;
+        };
+        let [u, v] = steady.circle.plane.map(|place| coordinates[place]);
+        let deviation = steady.assessor.push(u, v);
+        if record && steady.trace.angle.len() < TRACE {
+            let [cu, cv] = steady.circle.centre;
+            let angle = (v - cv).atan2(u - cu);
+            let angle = match steady.trace.angle.last() {
+                Some(last) => last + (angle - last + PI).rem_euclid(2.0 * PI) - PI,
+                None => angle,
+            };
+            steady.trace.angle.push(angle);
+            steady.trace.deviation.push(deviation);
+        }
+    }
+
+    pub(super) fn figures(&self) -> Vec<CircleFigures> {
+        let figures = self.list.iter().filter_map(|steady| {
+            let found = steady.assessor.report()?;
+            Some(CircleFigures {
+                index: steady.index + 1,
+                plane: steady.trace.plane.clone(),
+                counterclockwise: steady.circle.sweep > 0.0,
+                radius: steady.circle.radius,
+                mean: found.mean,
+                min: found.min,
+                max: found.max,
+                circular_deviation: found.full.map(|full| full.circular_deviation),
+            })
+        });
+        figures.collect()
+    }
+
+    /// Each circle that was run in both directions.
+    pub(super) fn bidirectional(&self) -> Vec<BidirectionalFigures> {
+        let mut pairs = Vec::new();
+        for (i, first) in self.list.iter().enumerate() {
+            let other = self.list.iter().skip(i + 1).find(|second| first.is_reverse_of(second));
+            let Some(second) = other else { continue };
+            if let Some(found) = bidirectional(&first.assessor, &second.assessor) {
+                pairs.push(BidirectionalFigures {
+                    moves: [first.index + 1, second.index + 1],
+                    circular_deviation: found.circular_deviation,
+                    mean_radial_deviation: found.mean_radial_deviation,
+                });
+            }
+        }
+        pairs
+    }
+
+    pub(super) fn into_traces(self) -> Vec<CircleTrace> {
+        self.list.into_iter().map(|steady| steady.trace).collect()
+    }
+}
+
+impl Steady {
+    fn is_reverse_of(&self, other: &Steady) -> bool {
+        let (a, b) = (&self.circle, &other.circle);
+        a.plane == b.plane
+            && (a.sweep > 0.0) != (b.sweep > 0.0)
+            && (a.radius - b.radius).abs() < SAME
+            && (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1]) < SAME
+    }
+}

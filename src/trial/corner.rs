@@ -1,0 +1,56 @@
+//! Contour error around the corners of a path.
+
+use crate::assess::Nearest;
+use crate::config::MachineConfig;
+use crate::path::Program;
+use crate::units::seconds;
+
+use super::figures::CornerFigures;
+use super::windows::turn;
+
+/// Half the length of the window around a corner, s.
+const WINDOW: f64 = 0.15;
+/// Most corners that are told one by one.
+const MOST: usize = 1000;
+
+/// Looks at each corner within its window.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Corners {
+    /// Time at which the corner has passed the delay of the position loop, s, and its figures.
+    list: Vec<(f64, CornerFigures)>,
+    /// The first whose window is not over.
+    next: usize,
+}
+
+impl Corners {
+    pub(super) fn of(program: &Program, machine: &MachineConfig) -> Self {
+        let kinds: Vec<_> = machine.axes().iter().map(|axis| axis.kind()).collect();
+        let delay = machine.axes().iter().map(|axis| axis.alpha()).max().unwrap_or(0);
+        let blocks = program.path().blocks();
+        let corners = blocks.windows(2).enumerate().filter_map(|(index, pair)| {
+            let turn = turn(&pair[0], &pair[1], &kinds)?;
+            let (end, next) = (program.span(index).end, program.span(index + 1).start);
+            // Behind a dwell the axes start anew: that is no corner.
+            if next > end {
+                return None;
+            }
+            let time = end + seconds(delay);
+            Some((time, CornerFigures { index: index + 1, turn, max_contour_error: 0.0 }))
+        });
+        Corners { list: corners.take(MOST).collect(), next: 0 }
+    }
+
+    pub(super) fn observe(&mut self, time: f64, nearest: &Nearest) {
+        while self.list.get(self.next).is_some_and(|(corner, _)| time > corner + WINDOW) {
+            self.next += 1;
+        }
+        let open = self.list.iter_mut().skip(self.next).take_while(|(corner, _)| time >= corner - WINDOW);
+        for (_, figures) in open {
+            figures.max_contour_error = figures.max_contour_error.max(nearest.within_ends);
+        }
+    }
+
+    pub(super) fn finish(self) -> Vec<CornerFigures> {
+        self.list.into_iter().map(|(_, figures)| figures).collect()
+    }
+}

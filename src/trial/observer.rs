@@ -1,0 +1,182 @@
+//! Looks at every tick of a trial.
+
+use std::sync::Arc;
+
+use crate::assess::{AxisAssessor, Nearest, PathTracker, SetpointTracker};
+use crate::config::{AxisKind, MachineConfig};
+use crate::kinematics::{Kinematics, ToolPose};
+use crate::path::Frame;
+use crate::units::seconds;
+
+use super::circle::Circles;
+use super::corner::Corners;
+use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, Reference};
+use super::recorder::Recorder;
+use super::{Outcome, Tick, Trial};
+
+/// Largest and mean square of an error.
+#[derive(Debug, Clone, Copy, Default)]
+struct Extent {
+    max: f64,
+    squares: f64,
+    count: u64,
+}
+
+impl Extent {
+    fn push(&mut self, value: f64) {
+        self.max = self.max.max(value);
+        self.squares += value * value;
+        self.count += 1;
+    }
+
+    fn rms(&self) -> f64 {
+        if self.count == 0 { 0.0 } else { (self.squares / self.count as f64).sqrt() }
+    }
+}
+
+/// What the tool is followed along.
+enum Tracker {
+    Path(Box<PathTracker>),
+    Setpoints(Box<SetpointTracker>),
+}
+
+/// Gathers figures and recording.
+pub(super) struct Observer<'a> {
+    trial: &'a Trial<'a>,
+    kinematics: Kinematics,
+    tracker: Option<Tracker>,
+    tick: f64,
+    end: f64,
+    axes: Vec<AxisAssessor>,
+    moves: Vec<bool>,
+    extrapolated: Vec<bool>,
+    start: Vec<f64>,
+    psec: Vec<f64>,
+    position: Vec<f64>,
+    contour: Extent,
+    within_ends: Extent,
+    orientation: Extent,
+    circles: Circles,
+    corners: Corners,
+    recorder: Option<Recorder>,
+}
+
+impl<'a> Observer<'a> {
+    pub(super) fn new(trial: &'a Trial<'a>, start: &[f64]) -> Self {
+        let machine: &MachineConfig = trial.machine;
+        let count = machine.axes().len();
+        let kinematics = Kinematics::new(machine);
+        let tracker = kinematics.has_linear_axis().then(|| match &trial.program {
+            Some(program) => Tracker::Path(Box::new(PathTracker::new(Arc::clone(program.path())))),
+            None => Tracker::Setpoints(Box::new(SetpointTracker::new(kinematics.forward(start)))),
+        });
+        let program = trial.program.as_deref();
+        Observer {
+            trial,
+            tracker,
+            tick: seconds(machine.periods().current),
+            end: 0.0,
+            axes: vec![AxisAssessor::default(); count],
+            moves: vec![false; count],
+            extrapolated: vec![false; count],
+            start: start.to_vec(),
+            psec: start.to_vec(),
+            position: start.to_vec(),
+            contour: Extent::default(),
+            within_ends: Extent::default(),
+            orientation: Extent::default(),
+            circles: program.map(|p| Circles::of(p, machine)).unwrap_or_default(),
+            corners: program.map(|p| Corners::of(p, machine)).unwrap_or_default(),
+            recorder: trial.record.then(|| Recorder::new(count)),
+            kinematics,
+        }
+    }
+
+    /// Takes a tick into account; `moving` tells whether set-points are under way.
+    pub(super) fn observe(&mut self, tick: Tick<'_>, moving: bool) {
+        let time = seconds(tick.time);
+        let axes = tick.machine.axes();
+        for (place, axis) in axes.iter().enumerate() {
+            let sample = axis.sample();
+            self.psec[place] = sample.psec;
+            self.position[place] = sample.position;
+            self.moves[place] |= sample.psec != self.start[place];
+            self.extrapolated[place] |= sample.friction_extrapolated;
+            if moving {
+                self.axes[place].observe(sample, tick.position_instant);
+            }
+        }
+        let pose = self.kinematics.forward(&self.position);
+        let nearest = self.nearest(&pose, time, tick.position_instant);
+        if let Some(nearest) = &nearest {
+            self.contour.push(nearest.distance);
+            self.within_ends.push(nearest.within_ends);
+            self.orientation.push(nearest.orientation);
+            self.corners.observe(time, nearest);
+        }
+        if tick.position_instant
+            && let Some(recorder) = &mut self.recorder
+        {
+            let tool = nearest.as_ref().map(|nearest| (nearest, pose.tip.into()));
+            recorder.push(time, axes.iter().map(|axis| axis.sample()), tool);
+        }
+        if self.trial.program.as_ref().is_some_and(|p| p.path().frame() == Frame::Workpiece) {
+            self.kinematics.joints_to_tip(&mut self.position);
+        }
+        self.circles.observe(time, &self.position, self.recorder.is_some());
+        self.end = time + self.tick;
+    }
+
+    fn nearest(&mut self, pose: &ToolPose, time: f64, position_instant: bool) -> Option<Nearest> {
+        match (self.tracker.as_mut()?, &self.trial.program) {
+            (Tracker::Path(tracker), Some(program)) => Some(tracker.nearest(pose, program.progress(time))),
+            (Tracker::Setpoints(tracker), _) => {
+                if position_instant {
+                    tracker.push(self.kinematics.forward(&self.psec));
+                }
+                Some(tracker.nearest(pose))
+            }
+            (Tracker::Path(_), None) => None,
+        }
+    }
+
+    pub(super) fn finish(self) -> Outcome {
+        let machine = self.trial.machine;
+        let axes = machine.axes().iter().enumerate().map(|(place, axis)| AxisFigures {
+            name: axis.name().to_owned(),
+            kind: axis.kind(),
+            moves: self.moves[place],
+            report: self.axes[place].report(self.tick),
+            friction_extrapolated: self.extrapolated[place],
+        });
+        let reference = match self.tracker {
+            Some(Tracker::Path(_)) => Some(Reference::Path),
+            Some(Tracker::Setpoints(_)) => Some(Reference::Setpoints),
+            None => None,
+        };
+        let rotary = machine.axes().iter().zip(&self.moves).any(|(a, &m)| m && a.kind() == AxisKind::Rotary);
+        let has_orientation = reference.is_some() && self.kinematics.has_rotary_axis();
+        let figures = Figures {
+            duration: self.end,
+            axes: axes.collect(),
+            contour: reference.map(|reference| ContourFigures {
+                reference,
+                max: self.contour.max,
+                rms: self.contour.rms(),
+                max_within_ends: self.within_ends.max,
+                rms_within_ends: self.within_ends.rms(),
+            }),
+            orientation: has_orientation
+                .then(|| OrientationFigures { max: self.orientation.max, rms: self.orientation.rms() }),
+            circles: self.circles.figures(),
+            bidirectional: self.circles.bidirectional(),
+            corners: self.corners.finish(),
+        };
+        let recording = self.recorder.map(|recorder| {
+            let mut recording = recorder.finish(machine, &self.moves, has_orientation && rotary);
+            recording.circles = self.circles.into_traces();
+            recording
+        });
+        Outcome { figures, recording }
+    }
+}

@@ -1,0 +1,236 @@
+//! Keeps the signals of a trial in bounded memory.
+
+use crate::assess::{AxisTrace, Nearest, Recording, ToolTrace};
+use crate::config::MachineConfig;
+use crate::machine::AxisSample;
+
+/// Rows that are kept; beyond, two become one. An even number.
+const CAPACITY: usize = 1 << 15;
+
+/// A signal that keeps its extremes when it is thinned.
+#[derive(Debug, Clone, Default)]
+struct Signal {
+    values: Vec<f64>,
+    /// Lowest and highest since the last values were written, and whether the lowest came first.
+    low: f64,
+    high: f64,
+    low_first: bool,
+}
+
+impl Signal {
+    /// Adds sample number `count` of a bucket of `bucket` samples, which becomes two values; a bucket
+    /// of one is that value.
+    fn push(&mut self, value: f64, count: usize, bucket: usize) {
+        if bucket == 1 {
+            self.values.push(value);
+            return;
+        }
+        if count == 0 {
+            (self.low, self.high) = (value, value);
+        }
+        if value < self.low {
+            (self.low, self.low_first) = (value, false);
+        }
+        if value > self.high {
+            (self.high, self.low_first) = (value, true);
+        }
+        if count + 1 == bucket {
+            let (first, second) = if self.low_first { (self.low, self.high) } else { (self.high, self.low) };
+            self.values.extend([first, second]);
+        }
+    }
+
+    /// Makes two values of each four, the extremes in their order.
+    fn thin(&mut self) {
+        let mut kept = Vec::with_capacity(self.values.capacity());
+        for four in self.values.chunks(4) {
+            let at = |order: fn(&f64, &f64) -> std::cmp::Ordering| {
+                (0..four.len()).max_by(|&a, &b| order(&four[a], &four[b])).unwrap_or(0)
+            };
+            let (low, high) = (at(|a, b| b.total_cmp(a)), at(f64::total_cmp));
+            let (first, second) = if low < high { (low, high) } else { (high, low) };
+            kept.extend([four[first], four[second]]);
+        }
+        self.values = kept;
+    }
+}
+
+/// Signals of an axis, in the order of [`AxisTrace`].
+const AXIS_SIGNALS: usize = 10;
+
+fn axis_values(s: &AxisSample) -> [f64; AXIS_SIGNALS] {
+    [
+        s.psec,
+        s.position,
+        s.tracking_error(),
+        s.synchronized_tracking_error(),
+        s.velocity,
+        s.current,
+        s.current_setpoint,
+        s.friction_current,
+        s.gravity_current,
+        s.load_current,
+    ]
+}
+
+/// Gathers a [`Recording`], one row per position instant as long as there is room.
+#[derive(Debug)]
+pub(super) struct Recorder {
+    time: Vec<f64>,
+    axes: Vec<[Signal; AXIS_SIGNALS]>,
+    contour: Signal,
+    orientation: Signal,
+    /// Reference and position of the tool tip, one pair per value of the signals.
+    tool: Vec<[[f64; 3]; 2]>,
+    /// Samples in a bucket: 1, then 4, 8, …
+    bucket: usize,
+    count: usize,
+}
+
+impl Recorder {
+    pub(super) fn new(axes: usize) -> Self {
+        Recorder {
+            time: Vec::new(),
+            axes: (0..axes).map(|_| Default::default()).collect(),
+            contour: Signal::default(),
+            orientation: Signal::default(),
+            tool: Vec::new(),
+            bucket: 1,
+            count: 0,
+        }
+    }
+
+    /// Adds a position instant, s from the start.
+    pub(super) fn push<'a>(
+        &mut self,
+        time: f64,
+        samples: impl Iterator<Item = &'a AxisSample>,
+        tool: Option<(&Nearest, [f64; 3])>,
+    ) {
+        let (count, bucket) = (self.count, self.bucket);
+        for (signals, sample) in self.axes.iter_mut().zip(samples) {
+            for (signal, value) in signals.iter_mut().zip(axis_values(sample)) {
+                signal.push(value, count, bucket);
+            }
+        }
+        // A bucket is told by its first instant and its middle.
+        let told = bucket == 1 || count == 0 || count == bucket / 2;
+        if told {
+            self.time.push(time);
+        }
+        if let Some((nearest, position)) = tool {
+            self.contour.push(nearest.distance, count, bucket);
+            self.orientation.push(nearest.orientation, count, bucket);
+            if told {
+                self.tool.push([nearest.point.into(), position]);
+            }
+        }
+        self.count = (count + 1) % bucket;
+        if self.count == 0 && self.time.len() >= CAPACITY {
+            self.thin();
+        }
+    }
+
+    fn thin(&mut self) {
+        for signal in self.axes.iter_mut().flatten() {
+            signal.thin();
+        }
+        self.contour.thin();
+        self.orientation.thin();
+        let mut place = 0;
+        let mut every_second = || {
+            place += 1;
+            place % 2 == 1
+        };
+        self.time.retain(|_| every_second());
+        let mut place = 0;
+        self.tool.retain(|_| {
+            place += 1;
+            place % 2 == 1
+        });
+        self.bucket = if self.bucket == 1 { 4 } else { 2 * self.bucket };
+    }
+
+    /// The recording; `moves` tells which axes move.
+    pub(super) fn finish(mut self, machine: &MachineConfig, moves: &[bool], orientation: bool) -> Recording {
+        // A bucket that was begun is left out, so that all lists are of one length.
+        let rows = self.axes.first().map_or(0, |signals| signals[0].values.len());
+        self.time.truncate(rows);
+        self.tool.truncate(rows);
+        let axes = machine.axes().iter().zip(self.axes).zip(moves).map(|((axis, signals), &moves)| {
+            let [
+                psec,
+                position,
+                tracking_error,
+                synchronized_tracking_error,
+                velocity,
+                current,
+                current_setpoint,
+                friction_current,
+                gravity_current,
+                load_current,
+            ] = signals.map(|signal| signal.values);
+            AxisTrace {
+                name: axis.name().to_owned(),
+                kind: axis.kind(),
+                moves,
+                psec,
+                position,
+                tracking_error,
+                synchronized_tracking_error,
+                velocity,
+                current,
+                current_setpoint,
+                friction_current,
+                gravity_current,
+                load_current,
+            }
+        });
+        let tool = (!self.tool.is_empty()).then(|| ToolTrace {
+            reference: self.tool.iter().map(|pair| pair[0]).collect(),
+            position: self.tool.iter().map(|pair| pair[1]).collect(),
+            contour_error: self.contour.values,
+            orientation_error: if orientation { self.orientation.values } else { Vec::new() },
+        });
+        Recording { time: self.time, axes: axes.collect(), tool, circles: Vec::new() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_signal_keeps_a_spike_of_one_sample() {
+        let mut signal = Signal::default();
+        let mut recorder = Recorder::new(1);
+        let length = 3 * CAPACITY;
+        for k in 0..length {
+            let position = if k == length / 2 + 1 { 1.0 } else { 0.0 };
+            let sample = AxisSample { position, ..AxisSample::default() };
+            recorder.push(k as f64, [&sample].into_iter(), None);
+            signal.push(position, 0, 1);
+        }
+        let values = &recorder.axes[0][1].values;
+        assert!(values.len() <= CAPACITY && values.len() >= CAPACITY / 4, "{}", values.len());
+        assert_eq!(values.iter().filter(|&&v| v == 1.0).count(), 1);
+        let at = values.iter().position(|&v| v == 1.0).expect("the spike is there");
+        let distance = (recorder.time[at] - (length / 2 + 1) as f64).abs();
+        assert!(distance <= recorder.bucket as f64, "the spike is {distance} instants off");
+    }
+
+    #[test]
+    fn time_and_signals_are_of_one_length() {
+        for length in [1, CAPACITY - 1, CAPACITY, CAPACITY + 3, 2 * CAPACITY + 5] {
+            let mut recorder = Recorder::new(1);
+            for k in 0..length {
+                recorder.push(k as f64, [&AxisSample::default()].into_iter(), None);
+            }
+            let config = crate::config::Parameters::embedded_default()
+                .and_then(|p| p.machine_config())
+                .expect("the embedded machine is valid");
+            let recording = recorder.finish(&config, &[false], false);
+            assert_eq!(recording.time.len(), recording.axes[0].position.len(), "{length} instants");
+        }
+    }
+}

@@ -1,0 +1,210 @@
+#!/usr/bin/env python3
+"""Writes docs/reproduction.md: the paper figure by figure, with the command for each number.
+
+    cargo build --release && tools/reproduction.py            # rewrites the page
+    tools/reproduction.py --check                             # status 1 if the page is not what comes out
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PROGRAM = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "virtual_axes"
+PAGE = ROOT / "docs" / "reproduction.md"
+
+HEAD = """# The paper, figure by figure
+
+Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling for the simulation of tool path tracking in
+multi-axis High Speed Machining*. Its figures compare measurements with a simulation; what it prints of
+them stands in the second column. The third is what this package's model is specified to have, the last
+what `virtual_axes` makes of it, by the command above each table. Add `--report page.html` to a command
+to see the plots, `--trace signals.csv` for the signals.
+
+`tools/reproduction.py` writes this page; the tests look that it is what comes out.
+"""
+
+
+def run(arguments: str) -> list[dict]:
+    """The runs of `virtual_axes run … --json`."""
+    command = [PROGRAM, "run", *arguments.split(), "--json"]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True, timeout=300).stdout)["runs"]
+
+
+def number(value: float, digits: int = 1) -> str:
+    """With a real minus sign, and without a negative zero."""
+    text = f"{value:.{digits}f}"
+    return (text if float(text) else text.removeprefix("-")).replace("-", "−")
+
+
+def section(title: str, text: str, command: str, rows: list[tuple[str, str, str, str]]) -> str:
+    """One figure of the paper."""
+    lines = [f"\n## {title}\n", text, f"\n    virtual_axes run {command}\n"]
+    lines += ["| what | paper | specified | here |", "|---|---|---|---|"]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def axis_rows(run: dict, axis: str, specified: tuple[str, str], paper: str = "—") -> list[tuple[str, str, str, str]]:
+    """Largest synchronised tracking error and current of an axis."""
+    figures = run["axes"][axis]
+    unit = {"um": "µm", "mdeg": "mdeg"}[figures["unit"]]
+    name = axis.upper()
+    error, current = figures["synchronized_tracking_error"]["max"], figures["peak_current_a"]
+    return [
+        (f"{name}, largest synchronised tracking error, {unit}", paper, specified[0], number(error)),
+        (f"{name}, largest current, A", "—", specified[1], number(current, 2)),
+    ]
+
+
+def contour_rows(run: dict) -> list[tuple[str, str, str, str]]:
+    """Contour and orientation errors."""
+    contour, orientation = run["contour_error_um"], run["orientation_error_mdeg"]
+    rows = [
+        ("contour error, max, µm", "—", "—", number(contour["max"])),
+        ("the same without overshoot of the path's ends, µm", "—", "—", number(contour["max_within_ends"])),
+        ("contour error, RMS, µm", "—", "—", number(contour["rms"])),
+    ]
+    if orientation["max"] > 0:
+        rows.append(("orientation error, max, mdeg", "—", "—", number(orientation["max"])))
+    return rows
+
+
+def synchronised_rows(run: dict) -> list[tuple[str, str, str, str]]:
+    """Largest synchronised tracking error of each axis that moves."""
+    units = {"um": "µm", "mdeg": "mdeg"}
+    return [
+        (
+            f"{name.upper()}, largest synchronised tracking error, {units[axis['unit']]}",
+            "—",
+            "—",
+            number(axis["synchronized_tracking_error"]["max"]),
+        )
+        for name, axis in run["axes"].items()
+        if axis["moves"]
+    ]
+
+
+def circle_rows(run: dict, paper: str, specified: tuple[str, str, str]) -> list[tuple[str, str, str, str]]:
+    """Radial deviation of the first circle."""
+    deviation = run["circles"][0]["radial_deviation_um"]
+    title = run["controller"]
+    return [
+        (f"{title}: radial deviation, mean, µm", paper, specified[0], number(deviation["mean"])),
+        (f"{title}: smallest, µm", "—", specified[1], number(deviation["min"])),
+        (f"{title}: largest, µm", "—", specified[2], number(deviation["max"])),
+    ]
+
+
+def page() -> str:
+    """The whole page."""
+    parts = [HEAD]
+    validated = "simulation within {} of the measurement"
+    [single] = run("x-constant")
+    rows = axis_rows(single, "x", ("218.9", "14.40"), validated.format("4 µm, 6 µm while it accelerates"))
+    parts.append(
+        section(
+            "Figure 6: one axis at constant velocity",
+            "X over 200 mm at 10 m/min; the paper prints neither length nor feed.",
+            "x-constant",
+            rows,
+        )
+    )
+    others = (("y", ("230.5", "12.40")), ("z", ("102.7", "11.50")), ("a", ("35.0", "2.37")), ("c", ("35.4", "1.76")))
+    for axis, specified in others:
+        [single] = run(f"{axis}-constant")
+        text = f"The same trial on {axis.upper()}{', 90° at 10 rpm' if axis in 'ac' else ''}; no figure of its own."
+        parts.append(
+            section(f"Section 4.1: {axis.upper()}", text, f"{axis}-constant", axis_rows(single, axis, specified))
+        )
+    [single] = run("c-two-speeds")
+    rows = axis_rows(single, "c", ("—", "—"), validated.format("6·10⁻³ °"))
+    parts.append(
+        section(
+            "Figure 7: two velocities on C",
+            "0 to 130° at 18 rpm, then to 210° at 6 rpm, which is reached at 130°.",
+            "c-two-speeds",
+            rows,
+        )
+    )
+    [single] = run("x-there-and-back")
+    parts.append(
+        section(
+            "Section 4.1, case 3: there and back",
+            "X over 200 mm and back at 10 m/min.",
+            "x-there-and-back",
+            axis_rows(single, "x", ("—", "—")),
+        )
+    )
+    figure_8 = (
+        ("a", "contour-a", "a closed polygon, stopping at the corners"),
+        ("b", "contour-b", "two lines joined by half circles"),
+        ("c", "orientation-ac", "A and C turn together; the shape is assumed"),
+        ("d", "bspline-3d", "a cubic B-spline in X, Y and Z; its control points are assumed"),
+    )
+    for letter, name, text in figure_8:
+        [single] = run(name)
+        parts.append(
+            section(
+                f"Figure 8 {letter}: {name}",
+                f"{text[0].upper()}{text[1:]}. The paper: "
+                f"{validated.format('5 µm or 0.005 °, 12 µm on the spline')}.",
+                name,
+                synchronised_rows(single) + contour_rows(single),
+            )
+        )
+    command = "ballbar --controller cascade,cascade-noff"
+    cascade, without = run(command)
+    rows = circle_rows(cascade, "50 (left)", ("49.0 ± 0.2", "47.7 ± 1", "68.6 ± 1"))
+    rows += circle_rows(without, "—", ("−283.1 ± 0.2", "−284.4 ± 1", "−263.5 ± 1"))
+    parts.append(
+        section(
+            "Figure 10: the ballbar",
+            "A circle of 150 mm radius at 15 m/min, two turns at full feed. The paper's unit is misprinted as mm.",
+            command,
+            rows,
+        )
+    )
+    for turn, specified in (("90", "146.6"), ("45", "103.7")):
+        [single] = run(f"corner-{turn}")
+        corner = single["corners"][0]
+        rows = [("largest contour error at the corner, µm", "—", specified, number(corner["max_contour_error_um"]))]
+        parts.append(
+            section(
+                f"Figure 11: corner of {turn}°",
+                "Two legs of 50 mm at 10 m/min, from rest to rest, without a pause between them.",
+                f"corner-{turn}",
+                rows + contour_rows(single),
+            )
+        )
+    for name, text in (
+        ("five-axis", "The tool tip along a path in the workpiece while A and C turn"),
+        ("bspline-5x", "The tool tip along a spatial B-spline while A and C turn"),
+    ):
+        [single] = run(name)
+        parts.append(
+            section(
+                f"Section 6, the stated aim: {name}",
+                f"{text}: the final geometric error due to the drives, in the workpiece frame.",
+                name,
+                synchronised_rows(single) + contour_rows(single),
+            )
+        )
+    return "".join(parts)
+
+
+def main() -> int:
+    """Writes or checks the page."""
+    text = page()
+    if "--check" in sys.argv[1:]:
+        return 0 if PAGE.read_text(encoding="utf-8") == text else 1
+    PAGE.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
