@@ -5,6 +5,7 @@ mod axis;
 mod circle;
 mod contour;
 mod motion;
+mod path_shape;
 mod path_tracker;
 mod recording;
 mod setpoint_tracker;
