@@ -66,6 +66,48 @@ fn links_are_followed_and_permissions_kept() {
     assert!(fs::symlink_metadata(&link).expect("there").is_symlink());
     assert_eq!(fs::metadata(&path).expect("there").permissions().mode() & 0o777, 0o600);
     assert_eq!(folder.names(), ["link.txt", "real.txt"]);
+
+    let far = folder.0.join("far.txt");
+    symlink("not_yet.txt", &far).expect("a link");
+    let mut out = OutputFile::create(&far).expect("can be made");
+    out.write_all(b"new").expect("can be written");
+    out.finish().expect("can be renamed");
+    assert!(fs::symlink_metadata(&far).expect("there").is_symlink());
+    assert_eq!(fs::read_to_string(folder.0.join("not_yet.txt")).expect("readable"), "new");
+}
+
+#[test]
+fn two_that_write_one_file_do_not_meet() {
+    let folder = Folder::new("output_two");
+    let path = folder.0.join("out.txt");
+    let mut first = OutputFile::create(&path).expect("can be made");
+    let mut second = OutputFile::create(&path).expect("can be made");
+    first.write_all(b"first").expect("can be written");
+    second.write_all(b"second").expect("can be written");
+    second.finish().expect("can be renamed");
+    first.finish().expect("can be renamed");
+    assert_eq!(fs::read_to_string(&path).expect("readable"), "first");
+    assert_eq!(folder.names(), ["out.txt"]);
+}
+
+/// A trace and the table on one stream: neither is lost nor overwrites the other.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_standard_output_takes_a_trace() {
+    let folder = Folder::new("output_stdout");
+    let psec = folder.file("psec.csv", "time,x\n0,0\n0.06,0.001\n");
+    let run = |stdout: std::process::Stdio| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_virtual_axes"));
+        command.arg("run").arg(&psec).args(["--trace", "/dev/stdout"]).stdout(stdout);
+        command.spawn().and_then(std::process::Child::wait_with_output).expect("runs")
+    };
+    let piped = String::from_utf8(run(std::process::Stdio::piped()).stdout).expect("text");
+    assert!(piped.starts_with("time,x.psec,"), "{piped:.80}");
+    assert!(piped.lines().count() > 11 && piped.contains("tracking error"), "{piped}");
+    let out = folder.0.join("out.txt");
+    assert!(run(fs::File::create(&out).expect("can be made").into()).status.success());
+    assert_eq!(fs::read_to_string(&out).expect("readable"), piped);
+    assert_eq!(folder.names(), ["out.txt", "psec.csv"]);
 }
 
 #[cfg(target_os = "linux")]
