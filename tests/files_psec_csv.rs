@@ -124,7 +124,8 @@ fn a_first_row_after_the_start_is_gone_to_from_home_as_the_timeline_does() {
             positions[0] += 5e-5;
         }
         assert_as_timeline(&points, &["x", "a"]);
-        let psec = open(&csv(&points, &["x", "a"])).expect("good");
+        let text = csv(&points, &["x", "a"]);
+        let psec = open(&text).expect("good");
         assert_eq!(psec.first_time(), first);
     }
     let rows = rows("time,x\n0.012,0.001\n").expect("one row");

@@ -200,7 +200,8 @@ impl<R: Read> PsecCsv<R> {
         Ok(psec)
     }
 
-    /// Where the axes stand before the first instant, m or rad, one value per joint of the machine.
+    /// Where the axes stand before the first instant, m or rad, one value per joint of the machine; to be
+    /// said before the first row is asked for.
     #[must_use]
     pub fn starting_at(mut self, positions: &[f64]) -> Self {
         for (column, &place) in self.places.iter().enumerate() {

@@ -101,9 +101,8 @@ fn topics_text(topics: &[String]) -> String {
 /// The trajectories of one topic of a recording in the order of their log times, each with its log time
 /// in ns.
 ///
-/// The file is read twice or more and never held: in the first pass everything is checked and the log
-/// times are taken down, in the last messages are handed out as they come. Held are those only that come
-/// before an earlier one.
+/// The file is read three times and never held: chunks are checked, then the log times are taken down, then
+/// messages are handed out as they come. Only those are held that come before an earlier one.
 pub struct Trajectories<R> {
     messages: MessageReader<BufReader<R>>,
     name: String,

@@ -2,6 +2,7 @@
 //! `ros2 topic echo` prints them.
 
 use std::fmt;
+use std::marker::PhantomData;
 
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
@@ -93,18 +94,92 @@ struct HeaderFields {
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Point {
-    positions: Vec<f64>,
-    velocities: Vec<f64>,
-    accelerations: Vec<f64>,
-    effort: Vec<f64>,
+    positions: Vec<Number>,
+    velocities: Vec<Number>,
+    accelerations: Vec<Number>,
+    effort: Vec<Number>,
     time_from_start: TimeFields,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct TimeFields {
-    sec: i32,
-    nanosec: u32,
+    sec: Whole<i32>,
+    nanosec: Whole<u32>,
+}
+
+/// A number, with a better message for what is none.
+struct Number(f64);
+
+/// A whole number, likewise.
+#[derive(Default)]
+struct Whole<T>(T);
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NumberVisitor)
+    }
+}
+
+struct NumberVisitor;
+
+impl Visitor<'_> for NumberVisitor {
+    type Value = Number;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a number")
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Number, E> {
+        Ok(Number(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Number, E> {
+        Ok(Number(value as f64))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Number, E> {
+        Ok(Number(value as f64))
+    }
+}
+
+impl<'de, T: TryFrom<i128> + Bounded> Deserialize<'de> for Whole<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WholeVisitor(PhantomData))
+    }
+}
+
+/// A type with bounds to name.
+trait Bounded {
+    const BOUNDS: (i64, i64);
+}
+
+impl Bounded for i32 {
+    const BOUNDS: (i64, i64) = (i32::MIN as i64, i32::MAX as i64);
+}
+
+impl Bounded for u32 {
+    const BOUNDS: (i64, i64) = (0, u32::MAX as i64);
+}
+
+struct WholeVisitor<T>(PhantomData<T>);
+
+impl<T: TryFrom<i128> + Bounded> Visitor<'_> for WholeVisitor<T> {
+    type Value = Whole<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "a whole number from {} to {}", T::BOUNDS.0, T::BOUNDS.1)
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<Whole<T>, E> {
+        let whole = T::try_from(value.into());
+        whole.map(Whole).map_err(|_| E::invalid_value(de::Unexpected::Signed(value), &self))
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<Whole<T>, E> {
+        let whole = T::try_from(value.into());
+        whole.map(Whole).map_err(|_| E::invalid_value(de::Unexpected::Unsigned(value), &self))
+    }
 }
 
 /// A header, or `auto`, which `ros2 topic pub` fills in: here it is the default.
@@ -160,7 +235,7 @@ impl From<Message> for JointTrajectory {
     fn from(message: Message) -> Self {
         let HeaderFields { stamp: Stamp(stamp), frame_id } = message.header.0;
         JointTrajectory {
-            header: Header { stamp: Time { sec: stamp.sec, nanosec: stamp.nanosec }, frame_id },
+            header: Header { stamp: Time { sec: stamp.sec.0, nanosec: stamp.nanosec.0 }, frame_id },
             joint_names: message.joint_names,
             points: message.points.into_iter().map(|point| point.value.into()).collect(),
         }
@@ -169,13 +244,14 @@ impl From<Message> for JointTrajectory {
 
 impl From<Point> for JointTrajectoryPoint {
     fn from(point: Point) -> Self {
+        let values = |field: Vec<Number>| field.into_iter().map(|number| number.0).collect();
         let TimeFields { sec, nanosec } = point.time_from_start;
         JointTrajectoryPoint {
-            positions: point.positions,
-            velocities: point.velocities,
-            accelerations: point.accelerations,
-            effort: point.effort,
-            time_from_start: Duration { sec, nanosec },
+            positions: values(point.positions),
+            velocities: values(point.velocities),
+            accelerations: values(point.accelerations),
+            effort: values(point.effort),
+            time_from_start: Duration { sec: sec.0, nanosec: nanosec.0 },
         }
     }
 }
