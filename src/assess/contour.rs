@@ -8,8 +8,8 @@ const LOOK_BACK: u64 = 8;
 /// Contour error along a path that becomes known set-point by set-point.
 ///
 /// The path is the polyline through the set-points of the linear axes. The nearest point is sought
-/// from a few segments behind the last nearest one up to the newest set-point, so that a path that
-/// crosses itself is followed in order.
+/// from a few segments behind the last nearest one up to the newest set-point, which may be one that
+/// is commanded later, so that a path that crosses itself is followed in order.
 #[derive(Debug, Clone)]
 pub struct ContourTracker {
     dimension: usize,

@@ -25,6 +25,9 @@ pub struct MotionAssessor {
     /// Places of the linear ones among them.
     linear: Vec<usize>,
     contour: ContourTracker,
+    /// Position periods that the path is known ahead of the set-point, and whether it is yet.
+    horizon: u32,
+    looked_ahead: bool,
     position: Vec<f64>,
     square_contour: f64,
     max_contour: f64,
@@ -34,19 +37,32 @@ pub struct MotionAssessor {
 
 impl MotionAssessor {
     /// An assessor of the axes at `places` of a machine whose axes are of `kinds`, with ticks of
-    /// `tick` seconds.
-    pub fn new(places: &[usize], kinds: &[AxisKind], tick: f64) -> Self {
+    /// `tick` seconds; the path is looked at `horizon` position periods ahead of the set-point.
+    pub fn new(places: &[usize], kinds: &[AxisKind], tick: f64, horizon: u32) -> Self {
         let linear: Vec<usize> =
             places.iter().copied().filter(|&p| kinds.get(p) == Some(&AxisKind::Linear)).collect();
         MotionAssessor {
             axes: places.iter().map(|&p| (p, AxisAssessor::default())).collect(),
             contour: ContourTracker::new(linear.len()),
+            horizon,
+            looked_ahead: false,
             position: vec![0.0; linear.len()],
             linear,
             square_contour: 0.0,
             max_contour: 0.0,
             ticks: 0,
             tick,
+        }
+    }
+
+    /// Learns the path before a position instant: `psec` gives the set-point of an axis, by its place,
+    /// so many periods after that instant. An axis that overshoots a corner is nearest to what comes
+    /// behind it.
+    pub fn look_ahead(&mut self, psec: impl Fn(usize, u32) -> f64) {
+        let first = if self.looked_ahead { self.horizon } else { 0 };
+        self.looked_ahead = true;
+        for periods in first..=self.horizon {
+            self.contour.push(self.linear.iter().map(|&place| psec(place, periods)));
         }
     }
 
@@ -57,9 +73,6 @@ impl MotionAssessor {
             assessor.observe(axes[*place].sample(), position_instant);
         }
         if !self.linear.is_empty() {
-            if position_instant {
-                self.contour.push(self.linear.iter().map(|&p| axes[p].sample().psec));
-            }
             for (value, &p) in self.position.iter_mut().zip(&self.linear) {
                 *value = axes[p].sample().position;
             }

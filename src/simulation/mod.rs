@@ -16,7 +16,7 @@ use crate::machine::{AxisSample, Machine, MachineError, MachineParameters};
 use crate::trajectory::{
     Admission, Event, JointLimits, MotionId, Rejection, Timeline, TimelineError, Trajectory,
 };
-use crate::units::{Nanoseconds, SECOND_NS, seconds};
+use crate::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
 
 use load::Loads;
 use motion::Motions;
@@ -27,6 +27,10 @@ const STANDSTILL: f64 = 1e-4;
 const OVERSHOOT: f64 = 1e-3;
 /// How long after the last motion the axes count as settling.
 const SETTLING: Nanoseconds = SECOND_NS;
+/// How far contour errors look ahead of the set-point: longer than an axis runs ahead of it.
+const LOOK_AHEAD: Nanoseconds = 100 * MILLISECOND_NS;
+/// Most set-points that contour errors look ahead, well inside what they remember.
+const MOST_AHEAD: u32 = 128;
 
 /// Why there is no simulation of a machine.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -85,7 +89,7 @@ impl Simulation {
         Ok(Simulation {
             timeline: Timeline::new(joints, period, &home)?,
             loads: Loads::new(axes.len()),
-            motions: Motions::new(kinds, seconds(tick)),
+            motions: Motions::new(kinds, seconds(tick), horizon(period)),
             saturated: vec![false; axes.len()],
             machine,
             origin,
@@ -182,6 +186,7 @@ impl Simulation {
         self.follow_timeline_events(k);
         self.awake |= self.motions.any_running() || self.loads.any();
         if self.awake {
+            self.motions.look_ahead(&self.timeline);
             self.loads.apply(&mut self.machine, k);
             self.run_ticks(observe);
         }
@@ -273,10 +278,21 @@ impl Simulation {
         !inside.contains(&sample.position)
     }
 
+    /// Set-point of a joint `periods` instants after the next one, m or rad, by what is known now;
+    /// none for a joint that there is not.
+    pub fn psec_ahead(&self, joint: usize, periods: u32) -> Option<f64> {
+        self.timeline.psec_ahead(joint, periods.saturating_add(1))
+    }
+
     /// Whether the set-points move.
     pub fn is_moving(&self) -> bool {
         self.timeline.is_moving()
     }
+}
+
+/// Position periods that contour errors look ahead of the set-point.
+pub fn horizon(period: Nanoseconds) -> u32 {
+    u32::try_from(LOOK_AHEAD / period.max(1)).unwrap_or(u32::MAX).clamp(1, MOST_AHEAD)
 }
 
 /// The joints of a machine as trajectories name and limit them, `prefix` before each name.

@@ -3,7 +3,7 @@
 use crate::assess::{MotionAssessor, MotionReport};
 use crate::config::AxisKind;
 use crate::machine::Machine;
-use crate::trajectory::MotionId;
+use crate::trajectory::{MotionId, Timeline};
 use crate::units::Nanoseconds;
 
 /// How a motion ended.
@@ -58,19 +58,20 @@ impl Motion {
 pub(super) struct Motions {
     kinds: Vec<AxisKind>,
     tick: f64,
+    horizon: u32,
     list: Vec<Motion>,
 }
 
 impl Motions {
-    pub(super) fn new(kinds: Vec<AxisKind>, tick: f64) -> Self {
-        Motions { kinds, tick, list: Vec::new() }
+    pub(super) fn new(kinds: Vec<AxisKind>, tick: f64, horizon: u32) -> Self {
+        Motions { kinds, tick, horizon, list: Vec::new() }
     }
 
     pub(super) fn accept(&mut self, id: MotionId, places: &[usize]) {
         self.list.push(Motion {
             id,
             places: places.to_vec(),
-            assessor: MotionAssessor::new(places, &self.kinds, self.tick),
+            assessor: MotionAssessor::new(places, &self.kinds, self.tick, self.horizon),
             running: false,
             finishes: None,
         });
@@ -121,6 +122,13 @@ impl Motions {
 
     pub(super) fn abort_all(&mut self, time: Nanoseconds, ends: &mut Vec<MotionEnd>) {
         ends.extend(self.list.drain(..).map(|m| m.into_end(Outcome::Aborted, time)));
+    }
+
+    /// Shows the motions under way what `timeline` commands next.
+    pub(super) fn look_ahead(&mut self, timeline: &Timeline) {
+        for motion in self.list.iter_mut().filter(|m| m.running) {
+            motion.assessor.look_ahead(|place, periods| timeline.psec_ahead(place, periods).unwrap_or(0.0));
+        }
     }
 
     pub(super) fn observe(&mut self, machine: &Machine, position_instant: bool) {

@@ -12,8 +12,10 @@ use super::windows::steady_circle;
 
 /// Most circles that are told one by one.
 const MOST: usize = 100;
-/// Points of a circle that are kept for its polar plot.
-const TRACE: usize = 1 << 14;
+/// Points of a circle that are kept for its polar plot: every tick of 16 s at 125 µs.
+const TRACE: usize = 1 << 17;
+/// Circles of which points are kept.
+const TRACED: usize = 8;
 /// Circles within this of each other are the same one, m.
 const SAME: f64 = 1e-9;
 
@@ -70,7 +72,7 @@ impl Circles {
         };
         let [u, v] = steady.circle.plane.map(|place| coordinates[place]);
         let deviation = steady.assessor.push(u, v);
-        if record && steady.trace.angle.len() < TRACE {
+        if record && self.next < TRACED && steady.trace.angle.len() < TRACE {
             let [cu, cv] = steady.circle.centre;
             let angle = (v - cv).atan2(u - cu);
             let angle = match steady.trace.angle.last() {

@@ -115,6 +115,7 @@ pub fn run(
             break;
         }
         let moving = simulation.is_asked();
+        observer.look_ahead(&simulation);
         let mut time = simulation.time_of(simulation.next_instant());
         let mut failed = None;
         simulation.step_with(|machine, position_instant| {

@@ -6,6 +6,7 @@ use crate::assess::{AxisAssessor, Nearest, PathTracker, SetpointTracker};
 use crate::config::{AxisKind, MachineConfig};
 use crate::kinematics::{Kinematics, ToolPose};
 use crate::path::Frame;
+use crate::simulation::{Simulation, horizon};
 use crate::units::seconds;
 
 use super::circle::Circles;
@@ -13,6 +14,10 @@ use super::corner::Corners;
 use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, Reference};
 use super::recorder::Recorder;
 use super::{Outcome, Tick, Trial};
+
+/// How far ahead of the set-point the nearest point of a path is sought, m or rad: an axis that
+/// overshoots a corner is nearest to what comes behind it.
+const AHEAD: f64 = 5e-3;
 
 /// Largest and mean square of an error.
 #[derive(Debug, Clone, Copy, Default)]
@@ -51,7 +56,9 @@ pub(super) struct Observer<'a> {
     moves: Vec<bool>,
     extrapolated: Vec<bool>,
     start: Vec<f64>,
-    psec: Vec<f64>,
+    /// Room for set-points to come.
+    ahead: Vec<f64>,
+    looked_ahead: bool,
     position: Vec<f64>,
     contour: Extent,
     within_ends: Extent,
@@ -80,7 +87,8 @@ impl<'a> Observer<'a> {
             moves: vec![false; count],
             extrapolated: vec![false; count],
             start: start.to_vec(),
-            psec: start.to_vec(),
+            ahead: start.to_vec(),
+            looked_ahead: false,
             position: start.to_vec(),
             contour: Extent::default(),
             within_ends: Extent::default(),
@@ -98,7 +106,6 @@ impl<'a> Observer<'a> {
         let axes = tick.machine.axes();
         for (place, axis) in axes.iter().enumerate() {
             let sample = axis.sample();
-            self.psec[place] = sample.psec;
             self.position[place] = sample.position;
             self.moves[place] |= sample.psec != self.start[place];
             self.extrapolated[place] |= sample.friction_extrapolated;
@@ -107,7 +114,7 @@ impl<'a> Observer<'a> {
             }
         }
         let pose = self.kinematics.forward(&self.position);
-        let nearest = self.nearest(&pose, time, tick.position_instant);
+        let nearest = self.nearest(&pose, time);
         if let Some(nearest) = &nearest {
             self.contour.push(nearest.distance);
             self.within_ends.push(nearest.within_ends);
@@ -127,15 +134,27 @@ impl<'a> Observer<'a> {
         self.end = time + self.tick;
     }
 
-    fn nearest(&mut self, pose: &ToolPose, time: f64, position_instant: bool) -> Option<Nearest> {
-        match (self.tracker.as_mut()?, &self.trial.program) {
-            (Tracker::Path(tracker), Some(program)) => Some(tracker.nearest(pose, program.progress(time))),
-            (Tracker::Setpoints(tracker), _) => {
-                if position_instant {
-                    tracker.push(self.kinematics.forward(&self.psec));
-                }
-                Some(tracker.nearest(pose))
+    /// Learns, before a position instant, where the set-points go, if they are what the tool is
+    /// followed along.
+    pub(super) fn look_ahead(&mut self, simulation: &Simulation) {
+        let Some(Tracker::Setpoints(tracker)) = &mut self.tracker else { return };
+        let horizon = horizon(simulation.period());
+        let first = if self.looked_ahead { horizon } else { 0 };
+        self.looked_ahead = true;
+        for periods in first..=horizon {
+            for (joint, value) in self.ahead.iter_mut().enumerate() {
+                *value = simulation.psec_ahead(joint, periods).unwrap_or(*value);
             }
+            tracker.push(self.kinematics.forward(&self.ahead));
+        }
+    }
+
+    fn nearest(&mut self, pose: &ToolPose, time: f64) -> Option<Nearest> {
+        match (self.tracker.as_mut()?, &self.trial.program) {
+            (Tracker::Path(tracker), Some(program)) => {
+                Some(tracker.nearest(pose, program.progress(time) + AHEAD))
+            }
+            (Tracker::Setpoints(tracker), _) => Some(tracker.nearest(pose)),
             (Tracker::Path(_), None) => None,
         }
     }
