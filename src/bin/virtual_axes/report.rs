@@ -15,17 +15,21 @@ use crate::table;
 pub fn write(path: &Path, input: &Input, machine: &str, runs: &[Run]) -> Result<(), Box<dyn Error>> {
     let titles: Vec<String> = runs.iter().map(Run::title).collect();
     let empty = Recording::default();
+    // All runs alike, so that their tables can be compared row by row.
+    let ends = runs.iter().any(|run| table::overshoots(&run.outcome.figures));
     let runs = runs.iter().zip(&titles).map(|(run, title)| {
         let figures = &run.outcome.figures;
         let mut facts = vec![
             ("machine".to_owned(), machine.to_owned()),
             ("controller".to_owned(), run.controller.clone()),
         ];
+        let extrapolated = figures.axes.iter().filter(|axis| axis.friction_extrapolated);
+        facts.extend(extrapolated.map(|axis| ("friction law extrapolated".to_owned(), axis.name.clone())));
         facts.extend(run.changes.iter().map(|change| ("set".to_owned(), change.clone())));
         ReportRun {
             title,
             facts,
-            tables: vec![table::axes(figures), table::path(figures)],
+            tables: vec![table::axes(figures), table::path(figures, ends)],
             recording: run.outcome.recording.as_ref().unwrap_or(&empty),
         }
     });

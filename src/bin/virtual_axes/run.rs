@@ -202,7 +202,11 @@ fn text(run: &Run, several: bool) -> String {
         text.push_str(&format!("{}\n\n", run.title()));
     }
     text.push_str(&table::text(&table::axes(figures)));
-    let path = table::path(figures);
+    for remark in table::remarks(figures) {
+        text.push_str(&remark);
+        text.push('\n');
+    }
+    let path = table::path(figures, table::overshoots(figures));
     if !path.rows.is_empty() {
         text.push('\n');
         text.push_str(&table::text(&path));

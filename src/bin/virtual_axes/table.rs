@@ -2,7 +2,7 @@
 
 use virtual_axes::config::AxisKind;
 use virtual_axes::report::{Column, Table};
-use virtual_axes::trial::{Figures, Reference};
+use virtual_axes::trial::{AxisFigures, Figures, Reference};
 use virtual_axes::units::{DEGREE, MILLIMETRE};
 
 /// Metres in a micrometre.
@@ -51,7 +51,7 @@ fn table(caption: &str, columns: &[(&str, &str)]) -> Table {
     Table { caption: caption.to_owned(), columns, rows: Vec::new() }
 }
 
-/// Tracking errors, currents and saturation of each axis.
+/// Tracking errors, currents and saturation of each axis that moves; of all if none does.
 pub fn axes(figures: &Figures) -> Table {
     let columns = [
         ("axis", ""),
@@ -62,10 +62,10 @@ pub fn axes(figures: &Figures) -> Table {
         ("RMS", ""),
         ("peak current", "A"),
         ("saturated", "s"),
-        ("remarks", ""),
     ];
     let mut table = table("Axes", &columns);
-    for axis in &figures.axes {
+    let none_moves = figures.axes.iter().all(|axis| !axis.moves);
+    for axis in figures.axes.iter().filter(|axis| axis.moves || none_moves) {
         let (unit, _, scale) = scale(axis.kind);
         let r = &axis.report;
         let errors = [
@@ -78,21 +78,34 @@ pub fn axes(figures: &Figures) -> Table {
         row.extend(errors.iter().map(|error| format!("{:.1}", error / scale)));
         row.push(format!("{:.2}", r.peak_current));
         row.push(format!("{:.3}", r.saturation_time));
-        let mut remarks = Vec::new();
-        if !axis.moves {
-            remarks.push("stands still");
-        }
-        if axis.friction_extrapolated {
-            remarks.push("friction law extrapolated");
-        }
-        row.push(remarks.join("; "));
         table.rows.push(row);
     }
     table
 }
 
-/// Contour, orientation, circles and corners; empty where there is nothing of these.
-pub fn path(figures: &Figures) -> Table {
+/// What else is to be said about the axes, a line each.
+pub fn remarks(figures: &Figures) -> Vec<String> {
+    let names = |told: fn(&AxisFigures) -> bool| {
+        let names: Vec<&str> = figures.axes.iter().filter(|a| told(a)).map(|a| a.name.as_str()).collect();
+        (!names.is_empty()).then(|| names.join(", "))
+    };
+    let still = names(|axis| !axis.moves).map(|names| format!("standing still: {names}"));
+    let extrapolated = names(|axis| axis.friction_extrapolated)
+        .map(|names| format!("friction law used beyond the velocities that it was fitted for: {names}"));
+    still.into_iter().chain(extrapolated).collect()
+}
+
+/// Whether the contour error differs, in print, without what overshoots the path's ends.
+pub fn overshoots(figures: &Figures) -> bool {
+    figures.contour.is_some_and(|c| {
+        let differ = |a: f64, b: f64| signed(a / MICROMETRE) != signed(b / MICROMETRE);
+        differ(c.max, c.max_within_ends) || differ(c.rms, c.rms_within_ends)
+    })
+}
+
+/// Contour, orientation, circles and corners; empty where there is nothing of these. `ends` adds the
+/// contour error without what overshoots the path's ends.
+pub fn path(figures: &Figures, ends: bool) -> Table {
     let mut table = table("Path", &[("error of the path", ""), ("value", ""), ("unit", "")]);
     let mut add = |name: String, value: f64, unit: &str, scale: f64| {
         table.rows.push(vec![name, signed(value / scale), unit.to_owned()]);
@@ -108,8 +121,7 @@ pub fn path(figures: &Figures) -> Table {
         ];
         for (name, whole, within_ends) in parts {
             add(format!("{name}{reference}"), whole, "µm", MICROMETRE);
-            // Twice only where the two differ in print.
-            if signed(whole / MICROMETRE) != signed(within_ends / MICROMETRE) {
+            if ends {
                 add(format!("{name}, without overshoot of the path's ends"), within_ends, "µm", MICROMETRE);
             }
         }
