@@ -237,7 +237,8 @@ impl<R: Read> PsecCsv<R> {
         self.next_k
     }
 
-    /// PSEC at the next instant, m or rad, in the order of [`joints`](Self::joints); `false` after the last.
+    /// PSEC at the next instant, m or rad, into `row`, which has a value for each of
+    /// [`joints`](Self::joints); `false` after the last instant.
     ///
     /// # Errors
     /// [`PsecError`], the first fault from the top. There is nothing after it.
