@@ -70,8 +70,12 @@ pub(super) fn fastest(rows: &[[f64; 3]], joints: &[LimitsConfig], cap: &Limits, 
     let mut best = (f64::INFINITY, Limits { velocity: 0.0, acceleration: 0.0, jerk: 0.0 });
     for part in SPEED_PARTS {
         let v = part * speed;
-        let free =
-            smallest(rows, joints, |limits, row| (use_of * limits.acceleration - row[1] * v * v) / row[0]);
+        // What is left of Amax, and of Jmax while the acceleration is constant.
+        let free = smallest(rows, joints, |limits, row| {
+            let by_acceleration = (use_of * limits.acceleration - row[1] * v * v) / row[0];
+            let by_jerk = (use_of * limits.jerk - row[2] * v * v * v) / (3.0 * row[1] * v);
+            by_acceleration.min(by_jerk)
+        });
         for part in ACCELERATION_PARTS {
             let acceleration = part * free.min(cap.acceleration);
             let jerk = smallest(rows, joints, |limits, row| {

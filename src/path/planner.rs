@@ -6,7 +6,7 @@ use super::block::Derivatives;
 use super::cosine::{Cosine, ramps_length};
 use super::curve::JointCurve;
 use super::error::{PlanError, Quantity};
-use super::junction::Junction;
+use super::junction::{Junction, share_jerk};
 use super::profile::{Limits, ProfilePlanner, reachable};
 use super::program::{Law, Move, Program, Span, SpanLaw};
 use super::route::{Frame, Path};
@@ -22,7 +22,7 @@ use crate::units::{Nanoseconds, seconds};
 /// by a part in ten at least in the end.
 const MAX_ROUNDS: usize = 40;
 /// Rounds after which whatever is near an excess is slowed, not only what is most likely its cause.
-const PATIENT_ROUNDS: usize = 8;
+const PATIENT_ROUNDS: usize = 4;
 /// Part of the largest speed at a junction from which on the jump of acceleration there matters.
 const JUMP_MATTERS: f64 = 0.1;
 /// Slowed by that much more than the excess asks for, so that the next round need not again.
@@ -177,21 +177,25 @@ impl Drafting {
         for (block, order) in orders.iter().enumerate() {
             let mut curve = JointCurve::new(&path, block);
             let length = curve.block().length();
-            if let Some(previous) = block.checked_sub(1).map(|previous| &orders[previous]) {
-                curve.derivatives(0.0, first_piece(&curve), &mut after);
-                let rests = previous.dwell > 0.0 || previous.is_cosine() || order.is_cosine();
-                junctions.push(if rests {
-                    Junction::STOP
-                } else {
-                    Junction::new(&before, &after, &joints, period, previous.corner)
-                });
-            }
-            curve.derivatives(length, last_piece(&curve), &mut before);
-            let spans = if order.is_cosine() {
+            let mut spans = if order.is_cosine() {
                 vec![Draft { block, s_from: 0.0, s_to: length, limits: order.cap, straight: true }]
             } else {
                 Divider { joints: &joints, cap: order.cap, length }.divide(&mut curve, block)
             };
+            if let Some(previous) = block.checked_sub(1).map(|previous| &orders[previous]) {
+                curve.derivatives(0.0, first_piece(&curve), &mut after);
+                let rests = previous.dwell > 0.0 || previous.is_cosine() || order.is_cosine();
+                let mut junction = Junction::STOP;
+                if let (false, Some(earlier), Some(later)) = (rests, drafts.last_mut(), spans.first_mut()) {
+                    junction = Junction::new(&before, &after, &joints, period, previous.corner);
+                    if junction.cap > 0.0 && !junction.corner {
+                        let earlier = (&before, &mut earlier.limits);
+                        share_jerk(&mut junction, earlier, (&after, &mut later.limits), &joints, period);
+                    }
+                }
+                junctions.push(junction);
+            }
+            curve.derivatives(length, last_piece(&curve), &mut before);
             for span in &spans {
                 let Limits { velocity, acceleration, jerk } = span.limits;
                 let usable = |limit: f64| limit.is_finite() && limit > 0.0;

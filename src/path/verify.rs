@@ -3,15 +3,20 @@
 use super::error::Quantity;
 use super::program::Program;
 use crate::config::LimitsConfig;
+use crate::trajectory::limits::SPEED_TOLERANCE;
 use crate::units::{Nanoseconds, seconds};
 
 /// Excess that is let through, relative: what the program promises.
 const TOLERANCE: f64 = 1e-6;
+/// The same for speeds, half of what trajectories are let through with.
+const VELOCITY_TOLERANCE: f64 = 0.5 * SPEED_TOLERANCE;
 /// Roundings of a position and of a time that a difference may add up.
 const ROUNDINGS: f64 = 16.0;
-/// Most instants looked at in one span, half of them from its start, half up to its end: in between
-/// the feed is constant.
-const MAX_INSTANTS: u64 = 200_000;
+/// Instants up to which a program is looked at entirely: more than an hour and a half at 6 ms. Of a longer one each span
+/// has its share, half from its start, half up to its end: in between the feed is constant.
+const MAX_INSTANTS: u64 = 1_000_000;
+/// Least share.
+const MIN_SHARE: u64 = 64;
 /// Set-points that the highest difference needs.
 const WINDOW: usize = 4;
 
@@ -73,17 +78,21 @@ pub(super) fn verify(
             worst: None,
         },
     };
+    let count = |t: f64| (t / seconds(period)) as u64;
+    let curved = || program.spans.iter().zip(natures).filter(|(_, nature)| !nature.straight || nature.jumps);
+    let ranges =
+        curved().map(|(span, _)| (count(span.start) + 1, count(span.end).saturating_add(WINDOW as u64)));
+    let total = ranges.clone().fold(0_u64, |total, (from, to)| total.saturating_add(to - from));
+    let share = match curved().count() as u64 {
+        spans if total > MAX_INSTANTS => (MAX_INSTANTS / spans.max(1)).max(MIN_SHARE),
+        _ => u64::MAX,
+    };
     let mut next = 0;
-    for (span, nature) in program.spans.iter().zip(natures) {
-        if nature.straight && !nature.jumps {
-            continue;
-        }
-        let instant = |t: f64| (t / seconds(period)) as u64;
-        let from = (instant(span.start) + 1).max(next);
-        let to = instant(span.end).saturating_add(WINDOW as u64);
-        if to.saturating_sub(from) > MAX_INSTANTS {
-            verifier.look(from, from + MAX_INSTANTS / 2);
-            verifier.look(to - MAX_INSTANTS / 2, to);
+    for (from, to) in ranges {
+        let from = from.max(next);
+        if to.saturating_sub(from) > share {
+            verifier.look(from, from + share / 2);
+            verifier.look(to - share / 2, to);
         } else {
             verifier.look(from, to);
         }
@@ -131,14 +140,14 @@ impl Verifier<'_> {
             let [a, b, c, d] = std::array::from_fn(|i| self.window[i].1[joint]);
             let rounding = ROUNDINGS * f64::EPSILON * (a.abs().max(d.abs()) + t * ((d - a) / period).abs());
             let orders = [
-                (Quantity::Speed, d - c, limits.velocity, 1),
-                (Quantity::Acceleration, d - 2.0 * c + b, limits.acceleration, 2),
-                (Quantity::Jerk, d - 3.0 * (c - b) - a, limits.jerk, 3),
+                (Quantity::Speed, d - c, limits.velocity, 1, VELOCITY_TOLERANCE),
+                (Quantity::Acceleration, d - 2.0 * c + b, limits.acceleration, 2, TOLERANCE),
+                (Quantity::Jerk, d - 3.0 * (c - b) - a, limits.jerk, 3, TOLERANCE),
             ];
-            for (quantity, difference, allowed, order) in orders {
+            for (quantity, difference, allowed, order, tolerance) in orders {
                 let found = (difference.abs() - rounding).max(0.0) / period.powi(order);
                 let ratio = found / allowed;
-                if ratio > 1.0 + TOLERANCE {
+                if ratio > 1.0 + tolerance {
                     let (from, to) = (self.window[WINDOW - 1 - order as usize].0, self.window[WINDOW - 1].0);
                     let excess = Excess { span: to, time: t, joint, quantity, ratio, allowed };
                     self.blame(from, to, order, excess);
