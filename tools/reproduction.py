@@ -103,9 +103,9 @@ def circle_rows(run: dict, paper: str, specified: tuple[str, str, str]) -> list[
 def page() -> str:
     """The whole page."""
     parts = [HEAD]
-    validated = "simulation within {} of the measurement"
+    validated = "measured and simulated agree to {}"
     [single] = run("x-constant")
-    rows = axis_rows(single, "x", ("218.9", "14.40"), validated.format("4 µm, 6 µm while it accelerates"))
+    rows = axis_rows(single, "x", ("218.9", "14.40"), validated.format("4 µm, while it accelerates to 6 µm"))
     parts.append(
         section(
             "Figure 6: one axis at constant velocity",
@@ -122,7 +122,7 @@ def page() -> str:
             section(f"Section 4.1: {axis.upper()}", text, f"{axis}-constant", axis_rows(single, axis, specified))
         )
     [single] = run("c-two-speeds")
-    rows = axis_rows(single, "c", ("—", "—"), validated.format("6·10⁻³ °"))
+    rows = axis_rows(single, "c", ("—", "—"), validated.format("0.006°"))
     parts.append(
         section(
             "Figure 7: two velocities on C",
@@ -151,8 +151,8 @@ def page() -> str:
         parts.append(
             section(
                 f"Figure 8 {letter}: {name}",
-                f"{text[0].upper()}{text[1:]}. The paper: "
-                f"{validated.format('5 µm or 0.005 °, 12 µm on the spline')}.",
+                f"{text[0].upper()}{text[1:]}. In the paper "
+                f"{validated.format('5 µm or 0.005°, on the spline to 12 µm')}.",
                 name,
                 synchronised_rows(single) + contour_rows(single),
             )
