@@ -10,6 +10,7 @@ mod page;
 mod path_plot;
 mod polar;
 mod scale;
+mod strip;
 mod svg;
 mod text;
 mod thin;
