@@ -328,6 +328,13 @@ fn figures_of_like_runs_stand_row_by_row() {
     runs[1].tables[0].rows.pop();
     let unlike = page("two", runs);
     assert_eq!(unlike.matches("<caption>Axes</caption>").count(), 2);
+    // Several values under one name stand together.
+    let mut runs = two_runs();
+    for change in ["x.position_loop.gain=2", "y.position_loop.gain=2"] {
+        runs[1].facts.push(("set".to_owned(), change.to_owned()));
+    }
+    let changed = page("two", runs);
+    assert!(changed.contains("<td></td><td>x.position_loop.gain=2, y.position_loop.gain=2</td>"));
     // What all runs share stands once.
     assert!(page_of_two.contains("<td class=\"same\" colspan=\"2\">mikron_ucp710</td>"));
 }
