@@ -5,7 +5,10 @@ mod report_common;
 
 use std::sync::LazyLock;
 
-use report_common::{NO_FEEDFORWARD, PERIOD, ballbar, corner, empty_axis, five_axes, report_run};
+use report_common::{
+    NO_FEEDFORWARD, PERIOD, ballbar, between, corner, empty_axis, five_axes, picture, pictures, points,
+    report_run,
+};
 use virtual_axes::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
 use virtual_axes::config::AxisKind;
 use virtual_axes::report::{Column, Report, ReportRun, Table};
@@ -22,51 +25,6 @@ fn page(title: &str, runs: Vec<ReportRun>) -> String {
 fn two_runs() -> Vec<ReportRun<'static>> {
     let [with, without] = &*BALLBAR;
     vec![report_run("cascade", with), report_run("cascade-noff", without)]
-}
-
-/// The pictures of a page.
-fn pictures(page: &str) -> Vec<&str> {
-    let pictures = page.split("<svg role=\"img\"").skip(1);
-    pictures.map(|rest| rest.split_once("</svg>").expect("it ends").0).collect()
-}
-
-/// What stands between `before` and `after`, each time.
-fn between<'a>(text: &'a str, before: &'a str, after: &'a str) -> Vec<&'a str> {
-    text.split(before).skip(1).map(|rest| rest.split_once(after).expect("it ends").0).collect()
-}
-
-/// Points of a path, pixels.
-fn points(path: &str) -> Vec<[f64; 2]> {
-    let mut spaced = String::new();
-    for c in path.chars() {
-        if "Mlh-".contains(c) {
-            spaced.push(' ');
-        }
-        spaced.push(c);
-        if "Mlh".contains(c) {
-            spaced.push(' ');
-        }
-    }
-    let (mut points, mut numbers) = (Vec::<[f64; 2]>::new(), Vec::new());
-    let mut absolute = false;
-    for token in spaced.split_whitespace() {
-        match token {
-            "M" | "l" | "h" => absolute = token == "M",
-            number => numbers.push(number.parse::<f64>().expect("a number")),
-        }
-        if let [x, y] = numbers[..] {
-            let [x0, y0] = if absolute { [0.0, 0.0] } else { *points.last().expect("a start") };
-            points.push([x0 + x, y0 + y]);
-            numbers.clear();
-        }
-    }
-    points
-}
-
-/// A picture whose title starts so.
-fn picture<'a>(page: &'a str, title: &str) -> &'a str {
-    let found = pictures(page).into_iter().find(|p| p.contains(&format!("-t\">{title}")));
-    found.unwrap_or_else(|| panic!("no picture {title}"))
 }
 
 fn words(text: &str) -> impl Iterator<Item = &str> {
@@ -370,6 +328,13 @@ fn figures_of_like_runs_stand_row_by_row() {
     runs[1].tables[0].rows.pop();
     let unlike = page("two", runs);
     assert_eq!(unlike.matches("<caption>Axes</caption>").count(), 2);
+    // Several values under one name stand together.
+    let mut runs = two_runs();
+    for change in ["x.position_loop.gain=2", "y.position_loop.gain=2"] {
+        runs[1].facts.push(("set".to_owned(), change.to_owned()));
+    }
+    let changed = page("two", runs);
+    assert!(changed.contains("<td></td><td>x.position_loop.gain=2, y.position_loop.gain=2</td>"));
     // What all runs share stands once.
     assert!(page_of_two.contains("<td class=\"same\" colspan=\"2\">mikron_ucp710</td>"));
 }

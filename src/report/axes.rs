@@ -4,11 +4,10 @@ use crate::assess::AxisTrace;
 
 use super::page::{Caption, Page, run_class};
 use super::scale::{Extent, Unit};
+use super::strip::{Strip, error_strip, legend, peak, run_series, strip, time};
 use super::text::{capital, listed};
 use super::time_plot::{Series, TimePlot};
 
-/// Runs whose errors are smaller than the largest by this factor are shown once more, larger.
-pub(super) const COMPARABLE: f64 = 8.0;
 /// A part of the current below this is none, A.
 const NO_CURRENT: f64 = 1e-3;
 
@@ -33,14 +32,24 @@ pub(super) fn sections(page: &mut Page) {
         axes.into_iter().partition(|axis| axis.traces.iter().any(|(_, _, trace)| trace.moves));
     for axis in &moving {
         page.open_section("axis", &format!("{} axis", axis.name));
-        let kind = axis.traces[0].2.kind;
         position(page, axis, time);
+        let kind = axis.traces[0].2.kind;
+        let of = format!("{} axis", axis.name);
+        let series = |page: &Page, signal: Signal| -> Vec<Series> {
+            axis.traces.iter().map(|&(run, time, trace)| run_series(page, run, time, signal(trace))).collect()
+        };
         let velocity =
             Strip { title: "Velocity", note: "", quantity: "Velocity", unit: Unit::velocity(kind) };
-        strip(page, axis, time, &velocity, |t| &t.velocity);
-        error(page, axis, time, "Tracking error", "PSEC − SP, with the pure delay", |t| &t.tracking_error);
+        let lines = series(page, |t| &t.velocity);
+        strip(page, &of, time, velocity, lines);
+        let note = "PSEC − SP, with the pure delay";
+        let tracking = Strip { title: "Tracking error", note, quantity: "Error", unit: Unit::error(kind) };
+        let lines = series(page, |t| &t.tracking_error);
+        error_strip(page, &of, time, tracking, lines);
         let note = "PSEC delayed by α − SP, what the controller is asked to follow";
-        error(page, axis, time, "Synchronised tracking error", note, |t| &t.synchronized_tracking_error);
+        let synchronised = Strip { title: "Synchronised tracking error", note, ..tracking };
+        let lines = series(page, |t| &t.synchronized_tracking_error);
+        error_strip(page, &of, time, synchronised, lines);
         currents(page, axis, time);
         page.close_section();
     }
@@ -63,13 +72,13 @@ fn held(axis: &Axis, explained: bool) -> String {
 /// Every axis by name, in the order in which the runs have them.
 fn axes<'a>(page: &Page<'a>) -> Vec<Axis<'a>> {
     let mut axes: Vec<Axis> = Vec::new();
+    let is_same = |a: &AxisTrace, b: &AxisTrace| a.name == b.name && a.kind == b.kind;
     for (i, run) in page.runs.iter().enumerate() {
         for trace in &run.recording.axes {
-            let name = axis_name(&trace.name);
             let entry = (i, run.recording.time.as_slice(), trace);
-            match axes.iter_mut().find(|a| a.name == name && a.traces[0].2.kind == trace.kind) {
+            match axes.iter_mut().find(|a| is_same(a.traces[0].2, trace)) {
                 Some(axis) => axis.traces.push(entry),
-                None => axes.push(Axis { name, traces: vec![entry] }),
+                None => axes.push(Axis { name: axis_name(&trace.name), traces: vec![entry] }),
             }
         }
     }
@@ -79,65 +88,6 @@ fn axes<'a>(page: &Page<'a>) -> Vec<Axis<'a>> {
 /// A joint's name as machinists write it: one letter is a capital.
 pub(super) fn axis_name(name: &str) -> String {
     if name.chars().count() == 1 { capital(name) } else { name.to_owned() }
-}
-
-/// Time that the runs take, s, the same for all plots.
-pub(super) fn time(page: &Page) -> Option<Extent> {
-    Extent::of(page.runs.iter().flat_map(|run| run.recording.time.iter().copied()))
-}
-
-/// What a strip shows.
-struct Strip {
-    title: &'static str,
-    note: &'static str,
-    quantity: &'static str,
-    unit: Unit,
-}
-
-/// One signal of all runs.
-fn strip(page: &mut Page, axis: &Axis, time: Extent, strip: &Strip, signal: Signal) {
-    let every: Vec<usize> = (0..axis.traces.len()).collect();
-    strip_of(page, axis, time, strip, signal, &every);
-}
-
-/// One signal of the runs at `places` of the axis.
-fn strip_of(page: &mut Page, axis: &Axis, time: Extent, strip: &Strip, signal: Signal, places: &[usize]) {
-    let traces = places.iter().filter_map(|&place| axis.traces.get(place));
-    let series = traces.map(|&(run, time, trace)| run_series(page, run, time, signal(trace)));
-    let series: Vec<Series> = series.collect();
-    over_time(page, &axis.name, time, strip, series);
-}
-
-/// A figure of signals over time, with a legend where runs must be told apart.
-pub(super) fn over_time_of(
-    page: &mut Page,
-    [title, note]: [&'static str; 2],
-    quantity: &'static str,
-    unit: Unit,
-    time: Extent,
-    series: Vec<Series>,
-) {
-    over_time(page, "", time, &Strip { title, note, quantity, unit }, series);
-}
-
-fn over_time(page: &mut Page, axis: &str, time: Extent, strip: &Strip, series: Vec<Series>) {
-    let Strip { title, note, quantity, unit } = *strip;
-    let legend = if page.is_comparison() { legend(&series) } else { Vec::new() };
-    let caption = Caption { title: title.to_owned(), note: note.to_owned(), legend };
-    let plot = TimePlot { quantity, unit, from_zero: true, time, series, at_least: None };
-    let title =
-        if axis.is_empty() { title.to_owned() } else { format!("{axis} axis: {}", title.to_lowercase()) };
-    page.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
-}
-
-fn legend(series: &[Series]) -> Vec<(String, String)> {
-    series.iter().map(|s| (s.class.clone(), s.label.clone())).collect()
-}
-
-/// A run's signal, in the run's style.
-pub(super) fn run_series<'a>(page: &Page, run: usize, time: &'a [f64], values: &'a [f64]) -> Series<'a> {
-    let label = page.runs.get(run).map_or("", |run| run.title).to_owned();
-    Series { label, class: format!("line {}", run_class(run)), time, values }
 }
 
 /// Set-points as a pale band, positions on it.
@@ -163,36 +113,6 @@ fn position(page: &mut Page, axis: &Axis, time: Extent) {
     let plot = TimePlot { quantity: "Position", unit, from_zero: false, time, series, at_least: None };
     let title = format!("{} axis: set-point and position", axis.name);
     page.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
-}
-
-/// An error of all runs; those that are much smaller than the largest once more on their own scale.
-fn error(
-    page: &mut Page,
-    axis: &Axis,
-    time: Extent,
-    title: &'static str,
-    note: &'static str,
-    signal: Signal,
-) {
-    let whole = Strip { title, note, quantity: "Error", unit: Unit::error(axis.traces[0].2.kind) };
-    strip(page, axis, time, &whole, signal);
-    let peaks = axis.traces.iter().map(|(_, _, t)| peak(signal(t)));
-    let small = smaller(&peaks.collect::<Vec<_>>());
-    if !small.is_empty() {
-        let detail = Strip { note: "enlarged: without the runs of larger error", ..whole };
-        strip_of(page, axis, time, &detail, signal, &small);
-    }
-}
-
-/// Places of the values that are much smaller than the largest.
-pub(super) fn smaller(peaks: &[f64]) -> Vec<usize> {
-    let largest = peaks.iter().copied().fold(0.0, f64::max);
-    (0..peaks.len()).filter(|&i| peaks[i] * COMPARABLE < largest).collect()
-}
-
-/// Largest magnitude of what can be drawn.
-pub(super) fn peak(values: &[f64]) -> f64 {
-    Extent::of(values.iter().copied()).map_or(0.0, |e| e.peak())
 }
 
 /// The current of each run with its parts, all at one scale.

@@ -10,6 +10,7 @@ mod page;
 mod path_plot;
 mod polar;
 mod scale;
+mod strip;
 mod svg;
 mod text;
 mod thin;
@@ -36,7 +37,7 @@ pub struct Report<'a> {
 pub struct ReportRun<'a> {
     /// What tells it from the others: the controller, say.
     pub title: &'a str,
-    /// Name and value: machine, controller, changed parameters.
+    /// Name and value: machine, controller, changed parameters; values under one name stand together.
     pub facts: Vec<(String, String)>,
     /// Figures, as on the terminal. Runs whose tables have the same columns and first cells are
     /// compared row by row.

@@ -162,7 +162,7 @@ impl Page<'_> {
         }
         put!(self, "</tr></thead>\n<tbody>\n");
         for name in names {
-            let values: Vec<&str> = self.runs.iter().map(|run| fact(run, name)).collect();
+            let values: Vec<String> = self.runs.iter().map(|run| fact(run, name)).collect();
             put!(self, "<tr><th scope=\"row\">{}</th>", Text(name));
             match values.split_first() {
                 Some((first, rest)) if rest.iter().all(|value| value == first) => {
@@ -201,7 +201,7 @@ impl Page<'_> {
 
     /// One table; the rows of several runs stand below each other.
     fn table(&mut self, tables: &[(usize, &Table)]) {
-        let Some((_, first)) = tables.first() else { return };
+        let Some((_, first)) = tables.first().filter(|(_, table)| !table.rows.is_empty()) else { return };
         put!(self, "<div class=\"table\"><table>\n<caption>{}</caption>\n<thead><tr>", Text(&first.caption));
         let name_runs = self.is_comparison();
         for (i, column) in first.columns.iter().enumerate() {
@@ -255,8 +255,10 @@ fn swatch(class: &str) -> String {
     format!("<svg class=\"swatch\" viewBox=\"0 0 34 12\" aria-hidden=\"true\">{shape}</svg>")
 }
 
-fn fact<'a>(run: &'a ReportRun, name: &str) -> &'a str {
-    run.facts.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value)
+/// Every value that a run gives under a name.
+fn fact(run: &ReportRun, name: &str) -> String {
+    let values = run.facts.iter().filter(|(n, _)| n == name).map(|(_, value)| value.as_str());
+    values.collect::<Vec<_>>().join(", ")
 }
 
 /// Whether two tables have the same columns and the same heads of rows.

@@ -2,11 +2,12 @@
 
 use crate::assess::{CircleTrace, ToolTrace};
 
-use super::axes::{COMPARABLE, axis_name, over_time_of, peak, run_series, smaller, time};
+use super::axes::axis_name;
 use super::page::{Caption, Page, run_class};
 use super::path_plot::{PathPlot, View};
 use super::polar::{DIRECTIONS, PolarPlot, range};
 use super::scale::{Extent, Unit};
+use super::strip::{COMPARABLE, Strip, error_strip, peak, run_series, smaller, time};
 use super::text::rounded;
 use super::time_plot::Series;
 
@@ -17,39 +18,22 @@ const SAME_RADIUS: f64 = 1e-6;
 /// A smaller orientation error is none, rad: 0.01 mdeg.
 const NO_ORIENTATION_ERROR: f64 = 1.7e-7;
 
-/// Path, errors over time, circles.
+/// Path, circles, errors over time.
 pub(super) fn sections(page: &mut Page) {
     let tools: Vec<(usize, &ToolTrace)> =
         page.runs.iter().enumerate().filter_map(|(i, run)| Some((i, run.recording.tool.as_ref()?))).collect();
     let circles = circles(page);
-    if tools.is_empty() && circles.is_empty() {
+    let (drawn, left_out) = circles.split_at(circles.len().min(MOST_CIRCLES));
+    if tools.is_empty() && drawn.is_empty() {
         return;
     }
     page.open_section("tool", "Tool in the workpiece frame");
-    // Square pictures of one run fit side by side.
-    let pictures = if page.is_comparison() { page.runs.len() } else { 1 + circles.len().min(MOST_CIRCLES) };
-    page.open_row(pictures);
-    let has_path = paths(page, &tools);
-    if page.is_comparison() {
-        page.close_row();
-    }
-    for circle in circles.iter().take(MOST_CIRCLES) {
-        if page.is_comparison() {
-            page.open_row(pictures);
-        }
-        polar_plots(page, circle);
-        if page.is_comparison() {
-            page.close_row();
-        }
-    }
-    if !page.is_comparison() {
-        page.close_row();
-    }
+    let has_path = pictures(page, &tools, drawn);
     if !tools.is_empty() && !has_path {
         page.paragraph("The path of the tool tip is a point.");
     }
-    if circles.len() > MOST_CIRCLES {
-        page.paragraph(&format!("{} more circles are not drawn.", circles.len() - MOST_CIRCLES));
+    if !left_out.is_empty() {
+        page.paragraph(&format!("More circles, not drawn: {}.", left_out.len()));
     }
     if let Some(time) = time(page) {
         let note = "distance of the tool tip from the path";
@@ -64,11 +48,31 @@ pub(super) fn sections(page: &mut Page) {
     page.close_section();
 }
 
-/// An error of all runs over time; those that are much smaller once more on their own scale.
+/// Paths and circles: those of one run side by side, else a row of runs for each; whether there is a path.
+fn pictures(page: &mut Page, tools: &[(usize, &ToolTrace)], circles: &[Circles]) -> bool {
+    if !page.is_comparison() {
+        page.open_row(1 + circles.len());
+        let has_path = paths(page, tools);
+        circles.iter().for_each(|circle| polar_plots(page, circle));
+        page.close_row();
+        return has_path;
+    }
+    page.open_row(page.runs.len());
+    let has_path = paths(page, tools);
+    page.close_row();
+    for circle in circles {
+        page.open_row(page.runs.len());
+        polar_plots(page, circle);
+        page.close_row();
+    }
+    has_path
+}
+
+/// An error of all runs over time.
 fn errors(
     page: &mut Page,
     time: Extent,
-    title: [&'static str; 2],
+    [title, note]: [&'static str; 2],
     unit: Unit,
     tools: &[(usize, &ToolTrace)],
     signal: fn(&ToolTrace) -> &[f64],
@@ -79,15 +83,8 @@ fn errors(
         .filter_map(|&(run, tool)| Some((run, runs.get(run)?, signal(tool))))
         .map(|(run, one, values)| run_series(page, run, &one.recording.time, values))
         .collect();
-    if series.iter().all(|s| s.values.is_empty()) {
-        return;
-    }
-    let small = smaller(&series.iter().map(|s| peak(s.values)).collect::<Vec<_>>());
-    let small: Vec<Series> = small.into_iter().map(|i| series[i].clone()).collect();
-    over_time_of(page, title, "Error", unit, time, series);
-    if !small.is_empty() {
-        let note = "enlarged: without the runs of larger error";
-        over_time_of(page, [title[0], note], "Error", unit, time, small);
+    if !series.iter().all(|s| s.values.is_empty()) {
+        error_strip(page, "", time, Strip { title, note, quantity: "Error", unit }, series);
     }
 }
 

@@ -12,7 +12,7 @@ use crate::units::{DEGREE, METRE_PER_MINUTE, REVOLUTION, RPM};
 
 use super::coordinates::{coordinate, overlay};
 use super::error::ScenarioError;
-use super::file::{ArcEntry, Entry, File, FrameName, Values};
+use super::file::{ArcEntry, Entry, File, FrameName, Number, Values};
 
 /// Most moves of one scenario.
 const MAX_MOVES: usize = 1_000_000;
@@ -51,7 +51,7 @@ pub(super) fn program(
     for entry in &file.moves {
         builder.add(entry)?;
     }
-    let rest = file.rest_s.unwrap_or(0.0);
+    let rest = file.rest_s.map_or(0.0, |Number(rest)| rest);
     check_time(name, "rest_s", rest)?;
     let Builder { joints, mut moves, .. } = builder;
     if let Some(last) = moves.last_mut() {
@@ -91,8 +91,8 @@ impl Feeds {
             });
         }
         let Feeds { linear, rotary } = Feeds {
-            linear: file.feed_m_min.and(feed_of(name, "--feed", Some(feed), METRE_PER_MINUTE)?),
-            rotary: file.feed_rpm.and(feed_of(name, "--feed", Some(feed), RPM)?),
+            linear: file.feed_m_min.and(feed_of(name, "--feed", Some(Number(feed)), METRE_PER_MINUTE)?),
+            rotary: file.feed_rpm.and(feed_of(name, "--feed", Some(Number(feed)), RPM)?),
         };
         if linear.is_some() && rotary.is_some() {
             return Err(ScenarioError::Key {
@@ -129,7 +129,7 @@ impl Builder<'_> {
         if given.iter().filter(|&&given| given).count() != 1 {
             return Err(wrong("a move is exactly one of line, arc, spline, dwell_s"));
         }
-        if let Some(dwell) = entry.dwell_s {
+        if let Some(Number(dwell)) = entry.dwell_s {
             check_time(&at, "dwell_s", dwell)?;
             let Some(last) = self.moves.last_mut() else {
                 return Err(wrong("a dwell stands behind a move; rest_s is the rest before the first"));
@@ -138,7 +138,7 @@ impl Builder<'_> {
             return Ok(());
         }
         let law = match entry.ramp_s {
-            Some(ramp) => {
+            Some(Number(ramp)) => {
                 check_time(&at, "ramp_s", ramp)?;
                 Law::Cosine { ramp }
             }
@@ -181,7 +181,7 @@ impl Builder<'_> {
 
     fn arc(&self, arc: &ArcEntry, entry: &Entry, at: &str) -> Result<Block, ScenarioError> {
         let mut centre = Vec::new();
-        for (key, &value) in &arc.center {
+        for (key, &Number(value)) in &arc.center {
             centre.push(coordinate(key, value, &self.joints, at)?);
         }
         // The plane's first coordinate is the machine's first, whatever the order in the file.
@@ -191,15 +191,15 @@ impl Builder<'_> {
             return Err(ScenarioError::Move { at: at.to_owned(), reason });
         };
         let mut sweep = match (arc.angle_deg, arc.turns) {
-            (Some(angle), None) => finite(at, "angle_deg", angle)? * DEGREE,
-            (None, Some(turns)) => finite(at, "turns", turns)? * TAU,
+            (Some(Number(angle)), None) => finite(at, "angle_deg", angle)? * DEGREE,
+            (None, Some(Number(turns))) => finite(at, "turns", turns)? * TAU,
             _ => {
                 let reason = "an arc has one of angle_deg and turns, positive counterclockwise".to_owned();
                 return Err(ScenarioError::Move { at: at.to_owned(), reason });
             }
         };
         let mut end = self.point.clone();
-        for (key, &value) in &arc.to {
+        for (key, &Number(value)) in &arc.to {
             let (place, value) = coordinate(key, value, &self.joints, at)?;
             if place == first || place == second {
                 return Err(ScenarioError::Key {
@@ -210,7 +210,7 @@ impl Builder<'_> {
             }
             end[place] = value;
         }
-        if let Some(ramp) = entry.ramp_s {
+        if let Some(Number(ramp)) = entry.ramp_s {
             // The angle is that at full feed; each of the two ramps adds half of what full feed would.
             let radius = (self.point[first] - u).hypot(self.point[second] - v);
             let feed = self.feed(entry, self.kinds[first], at)?;
@@ -259,19 +259,19 @@ fn check_time(at: &str, key: &str, value: f64) -> Result<(), ScenarioError> {
     Err(value_error(at, key, value, &format!("lie in 0 … {LONGEST} s")))
 }
 
-fn feed_of(at: &str, key: &str, value: Option<f64>, unit: f64) -> Result<Option<f64>, ScenarioError> {
+fn feed_of(at: &str, key: &str, value: Option<Number>, unit: f64) -> Result<Option<f64>, ScenarioError> {
     match value {
-        Some(feed) if !(feed > 0.0 && feed.is_finite()) => {
+        Some(Number(feed)) if !(feed > 0.0 && feed.is_finite()) => {
             Err(value_error(at, key, feed, "be a finite number above 0"))
         }
-        feed => Ok(feed.map(|feed| feed * unit)),
+        feed => Ok(feed.map(|Number(feed)| feed * unit)),
     }
 }
 
 /// Limits along the path, besides those of the axes.
 fn path_limits(values: &Values, at: &str) -> Result<PathLimits, ScenarioError> {
     let mut limits = PathLimits { acceleration: f64::INFINITY, jerk: f64::INFINITY };
-    for (key, &value) in values {
+    for (key, &Number(value)) in values {
         let (limit, unit) = match key.as_str() {
             "acceleration_m_s2" => (&mut limits.acceleration, 1.0),
             "acceleration_rev_s2" => (&mut limits.acceleration, REVOLUTION),

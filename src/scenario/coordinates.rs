@@ -5,7 +5,7 @@ use crate::trajectory::JointLimits;
 use crate::units::{DEGREE, MILLIMETRE};
 
 use super::error::ScenarioError;
-use super::file::Values;
+use super::file::{Number, Values};
 
 /// Suffix of a coordinate's key, and its unit in SI.
 fn unit(kind: AxisKind) -> (&'static str, f64) {
@@ -56,7 +56,7 @@ pub(super) fn overlay(
     joints: &[JointLimits],
     at: &str,
 ) -> Result<(), ScenarioError> {
-    for (key, &value) in values {
+    for (key, &Number(value)) in values {
         let (place, value) = coordinate(key, value, joints, at)?;
         point[place] = value;
     }

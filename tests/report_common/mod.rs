@@ -216,3 +216,48 @@ pub fn report_run<'a>(title: &'a str, recording: &'a Recording) -> ReportRun<'a>
     let facts = facts.map(|(name, value)| (name.to_owned(), value.to_owned())).to_vec();
     ReportRun { title, facts, tables: vec![figures(recording)], recording }
 }
+
+/// The pictures of a page.
+pub fn pictures(page: &str) -> Vec<&str> {
+    let pictures = page.split("<svg role=\"img\"").skip(1);
+    pictures.map(|rest| rest.split_once("</svg>").expect("it ends").0).collect()
+}
+
+/// What stands between `before` and `after`, each time.
+pub fn between<'a>(text: &'a str, before: &'a str, after: &'a str) -> Vec<&'a str> {
+    text.split(before).skip(1).map(|rest| rest.split_once(after).expect("it ends").0).collect()
+}
+
+/// Points of a path, pixels.
+pub fn points(path: &str) -> Vec<[f64; 2]> {
+    let mut spaced = String::new();
+    for c in path.chars() {
+        if "Mlh-".contains(c) {
+            spaced.push(' ');
+        }
+        spaced.push(c);
+        if "Mlh".contains(c) {
+            spaced.push(' ');
+        }
+    }
+    let (mut points, mut numbers) = (Vec::<[f64; 2]>::new(), Vec::new());
+    let mut absolute = false;
+    for token in spaced.split_whitespace() {
+        match token {
+            "M" | "l" | "h" => absolute = token == "M",
+            number => numbers.push(number.parse::<f64>().expect("a number")),
+        }
+        if let [x, y] = numbers[..] {
+            let [x0, y0] = if absolute { [0.0, 0.0] } else { *points.last().expect("a start") };
+            points.push([x0 + x, y0 + y]);
+            numbers.clear();
+        }
+    }
+    points
+}
+
+/// A picture whose title starts so.
+pub fn picture<'a>(page: &'a str, title: &str) -> &'a str {
+    let found = pictures(page).into_iter().find(|p| p.contains(&format!("-t\">{title}")));
+    found.unwrap_or_else(|| panic!("no picture {title}"))
+}

@@ -27,7 +27,7 @@ pub struct Arguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Feed in the place of the scenario's, m/min (rpm for a scenario of rotary moves).
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     feed: Option<f64>,
 }
 

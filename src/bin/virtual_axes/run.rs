@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(long, value_name = "KEY=VALUE[,KEY=VALUE]…")]
     compare: Vec<String>,
     /// Feed in the place of the scenario's, m/min (rpm for a scenario of rotary moves).
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     feed: Option<f64>,
     /// The topic to run, if a recording has several with a JointTrajectory.
     #[arg(long)]
