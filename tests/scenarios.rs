@@ -146,8 +146,14 @@ fn every_shipped_scenario_runs_on_every_shipped_machine() {
                 allow_nonzero_end_velocity: false,
                 record: true,
             };
-            let outcome = run_trial(&trial, setpoints(name, program, &config), |_| Ok(()))
-                .unwrap_or_else(|error| panic!("{name} on {machine}: {error}"));
+            let outcome = run_trial(&trial, setpoints(name, program, &config), |_| Ok(()));
+            // The circle is wider than the stroke of the smaller machine.
+            if machine == "linear_motor_center" && name.starts_with("ballbar") {
+                let error = outcome.expect_err("it leaves the stroke").to_string();
+                assert!(error.contains("outside the stroke"), "{error}");
+                continue;
+            }
+            let outcome = outcome.unwrap_or_else(|error| panic!("{name} on {machine}: {error}"));
             let figures = outcome.figures;
             assert!(figures.axes.iter().any(|axis| axis.moves), "{name} on {machine} moves nothing");
             let contour = figures.contour.expect("there are linear axes");
@@ -166,10 +172,9 @@ fn ballbar_figures() {
         assert_near("mean, µm", circle.mean / MICROMETRE, mean, 0.2);
         assert_near("min, µm", circle.min / MICROMETRE, min, 1.0);
         assert_near("max, µm", circle.max / MICROMETRE, max, 1.0);
-        // G is the range about the least-squares centre, which cannot be more than about the nominal one.
+        // G is the range about the centre of the least-squares circle, here near the nominal one.
         let deviation = circle.circular_deviation.expect("two turns");
-        assert!(deviation <= circle.max - circle.min + 1e-9);
-        assert!(deviation > 0.8 * (circle.max - circle.min));
+        assert_near("G, µm", deviation / MICROMETRE, (circle.max - circle.min) / MICROMETRE, 1.0);
     }
 }
 
@@ -187,7 +192,8 @@ fn both_directions_of_a_circle_are_told_together() {
     for circle in [first, second] {
         assert!(pair.circular_deviation > circle.circular_deviation.expect("two turns") - MICROMETRE);
     }
-    assert!(pair.circular_deviation < first.max.max(second.max) - first.min.min(second.min) + 1e-9);
+    let range = first.max.max(second.max) - first.min.min(second.min);
+    assert_near("G(b), µm", pair.circular_deviation / MICROMETRE, range / MICROMETRE, 1.0);
 }
 
 #[test]

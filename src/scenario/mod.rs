@@ -21,7 +21,7 @@ mod file;
 
 use std::path::Path as FilePath;
 
-use serde_saphyr::options;
+use serde_saphyr::{NonFiniteFloatPolicy, options};
 
 use crate::config::MachineConfig;
 use crate::path::Program;
@@ -102,7 +102,12 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Syntax`].
     pub fn from_yaml(text: &str, name: &str) -> Result<Self, ScenarioError> {
-        let options = options! { strict_booleans: true, with_snippet: false };
+        let options = options! {
+            strict_booleans: true,
+            // Let through, to be refused together with the key.
+            non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
+            with_snippet: false,
+        };
         let file = serde_saphyr::from_str_with_options(text, options).map_err(|error| {
             let line = error.location().map(|location| format!(":{}", location.line()));
             let text = error.without_snippet().to_string();
