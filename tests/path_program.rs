@@ -299,6 +299,45 @@ fn the_tip_of_the_tool_follows_its_path_while_the_tables_turn() {
     assert!(used > 0.9, "{used}");
 }
 
+#[test]
+fn halves_of_one_curve_of_the_tip_are_joined_at_speed() {
+    // A helix round the axis of C while A and C turn, cut in two.
+    let from = [0.03, 0.0, 0.0, 10.0 * DEGREE, 0.0];
+    let middle = arc(from, [0.0, 0.0], PI, [0.0, 0.0, 0.005, 20.0 * DEGREE, 60.0 * DEGREE]);
+    let mut at = [0.0; 5];
+    at.copy_from_slice(middle.end());
+    let rest = arc(at, [0.0, 0.0], PI, [0.0, 0.0, 0.01, 30.0 * DEGREE, 120.0 * DEGREE]);
+    let moves = [middle, rest].map(|block| Move::new(block, 2.0 * M_MIN)).to_vec();
+    let program = plan(Frame::Workpiece, moves).expect("planned");
+    assert_within_limits(&program);
+    let border = program.span(0).end;
+    assert!((speed(&program, border) / (2.0 * M_MIN) - 1.0).abs() < 1e-6, "{}", speed(&program, border));
+}
+
+#[test]
+fn many_turns_of_the_tip_keep_the_limits() {
+    let helix = arc([0.03, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0], 20.0 * TAU, [0.0, 0.0, 0.02, 0.5, 3.0 * TAU]);
+    let program = plan(Frame::Workpiece, vec![Move::new(helix, 10.0 * M_MIN)]).expect("planned");
+    assert_within_limits(&program);
+    println!("{} s", program.duration());
+}
+
+#[test]
+fn a_change_of_orientation_over_a_fixed_tip_keeps_the_limits_of_all_axes() {
+    let from = [0.05, 0.02, 0.0, 0.0, 0.0];
+    let to = [0.05, 0.02, 0.0, 60.0 * DEGREE, 90.0 * DEGREE];
+    let program = plan(Frame::Workpiece, vec![Move::new(line(from, to), 20.0 * RPM)]).expect("planned");
+    assert_within_limits(&program);
+    let tip = kinematics(&[]).forward(&psec(&program, 0.0)).tip;
+    for i in 0..=1000 {
+        let t = program.duration() * f64::from(i) / 1000.0;
+        assert!((kinematics(&[]).forward(&psec(&program, t)).tip - tip).norm() < 1e-15);
+    }
+    // Some axis is near a limit somewhere: it is not slower than it must be by much.
+    let used = use_of_limits(&program).concat().into_iter().fold(0.0, f64::max);
+    assert!(used > 0.9, "{used}");
+}
+
 /// Random blocks, end to end.
 #[derive(Debug, Clone)]
 enum Piece {

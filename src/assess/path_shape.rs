@@ -156,15 +156,17 @@ impl Shape {
         room: &mut Room,
     ) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
         let turn = !self.moves_tip();
-        let point = followed(path, block, s, turn, room);
+        let mut at = |s: f64| followed(path, block, s, turn, room);
         if let Self::Curve { map: Some(map), .. } = self {
+            let point = at(s);
             path.blocks()[block].derivatives_into(s, &mut room.derivatives);
             return (point, map.of(&room.derivatives.first), map.of(&room.derivatives.second));
         }
         let length = path.blocks()[block].length();
         let h = length * STEP;
         let middle = s.clamp(h, length - h);
-        let [a, b, c] = [-h, 0.0, h].map(|step| followed(path, block, middle + step, turn, room));
+        let [a, b, c] = [-h, 0.0, h].map(|step| at(middle + step));
+        let point = if middle == s { b } else { at(s) };
         let second = (a - 2.0 * b + c) / (h * h);
         (point, (c - a) / (2.0 * h) + second * (s - middle), second)
     }

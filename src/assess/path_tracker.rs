@@ -14,7 +14,7 @@ const BACK: f64 = 5e-3;
 /// How far behind it a point still counts as ahead, m or rad, when two are as near.
 const SLACK: f64 = 1e-5;
 /// Distances that differ by less, m, are the same: two passages of one place.
-const SAME: f64 = 1e-9;
+const SAME: f64 = 1e-12;
 /// Blocks looked at in one call; of more, some around the last nearest point and some spread out.
 const MAX_BLOCKS: usize = 16;
 /// Of these, those around the last nearest point, on either side.

@@ -185,8 +185,11 @@ impl Block {
         out
     }
 
-    /// Like [`derivatives`](Self::derivatives), into room made by [`Derivatives::new`].
+    /// Like [`derivatives`](Self::derivatives), into room that is used again.
     pub fn derivatives_into(&self, s: f64, out: &mut Derivatives) {
+        for order in [&mut out.first, &mut out.second, &mut out.third] {
+            order.resize(self.joints(), 0.0);
+        }
         let s = s.clamp(0.0, self.length);
         match &self.shape {
             Shape::Line(line) => line.derivatives(out),
@@ -218,7 +221,7 @@ impl Block {
 
     /// Whether none of the coordinates at `places` ever changes.
     pub fn keeps(&self, places: impl IntoIterator<Item = usize>) -> bool {
-        places.into_iter().all(|place| match &self.shape {
+        places.into_iter().filter(|place| *place < self.joints()).all(|place| match &self.shape {
             Shape::Line(line) => line.slopes[place] == 0.0,
             Shape::Arc(arc) => !arc.circle.plane.contains(&place) && arc.slopes[place] == 0.0,
             Shape::Spline(spline) => spline.keeps(place),

@@ -54,12 +54,12 @@ impl<'a> JointCurve<'a> {
 
     /// Derivatives at `s` in the smooth piece from `piece.0` to `piece.1`.
     pub fn derivatives(&mut self, s: f64, piece: (f64, f64), out: &mut Derivatives) {
+        // At a border of pieces the third derivative is that of this piece.
+        let inside = s.clamp(piece.0, piece.1.next_down().max(piece.0));
         match self.means {
-            Means::Direct => self.block().derivatives_into(s, out),
+            Means::Direct => self.block().derivatives_into(inside, out),
             Means::Turned => {
-                // At a border of pieces the third derivative is that of this piece.
-                let inside = (piece.1 - piece.0) * f64::EPSILON;
-                self.block().derivatives_into(s.clamp(piece.0, piece.1 - inside), out);
+                self.block().derivatives_into(inside, out);
                 for order in [&mut out.first, &mut out.second, &mut out.third] {
                     self.turn(order);
                 }

@@ -10,7 +10,7 @@ use super::junction::{Junction, share_jerk};
 use super::profile::{Limits, ProfilePlanner, reachable};
 use super::program::{Law, Move, Program, Span, SpanLaw};
 use super::route::{Frame, Path};
-use super::spans::{Divider, Draft, sample_block};
+use super::spans::{Divider, Draft, end_pieces, sample_block};
 use super::verify::{Finding, Nature, verify};
 use crate::config::LimitsConfig;
 use crate::kinematics::Kinematics;
@@ -177,13 +177,14 @@ impl Drafting {
         for (block, order) in orders.iter().enumerate() {
             let mut curve = JointCurve::new(&path, block);
             let length = curve.block().length();
+            let pieces = end_pieces(&curve);
             let mut spans = if order.is_cosine() {
                 vec![Draft { block, s_from: 0.0, s_to: length, limits: order.cap, straight: true }]
             } else {
                 Divider { joints: &joints, cap: order.cap, length }.divide(&mut curve, block)
             };
             if let Some(previous) = block.checked_sub(1).map(|previous| &orders[previous]) {
-                curve.derivatives(0.0, first_piece(&curve), &mut after);
+                curve.derivatives(0.0, pieces[0], &mut after);
                 let rests = previous.dwell > 0.0 || previous.is_cosine() || order.is_cosine();
                 let mut junction = Junction::STOP;
                 if let (false, Some(earlier), Some(later)) = (rests, drafts.last_mut(), spans.first_mut()) {
@@ -195,7 +196,7 @@ impl Drafting {
                 }
                 junctions.push(junction);
             }
-            curve.derivatives(length, last_piece(&curve), &mut before);
+            curve.derivatives(length, pieces[1], &mut before);
             for span in &spans {
                 let Limits { velocity, acceleration, jerk } = span.limits;
                 let usable = |limit: f64| limit.is_finite() && limit > 0.0;
@@ -307,14 +308,4 @@ impl Order {
     fn is_cosine(&self) -> bool {
         matches!(self.law, Law::Cosine { .. })
     }
-}
-
-fn first_piece(curve: &JointCurve<'_>) -> (f64, f64) {
-    let knots = curve.block().knots();
-    (knots[0], knots[1])
-}
-
-fn last_piece(curve: &JointCurve<'_>) -> (f64, f64) {
-    let knots = curve.block().knots();
-    (knots[knots.len() - 2], knots[knots.len() - 1])
 }

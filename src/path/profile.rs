@@ -178,7 +178,13 @@ impl ProfilePlanner {
         self.input.max_jerk = one(jerk);
         self.ruckig.calculate(&self.input, &mut self.output).ok()?;
         let profile = &self.output.profiles.first()?[0];
-        let peak = profile.v.iter().copied().fold(0.0, f64::max);
+        // Within a phase the speed is highest where the acceleration passes through 0.
+        let highest = |i: usize| {
+            let (speed, acceleration, jerk) = (profile.v[i], profile.a[i], profile.j[i]);
+            let passes = acceleration > 0.0 && profile.a[i + 1] < 0.0;
+            if passes { speed - 0.5 * acceleration * acceleration / jerk } else { speed }
+        };
+        let peak = (0..profile.j.len()).map(highest).fold(profile.vf, f64::max);
         Some(peak * limits.velocity).filter(|peak| peak.is_finite())
     }
 }
@@ -223,14 +229,18 @@ mod tests {
     proptest! {
         #[test]
         fn the_planner_and_the_equation_of_the_way_agree_on_the_peak(
-            length in 1e-3..0.19f64, entry in 0.0..0.5f64, exit in 0.0..0.5f64,
+            length in 1e-3..0.3f64, entry in 0.0..0.5f64, exit in 0.0..0.5f64,
         ) {
             let (low, high) = (entry.min(exit), entry.max(exit));
-            let exit_up = reachable(length, low, high, &LIMITS);
-            let profile = ProfilePlanner::default().plan(length, low, exit_up, &LIMITS);
-            let guess = ProfilePlanner::default().peak(length, low, exit_up, &LIMITS);
-            if let Some(guess) = guess {
-                prop_assert!((guess - profile.peak).abs() < 1e-6, "{guess} {}", profile.peak);
+            // Just beyond reach the duration is not smooth: of the order of the root of a rounding.
+            let exit_up = low + 0.999 * (reachable(length, low, high, &LIMITS) - low);
+            let mut planner = ProfilePlanner::default();
+            let profile = planner.plan(length, low, exit_up, &LIMITS);
+            if let Some(guess) = planner.peak(length, low, exit_up, &LIMITS) {
+                let highest = profile.peak;
+                prop_assert!((guess - highest).abs() < 1e-6, "{guess} {highest}");
+                let duration = planner.output.get_duration() * LIMITS.velocity / LIMITS.acceleration;
+                prop_assert!((duration - profile.duration()).abs() < 1e-9, "as fast as rsruckig");
             }
             prop_assert!((profile.up.length() + profile.down.length() + profile.cruising * profile.peak
                 - length).abs() < 1e-14);

@@ -133,7 +133,6 @@ impl Path {
     /// Whether the tables stand still along `block`, so that joints and tip differ by a fixed motion.
     pub fn keeps_tables(&self, block: usize) -> bool {
         let tables = [Role::A, Role::C].into_iter().filter_map(|role| self.kinematics.role(role));
-        let joints = self.joint_count();
-        self.blocks.get(block).is_none_or(|block| block.keeps(tables.filter(|place| *place < joints)))
+        self.blocks.get(block).is_none_or(|block| block.keeps(tables))
     }
 }

@@ -124,6 +124,20 @@ fn cells(curve: &JointCurve<'_>) -> Vec<Cell> {
     cells
 }
 
+/// The first and the last smooth piece of a block, short enough for difference quotients.
+pub(super) fn end_pieces(curve: &JointCurve<'_>) -> [(f64, f64); 2] {
+    let whole = (0.0, curve.block().length());
+    if !curve.is_bent() {
+        let knots = curve.block().knots();
+        return match knots.as_slice() {
+            [first, second, .., before, last] => [(*first, *second), (*before, *last)],
+            _ => [whole; 2],
+        };
+    }
+    let cells = cells(curve);
+    [cells.first(), cells.last()].map(|cell| cell.map_or(whole, |cell| cell.piece))
+}
+
 /// Divides a block into spans.
 pub(super) struct Divider<'a> {
     pub joints: &'a [LimitsConfig],

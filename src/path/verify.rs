@@ -158,29 +158,24 @@ impl Verifier<'_> {
 
     /// Notes who is to be slowed for `excess` in the spans `from` to `to`.
     fn blame(&mut self, from: usize, to: usize, order: i32, excess: Excess) {
-        let natures = self.natures;
-        let exempt = (from..=to).any(|i| natures[i].exempt) || (from..to).any(|i| natures[i].corner);
-        if exempt {
+        let (spans, borders) = (&self.natures[from..=to], &self.natures[from..to]);
+        if spans.iter().any(|span| span.exempt) || borders.iter().any(|border| border.corner) {
             return;
         }
         if self.finding.worst.is_none_or(|worst| worst.ratio < excess.ratio) {
             self.finding.worst = Some(excess);
         }
         let pace = excess.ratio.powf(-1.0 / f64::from(order));
-        let jumping = (from..to).any(|i| natures[i].jumps);
-        let curved = (from..=to).any(|i| !natures[i].straight);
-        for i in from..to {
-            if natures[i].jumps {
-                self.finding.junctions[i] = self.finding.junctions[i].min(pace);
+        let slow = |paces: &mut [f64], blamed: &dyn Fn(&Nature) -> bool| {
+            for (slowed, _) in paces.iter_mut().zip(spans).filter(|(_, nature)| blamed(nature)) {
+                *slowed = slowed.min(pace);
             }
-        }
-        if jumping && !self.strict {
+        };
+        slow(&mut self.finding.junctions[from..to], &|border| border.jumps);
+        if borders.iter().any(|border| border.jumps) && !self.strict {
             return;
         }
-        for i in from..=to {
-            if self.strict || !curved || !natures[i].straight {
-                self.finding.spans[i] = self.finding.spans[i].min(pace);
-            }
-        }
+        let all = self.strict || spans.iter().all(|span| span.straight);
+        slow(&mut self.finding.spans[from..=to], &|span| all || !span.straight);
     }
 }
