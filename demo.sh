@@ -32,4 +32,4 @@ echo
 "${CARGO_TARGET_DIR:-$root/target}/release/virtual_axes" run ballbar --controller cascade,cascade-noff --report "$page"
 echo
 echo "page with plots: $page"
-python "$root/tools/screenshot.py" "$page" "${page%.html}-page.png" || true
+python "$root/tools/screenshot.py" "$page" "${page%.html}-page.png"

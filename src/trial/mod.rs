@@ -1,6 +1,6 @@
 //! One trial, offline: set-points through the simulation, its figures and its recording.
 //!
-//! The trial gives the [`Simulation`](crate::simulation::Simulation) its set-points piece by piece and
+//! The trial gives the [`Simulation`] its set-points piece by piece and
 //! looks at every tick, so that its memory does not grow with its length.
 
 mod circle;

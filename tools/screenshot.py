@@ -1,0 +1,28 @@
+#!/usr/bin/env python3
+"""A picture of a page, if there is a Chromium: tools/screenshot.py PAGE.html PICTURE.png"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
+from browser import Browser, find_browser  # noqa: E402  (the path to it is set above)
+
+
+def main() -> int:
+    """Takes the picture, or says why there is none."""
+    page, picture = (Path(argument).resolve() for argument in sys.argv[1:3])
+    program = find_browser()
+    if program is None:
+        print("no Chromium here to make a picture of it")
+        return 0
+    with tempfile.TemporaryDirectory() as folder, Browser(program, Path(folder)) as browser:
+        browser.show_as()
+        browser.open(page.as_uri())
+        browser.screenshot(picture)
+    print(f"its picture: {picture}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
