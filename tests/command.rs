@@ -1,9 +1,12 @@
 //! The command `virtual_axes` as a user runs it.
 
+mod folder;
+
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use folder::Folder;
 use serde_json::Value;
 
 fn run(arguments: &[&str]) -> Output {
@@ -47,38 +50,19 @@ fn machines_and_parameters_are_listed() {
     assert!(text.contains("| `<joint>.motor.inertia_kg_m2` | 1e-9 … 1e3 kg·m² |"), "{text}");
 }
 
-/// A folder for one test, gone when the test is over.
-struct Folder(std::path::PathBuf);
+/// Paths in a test's folder as the command line takes them.
+trait Paths {
+    fn path(&self, name: &str) -> String;
+    fn text_file(&self, name: &str, text: &str) -> String;
+}
 
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("virtual_axes_{name}_{}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a folder can be made");
-        Folder(path)
-    }
-
-    fn file(&self, name: &str, text: &str) -> String {
-        let path = self.0.join(name);
-        std::fs::write(&path, text).expect("a file can be written");
-        path.to_string_lossy().into_owned()
-    }
-
+impl Paths for Folder {
     fn path(&self, name: &str) -> String {
         self.0.join(name).to_string_lossy().into_owned()
     }
 
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.0).expect("readable");
-        let mut names: Vec<String> =
-            entries.map(|e| e.expect("readable").file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
+    fn text_file(&self, name: &str, text: &str) -> String {
+        self.file(name, text).to_string_lossy().into_owned()
     }
 }
 
@@ -110,7 +94,7 @@ fn figures(arguments: &[&str]) -> Value {
 #[test]
 fn set_points_are_run_and_traced() {
     let folder = Folder::new("run");
-    let psec = folder.file("psec.csv", "time,x\n0,0\n0.6,0.01\n");
+    let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.6,0.01\n");
     let trace = folder.path("trace.csv");
     assert_runs(&["run", &psec, "--trace", &trace]);
     assert_eq!(folder.names(), ["psec.csv", "trace.csv"]);
@@ -122,7 +106,7 @@ fn set_points_are_run_and_traced() {
 #[test]
 fn a_trace_has_a_row_per_trace_period() {
     let folder = Folder::new("period");
-    let psec = folder.file("psec.csv", "time,x\n0,0\n0.6,0.01\n");
+    let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.6,0.01\n");
     let trace = folder.path("trace.csv");
     assert_runs(&["run", &psec, "--trace", &trace, "--trace-period", "125us"]);
     let text = std::fs::read_to_string(&trace).expect("readable");
@@ -155,7 +139,7 @@ fn bad_set_points_are_refused_with_file_and_line() {
         ("notime.csv", "x,y\n0,0\n", &["notime.csv", "time"]),
         ("back.csv", "time,x\n0,0\n0.1,0\n0.05,0\n", &["back.csv", "0.05", "0.1"]),
     ] {
-        let psec = folder.file(name, text);
+        let psec = folder.text_file(name, text);
         for (option, output) in [("--trace", "t.csv"), ("--trace", "t.mcap"), ("--report", "r.html")] {
             assert_refused(&run(&["run", &psec, option, &folder.path(output)]), words);
         }
@@ -198,7 +182,7 @@ fn bad_scenarios_are_refused_with_file_and_line() {
             &["still.yaml:4"],
         ),
     ] {
-        let file = folder.file(name, &text);
+        let file = folder.text_file(name, &text);
         for (option, output) in [("--trace", "t.csv"), ("--report", "r.html")] {
             assert_refused(&run(&["run", &file, option, &folder.path(output)]), words);
         }
@@ -214,8 +198,8 @@ fn bad_scenarios_are_refused_with_file_and_line() {
 fn a_trace_never_replaces_its_own_set_points_nor_other_files() {
     let folder = Folder::new("replaced");
     let text = "time,x\n0,0\n0.06,0.001\n";
-    let psec = folder.file("psec.csv", text);
-    let other = folder.file("trace.partial", "keep");
+    let psec = folder.text_file("psec.csv", text);
+    let other = folder.text_file("trace.partial", "keep");
     assert_refused(&run(&["run", &psec, "--trace", &psec]), &["psec.csv", "replace"]);
     assert_refused(&run(&["run", &psec, "--report", &psec]), &["psec.csv", "replace"]);
     assert_runs(&["run", &psec, "--trace", &folder.path("trace.csv")]);
@@ -226,7 +210,7 @@ fn a_trace_never_replaces_its_own_set_points_nor_other_files() {
 #[test]
 fn a_full_disk_is_said() {
     let folder = Folder::new("full");
-    let psec = folder.file("psec.csv", "time,x\n0,0\n0.06,0.001\n");
+    let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.06,0.001\n");
     for (command, option) in [("run", "--trace"), ("run", "--report")] {
         for extension in ["csv", "mcap"] {
             if (option, extension) == ("--report", "mcap") {
