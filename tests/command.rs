@@ -5,6 +5,7 @@ mod folder;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 use folder::Folder;
 use serde_json::Value;
@@ -36,7 +37,7 @@ fn a_bad_machine_file_gives_one_message_and_status_2() {
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty());
     let message = String::from_utf8_lossy(&output.stderr);
-    assert!(message.starts_with("no/such.yaml: cannot be read: "), "{message}");
+    assert!(message.starts_with("no/such.yaml: "), "{message}");
     assert_eq!(message.lines().count(), 1);
 }
 
@@ -160,6 +161,25 @@ fn bad_scenarios_are_refused_with_file_and_line() {
         ("negative.yaml", of("feed_m_min: -1\n"), &["negative.yaml", "feed_m_min", "-1"]),
         ("rest.yaml", of("feed_m_min: 1\nrest_s: -2\n"), &["rest.yaml", "rest_s", "-2"]),
         ("text.yaml", of("feed_m_min: fast\n"), &["text.yaml:2", "fast"]),
+        ("slow.yaml", of("feed_m_min: 1e-300\n"), &["slow.yaml", "86400 s"]),
+        ("jerk.yaml", of("feed_m_min: 1\nlimits: {jerk_m_s3: 1e-300}\n"), &["jerk.yaml", "86400 s"]),
+        (
+            "ramp.yaml",
+            "description: d\nfeed_m_min: 6\nmoves:\n  - {line: {x_mm: 10}, ramp_s: 10}\n".to_owned(),
+            &["ramp.yaml:4", "ramp_s", "10", "0.1000 s"],
+        ),
+        (
+            "turns.yaml",
+            "description: d\nfeed_m_min: 1\nmoves:\n  - arc: {center: {x_mm: 1, y_mm: 0}, turns: 1e9}\n"
+                .to_owned(),
+            &["turns.yaml", "86400 s"],
+        ),
+        (
+            "plane.yaml",
+            "description: d\nfeed_m_min: 1\nmoves:\n  - arc: {center: {x_mm: 1, c_deg: 0}, turns: 1}\n"
+                .to_owned(),
+            &["plane.yaml:4", "c", "rotary"],
+        ),
         (
             "joint.yaml",
             "description: d\nfeed_m_min: 1\nmoves:\n  - line: {xx_mm: 5}\n".to_owned(),
@@ -173,7 +193,7 @@ fn bad_scenarios_are_refused_with_file_and_line() {
         (
             "far.yaml",
             "description: d\nfeed_m_min: 1\nmoves:\n  - line: {x_mm: 5000}\n".to_owned(),
-            &["far.yaml", "x", "0.355", "stroke"],
+            &["far.yaml", "move 1", "x", "0.355", "stroke"],
         ),
         ("empty.yaml", "description: d\nmoves: []\n".to_owned(), &["empty.yaml", "0 moves"]),
         (
@@ -345,4 +365,83 @@ fn memory_does_not_grow_with_the_length_of_the_set_points() {
     assert!(short > 0, "memory can be read");
     // Held whole, ten minutes of five axes are 4 MB of set-points and more of checks.
     assert!(long < short + 1024, "{short} kB for a minute, {long} kB for ten");
+}
+
+#[test]
+fn the_readme_shows_what_is_printed() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
+    let text = std::fs::read_to_string(path).expect("the README is there");
+    let command = "`virtual_axes run corner-90` prints";
+    let (_, behind) = text.split_once(command).expect("the README shows it");
+    let lines = behind.lines().skip(2).take_while(|line| line.is_empty() || line.starts_with("    "));
+    let shown: Vec<&str> = lines.map(str::trim_start).collect();
+    let printed = assert_runs(&["run", "corner-90"]);
+    assert_eq!(shown.join("\n").trim_end(), printed.trim_end());
+}
+
+#[test]
+fn an_interrupted_command_leaves_nothing_behind() {
+    for signal in ["INT", "TERM"] {
+        let folder = Folder::new(&format!("interrupted_{signal}"));
+        let psec = folder.text_file("psec.csv", "time,x\n0,0\n1000000,0.3\n");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_virtual_axes"))
+            .args(["run", &psec, "--trace", &folder.path("trace.csv")])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the command starts");
+        let until = Instant::now() + Duration::from_secs(60);
+        while folder.names().len() < 2 {
+            assert!(Instant::now() < until, "no trace is begun");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        let id = child.id().to_string();
+        assert!(Command::new("kill").args(["-s", signal, &id]).status().expect("kill runs").success());
+        let status = child.wait().expect("it ends");
+        assert_eq!(status.code(), Some(130), "{signal}");
+        assert_eq!(folder.names(), ["psec.csv"], "{signal}");
+    }
+}
+
+#[test]
+fn outputs_do_not_replace_each_other() {
+    let folder = Folder::new("outputs");
+    let (csv, page) = (folder.path("o.csv"), folder.path("o.html"));
+    assert_refused(
+        &run(&["run", "corner-90", "--trace", &csv, "--report", &csv]),
+        &["o.csv", "trace", "report"],
+    );
+    assert_refused(&run(&["run", "corner-90", "--report", &csv]), &["o.csv", ".html"]);
+    assert_refused(&run(&["run", "corner-90", "--trace", &page]), &["o.html", ".csv", ".mcap"]);
+    assert!(folder.names().is_empty(), "{:?}", folder.names());
+}
+
+#[test]
+fn a_full_standard_output_is_said() {
+    let full = std::fs::File::options().write(true).open("/dev/full").expect("it is there");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_virtual_axes"));
+    let output = command.args(["run", "corner-90", "--json"]).stdout(full).output().expect("it runs");
+    assert_refused(&output, &["standard output"]);
+}
+
+#[test]
+fn a_machine_without_a_tool_says_so() {
+    let folder = Folder::new("names");
+    let text = std::fs::read_to_string(shipped("mikron_ucp710.yaml")).expect("it is there");
+    // The joints x and y are called u and v, and nothing is called z.
+    let mut renamed = text.replace("\"x\", \"y\", \"z\"", "\"u\", \"v\", \"w\"");
+    for (from, to) in [("\n    x:", "\n    u:"), ("\n    y:", "\n    v:"), ("\n    z:", "\n    w:")] {
+        renamed = renamed.replace(from, to);
+    }
+    let machine = folder.text_file("machine.yaml", &renamed);
+    let psec = folder.text_file("psec.csv", "time,u\n0,0\n0.6,0.01\n");
+    let printed = assert_runs(&["run", &psec, "--machine", &machine]);
+    assert!(printed.contains("no contour error: no linear joint is named x, y or z"), "{printed}");
+}
+
+#[test]
+fn what_is_shipped_is_checked_by_its_name() {
+    assert!(assert_runs(&["check", "linear_motor_center"]).contains("valid"));
+    assert!(assert_runs(&["check", "corner-90"]).contains("valid"));
+    assert_refused(&run(&["check", "corner-91"]), &["corner-91", "corner-90"]);
 }

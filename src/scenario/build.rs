@@ -16,8 +16,11 @@ use super::file::{ArcEntry, Entry, File, FrameName, Number, Values};
 
 /// Most moves of one scenario.
 const MAX_MOVES: usize = 1_000_000;
-/// Longest rest, dwell or ramp, s.
+/// Longest rest, dwell, ramp, and scenario, s: a day.
 const LONGEST: f64 = 86_400.0;
+
+/// Relative rounding of a ramp that takes the whole of a move.
+const RAMP_TOLERANCE: f64 = 1e-12;
 
 /// Builds the moves of `file` one after the other, then plans their times.
 pub(super) fn program(
@@ -62,8 +65,13 @@ pub(super) fn program(
         FrameName::Workpiece => Frame::Workpiece,
     };
     let period = machine.periods().position;
-    Program::plan(Kinematics::new(machine), frame, &joints, period, rest, moves)
-        .map_err(|error| ScenarioError::Plan { name: name.to_owned(), error })
+    let program = Program::plan(Kinematics::new(machine), frame, &joints, period, rest, moves)
+        .map_err(|error| ScenarioError::Plan { name: name.to_owned(), error })?;
+    let duration = program.duration();
+    if duration > LONGEST {
+        return Err(ScenarioError::TooLong { name: name.to_owned(), duration, limit: LONGEST });
+    }
+    Ok(program)
 }
 
 /// Feeds of moves that have none of their own: m/s along linear ones, rad/s along rotary ones.
@@ -140,6 +148,9 @@ impl Builder<'_> {
         let law = match entry.ramp_s {
             Some(Number(ramp)) => {
                 check_time(&at, "ramp_s", ramp)?;
+                if ramp == 0.0 {
+                    return Err(value_error(&at, "ramp_s", ramp, "be above 0"));
+                }
                 Law::Cosine { ramp }
             }
             None => Law::JerkLimited,
@@ -154,6 +165,13 @@ impl Builder<'_> {
             return Err(wrong("a move is exactly one of line, arc, spline, dwell_s"));
         };
         let feed = self.feed(entry, block.kind(), &at)?;
+        if let Law::Cosine { ramp } = law
+            && feed * ramp > block.length() * (1.0 + RAMP_TOLERANCE)
+        {
+            let allowed =
+                format!("be {:.4} s at most, for the length of this move at its feed", block.length() / feed);
+            return Err(value_error(&at, "ramp_s", ramp, &allowed));
+        }
         let corner = match block.kind() {
             AxisKind::Linear => feed_of(&at, "corner_m_min", entry.corner_m_min, METRE_PER_MINUTE)?,
             AxisKind::Rotary => feed_of(&at, "corner_rpm", entry.corner_rpm, RPM)?,
@@ -190,6 +208,13 @@ impl Builder<'_> {
             let reason = format!("center has {} coordinates; an arc has a center in two", centre.len());
             return Err(ScenarioError::Move { at: at.to_owned(), reason });
         };
+        if let Some(&place) = [first, second].iter().find(|&&place| self.kinds[place] == AxisKind::Rotary) {
+            let reason = format!(
+                "center names {}, which is rotary; a circle lies in two linear axes",
+                self.joints[place].name
+            );
+            return Err(ScenarioError::Move { at: at.to_owned(), reason });
+        }
         let mut sweep = match (arc.angle_deg, arc.turns) {
             (Some(Number(angle)), None) => finite(at, "angle_deg", angle)? * DEGREE,
             (None, Some(Number(turns))) => finite(at, "turns", turns)? * TAU,

@@ -7,6 +7,9 @@ use crate::units::{DEGREE, MILLIMETRE};
 use super::error::ScenarioError;
 use super::file::{Number, Values};
 
+/// Similarity (Jaro-Winkler) below which a known key is no help.
+const NEAR_ENOUGH: f64 = 0.7;
+
 /// Suffix of a coordinate's key, and its unit in SI.
 fn unit(kind: AxisKind) -> (&'static str, f64) {
     match kind {
@@ -29,7 +32,10 @@ pub(super) fn coordinate(
 ) -> Result<(usize, f64), ScenarioError> {
     let Some(place) = joints.iter().position(|joint| key_of(joint) == key) else {
         let known: Vec<String> = joints.iter().map(key_of).collect();
-        let nearest = known.iter().min_by_key(|known| strsim::damerau_levenshtein(key, known));
+        let nearest = known
+            .iter()
+            .min_by_key(|known| strsim::damerau_levenshtein(key, known))
+            .filter(|known| strsim::jaro_winkler(key, known) >= NEAR_ENOUGH);
         let hint = nearest.map(|nearest| format!("; the nearest is {nearest}")).unwrap_or_default();
         return Err(ScenarioError::Key {
             at: at.to_owned(),

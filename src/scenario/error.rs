@@ -62,6 +62,16 @@ pub enum ScenarioError {
         /// What is wrong with it.
         error: PathError,
     },
+    /// It would take longer than anybody waits for.
+    #[error("{name}: lasts {duration:e} s; a scenario lasts {limit} s at most")]
+    TooLong {
+        /// Scenario.
+        name: String,
+        /// s.
+        duration: f64,
+        /// s.
+        limit: f64,
+    },
     /// The moves cannot be run one after the other within the limits.
     #[error("{name}: {error}")]
     Plan {

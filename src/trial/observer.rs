@@ -73,7 +73,8 @@ impl<'a> Observer<'a> {
         let machine: &MachineConfig = trial.machine;
         let count = machine.axes().len();
         let kinematics = Kinematics::new(machine);
-        let tracker = kinematics.has_linear_axis().then(|| match &trial.program {
+        let has_tool = kinematics.has_linear_axis();
+        let tracker = has_tool.then(|| match &trial.program {
             Some(program) => Tracker::Path(Box::new(PathTracker::new(Arc::clone(program.path())))),
             None => Tracker::Setpoints(Box::new(SetpointTracker::new(kinematics.forward(start)))),
         });
@@ -94,7 +95,8 @@ impl<'a> Observer<'a> {
             within_ends: Extent::default(),
             orientation: Extent::default(),
             circles: program.map(|p| Circles::of(p, machine)).unwrap_or_default(),
-            corners: program.map(|p| Corners::of(p, machine)).unwrap_or_default(),
+            // Without a tool there is no contour error to tell at a corner.
+            corners: program.filter(|_| has_tool).map(|p| Corners::of(p, machine)).unwrap_or_default(),
             recorder: trial.record.then(|| Recorder::new(count)),
             kinematics,
         }

@@ -47,9 +47,11 @@ pub struct ProgramSource {
 
 /// A set-point that the machine cannot reach.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{name}: at {time} s: {rejection}")]
+#[error("{name}: move {index}, at {time} s: {rejection}")]
 pub struct UnreachableError {
     name: String,
+    /// The move, from 1.
+    index: usize,
     /// s from the start.
     time: f64,
     rejection: Rejection,
@@ -77,7 +79,8 @@ impl GridSource for ProgramSource {
         for (joint, &position) in self.limits.iter().zip(&*row) {
             let index = usize::try_from(self.next).unwrap_or(usize::MAX);
             joint.check_stroke(index, position).map_err(|rejection| {
-                Box::new(UnreachableError { name: self.name.clone(), time, rejection })
+                let (block, _) = self.program.path().locate(self.program.progress(time));
+                Box::new(UnreachableError { name: self.name.clone(), index: block + 1, time, rejection })
             })?;
         }
         self.next += 1;

@@ -1,7 +1,7 @@
 //! `virtual_axes check`: whether a file is in order, and what it is.
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
 use virtual_axes::files::{self, FileKind};
@@ -9,11 +9,13 @@ use virtual_axes::trial::Trial;
 use virtual_axes::units::seconds;
 
 use crate::input::Input;
+use crate::interrupt;
 
 /// Which file.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A machine file (a ROS 2 parameter file), a scenario, or set-points (CSV, MCAP, YAML).
+    /// A machine file (a ROS 2 parameter file), a scenario, or set-points (CSV, MCAP, YAML); or what is
+    /// shipped, by its name.
     file: PathBuf,
     /// The machine that a scenario or set-points are for.
     #[arg(long, default_value = DEFAULT_MACHINE)]
@@ -22,12 +24,16 @@ pub struct Arguments {
 
 /// Says what it is and that it is valid, or what is wrong.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    let file: &Path = &arguments.file;
-    if !file.exists() || files::Input::open(file)?.kind() == FileKind::Machine {
-        return Ok(machine(&Parameters::from_file(file)?.machine_config()?));
+    let name = arguments.file.to_string_lossy();
+    let is_machine = match arguments.file.exists() {
+        true => files::Input::open(&arguments.file)?.kind() == FileKind::Machine,
+        false => Parameters::builtin_names().any(|known| known == name),
+    };
+    if is_machine {
+        return Ok(machine(&Parameters::load(&name)?.machine_config()?));
     }
     let config = Parameters::load(&arguments.machine)?.machine_config()?;
-    let input = Input::open(&file.to_string_lossy(), None)?;
+    let input = Input::open(&name, None)?;
     let program = input.program(&config, None)?;
     let kind = if program.is_some() { "scenario" } else { "set-points" };
     let trial = Trial {
@@ -40,7 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     // The surest check is to run it.
     virtual_axes::trial::run(&trial, input.setpoints(&config, program.as_ref())?, |tick| {
         end = tick.time;
-        Ok(())
+        interrupt::check()
     })
     .map_err(|error| crate::run::named(&input, error))?;
     Ok(format!("{kind} for {}: {:.3} s\nvalid\n", config.name(), seconds(end)))

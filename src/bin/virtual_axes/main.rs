@@ -4,6 +4,7 @@
 
 mod check;
 mod input;
+mod interrupt;
 mod json;
 mod list;
 mod period;
@@ -23,7 +24,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use virtual_axes::config::listing;
 
-/// Exit status of a command that refused its input.
+/// Exit status of a command that refused its input, or could not write its output.
 const BAD_INPUT: u8 = 2;
 
 /// Virtual machine-tool axes.
@@ -71,18 +72,19 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    interrupt::listen();
     let text = match text_of(&Arguments::parse().command) {
         Ok(text) => text,
         Err(error) => {
             complain(&*error);
-            return ExitCode::from(BAD_INPUT);
+            return ExitCode::from(if interrupt::raised() { interrupt::INTERRUPTED } else { BAD_INPUT });
         }
     };
-    match io::stdout().write_all(text.as_bytes()) {
+    match io::stdout().write_all(text.as_bytes()).and_then(|()| io::stdout().flush()) {
         // A reader that has seen enough (`| head`) is no fault.
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             complain(&format!("standard output: {error}"));
-            ExitCode::FAILURE
+            ExitCode::from(BAD_INPUT)
         }
         _ => ExitCode::SUCCESS,
     }

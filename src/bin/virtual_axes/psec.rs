@@ -9,7 +9,7 @@ use virtual_axes::simulation::joints;
 use virtual_axes::trial::Setpoints;
 
 use crate::input::Input;
-use crate::variant;
+use crate::{interrupt, variant};
 
 /// Which set-points, and where to.
 #[derive(Debug, clap::Args)]
@@ -34,7 +34,7 @@ pub struct Arguments {
 /// Writes them; says nothing.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let machine = Parameters::load(&arguments.machine)?;
-    let config = variant::parameters(&machine, None, &arguments.set)?.machine_config()?;
+    let config = variant::parameters(&machine, None, &arguments.set, &[])?.machine_config()?;
     let input = Input::open(&arguments.scenario, None)?;
     input.must_not_be(&arguments.out)?;
     let program = input.program(&config, arguments.feed)?;
@@ -52,6 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let mut row = vec![0.0; names.len()];
     let mut time = 0;
     while source.next(&mut row).map_err(|error| -> Box<dyn Error> { error })? {
+        interrupt::check()?;
         writer.row(time, &row)?;
         time += config.periods().position;
     }

@@ -14,7 +14,7 @@ use crate::input::Input;
 use crate::period::Period;
 use crate::progress::Progress;
 use crate::variant::{self, Controller};
-use crate::{json, report, table};
+use crate::{interrupt, json, report, table};
 
 /// What to run.
 #[derive(Debug, clap::Args)]
@@ -85,9 +85,10 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let mut variants = Vec::new();
     for controller in controllers(&arguments.controller) {
         for compared in std::iter::once(None).chain(arguments.compare.iter().map(Some)) {
-            let mut changes = arguments.set.clone();
-            changes.extend(compared.iter().flat_map(|c| c.split(',')).map(|change| change.trim().to_owned()));
-            variants.push((variant::parameters(&machine, controller, &changes)?, changes));
+            let compared: Vec<String> =
+                compared.iter().flat_map(|c| c.split(',')).map(|change| change.trim().to_owned()).collect();
+            let parameters = variant::parameters(&machine, controller, &arguments.set, &compared)?;
+            variants.push((parameters, [arguments.set.clone(), compared].concat()));
         }
     }
     if arguments.trace.is_some() && variants.len() > 1 {
@@ -96,6 +97,14 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let input = Input::open(&arguments.input, arguments.topic.as_deref())?;
     for output in [&arguments.trace, &arguments.report].into_iter().flatten() {
         input.must_not_be(output)?;
+    }
+    if let (Some(trace), Some(report)) = (&arguments.trace, &arguments.report)
+        && trace == report
+    {
+        return Err(format!("{}: given for the trace and for the report", report.display()).into());
+    }
+    if let Some(report) = &arguments.report {
+        report::check_name(report)?;
     }
     let mut runs = Vec::new();
     for (parameters, changes) in variants {
@@ -139,6 +148,7 @@ fn trial(
     };
     let result = virtual_axes::trial::run(&trial, setpoints, |tick| {
         if tick.position_instant {
+            interrupt::check()?;
             progress.reached(seconds(tick.time));
         }
         trace.as_mut().map_or(Ok(()), |trace| trace.observe(tick))

@@ -10,6 +10,9 @@ pub const MICROMETRE: f64 = 1e-6;
 /// Radians in a thousandth of a degree.
 pub const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 
+/// Why there is no contour error.
+pub const NO_CONTOUR: &str = "no linear joint is named x, y or z";
+
 /// Unit of an axis's errors for people and for programs, and its value in SI.
 pub fn scale(kind: AxisKind) -> (&'static str, &'static str, f64) {
     match kind {
@@ -92,20 +95,22 @@ pub fn remarks(figures: &Figures) -> Vec<String> {
     let still = names(|axis| !axis.moves).map(|names| format!("standing still: {names}"));
     let extrapolated = names(|axis| axis.friction_extrapolated)
         .map(|names| format!("friction law used beyond the velocities that it was fitted for: {names}"));
-    still.into_iter().chain(extrapolated).collect()
+    let no_contour = figures.contour.is_none().then(|| format!("no contour error: {NO_CONTOUR}"));
+    still.into_iter().chain(extrapolated).chain(no_contour).collect()
 }
 
-/// Whether the contour error differs, in print, without what overshoots the path's ends.
-pub fn overshoots(figures: &Figures) -> bool {
-    figures.contour.is_some_and(|c| {
-        let differ = |a: f64, b: f64| signed(a / MICROMETRE) != signed(b / MICROMETRE);
-        differ(c.max, c.max_within_ends) || differ(c.rms, c.rms_within_ends)
-    })
+/// Whether the largest and the RMS contour error differ, in print, without what overshoots the path's
+/// ends.
+pub fn overshoots(figures: &Figures) -> [bool; 2] {
+    let differ = |a: f64, b: f64| signed(a / MICROMETRE) != signed(b / MICROMETRE);
+    figures
+        .contour
+        .map_or([false; 2], |c| [differ(c.max, c.max_within_ends), differ(c.rms, c.rms_within_ends)])
 }
 
 /// Contour, orientation, circles and corners; empty where there is nothing of these. `ends` adds the
-/// contour error without what overshoots the path's ends.
-pub fn path(figures: &Figures, ends: bool) -> Table {
+/// largest and the RMS contour error without what overshoots the path's ends.
+pub fn path(figures: &Figures, ends: [bool; 2]) -> Table {
     let mut table = table("Path", &[("error of the path", ""), ("value", ""), ("unit", "")]);
     let mut add = |name: String, value: f64, unit: &str, scale: f64| {
         table.rows.push(vec![name, signed(value / scale), unit.to_owned()]);
@@ -116,12 +121,12 @@ pub fn path(figures: &Figures, ends: bool) -> Table {
             Reference::Setpoints => " (from the polyline of the set-points)",
         };
         let parts = [
-            ("contour error, max", contour.max, contour.max_within_ends),
-            ("contour error, RMS", contour.rms, contour.rms_within_ends),
+            ("contour error, max", contour.max, contour.max_within_ends, ends[0]),
+            ("contour error, RMS", contour.rms, contour.rms_within_ends, ends[1]),
         ];
-        for (name, whole, within_ends) in parts {
+        for (name, whole, within_ends, differ) in parts {
             add(format!("{name}{reference}"), whole, "µm", MICROMETRE);
-            if ends {
+            if differ {
                 add(format!("{name}, without overshoot of the path's ends"), within_ends, "µm", MICROMETRE);
             }
         }

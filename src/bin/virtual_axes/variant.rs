@@ -49,18 +49,21 @@ pub fn controller_name(parameters: &Parameters) -> String {
     }
 }
 
-/// One machine: the controller, then the changes, over the machine file.
+/// One machine: the controller, then what `--set` and `--compare` say, over the machine file.
 pub fn parameters(
     machine: &Parameters,
     controller: Option<Controller>,
-    changes: &[String],
+    set: &[String],
+    compared: &[String],
 ) -> Result<Parameters, Box<dyn Error>> {
     let mut parameters = machine.clone();
     if let Some(controller) = controller {
         parameters.set_all(controller.assignments(machine))?;
     }
-    let source = Source::named("--set");
-    let assignments = changes.iter().map(|text| parse_assignment(text, &source));
-    parameters.set_all(assignments.collect::<Result<_, _>>()?)?;
+    for (option, texts) in [("--set", set), ("--compare", compared)] {
+        let source = Source::named(option);
+        let assignments = texts.iter().map(|text| parse_assignment(text, &source));
+        parameters.set_all(assignments.collect::<Result<_, _>>()?)?;
+    }
     Ok(parameters)
 }
