@@ -38,6 +38,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+from rclpy._rclpy_pybind11 import InvalidHandle
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -313,6 +314,7 @@ class Drive:
         self._results: list[TrajectoryResult] = []
         self._diagnostics: list[DiagnosticArray] = []
         self._sent = 0
+        self._closing = False
 
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
@@ -364,6 +366,7 @@ class Drive:
     def close(self) -> None:
         """Leave the graph; harmless when called twice."""
         if self._context.ok():
+            self._closing = True
             self._executor.shutdown(timeout_sec=2.0)
             self._thread.join(timeout=2.0)
             self.node.destroy_node()
@@ -374,6 +377,10 @@ class Drive:
             self._executor.spin()
         except ExternalShutdownException:
             pass
+        except InvalidHandle:
+            # A callback that was under way when the node left.
+            if not self._closing:
+                raise
 
     def _keep_sample(self, key: str) -> Callable[[bytes], None]:
         return self._keep(self._samples[key])
