@@ -21,6 +21,8 @@ from drive import node_binary
 LIGHT, DARK = "light", "dark"
 WIDE, NARROW = 1280, 360
 """Pixels: a screen on a desk, a telephone."""
+A4_WIDTH = 703
+"""Pixels of 1/96 inch between margins of 12 mm."""
 
 OVERLAPPING_TEXTS = """
 [...document.querySelectorAll('svg[role=img]')].flatMap(svg => {
@@ -34,6 +36,12 @@ OVERLAPPING_TEXTS = """
 })
 """
 """Texts of a picture that lie on each other or outside of it."""
+
+TABLES_CUT_OFF = """
+[...document.querySelectorAll('.table')].filter(frame => frame.scrollWidth > frame.clientWidth)
+    .map(frame => [frame.innerText.slice(0, 40), frame.scrollWidth, frame.clientWidth])
+"""
+"""Tables that are wider than their place."""
 
 
 @pytest.fixture(scope="module")
@@ -137,6 +145,16 @@ def test_it_prints_in_light_colours(browser: Browser):
     if path := keep("print.pdf"):
         path.write_bytes(pdf)
     assert pdf.startswith(b"%PDF") and len(pdf) > 10_000
+
+
+def test_long_names_push_no_figure_out_of_sight(browser: Browser):
+    """Every table fits a screen of 1200 px and a sheet of A4, whatever the names of the runs are."""
+    name = ", x.feedforward.torque_kg_m2=0.028"
+    browser.evaluate(f"document.querySelectorAll('th.run').forEach(cell => cell.append('{name}'))")
+    for width, media in ((1200, ""), (A4_WIDTH, "print")):
+        browser.show_as(width=width, media=media)
+        assert browser.evaluate(TABLES_CUT_OFF) == [], media
+    browser.show_as()
 
 
 TEXTS = ["--ink", "--muted"]

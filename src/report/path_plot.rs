@@ -27,6 +27,8 @@ const SHARE: f64 = 0.15;
 const LEAST_ERROR: f64 = 1e-7;
 /// A coordinate that varies by less stands still, m.
 const STANDSTILL: f64 = 1e-6;
+/// Paths lie apart if a range for all is longer than the longest by more than this part of the path.
+const APART: f64 = 0.3;
 /// Lines from the path to the magnified point.
 const WHISKERS: usize = 100;
 
@@ -53,12 +55,8 @@ pub(super) struct PathPlot<'a> {
 }
 
 impl View {
-    /// The plane of the two coordinates that move most; none if nothing moves.
+    /// The plane of the two coordinates that move most within a run; none if nothing moves.
     pub(super) fn of(tools: &[&ToolTrace]) -> Option<View> {
-        let extent = |axis: usize| {
-            let values = tools.iter().flat_map(|t| t.reference.iter().map(move |p| p[axis]));
-            Extent::of(values).map_or(0.0, |e| e.span())
-        };
         let error = |axis: usize| {
             let errors = tools.iter().flat_map(|t| errors(t).map(move |e| e[axis]));
             // Noise must not choose the plane.
@@ -66,7 +64,7 @@ impl View {
         };
         // Those that stand still come last, that with the largest error first.
         let mut order: Vec<(usize, bool, f64)> = (0..3)
-            .map(|axis| match extent(axis) {
+            .map(|axis| match largest_span(tools, axis) {
                 e if e > STANDSTILL => (axis, true, e),
                 _ => (axis, false, error(axis)),
             })
@@ -89,10 +87,7 @@ impl View {
 
     /// By how much to magnify so that `error` (m) is seen on the paths of `tools`.
     pub(super) fn magnification(&self, tools: &[&ToolTrace], error: f64) -> Round {
-        let spans = self.plane.map(|axis| {
-            let values = tools.iter().flat_map(|t| t.reference.iter().map(move |p| p[axis]));
-            Extent::of(values).map_or(0.0, |e| e.span())
-        });
+        let spans = self.plane.map(|axis| largest_span(tools, axis));
         let wanted = SHARE * spans[0].max(spans[1]) / error.max(LEAST_ERROR);
         Round::down(wanted.max(1.0))
     }
@@ -118,6 +113,27 @@ impl View {
             drawable.then_some((reference, shown))
         })
     }
+}
+
+/// How far a coordinate of a path goes, m: in the run where it goes farthest. Where the paths of
+/// different runs lie does not count, a tool of another length moves the whole path.
+fn largest_span(tools: &[&ToolTrace], axis: usize) -> f64 {
+    let span =
+        |tool: &ToolTrace| Extent::of(tool.reference.iter().map(|p| p[axis])).map_or(0.0, |e| e.span());
+    tools.iter().map(|tool| span(tool)).fold(0.0, f64::max)
+}
+
+/// Ranges to draw several runs at one scale, from what each needs: the same for all, but where the
+/// paths lie apart each about its own middle.
+pub(super) fn at_one_scale(own: &[[Extent; 2]]) -> Vec<[Extent; 2]> {
+    let along = |i: usize| own.iter().map(move |range| range[i]);
+    let spans = [0, 1].map(|i| along(i).map(|e| e.span()).fold(0.0, f64::max));
+    let common = [0, 1].map(|i| {
+        let all = along(i).fold(None, |all, e| Extent::join(all, Some(e)));
+        all.filter(|all| all.span() - spans[i] <= APART * spans[0].max(spans[1]))
+    });
+    let range = |own: &[Extent; 2]| [0, 1].map(|i| common[i].unwrap_or_else(|| own[i].at_least(spans[i])));
+    own.iter().map(range).collect()
 }
 
 /// Position − reference, m.

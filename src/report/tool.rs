@@ -4,7 +4,7 @@ use crate::assess::{CircleTrace, ToolTrace};
 
 use super::axes::axis_name;
 use super::page::{Caption, Page, run_class};
-use super::path_plot::{PathPlot, View};
+use super::path_plot::{PathPlot, View, at_one_scale};
 use super::polar::{DIRECTIONS, PolarPlot, range};
 use super::scale::{Extent, Unit};
 use super::strip::{COMPARABLE, Strip, error_strip, peak, run_series, smaller, time};
@@ -97,23 +97,25 @@ fn paths(page: &mut Page, tools: &[(usize, &ToolTrace)]) -> bool {
     let largest = peaks.iter().copied().fold(0.0, f64::max);
     let magnification =
         |peak: f64| view.magnification(&traces, if peak * COMPARABLE < largest { peak } else { largest });
-    let ranges = tools.iter().zip(&peaks).filter_map(|((_, tool), &p)| view.range(tool, magnification(p)));
-    let range = ranges
-        .fold([None, None], |all, [u, v]| [Extent::join(all[0], Some(u)), Extent::join(all[1], Some(v))]);
-    let [Some(across), Some(up)] = range else { return false };
-    for (&(run, tool), &peak) in tools.iter().zip(&peaks) {
+    let drawn: Vec<_> = tools
+        .iter()
+        .zip(&peaks)
+        .filter_map(|(&(run, tool), &peak)| Some((run, tool, peak, view.range(tool, magnification(peak))?)))
+        .collect();
+    let ranges = at_one_scale(&drawn.iter().map(|(.., range)| *range).collect::<Vec<_>>());
+    for (&(run, tool, peak, _), &range) in drawn.iter().zip(&ranges) {
         let class = run_class(run);
         let legend = vec![
             ("reference".to_owned(), "path".to_owned()),
             (format!("line solid {class}"), "tool tip".to_owned()),
             ("start".to_owned(), "start".to_owned()),
         ];
-        let plot = PathPlot { view, tool, magnification: magnification(peak), range: [across, up], class };
+        let plot = PathPlot { view, tool, magnification: magnification(peak), range, class };
         let title = page.of_run(&format!("{} path", view.name()), run);
         let caption = Caption { title: title.clone(), note: plot.note(), legend };
         page.figure("plane", &caption, &title, |id, title| plot.draw(id, title));
     }
-    true
+    !drawn.is_empty()
 }
 
 /// Circles of one plane and radius, and the runs that have them.
