@@ -1,7 +1,6 @@
 //! Pages of several runs: paths that lie apart, long names.
 
 mod common;
-#[allow(dead_code, reason = "other tests of the report use the rest")]
 mod report_common;
 
 use report_common::{between, picture, points, report_run};
