@@ -6,8 +6,7 @@ mod report_common;
 use std::sync::LazyLock;
 
 use report_common::{
-    NO_FEEDFORWARD, PERIOD, ballbar, between, corner, empty_axis, five_axes, picture, pictures, points,
-    report_run,
+    NO_FEEDFORWARD, PERIOD, ballbar, between, empty_axis, five_axes, picture, pictures, points, report_run,
 };
 use virtual_axes::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
 use virtual_axes::config::AxisKind;
@@ -337,36 +336,4 @@ fn figures_of_like_runs_stand_row_by_row() {
     assert!(changed.contains("<td></td><td>x.position_loop.gain=2, y.position_loop.gain=2</td>"));
     // What all runs share stands once.
     assert!(page_of_two.contains("<td class=\"same\" colspan=\"2\">mikron_ucp710</td>"));
-}
-
-/// Writes pages to look at into a folder: `VIRTUAL_AXES_REPORTS=folder cargo test --test report_page -- --ignored`.
-#[test]
-#[ignore = "writes files for a person to look at"]
-fn pages_to_look_at() {
-    let folder = std::env::var("VIRTUAL_AXES_REPORTS").expect("VIRTUAL_AXES_REPORTS names a folder");
-    let write = |name: &str, runs: Vec<ReportRun>, description: &str| {
-        let report = Report { title: name, description, runs };
-        let mut bytes = Vec::new();
-        report.write(&mut bytes).expect("memory takes it");
-        println!("{name}: {} bytes", bytes.len());
-        std::fs::write(format!("{folder}/{name}.html"), bytes).expect("the folder is there");
-    };
-    let circle = "A circle of 150 mm radius in X–Y at 15 m/min, two turns in each direction.";
-    write("ballbar", vec![report_run("cascade", &BALLBAR[0])], circle);
-    write("ballbar-2", two_runs(), circle);
-    let [soft, stiff] = [0.75, 3.0].map(|gain| ballbar(&[("x.position_loop.gain", gain)], PERIOD, true));
-    let mut runs = two_runs();
-    runs.push(report_run("cascade x.position_loop.gain=0.75", &soft));
-    write("ballbar-3", runs.clone(), circle);
-    runs.push(report_run("cascade x.position_loop.gain=3", &stiff));
-    write("ballbar-4", runs, circle);
-    let five = five_axes(PERIOD);
-    write("five-axes", vec![report_run("cascade", &five)], "All five axes swing.");
-    let corners = [90.0, 45.0, 0.0].map(|degrees| corner(degrees, PERIOD));
-    let runs =
-        corners.iter().zip(["90°", "45°", "straight on"]).map(|(c, title)| report_run(title, c)).collect();
-    write("corners", runs, "Two legs of 50 mm at 10 m/min.");
-    write("line", vec![report_run("cascade", &corners[2])], "Two lines of 50 mm, one after the other.");
-    let every_tick = five_axes(1);
-    write("five-axes-every-tick", vec![report_run("cascade", &every_tick)], "All five axes swing.");
 }

@@ -11,6 +11,7 @@ mod lines;
 mod mcap_out;
 mod output;
 mod psec_csv;
+mod psec_error;
 mod psec_mcap;
 mod psec_out;
 mod psec_yaml;
@@ -21,7 +22,8 @@ mod yaml;
 
 pub use input::{FileKind, Input, InputError};
 pub use output::OutputFile;
-pub use psec_csv::{PsecCsv, PsecError};
+pub use psec_csv::PsecCsv;
+pub use psec_error::PsecError;
 pub use psec_mcap::{RecordingError, Trajectories};
 pub use psec_out::{PsecCsvOut, PsecMcapOut, PsecWriter, PsecYamlOut, psec_writer};
 pub use psec_yaml::{TrajectoryYamlError, read_psec_yaml};

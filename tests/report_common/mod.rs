@@ -5,7 +5,7 @@ use virtual_axes::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
 use virtual_axes::config::AxisKind;
 use virtual_axes::report::{Column, ReportRun, Table};
 
-use crate::common::{self, AXES, Ballbar, M_MIN, Profile, machine};
+use crate::common::{self, AXES, Ballbar, machine};
 
 /// Names and kinds of the default machine's axes.
 const JOINTS: [(&str, AxisKind); AXES] = [
@@ -180,18 +180,6 @@ pub fn five_axes(every: u64) -> Recording {
         tool.orientation_error = c.iter().map(|e| e.abs()).collect();
     }
     recording
-}
-
-/// Two legs of 50 mm at 10 m/min, along X, then turned by `degrees`.
-pub fn corner(degrees: f64, every: u64) -> Recording {
-    let leg = Profile::new(0.05, 10.0 * M_MIN, 2.5, 50.0);
-    let (sin, cos) = degrees.to_radians().sin_cos();
-    let psec = move |t: f64| {
-        let (first, second) = (leg.at(t - 0.2), leg.at(t - 0.2 - leg.duration()));
-        [first + second * cos, second * sin, 0.0, 0.0, 0.0]
-    };
-    let duration = 2.0 * leg.duration() + 0.6;
-    record(&[], duration, psec, nearest_on(psec, duration), every)
 }
 
 /// Figures of the axes that move, as on a terminal.
