@@ -4,7 +4,8 @@
 //! around [`simulation::Simulation`] in the room `ros` (cargo feature `ros`).
 //!
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
-//! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`machine`] → [`trajectory`],
+//! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] →
+//! [`machine`] → [`trajectory`],
 //! [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] → [`messages`], [`files`], [`report`] →
 //! `ros`.
 
@@ -14,6 +15,7 @@
 pub mod assess;
 pub mod config;
 pub mod control;
+pub mod design;
 pub mod drive;
 pub mod files;
 pub mod kinematics;

@@ -4,12 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// As in ARCHITECTURE.md.
-const ORDER: [&str; 16] = [
+const ORDER: [&str; 17] = [
     "units",
     "config",
     "kinematics",
     "drive",
     "control",
+    "design",
     "machine",
     "trajectory",
     "path",
@@ -24,8 +25,9 @@ const ORDER: [&str; 16] = [
 ];
 
 /// Rooms before a room that it still must not know.
-const APART: [(&str, &str); 6] = [
+const APART: [(&str, &str); 7] = [
     ("control", "drive"),
+    ("design", "drive"),
     ("report", "files"),
     ("report", "messages"),
     ("ros", "files"),

@@ -5,8 +5,10 @@
 
 mod pi;
 mod position;
+mod rst;
 mod setpoint;
 
 pub use pi::{Pi, PiState};
 pub use position::PositionController;
+pub use rst::{MAX_COEFFICIENTS, MAX_PREVIEW, Rst, RstError};
 pub use setpoint::{Delays, Feedforward, SetpointHistory};

@@ -1,0 +1,139 @@
+//! Generalized predictive control in RST form.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{DesignError, PredictionModel};
+use crate::control::{MAX_PREVIEW, Rst};
+
+/// Weight of the control increments in the criterion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Weight {
+    /// λ itself, s².
+    Absolute(f64),
+    /// λ_rel = λ / trace(GᵀG).
+    Relative(f64),
+}
+
+/// Tuning of a generalized predictive controller (Prévost table 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GpcTuning {
+    /// N1, first period of the prediction horizon.
+    pub n1: usize,
+    /// N2, last period of the prediction horizon.
+    pub n2: usize,
+    /// Nu, periods of the control horizon.
+    pub nu: usize,
+    /// λ.
+    pub weight: Weight,
+}
+
+impl GpcTuning {
+    fn check(&self) -> Result<(), DesignError> {
+        let max = MAX_PREVIEW as usize;
+        let within = |name, value: usize, last: usize| {
+            let refused = DesignError::OutOfRange {
+                name,
+                value: value as f64,
+                allowed: format!("lie in 1 … {last}{}", if last == self.n2 { ", n2" } else { "" }),
+            };
+            if (1..=last).contains(&value) { Ok(()) } else { Err(refused) }
+        };
+        within("n2", self.n2, max)?;
+        within("n1", self.n1, self.n2)?;
+        within("nu", self.nu, self.n2)?;
+        let (name, value) = match self.weight {
+            Weight::Absolute(value) => ("lambda", value),
+            Weight::Relative(value) => ("lambda_rel", value),
+        };
+        if value.is_finite() && value >= 0.0 {
+            return Ok(());
+        }
+        Err(DesignError::OutOfRange { name, value, allowed: "be finite and not negative".to_owned() })
+    }
+}
+
+/// The controller that minimises the GPC criterion over the receding horizon (Prévost section 5, eq. 9).
+///
+/// ```text
+/// 1 = Eⱼ Δ A + q⁻ʲ Fⱼ      Eⱼ B = Gⱼ + q⁻ʲ Hⱼ      k = first row of (GᵀG + λI)⁻¹ Gᵀ,  j = N1 … N2
+/// R = Σ kⱼ Fⱼ              S = Δ (1 + q⁻¹ Σ kⱼ Hⱼ)     T = Σ kⱼ qʲ
+/// ```
+///
+/// # Errors
+/// [`DesignError::OutOfRange`] naming the parameter, [`DesignError::Singular`].
+pub fn gpc(model: &PredictionModel, tuning: &GpcTuning) -> Result<Rst, DesignError> {
+    tuning.check()?;
+    let GpcTuning { n1, n2, nu, weight } = *tuning;
+    // B = q⁻¹ B': Eⱼ B' is what the control increments from u(k + j − 1) backwards add to θ(k + j).
+    let b = &model.b()[1..];
+    let delta_a = product(&[1.0, -1.0], model.a());
+    let order = delta_a.len() - 1;
+    let mut f: Vec<Vec<f64>> = Vec::with_capacity(n2);
+    let mut e = Vec::with_capacity(n2);
+    // 1 = E₀ΔA + F₀ with E₀ = 0, F₀ = 1; each step divides once more by ΔA.
+    let mut remainder = vec![0.0; order];
+    remainder[0] = 1.0;
+    for _ in 0..n2 {
+        let quotient = remainder[0];
+        e.push(quotient);
+        for i in 0..order {
+            let next = remainder.get(i + 1).copied().unwrap_or(0.0);
+            remainder[i] = next - quotient * delta_a[i + 1];
+        }
+        f.push(remainder.clone());
+    }
+    // Eⱼ has the first j coefficients of e, so that the step response stands in the first j of Eⱼ B'.
+    let step = product(&e, b);
+    let rows = n2 - n1 + 1;
+    let g = DMatrix::from_fn(rows, nu, |row, column| match (n1 + row).checked_sub(column + 1) {
+        Some(lag) => step[lag],
+        None => 0.0,
+    });
+    let gram = g.transpose() * &g;
+    let lambda = match weight {
+        Weight::Absolute(lambda) => lambda,
+        Weight::Relative(lambda) => lambda * gram.trace(),
+    };
+    let gains = first_row(gram, lambda, &g).ok_or(DesignError::Singular { n1, n2, nu, lambda })?;
+    let mut r = vec![0.0; order];
+    let mut past = vec![0.0; b.len().saturating_sub(1)];
+    for (gain, j) in gains.iter().zip(n1..=n2) {
+        for (sum, f) in r.iter_mut().zip(&f[j - 1]) {
+            *sum += gain * f;
+        }
+        let response = product(&e[..j], b);
+        for (sum, h) in past.iter_mut().zip(&response[j..]) {
+            *sum += gain * h;
+        }
+    }
+    past.insert(0, 1.0);
+    let s = product(&[1.0, -1.0], &past);
+    Ok(Rst::new(&r, &s, gains.as_slice(), n1 as i64)?)
+}
+
+/// First row of (GᵀG + λI)⁻¹ Gᵀ; none if the matrix cannot be inverted.
+fn first_row(gram: DMatrix<f64>, lambda: f64, g: &DMatrix<f64>) -> Option<DVector<f64>> {
+    let size = gram.nrows();
+    let scale = gram.trace();
+    let regular = gram + DMatrix::identity(size, size) * lambda;
+    let decomposition = regular.cholesky()?;
+    // A pivot that is rounding error is no pivot.
+    let smallest = decomposition.l_dirty().diagonal().iter().fold(f64::INFINITY, |m, d| m.min(d * d));
+    if !(smallest > size as f64 * f64::EPSILON * scale) {
+        return None;
+    }
+    let mut first = DVector::zeros(size);
+    first[0] = 1.0;
+    Some(g * decomposition.solve(&first))
+}
+
+/// Product of two polynomials.
+fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
+    for (i, x) in a.iter().enumerate() {
+        for (j, y) in b.iter().enumerate() {
+            product[i + j] += x * y;
+        }
+    }
+    product
+}
