@@ -7,9 +7,9 @@ use super::definition::MotorKind;
 use super::error::{ConfigError, Source};
 use super::layout::Joint;
 use super::machine::{
-    AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GpcConfig, GravityConfig, KinematicsConfig,
-    LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig,
-    PositionLoopConfig,
+    AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GpcConfig,
+    GravityConfig, KinematicsConfig, LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig,
+    PositionControllerConfig, PositionLoopConfig,
 };
 use super::parameters::Parameters;
 use super::value::Value;

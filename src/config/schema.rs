@@ -60,7 +60,10 @@ const fn delay(key: &'static str) -> Definition {
 
 /// A horizon of predictive control, live.
 const fn horizon(key: &'static str, default: i64) -> Definition {
-    Definition::new(key, "", Kind::Integer { min: 1, max: MAX_HORIZON }).of_axis().default(Integer(default)).live()
+    Definition::new(key, "", Kind::Integer { min: 1, max: MAX_HORIZON })
+        .of_axis()
+        .default(Integer(default))
+        .live()
 }
 
 /// A factor of the plant, live.

@@ -14,10 +14,23 @@ pub enum PositionController {
     Rst {
         /// The polynomials.
         rst: Rst,
-        /// Kp of the law that holds the axis while the set-point stands still, s⁻¹; none where the
-        /// controller comes to rest by itself, since it has no integral action.
-        hold: Option<f64>,
+        /// The law that holds the axis at rest; none where the controller comes to rest by itself, since
+        /// it has no integral action.
+        hold: Option<Hold>,
     },
+}
+
+/// The proportional law that takes over where the set-point has stood still for a while, over the whole
+/// horizon of the controller, until motion comes into its preview.
+///
+/// Integral action on top of that of the velocity loop hunts against Coulomb friction for ever; the
+/// proportional law lets the axis creep to where it should be, and friction keeps it there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hold {
+    /// Kp, s⁻¹.
+    pub gain: f64,
+    /// Position periods of standstill that the controller itself is given to finish a move.
+    pub after: u32,
 }
 
 /// What a position controller remembers: what it has seen and what it has asked for.
@@ -29,14 +42,18 @@ pub struct PositionState {
     angles: [f64; MAX_COEFFICIENTS],
     /// Ω*(k − 1), Ω*(k − 2), …: as limited, with the velocity feedforward.
     commands: [f64; MAX_COEFFICIENTS],
-    /// Whether the axis is held at rest.
-    holding: bool,
+    /// Position instants since which the set-point has stood still over the whole horizon.
+    still: u32,
 }
 
 impl PositionState {
     /// At rest at `angle`, rad.
     pub fn at_rest(angle: f64) -> Self {
-        PositionState { angles: [angle; MAX_COEFFICIENTS], commands: [0.0; MAX_COEFFICIENTS], holding: true }
+        PositionState {
+            angles: [angle; MAX_COEFFICIENTS],
+            commands: [0.0; MAX_COEFFICIENTS],
+            still: u32::MAX,
+        }
     }
 
     /// Takes down what the velocity loop is asked for until the next position instant, rad/s of the
@@ -79,20 +96,18 @@ impl PositionController {
         match self {
             PositionController::Proportional { gain } => gain * (setpoint(0) - angle),
             PositionController::Rst { rst, hold } => {
-                let still = || (1..=rst.preview()).all(|j| setpoint(j) == setpoint(0));
-                match hold {
-                    Some(gain) if still() => {
-                        s.holding = true;
-                        gain * (setpoint(0) - angle)
-                    }
-                    _ => {
-                        s.holding = false;
-                        let asked = weighted(rst.t(), |i| setpoint(rst.t_first() + i as i64));
-                        let seen = weighted(rst.r(), |i| s.angles[i]);
-                        let done = weighted(&rst.s()[1..], |i| s.commands[i]);
-                        asked - seen - done
-                    }
+                let now = setpoint(0);
+                let is_still = (1..=rst.preview()).all(|j| setpoint(j) == now);
+                s.still = if is_still { s.still.saturating_add(1) } else { 0 };
+                if let Some(hold) = hold
+                    && s.still > hold.after
+                {
+                    return hold.gain * (now - angle);
                 }
+                let asked = weighted(rst.t(), |i| setpoint(rst.t_first() + i as i64));
+                let seen = weighted(rst.r(), |i| s.angles[i]);
+                let done = weighted(&rst.s()[1..], |i| s.commands[i]);
+                asked - seen - done
             }
         }
     }

@@ -7,7 +7,7 @@ use crate::control::{
 use crate::drive::{MotorState, Plant, Torques};
 use crate::units::seconds;
 
-use super::compensation::{CompensationState, FrictionCompensation};
+use super::compensation::FrictionCompensation;
 use super::controller::{feedforward, position_controller};
 use super::{AxisError, AxisSample};
 
@@ -44,10 +44,11 @@ impl AxisParameters {
 
     fn reach(&self) -> Reach {
         let delay = self.delays.position.div_ceil(self.ticks_per_position) as i64;
+        let compensated = self.compensation.as_ref().map_or(0, FrictionCompensation::preview);
         Reach {
             delay: self.delays.longest(),
             lookback: self.position.lookback() as usize,
-            ahead: (self.position.preview() - delay).max(0) as usize,
+            ahead: (self.position.preview() - delay).max(compensated).max(0) as usize,
         }
     }
 
@@ -59,6 +60,7 @@ impl AxisParameters {
         let motor = &axis.motor;
         let tick = seconds(periods.current);
         let (position, controller) = position_controller(axis, periods)?;
+        let delays = Delays::new(&axis.delays, periods.current);
         Ok(AxisParameters {
             plant: Plant::new(axis, tick)?,
             position,
@@ -75,8 +77,8 @@ impl AxisParameters {
                 seconds(periods.position),
                 axis.transmission_ratio,
             ),
-            compensation: FrictionCompensation::new(axis, seconds(periods.position)),
-            delays: Delays::new(&axis.delays, periods.current),
+            compensation: FrictionCompensation::new(axis, periods, delays.friction),
+            delays,
             ratio: axis.transmission_ratio,
             torque_constant: motor.torque_constant,
             resistance: motor.resistance,
@@ -95,7 +97,6 @@ pub struct Axis {
     load: f64,
     psec: SetpointHistory,
     position: PositionState,
-    compensation: CompensationState,
     velocity_pi: PiState,
     current_pi: PiState,
     speed_limited: bool,
@@ -117,7 +118,6 @@ impl Axis {
             load: 0.0,
             psec: SetpointHistory::new(position, p.ticks_per_position, p.reach()),
             position: PositionState::at_rest(motor.angle),
-            compensation: CompensationState::default(),
             velocity_pi: PiState { integral: torque, limited: false },
             current_pi: PiState { integral: voltage, limited: false },
             speed_limited: false,
@@ -142,7 +142,6 @@ impl Axis {
         };
         self.velocity_pi.integral += torque(old) - torque(p);
         self.psec.adopt(p.reach());
-        self.compensation = CompensationState::default();
     }
 
     /// The set-point of the position period that begins, and those behind it as far as they are known.
@@ -188,8 +187,7 @@ impl Axis {
         s.velocity_feedforward = p.feedforward.velocity(&self.psec, velocity_index);
         s.torque_feedforward = p.feedforward.torque(&self.psec, torque_index);
         if let Some(compensation) = &p.compensation {
-            let index = self.psec.index(tick, p.delays.friction);
-            s.torque_feedforward += compensation.torque(&mut self.compensation, &self.psec, index);
+            s.torque_feedforward += compensation.torque(&self.psec, tick);
         }
         let error = s.velocity_setpoint + s.velocity_feedforward - self.motor.speed;
         s.current_setpoint = p.velocity.update(&mut self.velocity_pi, error, s.torque_feedforward);

@@ -1,11 +1,16 @@
 //! The position controller of an axis, as its configuration asks for it.
 
 use crate::config::{AxisConfig, FeedforwardConfig, GpcConfig, Periods, PositionControllerConfig};
-use crate::control::{PositionController, Rst};
-use crate::design::{GpcTuning, Weight, gpc};
+use crate::control::{Hold, PositionController, Rst};
+use crate::design::{DesignError, GpcTuning, Weight, gpc};
+use crate::units::{MILLISECOND_NS, Nanoseconds};
 
 use super::AxisError;
 use super::prediction::prediction_model;
+
+/// Standstill of the set-point after which an axis is held: a controller with a bandwidth worth its name
+/// has finished a move by then.
+const HOLD_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
 
 impl From<&GpcConfig> for GpcTuning {
     fn from(config: &GpcConfig) -> Self {
@@ -28,10 +33,12 @@ pub(super) fn position_controller(
             (gpc(&prediction_model(axis, periods)?, &GpcTuning::from(config))?, "gpc")
         }
         PositionControllerConfig::Rst(config) => {
-            (Rst::new(&config.r, &config.s, &config.t, config.t_first).map_err(crate::design::DesignError::from)?, "rst")
+            let rst = Rst::new(&config.r, &config.s, &config.t, config.t_first);
+            (rst.map_err(DesignError::from)?, "rst")
         }
     };
-    let hold = rst.has_integral_action().then_some(gain);
+    let after = (HOLD_AFTER / periods.position) as u32;
+    let hold = rst.has_integral_action().then_some(Hold { gain, after });
     Ok((PositionController::Rst { rst, hold }, name))
 }
 

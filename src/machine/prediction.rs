@@ -118,9 +118,8 @@ fn minimal(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
     }
     let denominator = characteristic_polynomial(&transition);
     // A·(h₁q⁻¹ + h₂q⁻² + …) ends after as many terms as there are states.
-    let numerator = (0..=kept.len())
-        .map(|k| (0..k).map(|i| denominator[i] * markov[k - 1 - i]).sum())
-        .collect();
+    let numerator =
+        (0..=kept.len()).map(|k| (0..k).map(|i| denominator[i] * markov[k - 1 - i]).sum()).collect();
     Ok((denominator, numerator))
 }
 
