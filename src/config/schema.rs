@@ -28,6 +28,10 @@ const POSITIVE: f64 = 1e-9;
 const GAIN: f64 = 1e9;
 /// Shortest and longest integral time, ms; zero would divide by zero.
 const INTEGRAL_TIME_MS: (f64, f64) = (1e-3, 1e6);
+/// Most coefficients of R and of S; a design on a model of the drive's order has fewer than ten.
+const RST_TERMS: usize = 32;
+/// Farthest preview and oldest set-point that T may read, position periods.
+const RST_HORIZON: i64 = 200;
 
 /// A coefficient of the friction law, A.
 const fn friction_current(key: &'static str) -> Definition {
@@ -47,6 +51,11 @@ const fn gain(key: &'static str, unit: &'static str) -> Definition {
 /// An integral time, live.
 const fn integral_time(key: &'static str) -> Definition {
     Definition::number(key, "ms", INTEGRAL_TIME_MS.0, INTEGRAL_TIME_MS.1).of_axis().live()
+}
+
+/// A polynomial of an RST controller, live.
+const fn polynomial(key: &'static str, unit: &'static str, max_len: usize) -> Definition {
+    Definition::new(key, unit, Kind::NumberList { min_len: 1, max_len }).of_axis().optional().live()
 }
 
 /// A delay of the set-point, live.
@@ -204,6 +213,17 @@ pub static DEFINITIONS: &[Definition] = &[
     gain("position_loop.gain", "(1000 °/min)/°")
         .on(Rotary)
         .is("Kp, position-loop gain; 1 (1000 °/min)/° is 16.667 s⁻¹ (Prévost Appendix 2)."),
+    polynomial("position_loop.rst.r", "s⁻¹", RST_TERMS)
+        .is("R of an RST controller, in rising powers of q⁻¹ from q⁰ on (Prévost eq. 9)."),
+    polynomial("position_loop.rst.s", "", RST_TERMS)
+        .is("S of an RST controller, in rising powers of q⁻¹ from q⁰ on (Prévost eq. 9)."),
+    polynomial("position_loop.rst.t", "s⁻¹", 2 * RST_HORIZON as usize + 1)
+        .is("T of an RST controller, in rising powers of q from position_loop.rst.t_first on (Prévost eq. 9)."),
+    Definition::new("position_loop.rst.t_first", "", Kind::Integer { min: -RST_HORIZON, max: RST_HORIZON })
+        .of_axis()
+        .default(Integer(0))
+        .live()
+        .is("Power of q of T's first term: 1 begins one position period ahead."),
     gain("velocity_loop.gain", "N·m/(rad/s)")
         .driven_by(RotatingMotor)
         .is("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),
