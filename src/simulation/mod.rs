@@ -45,8 +45,8 @@ pub enum SimulationError {
 
 /// A machine with the trajectories that it has been given.
 ///
-/// Position instant k is at `origin + k·Tsp`; the first is k = 0. Until the first trajectory starts or
-/// the first load acts, the machine stands still at its start position, exactly: what a trajectory
+/// Position instant k is at `origin + k·Tsp`; the first is k = 0. Until the first trajectory starts, a
+/// stream first moves a joint or the first load acts, the machine stands still at its start position, exactly: what a trajectory
 /// does afterwards does not depend on how long it was waited for.
 #[derive(Debug)]
 pub struct Simulation {
@@ -133,6 +133,32 @@ impl Simulation {
         Ok(admission)
     }
 
+    /// Sets one set-point of a stream, m or rad, for the next position instant; `false` while a
+    /// trajectory or a stop has the joint. It is commanded [`stream_delay`](Self::stream_delay)
+    /// later. A stream is no motion: it has no figures and no end.
+    ///
+    /// # Errors
+    /// [`Rejection`] as of [`Timeline::stream`]; nothing changes then.
+    pub fn stream(&mut self, place: usize, position: f64) -> Result<bool, Rejection> {
+        self.timeline.stream(place, position)
+    }
+
+    /// Sets how many position periods a stream is delayed, for controllers that look as far ahead;
+    /// takes effect when the stream pauses, see [`Timeline::set_stream_delay`].
+    pub fn set_stream_delay(&mut self, periods: u32) {
+        self.timeline.set_stream_delay(periods);
+    }
+
+    /// Delay of streamed set-points that is in effect, ns.
+    pub fn stream_delay(&self) -> Nanoseconds {
+        Nanoseconds::from(self.timeline.stream_delay()) * self.period
+    }
+
+    /// Whether a stream drives, moving or not: see [`Timeline::is_streaming`].
+    pub fn is_streaming(&self) -> bool {
+        self.timeline.is_streaming()
+    }
+
     /// External force or torque on an axis (N or N·m, positive towards plus) from the next position
     /// instant on, for `hold` ns; limited to ±[`MAX_LOAD`], and none if it is NaN.
     pub fn set_load(&mut self, axis: usize, load: f64, hold: Nanoseconds) {
@@ -184,7 +210,7 @@ impl Simulation {
         let k = self.next;
         self.timeline.next();
         self.follow_timeline_events(k);
-        self.awake |= self.motions.any_running() || self.loads.any();
+        self.awake |= self.motions.any_running() || self.loads.any() || self.timeline.is_stream_moving();
         if self.awake {
             self.motions.look_ahead(&self.timeline);
             self.loads.apply(&mut self.machine, k);
@@ -254,7 +280,8 @@ impl Simulation {
         self.ends.drain(..)
     }
 
-    /// Whether a trajectory waits, runs or has just ended, or a load acts.
+    /// Whether a trajectory waits, runs or has just ended, or a load acts. A stream does not count: it
+    /// comes at the pace of its sender, which whoever computes ahead would run away from.
     pub fn is_asked(&self) -> bool {
         self.motions.any() || self.timeline.is_moving() || self.timeline.is_waiting() || self.loads.any()
     }
@@ -284,7 +311,7 @@ impl Simulation {
         self.timeline.psec_ahead(joint, periods.saturating_add(1))
     }
 
-    /// Whether the set-points move.
+    /// Whether a trajectory or a stop moves the set-points.
     pub fn is_moving(&self) -> bool {
         self.timeline.is_moving()
     }
