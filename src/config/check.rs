@@ -56,6 +56,8 @@ pub(super) fn check(
         set.check_transmission(joint, origin)?;
         set.check_friction(joint)?;
         set.check_stroke(joint)?;
+        set.check_horizons(joint)?;
+        set.check_polynomials(joint)?;
     }
     Ok(layout)
 }
@@ -279,6 +281,43 @@ impl Set<'_> {
             )),
             _ => Ok(()),
         }
+    }
+
+    fn check_horizons(&self, joint: &Joint) -> Result<(), ConfigError> {
+        let key = |name: &str| format!("{}.position_loop.gpc.{name}", joint.name);
+        let last = key("n2");
+        let count = |key: &str| match self.value(key) {
+            Some(Value::Integer(count)) => Some(count),
+            _ => None,
+        };
+        for first in [key("n1"), key("nu")] {
+            if let (Some(value), Some(most)) = (count(&first), count(&last))
+                && value > most
+            {
+                let allowed = format!("keep {first} ≤ {last}: they are {value} and {most}");
+                return Err(self.refused(&[&first, &last], allowed));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_polynomials(&self, joint: &Joint) -> Result<(), ConfigError> {
+        let controller = format!("{}.position_loop.controller", joint.name);
+        let Some(entry) = self.entries.get(&controller).filter(|e| e.value == Value::Text("rst".to_owned()))
+        else {
+            return Ok(());
+        };
+        for name in ["r", "s", "t"] {
+            let key = format!("{}.position_loop.rst.{name}", joint.name);
+            if !self.entries.contains_key(&key) {
+                return Err(missing(
+                    &entry.source,
+                    &key,
+                    format!("list of numbers, since {controller} = rst"),
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// The ranges of the schema keep home, 0, within the stroke; this keeps the stroke open.
