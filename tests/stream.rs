@@ -3,11 +3,15 @@
 mod common;
 mod trajectory_common;
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
 use trajectory_common::*;
+use virtual_axes::config::{Assignment, MachineConfig, Source, Value};
+use virtual_axes::machine::MachineParameters;
 use virtual_axes::simulation::{Simulation, joints as joints_of};
 use virtual_axes::trajectory::stream::{MAX_STREAM_DELAY, STREAM_PAUSE};
-use virtual_axes::trajectory::{Code, MotionId, Start, State, Timeline};
+use virtual_axes::trajectory::{Code, Context, MotionId, Request, Row, Start, State, Timeline, Trajectory};
 
 /// Vmax·Tsp of the joints, m or rad.
 const REACH: f64 = 0.003;
@@ -271,52 +275,91 @@ proptest! {
     }
 }
 
-/// The default machine's axes, the stream's way.
-fn simulation(delay: u32) -> Simulation {
-    let config = common::parameters::<&str>(&[]).machine_config().expect("valid");
-    let mut simulation = Simulation::new(&config, joints_of(&config, ""), 0).expect("can be simulated");
-    simulation.set_stream_delay(delay);
-    simulation
+/// The default machine with `controller` on X.
+fn config(controller: &str) -> MachineConfig {
+    let mut parameters = common::parameters::<&str>(&[]);
+    let assignment = Assignment {
+        key: "x.position_loop.controller".into(),
+        value: Value::Text(controller.into()),
+        source: Source::named("test"),
+    };
+    parameters.set_all(vec![assignment]).expect("there is such a controller");
+    parameters.machine_config().expect("valid")
+}
+
+fn simulation(config: &MachineConfig) -> Simulation {
+    Simulation::new(config, joints_of(config, ""), 0).expect("can be simulated")
+}
+
+/// What there is to tell of X, bit for bit.
+fn signals(s: &Simulation) -> [u64; 4] {
+    let x = s.samples()[0];
+    [x.psec, x.position, x.current, x.velocity_setpoint].map(f64::to_bits)
+}
+
+/// A trajectory of X on the grid of position instants, from rest.
+fn given(config: &MachineConfig, positions: &[f64]) -> Arc<Trajectory> {
+    let mut request = Request::new(Start::Now, vec!["x".into()]);
+    for (k, position) in positions.iter().enumerate() {
+        request.push(k as i64 * TSP, Row { positions: &[*position], ..Row::default() }).unwrap();
+    }
+    let joints = joints_of(config, "");
+    let context =
+        Context { joints: &joints, period: TSP, max_points: 1000, allow_nonzero_end_velocity: false };
+    Trajectory::new(request, &context).unwrap().into()
+}
+
+/// The delay is what makes it so for a controller that looks ahead, whose T reads up to N2 = 14 periods
+/// beyond the set-point that α = 1.5 periods, in whole ones 2, hold back.
+#[test]
+fn a_streamed_path_is_followed_bit_for_bit_as_the_same_path_in_a_trajectory() {
+    for (controller, delay) in [("cascade", 0), ("gpc", 12)] {
+        let config = config(controller);
+        // Standing first, for the longest preview, and at the end.
+        let wave = |k: i32| 0.02 * (1.0 - (f64::from(k.clamp(0, 314)) * 0.02).cos());
+        let positions: Vec<_> = (-20..400).map(wave).collect();
+        let mut streamed = simulation(&config);
+        assert_eq!(streamed.stream_delay(), delay * TSP, "{controller}");
+        let mut followed = Vec::new();
+        for &position in positions.iter().chain(&[wave(400); 12]) {
+            streamed.stream(0, position).unwrap();
+            streamed.step();
+            followed.push(signals(&streamed));
+        }
+        let mut reference = simulation(&config);
+        reference.offer(MotionId(1), given(&config, &positions)).unwrap();
+        for k in 0..positions.len() {
+            reference.step();
+            assert_eq!(signals(&reference), followed[k + delay as usize], "{controller}, instant {k}");
+        }
+    }
 }
 
 #[test]
-fn a_streamed_path_is_followed_bit_for_bit_as_the_same_path_in_a_trajectory() {
-    let positions = |k: usize| 0.02 * (1.0 - (k as f64 * 0.02).cos());
-    let signals = |s: &Simulation| s.samples()[0].position.to_bits();
-    let mut streamed = simulation(9);
-    let mut follow = Vec::new();
-    for k in 0..409 {
-        if k < 400 {
-            streamed.stream(0, positions(k)).unwrap();
-        }
-        streamed.step();
-        follow.push(signals(&streamed));
+fn another_controller_changes_the_delay_when_the_stream_pauses() {
+    let parameters = |controller| Arc::new(MachineParameters::new(&config(controller)).unwrap());
+    let mut s = simulation(&config("cascade"));
+    for position in ramp(0.0, 0.001, 20) {
+        s.stream(0, position).unwrap();
+        s.step();
     }
-    let mut given = simulation(0);
-    let points: Vec<_> = (0..400).map(|k| (k * TSP, [positions(k as usize)])).collect();
-    let mut request = virtual_axes::trajectory::Request::new(Start::Now, vec!["x".into()]);
-    for (time, row) in &points {
-        let row = virtual_axes::trajectory::Row { positions: row, ..Default::default() };
-        request.push(*time, row).unwrap();
+    s.adopt(parameters("gpc")).unwrap();
+    for _ in 0..3 {
+        s.step();
+        assert_eq!(s.stream_delay(), 0);
+        assert_eq!(s.samples()[0].psec, 0.020);
     }
-    let config = common::parameters::<&str>(&[]).machine_config().unwrap();
-    let context = virtual_axes::trajectory::Context {
-        joints: &joints_of(&config, ""),
-        period: TSP,
-        max_points: 1000,
-        allow_nonzero_end_velocity: true,
-    };
-    let path = virtual_axes::trajectory::Trajectory::new(request, &context).unwrap();
-    given.offer(MotionId(1), path.into()).unwrap();
-    for k in 0..400 {
-        given.step();
-        assert_eq!(signals(&given), follow[k + 9], "instant {k}");
+    for _ in 0..PAUSE {
+        s.step();
     }
+    assert_eq!(s.stream_delay(), 12 * TSP);
+    s.adopt(parameters("cascade")).unwrap();
+    assert_eq!(s.stream_delay(), 0, "it has paused");
 }
 
 #[test]
 fn a_stream_wakes_the_axes_when_it_moves_them_and_asks_for_no_haste() {
-    let mut s = simulation(0);
+    let mut s = simulation(&config("cascade"));
     let at_rest = s.machine().tick();
     for _ in 0..10 {
         s.stream(0, 0.0).unwrap();

@@ -88,8 +88,10 @@ impl Simulation {
         let home = vec![0.0; axes.len()];
         let samples = machine.axes().iter().map(|a| *a.sample()).collect();
         let Periods { position: period, current: tick, .. } = config.periods();
+        let mut timeline = Timeline::new(joints, period, &home)?;
+        timeline.set_stream_delay(stream_delay(&machine));
         Ok(Simulation {
-            timeline: Timeline::new(joints, period, &home)?,
+            timeline,
             loads: Loads::new(axes.len()),
             motions: Motions::new(kinds, seconds(tick), horizon(period)),
             saturated: vec![false; axes.len()],
@@ -146,13 +148,9 @@ impl Simulation {
         self.timeline.stream(place, position)
     }
 
-    /// Sets how many position periods a stream is delayed, for controllers that look as far ahead;
-    /// takes effect when the stream pauses, see [`Timeline::set_stream_delay`].
-    pub fn set_stream_delay(&mut self, periods: u32) {
-        self.timeline.set_stream_delay(periods);
-    }
-
-    /// Delay of streamed set-points that is in effect, ns.
+    /// Delay of streamed set-points that is in effect, ns: as many position periods as the controllers
+    /// look ahead. After [`adopt`](Self::adopt) it changes when the stream pauses, see
+    /// [`Timeline::set_stream_delay`].
     pub fn stream_delay(&self) -> Nanoseconds {
         Nanoseconds::from(self.timeline.stream_delay()) * self.period
     }
@@ -174,7 +172,9 @@ impl Simulation {
     /// # Errors
     /// [`MachineError::AnotherMachine`] if joints or periods differ; nothing changes then.
     pub fn adopt(&mut self, parameters: Arc<MachineParameters>) -> Result<(), MachineError> {
-        self.machine.adopt(parameters)
+        self.machine.adopt(parameters)?;
+        self.timeline.set_stream_delay(stream_delay(&self.machine));
+        Ok(())
     }
 
     /// Puts the machine back to rest at home; motions under way end as aborted.
@@ -213,7 +213,10 @@ impl Simulation {
         let k = self.next;
         self.timeline.next();
         self.follow_timeline_events(k);
-        self.awake |= self.motions.any_running() || self.loads.any() || self.timeline.is_stream_moving();
+        self.awake |= self.motions.any_running() || self.loads.any();
+        if !self.awake && self.timeline.is_stream_moving() {
+            self.wake_at_rest();
+        }
         if self.awake {
             self.motions.look_ahead(&self.timeline);
             self.loads.apply(&mut self.machine, k);
@@ -225,6 +228,14 @@ impl Simulation {
             self.settled_from = k + 1 + SETTLING / self.period;
         }
         self.next = k + 1;
+    }
+
+    /// A position period at rest: of a machine that has moved nothing the first set-point counts as the
+    /// one before it too, and a stream's first need not be where the machine stands.
+    fn wake_at_rest(&mut self) {
+        let rest: Vec<f64> = self.samples.iter().map(|sample| sample.psec).collect();
+        self.machine.advance(&rest);
+        self.awake = true;
     }
 
     fn follow_timeline_events(&mut self, k: i64) {
@@ -333,6 +344,11 @@ impl Simulation {
 /// Position periods that contour errors look ahead of the set-point.
 pub fn horizon(period: Nanoseconds) -> u32 {
     u32::try_from(LOOK_AHEAD / period.max(1)).unwrap_or(u32::MAX).clamp(1, MOST_AHEAD)
+}
+
+/// Position periods that a stream is delayed, for controllers that look as far ahead.
+fn stream_delay(machine: &Machine) -> u32 {
+    u32::try_from(machine.horizon()).unwrap_or(u32::MAX)
 }
 
 /// The joints of a machine as trajectories name and limit them, `prefix` before each name.

@@ -151,6 +151,7 @@ impl Timeline {
             return;
         }
         self.stream.delay = self.stream.wanted;
+        self.stream.moved_k = None;
         for track in &mut self.tracks {
             // Of a joint that stands, all entries are what it is commanded.
             track.ahead.buffer.resize(self.stream.delay, track.state.position);
