@@ -209,6 +209,31 @@ def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
     real.stop()
 
 
+def test_a_controller_that_looks_ahead_delays_the_stream(start: Callable[..., Drive]):
+    """By what it reads ahead of the set-point that alpha holds back, and all joints alike."""
+    drive = start("-p", "x.position_loop.controller:=gpc")
+    found = drive.get_parameters(["x.position_loop.gpc.n2", "x.delays.alpha_ms"])
+    delay = found["x.position_loop.gpc.n2"] - math.ceil(found["x.delays.alpha_ms"] * 1e6 / TSP_NS)
+    assert delay > 0
+    node_status(drive, lambda v: v["stream_delay_ms"] == f"{delay * TSP_NS // 1_000_000}")
+
+    begin = drive.now()
+    drive.stream(["x", "y"], [0.001, 0.001])
+    drive.wait_for(lambda: drive.latest("psec")["x"] == 0.001, 5, "set-point of x")
+    states = drive.record(begin, drive.now()).states
+    first = {joint: states.stamp[np.flatnonzero(states["psec", joint])[0]] for joint in ("x", "y")}
+    assert first["x"] == first["y"]
+    # Sent after `begin`, it entered at the instant after that one at the earliest.
+    assert first["x"] >= begin + (1 + delay) * TSP_NS
+    rows = np.column_stack([0.001 + wave(0.02, 50)])[:20]
+    follow(drive, ["x"], rows)
+    np.testing.assert_array_equal(commanded(drive, "x", begin), [0.0, 0.001, *rows[:, 0]])
+
+    # In its place one that does not look ahead: no delay, once the stream has paused.
+    drive.set_parameters({"x.position_loop.controller": "cascade"})
+    node_status(drive, lambda v: v["stream_delay_ms"] == "0")
+
+
 def test_in_fast_a_stream_alone_goes_at_real_pace(fast: Drive):
     """Its sender does too: nothing is gained by running away from it."""
     go_home(fast)
