@@ -46,8 +46,10 @@ impl LookAhead {
 
     /// Takes `newest` in and gives the next state to command; `state` is the one before it.
     pub fn next(&mut self, newest: f64, state: State, period: Nanoseconds) -> State {
-        self.buffer.push_back(newest);
-        let position = self.buffer.pop_front().unwrap_or(newest);
+        let position = self.buffer.pop_front().map_or(newest, |position| {
+            self.buffer.push_back(newest);
+            position
+        });
         between(state.position, position, period)
     }
 
@@ -121,8 +123,8 @@ impl Timeline {
     pub fn set_stream_delay(&mut self, periods: u32) {
         let wanted = periods.min(MAX_STREAM_DELAY) as usize;
         for track in &mut self.tracks {
-            // One more: what enters at an instant meets what leaves at it.
-            let room = (wanted + 1).saturating_sub(track.ahead.buffer.len());
+            // Here, so that the instant at which it takes effect allocates nothing.
+            let room = wanted.saturating_sub(track.ahead.buffer.len());
             track.ahead.buffer.reserve(room);
         }
         self.stream.wanted = wanted;
