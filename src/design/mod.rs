@@ -6,7 +6,7 @@ mod margins;
 mod model;
 mod pole_placement;
 mod poles;
-mod polynomial;
+pub(crate) mod polynomial;
 
 pub use classic::{Pid, p, pi, pid};
 pub use gpc::{GpcTuning, Weight, gpc};

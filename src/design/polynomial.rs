@@ -8,7 +8,7 @@ use nalgebra::{Complex, DMatrix, DVector, Schur};
 const ITERATIONS_PER_ROOT: usize = 40;
 
 /// Product of two polynomials.
-pub(super) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
     for (i, x) in a.iter().enumerate() {
         for (j, y) in b.iter().enumerate() {
