@@ -60,9 +60,9 @@ impl Situation {
         angles[present..].to_vec()
     }
 
-    /// The first increment of Ω* that minimises Σ (θ* − θ)² + λ Σ ΔΩ*² over the horizons: the least
-    /// squares solution of the criterion's residuals, whose derivatives are found by response to one
-    /// increment at a time. λ_rel is resolved with the same responses.
+    /// The first increment of Ω* that minimises Σ (θ* − θ)² + λ Σ ΔΩ*² over the horizons: least
+    /// squares of the criterion's residuals, whose derivatives are the responses to one increment at a
+    /// time. λ_rel is resolved with the same responses.
     fn first_increment(&self, model: &PredictionModel, tuning: &GpcTuning) -> f64 {
         let GpcTuning { n1, n2, nu, weight } = *tuning;
         let within = |response: Vec<f64>| response[n1 - 1..].to_vec();
@@ -84,17 +84,22 @@ impl Situation {
             Weight::Relative(lambda) => lambda * forced.iter().flatten().map(|g| g * g).sum::<f64>(),
         };
         let rows = n2 - n1 + 1;
-        let residuals = DMatrix::from_fn(rows + nu, nu, |row, column| {
-            if row < rows {
-                forced[column][row]
-            } else {
-                f64::from(u8::from(row - rows == column)) * lambda.sqrt()
-            }
+        // The residuals e = w − J ΔΩ* are least where Jᵀ e = 0; both are the unknowns of one system.
+        let (rows, all) = (n2 - n1 + 1, n2 - n1 + 1 + nu);
+        let derivative = |row: usize, column: usize| match row.checked_sub(rows) {
+            None => forced[column][row],
+            Some(moved) => f64::from(u8::from(moved == column)) * lambda.sqrt(),
+        };
+        let system = DMatrix::from_fn(all + nu, all + nu, |row, column| match (row < all, column < all) {
+            (true, true) => f64::from(u8::from(row == column)),
+            (true, false) => derivative(row, column - all),
+            (false, true) => derivative(column, row - all),
+            (false, false) => 0.0,
         });
-        let wanted = DVector::from_fn(rows + nu, |row, _| {
+        let wanted = DVector::from_fn(all + nu, |row, _| {
             if row < rows { self.setpoints[n1 - 1 + row] - free[row] } else { 0.0 }
         });
-        residuals.svd(true, true).solve(&wanted, 0.0).expect("both sides were asked for")[0]
+        system.full_piv_lu().solve(&wanted).expect("λ > 0")[all]
     }
 
     /// ΔΩ*(k) of S Ω* = −R θ + T θ*.
