@@ -29,6 +29,13 @@ pub enum Kind {
     Choice(&'static [&'static str]),
     /// A list of texts.
     TextList,
+    /// A list of finite numbers.
+    NumberList {
+        /// Fewest numbers.
+        min_len: usize,
+        /// Most numbers.
+        max_len: usize,
+    },
 }
 
 /// A default value that can stand in a constant.
@@ -117,11 +124,14 @@ impl Definition {
             Kind::Text => "be a text".to_owned(),
             Kind::TextList => "be a list of texts".to_owned(),
             Kind::Choice(choices) => format!("be {}", choices.join(" or ")),
+            Kind::NumberList { min_len, max_len } => {
+                format!("be a list of {min_len} … {max_len} finite numbers")
+            }
             Kind::Number { .. } | Kind::Integer { .. } => format!("lie in {}", self.range()),
         }
     }
 
-    /// The range with its unit, or the choices: `1e-9 … 1e3 kg·m²`, `real, fast`.
+    /// The range with its unit, or the choices: `1e-9 … 1e3 kg·m²`, `real, fast`, `1 … 32 numbers in s⁻¹`.
     pub fn range(&self) -> String {
         let (min, max) = match self.kind {
             Kind::Number { min, max } => (number_text(min), number_text(max)),
@@ -130,6 +140,12 @@ impl Definition {
             Kind::Text => return "text".to_owned(),
             Kind::TextList => return "list of texts".to_owned(),
             Kind::Choice(choices) => return choices.join(", "),
+            Kind::NumberList { min_len, max_len } if self.unit.is_empty() => {
+                return format!("{min_len} … {max_len} numbers");
+            }
+            Kind::NumberList { min_len, max_len } => {
+                return format!("{min_len} … {max_len} numbers in {}", self.unit);
+            }
         };
         if self.unit.is_empty() {
             format!("{min} … {max}")
@@ -178,6 +194,12 @@ impl Definition {
             (Kind::Choice(choices), Value::Text(text)) => {
                 choices.contains(&text.as_str()).then(|| value.clone())
             }
+            (Kind::NumberList { min_len, max_len }, list) if list.numbers().is_some() => list
+                .numbers()
+                .filter(|numbers| {
+                    (min_len..=max_len).contains(&numbers.len()) && numbers.iter().all(|n| n.is_finite())
+                })
+                .map(Value::DoubleList),
             (Kind::Flag, Value::Bool(_))
             | (Kind::Text, Value::Text(_))
             | (Kind::TextList, Value::TextList(_)) => Some(value.clone()),
@@ -207,6 +229,7 @@ impl Definition {
             Kind::Text => "text (in quotation marks)".to_owned(),
             Kind::Choice(choices) => choices.join(" or "),
             Kind::TextList => "list of texts".to_owned(),
+            Kind::NumberList { .. } => "list of numbers".to_owned(),
         }
     }
 }

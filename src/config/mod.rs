@@ -23,6 +23,7 @@ mod parameter_file;
 mod parameters;
 mod schema;
 mod value;
+mod writer;
 mod yaml;
 
 #[cfg(test)]

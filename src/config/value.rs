@@ -26,6 +26,18 @@ pub enum Value {
 }
 
 impl Value {
+    /// The numbers of a list of numbers or integers; an empty list holds none, whatever its kind.
+    pub(super) fn numbers(&self) -> Option<Vec<f64>> {
+        match self {
+            Self::DoubleList(numbers) => Some(numbers.clone()),
+            Self::IntegerList(integers) => Some(integers.iter().map(|integer| *integer as f64).collect()),
+            // YAML and ROS do not know of what an empty list is.
+            Self::TextList(texts) if texts.is_empty() => Some(Vec::new()),
+            Self::BoolList(flags) if flags.is_empty() => Some(Vec::new()),
+            _ => None,
+        }
+    }
+
     /// Kind and value for a message: `text "abc"`.
     pub(super) fn described(&self) -> String {
         match self {

@@ -14,23 +14,33 @@ pub enum PositionController {
     Rst {
         /// The polynomials.
         rst: Rst,
-        /// The law that holds the axis at rest; none where the controller comes to rest by itself, since
-        /// it has no integral action.
-        hold: Option<Hold>,
+        /// What takes over where the controller is out of its depth; none where it has no integral action,
+        /// and with it nothing that hunts or winds up.
+        guard: Option<Guard>,
     },
 }
 
-/// The proportional law that takes over where the set-point has stood still for a while, over the whole
-/// horizon of the controller, until motion comes into its preview.
+/// The proportional law with velocity feedforward that takes over from an RST controller
 ///
-/// Integral action on top of that of the velocity loop hunts against Coulomb friction for ever; the
-/// proportional law lets the axis creep to where it should be, and friction keeps it there.
+/// - where the set-point has stood still for a while over the whole horizon, until motion comes into it:
+///   integral action on top of that of the velocity loop hunts against Coulomb friction for ever, while a
+///   proportional law lets the axis creep to where it should be, and friction keeps it there;
+/// - where the motor's current has been at its limit, until it has not been there for a while: a linear law
+///   that is faster than the motor can accelerate swings about its set-point for ever.
+///
+/// ```text
+/// Ω* = Kp (θ*(k) − θ(k)) + (θ*(k+1) − θ*(k)) / Tsp
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hold {
+pub struct Guard {
     /// Kp, s⁻¹.
     pub gain: f64,
-    /// Position periods of standstill that the controller itself is given to finish a move.
-    pub after: u32,
+    /// Tsp, s.
+    pub period: f64,
+    /// Position periods of standstill that the controller is given to finish a move by itself.
+    pub rest_after: u32,
+    /// Position periods without a limit after which the controller is back.
+    pub recovered_after: u32,
 }
 
 /// What a position controller remembers: what it has seen and what it has asked for.
@@ -44,6 +54,8 @@ pub struct PositionState {
     commands: [f64; MAX_COEFFICIENTS],
     /// Position instants since which the set-point has stood still over the whole horizon.
     still: u32,
+    /// Position instants since the motor's current was at its limit.
+    unlimited: u32,
 }
 
 impl PositionState {
@@ -53,6 +65,7 @@ impl PositionState {
             angles: [angle; MAX_COEFFICIENTS],
             commands: [0.0; MAX_COEFFICIENTS],
             still: u32::MAX,
+            unlimited: u32::MAX,
         }
     }
 
@@ -64,6 +77,14 @@ impl PositionState {
     #[inline]
     pub fn record(&mut self, command: f64) {
         shift_in(&mut self.commands, command);
+    }
+
+    /// Takes down that the axis reached `speed` instead, rad/s: the motor's current was at its limit, and
+    /// a recursion that went on from what was asked for would wind up.
+    #[inline]
+    pub fn correct(&mut self, speed: f64) {
+        self.commands[0] = speed;
+        self.unlimited = 0;
     }
 }
 
@@ -95,14 +116,15 @@ impl PositionController {
         shift_in(&mut s.angles, angle);
         match self {
             PositionController::Proportional { gain } => gain * (setpoint(0) - angle),
-            PositionController::Rst { rst, hold } => {
+            PositionController::Rst { rst, guard } => {
                 let now = setpoint(0);
                 let is_still = (1..=rst.preview()).all(|j| setpoint(j) == now);
                 s.still = if is_still { s.still.saturating_add(1) } else { 0 };
-                if let Some(hold) = hold
-                    && s.still > hold.after
+                s.unlimited = s.unlimited.saturating_add(1);
+                if let Some(guard) = guard
+                    && (s.still > guard.rest_after || s.unlimited <= guard.recovered_after)
                 {
-                    return hold.gain * (now - angle);
+                    return guard.gain * (now - angle) + (setpoint(1) - now) / guard.period;
                 }
                 let asked = weighted(rst.t(), |i| setpoint(rst.t_first() + i as i64));
                 let seen = weighted(rst.r(), |i| s.angles[i]);

@@ -100,6 +100,8 @@ pub struct Axis {
     velocity_pi: PiState,
     current_pi: PiState,
     speed_limited: bool,
+    /// Whether the current set-point was limited since the last position instant.
+    current_limited: bool,
     sample: AxisSample,
 }
 
@@ -121,6 +123,7 @@ impl Axis {
             velocity_pi: PiState { integral: torque, limited: false },
             current_pi: PiState { integral: voltage, limited: false },
             speed_limited: false,
+            current_limited: false,
             sample: AxisSample {
                 psec: position,
                 delayed_psec: position,
@@ -172,6 +175,9 @@ impl Axis {
     fn control_position(&mut self, p: &AxisParameters, tick: u64) {
         let k = self.psec.index(tick, p.delays.position);
         self.sample.delayed_psec = self.psec.at(k);
+        if std::mem::take(&mut self.current_limited) {
+            self.position.correct(self.motor.speed);
+        }
         let psec = &self.psec;
         let wanted = p.position.update(&mut self.position, |j| psec.at(k + j) / p.ratio, self.motor.angle);
         self.sample.velocity_setpoint = wanted.clamp(-p.max_speed, p.max_speed);
@@ -191,6 +197,7 @@ impl Axis {
         }
         let error = s.velocity_setpoint + s.velocity_feedforward - self.motor.speed;
         s.current_setpoint = p.velocity.update(&mut self.velocity_pi, error, s.torque_feedforward);
+        self.current_limited |= self.velocity_pi.limited;
     }
 
     /// Moves the plant by one tick.

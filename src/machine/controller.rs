@@ -1,16 +1,16 @@
 //! The position controller of an axis, as its configuration asks for it.
 
 use crate::config::{AxisConfig, FeedforwardConfig, GpcConfig, Periods, PositionControllerConfig};
-use crate::control::{Hold, PositionController, Rst};
+use crate::control::{Guard, PositionController, Rst};
 use crate::design::{DesignError, GpcTuning, Weight, gpc};
-use crate::units::{MILLISECOND_NS, Nanoseconds};
+use crate::units::{MILLISECOND_NS, Nanoseconds, seconds};
 
 use super::AxisError;
 use super::prediction::prediction_model;
 
 /// Standstill of the set-point after which an axis is held: a controller with a bandwidth worth its name
 /// has finished a move by then.
-const HOLD_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
+const REST_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
 
 impl From<&GpcConfig> for GpcTuning {
     fn from(config: &GpcConfig) -> Self {
@@ -37,9 +37,14 @@ pub(super) fn position_controller(
             (rst.map_err(DesignError::from)?, "rst")
         }
     };
-    let after = (HOLD_AFTER / periods.position) as u32;
-    let hold = rst.has_integral_action().then_some(Hold { gain, after });
-    Ok((PositionController::Rst { rst, hold }, name))
+    let guard = Guard {
+        gain,
+        period: seconds(periods.position),
+        rest_after: (REST_AFTER / periods.position) as u32,
+        recovered_after: rst.preview() as u32 + 1,
+    };
+    let guard = rst.has_integral_action().then_some(guard);
+    Ok((PositionController::Rst { rst, guard }, name))
 }
 
 /// The feedforward of the axis: velocity and torque are the cascade's, an RST controller has it in T.

@@ -119,20 +119,21 @@ fn descriptor(definition: &Definition) -> Descriptor {
         Kind::Flag => (ParameterType::Bool, None),
         Kind::Text | Kind::Choice(_) => (ParameterType::String, None),
         Kind::TextList => (ParameterType::StringArray, None),
+        Kind::NumberList { .. } => (ParameterType::DoubleArray, None),
     };
     let description = if definition.unit.is_empty() {
         definition.description.to_owned()
     } else {
         format!("{} Unit: {}.", definition.description, definition.unit)
     };
-    let choices = match definition.kind {
-        Kind::Choice(_) => format!("must {}", definition.allowed()),
+    let constraints = match definition.kind {
+        Kind::Choice(_) | Kind::NumberList { .. } => format!("must {}", definition.allowed()),
         _ => String::new(),
     };
     Descriptor {
         kind,
         description,
-        additional_constraints: choices,
+        additional_constraints: constraints,
         read_only: !definition.live,
         dynamic_typing: false,
         range,

@@ -4,6 +4,7 @@ mod faults;
 mod file_faults;
 mod machines;
 mod setting;
+mod writing;
 
 use super::{ConfigError, Parameters};
 

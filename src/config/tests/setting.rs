@@ -35,6 +35,9 @@ fn every_live_key_takes_both_ends_of_its_range() {
                 Kind::Choice(choices) => {
                     choices.iter().map(|choice| Value::Text((*choice).to_owned())).collect()
                 }
+                Kind::NumberList { min_len, max_len } => {
+                    vec![Value::DoubleList(vec![1.0; min_len]), Value::DoubleList(vec![-1e300; max_len])]
+                }
                 Kind::Text | Kind::TextList => Vec::new(),
             };
             for value in values {
@@ -52,8 +55,39 @@ fn every_live_key_takes_both_ends_of_its_range() {
             assert_eq!(parameters, start);
         }
     }
-    // 11 on each of five axes, and one of the node.
-    assert_eq!(live, 2 * (5 * 11 + 1));
+    // 15 on each of five axes, and one of the node.
+    assert_eq!(live, 2 * (5 * 15 + 1));
+}
+
+#[test]
+fn lists_of_numbers_take_integers() {
+    for (text, expected) in
+        [("[1.0, -2]", vec![1.0, -2.0]), ("[3, 4]", vec![3.0, 4.0]), ("[1e-9]", vec![1e-9])]
+    {
+        let parameters = set(&format!("x.position_loop.rst.r={text}")).expect(text);
+        assert_eq!(parameters.get("x.position_loop.rst.r"), Some(Value::DoubleList(expected)));
+    }
+}
+
+#[test]
+fn lists_of_numbers_are_refused_by_name() {
+    for (text, why) in [
+        ("x.position_loop.rst.r=2.0", "found number 2, list of numbers wanted"),
+        ("x.position_loop.rst.r=[a]", "found a list of texts [a], list of numbers wanted"),
+        ("x.position_loop.rst.r=[true]", "found a list of flags [true], list of numbers wanted"),
+        ("x.position_loop.rst.r=[1, [2]]", "found a list of unlike or nested items, a value wanted"),
+    ] {
+        assert_eq!(refused(text), format!("--set: x.position_loop.rst.r: {why}"));
+    }
+    for value in ["[]", "[1, NaN]", "[inf]"] {
+        let written = value.replace("NaN", ".nan").replace("inf", ".inf");
+        assert_eq!(
+            refused(&format!("x.position_loop.rst.r={written}")),
+            format!("--set: x.position_loop.rst.r = {value}: must be a list of 1 … 32 finite numbers")
+        );
+    }
+    let long = format!("x.position_loop.rst.t=[{}1]", "1,".repeat(401));
+    assert!(refused(&long).ends_with("must be a list of 1 … 401 finite numbers"), "{}", refused(&long));
 }
 
 #[test]

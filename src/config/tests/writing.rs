@@ -1,0 +1,111 @@
+//! Machine files that are written, and read again.
+
+use proptest::prelude::*;
+
+use super::mikron;
+use crate::config::{Kind, Parameters, Source, Value};
+
+fn source() -> Source {
+    Source::named("test")
+}
+
+/// Asserts that the file of `parameters` holds the same values.
+fn assert_reads_back(parameters: &Parameters) -> Result<(), TestCaseError> {
+    let text = parameters.to_yaml("", |_| None);
+    let again =
+        Parameters::from_yaml(&text, "new.yaml").map_err(|e| TestCaseError::fail(format!("{e}\n{text}")))?;
+    prop_assert_eq!(again.machine_config(), parameters.machine_config());
+    let values = |p: &Parameters| format!("{:?}", p.iter().collect::<Vec<_>>());
+    prop_assert_eq!(values(&again), values(parameters), "{}", text);
+    Ok(())
+}
+
+#[test]
+fn shipped_machines_are_the_same_after_writing() {
+    for name in Parameters::builtin_names() {
+        let parameters = Parameters::builtin(name).expect("a shipped machine");
+        assert_reads_back(&parameters).expect(name);
+    }
+}
+
+#[test]
+fn the_file_is_laid_out_as_the_shipped_ones() {
+    let mut parameters = mikron();
+    parameters.set_text("max_points=7", &source()).expect("valid");
+    parameters.set_text("x.position_loop.rst.r=[1.0, -2, 1e-9]", &source()).expect("valid");
+    let text = parameters
+        .to_yaml("Two\nlines", |key| (key == "x.position_loop.gain").then(|| "tuned: 12.5 µm".to_owned()));
+    assert!(
+        text.starts_with("# Two\n# lines\n/**:\n  ros__parameters:\n    machine: \"Mikron UCP 710\"\n"),
+        "{text}"
+    );
+    assert!(
+        text.contains(
+            "    joints: [\"x\", \"y\", \"z\", \"a\", \"c\"]\n    periods:\n      position_ms: 6.0\n"
+        )
+    );
+    assert!(
+        text.contains(
+            "      position_loop:\n        controller: cascade\n        gain: 1.5  # tuned: 12.5 µm\n        \
+         rst:\n          r: [1.0, -2.0, 1.0e-9]\n"
+        ),
+        "{text}"
+    );
+    // Bare, it is the flag "yes" to other readers.
+    assert!(text.contains("\n\n    \"y\":\n      type: linear\n"), "{text}");
+    assert!(text.ends_with("\n\n    max_points: 7\n"), "{text}");
+    // What has its default only is not written.
+    assert!(!text.contains("t_first") && !text.contains("qos"), "{text}");
+}
+
+#[test]
+fn a_comment_stays_one_comment() {
+    let text = mikron().to_yaml("a\u{2028}b\rc", |_| Some("x\nmachine: other".to_owned()));
+    let again = Parameters::from_yaml(&text, "new.yaml").expect("valid");
+    assert_eq!(again.machine_config(), mikron().machine_config());
+}
+
+#[test]
+fn joints_that_are_words_of_yaml_are_read_back() {
+    let text = super::MIKRON.replace("[\"x\", \"y\"", "[\"x\", \"on\"").replace("    y:\n", "    \"on\":\n");
+    let parameters = Parameters::from_yaml(&text, "my.yaml").expect("valid");
+    assert_reads_back(&parameters).expect("the same");
+}
+
+proptest! {
+    #[test]
+    fn changed_values_are_the_same_bits_after_writing(
+        machine in prop::sample::select(Parameters::builtin_names().collect::<Vec<_>>()),
+        name in any::<String>(),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), 0.0..1.0f64, -300i32..300), 1..40),
+        list in prop::collection::vec(-1e300..1e300f64, 1..32),
+    ) {
+        let mut parameters = Parameters::builtin(machine).expect("a shipped machine");
+        parameters.set("machine", Value::Text(name), &source()).expect("any text");
+        let all: Vec<_> = parameters.definitions().collect();
+        for (index, fraction, exponent) in changes {
+            let (key, definition) = &all[index.index(all.len())];
+            let value = match definition.kind {
+                // Of any magnitude in the range, with all digits.
+                Kind::Number { min, max } => {
+                    Value::Double((fraction * 10f64.powi(exponent)).clamp(min, max))
+                }
+                Kind::Integer { min, max } => {
+                    Value::Integer(min + ((max - min) as f64 * fraction) as i64)
+                }
+                Kind::Flag => Value::Bool(fraction < 0.5),
+                Kind::NumberList { max_len, .. } => {
+                    Value::DoubleList(list.iter().copied().take(max_len).collect())
+                }
+                Kind::Choice(choices) => {
+                    Value::Text(choices[(fraction * choices.len() as f64) as usize].to_owned())
+                }
+                Kind::Text => Value::Text(format!("{fraction}")),
+                Kind::TextList => continue,
+            };
+            // What is at odds with another parameter is refused, and nothing is changed.
+            let _ = parameters.set(key, value, &source());
+        }
+        assert_reads_back(&parameters)?;
+    }
+}
