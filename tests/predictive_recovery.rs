@@ -30,7 +30,9 @@ fn advance(machine: &mut Machine, place: usize, k: i64, psec: impl Fn(i64) -> f6
 #[test]
 fn step() {
     for name in MACHINES {
-        for tuning in [vec![], vec!["n2=8", "nu=6", "lambda_rel=0.001"], vec!["n2=8", "nu=6", "lambda_rel=0.01"]] {
+        for tuning in
+            [vec![], vec!["n2=8", "nu=6", "lambda_rel=0.001"], vec!["n2=8", "nu=6", "lambda_rel=0.01"]]
+        {
             let tuning: Vec<String> = tuning.iter().map(|t| format!("position_loop.gpc.{t}")).collect();
             let mut all = vec![GPC];
             all.extend(tuning.iter().map(String::as_str));
@@ -43,14 +45,27 @@ fn step() {
                     let mut settled = 0;
                     for k in 0..1000 {
                         let at = |k: i64| if k < 20 { 0.0 } else { step + 1e-10 * (k % 2) as f64 };
-                        if preview { advance(&mut m, place, k, at); } else { let mut p = vec![0.0; config.axes().len()]; p[place] = at(k); m.advance(&p); }
+                        if preview {
+                            advance(&mut m, place, k, at);
+                        } else {
+                            let mut p = vec![0.0; config.axes().len()];
+                            p[place] = at(k);
+                            m.advance(&p);
+                        }
                         let s = m.axis(place).sample();
                         sat += usize::from(s.saturated);
                         peak = peak.max(s.position / step);
-                        if k > 800 { late = late.max((s.position - step).abs()); }
-                        if (s.position - step).abs() > 2e-6 { settled = k - 20; }
+                        if k > 800 {
+                            late = late.max((s.position - step).abs());
+                        }
+                        if (s.position - step).abs() > 2e-6 {
+                            settled = k - 20;
+                        }
                     }
-                    println!("{name} {tuning:?} axis {place} preview {preview}: peak {peak:.3} late {:.3} µ saturated {sat} settled {settled}", late * 1e6);
+                    println!(
+                        "{name} {tuning:?} axis {place} preview {preview}: peak {peak:.3} late {:.3} µ saturated {sat} settled {settled}",
+                        late * 1e6
+                    );
                 }
             }
         }
@@ -72,10 +87,17 @@ fn load() {
                 let s = m.axis(place).sample();
                 sat += usize::from(s.saturated);
                 peak = peak.max(s.position.abs());
-                if k > 800 { late = late.max(s.position.abs()); }
-                if s.position.abs() > 2e-6 { settled = k - 20; }
+                if k > 800 {
+                    late = late.max(s.position.abs());
+                }
+                if s.position.abs() > 2e-6 {
+                    settled = k - 20;
+                }
             }
-            println!("{name} axis {place}: peak {peak:.4} late {:.3} µ saturated {sat} settled {settled}", late * 1e6);
+            println!(
+                "{name} axis {place}: peak {peak:.4} late {:.3} µ saturated {sat} settled {settled}",
+                late * 1e6
+            );
         }
     }
 }
