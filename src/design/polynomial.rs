@@ -1,7 +1,17 @@
-//! Polynomials by their coefficients in rising powers.
+//! Polynomials in q⁻¹, coefficients in rising powers.
 
-/// Product of two polynomials; nothing times anything is nothing.
-pub fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+use std::cmp::Ordering;
+
+use nalgebra::{Complex, DMatrix, DVector, Schur};
+
+/// Steps of the QR iteration for each root; it needs two or three.
+const ITERATIONS_PER_ROOT: usize = 40;
+
+/// Value at q = 1 up to which a polynomial has the factor 1 − q⁻¹, relative to the sum of its |cᵢ|.
+pub(super) const INTEGRATOR: f64 = 1e-9;
+
+/// Product of two polynomials.
+pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
     for (i, x) in a.iter().enumerate() {
         for (j, y) in b.iter().enumerate() {
@@ -9,4 +19,151 @@ pub fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
         }
     }
     product
+}
+
+/// Sum of two polynomials.
+pub(super) fn sum(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let at = |p: &[f64], i: usize| p.get(i).copied().unwrap_or(0.0);
+    (0..a.len().max(b.len())).map(|i| at(a, i) + at(b, i)).collect()
+}
+
+/// The value at q⁻¹ = `x`.
+pub(super) fn value(polynomial: &[f64], x: Complex<f64>) -> Complex<f64> {
+    polynomial.iter().rev().fold(Complex::new(0.0, 0.0), |sum, c| sum * x + c)
+}
+
+/// Roots in z = q, largest modulus first; a polynomial of degree n in q⁻¹ has n, some of them 0. None
+/// if the iteration does not end. The first coefficient must not be 0.
+///
+/// The eigenvalues of the companion matrix.
+pub(super) fn roots(polynomial: &[f64]) -> Option<Vec<Complex<f64>>> {
+    let leading = *polynomial.first()?;
+    let largest = polynomial.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    // What is below the rounding of the others is none: those roots are 0.
+    let significant = polynomial.iter().rposition(|c| c.abs() > f64::EPSILON * largest)?;
+    let mut roots = eigenvalues(significant, |i| -polynomial[i + 1] / leading)?;
+    roots.resize(polynomial.len() - 1, Complex::new(0.0, 0.0));
+    roots.sort_by(|a, b| {
+        // Pairs stand together, the one above the real axis first.
+        let by_modulus = b.norm().partial_cmp(&a.norm()).unwrap_or(Ordering::Equal);
+        by_modulus.then(b.im.partial_cmp(&a.im).unwrap_or(Ordering::Equal))
+    });
+    Some(roots)
+}
+
+/// Whether all roots in z lie inside the circle of this radius (recursion of Schur and Cohn): far quicker
+/// than to compute them.
+pub(super) fn roots_within(polynomial: &[f64], radius: f64) -> bool {
+    let mut scale = 1.0;
+    let mut left: Vec<f64> = Vec::with_capacity(polynomial.len());
+    for c in polynomial {
+        left.push(c / scale);
+        scale *= radius;
+    }
+    let mut next = left.clone();
+    while left.len() > 1 {
+        let last = left.len() - 1;
+        let reflection = left[last] / left[0];
+        // A NaN is not.
+        let inside = reflection.abs() < 1.0;
+        if !inside {
+            return false;
+        }
+        next.clear();
+        next.extend((0..last).map(|i| left[i] - reflection * left[last - i]));
+        std::mem::swap(&mut left, &mut next);
+    }
+    true
+}
+
+/// The polynomial without its factors 1 − q⁻¹.
+pub(super) fn without_integrators(polynomial: &[f64]) -> Vec<f64> {
+    let mut left = polynomial.to_vec();
+    let size: f64 = left.iter().map(|c| c.abs()).sum();
+    while left.len() > 1 && left.iter().sum::<f64>().abs() <= INTEGRATOR * size {
+        // Division by 1 − q⁻¹ sums up the coefficients.
+        let mut sum = 0.0;
+        for c in &mut left {
+            sum += *c;
+            *c = sum;
+        }
+        left.pop();
+    }
+    left
+}
+
+/// Eigenvalues of the companion matrix with this first row.
+fn eigenvalues(size: usize, first_row: impl Fn(usize) -> f64) -> Option<Vec<Complex<f64>>> {
+    if size == 0 {
+        return Some(Vec::new());
+    }
+    let companion = DMatrix::from_fn(size, size, |row, column| match row {
+        0 => first_row(column),
+        _ => f64::from(u8::from(row == column + 1)),
+    });
+    if !companion.iter().all(|c| c.is_finite()) {
+        return None;
+    }
+    let limit = ITERATIONS_PER_ROOT * size;
+    let schur = |matrix| Schur::try_new(matrix, f64::EPSILON, limit);
+    // The iteration stands still on matrices such as that of zⁿ − 1; mirrored, they are as any other.
+    let schur = schur(companion.clone()).or_else(|| schur(mirrored(companion)))?;
+    Some(schur.complex_eigenvalues().iter().copied().collect())
+}
+
+/// H M H with a Householder matrix H of no symmetry.
+fn mirrored(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let size = matrix.nrows();
+    let normal = DVector::from_fn(size, |i, _| 1.0 / (i + 1) as f64).normalize();
+    let mirror = DMatrix::identity(size, size) - &normal * normal.transpose() * 2.0;
+    &mirror * matrix * &mirror
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn roots_on_a_circle_do_not_hold_the_iteration() {
+        for size in 1..=24 {
+            let mut polynomial = vec![0.0; size + 1];
+            polynomial[0] = 2.0;
+            polynomial[size] = -2.0;
+            let found = roots(&polynomial).expect("it ends");
+            assert_eq!(found.len(), size);
+            for root in found {
+                let power = root.powu(size as u32);
+                assert!((power - 1.0).norm() < 1e-12, "{root} to the {size} is {power}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_recursion_tells_inside_from_outside() {
+        for radius in [0.2, 0.7, 1.0, 1.5] {
+            for (size, inside) in [(0.999_f64, true), (1.001, false)] {
+                let (re, square) = (0.6 * size * radius, (size * radius).powi(2));
+                let pair = [1.0, -2.0 * re, square];
+                assert_eq!(roots_within(&pair, radius), inside);
+                let more =
+                    product(&product(&pair, &[2.0, -0.1 * radius]), &[1.0, 0.0, 0.3 * radius * radius]);
+                assert_eq!(roots_within(&more, radius), inside);
+            }
+        }
+        assert!(roots_within(&[1.0, -0.5, 0.0], 0.6) && !roots_within(&[1.0, f64::NAN], 1.0));
+    }
+
+    #[test]
+    fn integrators_are_divided_out() {
+        let double = product(&product(&[1.0, -1.0], &[1.0, -1.0]), &[1.0, -0.3]);
+        let left = without_integrators(&double);
+        assert!((left[0] - 1.0).abs() + (left[1] + 0.3).abs() < 1e-15 && left.len() == 2, "{left:?}");
+    }
+
+    #[test]
+    fn trailing_zeros_are_roots_at_zero() {
+        assert_eq!(roots(&[1.0, -0.5, 0.0, 0.0]), Some([0.5, 0.0, 0.0].map(|re| re.into()).to_vec()));
+        assert_eq!(roots(&[3.0]), Some(Vec::new()));
+        assert_eq!(roots(&[1.0, 0.0]), Some(vec![0.0.into()]));
+    }
 }

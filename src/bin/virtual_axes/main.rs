@@ -3,6 +3,8 @@
 #![forbid(unsafe_code)]
 
 mod check;
+mod design;
+mod design_output;
 mod input;
 mod interrupt;
 mod json;
@@ -41,6 +43,8 @@ enum Command {
     Run(run::Arguments),
     /// Write the set-points of a scenario to a file.
     Psec(psec::Arguments),
+    /// Design position controllers: polynomials, closed-loop poles and stability margins.
+    Design(design::Arguments),
     /// Check a file: a machine, a scenario, or set-points.
     Check(check::Arguments),
     /// List the machines that come with the program.
@@ -100,6 +104,7 @@ fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
     match command {
         Command::Run(arguments) => run::run(arguments),
         Command::Psec(arguments) => psec::run(arguments),
+        Command::Design(arguments) => design::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Machines { json } => list::machines(*json),
         Command::Scenarios { show: Some(name), .. } => list::scenario(name),
