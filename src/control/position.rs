@@ -1,23 +1,26 @@
 //! Position controllers: set-points and position in, velocity set-point out.
 
 use super::rst::{MAX_COEFFICIENTS, Rst};
+use super::transfer::{Transfer, TransferState};
+
+/// How far an axis may creep in a position period to count as stopped, relative to the error with which it
+/// may rest.
+const STOPPED: f64 = 1e-3;
 
 /// A position controller; works in motor units (rad, rad/s).
 #[derive(Debug, Clone, PartialEq)]
-pub enum PositionController {
+pub struct PositionController {
+    law: Law,
+    guard: Option<Guard>,
+    transfer: Transfer,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Law {
     /// `Ω* = Kp (θ* − θ)`.
-    Proportional {
-        /// Kp, s⁻¹.
-        gain: f64,
-    },
+    Proportional { gain: f64 },
     /// `S Ω* = −R θ + T θ*` (Prévost eq. 9).
-    Rst {
-        /// The polynomials.
-        rst: Rst,
-        /// What takes over where the controller is out of its depth; none where it has no integral action,
-        /// and with it nothing that hunts or winds up.
-        guard: Option<Guard>,
-    },
+    Rst(Rst),
 }
 
 /// The proportional law with velocity feedforward that takes over from an RST controller
@@ -29,7 +32,7 @@ pub enum PositionController {
 ///   that is faster than the motor can accelerate swings about its set-point for ever.
 ///
 /// ```text
-/// Ω* = Kp (θ*(k) − θ(k)) + (θ*(k+1) − θ*(k)) / Tsp
+/// Ω* = Kp (θ*(k) − θ(k)) + (θ*(k+1) − θ*(k)) / Tsp      0 where friction has stopped the axis close enough
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Guard {
@@ -39,13 +42,14 @@ pub struct Guard {
     pub period: f64,
     /// Position periods of standstill that the controller is given to finish a move by itself.
     pub rest_after: u32,
-    /// Position periods without a limit after which the controller is back.
-    pub recovered_after: u32,
+    /// Error with which an axis that friction has stopped may rest, rad: the integral of the velocity loop
+    /// would tear it loose for less than is worth it.
+    pub rest_error: f64,
 }
 
-/// What a position controller remembers: what it has seen and what it has asked for.
+/// What a position controller remembers: what it has seen and what has been asked for.
 ///
-/// It is kept whatever the law is, so that one takes over from another without a bump.
+/// It is kept whatever the law is, so that one takes over from another with the past as it was.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionState {
     /// θ(k), θ(k − 1), …
@@ -56,6 +60,7 @@ pub struct PositionState {
     still: u32,
     /// Position instants since the motor's current was at its limit.
     unlimited: u32,
+    transfer: TransferState,
 }
 
 impl PositionState {
@@ -66,6 +71,7 @@ impl PositionState {
             commands: [0.0; MAX_COEFFICIENTS],
             still: u32::MAX,
             unlimited: u32::MAX,
+            transfer: TransferState::default(),
         }
     }
 
@@ -86,6 +92,11 @@ impl PositionState {
         self.commands[0] = speed;
         self.unlimited = 0;
     }
+
+    /// Another controller takes over at the next position instant.
+    pub fn hand_over(&mut self) {
+        self.transfer.pending = true;
+    }
 }
 
 fn shift_in(values: &mut [f64; MAX_COEFFICIENTS], newest: f64) {
@@ -94,44 +105,90 @@ fn shift_in(values: &mut [f64; MAX_COEFFICIENTS], newest: f64) {
 }
 
 impl PositionController {
+    /// `Ω* = Kp (θ* − θ)` with `gain` Kp, s⁻¹.
+    pub fn proportional(gain: f64, transfer: Transfer) -> Self {
+        PositionController { law: Law::Proportional { gain }, guard: None, transfer }
+    }
+
+    /// `S Ω* = −R θ + T θ*` (Prévost eq. 9); `guard` is for controllers with integral action, the others
+    /// neither hunt nor wind up.
+    pub fn rst(rst: Rst, guard: Guard, transfer: Transfer) -> Self {
+        let guard = rst.has_integral_action().then_some(guard);
+        PositionController { law: Law::Rst(rst), guard, transfer }
+    }
+
     /// The furthest set-point that the controller reads, position periods ahead of the delayed one.
     pub fn preview(&self) -> i64 {
-        match self {
-            PositionController::Proportional { .. } => 0,
-            PositionController::Rst { rst, .. } => rst.preview(),
+        match &self.law {
+            Law::Proportional { .. } => 0,
+            // The guard reads one.
+            Law::Rst(rst) => rst.preview().max(i64::from(self.guard.is_some())),
         }
     }
 
     /// The oldest set-point that the controller reads, position periods behind the delayed one.
     pub fn lookback(&self) -> i64 {
-        match self {
-            PositionController::Proportional { .. } => 0,
-            PositionController::Rst { rst, .. } => rst.lookback(),
+        match &self.law {
+            Law::Proportional { .. } => 0,
+            Law::Rst(rst) => rst.lookback(),
         }
     }
 
-    /// Ω* before the limit of the motor's speed, rad/s; `setpoint(j)` is θ*(k + j), rad, and `angle` θ(k).
+    /// Ω* before the limit of the motor's speed, rad/s; `setpoint(j)` is θ*(k + j), rad, `angle` θ(k), and
+    /// `feedforward` what the velocity loop will be asked for on top, rad/s.
     #[inline]
-    pub fn update(&self, s: &mut PositionState, setpoint: impl Fn(i64) -> f64, angle: f64) -> f64 {
+    pub fn update(
+        &self,
+        s: &mut PositionState,
+        setpoint: impl Fn(i64) -> f64,
+        angle: f64,
+        feedforward: f64,
+    ) -> f64 {
         shift_in(&mut s.angles, angle);
-        match self {
-            PositionController::Proportional { gain } => gain * (setpoint(0) - angle),
-            PositionController::Rst { rst, guard } => {
-                let now = setpoint(0);
-                let is_still = (1..=rst.preview()).all(|j| setpoint(j) == now);
-                s.still = if is_still { s.still.saturating_add(1) } else { 0 };
-                s.unlimited = s.unlimited.saturating_add(1);
-                if let Some(guard) = guard
-                    && (s.still > guard.rest_after || s.unlimited <= guard.recovered_after)
-                {
-                    return guard.gain * (now - angle) + (setpoint(1) - now) / guard.period;
+        if self.guard.is_some() {
+            let is_still = (1..=self.preview()).all(|j| setpoint(j) == setpoint(0));
+            s.still = if is_still { s.still.saturating_add(1) } else { 0 };
+            s.unlimited = s.unlimited.saturating_add(1);
+        }
+        if s.transfer.pending {
+            let excess = self.output(s, &setpoint, angle) + feedforward - s.commands[0];
+            let excess = excess - excess.clamp(-self.transfer.step, self.transfer.step);
+            match &self.guard {
+                _ if excess == 0.0 => s.transfer.end(),
+                Some(_) => s.transfer.begin(0.0, setpoint(0) - angle),
+                None => s.transfer.begin(-excess, 0.0),
+            }
+        }
+        let (command, error) = s.transfer.next(&self.transfer);
+        self.output(s, |j| setpoint(j) - error, angle) + command
+    }
+
+    #[inline]
+    fn output(&self, s: &PositionState, setpoint: impl Fn(i64) -> f64, angle: f64) -> f64 {
+        match (&self.law, &self.guard) {
+            (Law::Proportional { gain }, _) => gain * (setpoint(0) - angle),
+            (Law::Rst(_), Some(guard)) if self.is_guarded(s, guard) => {
+                let error = setpoint(0) - angle;
+                let asked = setpoint(1) - setpoint(0);
+                let crept = (angle - s.angles[1]).abs();
+                if asked == 0.0 && error.abs() <= guard.rest_error && crept <= STOPPED * guard.rest_error {
+                    return 0.0;
                 }
+                guard.gain * error + asked / guard.period
+            }
+            (Law::Rst(rst), _) => {
                 let asked = weighted(rst.t(), |i| setpoint(rst.t_first() + i as i64));
                 let seen = weighted(rst.r(), |i| s.angles[i]);
                 let done = weighted(&rst.s()[1..], |i| s.commands[i]);
                 asked - seen - done
             }
         }
+    }
+
+    fn is_guarded(&self, s: &PositionState, guard: &Guard) -> bool {
+        // As long as the controller's own horizon, and the instant that the limit was seen at.
+        let recovered_after = self.preview() + 1;
+        s.still > guard.rest_after || i64::from(s.unlimited) <= recovered_after
     }
 }
 

@@ -145,6 +145,9 @@ impl Axis {
         };
         self.velocity_pi.integral += torque(old) - torque(p);
         self.psec.adopt(p.reach());
+        if (&old.position, &old.feedforward) != (&p.position, &p.feedforward) {
+            self.position.hand_over();
+        }
     }
 
     /// The set-point of the position period that begins, and those behind it as far as they are known.
@@ -179,10 +182,11 @@ impl Axis {
             self.position.correct(self.motor.speed);
         }
         let psec = &self.psec;
-        let wanted = p.position.update(&mut self.position, |j| psec.at(k + j) / p.ratio, self.motor.angle);
+        let feedforward = p.feedforward.velocity(psec, psec.index(tick, p.delays.velocity));
+        let setpoint = |j| psec.at(k + j) / p.ratio;
+        let wanted = p.position.update(&mut self.position, setpoint, self.motor.angle, feedforward);
         self.sample.velocity_setpoint = wanted.clamp(-p.max_speed, p.max_speed);
         self.speed_limited = wanted != self.sample.velocity_setpoint;
-        let feedforward = p.feedforward.velocity(psec, psec.index(tick, p.delays.velocity));
         self.position.record(self.sample.velocity_setpoint + feedforward);
     }
 

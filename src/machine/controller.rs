@@ -1,9 +1,9 @@
 //! The position controller of an axis, as its configuration asks for it.
 
-use crate::config::{AxisConfig, FeedforwardConfig, GpcConfig, Periods, PositionControllerConfig};
-use crate::control::{Guard, PositionController, Rst};
+use crate::config::{AxisConfig, AxisKind, FeedforwardConfig, GpcConfig, Periods, PositionControllerConfig};
+use crate::control::{Guard, PositionController, Rst, Transfer};
 use crate::design::{DesignError, GpcTuning, Weight, gpc};
-use crate::units::{MILLISECOND_NS, Nanoseconds, seconds};
+use crate::units::{DEGREE, MILLISECOND_NS, Nanoseconds, seconds};
 
 use super::AxisError;
 use super::prediction::prediction_model;
@@ -11,6 +11,13 @@ use super::prediction::prediction_model;
 /// Standstill of the set-point after which an axis is held: a controller with a bandwidth worth its name
 /// has finished a move by then.
 const REST_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
+
+/// Error with which an axis may rest, m.
+const REST_ERROR_LINEAR: f64 = 1e-6;
+/// Error with which an axis may rest, rad: half a thousandth of a degree.
+const REST_ERROR_ROTARY: f64 = 0.5e-3 * DEGREE;
+/// How long what a controller leaves behind takes to fade, where it would be a bump.
+const TRANSFER: Nanoseconds = 300 * MILLISECOND_NS;
 
 impl From<&GpcConfig> for GpcTuning {
     fn from(config: &GpcConfig) -> Self {
@@ -24,10 +31,14 @@ pub(super) fn position_controller(
     axis: &AxisConfig,
     periods: &Periods,
 ) -> Result<(PositionController, &'static str), AxisError> {
-    let gain = axis.position_loop.gain;
+    let (gain, period) = (axis.position_loop.gain, seconds(periods.position));
+    let transfer = Transfer {
+        step: axis.limits.acceleration * period / axis.transmission_ratio,
+        periods: (TRANSFER / periods.position) as u32,
+    };
     let (rst, name) = match &axis.position_loop.controller {
         PositionControllerConfig::Cascade => {
-            return Ok((PositionController::Proportional { gain }, "cascade"));
+            return Ok((PositionController::proportional(gain, transfer), "cascade"));
         }
         PositionControllerConfig::Gpc(config) => {
             (gpc(&prediction_model(axis, periods)?, &GpcTuning::from(config))?, "gpc")
@@ -37,14 +48,17 @@ pub(super) fn position_controller(
             (rst.map_err(DesignError::from)?, "rst")
         }
     };
+    let rest_error = match axis.kind {
+        AxisKind::Linear => REST_ERROR_LINEAR,
+        AxisKind::Rotary => REST_ERROR_ROTARY,
+    };
     let guard = Guard {
         gain,
-        period: seconds(periods.position),
+        period,
         rest_after: (REST_AFTER / periods.position) as u32,
-        recovered_after: rst.preview() as u32 + 1,
+        rest_error: rest_error / axis.transmission_ratio,
     };
-    let guard = rst.has_integral_action().then_some(guard);
-    Ok((PositionController::Rst { rst, guard }, name))
+    Ok((PositionController::rst(rst, guard, transfer), name))
 }
 
 /// The feedforward of the axis: velocity and torque are the cascade's, an RST controller has it in T.
