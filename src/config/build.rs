@@ -7,9 +7,9 @@ use super::definition::MotorKind;
 use super::error::{ConfigError, Source};
 use super::layout::Joint;
 use super::machine::{
-    AxisConfig, AxisKind, DelaysConfig, FeedforwardConfig, FrictionConfig, GravityConfig, KinematicsConfig,
-    LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig,
-    PositionLoopConfig,
+    AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GpcConfig,
+    GravityConfig, KinematicsConfig, LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig,
+    PositionControllerConfig, PositionLoopConfig,
 };
 use super::parameters::Parameters;
 use super::value::Value;
@@ -134,11 +134,15 @@ impl Parameters {
     fn number(&self, key: &str) -> Result<f64, ConfigError> {
         match self.get(key) {
             Some(Value::Double(number)) => Ok(number),
-            _ => Err(ConfigError::Missing {
-                at: Source::named("parameters"),
-                key: key.to_owned(),
-                wanted: "number".to_owned(),
-            }),
+            _ => Err(self.missing(key, "number")),
+        }
+    }
+
+    fn missing(&self, key: &str, wanted: &str) -> ConfigError {
+        ConfigError::Missing {
+            at: Source::named("parameters"),
+            key: key.to_owned(),
+            wanted: wanted.to_owned(),
         }
     }
 
@@ -206,23 +210,51 @@ impl Axis<'_> {
                 phase: self.or_zero("gravity.tilt_phase_deg") * DEGREE,
             },
             position_loop: PositionLoopConfig {
-                controller: PositionControllerConfig::Cascade {
-                    gain: self.scaled("position_loop.gain", POSITION_GAIN)?,
-                },
+                gain: self.scaled("position_loop.gain", POSITION_GAIN)?,
+                controller: self.position_controller()?,
+                allow_unstable: self.set.flag(&self.key("position_loop.allow_unstable")),
             },
             velocity_loop: pi("velocity_loop")?,
             current_loop: pi("current_loop")?,
             feedforward: FeedforwardConfig {
                 velocity: self.number("feedforward.velocity")?,
                 torque: self.number(self.by_motor("feedforward.torque_kg_m2", "feedforward.torque_kg"))?,
+                friction: self.number("feedforward.friction")?,
             },
             delays: DelaysConfig {
                 alpha: delay("delays.alpha_ms")?,
                 beta: delay("delays.beta_ms")?,
                 gamma: delay("delays.gamma_ms")?,
+                friction: delay("delays.friction_ms")?,
+            },
+            deviation: DeviationConfig {
+                inertia: self.number("deviation.inertia")?,
+                friction: self.number("deviation.friction")?,
+                torque_constant: self.number("deviation.torque_constant")?,
             },
             limits: self.limits()?,
         })
+    }
+
+    fn position_controller(&self) -> Result<PositionControllerConfig, ConfigError> {
+        Ok(match self.set.text(&self.key("position_loop.controller")).as_str() {
+            "gpc" => PositionControllerConfig::Gpc(GpcConfig {
+                n1: self.count("position_loop.gpc.n1")?,
+                n2: self.count("position_loop.gpc.n2")?,
+                nu: self.count("position_loop.gpc.nu")?,
+                lambda_rel: self.number("position_loop.gpc.lambda_rel")?,
+                lambda: self.number("position_loop.gpc.lambda").ok(),
+            }),
+            _ => PositionControllerConfig::Cascade,
+        })
+    }
+
+    fn count(&self, suffix: &str) -> Result<usize, ConfigError> {
+        let key = self.key(suffix);
+        match self.set.get(&key) {
+            Some(Value::Integer(count)) => Ok(usize::try_from(count).unwrap_or(0)),
+            _ => Err(self.set.missing(&key, "integer")),
+        }
     }
 
     fn by_motor<T>(&self, rotating: T, linear: T) -> T {

@@ -56,6 +56,7 @@ pub(super) fn check(
         set.check_transmission(joint, origin)?;
         set.check_friction(joint)?;
         set.check_stroke(joint)?;
+        set.check_horizons(joint)?;
     }
     Ok(layout)
 }
@@ -279,6 +280,24 @@ impl Set<'_> {
             )),
             _ => Ok(()),
         }
+    }
+
+    fn check_horizons(&self, joint: &Joint) -> Result<(), ConfigError> {
+        let key = |name: &str| format!("{}.position_loop.gpc.{name}", joint.name);
+        let last = key("n2");
+        let count = |key: &str| match self.value(key) {
+            Some(Value::Integer(count)) => Some(count),
+            _ => None,
+        };
+        for first in [key("n1"), key("nu")] {
+            if let (Some(value), Some(most)) = (count(&first), count(&last))
+                && value > most
+            {
+                let allowed = format!("keep {first} ≤ {last}: they are {value} and {most}");
+                return Err(self.refused(&[&first, &last], allowed));
+            }
+        }
+        Ok(())
     }
 
     /// The ranges of the schema keep home, 0, within the stroke; this keeps the stroke open.

@@ -75,6 +75,7 @@ pub struct AxisConfig {
     pub(crate) current_loop: PiConfig,
     pub(crate) feedforward: FeedforwardConfig,
     pub(crate) delays: DelaysConfig,
+    pub(crate) deviation: DeviationConfig,
     pub(crate) limits: LimitsConfig,
 }
 
@@ -128,18 +129,51 @@ pub struct GravityConfig {
 /// Position controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionLoopConfig {
-    /// Which controller, and its gains.
+    /// Kp of the proportional law, s⁻¹: the cascade's, and that which holds the axis at rest.
+    pub gain: f64,
+    /// Which controller.
     pub controller: PositionControllerConfig,
+    /// Whether an unstable closed loop is accepted.
+    pub allow_unstable: bool,
 }
 
 /// The position controllers that there are.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PositionControllerConfig {
-    /// Proportional, with the feedforward of the cascade; Kp in s⁻¹.
-    Cascade {
-        /// Kp, s⁻¹.
-        gain: f64,
-    },
+    /// Proportional, with velocity and torque feedforward (Prévost fig. 3).
+    Cascade,
+    /// Generalized predictive control in RST form (Prévost section 5).
+    Gpc(GpcConfig),
+    /// Any linear controller, by its polynomials (Prévost eq. 9).
+    Rst(RstConfig),
+}
+
+/// Tuning of a generalized predictive controller (Prévost table 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GpcConfig {
+    /// N1, first period of the prediction horizon.
+    pub n1: usize,
+    /// N2, last period of the prediction horizon.
+    pub n2: usize,
+    /// Nu, periods of the control horizon.
+    pub nu: usize,
+    /// λ / trace(GᵀG); not used where `lambda` is given.
+    pub lambda_rel: f64,
+    /// λ, weight of the control increments.
+    pub lambda: Option<f64>,
+}
+
+/// Polynomials of a linear position controller (Prévost eq. 9), motor units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RstConfig {
+    /// R, rising powers of q⁻¹, s⁻¹.
+    pub r: Vec<f64>,
+    /// S, rising powers of q⁻¹.
+    pub s: Vec<f64>,
+    /// T, rising powers of q from `t_first` on, s⁻¹.
+    pub t: Vec<f64>,
+    /// Exponent of q of the first coefficient of T.
+    pub t_first: i64,
 }
 
 /// Gain and integral time of a PI controller.
@@ -154,10 +188,12 @@ pub struct PiConfig {
 /// Weights of the feedforward (Prévost eqs. 6 and 7); zero is off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeedforwardConfig {
-    /// VFFW, 1.
+    /// VFFW, 1; the cascade's only.
     pub velocity: f64,
-    /// TFFW, kg·m² at the motor (kg).
+    /// TFFW, kg·m² at the motor (kg); the cascade's only.
     pub torque: f64,
+    /// Weight of the friction compensation, 1; of every controller.
+    pub friction: f64,
 }
 
 /// Delays of the set-point, ns, before rounding to a tick.
@@ -169,6 +205,19 @@ pub struct DelaysConfig {
     pub beta: Nanoseconds,
     /// γ, behind the torque feedforward.
     pub gamma: Nanoseconds,
+    /// Shift of the friction compensation.
+    pub friction: Nanoseconds,
+}
+
+/// What the plant has that the controllers are not designed for, as factors; 1 is none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviationConfig {
+    /// Of the inertia.
+    pub inertia: f64,
+    /// Of the friction torque.
+    pub friction: f64,
+    /// Of the torque constant.
+    pub torque_constant: f64,
 }
 
 /// What trajectories may ask of an axis; m or rad, and seconds.

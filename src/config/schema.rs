@@ -22,6 +22,10 @@ const CURRENT: f64 = 1e4;
 /// Exponents of the friction law, min/m or min/rev: the fall after breakaway can be steep, a rise
 /// steeper than e^V has no bearing that makes it.
 const FRICTION_EXPONENT: (f64, f64) = (-100.0, 1.0);
+/// Longest horizon of predictive control, position periods.
+const MAX_HORIZON: i64 = 200;
+/// Smallest and largest factor of a plant that deviates.
+const DEVIATION: (f64, f64) = (0.1, 10.0);
 /// Smallest value of what is divided by, or what has no sense at zero.
 const POSITIVE: f64 = 1e-9;
 /// Largest gain of a loop, in its unit.
@@ -61,6 +65,19 @@ const fn polynomial(key: &'static str, unit: &'static str, max_len: usize) -> De
 /// A delay of the set-point, live.
 const fn delay(key: &'static str) -> Definition {
     Definition::number(key, "ms", 0.0, DELAY_MS).of_axis().default(Number(0.0)).live()
+}
+
+/// A horizon of predictive control, live.
+const fn horizon(key: &'static str, default: i64) -> Definition {
+    Definition::new(key, "", Kind::Integer { min: 1, max: MAX_HORIZON })
+        .of_axis()
+        .default(Integer(default))
+        .live()
+}
+
+/// A factor of the plant, live.
+const fn deviation(key: &'static str) -> Definition {
+    Definition::number(key, "", DEVIATION.0, DEVIATION.1).of_axis().default(Number(1.0)).live()
 }
 
 /// A coordinate of a point of the machine, home in the origin.
@@ -202,17 +219,32 @@ pub static DEFINITIONS: &[Definition] = &[
         .default(Number(0.0))
         .is("Phase of the gravity torque of a tilting axis."),
     // Control.
-    Definition::new("position_loop.controller", "", Kind::Choice(&["cascade"]))
+    Definition::new("position_loop.controller", "", Kind::Choice(&["cascade", "gpc", "rst"]))
         .of_axis()
         .default(Text("cascade"))
         .live()
-        .is("Position controller: proportional with feedforward (Prévost fig. 3)."),
+        .is("Position controller: proportional with feedforward (Prévost fig. 3), predictive, or by its polynomials."),
     gain("position_loop.gain", "(m/min)/mm")
         .on(Linear)
         .is("Kp, position-loop gain; 1 (m/min)/mm is 16.667 s⁻¹ (Prévost Appendix 2)."),
     gain("position_loop.gain", "(1000 °/min)/°")
         .on(Rotary)
         .is("Kp, position-loop gain; 1 (1000 °/min)/° is 16.667 s⁻¹ (Prévost Appendix 2)."),
+    horizon("position_loop.gpc.n1", 1)
+        .is("N1, first position period of the prediction horizon, at most n2 (Prévost table 1)."),
+    horizon("position_loop.gpc.n2", 14).is("N2, last position period of the prediction horizon (Prévost table 1)."),
+    horizon("position_loop.gpc.nu", 12)
+        .is("Nu, position periods of the control horizon, at most n2 (Prévost table 1)."),
+    Definition::number("position_loop.gpc.lambda_rel", "", 0.0, GAIN)
+        .of_axis()
+        .default(Number(0.005))
+        .live()
+        .is("λ / trace(GᵀG), weight of the control increments; not used where lambda is given."),
+    Definition::number("position_loop.gpc.lambda", "s²", 0.0, GAIN)
+        .of_axis()
+        .optional()
+        .live()
+        .is("λ, weight of the control increments (Prévost table 1)."),
     polynomial("position_loop.rst.r", "s⁻¹", RST_TERMS)
         .is("R of an RST controller, in rising powers of q⁻¹ from q⁰ on (Prévost eq. 9)."),
     polynomial("position_loop.rst.s", "", RST_TERMS)
@@ -224,6 +256,11 @@ pub static DEFINITIONS: &[Definition] = &[
         .default(Integer(0))
         .live()
         .is("Power of q of T's first term: 1 begins one position period ahead."),
+    Definition::new("position_loop.allow_unstable", "", Kind::Flag)
+        .of_axis()
+        .default(Flag(false))
+        .live()
+        .is("Accept a position controller whose closed loop is unstable."),
     gain("velocity_loop.gain", "N·m/(rad/s)")
         .driven_by(RotatingMotor)
         .is("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),
@@ -251,9 +288,19 @@ pub static DEFINITIONS: &[Definition] = &[
         .default(Number(0.0))
         .live()
         .is("TFFW, weight of the force feedforward; 0 is off (Prévost eq. 7)."),
+    Definition::number("feedforward.friction", "", 0.0, 2.0)
+        .of_axis()
+        .default(Number(0.0))
+        .live()
+        .is("Weight of the friction compensation: the friction torque at the set-point's velocity; 0 is off."),
     delay("delays.alpha_ms").is("α, delay of the set-point before the position comparator (Prévost fig. 3)."),
     delay("delays.beta_ms").is("β, delay of the velocity feedforward (Prévost fig. 3)."),
     delay("delays.gamma_ms").is("γ, delay of the torque feedforward (Prévost fig. 3)."),
+    delay("delays.friction_ms").is("Shift of the friction compensation behind the set-point."),
+    // What the controllers do not know.
+    deviation("deviation.inertia").is("Inertia of the plant, relative to the one that controllers are designed for."),
+    deviation("deviation.friction").is("Friction of the plant, relative to the one that is compensated."),
+    deviation("deviation.torque_constant").is("Torque constant of the plant, relative to the one that the drive reckons with."),
     // Limits.
     Definition::number("limits.velocity_m_min", "m/min", 1e-6, 1e5)
         .on(Linear)

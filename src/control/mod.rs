@@ -9,6 +9,6 @@ mod rst;
 mod setpoint;
 
 pub use pi::{Pi, PiState};
-pub use position::PositionController;
+pub use position::{Hold, PositionController, PositionState};
 pub use rst::{MAX_COEFFICIENTS, MAX_PREVIEW, Rst, RstError};
-pub use setpoint::{Delays, Feedforward, SetpointHistory};
+pub use setpoint::{Delays, Feedforward, Reach, SetpointHistory};

@@ -3,7 +3,7 @@
 use crate::config::{DelaysConfig, FeedforwardConfig};
 use crate::units::Nanoseconds;
 
-/// Delays α, β and γ in ticks.
+/// Delays of the set-point in ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Delays {
     /// α, before the position comparator.
@@ -12,24 +12,42 @@ pub struct Delays {
     pub velocity: u64,
     /// γ, behind the torque feedforward.
     pub torque: u64,
+    /// Shift of the friction compensation.
+    pub friction: u64,
 }
 
 impl Delays {
     /// Delays rounded to the nearest tick of `tick` ns.
     pub fn new(config: &DelaysConfig, tick: Nanoseconds) -> Self {
         let ticks = |delay: Nanoseconds| ((delay.max(0) + tick / 2) / tick) as u64;
-        Delays { position: ticks(config.alpha), velocity: ticks(config.beta), torque: ticks(config.gamma) }
+        Delays {
+            position: ticks(config.alpha),
+            velocity: ticks(config.beta),
+            torque: ticks(config.gamma),
+            friction: ticks(config.friction),
+        }
     }
 
-    /// The longest of the three, ticks.
+    /// The longest of them, ticks.
     pub fn longest(&self) -> u64 {
-        self.position.max(self.velocity).max(self.torque)
+        self.position.max(self.velocity).max(self.torque).max(self.friction)
     }
+}
+
+/// How far from the present one set-points are read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Reach {
+    /// The longest delay, ticks.
+    pub delay: u64,
+    /// Set-points behind the delay.
+    pub lookback: usize,
+    /// Set-points ahead of the present one.
+    pub ahead: usize,
 }
 
 /// PSEC as the staircase that the drive sees: value k holds on [k·Tsp, (k+1)·Tsp).
 ///
-/// Before the first set-point PSEC has its first value.
+/// Before the first set-point PSEC has its first value; what is not known of the future yet is its last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetpointHistory {
     /// Ring: set-point k stands at k modulo its length.
@@ -37,36 +55,40 @@ pub struct SetpointHistory {
     ticks_per_setpoint: u64,
     /// How many set-points have been pushed.
     count: u64,
+    /// Set-points that stand in the ring behind those.
+    ahead: usize,
     first: f64,
 }
 
 impl SetpointHistory {
-    /// A history in which delays up to `longest_delay` ticks can be read, and two set-points more for
-    /// the second derivative.
-    pub fn new(initial: f64, ticks_per_setpoint: u64, longest_delay: u64) -> Self {
+    /// A history in which set-points within `reach` can be read, and two more for the second derivative.
+    pub fn new(initial: f64, ticks_per_setpoint: u64, reach: Reach) -> Self {
         SetpointHistory {
-            ring: vec![initial; Self::length(ticks_per_setpoint, longest_delay)].into_boxed_slice(),
+            ring: vec![initial; Self::length(ticks_per_setpoint, reach)].into_boxed_slice(),
             ticks_per_setpoint,
             count: 0,
+            ahead: reach.ahead,
             first: initial,
         }
     }
 
     /// Set-points to hold: those that the delay spans, the present one, and two for the derivatives.
-    fn length(ticks_per_setpoint: u64, longest_delay: u64) -> usize {
-        (longest_delay.div_ceil(ticks_per_setpoint) + 3) as usize
+    fn length(ticks_per_setpoint: u64, reach: Reach) -> usize {
+        reach.delay.div_ceil(ticks_per_setpoint) as usize + 3 + reach.lookback + reach.ahead
     }
 
-    /// Makes room for a longer delay; set-points that are no longer known read as the oldest known one.
-    pub fn lengthen(&mut self, longest_delay: u64) {
-        let length = Self::length(self.ticks_per_setpoint, longest_delay);
-        if length <= self.ring.len() {
+    /// Makes room for another reach; set-points that are no longer known read as the oldest known one,
+    /// those ahead are known from the next period on.
+    pub fn adopt(&mut self, reach: Reach) {
+        let (length, old) = (Self::length(self.ticks_per_setpoint, reach), self.ring.len());
+        let ahead = std::mem::replace(&mut self.ahead, reach.ahead);
+        if length == old && ahead == reach.ahead {
             return;
         }
         let count = self.count as i64;
-        let oldest = (count - self.ring.len() as i64).max(0);
+        let oldest = (count + ahead as i64 - old as i64).max(0);
         let mut ring = vec![self.first; length].into_boxed_slice();
-        for k in (count - length as i64).max(0)..count {
+        for k in (count + reach.ahead as i64 - length as i64).max(0)..count {
             ring[(k as u64 % length as u64) as usize] = self.at(k.max(oldest));
         }
         self.ring = ring;
@@ -78,9 +100,23 @@ impl SetpointHistory {
         if self.count == 0 {
             self.first = psec;
         }
-        let place = (self.count % self.ring.len() as u64) as usize;
-        self.ring[place] = psec;
+        self.put(self.count, psec);
         self.count += 1;
+    }
+
+    /// The set-points behind the last one that was pushed, as they are known now.
+    #[inline]
+    pub fn foresee(&mut self, ahead: &[f64]) {
+        let mut last = self.at(self.count as i64 - 1);
+        for j in 0..self.ahead {
+            last = ahead.get(j).copied().unwrap_or(last);
+            self.put(self.count + j as u64, last);
+        }
+    }
+
+    #[inline]
+    fn put(&mut self, k: u64, psec: f64) {
+        self.ring[(k % self.ring.len() as u64) as usize] = psec;
     }
 
     /// PSEC_k; the first value for k before the first set-point.
@@ -146,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_delay_of_one_and_a_half_periods_reads_two_set_points_back_at_position_instants() {
-        let mut h = SetpointHistory::new(0.0, 48, 72);
+        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 72, ..Reach::default() });
         for k in 0..10 {
             h.push(f64::from(k));
         }
@@ -158,7 +194,7 @@ mod tests {
 
     #[test]
     fn before_the_first_set_point_psec_has_its_first_value() {
-        let mut h = SetpointHistory::new(0.0, 48, 72);
+        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 72, ..Reach::default() });
         h.push(5.0);
         assert_eq!(h.at(-1), 5.0);
         let f = Feedforward { velocity: 1.0, torque: 1.0 };
@@ -167,19 +203,35 @@ mod tests {
 
     #[test]
     fn a_longer_delay_finds_the_set_points_that_are_known() {
-        let mut h = SetpointHistory::new(0.0, 48, 48);
+        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 48, ..Reach::default() });
         for k in 0..10 {
             h.push(f64::from(k));
         }
-        h.lengthen(6 * 48);
+        h.adopt(Reach { delay: 6 * 48, ..Reach::default() });
         assert_eq!((h.at(9), h.at(6), h.at(5), h.at(1)), (9.0, 6.0, 6.0, 6.0));
         h.push(10.0);
         assert_eq!(h.at(10), 10.0);
     }
 
     #[test]
+    fn set_points_ahead_are_read_and_what_is_not_known_is_the_last_one() {
+        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 72, lookback: 1, ahead: 3 });
+        for k in 0..10 {
+            h.push(f64::from(k));
+            h.foresee(&[f64::from(k) + 1.0, f64::from(k) + 2.0]);
+        }
+        assert_eq!([9, 10, 11, 12].map(|k| h.at(k)), [9.0, 10.0, 11.0, 11.0]);
+        assert_eq!([6, 7, 8].map(|k| h.at(k)), [6.0, 7.0, 8.0]);
+        h.adopt(Reach { delay: 72, lookback: 1, ahead: 5 });
+        assert_eq!([6, 7, 8, 9].map(|k| h.at(k)), [6.0, 7.0, 8.0, 9.0]);
+        h.push(10.0);
+        h.foresee(&[]);
+        assert_eq!([10, 11, 15].map(|k| h.at(k)), [10.0; 3]);
+    }
+
+    #[test]
     fn delays_are_rounded_to_the_nearest_tick() {
-        let config = DelaysConfig { alpha: 9 * MILLISECOND_NS, beta: 187_499, gamma: 187_500 };
+        let config = DelaysConfig { alpha: 9 * MILLISECOND_NS, beta: 187_499, gamma: 187_500, friction: 0 };
         let d = Delays::new(&config, 125 * MICROSECOND_NS);
         assert_eq!((d.position, d.velocity, d.torque), (72, 1, 2));
     }

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::polynomial::product;
 use super::{DesignError, PredictionModel};
 use crate::control::{MAX_PREVIEW, Rst};
 
@@ -125,15 +126,4 @@ fn first_row(gram: DMatrix<f64>, lambda: f64, g: &DMatrix<f64>) -> Option<DVecto
     let mut first = DVector::zeros(size);
     first[0] = 1.0;
     Some(g * decomposition.solve(&first))
-}
-
-/// Product of two polynomials.
-fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
-    for (i, x) in a.iter().enumerate() {
-        for (j, y) in b.iter().enumerate() {
-            product[i + j] += x * y;
-        }
-    }
-    product
 }

@@ -2,6 +2,7 @@
 
 mod gpc;
 mod model;
+pub(crate) mod polynomial;
 
 pub use gpc::{GpcTuning, Weight, gpc};
 pub use model::PredictionModel;

@@ -1,7 +1,7 @@
 //! Motor, friction, gravity and load together.
 
 use super::{DriveError, Friction, Gravity, Motor, MotorState};
-use crate::config::AxisConfig;
+use crate::config::{AxisConfig, MotorConfig};
 
 /// Torques that acted over a tick, N·m at the motor (N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -21,21 +21,36 @@ pub struct Plant {
     friction: Friction,
     gravity: Gravity,
     ratio: f64,
+    torque_constant: f64,
 }
 
 impl Plant {
-    /// The plant of `axis`, stepped by `period` seconds.
+    /// The plant of `axis`, with what it deviates by, stepped by `period` seconds.
     ///
     /// # Errors
     /// [`DriveError`] if the motor cannot be discretised over the period.
     pub fn new(axis: &AxisConfig, period: f64) -> Result<Self, DriveError> {
-        let r = axis.transmission_ratio;
+        let (r, deviation) = (axis.transmission_ratio, &axis.deviation);
+        let motor = MotorConfig {
+            inertia: axis.motor.inertia * deviation.inertia,
+            torque_constant: axis.motor.torque_constant * deviation.torque_constant,
+            ..axis.motor
+        };
+        // The law gives amperes of the motor as it is reckoned with: its torque does not follow Kt.
+        let friction_constant = axis.motor.torque_constant * deviation.friction;
         Ok(Plant {
-            motor: Motor::new(&axis.motor, period)?,
-            friction: Friction::new(axis.friction, axis.kind, r, axis.motor.torque_constant),
+            friction: Friction::new(axis.friction, axis.kind, r, friction_constant),
             gravity: Gravity::new(&axis.gravity, r),
             ratio: r,
+            torque_constant: motor.torque_constant,
+            motor: Motor::new(&motor, period)?,
         })
+    }
+
+    /// Kt as it is, N·m/A.
+    #[inline]
+    pub fn torque_constant(&self) -> f64 {
+        self.torque_constant
     }
 
     /// Axis position of a motor state, m or rad.

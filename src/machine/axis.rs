@@ -1,22 +1,29 @@
 //! One axis: a plant, its cascade, and the state of both.
 
 use crate::config::{AxisConfig, Periods};
-use crate::control::{Delays, Feedforward, Pi, PiState, PositionController, SetpointHistory};
-use crate::drive::{DriveError, MotorState, Plant, Torques};
+use crate::control::{
+    Delays, Feedforward, Pi, PiState, PositionController, PositionState, Reach, SetpointHistory,
+};
+use crate::drive::{MotorState, Plant, Torques};
 use crate::units::seconds;
 
-use super::AxisSample;
+use super::compensation::FrictionCompensation;
+use super::controller::{feedforward, position_controller};
+use super::{AxisError, AxisSample};
 
 /// Everything immutable about one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisParameters {
     plant: Plant,
     position: PositionController,
+    controller: &'static str,
     velocity: Pi,
     current: Pi,
     feedforward: Feedforward,
+    compensation: Option<FrictionCompensation>,
     delays: Delays,
     ratio: f64,
+    /// Kt that the drive reckons with.
     torque_constant: f64,
     resistance: f64,
     max_speed: f64,
@@ -30,16 +37,34 @@ impl AxisParameters {
         self.delays.longest()
     }
 
-    /// Discretises an axis.
+    /// Set-points ahead of the present one that the position controller reads.
+    pub fn horizon(&self) -> usize {
+        self.reach().ahead
+    }
+
+    fn reach(&self) -> Reach {
+        let delay = self.delays.position.div_ceil(self.ticks_per_position) as i64;
+        let compensated = self.compensation.as_ref().map_or(0, FrictionCompensation::preview);
+        Reach {
+            delay: self.delays.longest(),
+            lookback: self.position.lookback() as usize,
+            ahead: (self.position.preview() - delay).max(compensated).max(0) as usize,
+        }
+    }
+
+    /// Discretises an axis and designs its position controller.
     ///
     /// # Errors
-    /// [`DriveError`] if the motor cannot be stepped over the current period.
-    pub fn new(axis: &AxisConfig, periods: &Periods) -> Result<Self, DriveError> {
+    /// [`AxisError`].
+    pub fn new(axis: &AxisConfig, periods: &Periods) -> Result<Self, AxisError> {
         let motor = &axis.motor;
         let tick = seconds(periods.current);
+        let (position, controller) = position_controller(axis, periods)?;
+        let delays = Delays::new(&axis.delays, periods.current);
         Ok(AxisParameters {
             plant: Plant::new(axis, tick)?,
-            position: PositionController::new(&axis.position_loop.controller),
+            position,
+            controller,
             velocity: Pi::new(
                 &axis.velocity_loop,
                 seconds(periods.velocity),
@@ -48,11 +73,12 @@ impl AxisParameters {
             ),
             current: Pi::new(&axis.current_loop, tick, 1.0, motor.max_voltage),
             feedforward: Feedforward::new(
-                &axis.feedforward,
+                &feedforward(axis),
                 seconds(periods.position),
                 axis.transmission_ratio,
             ),
-            delays: Delays::new(&axis.delays, periods.current),
+            compensation: FrictionCompensation::new(axis, periods, delays.friction),
+            delays,
             ratio: axis.transmission_ratio,
             torque_constant: motor.torque_constant,
             resistance: motor.resistance,
@@ -70,6 +96,7 @@ pub struct Axis {
     torques: Torques,
     load: f64,
     psec: SetpointHistory,
+    position: PositionState,
     velocity_pi: PiState,
     current_pi: PiState,
     speed_limited: bool,
@@ -81,14 +108,17 @@ impl Axis {
     pub fn at_rest(p: &AxisParameters, position: f64) -> Self {
         let motor = MotorState { current: 0.0, speed: 0.0, angle: position / p.ratio };
         let gravity = p.plant.gravity(&motor);
-        let current = gravity / p.torque_constant;
+        let current = gravity / p.plant.torque_constant();
+        // What the drive takes that current for.
+        let torque = gravity * (p.torque_constant / p.plant.torque_constant());
         let voltage = p.resistance * current;
         let mut axis = Axis {
             motor: MotorState { current, ..motor },
             torques: Torques { friction: 0.0, gravity, load: 0.0 },
             load: 0.0,
-            psec: SetpointHistory::new(position, p.ticks_per_position, p.delays.longest()),
-            velocity_pi: PiState { integral: gravity, limited: false },
+            psec: SetpointHistory::new(position, p.ticks_per_position, p.reach()),
+            position: PositionState::at_rest(motor.angle),
+            velocity_pi: PiState { integral: torque, limited: false },
             current_pi: PiState { integral: voltage, limited: false },
             speed_limited: false,
             sample: AxisSample {
@@ -103,14 +133,21 @@ impl Axis {
         axis
     }
 
-    /// Takes over changed parameters; the state goes on.
-    pub(super) fn adopt(&mut self, p: &AxisParameters) {
-        self.psec.lengthen(p.delays.longest());
+    /// Takes over changed parameters in the place of `old`; the state goes on.
+    ///
+    /// The velocity loop's integral takes over the torque that the feedforward gives up.
+    pub(super) fn adopt(&mut self, old: &AxisParameters, p: &AxisParameters, tick: u64) {
+        let torque = |p: &AxisParameters| {
+            p.feedforward.torque(&self.psec, self.psec.index(tick.saturating_sub(1), p.delays.torque))
+        };
+        self.velocity_pi.integral += torque(old) - torque(p);
+        self.psec.adopt(p.reach());
     }
 
-    /// The set-point of the position period that begins.
-    pub(super) fn begin_period(&mut self, psec: f64) {
+    /// The set-point of the position period that begins, and those behind it as far as they are known.
+    pub(super) fn begin_period(&mut self, psec: f64, ahead: &[f64]) {
         self.psec.push(psec);
+        self.psec.foresee(ahead);
         self.sample.psec = psec;
     }
 
@@ -133,10 +170,14 @@ impl Axis {
     }
 
     fn control_position(&mut self, p: &AxisParameters, tick: u64) {
-        self.sample.delayed_psec = self.psec.delayed(tick, p.delays.position);
-        let wanted = p.position.update(self.sample.delayed_psec / p.ratio, self.motor.angle);
+        let k = self.psec.index(tick, p.delays.position);
+        self.sample.delayed_psec = self.psec.at(k);
+        let psec = &self.psec;
+        let wanted = p.position.update(&mut self.position, |j| psec.at(k + j) / p.ratio, self.motor.angle);
         self.sample.velocity_setpoint = wanted.clamp(-p.max_speed, p.max_speed);
         self.speed_limited = wanted != self.sample.velocity_setpoint;
+        let feedforward = p.feedforward.velocity(psec, psec.index(tick, p.delays.velocity));
+        self.position.record(self.sample.velocity_setpoint + feedforward);
     }
 
     fn control_velocity(&mut self, p: &AxisParameters, tick: u64) {
@@ -145,6 +186,9 @@ impl Axis {
         let torque_index = self.psec.index(tick, p.delays.torque);
         s.velocity_feedforward = p.feedforward.velocity(&self.psec, velocity_index);
         s.torque_feedforward = p.feedforward.torque(&self.psec, torque_index);
+        if let Some(compensation) = &p.compensation {
+            s.torque_feedforward += compensation.torque(&self.psec, tick);
+        }
         let error = s.velocity_setpoint + s.velocity_feedforward - self.motor.speed;
         s.current_setpoint = p.velocity.update(&mut self.velocity_pi, error, s.torque_feedforward);
     }
@@ -162,12 +206,13 @@ impl Axis {
         s.position = p.plant.position(&self.motor);
         s.velocity = p.plant.velocity(&self.motor);
         s.current = self.motor.current;
-        s.friction_current = self.torques.friction / p.torque_constant;
-        s.gravity_current = self.torques.gravity / p.torque_constant;
-        s.load_current = -self.torques.load / p.torque_constant;
-        s.effort = p.torque_constant * self.motor.current / p.ratio;
+        let torque_constant = p.plant.torque_constant();
+        s.friction_current = self.torques.friction / torque_constant;
+        s.gravity_current = self.torques.gravity / torque_constant;
+        s.load_current = -self.torques.load / torque_constant;
+        s.effort = torque_constant * self.motor.current / p.ratio;
         s.saturated = self.speed_limited || self.velocity_pi.limited || self.current_pi.limited;
-        s.controller = p.position.name();
+        s.controller = p.controller;
         s.friction_extrapolated = p.plant.friction_is_extrapolated(&self.motor);
     }
 

@@ -4,14 +4,19 @@
 //! integer count of ticks of the current loop; nothing here knows the wall clock.
 
 mod axis;
+mod compensation;
+mod controller;
+mod prediction;
 mod sample;
 
 pub use axis::{Axis, AxisParameters};
+pub use prediction::prediction_model;
 pub use sample::AxisSample;
 
 use std::sync::Arc;
 
 use crate::config::{MachineConfig, Periods};
+use crate::design::DesignError;
 use crate::drive::DriveError;
 use crate::units::Nanoseconds;
 
@@ -24,11 +29,22 @@ pub enum MachineError {
         /// Name of the axis.
         axis: String,
         /// What is wrong with it.
-        source: DriveError,
+        source: AxisError,
     },
     /// Parameters of another machine cannot be taken over while running.
     #[error("the new parameters have other joints or periods than the machine that runs")]
     AnotherMachine,
+}
+
+/// Why an axis cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AxisError {
+    /// Its motor cannot be stepped over the current period.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// It has no such position controller.
+    #[error("position_loop: {0}")]
+    Design(#[from] DesignError),
 }
 
 /// Everything immutable about a machine, discretised and ready to run.
@@ -42,7 +58,7 @@ impl MachineParameters {
     /// Discretises every axis of `config`.
     ///
     /// # Errors
-    /// [`MachineError::Axis`] naming the axis that cannot be stepped over the current period.
+    /// [`MachineError::Axis`] naming the axis that cannot be built.
     pub fn new(config: &MachineConfig) -> Result<Self, MachineError> {
         let axes = config
             .axes
@@ -110,8 +126,8 @@ impl Machine {
         if !same {
             return Err(MachineError::AnotherMachine);
         }
-        for (axis, p) in self.axes.iter_mut().zip(&parameters.axes) {
-            axis.adopt(p);
+        for ((axis, old), p) in self.axes.iter_mut().zip(&self.parameters.axes).zip(&parameters.axes) {
+            axis.adopt(old, p, self.tick);
         }
         self.parameters = parameters;
         Ok(())
@@ -155,6 +171,11 @@ impl Machine {
         self.parameters.axes.iter().map(AxisParameters::longest_delay).max().unwrap_or(0)
     }
 
+    /// Set-points ahead of the present one that the position controllers read, the most of any axis.
+    pub fn horizon(&self) -> usize {
+        self.parameters.axes.iter().map(AxisParameters::horizon).max().unwrap_or(0)
+    }
+
     /// External force or torque on one axis (N or N·m, positive towards plus) from the next tick on.
     pub fn set_load(&mut self, axis: usize, load: f64) {
         if let Some(axis) = self.axes.get_mut(axis) {
@@ -162,17 +183,22 @@ impl Machine {
         }
     }
 
-    /// One position period with the set-points `psec` (m or rad, one per axis).
+    /// One position period with the set-points `psec` (m or rad, one per axis), of whose future nothing
+    /// is known: controllers that read ahead find the present one.
     pub fn advance(&mut self, psec: &[f64]) {
-        self.advance_with(psec, |_| ());
+        self.advance_with(psec, &[], |_| ());
     }
 
     /// One position period, showing the machine to `observe` at every tick: after the controllers have
     /// acted on the tick's state and before the plant moves. The first call is the position instant.
-    pub fn advance_with(&mut self, psec: &[f64], mut observe: impl FnMut(&Machine)) {
+    ///
+    /// `ahead` holds the set-points of the next periods, as many for each axis, one axis behind the
+    /// other; beyond them, up to the [`horizon`](Self::horizon), the last one is taken.
+    pub fn advance_with(&mut self, psec: &[f64], ahead: &[f64], mut observe: impl FnMut(&Machine)) {
         let parameters = Arc::clone(&self.parameters);
-        for (axis, &setpoint) in self.axes.iter_mut().zip(psec) {
-            axis.begin_period(setpoint);
+        let known = ahead.len() / self.axes.len().max(1);
+        for (place, (axis, &setpoint)) in self.axes.iter_mut().zip(psec).enumerate() {
+            axis.begin_period(setpoint, &ahead[place * known..][..known]);
         }
         for tick_in_period in 0..parameters.periods.ticks_per_position() {
             for (axis, p) in self.axes.iter_mut().zip(&parameters.axes) {

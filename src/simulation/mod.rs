@@ -52,6 +52,8 @@ pub enum SimulationError {
 pub struct Simulation {
     machine: Machine,
     timeline: Timeline,
+    /// Set-points of the next periods, as many for each axis.
+    ahead: Vec<f64>,
     origin: Nanoseconds,
     period: Nanoseconds,
     /// The position instant that the next step computes.
@@ -91,6 +93,7 @@ impl Simulation {
             loads: Loads::new(axes.len()),
             motions: Motions::new(kinds, seconds(tick), horizon(period)),
             saturated: vec![false; axes.len()],
+            ahead: Vec::with_capacity(machine.horizon() * axes.len()),
             machine,
             origin,
             period,
@@ -188,6 +191,7 @@ impl Simulation {
         if self.awake {
             self.motions.look_ahead(&self.timeline);
             self.loads.apply(&mut self.machine, k);
+            self.look_ahead();
             self.run_ticks(observe);
         }
         self.motions.finish(k, self.origin + k * self.period, &mut self.ends);
@@ -221,10 +225,19 @@ impl Simulation {
         delay.unsigned_abs().div_ceil(self.period.unsigned_abs()) as i64
     }
 
+    /// The set-points that controllers read ahead, as they are known now.
+    fn look_ahead(&mut self) {
+        let horizon = self.machine.horizon();
+        self.ahead.clear();
+        for joint in 0..self.machine.axis_count() {
+            self.ahead.extend((1..=horizon).filter_map(|j| self.timeline.psec_ahead(joint, j as u32)));
+        }
+    }
+
     fn run_ticks(&mut self, mut observe: impl FnMut(&Machine, bool)) {
-        let Simulation { machine, timeline, motions, samples, saturated, .. } = self;
+        let Simulation { machine, timeline, ahead, motions, samples, saturated, .. } = self;
         let mut position_instant = true;
-        machine.advance_with(timeline.psec(), |m| {
+        machine.advance_with(timeline.psec(), ahead, |m: &Machine| {
             for ((axis, sample), saturated) in m.axes().iter().zip(samples.iter_mut()).zip(&mut *saturated) {
                 *saturated |= axis.sample().saturated;
                 if position_instant {

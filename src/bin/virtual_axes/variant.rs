@@ -11,15 +11,28 @@ pub enum Controller {
     Cascade,
     /// Proportional, without feedforward.
     CascadeNoff,
+    /// Generalized predictive control, with the tuning of the machine file.
+    Gpc,
+    /// The polynomials of the machine file.
+    Rst,
 }
 
 impl Controller {
+    /// The value of `position_loop.controller`.
+    fn name(self) -> &'static str {
+        match self {
+            Controller::Cascade | Controller::CascadeNoff => "cascade",
+            Controller::Gpc => "gpc",
+            Controller::Rst => "rst",
+        }
+    }
+
     /// The parameters that it sets on each axis of `parameters`.
     fn assignments(self, parameters: &Parameters) -> Vec<Assignment> {
         let set = |key: String, value| Assignment { key, value, source: Source::named("--controller") };
         let of_key = |(key, _): (String, Value)| {
             if key.ends_with(".position_loop.controller") {
-                Some(set(key, Value::Text("cascade".to_owned())))
+                Some(set(key, Value::Text(self.name().to_owned())))
             } else if self == Controller::CascadeNoff && key.contains(".feedforward.") {
                 Some(set(key, Value::Double(0.0)))
             } else {
