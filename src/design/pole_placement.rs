@@ -1,0 +1,156 @@
+//! Position controllers by pole placement.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::classic::{check_feedforward, with_feedforward};
+use super::poles::inside;
+use super::polynomial::{product, roots, sum};
+use super::{DesignError, PredictionModel};
+use crate::control::Rst;
+
+/// How near the conjugate of a wanted pole must be.
+const SAME_POLE: f64 = 1e-9;
+/// Least ratio of the singular values of the Sylvester matrix: with less, fewer than three digits of the
+/// coefficients are left.
+const LEAST_CONDITION: f64 = 1e-13;
+/// How far A S + B R may be from what is wanted, relative to the sum of its |cᵢ|.
+const RESIDUAL: f64 = 1e-9;
+
+/// What a loop by pole placement is to be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PolePlacement {
+    /// The wanted poles in z, each off the real axis with its conjugate; what is left over lies at 0.
+    pub poles: Vec<Complex<f64>>,
+    /// Whether S contains the factor 1 − q⁻¹, so that no constant torque leaves an error.
+    pub integrator: bool,
+    /// Weight of the velocity feedforward; 0: none.
+    pub velocity_feedforward: f64,
+}
+
+/// The controller of least degree that gives the closed loop the wanted poles: A S + B R = Π (1 − pᵢ q⁻¹).
+///
+/// T is R(1), so that set-points do not meet the zeros of R, and the feedforward.
+///
+/// # Errors
+/// [`DesignError::OutOfRange`] for more poles than the model and the controller have,
+/// [`DesignError::PoleOutside`], [`DesignError::NoConjugate`], [`DesignError::SharedRoot`].
+pub fn pole_placement(model: &PredictionModel, wanted: &PolePlacement) -> Result<Rst, DesignError> {
+    check_feedforward(wanted.velocity_feedforward)?;
+    let factor: &[f64] = if wanted.integrator { &[1.0, -1.0] } else { &[1.0] };
+    let mut a = product(trimmed(model.a()), factor);
+    // An A of degree 0 leaves no R; with a zero at its end there is a gain.
+    a.resize(a.len().max(2), 0.0);
+    let b = trimmed(model.b());
+    let (order_a, order_b) = (a.len() - 1, b.len() - 1);
+    let unknowns = order_a + order_b - 1;
+    if wanted.poles.len() > unknowns {
+        return Err(DesignError::OutOfRange {
+            name: "poles",
+            value: wanted.poles.len() as f64,
+            allowed: format!("be at most {unknowns} in number, the order of this loop"),
+        });
+    }
+    let mut target = polynomial(&wanted.poles)?;
+    target.resize(unknowns + 1, 0.0);
+    // Unknowns: s₁ … of degree order_b − 1, then r₀ … of degree order_a − 1; rows: q⁻¹ … q^−unknowns.
+    let shifted = |p: &[f64], row: usize, shift: usize| {
+        row.checked_sub(shift).and_then(|i| p.get(i)).copied().unwrap_or(0.0)
+    };
+    let mut sylvester =
+        DMatrix::from_fn(unknowns, unknowns, |row, column| match (column + 1).checked_sub(order_b) {
+            None => shifted(&a, row + 1, column + 1),
+            Some(lag) => shifted(b, row + 1, lag),
+        });
+    let right = DVector::from_fn(unknowns, |row, _| target[row + 1] - shifted(&a, row + 1, 0));
+    // B is far smaller than A: columns of one length, so that singular values tell of shared roots only.
+    let lengths: Vec<f64> = sylvester.column_iter().map(|column| column.norm()).collect();
+    for (mut column, length) in sylvester.column_iter_mut().zip(&lengths) {
+        column /= *length;
+    }
+    let solution = solve(sylvester, &right).ok_or_else(|| shared_root(&a, b))?;
+    let coefficient = |i: usize| solution[i] / lengths[i];
+    let s: Vec<f64> = std::iter::once(1.0).chain((0..order_b - 1).map(coefficient)).collect();
+    let r: Vec<f64> = (order_b - 1..unknowns).map(coefficient).collect();
+    let found = sum(&product(&a, &s), &product(b, &r));
+    let scale: f64 = found.iter().chain(&target).map(|c| c.abs()).sum();
+    if !found.iter().zip(&target).all(|(f, t)| (f - t).abs() <= RESIDUAL * scale) {
+        return Err(shared_root(&a, b));
+    }
+    let gain: f64 = r.iter().sum();
+    with_feedforward(&r, &product(&s, factor), &[gain], wanted.velocity_feedforward, model.period())
+}
+
+/// The poles in z of a pair with this bandwidth (natural frequency, rad/s) and damping, sampled every
+/// `period` s: exp(s Tsp). From a damping of 1 on both are real.
+///
+/// # Errors
+/// [`DesignError::OutOfRange`] unless 0 < bandwidth ≤ π/period and 0 < damping.
+pub fn pole_pair(bandwidth: f64, damping: f64, period: f64) -> Result<[Complex<f64>; 2], DesignError> {
+    let nyquist = std::f64::consts::PI / period;
+    if !(bandwidth > 0.0 && bandwidth <= nyquist) {
+        let allowed = format!("be above 0 and at most {nyquist:.3}, half the sampling rate in rad/s");
+        return Err(DesignError::OutOfRange { name: "bandwidth", value: bandwidth, allowed });
+    }
+    if !(damping > 0.0 && damping.is_finite()) {
+        let allowed = "be finite and above 0".to_owned();
+        return Err(DesignError::OutOfRange { name: "damping", value: damping, allowed });
+    }
+    let turn = Complex::new(damping * damping - 1.0, 0.0).sqrt();
+    // The product of the two is ω², which gives the slow one without a difference.
+    let fast = -(turn + damping) * bandwidth;
+    let slow = Complex::new(bandwidth * bandwidth, 0.0) / fast;
+    let exact = |s: Complex<f64>| if damping < 1.0 { s } else { s.re.into() };
+    Ok([exact(slow), exact(fast)].map(|s| (s * period).exp()))
+}
+
+/// Π (1 − pᵢ q⁻¹).
+fn polynomial(poles: &[Complex<f64>]) -> Result<Vec<f64>, DesignError> {
+    let mut polynomial = vec![1.0];
+    let mut left = poles.to_vec();
+    while let Some(pole) = left.pop() {
+        if !inside(pole) {
+            return Err(DesignError::PoleOutside { re: pole.re, im: pole.im, modulus: pole.norm() });
+        }
+        if pole.im == 0.0 {
+            polynomial = product(&polynomial, &[1.0, -pole.re]);
+            continue;
+        }
+        match left.iter().position(|other| (other - pole.conj()).norm() <= SAME_POLE) {
+            Some(conjugate) => left.swap_remove(conjugate),
+            None => return Err(DesignError::NoConjugate { re: pole.re, im: pole.im }),
+        };
+        polynomial = product(&polynomial, &[1.0, -2.0 * pole.re, pole.norm_sqr()]);
+    }
+    Ok(polynomial)
+}
+
+/// The polynomial without zeros at its end.
+fn trimmed(polynomial: &[f64]) -> &[f64] {
+    let end = polynomial.iter().rposition(|c| *c != 0.0).map_or(0, |last| last + 1);
+    &polynomial[..end]
+}
+
+/// The solution of a square system; none if its matrix is singular.
+fn solve(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let svd = matrix.svd(true, true);
+    let least = svd.singular_values.max() * LEAST_CONDITION;
+    // Written so that a NaN is refused too.
+    if !(svd.singular_values.min() > least) {
+        return None;
+    }
+    svd.solve(right, 0.0).ok()
+}
+
+/// The refusal that names the root of A which is nearest to one of B.
+fn shared_root(a: &[f64], b: &[f64]) -> DesignError {
+    // B without its delay, so that its first coefficient is none.
+    let leading = b.iter().position(|c| *c != 0.0).unwrap_or(0);
+    let (Some(of_a), Some(of_b)) = (roots(a), roots(&b[leading..])) else {
+        return DesignError::NoPoles;
+    };
+    let distance = |root: &Complex<f64>| of_b.iter().map(|z| (z - root).norm()).fold(f64::INFINITY, f64::min);
+    match of_a.iter().min_by(|x, y| distance(x).total_cmp(&distance(y))) {
+        Some(root) => DesignError::SharedRoot { re: root.re, im: root.im.abs() },
+        None => DesignError::NoPoles,
+    }
+}
