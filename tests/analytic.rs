@@ -232,7 +232,7 @@ fn cascade_step(kp: f64, periods: usize, step: f64) {
     for _ in 0..periods {
         x = position * x;
         let mut tick = 0;
-        m.advance_with(&[step, 0.0, 0.0, 0.0, 0.0], |m| {
+        m.advance_with(&[step, 0.0, 0.0, 0.0, 0.0], &[], |m| {
             if tick % 2 == 0 {
                 x = velocity * x;
             }

@@ -86,7 +86,7 @@ fn a_step_of_100_mm_saturates_and_is_recovered_from() {
     let mut m = machine(&[]);
     let mut saturated = 0;
     for _ in 0..500 {
-        m.advance_with(&[0.1, 0.0, 0.0, 0.0, 0.0], |m| {
+        m.advance_with(&[0.1, 0.0, 0.0, 0.0, 0.0], &[], |m| {
             let s = m.axis(X).sample();
             assert!(s.current_setpoint.abs() <= 54.0 && s.voltage.abs() <= 245.0, "{s:?}");
             assert!(s.velocity_setpoint.abs() <= 2000.0 * TAU / 60.0, "{s:?}");

@@ -9,7 +9,7 @@ use super::layout::Joint;
 use super::machine::{
     AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GpcConfig,
     GravityConfig, KinematicsConfig, LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig,
-    PositionControllerConfig, PositionLoopConfig,
+    PositionControllerConfig, PositionLoopConfig, RstConfig,
 };
 use super::parameters::Parameters;
 use super::value::Value;
@@ -245,8 +245,25 @@ impl Axis<'_> {
                 lambda_rel: self.number("position_loop.gpc.lambda_rel")?,
                 lambda: self.number("position_loop.gpc.lambda").ok(),
             }),
+            "rst" => PositionControllerConfig::Rst(RstConfig {
+                r: self.numbers("position_loop.rst.r")?,
+                s: self.numbers("position_loop.rst.s")?,
+                t: self.numbers("position_loop.rst.t")?,
+                t_first: match self.set.get(&self.key("position_loop.rst.t_first")) {
+                    Some(Value::Integer(exponent)) => exponent,
+                    _ => 0,
+                },
+            }),
             _ => PositionControllerConfig::Cascade,
         })
+    }
+
+    fn numbers(&self, suffix: &str) -> Result<Vec<f64>, ConfigError> {
+        let key = self.key(suffix);
+        match self.set.get(&key) {
+            Some(Value::DoubleList(numbers)) => Ok(numbers),
+            _ => Err(self.set.missing(&key, "list of numbers, since position_loop.controller = rst")),
+        }
     }
 
     fn count(&self, suffix: &str) -> Result<usize, ConfigError> {

@@ -57,6 +57,7 @@ pub(super) fn check(
         set.check_friction(joint)?;
         set.check_stroke(joint)?;
         set.check_horizons(joint)?;
+        set.check_polynomials(joint)?;
     }
     Ok(layout)
 }
@@ -295,6 +296,25 @@ impl Set<'_> {
             {
                 let allowed = format!("keep {first} ≤ {last}: they are {value} and {most}");
                 return Err(self.refused(&[&first, &last], allowed));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_polynomials(&self, joint: &Joint) -> Result<(), ConfigError> {
+        let controller = format!("{}.position_loop.controller", joint.name);
+        let Some(entry) = self.entries.get(&controller).filter(|e| e.value == Value::Text("rst".to_owned()))
+        else {
+            return Ok(());
+        };
+        for name in ["r", "s", "t"] {
+            let key = format!("{}.position_loop.rst.{name}", joint.name);
+            if !self.entries.contains_key(&key) {
+                return Err(missing(
+                    &entry.source,
+                    &key,
+                    format!("list of numbers, since {controller} = rst"),
+                ));
             }
         }
         Ok(())

@@ -22,7 +22,7 @@ const CURRENT: f64 = 1e4;
 /// Exponents of the friction law, min/m or min/rev: the fall after breakaway can be steep, a rise
 /// steeper than e^V has no bearing that makes it.
 const FRICTION_EXPONENT: (f64, f64) = (-100.0, 1.0);
-/// Longest horizon of predictive control, position periods.
+/// Longest horizon of predictive control, and furthest set-point that T may read, position periods.
 const MAX_HORIZON: i64 = 200;
 /// Smallest and largest factor of a plant that deviates.
 const DEVIATION: (f64, f64) = (0.1, 10.0);
@@ -34,8 +34,6 @@ const GAIN: f64 = 1e9;
 const INTEGRAL_TIME_MS: (f64, f64) = (1e-3, 1e6);
 /// Most coefficients of R and of S; a design on a model of the drive's order has fewer than ten.
 const RST_TERMS: usize = 32;
-/// Farthest preview and oldest set-point that T may read, position periods.
-const RST_HORIZON: i64 = 200;
 
 /// A coefficient of the friction law, A.
 const fn friction_current(key: &'static str) -> Definition {
@@ -245,22 +243,22 @@ pub static DEFINITIONS: &[Definition] = &[
         .optional()
         .live()
         .is("λ, weight of the control increments (Prévost table 1)."),
-    polynomial("position_loop.rst.r", "s⁻¹", RST_TERMS)
-        .is("R of an RST controller, in rising powers of q⁻¹ from q⁰ on (Prévost eq. 9)."),
-    polynomial("position_loop.rst.s", "", RST_TERMS)
-        .is("S of an RST controller, in rising powers of q⁻¹ from q⁰ on (Prévost eq. 9)."),
-    polynomial("position_loop.rst.t", "s⁻¹", 2 * RST_HORIZON as usize + 1)
-        .is("T of an RST controller, in rising powers of q from position_loop.rst.t_first on (Prévost eq. 9)."),
-    Definition::new("position_loop.rst.t_first", "", Kind::Integer { min: -RST_HORIZON, max: RST_HORIZON })
-        .of_axis()
-        .default(Integer(0))
-        .live()
-        .is("Power of q of T's first term: 1 begins one position period ahead."),
     Definition::new("position_loop.allow_unstable", "", Kind::Flag)
         .of_axis()
         .default(Flag(false))
         .live()
         .is("Accept a position controller whose closed loop is unstable."),
+    polynomial("position_loop.rst.r", "s⁻¹", RST_TERMS)
+        .is("R of an RST controller, in rising powers of q⁻¹ from q⁰ on (Prévost eq. 9)."),
+    polynomial("position_loop.rst.s", "", RST_TERMS)
+        .is("S of an RST controller, in rising powers of q⁻¹ from q⁰ on (Prévost eq. 9)."),
+    polynomial("position_loop.rst.t", "s⁻¹", 2 * MAX_HORIZON as usize + 1)
+        .is("T of an RST controller, in rising powers of q from position_loop.rst.t_first on (Prévost eq. 9)."),
+    Definition::new("position_loop.rst.t_first", "", Kind::Integer { min: -MAX_HORIZON, max: MAX_HORIZON })
+        .of_axis()
+        .default(Integer(0))
+        .live()
+        .is("Power of q of T's first term: 1 begins one position period ahead."),
     gain("velocity_loop.gain", "N·m/(rad/s)")
         .driven_by(RotatingMotor)
         .is("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),

@@ -176,7 +176,7 @@ pub fn run(
     machine.reset(&psec(0.0));
     let last = (duration / TSP).ceil() as u64;
     for k in 0..=last {
-        machine.advance_with(&psec(k as f64 * TSP), |m| observe(m.time() as f64 * 1e-9, m));
+        machine.advance_with(&psec(k as f64 * TSP), &[], |m| observe(m.time() as f64 * 1e-9, m));
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
 use virtual_axes::files::{self, FileKind};
+use virtual_axes::machine::MachineParameters;
 use virtual_axes::trial::Trial;
 use virtual_axes::units::seconds;
 
@@ -30,7 +31,9 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         false => Parameters::builtin_names().any(|known| known == name),
     };
     if is_machine {
-        return Ok(machine(&Parameters::load(&name)?.machine_config()?));
+        let config = Parameters::load(&name)?.machine_config()?;
+        MachineParameters::new(&config).map_err(|error| format!("{name}: {error}"))?;
+        return Ok(machine(&config));
     }
     let config = Parameters::load(&arguments.machine)?.machine_config()?;
     let input = Input::open(&name, None)?;

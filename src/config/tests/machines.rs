@@ -3,9 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{MIKRON, mikron};
-use crate::config::{
-    AxisConfig, AxisKind, KinematicsConfig, MachineConfig, Parameters, PositionControllerConfig, Source,
-};
+use crate::config::{AxisConfig, AxisKind, KinematicsConfig, MachineConfig, Parameters, Source};
 
 /// Relative difference that the conversion of units may leave.
 const ROUNDING: f64 = 1e-12;
@@ -135,7 +133,7 @@ impl Column {
     fn check(&self, axis: &AxisConfig) {
         assert_eq!(axis.name, self.name);
         assert_eq!(axis.kind, self.kind);
-        let PositionControllerConfig::Cascade { gain } = axis.position_loop.controller;
+        let gain = axis.position_loop.gain;
         let motor = &axis.motor;
         let pairs = [
             ("r", axis.transmission_ratio, self.ratio),
