@@ -7,8 +7,10 @@ mod pi;
 mod position;
 mod rst;
 mod setpoint;
+mod transfer;
 
 pub use pi::{Pi, PiState};
-pub use position::{Hold, PositionController, PositionState};
+pub use position::{Guard, PositionController, PositionState};
 pub use rst::{MAX_COEFFICIENTS, MAX_PREVIEW, Rst, RstError};
 pub use setpoint::{Delays, Feedforward, Reach, SetpointHistory};
+pub use transfer::{Transfer, TransferState};

@@ -1,41 +1,48 @@
 //! Position controllers: set-points and position in, velocity set-point out.
 
 use super::rst::{MAX_COEFFICIENTS, Rst};
+use super::transfer::{Transfer, TransferState};
 
 /// A position controller; works in motor units (rad, rad/s).
 #[derive(Debug, Clone, PartialEq)]
-pub enum PositionController {
-    /// `Ω* = Kp (θ* − θ)`.
-    Proportional {
-        /// Kp, s⁻¹.
-        gain: f64,
-    },
-    /// `S Ω* = −R θ + T θ*` (Prévost eq. 9).
-    Rst {
-        /// The polynomials.
-        rst: Rst,
-        /// The law that holds the axis at rest; none where the controller comes to rest by itself, since
-        /// it has no integral action.
-        hold: Option<Hold>,
-    },
+pub struct PositionController {
+    law: Law,
+    guard: Option<Guard>,
+    transfer: Transfer,
 }
 
-/// The proportional law that takes over where the set-point has stood still for a while, over the whole
-/// horizon of the controller, until motion comes into its preview.
+#[derive(Debug, Clone, PartialEq)]
+enum Law {
+    /// `Ω* = Kp (θ* − θ)`.
+    Proportional { gain: f64 },
+    /// `S Ω* = −R θ + T θ*` (Prévost eq. 9).
+    Rst(Rst),
+}
+
+/// The proportional law with velocity feedforward that takes over from an RST controller
 ///
-/// Integral action on top of that of the velocity loop hunts against Coulomb friction for ever; the
-/// proportional law lets the axis creep to where it should be, and friction keeps it there.
+/// - where the set-point has stood still for a while over the whole horizon, until motion comes into it:
+///   integral action on top of that of the velocity loop hunts against Coulomb friction for ever, while a
+///   proportional law lets the axis creep to where it should be, and friction keeps it there;
+/// - where the motor's current has been at its limit, until it has not been there for a while: a linear law
+///   that is faster than the motor can accelerate swings about its set-point for ever.
+///
+/// ```text
+/// Ω* = Kp (θ*(k) − θ(k)) + (θ*(k+1) − θ*(k)) / Tsp
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hold {
+pub struct Guard {
     /// Kp, s⁻¹.
     pub gain: f64,
-    /// Position periods of standstill that the controller itself is given to finish a move.
-    pub after: u32,
+    /// Tsp, s.
+    pub period: f64,
+    /// Position periods of standstill that the controller is given to finish a move by itself.
+    pub rest_after: u32,
 }
 
-/// What a position controller remembers: what it has seen and what it has asked for.
+/// What a position controller remembers: what it has seen and what has been asked for.
 ///
-/// It is kept whatever the law is, so that one takes over from another without a bump.
+/// It is kept whatever the law is, so that one takes over from another with the past as it was.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionState {
     /// θ(k), θ(k − 1), …
@@ -44,6 +51,9 @@ pub struct PositionState {
     commands: [f64; MAX_COEFFICIENTS],
     /// Position instants since which the set-point has stood still over the whole horizon.
     still: u32,
+    /// Position instants since the motor's current was at its limit.
+    unlimited: u32,
+    transfer: TransferState,
 }
 
 impl PositionState {
@@ -53,6 +63,8 @@ impl PositionState {
             angles: [angle; MAX_COEFFICIENTS],
             commands: [0.0; MAX_COEFFICIENTS],
             still: u32::MAX,
+            unlimited: u32::MAX,
+            transfer: TransferState::default(),
         }
     }
 
@@ -65,6 +77,19 @@ impl PositionState {
     pub fn record(&mut self, command: f64) {
         shift_in(&mut self.commands, command);
     }
+
+    /// Takes down that the axis reached `speed` instead, rad/s: the motor's current was at its limit, and
+    /// a recursion that went on from what was asked for would wind up.
+    #[inline]
+    pub fn correct(&mut self, speed: f64) {
+        self.commands[0] = speed;
+        self.unlimited = 0;
+    }
+
+    /// Another controller takes over at the next position instant.
+    pub fn hand_over(&mut self) {
+        self.transfer.pending = true;
+    }
 }
 
 fn shift_in(values: &mut [f64; MAX_COEFFICIENTS], newest: f64) {
@@ -73,43 +98,85 @@ fn shift_in(values: &mut [f64; MAX_COEFFICIENTS], newest: f64) {
 }
 
 impl PositionController {
+    /// `Ω* = Kp (θ* − θ)` with `gain` Kp, s⁻¹.
+    pub fn proportional(gain: f64, transfer: Transfer) -> Self {
+        PositionController { law: Law::Proportional { gain }, guard: None, transfer }
+    }
+
+    /// `S Ω* = −R θ + T θ*` (Prévost eq. 9); `guard` is for controllers with integral action, the others
+    /// neither hunt nor wind up.
+    pub fn rst(rst: Rst, guard: Guard, transfer: Transfer) -> Self {
+        let guard = rst.has_integral_action().then_some(guard);
+        PositionController { law: Law::Rst(rst), guard, transfer }
+    }
+
     /// The furthest set-point that the controller reads, position periods ahead of the delayed one.
     pub fn preview(&self) -> i64 {
-        match self {
-            PositionController::Proportional { .. } => 0,
-            PositionController::Rst { rst, .. } => rst.preview(),
+        match &self.law {
+            Law::Proportional { .. } => 0,
+            // The guard reads one.
+            Law::Rst(rst) => rst.preview().max(i64::from(self.guard.is_some())),
         }
     }
 
     /// The oldest set-point that the controller reads, position periods behind the delayed one.
     pub fn lookback(&self) -> i64 {
-        match self {
-            PositionController::Proportional { .. } => 0,
-            PositionController::Rst { rst, .. } => rst.lookback(),
+        match &self.law {
+            Law::Proportional { .. } => 0,
+            Law::Rst(rst) => rst.lookback(),
         }
     }
 
-    /// Ω* before the limit of the motor's speed, rad/s; `setpoint(j)` is θ*(k + j), rad, and `angle` θ(k).
+    /// Ω* before the limit of the motor's speed, rad/s; `setpoint(j)` is θ*(k + j), rad, `angle` θ(k), and
+    /// `feedforward` what the velocity loop will be asked for on top, rad/s.
     #[inline]
-    pub fn update(&self, s: &mut PositionState, setpoint: impl Fn(i64) -> f64, angle: f64) -> f64 {
+    pub fn update(
+        &self,
+        s: &mut PositionState,
+        setpoint: impl Fn(i64) -> f64,
+        angle: f64,
+        feedforward: f64,
+    ) -> f64 {
         shift_in(&mut s.angles, angle);
-        match self {
-            PositionController::Proportional { gain } => gain * (setpoint(0) - angle),
-            PositionController::Rst { rst, hold } => {
+        if self.guard.is_some() {
+            let is_still = (1..=self.preview()).all(|j| setpoint(j) == setpoint(0));
+            s.still = if is_still { s.still.saturating_add(1) } else { 0 };
+            s.unlimited = s.unlimited.saturating_add(1);
+        }
+        if s.transfer.pending {
+            let excess = self.output(s, &setpoint, angle) + feedforward - s.commands[0];
+            let excess = excess - excess.clamp(-self.transfer.step, self.transfer.step);
+            match &self.guard {
+                _ if excess == 0.0 => s.transfer.end(),
+                Some(_) => s.transfer.begin(0.0, setpoint(0) - angle),
+                None => s.transfer.begin(-excess, 0.0),
+            }
+        }
+        let (command, error) = s.transfer.next(&self.transfer);
+        self.output(s, |j| setpoint(j) - error, angle) + command
+    }
+
+    #[inline]
+    fn output(&self, s: &PositionState, setpoint: impl Fn(i64) -> f64, angle: f64) -> f64 {
+        match (&self.law, &self.guard) {
+            (Law::Proportional { gain }, _) => gain * (setpoint(0) - angle),
+            (Law::Rst(_), Some(guard)) if self.is_guarded(s, guard) => {
                 let now = setpoint(0);
-                let is_still = (1..=rst.preview()).all(|j| setpoint(j) == now);
-                s.still = if is_still { s.still.saturating_add(1) } else { 0 };
-                if let Some(hold) = hold
-                    && s.still > hold.after
-                {
-                    return hold.gain * (now - angle);
-                }
+                guard.gain * (now - angle) + (setpoint(1) - now) / guard.period
+            }
+            (Law::Rst(rst), _) => {
                 let asked = weighted(rst.t(), |i| setpoint(rst.t_first() + i as i64));
                 let seen = weighted(rst.r(), |i| s.angles[i]);
                 let done = weighted(&rst.s()[1..], |i| s.commands[i]);
                 asked - seen - done
             }
         }
+    }
+
+    fn is_guarded(&self, s: &PositionState, guard: &Guard) -> bool {
+        // As long as the controller's own horizon, and the instant that the limit was seen at.
+        let recovered_after = self.preview() + 1;
+        s.still > guard.rest_after || i64::from(s.unlimited) <= recovered_after
     }
 }
 

@@ -100,6 +100,8 @@ pub struct Axis {
     velocity_pi: PiState,
     current_pi: PiState,
     speed_limited: bool,
+    /// Whether the current set-point was limited since the last position instant.
+    current_limited: bool,
     sample: AxisSample,
 }
 
@@ -121,6 +123,7 @@ impl Axis {
             velocity_pi: PiState { integral: torque, limited: false },
             current_pi: PiState { integral: voltage, limited: false },
             speed_limited: false,
+            current_limited: false,
             sample: AxisSample {
                 psec: position,
                 delayed_psec: position,
@@ -142,6 +145,9 @@ impl Axis {
         };
         self.velocity_pi.integral += torque(old) - torque(p);
         self.psec.adopt(p.reach());
+        if (&old.position, &old.feedforward) != (&p.position, &p.feedforward) {
+            self.position.hand_over();
+        }
     }
 
     /// The set-point of the position period that begins, and those behind it as far as they are known.
@@ -172,11 +178,15 @@ impl Axis {
     fn control_position(&mut self, p: &AxisParameters, tick: u64) {
         let k = self.psec.index(tick, p.delays.position);
         self.sample.delayed_psec = self.psec.at(k);
+        if std::mem::take(&mut self.current_limited) {
+            self.position.correct(self.motor.speed);
+        }
         let psec = &self.psec;
-        let wanted = p.position.update(&mut self.position, |j| psec.at(k + j) / p.ratio, self.motor.angle);
+        let feedforward = p.feedforward.velocity(psec, psec.index(tick, p.delays.velocity));
+        let setpoint = |j| psec.at(k + j) / p.ratio;
+        let wanted = p.position.update(&mut self.position, setpoint, self.motor.angle, feedforward);
         self.sample.velocity_setpoint = wanted.clamp(-p.max_speed, p.max_speed);
         self.speed_limited = wanted != self.sample.velocity_setpoint;
-        let feedforward = p.feedforward.velocity(psec, psec.index(tick, p.delays.velocity));
         self.position.record(self.sample.velocity_setpoint + feedforward);
     }
 
@@ -191,6 +201,7 @@ impl Axis {
         }
         let error = s.velocity_setpoint + s.velocity_feedforward - self.motor.speed;
         s.current_setpoint = p.velocity.update(&mut self.velocity_pi, error, s.torque_feedforward);
+        self.current_limited |= self.velocity_pi.limited;
     }
 
     /// Moves the plant by one tick.

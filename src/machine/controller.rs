@@ -1,16 +1,19 @@
 //! The position controller of an axis, as its configuration asks for it.
 
 use crate::config::{AxisConfig, FeedforwardConfig, GpcConfig, Periods, PositionControllerConfig};
-use crate::control::{Hold, PositionController, Rst};
+use crate::control::{Guard, PositionController, Rst, Transfer};
 use crate::design::{DesignError, GpcTuning, Weight, gpc};
-use crate::units::{MILLISECOND_NS, Nanoseconds};
+use crate::units::{MILLISECOND_NS, Nanoseconds, seconds};
 
 use super::AxisError;
 use super::prediction::prediction_model;
 
 /// Standstill of the set-point after which an axis is held: a controller with a bandwidth worth its name
 /// has finished a move by then.
-const HOLD_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
+const REST_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
+
+/// How long what a controller leaves behind takes to fade, where it would be a bump.
+const TRANSFER: Nanoseconds = 300 * MILLISECOND_NS;
 
 impl From<&GpcConfig> for GpcTuning {
     fn from(config: &GpcConfig) -> Self {
@@ -24,10 +27,14 @@ pub(super) fn position_controller(
     axis: &AxisConfig,
     periods: &Periods,
 ) -> Result<(PositionController, &'static str), AxisError> {
-    let gain = axis.position_loop.gain;
+    let (gain, period) = (axis.position_loop.gain, seconds(periods.position));
+    let transfer = Transfer {
+        step: axis.limits.acceleration * period / axis.transmission_ratio,
+        periods: (TRANSFER / periods.position) as u32,
+    };
     let (rst, name) = match &axis.position_loop.controller {
         PositionControllerConfig::Cascade => {
-            return Ok((PositionController::Proportional { gain }, "cascade"));
+            return Ok((PositionController::proportional(gain, transfer), "cascade"));
         }
         PositionControllerConfig::Gpc(config) => {
             (gpc(&prediction_model(axis, periods)?, &GpcTuning::from(config))?, "gpc")
@@ -37,9 +44,8 @@ pub(super) fn position_controller(
             (rst.map_err(DesignError::from)?, "rst")
         }
     };
-    let after = (HOLD_AFTER / periods.position) as u32;
-    let hold = rst.has_integral_action().then_some(Hold { gain, after });
-    Ok((PositionController::Rst { rst, hold }, name))
+    let guard = Guard { gain, period, rest_after: (REST_AFTER / periods.position) as u32 };
+    Ok((PositionController::rst(rst, guard, transfer), name))
 }
 
 /// The feedforward of the axis: velocity and torque are the cascade's, an RST controller has it in T.

@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::{Arc, LazyLock};
 
-use virtual_axes::config::{Assignment, Parameters, Source, Value};
+use virtual_axes::config::{Assignment, MachineConfig, Parameters, Source, Value, parse_assignment};
 use virtual_axes::machine::{Machine, MachineParameters};
 
 /// Position period of the default machine, s.
@@ -32,6 +32,18 @@ pub fn parameters<K: AsRef<str>>(changes: &[(K, f64)]) -> Parameters {
 pub fn machine(changes: &[(&str, f64)]) -> Machine {
     let config = parameters(changes).machine_config().expect("the machine is valid");
     Machine::new(Arc::new(MachineParameters::new(&config).expect("the machine can be discretised")))
+}
+
+/// A shipped machine with what `--set` would say for every joint: `position_loop.controller=gpc`.
+pub fn configured(machine: &str, of_every_joint: &[&str]) -> MachineConfig {
+    let mut parameters = Parameters::builtin(machine).expect("the machine is shipped");
+    let source = Source::named("test");
+    let names: Vec<String> =
+        parameters.machine_config().expect("valid").axes().iter().map(|a| a.name().to_owned()).collect();
+    let texts = names.iter().flat_map(|name| of_every_joint.iter().map(move |text| format!("{name}.{text}")));
+    let assignments = texts.map(|text| parse_assignment(&text, &source).expect("an assignment")).collect();
+    parameters.set_all(assignments).expect("the changes are valid");
+    parameters.machine_config().expect("the machine is valid")
 }
 
 /// Friction of the X axis: a, b, c, d, i0.
