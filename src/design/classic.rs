@@ -57,7 +57,7 @@ pub fn p(gain: f64, velocity_feedforward: f64, period: f64) -> Result<Rst, Desig
 /// [`DesignError::OutOfRange`] naming the parameter.
 pub fn pi(gain: f64, integral_time: f64, velocity_feedforward: f64, period: f64) -> Result<Rst, DesignError> {
     check_common(gain, velocity_feedforward, period)?;
-    check_positive("integral_time", integral_time, MAX_INTEGRAL_TIME)?;
+    check_positive("integral_time", integral_time, MAX_INTEGRAL_TIME, " s")?;
     let on_error = proportional_integral(gain, integral_time, period);
     with_feedforward(&on_error, &DIFFERENCE, &on_error, velocity_feedforward, period)
 }
@@ -69,9 +69,9 @@ pub fn pi(gain: f64, integral_time: f64, velocity_feedforward: f64, period: f64)
 pub fn pid(tuning: &Pid, period: f64) -> Result<Rst, DesignError> {
     let Pid { gain, integral_time, derivative_time, filter_time, velocity_feedforward } = *tuning;
     check_common(gain, velocity_feedforward, period)?;
-    check_positive("integral_time", integral_time, MAX_INTEGRAL_TIME)?;
-    check_range("derivative_time", derivative_time, MAX_DERIVATIVE_TIME)?;
-    check_range("filter_time", filter_time, MAX_DERIVATIVE_TIME)?;
+    check_positive("integral_time", integral_time, MAX_INTEGRAL_TIME, " s")?;
+    check_range("derivative_time", derivative_time, MAX_DERIVATIVE_TIME, " s")?;
+    check_range("filter_time", filter_time, MAX_DERIVATIVE_TIME, " s")?;
     if derivative_time == 0.0 {
         return pi(gain, integral_time, velocity_feedforward, period);
     }
@@ -107,26 +107,26 @@ pub(super) fn with_feedforward(
 }
 
 fn check_common(gain: f64, velocity_feedforward: f64, period: f64) -> Result<(), DesignError> {
-    check_positive("gain", gain, MAX_GAIN)?;
+    check_positive("gain", gain, MAX_GAIN, " s⁻¹")?;
     check_feedforward(velocity_feedforward)?;
-    check_positive("period", period, MAX_PERIOD)
+    check_positive("period", period, MAX_PERIOD, " s")
 }
 
 /// That w is a weight.
 pub(super) fn check_feedforward(weight: f64) -> Result<(), DesignError> {
-    check_range("velocity_feedforward", weight, MAX_FEEDFORWARD)
+    check_range("velocity_feedforward", weight, MAX_FEEDFORWARD, "")
 }
 
-fn check_range(name: &'static str, value: f64, max: f64) -> Result<(), DesignError> {
+fn check_range(name: &'static str, value: f64, max: f64, unit: &str) -> Result<(), DesignError> {
     if (0.0..=max).contains(&value) {
         return Ok(());
     }
-    Err(DesignError::OutOfRange { name, value, allowed: format!("lie in 0 … {max}") })
+    Err(DesignError::OutOfRange { name, value, allowed: format!("lie in 0 … {max}{unit}") })
 }
 
-fn check_positive(name: &'static str, value: f64, max: f64) -> Result<(), DesignError> {
+fn check_positive(name: &'static str, value: f64, max: f64, unit: &str) -> Result<(), DesignError> {
     if value > 0.0 && value <= max {
         return Ok(());
     }
-    Err(DesignError::OutOfRange { name, value, allowed: format!("be above 0 and at most {max}") })
+    Err(DesignError::OutOfRange { name, value, allowed: format!("be above 0 and at most {max}{unit}") })
 }

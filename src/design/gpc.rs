@@ -90,12 +90,12 @@ pub fn gpc(model: &PredictionModel, tuning: &GpcTuning) -> Result<Rst, DesignErr
         Some(lag) => step[lag],
         None => 0.0,
     });
-    let gram = g.transpose() * &g;
     let lambda = match weight {
         Weight::Absolute(lambda) => lambda,
-        Weight::Relative(lambda) => lambda * gram.trace(),
+        // trace(GᵀG)
+        Weight::Relative(lambda) => lambda * g.norm_squared(),
     };
-    let gains = first_row(gram, lambda, &g).ok_or(DesignError::Singular { n1, n2, nu, lambda })?;
+    let gains = first_row(&g, lambda).ok_or(DesignError::Singular { n1, n2, nu, lambda })?;
     let mut r = vec![0.0; order];
     let mut past = vec![0.0; b.len().saturating_sub(1)];
     for (gain, j) in gains.iter().zip(n1..=n2) {
@@ -113,17 +113,21 @@ pub fn gpc(model: &PredictionModel, tuning: &GpcTuning) -> Result<Rst, DesignErr
 }
 
 /// First row of (GᵀG + λI)⁻¹ Gᵀ; none if the matrix cannot be inverted.
-fn first_row(gram: DMatrix<f64>, lambda: f64, g: &DMatrix<f64>) -> Option<DVector<f64>> {
-    let size = gram.nrows();
-    let scale = gram.trace();
-    let regular = gram + DMatrix::identity(size, size) * lambda;
-    let decomposition = regular.cholesky()?;
-    // A pivot that is rounding error is no pivot.
-    let smallest = decomposition.l_dirty().diagonal().iter().fold(f64::INFINITY, |m, d| m.min(d * d));
-    if !(smallest > size as f64 * f64::EPSILON * scale) {
+///
+/// From the QR decomposition of G above √λ I: to form GᵀG would lose half the digits.
+fn first_row(g: &DMatrix<f64>, lambda: f64) -> Option<DVector<f64>> {
+    let (rows, size) = g.shape();
+    let mut stacked = g.clone().resize_vertically(rows + size, 0.0);
+    for column in 0..size {
+        stacked[(rows + column, column)] = lambda.sqrt();
+    }
+    let (q, r) = stacked.qr().unpack();
+    // A pivot of GᵀG + λI that is rounding error is no pivot.
+    let smallest = r.diagonal().iter().fold(f64::INFINITY, |m, d| m.min(d * d));
+    if !(smallest > size as f64 * f64::EPSILON * g.norm_squared()) {
         return None;
     }
     let mut first = DVector::zeros(size);
     first[0] = 1.0;
-    Some(g * decomposition.solve(&first))
+    Some(q.rows(0, rows) * r.tr_solve_upper_triangular(&first)?)
 }

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use nalgebra::Complex;
 
-use super::poles::check_stable;
-use super::polynomial::{roots, value};
+use super::poles::{STABILITY_MARGIN, characteristic, check_stable};
+use super::polynomial::{INTEGRATOR, roots, roots_within, value, without_integrators};
 use super::{DesignError, PredictionModel};
 use crate::control::Rst;
 
@@ -29,8 +29,6 @@ const GOLDEN_STEPS: usize = 38;
 const BISECTIONS: usize = 50;
 /// |L| beyond which a point is a pole of L and no crossover.
 const INFINITE: f64 = 1e9;
-/// |A(1) S(1)| up to which L has an integrator, relative to the sums of their coefficients.
-const INTEGRATOR: f64 = 1e-9;
 
 /// How far a stable loop is from instability: margins of L = B R / (A S), sampled every Tsp.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +53,9 @@ pub struct Margins {
 /// [`DesignError::Unstable`] with the pole: a loop that is not stable has no margins;
 /// [`DesignError::NoPoles`].
 pub fn margins(model: &PredictionModel, rst: &Rst) -> Result<Margins, DesignError> {
-    check_stable(model, rst)?;
+    if !roots_within(&characteristic(model, rst), 1.0 - STABILITY_MARGIN) {
+        check_stable(model, rst)?;
+    }
     let l = OpenLoop { model, rst };
     let samples: Vec<Sample> = grid(model, rst).into_iter().map(|angle| l.sample(angle)).collect();
     let mut found = Margins {
@@ -139,9 +139,13 @@ fn grid(model: &PredictionModel, rst: &Rst) -> Vec<f64> {
         angle *= 10_f64.powf(1.0 / PER_DECADE);
     }
     for polynomial in [model.a(), rst.s()] {
-        for pole in roots(polynomial).into_iter().flatten() {
+        // Poles at angle 0 are served by the logarithmic part.
+        let others = without_integrators(polynomial);
+        if roots_within(&others, 1.0 - NEAR * distance) {
+            continue;
+        }
+        for pole in roots(&others).into_iter().flatten() {
             let depth = (1.0 - pole.norm()).abs();
-            // Those at angle 0 are served by the logarithmic part.
             if depth > NEAR * distance || pole.im < 0.0 || (pole.im == 0.0 && pole.re > 0.0) {
                 continue;
             }

@@ -10,9 +10,9 @@ use crate::control::Rst;
 
 /// How near the conjugate of a wanted pole must be.
 const SAME_POLE: f64 = 1e-9;
-/// Least ratio of the singular values of the Sylvester matrix: with less, fewer than three digits of the
+/// Least ratio of the pivots of the Sylvester matrix: with less, fewer than three digits of the
 /// coefficients are left.
-const LEAST_CONDITION: f64 = 1e-13;
+const LEAST_PIVOT: f64 = 1e-13;
 /// How far A S + B R may be from what is wanted, relative to the sum of its |cᵢ|.
 const RESIDUAL: f64 = 1e-9;
 
@@ -62,7 +62,7 @@ pub fn pole_placement(model: &PredictionModel, wanted: &PolePlacement) -> Result
             Some(lag) => shifted(b, row + 1, lag),
         });
     let right = DVector::from_fn(unknowns, |row, _| target[row + 1] - shifted(&a, row + 1, 0));
-    // B is far smaller than A: columns of one length, so that singular values tell of shared roots only.
+    // B is far smaller than A: columns of one length, so that pivots tell of shared roots only.
     let lengths: Vec<f64> = sylvester.column_iter().map(|column| column.norm()).collect();
     for (mut column, length) in sylvester.column_iter_mut().zip(&lengths) {
         column /= *length;
@@ -132,13 +132,13 @@ fn trimmed(polynomial: &[f64]) -> &[f64] {
 
 /// The solution of a square system; none if its matrix is singular.
 fn solve(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let svd = matrix.svd(true, true);
-    let least = svd.singular_values.max() * LEAST_CONDITION;
+    let decomposition = matrix.full_piv_lu();
+    let pivots = decomposition.u().diagonal().abs();
     // Written so that a NaN is refused too.
-    if !(svd.singular_values.min() > least) {
+    if !(pivots.min() > LEAST_PIVOT * pivots.max()) {
         return None;
     }
-    svd.solve(right, 0.0).ok()
+    decomposition.solve(right)
 }
 
 /// The refusal that names the root of A which is nearest to one of B.

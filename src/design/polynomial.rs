@@ -7,6 +7,9 @@ use nalgebra::{Complex, DMatrix, DVector, Schur};
 /// Steps of the QR iteration for each root; it needs two or three.
 const ITERATIONS_PER_ROOT: usize = 40;
 
+/// Value at q = 1 up to which a polynomial has the factor 1 − q⁻¹, relative to the sum of its |cᵢ|.
+pub(super) const INTEGRATOR: f64 = 1e-9;
+
 /// Product of two polynomials.
 pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
@@ -46,6 +49,46 @@ pub(super) fn roots(polynomial: &[f64]) -> Option<Vec<Complex<f64>>> {
         by_modulus.then(b.im.partial_cmp(&a.im).unwrap_or(Ordering::Equal))
     });
     Some(roots)
+}
+
+/// Whether all roots in z lie inside the circle of this radius (recursion of Schur and Cohn): far quicker
+/// than to compute them.
+pub(super) fn roots_within(polynomial: &[f64], radius: f64) -> bool {
+    let mut scale = 1.0;
+    let mut left: Vec<f64> = Vec::with_capacity(polynomial.len());
+    for c in polynomial {
+        left.push(c / scale);
+        scale *= radius;
+    }
+    let mut next = left.clone();
+    while left.len() > 1 {
+        let last = left.len() - 1;
+        let reflection = left[last] / left[0];
+        // Written so that a NaN is outside.
+        if !(reflection.abs() < 1.0) {
+            return false;
+        }
+        next.clear();
+        next.extend((0..last).map(|i| left[i] - reflection * left[last - i]));
+        std::mem::swap(&mut left, &mut next);
+    }
+    true
+}
+
+/// The polynomial without its factors 1 − q⁻¹.
+pub(super) fn without_integrators(polynomial: &[f64]) -> Vec<f64> {
+    let mut left = polynomial.to_vec();
+    let size: f64 = left.iter().map(|c| c.abs()).sum();
+    while left.len() > 1 && left.iter().sum::<f64>().abs() <= INTEGRATOR * size {
+        // Division by 1 − q⁻¹ sums up the coefficients.
+        let mut sum = 0.0;
+        for c in &mut left {
+            sum += *c;
+            *c = sum;
+        }
+        left.pop();
+    }
+    left
 }
 
 /// Eigenvalues of the companion matrix with this first row.
@@ -92,6 +135,28 @@ mod tests {
                 assert!((power - 1.0).norm() < 1e-12, "{root} to the {size} is {power}");
             }
         }
+    }
+
+    #[test]
+    fn the_recursion_tells_inside_from_outside() {
+        for radius in [0.2, 0.7, 1.0, 1.5] {
+            for (size, inside) in [(0.999, true), (1.001, false)] {
+                let (re, square) = (0.6 * size * radius, (size * radius).powi(2));
+                let pair = [1.0, -2.0 * re, square];
+                assert_eq!(roots_within(&pair, radius), inside);
+                let more =
+                    product(&product(&pair, &[2.0, -0.1 * radius]), &[1.0, 0.0, 0.3 * radius * radius]);
+                assert_eq!(roots_within(&more, radius), inside);
+            }
+        }
+        assert!(roots_within(&[1.0, -0.5, 0.0], 0.6) && !roots_within(&[1.0, f64::NAN], 1.0));
+    }
+
+    #[test]
+    fn integrators_are_divided_out() {
+        let double = product(&product(&[1.0, -1.0], &[1.0, -1.0]), &[1.0, -0.3]);
+        let left = without_integrators(&double);
+        assert!((left[0] - 1.0).abs() + (left[1] + 0.3).abs() < 1e-15 && left.len() == 2, "{left:?}");
     }
 
     #[test]

@@ -3,6 +3,8 @@
 #![forbid(unsafe_code)]
 
 mod check;
+mod design;
+mod design_output;
 mod input;
 mod interrupt;
 mod json;
@@ -44,6 +46,8 @@ enum Command {
     Run(run::Arguments),
     /// Write the set-points of a scenario to a file.
     Psec(psec::Arguments),
+    /// Design position controllers: polynomials, closed-loop poles and stability margins.
+    Design(design::Arguments),
     /// Find the tuning of the position controllers that suits a path best.
     Tune(Box<tune::Arguments>),
     /// Run one tuning on plants whose inertia, friction and torque constant are off.
@@ -107,6 +111,7 @@ fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
     match command {
         Command::Run(arguments) => run::run(arguments),
         Command::Psec(arguments) => psec::run(arguments),
+        Command::Design(arguments) => design::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),
         Command::Robustness(arguments) => robustness::run(arguments),
         Command::Check(arguments) => check::run(arguments),

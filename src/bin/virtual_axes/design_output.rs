@@ -1,0 +1,232 @@
+//! Controllers that were designed, as text, JSON and lines of a machine file.
+
+use nalgebra::Complex;
+use serde_json::{Map, Value, json};
+use virtual_axes::design::Margins;
+use virtual_axes::report::{Column, Table};
+use virtual_axes::units::{DEGREE, MILLISECOND};
+
+use crate::design::Design;
+use crate::table;
+
+/// Poles nearer to 0 than so are delays; they are counted and not listed.
+const DELAY: f64 = 1e-3;
+
+/// The controllers one after the other, then the margins of all.
+pub fn text(method: &str, designs: &[Design]) -> String {
+    let mut text: String = designs.iter().map(|design| one(method, design) + "\n").collect();
+    text.push_str(&table::text(&margins_table(designs)));
+    text
+}
+
+fn one(method: &str, design: &Design) -> String {
+    let tuning: Vec<String> = design.tuning.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    let (model, rst) = (&design.model, &design.rst);
+    let order = model.a().len().max(model.b().len()) - 1;
+    let mut text = format!("{}: {method}, {}\n", design.axis, tuning.join(", "));
+    let period = model.period() / MILLISECOND;
+    text.push_str(&format!(
+        "prediction model of order {order}, period {period} ms, powers of 1/q from 0 on\n"
+    ));
+    text.push_str(&format!("A = {}\nB = {}\n", list(model.a()), list(model.b())));
+    text.push_str("controller, powers of 1/q from 0 on; T: powers of q from t_first on\n");
+    text.push_str(&format!("R = {}\nS = {}\n", list(rst.r()), list(rst.s())));
+    text.push_str(&format!("T = {}\nt_first = {}\n", list(rst.t()), rst.t_first()));
+    text.push_str(&table::text(&poles_table(design)));
+    let delays = design.poles.iter().filter(|pole| is_delay(**pole)).count();
+    if delays > 0 {
+        text.push_str(&format!("and {delays} at or near 0 (modulus below {DELAY})\n"));
+    }
+    if let Err(error) = &design.margins {
+        text.push_str(&format!("no margins: {error}\n"));
+    }
+    text
+}
+
+fn poles_table(design: &Design) -> Table {
+    let columns = [
+        Column::new("closed-loop pole", ""),
+        Column::new("modulus", ""),
+        Column::new("natural frequency", "rad/s"),
+        Column::new("damping", ""),
+    ];
+    let mut rows = Vec::new();
+    for pole in design.poles.iter().filter(|pole| !is_delay(**pole)) {
+        // A pair is one row.
+        if pole.im < 0.0 {
+            continue;
+        }
+        let (frequency, damping) = continuous(*pole, design.model.period());
+        let place = match pole.im {
+            0.0 => format!("{:.6}", pole.re),
+            im => format!("{:.6} ± {im:.6}j", pole.re),
+        };
+        rows.push(vec![
+            place,
+            format!("{:.6}", pole.norm()),
+            format!("{frequency:.2}"),
+            format!("{damping:.3}"),
+        ]);
+    }
+    Table { caption: "Poles".to_owned(), columns: columns.to_vec(), rows }
+}
+
+fn is_delay(pole: Complex<f64>) -> bool {
+    pole.norm() < DELAY
+}
+
+/// Natural frequency, rad/s, and damping of the pole s = ln(z)/Tsp.
+fn continuous(pole: Complex<f64>, period: f64) -> (f64, f64) {
+    let s = pole.ln() / period;
+    (s.norm(), -s.re / s.norm())
+}
+
+/// Margins of all axes, with the worst of several.
+fn margins_table(designs: &[Design]) -> Table {
+    let columns = [
+        Column::new("margins of", ""),
+        Column::new("modulus", ""),
+        Column::new("phase", "°"),
+        Column::new("gain", "×"),
+        Column::new("gain downwards", "×"),
+        Column::new("delay", "ms"),
+    ];
+    let mut rows: Vec<Vec<String>> = designs
+        .iter()
+        .map(|design| match &design.margins {
+            Ok(margins) => row(&design.axis, margins),
+            Err(_) => vec![design.axis.clone(), "unstable".to_owned()],
+        })
+        .collect();
+    if designs.len() > 1
+        && let Some(worst) = worst(designs)
+    {
+        rows.push(row("worst", &worst));
+    }
+    Table { caption: "Margins".to_owned(), columns: columns.to_vec(), rows }
+}
+
+fn row(name: &str, margins: &Margins) -> Vec<String> {
+    let figure = |value: f64, digits: usize| match value {
+        f64::INFINITY => "none".to_owned(),
+        value => format!("{value:.digits$}"),
+    };
+    let downwards = match margins.gain_reduction {
+        0.0 => "none".to_owned(),
+        factor => figure(factor, 3),
+    };
+    vec![
+        name.to_owned(),
+        figure(margins.modulus, 3),
+        figure(margins.phase / DEGREE, 1),
+        figure(margins.gain, 3),
+        downwards,
+        figure(margins.delay / MILLISECOND, 2),
+    ]
+}
+
+/// The worst of each margin; none if an axis is unstable.
+fn worst(designs: &[Design]) -> Option<Margins> {
+    designs.iter().map(|design| design.margins.as_ref().ok().copied()).reduce(|a, b| {
+        let (a, b) = (a?, b?);
+        Some(Margins {
+            modulus: a.modulus.min(b.modulus),
+            phase: a.phase.min(b.phase),
+            gain: a.gain.min(b.gain),
+            gain_reduction: a.gain_reduction.max(b.gain_reduction),
+            delay: a.delay.min(b.delay),
+        })
+    })?
+}
+
+/// `--json`: units stand in the keys; what is infinite is null.
+pub fn object(machine: &str, method: &str, designs: &[Design]) -> Value {
+    let axes: Map<String, Value> = designs.iter().map(|d| (d.axis.clone(), axis(d))).collect();
+    json!({
+        "machine": machine,
+        "method": method,
+        "axes": axes,
+        "worst": worst(designs).map(|worst| margins(&worst)),
+    })
+}
+
+fn axis(design: &Design) -> Value {
+    let tuning: Map<String, Value> =
+        design.tuning.iter().map(|(name, value)| ((*name).to_owned(), json!(value))).collect();
+    let (model, rst) = (&design.model, &design.rst);
+    let poles: Vec<Value> = design
+        .poles
+        .iter()
+        .map(|pole| {
+            let (frequency, damping) = continuous(*pole, model.period());
+            json!({
+                "re": pole.re,
+                "im": pole.im,
+                "modulus": pole.norm(),
+
+                "natural_frequency_rad_s": frequency,
+                "damping": damping,
+            })
+        })
+        .collect();
+    json!({
+        "tuning": tuning,
+        "model": { "period_ms": model.period() / MILLISECOND, "a": model.a(), "b_s": plain(model.b()) },
+        "r_per_s": rst.r(),
+        "s": rst.s(),
+        "t_per_s": rst.t(),
+        "t_first": rst.t_first(),
+        "stable": design.margins.is_ok(),
+        "poles": poles,
+        "margins": design.margins.as_ref().ok().map(margins),
+    })
+}
+
+fn margins(margins: &Margins) -> Value {
+    json!({
+        "modulus": margins.modulus,
+        "phase_deg": margins.phase / DEGREE,
+        "gain": margins.gain,
+        "gain_reduction": margins.gain_reduction,
+        "delay_ms": margins.delay / MILLISECOND,
+    })
+}
+
+/// `--yaml`: parameters that run these controllers, over a machine file or to be pasted into it.
+pub fn yaml(designs: &[Design]) -> String {
+    let mut text = "/**:\n  ros__parameters:\n".to_owned();
+    for Design { axis, rst, margins, .. } in designs {
+        text.push_str(&format!("    {axis}:\n      position_loop:\n        controller: rst\n"));
+        if margins.is_err() {
+            text.push_str("        allow_unstable: true\n");
+        }
+        let (r, s, t) = (list(rst.r()), list(rst.s()), list(rst.t()));
+        text.push_str(&format!(
+            "        rst:\n          r: {r}\n          s: {s}\n          t: {t}\n          t_first: {}\n",
+            rst.t_first()
+        ));
+    }
+    text
+}
+
+fn list(polynomial: &[f64]) -> String {
+    let numbers: Vec<String> = polynomial.iter().copied().map(number).collect();
+    format!("[{}]", numbers.join(", "))
+}
+
+/// The shortest digits that give the same number back, as every YAML reader takes them: with a point
+/// and, in an exponent, a sign.
+fn number(value: f64) -> String {
+    let text = format!("{:?}", value + 0.0);
+    let Some((digits, exponent)) = text.split_once('e') else {
+        return text;
+    };
+    let point = if digits.contains('.') { "" } else { ".0" };
+    let sign = if exponent.starts_with('-') { "" } else { "+" };
+    format!("{digits}{point}e{sign}{exponent}")
+}
+
+/// Without negative zeros.
+fn plain(polynomial: &[f64]) -> Vec<f64> {
+    polynomial.iter().map(|c| c + 0.0).collect()
+}
