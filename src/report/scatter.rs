@@ -17,7 +17,7 @@ const STEPS: [f64; 2] = [9.0, 7.0];
 /// Room about the points, part of their range.
 const MARGIN: f64 = 0.05;
 /// A range smaller than this is drawn as large.
-const LEAST_RANGE: f64 = 1e-6;
+const LEAST_RANGE: f64 = 1e-3;
 /// Radii of points and of marks.
 const DOT: f64 = 2.2;
 const MARK: f64 = 6.0;
@@ -85,14 +85,16 @@ pub(super) fn section(page: &mut Page, scatters: &[Scatter]) {
     page.close_section();
 }
 
-impl Scatter {
-    fn points(&self) -> impl Iterator<Item = [f64; 2]> {
-        let all = self.groups.iter().flat_map(|group| group.points.iter().copied());
-        all.filter(|point| point.iter().all(|value| is_drawable(*value)))
+impl PointGroup {
+    fn drawable(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        self.points.iter().copied().filter(|point| point.iter().all(|value| is_drawable(*value)))
     }
+}
 
+impl Scatter {
     fn extent(&self, axis: usize) -> Extent {
-        Extent::of(self.points().map(|point| point[axis])).unwrap_or(Extent { min: 0.0, max: 0.0 })
+        let points = self.groups.iter().flat_map(PointGroup::drawable);
+        Extent::of(points.map(|point| point[axis])).unwrap_or(Extent { min: 0.0, max: 0.0 })
     }
 
     fn draw(&self, id: &str, title: &str) -> String {
@@ -116,8 +118,7 @@ impl Scatter {
         svg.upward_text("label", [14.0, (TOP + BOTTOM) / 2.0], &self.y);
         for group in &self.groups {
             let class = group.style.class();
-            let drawable = group.points.iter().filter(|point| point.iter().all(|value| is_drawable(*value)));
-            let places: Vec<[f64; 2]> = drawable.map(|point| [x(point[0]), y(point[1])]).collect();
+            let places: Vec<[f64; 2]> = group.drawable().map(|point| [x(point[0]), y(point[1])]).collect();
             match group.style {
                 PointStyle::Dots => {
                     let mut cells: Vec<[i64; 2]> =
@@ -146,9 +147,11 @@ impl Scatter {
 
     /// In words: how many points there are, and where those of the runs lie.
     fn description(&self) -> String {
-        let told = self.groups.iter().map(|group| match (group.style, group.points.as_slice()) {
-            (PointStyle::Run(_), [[x, y]]) => format!("{} at {}, {}", group.label, rounded(*x), rounded(*y)),
-            (_, points) => format!("{}: {} points", group.label, points.len()),
+        let told = self.groups.iter().map(|group| match (group.style, group.drawable().next()) {
+            (PointStyle::Run(_), Some([x, y])) => {
+                format!("{} at {}, {}", group.label, rounded(x), rounded(y))
+            }
+            _ => format!("{}: {} points", group.label, group.drawable().count()),
         });
         format!("{} over {}. {}.", self.y, self.x, told.collect::<Vec<_>>().join("; "))
     }

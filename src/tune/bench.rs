@@ -175,6 +175,12 @@ impl<'a> Bench<'a> {
         Ok(candidate(tuning.clone(), self.margins(tuning), figures, self.cost, &self.config))
     }
 
+    /// Runs of `tunings` on a path, over all cores, in their order.
+    pub(super) fn runs_on(&self, course: &Course, tunings: Vec<Tuning>) -> Result<Vec<Candidate>, TuneError> {
+        self.watch.begin("both paths", tunings.len());
+        tunings.into_par_iter().map(|tuning| self.run_on(course, &tuning)).collect()
+    }
+
     /// The margins of each of `tunings`, over all cores.
     pub(super) fn designs(&self, tunings: Vec<Tuning>) -> Vec<(Tuning, Option<Margins>)> {
         let with_margins = |tuning: Tuning| {

@@ -46,6 +46,21 @@ impl Term {
         }
     }
 
+    /// Its unit on a path that has `figures`.
+    pub fn unit(self, figures: &Figures) -> &'static str {
+        let moves = |kind: AxisKind| figures.axes.iter().any(|axis| axis.moves && axis.kind == kind);
+        match self {
+            Term::Current => "of the limit",
+            Term::Activity => "A",
+            Term::Contour | Term::ContourRms if has_contour(figures) => "µm",
+            _ => match (moves(AxisKind::Linear), moves(AxisKind::Rotary)) {
+                (true, true) => "µm or mdeg",
+                (false, true) => "mdeg",
+                _ => "µm",
+            },
+        }
+    }
+
     /// Its value in a run of `machine`, in its unit; of the axes that move.
     pub fn of(self, figures: &Figures, machine: &MachineConfig) -> f64 {
         let worst = |value: &dyn Fn(&AxisFigures) -> f64| {
@@ -78,7 +93,7 @@ impl Term {
 /// a linear axis the tool turns in place.
 fn has_contour(figures: &Figures) -> bool {
     let moving = || figures.axes.iter().filter(|axis| axis.moves);
-    moving().count() > 1 && moving().any(|axis| axis.kind == AxisKind::Linear)
+    figures.contour.is_some() && moving().count() > 1 && moving().any(|axis| axis.kind == AxisKind::Linear)
 }
 
 /// A weighted sum of figures, to be as small as possible.
@@ -152,20 +167,11 @@ impl Cost {
         self.terms.iter().map(|(term, weight)| weight * term.of(figures, machine)).sum()
     }
 
-    /// Unit of the cost on a path that has `figures`; empty for a sum of unlike terms.
+    /// Unit of the cost on a path that has `figures`; empty for a sum of terms, and for one with a weight.
     pub fn unit(&self, figures: &Figures) -> &'static str {
-        let [(term, 1.0)] = self.terms.as_slice() else { return "" };
-        let errors = if figures.axes.iter().any(|axis| axis.moves && axis.kind == AxisKind::Rotary) {
-            let linear = figures.axes.iter().any(|axis| axis.moves && axis.kind == AxisKind::Linear);
-            if linear { "µm or mdeg" } else { "mdeg" }
-        } else {
-            "µm"
-        };
-        match term {
-            Term::Contour | Term::ContourRms if has_contour(figures) && figures.contour.is_some() => "µm",
-            Term::Contour | Term::ContourRms | Term::Tracking | Term::Rms => errors,
-            Term::Current => "of the limit",
-            Term::Activity => "A",
+        match self.terms.as_slice() {
+            [(term, 1.0)] => term.unit(figures),
+            _ => "",
         }
     }
 }

@@ -85,14 +85,13 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
 }
 
 fn rows(arguments: &Arguments, config: &MachineConfig, found: &Robustness) -> Table {
-    let unit = arguments.cost.unit(&found.nominal.figures);
     let cells =
         |name: String, one: &Deviated| row(name, one.cost, one.margins.as_ref(), &one.figures, config);
     let nominal = cells("nominal".to_owned(), &found.nominal);
     let single = found.single.iter().map(|one| cells(name(&one.deviation), one));
     let worst = cells(format!("worst together: {}", name(&found.worst.deviation)), &found.worst);
     let rows = std::iter::once(nominal).chain(single).chain([worst]).collect();
-    Table { columns: columns("plant", unit), rows, ..Table::default() }
+    Table { columns: columns("plant", &arguments.cost, &found.nominal.figures), rows, ..Table::default() }
 }
 
 /// "inertia × 0.7, friction × 1.3"

@@ -7,7 +7,7 @@ use virtual_axes::config::MachineConfig;
 use virtual_axes::design::Margins;
 use virtual_axes::report::Column;
 use virtual_axes::trial::Figures;
-use virtual_axes::tune::{Candidate, Course, Term, TuneError, Tuning};
+use virtual_axes::tune::{Candidate, Cost, Course, Term, TuneError, Tuning};
 use virtual_axes::units::{DEGREE, MILLISECOND};
 
 use crate::input::Input;
@@ -32,11 +32,13 @@ pub fn named(input: &Input, error: TuneError) -> Box<dyn Error> {
     }
 }
 
-/// Heads of the columns that say how a tuning does; `unit` is that of the cost.
-pub fn columns(first: &str, unit: &str) -> Vec<Column> {
+/// Heads of the columns that say how a tuning does on a path with `figures`.
+pub fn columns(first: &str, cost: &Cost, figures: &Figures) -> Vec<Column> {
+    let rms = Term::ContourRms.unit(figures);
     let columns = [
         (first, ""),
-        ("cost", unit),
+        ("cost", cost.unit(figures)),
+        ("RMS error", rms),
         ("modulus margin", ""),
         ("delay margin", "ms"),
         ("phase margin", "°"),
@@ -62,6 +64,7 @@ pub fn row(
     vec![
         name,
         format!("{cost:.2}"),
+        format!("{:.2}", Term::ContourRms.of(figures, machine)),
         margin(|m| m.modulus, 3),
         margin(|m| m.delay / MILLISECOND, 2),
         margin(|m| m.phase / DEGREE, 1),

@@ -66,7 +66,7 @@ pub struct Arguments {
     #[arg(long, allow_negative_numbers = true, value_parser = delay_margin)]
     delay_margin_ms: Option<f64>,
     /// Seed of the starts of the search of the cascade's gains.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// One more path to run the tuning that was found on; can be given several times.
     #[arg(long, value_name = "SCENARIO|FILE")]
@@ -262,8 +262,8 @@ fn thinned<T>(all: &[T]) -> Vec<&T> {
 }
 
 fn text(arguments: &Arguments, bench: &Bench<'_>, found: &Found) -> String {
-    let unit = bench.cost().unit(&bench.present().figures);
-    let mut tunings = Table { columns: columns("tuning", unit), ..Table::default() };
+    let columns = |first: &str| columns(first, bench.cost(), &bench.present().figures);
+    let mut tunings = Table { columns: columns("tuning"), ..Table::default() };
     tunings.rows.push(candidate_row("as it is".to_owned(), bench.present(), bench));
     let name = if arguments.contrast { "found" } else { "best" };
     tunings.rows.push(candidate_row(name.to_owned(), &found.best, bench));
@@ -276,9 +276,12 @@ fn text(arguments: &Arguments, bench: &Bench<'_>, found: &Found) -> String {
         table::text(&tunings),
         table::text(&values(bench, &found.best.tuning)),
     );
+    if found.best.cost >= bench.present().cost {
+        text.push_str("\nno tuning within these margins is better than the machine as it is\n");
+    }
     if let Some(search) = &found.search {
         let front = pareto(found);
-        let mut rows = Table { columns: columns("cost against modulus margin", unit), ..Table::default() };
+        let mut rows = Table { columns: columns("cost against modulus margin"), ..Table::default() };
         for one in thinned(&front) {
             rows.rows.push(candidate_row(one.tuning.to_string(), one, bench));
         }
@@ -313,16 +316,18 @@ fn values(bench: &Bench<'_>, tuning: &Tuning) -> Table {
 
 fn contrasts(bench: &Bench<'_>, found: &Found) -> Table {
     let other = found.elsewhere.first().map_or("", |path| path.name.as_str());
-    let mut columns = columns("tuning", "");
-    columns.truncate(1);
-    columns.push(Column::new(bench.course().name(), ""));
-    columns.push(Column::new(other, ""));
-    columns.push(Column::new("modulus margin", ""));
-    columns.push(Column::new("delay margin", "ms"));
+    let columns = [
+        ("tuning", ""),
+        (bench.course().name(), bench.cost().unit(&bench.present().figures)),
+        (other, found.elsewhere.first().map_or("", |path| bench.cost().unit(&path.present.figures))),
+        ("modulus margin", ""),
+        ("delay margin", "ms"),
+    ];
+    let columns = columns.map(|(name, unit)| Column::new(name, unit)).to_vec();
     let cells = |name: String, better: &Candidate, worse: &Candidate| {
         let margins = candidate_row(name.clone(), better, bench);
         let margin = |place: usize| margins.get(place).cloned().unwrap_or_default();
-        vec![name, format!("{:.2}", better.cost), format!("{:.2}", worse.cost), margin(2), margin(3)]
+        vec![name, format!("{:.2}", better.cost), format!("{:.2}", worse.cost), margin(3), margin(4)]
     };
     let present =
         found.elsewhere.iter().map(|path| cells("as it is".to_owned(), bench.present(), &path.present));
