@@ -56,6 +56,8 @@ TSP_NS = 6_000_000
 
 DEFAULT_NODE = "/virtual_axes"
 PSEC_QOS = QoSProfile(depth=64, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+STREAM_QOS = QoSProfile(depth=1)
+"""Reliable, of one sample: as ros2_control's topic-based hardware publishes."""
 DEEP_QOS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST)
 """Deep enough that a reader which is late by two minutes at 6 ms loses nothing."""
 # Deeper than the node's own 50: a burst of trajectories has two results each.
@@ -323,6 +325,7 @@ class Drive:
             self.name, context=self._context, enable_rosout=False, start_parameter_services=False
         )
         self._psec = self.node.create_publisher(JointTrajectory, f"{namespace}/psec", PSEC_QOS)
+        self._stream = self.node.create_publisher(JointState, f"{namespace}/psec_stream", STREAM_QOS)
         self._load = self.node.create_publisher(JointState, f"{namespace}/load", 10)
         # Raw: taking a sample must not cost more than the node needs to make one.
         self._subscriptions = [
@@ -416,6 +419,7 @@ class Drive:
         def matched() -> bool:
             return (
                 self._psec.get_subscription_count() > 0
+                and self._stream.get_subscription_count() > 0
                 and all(subscription.get_publisher_count() > 0 for subscription in self._subscriptions)
                 and all(self._samples.values())
             )
@@ -535,6 +539,10 @@ class Drive:
         with self._changed:
             message = deserialize_message(self._samples["states"][-1], DriveStates)
         return dict(zip(message.name, getattr(message, field)))
+
+    def stream(self, names: Sequence[str], positions: Sequence[float]) -> None:
+        """Publish one set-point of a stream (m, rad); NaN, or none, leaves the joint alone."""
+        self._stream.publish(JointState(name=list(names), position=[float(value) for value in positions]))
 
     def load(self, effort: Mapping[str, float]) -> None:
         """Apply external forces or torques (N, N.m of the axis, towards plus); they time out."""

@@ -113,7 +113,7 @@ fn bad_gains_and_times_are_refused_by_name() {
         assert!(matches!(p(25.0, 0.0, bad), Err(DesignError::OutOfRange { name: "period", .. })));
     }
     let message = pi(0.0, 0.2, 0.0, TSP).expect_err("no gain").to_string();
-    assert_eq!(message, "gain = 0 must be above 0 and at most 10000");
+    assert_eq!(message, "gain = 0 must be above 0 and at most 10000 s⁻¹");
 }
 
 fn placed(poles: &[Complex<f64>], integrator: bool) -> PolePlacement {

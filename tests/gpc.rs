@@ -65,25 +65,12 @@ impl Situation {
     /// time. λ_rel is resolved with the same responses.
     fn first_increment(&self, model: &PredictionModel, tuning: &GpcTuning) -> f64 {
         let GpcTuning { n1, n2, nu, weight } = *tuning;
-        let within = |response: Vec<f64>| response[n1 - 1..].to_vec();
-        let free = within(self.response(model, &[], n2));
-        let at_rest = Situation {
-            angles: vec![0.0; self.angles.len()],
-            speeds: vec![0.0; self.speeds.len()],
-            setpoints: Vec::new(),
-        };
-        let forced: Vec<Vec<f64>> = (0..nu)
-            .map(|moved| {
-                let mut increments = vec![0.0; nu];
-                increments[moved] = 1.0;
-                within(at_rest.response(model, &increments, n2))
-            })
-            .collect();
+        let free = self.response(model, &[], n2)[n1 - 1..].to_vec();
+        let forced = forced(model, tuning);
         let lambda = match weight {
             Weight::Absolute(lambda) => lambda,
-            Weight::Relative(lambda) => lambda * forced.iter().flatten().map(|g| g * g).sum::<f64>(),
+            Weight::Relative(lambda) => lambda * sum_of_squares(&forced),
         };
-        let rows = n2 - n1 + 1;
         // The residuals e = w − J ΔΩ* are least where Jᵀ e = 0; both are the unknowns of one system.
         let (rows, all) = (n2 - n1 + 1, n2 - n1 + 1 + nu);
         let derivative = |row: usize, column: usize| match row.checked_sub(rows) {
@@ -112,13 +99,24 @@ impl Situation {
     }
 }
 
+/// What one unit of each increment adds to θ over the horizon.
+fn forced(model: &PredictionModel, tuning: &GpcTuning) -> Vec<Vec<f64>> {
+    let rest = Situation { angles: vec![0.0; 12], speeds: vec![0.0; 12], setpoints: Vec::new() };
+    let response = |moved: usize| {
+        let mut increments = vec![0.0; tuning.nu];
+        increments[moved] = 1.0;
+        rest.response(model, &increments, tuning.n2)[tuning.n1 - 1..].to_vec()
+    };
+    (0..tuning.nu).map(response).collect()
+}
+
+fn sum_of_squares(columns: &[Vec<f64>]) -> f64 {
+    columns.iter().flatten().map(|g| g * g).sum()
+}
+
 fn tunings() -> impl Strategy<Value = GpcTuning> {
     let horizons = (1_usize..30).prop_flat_map(|n2| (1..=n2, Just(n2), 1..=n2));
-    (horizons, -4.0..0.0_f64, any::<bool>()).prop_map(|((n1, n2, nu), exponent, relative)| {
-        let value = 10_f64.powf(exponent);
-        let weight = if relative { Weight::Relative(value) } else { Weight::Absolute(value) };
-        GpcTuning { n1, n2, nu, weight }
-    })
+    (horizons, -4.0..0.0_f64).prop_map(|((n1, n2, nu), exponent)| relative(n1, n2, nu, 10_f64.powf(exponent)))
 }
 
 fn situations() -> impl Strategy<Value = Situation> {
@@ -144,6 +142,11 @@ proptest! {
         let rst = gpc(&model, &tuning).expect("a controller");
         let (found, wanted) = (situation.by(&rst), situation.first_increment(&model, &tuning));
         let size: f64 = rst.r().iter().chain(rst.t()).chain(rst.s()).map(|c| c.abs()).sum();
+        prop_assert!((found - wanted).abs() <= 1e-9 * size, "{found} against {wanted}");
+        // The same λ, given as such.
+        let Weight::Relative(lambda) = tuning.weight else { unreachable!("the tunings are relative") };
+        let weight = Weight::Absolute(lambda * sum_of_squares(&forced(&model, &tuning)));
+        let found = situation.by(&gpc(&model, &GpcTuning { weight, ..tuning }).expect("a controller"));
         prop_assert!((found - wanted).abs() <= 1e-9 * size, "{found} against {wanted}");
     }
 }

@@ -6,10 +6,8 @@ use std::sync::Arc;
 
 use common::*;
 use virtual_axes::config::MachineConfig;
-use virtual_axes::path::Program;
 use virtual_axes::scenario::Scenario;
-use virtual_axes::simulation::joints;
-use virtual_axes::trial::{Figures, ProgramSource, Setpoints, Tick, Trial, run as run_trial};
+use virtual_axes::trial::{Figures, Tick, Trial, run as run_trial};
 use virtual_axes::units::{DEGREE, REVOLUTION, RPM};
 
 const X: usize = 0;
@@ -26,31 +24,9 @@ fn config(changes: &[(&str, f64)]) -> MachineConfig {
     parameters(changes).machine_config().expect("the machine is valid")
 }
 
-fn program(name: &str, machine: &MachineConfig) -> Arc<Program> {
-    let scenario = Scenario::builtin(name).expect("it is shipped");
-    Arc::new(scenario.program(machine, None).unwrap_or_else(|error| panic!("{error}")))
-}
-
-fn setpoints(name: &str, program: Arc<Program>, machine: &MachineConfig) -> Setpoints<'static> {
-    let limits = joints(machine, "");
-    Setpoints::Grid(Box::new(ProgramSource::new(program, name, &limits, machine.periods().position)))
-}
-
 /// Runs a shipped scenario and shows every tick.
-fn watch(name: &str, changes: &[(&str, f64)], mut look: impl FnMut(Tick<'_>)) -> Figures {
-    let machine = config(changes);
-    let program = program(name, &machine);
-    let trial = Trial {
-        machine: &machine,
-        program: Some(Arc::clone(&program)),
-        allow_nonzero_end_velocity: false,
-        record: false,
-    };
-    let outcome = run_trial(&trial, setpoints(name, program, &machine), |tick| {
-        look(tick);
-        Ok(())
-    });
-    outcome.unwrap_or_else(|error| panic!("{name}: {error}")).figures
+fn watch(name: &str, changes: &[(&str, f64)], look: impl FnMut(Tick<'_>)) -> Figures {
+    watch_scenario(name, &config(changes), look)
 }
 
 fn figures(name: &str, changes: &[(&str, f64)]) -> Figures {

@@ -368,6 +368,10 @@ pub static DEFINITIONS: &[Definition] = &[
     qos_reliability("qos.psec.reliability", "reliable"),
     qos_durability("qos.psec.durability", "volatile"),
     qos_depth("qos.psec.depth", 64),
+    // As ros2_control's topic-based hardware publishes; it sends the last set-point of a move once.
+    qos_reliability("qos.psec_stream.reliability", "reliable"),
+    qos_durability("qos.psec_stream.durability", "volatile"),
+    qos_depth("qos.psec_stream.depth", 10),
     qos_reliability("qos.load.reliability", "best_effort"),
     qos_durability("qos.load.durability", "volatile"),
     qos_depth("qos.load.depth", 10),

@@ -3,6 +3,10 @@
 use super::rst::{MAX_COEFFICIENTS, Rst};
 use super::transfer::{Transfer, TransferState};
 
+/// How far an axis may creep in a position period to count as stopped, relative to the error with which it
+/// may rest.
+const STOPPED: f64 = 1e-3;
+
 /// A position controller; works in motor units (rad, rad/s).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionController {
@@ -28,7 +32,7 @@ enum Law {
 ///   that is faster than the motor can accelerate swings about its set-point for ever.
 ///
 /// ```text
-/// Ω* = Kp (θ*(k) − θ(k)) + (θ*(k+1) − θ*(k)) / Tsp
+/// Ω* = Kp (θ*(k) − θ(k)) + (θ*(k+1) − θ*(k)) / Tsp      0 where friction has stopped the axis close enough
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Guard {
@@ -38,6 +42,9 @@ pub struct Guard {
     pub period: f64,
     /// Position periods of standstill that the controller is given to finish a move by itself.
     pub rest_after: u32,
+    /// Error with which an axis that friction has stopped may rest, rad: the integral of the velocity loop
+    /// would tear it loose for less than is worth it.
+    pub rest_error: f64,
 }
 
 /// What a position controller remembers: what it has seen and what has been asked for.
@@ -161,8 +168,13 @@ impl PositionController {
         match (&self.law, &self.guard) {
             (Law::Proportional { gain }, _) => gain * (setpoint(0) - angle),
             (Law::Rst(_), Some(guard)) if self.is_guarded(s, guard) => {
-                let now = setpoint(0);
-                guard.gain * (now - angle) + (setpoint(1) - now) / guard.period
+                let error = setpoint(0) - angle;
+                let asked = setpoint(1) - setpoint(0);
+                let crept = (angle - s.angles[1]).abs();
+                if asked == 0.0 && error.abs() <= guard.rest_error && crept <= STOPPED * guard.rest_error {
+                    return 0.0;
+                }
+                guard.gain * error + asked / guard.period
             }
             (Law::Rst(rst), _) => {
                 let asked = weighted(rst.t(), |i| setpoint(rst.t_first() + i as i64));

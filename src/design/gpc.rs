@@ -124,7 +124,8 @@ fn first_row(g: &DMatrix<f64>, lambda: f64) -> Option<DVector<f64>> {
     let (q, r) = stacked.qr().unpack();
     // A pivot of GᵀG + λI that is rounding error is no pivot.
     let smallest = r.diagonal().iter().fold(f64::INFINITY, |m, d| m.min(d * d));
-    if !(smallest > size as f64 * f64::EPSILON * g.norm_squared()) {
+    let regular = smallest > size as f64 * f64::EPSILON * g.norm_squared();
+    if !regular {
         return None;
     }
     let mut first = DVector::zeros(size);

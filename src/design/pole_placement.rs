@@ -134,11 +134,9 @@ fn trimmed(polynomial: &[f64]) -> &[f64] {
 fn solve(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let decomposition = matrix.full_piv_lu();
     let pivots = decomposition.u().diagonal().abs();
-    // Written so that a NaN is refused too.
-    if !(pivots.min() > LEAST_PIVOT * pivots.max()) {
-        return None;
-    }
-    decomposition.solve(right)
+    // Of a NaN it is not.
+    let regular = pivots.min() > LEAST_PIVOT * pivots.max();
+    if regular { decomposition.solve(right) } else { None }
 }
 
 /// The refusal that names the root of A which is nearest to one of B.

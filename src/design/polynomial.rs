@@ -64,8 +64,9 @@ pub(super) fn roots_within(polynomial: &[f64], radius: f64) -> bool {
     while left.len() > 1 {
         let last = left.len() - 1;
         let reflection = left[last] / left[0];
-        // Written so that a NaN is outside.
-        if !(reflection.abs() < 1.0) {
+        // A NaN is not.
+        let inside = reflection.abs() < 1.0;
+        if !inside {
             return false;
         }
         next.clear();
@@ -140,7 +141,7 @@ mod tests {
     #[test]
     fn the_recursion_tells_inside_from_outside() {
         for radius in [0.2, 0.7, 1.0, 1.5] {
-            for (size, inside) in [(0.999, true), (1.001, false)] {
+            for (size, inside) in [(0.999_f64, true), (1.001, false)] {
                 let (re, square) = (0.6 * size * radius, (size * radius).powi(2));
                 let pair = [1.0, -2.0 * re, square];
                 assert_eq!(roots_within(&pair, radius), inside);

@@ -1,9 +1,9 @@
 //! The position controller of an axis, as its configuration asks for it.
 
-use crate::config::{AxisConfig, FeedforwardConfig, GpcConfig, Periods, PositionControllerConfig};
+use crate::config::{AxisConfig, AxisKind, FeedforwardConfig, GpcConfig, Periods, PositionControllerConfig};
 use crate::control::{Guard, PositionController, Rst, Transfer};
 use crate::design::{DesignError, GpcTuning, Weight, gpc};
-use crate::units::{MILLISECOND_NS, Nanoseconds, seconds};
+use crate::units::{DEGREE, MILLISECOND_NS, Nanoseconds, seconds};
 
 use super::AxisError;
 use super::prediction::prediction_model;
@@ -12,6 +12,10 @@ use super::prediction::prediction_model;
 /// has finished a move by then.
 const REST_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
 
+/// Error with which an axis may rest, m.
+const REST_ERROR_LINEAR: f64 = 1e-6;
+/// Error with which an axis may rest, rad: half a thousandth of a degree.
+const REST_ERROR_ROTARY: f64 = 0.5e-3 * DEGREE;
 /// How long what a controller leaves behind takes to fade, where it would be a bump.
 const TRANSFER: Nanoseconds = 300 * MILLISECOND_NS;
 
@@ -44,7 +48,16 @@ pub(super) fn position_controller(
             (rst.map_err(DesignError::from)?, "rst")
         }
     };
-    let guard = Guard { gain, period, rest_after: (REST_AFTER / periods.position) as u32 };
+    let rest_error = match axis.kind {
+        AxisKind::Linear => REST_ERROR_LINEAR,
+        AxisKind::Rotary => REST_ERROR_ROTARY,
+    };
+    let guard = Guard {
+        gain,
+        period,
+        rest_after: (REST_AFTER / periods.position) as u32,
+        rest_error: rest_error / axis.transmission_ratio,
+    };
     Ok((PositionController::rst(rst, guard, transfer), name))
 }
 

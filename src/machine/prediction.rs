@@ -13,6 +13,8 @@ use super::AxisError;
 
 /// What goes on from one position instant to the next: i, ω, the two integrals, and θ.
 const STATES: usize = 5;
+/// What of that the steps of θ depend on: all but θ itself.
+const VELOCITY_STATES: usize = STATES - 1;
 /// Hankel singular values of the velocity, relative to the largest, up to which the states behind them
 /// are left out: their part of θ is far below 1e-9 of the whole.
 const NEGLIGIBLE: f64 = 1e-12;
@@ -41,8 +43,8 @@ pub fn deviating_model(axis: &AxisConfig, periods: &Periods) -> Result<Predictio
 fn model(axis: &AxisConfig, motor: &MotorConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
     let loops = InnerLoops::new(axis, motor, periods)?;
     let (transition, input) = loops.over_one_period();
-    // Steps of θ, whose transfer has no integrator: what the velocity states add to it.
-    let markov = step_markov(&transition, &input, 2 * STATES);
+    // θ(k + 1) − θ(k) = C x(k) + D Ω*(k) has no integrator.
+    let markov = step_markov(&transition, &input, 2 * VELOCITY_STATES + 1);
     let (poles, numerator) = minimal(&markov)?;
     let a = product(&[1.0, -1.0], &poles);
     Ok(PredictionModel::new(a, numerator, seconds(periods.position))?)
@@ -109,30 +111,32 @@ fn step_markov(transition: &SMatrix<f64, STATES, STATES>, input: &State, count: 
 }
 
 /// Denominator and numerator, in rising powers of q⁻¹, of the smallest system with these Markov
-/// parameters (realisation of Ho and Kalman from the singular values of the Hankel matrix).
+/// parameters: the first is the feedthrough, the others are realised after Ho and Kalman from the singular
+/// values of their Hankel matrix. The numerator has one more q⁻¹, since the step ends a period later.
 fn minimal(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
-    let hankel = |shift: usize| DMatrix::from_fn(STATES, STATES, |i, j| markov[i + j + shift]);
-    let decomposition = hankel(0).svd(true, true);
+    const SIZE: usize = VELOCITY_STATES;
+    let hankel = |shift: usize| DMatrix::from_fn(SIZE, SIZE, |i, j| markov[i + j + shift]);
+    let decomposition = hankel(1).svd(true, true);
     let no_model = || DesignError::Model("the inner loops do not move the axis".to_owned());
     let (u, vt) = (decomposition.u.ok_or_else(no_model)?, decomposition.v_t.ok_or_else(no_model)?);
     let values = decomposition.singular_values;
     let largest = values.max();
-    let kept: Vec<usize> = (0..STATES).filter(|&k| values[k] > NEGLIGIBLE * largest).collect();
-    if kept.is_empty() || !largest.is_finite() {
+    let kept: Vec<usize> = (0..SIZE).filter(|&k| values[k] > NEGLIGIBLE * largest).collect();
+    if !markov.iter().all(|h| h.is_finite()) {
         return Err(no_model());
     }
     let root = DVector::from_iterator(kept.len(), kept.iter().map(|&k| values[k].sqrt()));
     let (left, right) = (u.select_columns(&kept), vt.select_rows(&kept));
-    let mut transition = left.transpose() * hankel(1) * right.transpose();
+    let mut transition = left.transpose() * hankel(2) * right.transpose();
     for i in 0..kept.len() {
         for j in 0..kept.len() {
             transition[(i, j)] /= root[i] * root[j];
         }
     }
     let denominator = characteristic_polynomial(&transition);
-    // A·(h₁q⁻¹ + h₂q⁻² + …) ends after as many terms as there are states.
-    let numerator =
-        (0..=kept.len()).map(|k| (0..k).map(|i| denominator[i] * markov[k - 1 - i]).sum()).collect();
+    // A·(h₀ + h₁q⁻¹ + …) ends after as many terms as there are states.
+    let coefficient = |k: usize| (0..=k).map(|i| denominator[i] * markov[k - i]).sum();
+    let numerator = std::iter::once(0.0).chain((0..=kept.len()).map(coefficient)).collect();
     Ok((denominator, numerator))
 }
 

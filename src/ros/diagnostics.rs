@@ -6,7 +6,7 @@ use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::{DiagnosticArray, Diagnos
 
 use super::convert::header;
 use super::pace::{AxisHealth, Health};
-use crate::units::Nanoseconds;
+use crate::units::{MILLISECOND_NS, Nanoseconds};
 
 /// What stays the same from message to message.
 #[derive(Debug, Clone)]
@@ -63,8 +63,13 @@ impl Diagnostics {
         if dropped > 0 {
             problems.push("samples were dropped: a subscriber is slow");
         }
+        if now.stream.refused > before.stream.refused {
+            problems.push("set-points of the stream were refused");
+        }
         let fine = if now.moving {
             "running"
+        } else if now.stream.drives {
+            "streaming"
         } else if now.busy {
             "settling"
         } else {
@@ -79,6 +84,10 @@ impl Diagnostics {
             value("dropped_samples", now.dropped + new),
             value("mean_lateness_ms", format!("{:.3}", mean * 1e3)),
             value("max_lateness_ms", format!("{:.3}", now.max_lateness * 1e3)),
+            value("stream_drives", now.stream.drives),
+            value("stream_delay_ms", now.stream.delay as f64 / MILLISECOND_NS as f64),
+            value("stream_setpoints_refused", now.stream.refused),
+            value("stream_setpoints_ignored", now.stream.ignored),
         ];
         self.status(format!("{}: axes", self.node), &problems, fine, values)
     }

@@ -1,4 +1,4 @@
-//! What the node listens to: `psec` and `load`.
+//! What the node listens to: `psec`, `psec_stream` and `load`.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,6 +14,7 @@ use super::convert;
 use super::pace::{Command, Health};
 use super::parameter_host::LiveNodeParameters;
 use super::results::{Origin, Results};
+use super::stream::Setpoints;
 use crate::config::NodeConfig;
 use crate::trajectory::{Context, JointLimits, MotionId, Rejection, Trajectory};
 use crate::units::Nanoseconds;
@@ -83,6 +84,23 @@ impl PsecInput {
             allow_nonzero_end_velocity: self.live.allow_nonzero_end_velocity.load(Ordering::Relaxed),
         };
         Trajectory::new(request, &context)
+    }
+}
+
+/// Takes streamed set-points in until the node shuts down.
+pub async fn take_stream(
+    subscription: Subscription<JointState>,
+    joints: Vec<String>,
+    commands: mpsc::Sender<Command>,
+) {
+    let mut messages = std::pin::pin!(subscription.async_stream());
+    while let Some(received) = messages.next().await {
+        match received {
+            Ok((message, _)) => {
+                let _ = commands.send(Command::Stream(Setpoints::of(&message, &joints))).await;
+            }
+            Err(error) => warn!("a message on psec_stream could not be read: {error:?}"),
+        }
     }
 }
 

@@ -25,5 +25,6 @@ mod results;
 pub mod rosout;
 mod rtps;
 mod service;
+mod stream;
 mod topics;
 mod trigger;

@@ -18,7 +18,7 @@ use super::diagnostics::Diagnostics;
 use super::endpoints::EndpointError;
 use super::environment::Environment;
 use super::fan_out::{ClockOutput, FanOut, publish_diagnostics, watch_clock};
-use super::inputs::{PsecInput, next_id, take_loads};
+use super::inputs::{PsecInput, next_id, take_loads, take_stream};
 use super::log::LogRecord;
 use super::outputs::{Output, WhenFull, queue_length};
 use super::pace::{self, Channels, Command, Health};
@@ -166,6 +166,7 @@ async fn serve(
         ids: Arc::clone(&ids),
     };
     tasks.spawn(psec_input.run(topics.psec));
+    tasks.spawn(take_stream(topics.psec_stream, joints.clone(), commands.clone()));
     tasks.spawn(take_loads(topics.load, joints.clone(), node_config.load_timeout, commands.clone()));
     let clock_health = health.clone();
     let now = move || convert::stamp(clock_health.borrow().time);

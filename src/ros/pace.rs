@@ -3,7 +3,7 @@
 //! In real time position instant k is computed and released when the wall clock reaches it; an
 //! instant that comes late is computed at once and counted, none is left out. In `fast` the thread
 //! runs as fast as its frames are taken while something is asked of the axes, and at real pace
-//! when nothing is.
+//! when nothing is; a stream of set-points alone goes at real pace too, since its sender does.
 
 use std::sync::Arc;
 use std::thread;
@@ -12,6 +12,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
 
+use super::stream::{Setpoints, StreamHealth, StreamLog};
 use crate::config::TimeMode;
 use crate::machine::{AxisSample, MachineParameters};
 use crate::simulation::{MotionEnd, Simulation};
@@ -38,6 +39,8 @@ pub enum Command {
         /// How long, ns.
         hold: Nanoseconds,
     },
+    /// Take the set-points of a stream over, where no trajectory moves.
+    Stream(Setpoints),
     /// Take changed parameters over.
     Adopt(Arc<MachineParameters>),
     /// Back to rest at home.
@@ -80,7 +83,7 @@ pub struct Frame {
 pub struct Health {
     /// Time of the last position instant, ns.
     pub time: Nanoseconds,
-    /// Whether the set-points move.
+    /// Whether a trajectory or a stop moves the set-points.
     pub moving: bool,
     /// Whether something is asked of the axes.
     pub busy: bool,
@@ -94,6 +97,8 @@ pub struct Health {
     pub max_lateness: f64,
     /// Sum of all latenesses, s.
     pub total_lateness: f64,
+    /// How the stream of set-points fares.
+    pub stream: StreamHealth,
     /// Periods with an axis at a limit, and with friction beyond its fitted range, per axis.
     pub axes: Vec<AxisHealth>,
 }
@@ -132,6 +137,7 @@ pub fn grid_origin(period: Nanoseconds) -> Nanoseconds {
 pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
     let clock = PaceClock::new(&simulation);
     channels.health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
+    let mut stream = StreamLog::default();
     loop {
         let lateness = match mode {
             TimeMode::Real => clock.wait_for(simulation.next_instant()),
@@ -145,6 +151,7 @@ pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
         loop {
             match channels.commands.try_recv() {
                 Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => return,
+                Ok(Command::Stream(setpoints)) => stream.take(&mut simulation, setpoints),
                 Ok(command) => obey(&mut simulation, command, &channels.reports),
                 Err(mpsc::error::TryRecvError::Empty) => break,
             }
@@ -162,7 +169,10 @@ pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
             let _ = channels.reports.send(Report::Ended(end));
         }
         let missed = lateness > clock.period;
-        channels.health.send_modify(|h| h.update(&simulation, lateness, missed, !taken));
+        channels.health.send_modify(|h| {
+            h.update(&simulation, lateness, missed, !taken);
+            h.stream = stream.health(&simulation);
+        });
     }
 }
 
@@ -192,7 +202,8 @@ fn obey(simulation: &mut Simulation, command: Command, reports: &mpsc::Unbounded
             simulation.reset();
             let _ = done.send(());
         }
-        Command::Shutdown => {}
+        // Taken care of by the loop.
+        Command::Stream(_) | Command::Shutdown => {}
     }
 }
 

@@ -21,6 +21,8 @@ impl Message for TrajectoryResult {}
 pub struct Topics {
     /// `psec`.
     pub psec: Subscription<JointTrajectory>,
+    /// `psec_stream`.
+    pub psec_stream: Subscription<JointState>,
     /// `load`.
     pub load: Subscription<JointState>,
     /// `joint_states`.
@@ -64,6 +66,7 @@ impl Topics {
         let own = |name: &str| MessageTypeName::new(PACKAGE, name);
 
         let (psec, psec_name) = endpoints.subscription("psec", trajectory)?;
+        let (psec_stream, stream_name) = endpoints.subscription("psec_stream", joint_state())?;
         let (load, load_name) = endpoints.subscription("load", joint_state())?;
         let (joint_states, joint_states_name) = endpoints.publisher("joint_states", joint_state())?;
         let (motor_currents, currents_name) =
@@ -78,7 +81,7 @@ impl Topics {
             None
         };
         let names = Names {
-            subscribed: vec![psec_name, load_name],
+            subscribed: vec![psec_name, stream_name, load_name],
             published: [joint_states_name, currents_name, states_name, results_name, diagnostics_name]
                 .into_iter()
                 .chain(clock.iter().map(|(_, name)| name.clone()))
@@ -87,6 +90,7 @@ impl Topics {
         };
         Ok(Topics {
             psec,
+            psec_stream,
             load,
             joint_states,
             motor_currents,

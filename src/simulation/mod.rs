@@ -45,8 +45,8 @@ pub enum SimulationError {
 
 /// A machine with the trajectories that it has been given.
 ///
-/// Position instant k is at `origin + k·Tsp`; the first is k = 0. Until the first trajectory starts or
-/// the first load acts, the machine stands still at its start position, exactly: what a trajectory
+/// Position instant k is at `origin + k·Tsp`; the first is k = 0. Until the first trajectory starts, a
+/// stream first moves a joint or the first load acts, the machine stands still at its start position, exactly: what a trajectory
 /// does afterwards does not depend on how long it was waited for.
 #[derive(Debug)]
 pub struct Simulation {
@@ -88,8 +88,10 @@ impl Simulation {
         let home = vec![0.0; axes.len()];
         let samples = machine.axes().iter().map(|a| *a.sample()).collect();
         let Periods { position: period, current: tick, .. } = config.periods();
+        let mut timeline = Timeline::new(joints, period, &home)?;
+        timeline.set_stream_delay(stream_delay(&machine));
         Ok(Simulation {
-            timeline: Timeline::new(joints, period, &home)?,
+            timeline,
             loads: Loads::new(axes.len()),
             motions: Motions::new(kinds, seconds(tick), horizon(period)),
             saturated: vec![false; axes.len()],
@@ -136,6 +138,28 @@ impl Simulation {
         Ok(admission)
     }
 
+    /// Sets one set-point of a stream, m or rad, for the next position instant; `false` while a
+    /// trajectory or a stop has the joint. It is commanded [`stream_delay`](Self::stream_delay)
+    /// later. A stream is no motion: it has no figures and no end.
+    ///
+    /// # Errors
+    /// [`Rejection`] as of [`Timeline::stream`]; nothing changes then.
+    pub fn stream(&mut self, place: usize, position: f64) -> Result<bool, Rejection> {
+        self.timeline.stream(place, position)
+    }
+
+    /// Delay of streamed set-points that is in effect, ns: as many position periods as the controllers
+    /// look ahead. After [`adopt`](Self::adopt) it changes when the stream pauses, see
+    /// [`Timeline::set_stream_delay`].
+    pub fn stream_delay(&self) -> Nanoseconds {
+        Nanoseconds::from(self.timeline.stream_delay()) * self.period
+    }
+
+    /// Whether a stream drives, moving or not: see [`Timeline::is_streaming`].
+    pub fn is_streaming(&self) -> bool {
+        self.timeline.is_streaming()
+    }
+
     /// External force or torque on an axis (N or N·m, positive towards plus) from the next position
     /// instant on, for `hold` ns; limited to ±[`MAX_LOAD`], and none if it is NaN.
     pub fn set_load(&mut self, axis: usize, load: f64, hold: Nanoseconds) {
@@ -148,7 +172,9 @@ impl Simulation {
     /// # Errors
     /// [`MachineError::AnotherMachine`] if joints or periods differ; nothing changes then.
     pub fn adopt(&mut self, parameters: Arc<MachineParameters>) -> Result<(), MachineError> {
-        self.machine.adopt(parameters)
+        self.machine.adopt(parameters)?;
+        self.timeline.set_stream_delay(stream_delay(&self.machine));
+        Ok(())
     }
 
     /// Puts the machine back to rest at home; motions under way end as aborted.
@@ -188,6 +214,9 @@ impl Simulation {
         self.timeline.next();
         self.follow_timeline_events(k);
         self.awake |= self.motions.any_running() || self.loads.any();
+        if !self.awake && self.timeline.is_stream_moving() {
+            self.wake_at_rest();
+        }
         if self.awake {
             self.motions.look_ahead(&self.timeline);
             self.loads.apply(&mut self.machine, k);
@@ -199,6 +228,14 @@ impl Simulation {
             self.settled_from = k + 1 + SETTLING / self.period;
         }
         self.next = k + 1;
+    }
+
+    /// A position period at rest: of a machine that has moved nothing the first set-point counts as the
+    /// one before it too, and a stream's first need not be where the machine stands.
+    fn wake_at_rest(&mut self) {
+        let rest: Vec<f64> = self.samples.iter().map(|sample| sample.psec).collect();
+        self.machine.advance(&rest);
+        self.awake = true;
     }
 
     fn follow_timeline_events(&mut self, k: i64) {
@@ -267,7 +304,8 @@ impl Simulation {
         self.ends.drain(..)
     }
 
-    /// Whether a trajectory waits, runs or has just ended, or a load acts.
+    /// Whether a trajectory waits, runs or has just ended, or a load acts. A stream does not count: it
+    /// comes at the pace of its sender, which whoever computes ahead would run away from.
     pub fn is_asked(&self) -> bool {
         self.motions.any() || self.timeline.is_moving() || self.timeline.is_waiting() || self.loads.any()
     }
@@ -297,7 +335,7 @@ impl Simulation {
         self.timeline.psec_ahead(joint, periods.saturating_add(1))
     }
 
-    /// Whether the set-points move.
+    /// Whether a trajectory or a stop moves the set-points.
     pub fn is_moving(&self) -> bool {
         self.timeline.is_moving()
     }
@@ -306,6 +344,11 @@ impl Simulation {
 /// Position periods that contour errors look ahead of the set-point.
 pub fn horizon(period: Nanoseconds) -> u32 {
     u32::try_from(LOOK_AHEAD / period.max(1)).unwrap_or(u32::MAX).clamp(1, MOST_AHEAD)
+}
+
+/// Position periods that a stream is delayed, for controllers that look as far ahead.
+fn stream_delay(machine: &Machine) -> u32 {
+    u32::try_from(machine.horizon()).unwrap_or(u32::MAX)
 }
 
 /// The joints of a machine as trajectories name and limit them, `prefix` before each name.

@@ -12,6 +12,7 @@ pub mod rejection;
 pub mod request;
 pub mod spline;
 pub mod stop;
+pub mod stream;
 pub mod timeline;
 
 mod check;

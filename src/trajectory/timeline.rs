@@ -7,7 +7,8 @@ use super::plan::{Kind, Plan};
 use super::rejection::{Code, Rejection};
 use super::spline::State;
 use super::stop::StopPlanner;
-use crate::units::{Nanoseconds, seconds};
+use super::stream::{LookAhead, Stream};
+use crate::units::Nanoseconds;
 use std::collections::VecDeque;
 
 /// Most trajectories that wait for one joint.
@@ -32,6 +33,7 @@ pub struct Timeline {
     pub(super) tracks: Vec<Track>,
     pub(super) motions: Motions,
     pub(super) planner: StopPlanner,
+    pub(super) stream: Stream,
     psec: Vec<f64>,
     pub(super) events: Vec<Event>,
     /// Events since the last instant, told at the next.
@@ -43,6 +45,8 @@ pub struct Timeline {
 pub(super) struct Track {
     pub queue: VecDeque<Plan>,
     pub state: State,
+    /// Streamed set-points between the last commanded one and the one that the joint holds.
+    pub ahead: LookAhead,
 }
 
 /// Why there is no timeline for these joints.
@@ -86,11 +90,13 @@ impl Timeline {
         let track = |&position: &f64| Track {
             queue: VecDeque::from([Plan::hold(position)]),
             state: State::rest(position),
+            ahead: LookAhead::default(),
         };
         Ok(Self {
             tracks: positions.iter().map(track).collect(),
             motions: Motions::new(joints.len()),
             planner: StopPlanner::default(),
+            stream: Stream::default(),
             psec: positions.to_vec(),
             events: Vec::new(),
             pending: Vec::new(),
@@ -108,6 +114,7 @@ impl Timeline {
         let (k, period) = (self.next_k, self.period);
         self.events.clear();
         self.events.append(&mut self.pending);
+        self.settle_stream_delay();
         for (joint, track) in self.tracks.iter_mut().enumerate() {
             if track.queue.get(1).is_some_and(|plan| plan.join_k <= k) {
                 let old = track.queue.pop_front();
@@ -121,15 +128,23 @@ impl Timeline {
                 continue;
             };
             plan.advance(k, period);
-            track.state = plan.state(k, period);
+            track.state = match plan.kind {
+                Kind::Hold(newest) => {
+                    self.stream.note(k, newest != track.ahead.entered(track.state));
+                    track.ahead.next(newest, track.state, period)
+                }
+                _ => plan.state(k, period),
+            };
             self.psec[joint] = track.state.position;
             if k >= plan.end_k
                 && let Some(slot) = plan.slot.take()
             {
                 self.motions.release(slot, joint, Release::Completed);
             }
-            if plan.slot.is_none() && !plan.is_moving(k, period) {
+            let is_over = plan.slot.is_none() && !plan.is_moving(k, period);
+            if is_over && !matches!(plan.kind, Kind::Hold(_)) {
                 plan.kind = Kind::Hold(track.state.position);
+                track.ahead.empty(track.state.position);
             }
         }
         self.motions.settle(&mut self.events);
@@ -184,12 +199,16 @@ impl Timeline {
         }
         let after = track.queue.partition_point(|plan| plan.join_k <= k);
         match track.queue.get(after.saturating_sub(1)) {
+            Some(Plan { kind: Kind::Hold(newest), .. }) => {
+                track.ahead.at(k - self.next_k, *newest, track.state, self.period)
+            }
             Some(plan) => plan.state(k, self.period),
             None => track.state,
         }
     }
 
-    /// Whether a joint is commanded to move after the last instant by what has started already.
+    /// Whether a joint is commanded to move after the last instant by a trajectory or a stop that
+    /// has started already. A stream is another matter: [`Timeline::is_stream_moving`].
     pub fn is_moving(&self) -> bool {
         let k = self.next_k - 1;
         self.tracks
@@ -223,8 +242,10 @@ impl Timeline {
             track.queue.clear();
             track.queue.push_back(Plan::hold(position));
             track.state = State::rest(position);
+            track.ahead.empty(position);
             self.psec[joint] = position;
         }
+        self.forget_stream();
         self.motions.settle(&mut self.pending);
         self.reserve_events();
         Ok(())
@@ -234,31 +255,6 @@ impl Timeline {
     /// that it does not allocate.
     pub(super) fn reserve_events(&mut self) {
         self.events.reserve(self.pending.len() + 2 * self.motions.capacity());
-    }
-
-    /// Sets one set-point for the next instant, m or rad, from a stream of them: `true` if it is
-    /// taken, `false` while a trajectory or a stop moves the joint or waits for it.
-    ///
-    /// # Errors
-    /// [`Code::UnknownJoint`], [`Code::NotFinite`], [`Code::OutsideStroke`], [`Code::Jump`].
-    pub fn stream(&mut self, joint: usize, position: f64) -> Result<bool, Rejection> {
-        let Some(limits) = self.joints.get(joint) else {
-            let text = format!("there is no joint with index {joint}");
-            return Err(Rejection::new(Code::UnknownJoint, text));
-        };
-        check_finite(limits, position)?;
-        limits.check_stroke(0, position)?;
-        let track = &mut self.tracks[joint];
-        let waiting = track.queue.len() > 1;
-        let Some(plan) = track.queue.front_mut().filter(|_| !waiting) else {
-            return Ok(false);
-        };
-        if plan.slot.is_some() || !matches!(plan.kind, Kind::Hold(_)) {
-            return Ok(false);
-        }
-        limits.check_jump(0, track.state.position, position, seconds(self.period))?;
-        plan.kind = Kind::Hold(position);
-        Ok(true)
     }
 
     /// Takes `joint` away from everything that moves it or waits for it.
@@ -271,7 +267,7 @@ impl Timeline {
     }
 }
 
-fn check_finite(joint: &JointLimits, position: f64) -> Result<(), Rejection> {
+pub(super) fn check_finite(joint: &JointLimits, position: f64) -> Result<(), Rejection> {
     if position.is_finite() {
         return Ok(());
     }

@@ -6,6 +6,10 @@ use std::sync::{Arc, LazyLock};
 
 use virtual_axes::config::{Assignment, MachineConfig, Parameters, Source, Value, parse_assignment};
 use virtual_axes::machine::{Machine, MachineParameters};
+use virtual_axes::path::Program;
+use virtual_axes::scenario::Scenario;
+use virtual_axes::simulation::joints;
+use virtual_axes::trial::{Figures, ProgramSource, Setpoints, Tick, Trial, run as run_trial};
 
 /// Position period of the default machine, s.
 pub const TSP: f64 = 0.006;
@@ -36,14 +40,48 @@ pub fn machine(changes: &[(&str, f64)]) -> Machine {
 
 /// A shipped machine with what `--set` would say for every joint: `position_loop.controller=gpc`.
 pub fn configured(machine: &str, of_every_joint: &[&str]) -> MachineConfig {
+    configured_with(machine, of_every_joint, &[])
+}
+
+/// Likewise, and what it would say for one joint: `a.gravity.tilt_nm=0`.
+pub fn configured_with(machine: &str, of_every_joint: &[&str], of_one: &[&str]) -> MachineConfig {
     let mut parameters = Parameters::builtin(machine).expect("the machine is shipped");
     let source = Source::named("test");
     let names: Vec<String> =
         parameters.machine_config().expect("valid").axes().iter().map(|a| a.name().to_owned()).collect();
     let texts = names.iter().flat_map(|name| of_every_joint.iter().map(move |text| format!("{name}.{text}")));
+    let texts = texts.chain(of_one.iter().map(|text| (*text).to_owned()));
     let assignments = texts.map(|text| parse_assignment(&text, &source).expect("an assignment")).collect();
     parameters.set_all(assignments).expect("the changes are valid");
     parameters.machine_config().expect("the machine is valid")
+}
+
+/// A shipped scenario planned for a machine.
+pub fn program(name: &str, machine: &MachineConfig) -> Arc<Program> {
+    let scenario = Scenario::builtin(name).expect("it is shipped");
+    Arc::new(scenario.program(machine, None).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// Set-points of a planned scenario.
+pub fn setpoints(name: &str, program: Arc<Program>, machine: &MachineConfig) -> Setpoints<'static> {
+    let limits = joints(machine, "");
+    Setpoints::Grid(Box::new(ProgramSource::new(program, name, &limits, machine.periods().position)))
+}
+
+/// Runs a shipped scenario and shows every tick.
+pub fn watch_scenario(name: &str, machine: &MachineConfig, mut look: impl FnMut(Tick<'_>)) -> Figures {
+    let program = program(name, machine);
+    let trial = Trial {
+        machine,
+        program: Some(Arc::clone(&program)),
+        allow_nonzero_end_velocity: false,
+        record: false,
+    };
+    let outcome = run_trial(&trial, setpoints(name, program, machine), |tick| {
+        look(tick);
+        Ok(())
+    });
+    outcome.unwrap_or_else(|error| panic!("{name}: {error}")).figures
 }
 
 /// Friction of the X axis: a, b, c, d, i0.
@@ -176,6 +214,30 @@ impl Ballbar {
     pub fn radial_deviation(&self, x: f64, y: f64) -> f64 {
         (x + self.radius).hypot(y) - self.radius
     }
+}
+
+/// A machine with which nothing has happened yet.
+pub fn at_rest(config: &MachineConfig) -> Machine {
+    Machine::new(Arc::new(MachineParameters::new(config).expect("the machine can be built")))
+}
+
+/// One position period of one axis whose set-points are known as far ahead as its controller reads; the
+/// others stand still.
+pub fn advance_axis(
+    machine: &mut Machine,
+    place: usize,
+    k: i64,
+    psec: impl Fn(i64) -> f64,
+    observe: impl FnMut(&Machine),
+) {
+    let (axes, horizon) = (machine.axis_count(), machine.horizon());
+    let mut now = vec![0.0; axes];
+    let mut ahead = vec![0.0; axes * horizon];
+    now[place] = psec(k);
+    for (j, value) in ahead[place * horizon..][..horizon].iter_mut().enumerate() {
+        *value = psec(k + 1 + j as i64);
+    }
+    machine.advance_with(&now, &ahead, observe);
 }
 
 /// Runs `psec(t)` for `duration` seconds and shows every tick with its time in seconds.

@@ -1,0 +1,258 @@
+"""psec_stream: set-points one at a time, as ros2_control's topic-based hardware and teleoperation send them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from virtual_axes.msg import TrajectoryResult as R
+
+from drive import TSP_NS, Drive, joint_trajectory, to_ns
+from motion import TSP, assert_psec, go_home, start_swing
+
+REACH = 0.5 * TSP
+"""How far x moves in a position period, m."""
+
+
+def follow(drive: Drive, joints: Sequence[str], rows: np.ndarray) -> None:
+    """Stream rows of positions, each once the axes are commanded the one before."""
+    for row in rows:
+        drive.stream(joints, row)
+        wanted = dict(zip(joints, row))
+        drive.wait_for(lambda: wanted.items() <= drive.latest("psec").items(), 5, f"set-point {wanted}")
+
+
+def commanded(drive: Drive, joint: str, begin: int) -> np.ndarray:
+    """What `joint` was commanded since `begin`, in order, what holds only once; no instant missing."""
+    states = drive.record(begin, drive.now()).states
+    assert set(np.diff(states.stamp)) <= {TSP_NS}
+    psec = states["psec", joint]
+    return psec[np.concatenate([[True], psec[1:] != psec[:-1]])]
+
+
+def node_status(drive: Drive, condition: Callable[[dict[str, str]], bool]) -> DiagnosticStatus:
+    """The node's part of the first diagnostics from now on whose values fulfil `condition`."""
+    seen = len(drive.diagnostics())
+
+    def found() -> list[DiagnosticStatus]:
+        return [array.status[0] for array in drive.diagnostics()[seen:] if condition(values(array.status[0]))]
+
+    return drive.wait_for(found, 5, "diagnostics of the stream")[0]
+
+
+def values(status: DiagnosticStatus) -> dict[str, str]:
+    """Values of a status by key."""
+    return {value.key: value.value for value in status.values}
+
+
+def counts(drive: Drive) -> tuple[int, int]:
+    """Set-points refused and ignored so far, by diagnostics that are younger than now."""
+    now = drive.now()
+    seen = len(drive.diagnostics())
+
+    def young() -> list[dict[str, str]]:
+        return [values(a.status[0]) for a in drive.diagnostics()[seen:] if to_ns(a.header.stamp) > now + 2 * TSP_NS]
+
+    newest = drive.wait_for(young, 5, "diagnostics")[-1]
+    return int(newest["stream_setpoints_refused"]), int(newest["stream_setpoints_ignored"])
+
+
+def wave(amplitude: float, count: int = 100) -> np.ndarray:
+    """One swing 0 -> amplitude -> 0."""
+    return amplitude / 2 * (1 - np.cos(2 * np.pi * np.arange(1, count + 1) / count))
+
+
+@pytest.mark.parametrize("mode", ["real", "fast"])
+def test_the_axes_are_commanded_what_was_streamed_sample_by_sample(mode: str, request: pytest.FixtureRequest):
+    """Two axes along their own paths: each set-point bit for bit, none twice, none left out."""
+    drive: Drive = request.getfixturevalue(mode)
+    go_home(drive)
+    begin = drive.now()
+    rows = np.column_stack([wave(0.04), -wave(0.02)])[:80]
+    follow(drive, ["x", "c"], rows)
+    np.testing.assert_array_equal(commanded(drive, "x", begin), [0.0, *rows[:, 0]])
+    np.testing.assert_array_equal(commanded(drive, "c", begin), [0.0, *rows[:, 1]])
+    assert not commanded(drive, "y", begin).any()
+    drive.wait_until(drive.now() + 150 * TSP_NS, 10)
+    assert drive.latest("position")["x"] == pytest.approx(rows[-1, 0], abs=2e-6)
+    assert drive.latest("psec")["x"] == rows[-1, 0]
+
+
+def test_a_sender_with_its_own_clock_is_followed_in_order(real: Drive):
+    """At the position period by another clock: set-points may hold or be overtaken, never go back."""
+    go_home(real)
+    begin, refused = real.now(), counts(real)[0]
+    # Slow enough that a sender that was held up is still within reach.
+    sent = np.arange(1, 301) * REACH / 300
+    due = time.monotonic()
+    for position in sent:
+        real.stream(["x"], [position])
+        due += TSP
+        time.sleep(max(0.0, due - time.monotonic()))
+    real.wait_for(lambda: real.latest("psec")["x"] == sent[-1], 5, "last set-point")
+    followed = commanded(real, "x", begin)[1:]
+    assert set(followed) <= set(sent)
+    assert (np.diff(followed) > 0).all()
+    assert counts(real)[0] == refused
+
+
+def test_nan_and_short_arrays_leave_joints_alone(real: Drive):
+    """NaN and a missing position mean that the message does not command the joint."""
+    go_home(real)
+    begin = real.now()
+    refused = counts(real)[0]
+    follow(real, ["y"], np.array([[0.001]]))
+    real.stream(["z", "x", "y"], [math.nan, 0.002])
+    real.wait_for(lambda: real.latest("psec")["x"] == 0.002, 5, "set-point of x")
+    real.stream(["x", "y"], [])
+    real.stream(["x"], [math.nan])
+    assert counts(real)[0] == refused
+    np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, 0.002])
+    np.testing.assert_array_equal(commanded(real, "y", begin), [0.0, 0.001])
+    assert not commanded(real, "z", begin).any()
+
+
+def test_a_trajectory_takes_over_and_the_stream_is_ignored_meanwhile(real: Drive):
+    """From the joint's streamed set-point; the joints that it leaves go on with the stream."""
+    go_home(real)
+    follow(real, ["x", "y"], np.array([[0.001, 0.001], [0.002, 0.002]]))
+    ignored = counts(real)[1]
+    plan = 0.002 + wave(0.02, 500)
+    accepted = real.accept(joint_trajectory(["x"], np.arange(500) * TSP, plan))
+    start = to_ns(accepted.start)
+    real.wait_until(start, 5)
+    for position in np.arange(3, 13) * 1e-3:
+        real.stream(["x", "y"], [0.002, position])
+        real.wait_for(lambda: real.latest("psec")["y"] == position, 5, "set-point of y")
+    assert real.end(accepted.sequence_number, 10).status == R.COMPLETED
+    assert_psec(real, start, {"x": plan})
+    assert counts(real)[1] == ignored + 10
+    # And then the stream has the joint again.
+    follow(real, ["x"], np.array([[plan[-1] + 0.001]]))
+    assert real.latest("psec")["y"] == 0.012
+
+
+def test_a_set_point_that_cannot_be_is_refused_counted_and_told_once_a_second(start: Callable[..., Drive]):
+    """Beyond the stroke, out of reach, of no joint; the axis stays, and the log is not flooded."""
+    drive = start()
+    begin = drive.now()
+    assert counts(drive) == (0, 0)
+    seen = len(drive.diagnostics())
+    sent = time.monotonic()
+    for _ in range(20):
+        drive.stream(["x"], [0.4])
+        drive.stream(["x"], [0.1])
+        drive.stream(["q", "y"], [0.0, 0.001])
+        time.sleep(0.02)
+    lasted = time.monotonic() - sent
+    assert counts(drive) == (60, 0)
+    statuses = [array.status[0] for array in drive.diagnostics()[seen:]]
+    assert any(s.level == DiagnosticStatus.WARN and "stream were refused" in s.message for s in statuses)
+    assert not commanded(drive, "x", begin).any()
+    np.testing.assert_array_equal(commanded(drive, "y", begin), [0.0, 0.001])
+    told = [line for line in drive.process.output().splitlines() if "set-point of the stream refused" in line]
+    for words in ("outside the stroke", "away from the set-point", "unknown joint q"):
+        lines = [line for line in told if words in line]
+        assert 1 <= len(lines) <= 1 + lasted, told
+
+
+def test_a_reset_leaves_nothing_of_the_stream(real: Drive):
+    """Home; what goes on where the stream was is out of reach, a stream that begins at home is not."""
+    go_home(real)
+    follow(real, ["x"], REACH * np.arange(1, 11).reshape(-1, 1) * 0.9)
+    refused = counts(real)[0]
+    go_home(real)
+    begin = real.now()
+    real.stream(["x"], [10 * REACH])
+    assert counts(real)[0] == refused + 1
+    follow(real, ["x"], np.array([[REACH / 2]]))
+    np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, REACH / 2])
+
+
+def test_a_stop_moves_the_joint_away_from_the_stream_until_it_stands(real: Drive):
+    """A stop at rest is over at once; the stream goes on from there."""
+    go_home(real)
+    follow(real, ["x"], np.array([[0.002]]))
+    real.stop()
+    real.wait_until(real.now() + 3 * TSP_NS, 5)
+    assert real.latest("psec")["x"] == 0.002
+    follow(real, ["x"], np.array([[0.003]]))
+
+
+def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
+    """Without a controller that looks ahead there is no delay."""
+    go_home(real)
+    status = node_status(real, lambda v: v["stream_drives"] == "false" and v["state"] == "holding")
+    assert values(status)["stream_delay_ms"] == "0"
+
+    seen = len(real.diagnostics())
+    positions = iter(np.tile(wave(0.01), 50))
+
+    def streaming() -> bool:
+        real.stream(["x"], [next(positions)])
+        return any(
+            (found := values(a.status[0]))["stream_drives"] == "true" and found["state"] == "streaming"
+            for a in real.diagnostics()[seen:]
+        )
+
+    real.wait_for(streaming, 5, "diagnostics of a stream that drives")
+    node_status(real, lambda v: v["stream_drives"] == "false")
+    # A trajectory is no stream.
+    go_home(real)
+    start_swing(real, duration=6.0)
+    node_status(real, lambda v: v["stream_drives"] == "false" and v["state"] == "running")
+    real.stop()
+
+
+def test_a_controller_that_looks_ahead_delays_the_stream(start: Callable[..., Drive]):
+    """By what it reads ahead of the set-point that alpha holds back, and all joints alike."""
+    drive = start("-p", "x.position_loop.controller:=gpc")
+    found = drive.get_parameters(["x.position_loop.gpc.n2", "x.delays.alpha_ms"])
+    delay = found["x.position_loop.gpc.n2"] - math.ceil(found["x.delays.alpha_ms"] * 1e6 / TSP_NS)
+    assert delay > 0
+    node_status(drive, lambda v: v["stream_delay_ms"] == f"{delay * TSP_NS // 1_000_000}")
+
+    begin = drive.now()
+    drive.stream(["x", "y"], [0.001, 0.001])
+    drive.wait_for(lambda: drive.latest("psec")["x"] == 0.001, 5, "set-point of x")
+    states = drive.record(begin, drive.now()).states
+    first = {joint: states.stamp[np.flatnonzero(states["psec", joint])[0]] for joint in ("x", "y")}
+    assert first["x"] == first["y"]
+    # Sent after `begin`, it entered at the instant after that one at the earliest.
+    assert first["x"] >= begin + (1 + delay) * TSP_NS
+    rows = np.column_stack([0.001 + wave(0.02, 50)])[:20]
+    follow(drive, ["x"], rows)
+    np.testing.assert_array_equal(commanded(drive, "x", begin), [0.0, 0.001, *rows[:, 0]])
+
+    # In its place one that does not look ahead: no delay, once the stream has paused.
+    drive.set_parameters({"x.position_loop.controller": "cascade"})
+    node_status(drive, lambda v: v["stream_delay_ms"] == "0")
+
+
+def test_in_fast_a_stream_alone_goes_at_real_pace(fast: Drive):
+    """Its sender does too: nothing is gained by running away from it."""
+    go_home(fast)
+    before, began = fast.now(), time.monotonic()
+    for position in wave(0.01, 150):
+        fast.stream(["x"], [position])
+        time.sleep(TSP)
+    shown, passed = (fast.now() - before) / 1e9, time.monotonic() - began
+    # Slower on a busy machine, never faster.
+    assert 0 < shown < 1.5 * passed
+
+
+def test_the_topic_can_be_renamed_and_is_reliable(start: Callable[..., Drive]):
+    """To the name under which ros2_control's topic-based hardware publishes."""
+    drive = start("-r", "psec_stream:=/robot_joint_commands", connect=False)
+    found = drive.wait_for(
+        lambda: drive.node.get_subscriptions_info_by_topic("/robot_joint_commands"), 10, "subscription"
+    )[0]
+    assert found.topic_type == "sensor_msgs/msg/JointState"
+    profile = found.qos_profile
+    assert (profile.reliability, profile.durability) == (ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE)
+    assert drive.node.count_subscribers("/psec_stream") == 0
