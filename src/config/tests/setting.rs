@@ -42,6 +42,19 @@ fn every_live_key_takes_both_ends_of_its_range() {
             };
             for value in values {
                 let mut parameters = start.clone();
+                // What goes with the key, so that its own range is what is tried.
+                if let Some((joint, _)) = key.split_once(".position_loop.") {
+                    for polynomial in ["r", "s", "t"] {
+                        let key = format!("{joint}.position_loop.rst.{polynomial}");
+                        parameters.set(&key, Value::DoubleList(vec![1.0]), &source()).expect("a polynomial");
+                    }
+                    let others =
+                        if key.ends_with("n2") { [("nu", 1), ("n1", 1)] } else { [("n2", 200), ("nu", 1)] };
+                    for (name, count) in others {
+                        let key = format!("{joint}.position_loop.gpc.{name}");
+                        parameters.set(&key, Value::Integer(count), &source()).expect("a horizon");
+                    }
+                }
                 assert_eq!(parameters.set(&key, value.clone(), &source()), Ok(()), "{key}");
                 assert_eq!(parameters.get(&key), Some(value), "{key}");
                 assert!(parameters.machine_config().is_ok(), "{key}");
@@ -55,8 +68,24 @@ fn every_live_key_takes_both_ends_of_its_range() {
             assert_eq!(parameters, start);
         }
     }
-    // 15 on each of five axes, and one of the node.
-    assert_eq!(live, 2 * (5 * 15 + 1));
+    // 30 on each of five axes, and one of the node.
+    assert_eq!(live, 2 * (5 * 30 + 1));
+}
+
+#[test]
+fn horizons_that_contradict_each_other_are_refused_by_name() {
+    for (text, key, value) in [
+        ("x.position_loop.gpc.n1=15", "x.position_loop.gpc.n1", "15"),
+        ("x.position_loop.gpc.nu=15", "x.position_loop.gpc.nu", "15"),
+        ("x.position_loop.gpc.n2=11", "x.position_loop.gpc.n2", "11"),
+    ] {
+        let error = set(text).expect_err(text).to_string();
+        assert!(error.contains(key) && error.contains(value) && error.contains("n2"), "{error}");
+    }
+    let error = set("x.position_loop.gpc.lambda_rel=-1").expect_err("negative").to_string();
+    assert!(error.contains("lambda_rel") && error.contains("-1"), "{error}");
+    let error = set("y.position_loop.controller=rst").expect_err("no polynomials").to_string();
+    assert!(error.contains("y.position_loop.rst.r") && error.contains("list of numbers"), "{error}");
 }
 
 #[test]
