@@ -228,6 +228,21 @@ impl Watch for Impatient {
 }
 
 #[test]
+fn a_weight_given_as_such_does_not_hide_the_relative_one() {
+    let mut parameters = machine(&["x", "y"]);
+    set(&mut parameters, "x.position_loop.gpc.lambda", Value::Double(1.0));
+    let tuning = Tuning::Gpc { n1: 1, n2: 8, nu: 6, lambda_rel: 0.01 };
+    let tuned = tuning.apply(&parameters, &["x".to_owned()]).expect("valid");
+    assert_eq!(tuned.get("x.position_loop.gpc.lambda"), None);
+    assert_eq!(tuned.get("x.position_loop.gpc.lambda_rel"), Some(Value::Double(0.01)));
+    // The other axis is as it was.
+    let y = |parameters: &Parameters| {
+        parameters.iter().filter(|(key, _)| key.starts_with("y.")).collect::<Vec<_>>()
+    };
+    assert_eq!(y(&tuned), y(&parameters));
+}
+
+#[test]
 fn a_search_that_is_interrupted_ends_with_the_reason() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");

@@ -156,12 +156,12 @@ impl<'a> Bench<'a> {
         Ok(candidate(tuning.clone(), margins, figures, self.cost, &self.config))
     }
 
-    /// Runs `tuning` with a recording.
+    /// Runs `tuning` on a path with a recording.
     ///
     /// # Errors
     /// [`TuneError`].
-    pub fn record(&self, tuning: &Tuning) -> Result<Outcome, TuneError> {
-        run(&tuning.apply(self.parameters, &self.joints)?, self.course, self.watch, true)
+    pub fn record_on(&self, course: &Course, tuning: &Tuning) -> Result<Outcome, TuneError> {
+        run(&tuning.apply(self.parameters, &self.joints)?, course, self.watch, true)
     }
 
     /// Runs `tuning` on another path; the axes that are tuned are those that move on the bench's own.

@@ -78,7 +78,8 @@ pub struct Arguments {
     /// Where to write the machine with the tuning that was found.
     #[arg(long, value_name = "FILE.yaml")]
     out: Option<PathBuf>,
-    /// Where to write a page with the search and with plots of the tuning beside the machine as it is.
+    /// Where to write a page with the search and with plots of the tuning beside the machine as it is
+    /// (with --contrast on the --also path).
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
     /// Print the result as one JSON object.
@@ -155,10 +156,13 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         write_machine(out, arguments, &bench, &found)?;
     }
     if let Some(page) = &arguments.report {
-        write_report(page, &input, &bench, &found).map_err(|error| match error.downcast() {
-            Ok(error) => named(&input, *error),
-            Err(error) => error,
-        })?;
+        // A contrast is seen where the tuning is worse.
+        let (shown, course) = match (others.first(), paths.first()) {
+            (Some(other), Some(course)) if arguments.contrast => (other, course),
+            _ => (&input, &path),
+        };
+        let runs = recorded(course, &bench, &found).map_err(|error| named(shown, error))?;
+        report::write(page, shown, bench.config().name(), &runs, &scatters(&bench, &found))?;
     }
     if arguments.json {
         return Ok(format!("{:#}\n", object(arguments, &input, tunable, &limits, &bench, &found)));
@@ -444,17 +448,15 @@ fn write_machine(
     Ok(file.finish()?)
 }
 
-fn write_report(path: &Path, input: &Input, bench: &Bench<'_>, found: &Found) -> Result<(), Box<dyn Error>> {
-    let recorded = |controller: String, tuning: &Tuning, change: String| -> Result<Run, Box<dyn Error>> {
-        Ok(Run { controller, changes: vec![change], outcome: bench.record(tuning)? })
+/// The machine as it is and the tuning that was found on a path, with recordings.
+fn recorded(course: &Course, bench: &Bench<'_>, found: &Found) -> Result<[Run; 2], TuneError> {
+    let run = |tuning: &Tuning| -> Result<Run, TuneError> {
+        let parameters = tuning.apply(bench.parameters(), bench.joints())?;
+        let controller = variant::controller_name(&parameters);
+        let outcome = bench.record_on(course, tuning)?;
+        Ok(Run { controller, changes: vec![tuning.to_string()], outcome })
     };
-    let tuned = found.best.tuning.apply(bench.parameters(), bench.joints())?;
-    let name = |parameters: &Parameters| variant::controller_name(parameters);
-    let runs = [
-        recorded(name(bench.parameters()), &Tuning::Present, "as it is".to_owned())?,
-        recorded(name(&tuned), &found.best.tuning, found.best.tuning.to_string())?,
-    ];
-    report::write(path, input, bench.config().name(), &runs, &scatters(bench, found))
+    Ok([run(&Tuning::Present)?, run(&found.best.tuning)?])
 }
 
 /// Cost against modulus margin and against control activity, or on one path against another.

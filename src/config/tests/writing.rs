@@ -44,7 +44,8 @@ fn the_file_is_laid_out_as_the_shipped_ones() {
             "    joints: [\"x\", \"y\", \"z\", \"a\", \"c\"]\n    periods:\n      position_ms: 6.0\n"
         )
     );
-    let section = "      position_loop:\n        controller: cascade\n        gain: 1.5  # tuned: 12.5 µm\n        ";
+    let section =
+        "      position_loop:\n        controller: cascade\n        gain: 1.5  # tuned: 12.5 µm\n        ";
     assert!(text.contains(section), "{text}");
     assert!(text.contains("        rst:\n          r: [1.0, -2.0, 1.0e-9]\n"), "{text}");
     // Bare, it is the flag "yes" to other readers.
