@@ -180,7 +180,10 @@ impl fmt::Display for Cost {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (place, (term, weight)) in self.terms.iter().enumerate() {
             let comma = if place > 0 { "," } else { "" };
-            write!(f, "{comma}{}={weight}", term.name())?;
+            write!(f, "{comma}{}", term.name())?;
+            if *weight != 1.0 {
+                write!(f, "={weight}")?;
+            }
         }
         Ok(())
     }

@@ -22,9 +22,9 @@ use crate::{json, report, table, variant};
 
 /// Rows of a table of many tunings; `--json` has all.
 const ROWS: usize = 12;
-/// Points that cost more than so many times the machine as it is, or the dearest of the front, are not in
-/// the picture: they would press the others to its edge.
-const PICTURED: f64 = 1.5;
+/// Points that cost more than so many times the machine as it is and the best are not in the picture: they
+/// would press the others to its edge.
+const PICTURED: f64 = 2.0;
 
 /// Controllers that can be tuned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -451,8 +451,12 @@ fn write_machine(
 /// The machine as it is and the tuning that was found on a path, with recordings.
 fn recorded(course: &Course, bench: &Bench<'_>, found: &Found) -> Result<[Run; 2], TuneError> {
     let run = |tuning: &Tuning| -> Result<Run, TuneError> {
-        let parameters = tuning.apply(bench.parameters(), bench.joints())?;
-        let controller = variant::controller_name(&parameters);
+        // Of the axes that are tuned.
+        let controller = match tuning {
+            Tuning::Present => variant::controller_name(bench.parameters()),
+            Tuning::Gpc { .. } => "gpc".to_owned(),
+            Tuning::Cascade(_) => "cascade".to_owned(),
+        };
         let outcome = bench.record_on(course, tuning)?;
         Ok(Run { controller, changes: vec![tuning.to_string()], outcome })
     };
@@ -463,7 +467,7 @@ fn recorded(course: &Course, bench: &Bench<'_>, found: &Found) -> Result<[Run; 2
 fn scatters(bench: &Bench<'_>, found: &Found) -> Vec<Scatter> {
     let unit = bench.cost().unit(&bench.present().figures);
     let quantity = |unit: &str| if unit.is_empty() { String::new() } else { format!(" ({unit})") };
-    let cost = format!("Cost {}{}", bench.cost(), quantity(unit));
+    let cost = format!("Cost: {}{}", bench.cost(), quantity(unit));
     let group = |label: &str, style, points| PointGroup { label: label.to_owned(), style, points };
     if let Some(path) = found.elsewhere.first().filter(|_| !found.contrasts.is_empty()) {
         let points = found.contrasts.iter().map(|c| [c.better.cost, c.worse.cost]).collect();
@@ -489,12 +493,13 @@ fn scatters(bench: &Bench<'_>, found: &Found) -> Vec<Scatter> {
     ];
     let scatter = |(title, y, measure, merit): (&str, &str, Measure, Measure)| {
         let front = front(&search.tried, merit);
-        let dearest = front.last().map_or(0.0, |c| c.cost).max(bench.present().cost);
+        let dearest = PICTURED * search.best.cost.max(bench.present().cost);
         let point = |c: &Candidate| [c.cost, measure(c)];
-        let shown = search.tried.iter().filter(|c| c.cost <= PICTURED * dearest);
+        let shown = search.tried.iter().filter(|c| c.cost <= dearest);
+        let front = front.into_iter().filter(|c| c.cost <= dearest);
         Scatter {
             title: title.to_owned(),
-            note: "of every tuning that was run and keeps the margins".to_owned(),
+            note: "of the tunings that were run and keep the margins".to_owned(),
             x: cost.clone(),
             y: y.to_owned(),
             groups: vec![
