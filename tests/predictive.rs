@@ -244,3 +244,39 @@ fn a_controller_that_goes_elsewhere_or_has_no_gain_is_refused_by_axis_and_number
         refusal(&["position_loop.rst.s=[0, 1]", "position_loop.rst.r=[25]", "position_loop.rst.t=[25]"]);
     assert!(text.contains("s[0] = 0"), "{text}");
 }
+
+#[test]
+fn an_unstable_loop_is_refused_with_its_pole_unless_it_is_forced() {
+    use virtual_axes::machine::MachineParameters;
+
+    // A gain that the lag of the velocity loop cannot bear.
+    let unstable = [
+        "position_loop.controller=rst",
+        "position_loop.rst.r=[250]",
+        "position_loop.rst.s=[1]",
+        "position_loop.rst.t=[250]",
+    ];
+    let text = MachineParameters::new(&configured(DEFAULT, &unstable)).expect_err("refused").to_string();
+    assert!(
+        text.starts_with("axis x: position_loop") && text.contains("unstable") && text.contains("pole"),
+        "{text}"
+    );
+    let mut forced = unstable.to_vec();
+    forced.push("position_loop.allow_unstable=true");
+    let config = configured(DEFAULT, &forced);
+    // It is told the truth: without a limit the oscillation would grow for ever.
+    let mut machine = at_rest(&config);
+    let mut saturated = false;
+    for k in 0..500 {
+        advance_axis(
+            &mut machine,
+            0,
+            k,
+            |k| if k < 10 { 0.0 } else { 1e-3 },
+            |m| {
+                saturated |= m.axis(0).sample().saturated;
+            },
+        );
+    }
+    assert!(saturated, "the loop is stable after all");
+}

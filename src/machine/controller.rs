@@ -2,7 +2,7 @@
 
 use crate::config::{AxisConfig, AxisKind, FeedforwardConfig, GpcConfig, Periods, PositionControllerConfig};
 use crate::control::{Guard, PositionController, Rst, Transfer};
-use crate::design::{DesignError, GpcTuning, Weight, gpc};
+use crate::design::{DesignError, GpcTuning, Weight, accept, gpc};
 use crate::units::{DEGREE, MILLISECOND_NS, Nanoseconds, seconds};
 
 use super::AxisError;
@@ -36,18 +36,18 @@ pub(super) fn position_controller(
         step: axis.limits.acceleration * period / axis.transmission_ratio,
         periods: (TRANSFER / periods.position) as u32,
     };
+    let model = &prediction_model(axis, periods)?;
     let (rst, name) = match &axis.position_loop.controller {
         PositionControllerConfig::Cascade => {
             return Ok((PositionController::proportional(gain, transfer), "cascade"));
         }
-        PositionControllerConfig::Gpc(config) => {
-            (gpc(&prediction_model(axis, periods)?, &GpcTuning::from(config))?, "gpc")
-        }
+        PositionControllerConfig::Gpc(config) => (gpc(model, &GpcTuning::from(config))?, "gpc"),
         PositionControllerConfig::Rst(config) => {
             let rst = Rst::new(&config.r, &config.s, &config.t, config.t_first);
             (rst.map_err(DesignError::from)?, "rst")
         }
     };
+    let rst = accept(model, rst, axis.position_loop.allow_unstable)?;
     let rest_error = match axis.kind {
         AxisKind::Linear => REST_ERROR_LINEAR,
         AxisKind::Rotary => REST_ERROR_ROTARY,

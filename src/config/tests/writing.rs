@@ -44,10 +44,14 @@ fn the_file_is_laid_out_as_the_shipped_ones() {
             "    joints: [\"x\", \"y\", \"z\", \"a\", \"c\"]\n    periods:\n      position_ms: 6.0\n"
         )
     );
-    let section =
-        "      position_loop:\n        controller: cascade\n        gain: 1.5  # tuned: 12.5 µm\n        ";
-    assert!(text.contains(section), "{text}");
-    assert!(text.contains("        rst:\n          r: [1.0, -2.0, 1.0e-9]\n"), "{text}");
+    assert!(
+        text.contains(
+            "      position_loop:\n        controller: cascade\n        gain: 1.5  # tuned: 12.5 µm\n        \
+             gpc:\n          n1: 1\n"
+        ),
+        "{text}"
+    );
+    assert!(text.contains("\n        rst:\n          r: [1.0, -2.0, 1.0e-9]\n"), "{text}");
     // Bare, it is the flag "yes" to other readers.
     assert!(text.contains("\n\n    \"y\":\n      type: linear\n"), "{text}");
     assert!(text.ends_with("\n\n    max_points: 7\n"), "{text}");
