@@ -6,7 +6,7 @@
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
 //! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] →
 //! [`machine`] → [`trajectory`],
-//! [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] → [`messages`], [`files`], [`report`] →
+//! [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] → [`tune`] → [`messages`], [`files`], [`report`] →
 //! `ros`.
 
 #![forbid(unsafe_code)]
@@ -29,4 +29,5 @@ pub mod scenario;
 pub mod simulation;
 pub mod trajectory;
 pub mod trial;
+pub mod tune;
 pub mod units;

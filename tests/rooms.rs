@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// As in ARCHITECTURE.md.
-const ORDER: [&str; 17] = [
+const ORDER: [&str; 18] = [
     "units",
     "config",
     "kinematics",
@@ -18,6 +18,7 @@ const ORDER: [&str; 17] = [
     "simulation",
     "scenario",
     "trial",
+    "tune",
     "messages",
     "files",
     "report",

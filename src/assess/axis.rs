@@ -17,6 +17,9 @@ pub struct AxisReport {
     pub peak_current: f64,
     /// Time with speed, current or voltage set-point at its limit, s.
     pub saturation_time: f64,
+    /// Control activity: RMS of the change of the current set-point from one position instant to the
+    /// next, A.
+    pub control_activity: f64,
 }
 
 /// Gathers the figures of one axis, tick by tick.
@@ -25,6 +28,9 @@ pub struct AxisAssessor {
     maxima: AxisReport,
     square_tracking: f64,
     square_synchronized: f64,
+    square_activity: f64,
+    /// Set-point of the current at the last position instant, A.
+    current_setpoint: f64,
     instants: u64,
     saturated_ticks: u64,
 }
@@ -42,6 +48,11 @@ impl AxisAssessor {
                 report.max_synchronized_tracking_error.max(synchronized.abs());
             self.square_tracking += tracking * tracking;
             self.square_synchronized += synchronized * synchronized;
+            if self.instants > 0 {
+                let change = sample.current_setpoint - self.current_setpoint;
+                self.square_activity += change * change;
+            }
+            self.current_setpoint = sample.current_setpoint;
             self.instants += 1;
         }
     }
@@ -51,6 +62,7 @@ impl AxisAssessor {
         AxisReport {
             rms_tracking_error: root_mean(self.square_tracking, self.instants),
             rms_synchronized_tracking_error: root_mean(self.square_synchronized, self.instants),
+            control_activity: root_mean(self.square_activity, self.instants.saturating_sub(1)),
             saturation_time: self.saturated_ticks as f64 * tick,
             ..self.maxima
         }

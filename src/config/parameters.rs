@@ -190,6 +190,20 @@ impl Parameters {
         Ok(())
     }
 
+    /// Takes a value away, so that the parameter has its default or none; `source` is for messages.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError::Missing`] if it is required; nothing is changed then.
+    pub fn unset(&mut self, key: &str, source: &Source) -> Result<(), ConfigError> {
+        let mut entries = self.entries.clone();
+        if entries.remove(key).is_some() {
+            let layout = check(&mut entries, &[], source)?;
+            *self = Self { entries, layout };
+        }
+        Ok(())
+    }
+
     fn from_assignments(
         base: Entries,
         assignments: Vec<Assignment>,

@@ -31,11 +31,7 @@ impl Plant {
     /// [`DriveError`] if the motor cannot be discretised over the period.
     pub fn new(axis: &AxisConfig, period: f64) -> Result<Self, DriveError> {
         let (r, deviation) = (axis.transmission_ratio, &axis.deviation);
-        let motor = MotorConfig {
-            inertia: axis.motor.inertia * deviation.inertia,
-            torque_constant: axis.motor.torque_constant * deviation.torque_constant,
-            ..axis.motor
-        };
+        let motor = Self::motor(axis);
         // The law gives amperes of the motor as it is reckoned with: its torque does not follow Kt.
         let friction_constant = axis.motor.torque_constant * deviation.friction;
         Ok(Plant {
@@ -45,6 +41,15 @@ impl Plant {
             torque_constant: motor.torque_constant,
             motor: Motor::new(&motor, period)?,
         })
+    }
+
+    /// The motor of `axis` as it is: with what its inertia and Kt deviate by.
+    pub fn motor(axis: &AxisConfig) -> MotorConfig {
+        MotorConfig {
+            inertia: axis.motor.inertia * axis.deviation.inertia,
+            torque_constant: axis.motor.torque_constant * axis.deviation.torque_constant,
+            ..axis.motor
+        }
     }
 
     /// Kt as it is, N·m/A.

@@ -10,7 +10,7 @@ mod prediction;
 mod sample;
 
 pub use axis::{Axis, AxisParameters};
-pub use prediction::prediction_model;
+pub use prediction::{deviating_model, prediction_model};
 pub use sample::AxisSample;
 
 use std::sync::Arc;

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use crate::config::{AxisConfig, Periods};
+use crate::config::{AxisConfig, MotorConfig, Periods};
 use crate::control::{Pi, PiState};
 use crate::design::polynomial::product;
 use crate::design::{DesignError, PredictionModel};
-use crate::drive::{Motor, MotorState};
+use crate::drive::{Motor, MotorState, Plant};
 use crate::units::seconds;
 
 use super::AxisError;
@@ -28,7 +28,20 @@ const NEGLIGIBLE: f64 = 1e-12;
 /// # Errors
 /// [`AxisError`] if the motor cannot be discretised, or nothing moves.
 pub fn prediction_model(axis: &AxisConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
-    let loops = InnerLoops::new(axis, periods)?;
+    model(axis, &axis.motor, periods)
+}
+
+/// The same of the plant as it is, with what it deviates by; the controllers inside know nothing of that.
+///
+/// # Errors
+/// As [`prediction_model`].
+pub fn deviating_model(axis: &AxisConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
+    model(axis, &Plant::motor(axis), periods)
+}
+
+/// The loops of `axis` about a motor.
+fn model(axis: &AxisConfig, motor: &MotorConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
+    let loops = InnerLoops::new(axis, motor, periods)?;
     let (transition, input) = loops.over_one_period();
     // θ(k + 1) − θ(k) = C x(k) + D Ω*(k) has no integrator.
     let markov = step_markov(&transition, &input, 2 * VELOCITY_STATES + 1);
@@ -49,11 +62,11 @@ struct InnerLoops {
 type State = SVector<f64, STATES>;
 
 impl InnerLoops {
-    fn new(axis: &AxisConfig, periods: &Periods) -> Result<Self, AxisError> {
+    fn new(axis: &AxisConfig, motor: &MotorConfig, periods: &Periods) -> Result<Self, AxisError> {
         let tick = seconds(periods.current);
         let (unlimited, torque_constant) = (f64::INFINITY, axis.motor.torque_constant);
         Ok(InnerLoops {
-            motor: Motor::new(&axis.motor, tick)?,
+            motor: Motor::new(motor, tick)?,
             velocity: Pi::new(&axis.velocity_loop, seconds(periods.velocity), torque_constant, unlimited),
             current: Pi::new(&axis.current_loop, tick, 1.0, unlimited),
             ticks_per_position: periods.ticks_per_position(),

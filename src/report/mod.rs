@@ -10,6 +10,7 @@ mod page;
 mod path_plot;
 mod polar;
 mod scale;
+mod scatter;
 mod strip;
 mod svg;
 mod text;
@@ -20,6 +21,8 @@ mod tool;
 use std::io;
 
 use crate::assess::Recording;
+
+pub use scatter::{PointGroup, PointStyle, Scatter};
 
 /// What a page shows.
 #[derive(Debug, Clone)]
@@ -79,6 +82,14 @@ impl Report<'_> {
     /// # Errors
     /// Those of the output.
     pub fn write(&self, out: &mut impl io::Write) -> io::Result<()> {
-        out.write_all(page::page(self).as_bytes())
+        self.write_with(&[], out)
+    }
+
+    /// Writes the page with pictures of a search, whose marks are those of the runs.
+    ///
+    /// # Errors
+    /// Those of the output.
+    pub fn write_with(&self, scatters: &[Scatter], out: &mut impl io::Write) -> io::Result<()> {
+        out.write_all(page::page(self, scatters).as_bytes())
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::text::{Text, cell, is_number};
-use super::{Report, ReportRun, Table, axes, tool};
+use super::{Report, ReportRun, Scatter, Table, axes, scatter, tool};
 
 /// Colours for light, dark and paper, and the layout.
 const STYLE: &str = include_str!("style.css");
@@ -44,7 +44,7 @@ macro_rules! put {
 }
 
 /// The whole page.
-pub(super) fn page(report: &Report) -> String {
+pub(super) fn page(report: &Report, scatters: &[Scatter]) -> String {
     let mut page = Page { runs: &report.runs, html: String::new(), pictures: 0 };
     let title = Text(report.title);
     put!(
@@ -61,6 +61,7 @@ pub(super) fn page(report: &Report) -> String {
     put!(page, "</header>\n");
     page.facts();
     page.tables();
+    scatter::section(&mut page, scatters);
     tool::sections(&mut page);
     axes::sections(&mut page);
     put!(
@@ -250,6 +251,9 @@ impl Page<'_> {
 fn swatch(class: &str) -> String {
     let shape = match class {
         "start" => "<circle class=\"start\" cx=\"17\" cy=\"6\" r=\"4\"/>".to_owned(),
+        point if point == "dot" || point.starts_with("mark ") => {
+            format!("<circle class=\"{point}\" cx=\"17\" cy=\"6\" r=\"4\"/>")
+        }
         line => format!("<path class=\"{line}\" d=\"M1 6h32\"/>"),
     };
     format!("<svg class=\"swatch\" viewBox=\"0 0 34 12\" aria-hidden=\"true\">{shape}</svg>")

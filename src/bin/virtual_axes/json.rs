@@ -23,10 +23,16 @@ pub fn object(input: &Input, machine: &str, runs: &[Run]) -> Value {
 }
 
 fn run(run: &Run) -> Value {
-    let figures = &run.outcome.figures;
     let mut object = Map::new();
     object.insert("controller".to_owned(), json!(run.controller));
     object.insert("changes".to_owned(), json!(run.changes));
+    object.extend(figures(&run.outcome.figures));
+    Value::Object(object)
+}
+
+/// Everything that was measured on a run.
+pub fn figures(figures: &Figures) -> Map<String, Value> {
+    let mut object = Map::new();
     object.insert("duration_s".to_owned(), json!(figures.duration));
     let axes = figures.axes.iter().map(|axis| (axis.name.clone(), self::axis(axis)));
     object.insert("axes".to_owned(), Value::Object(axes.collect()));
@@ -35,7 +41,7 @@ fn run(run: &Run) -> Value {
     object.insert("circles".to_owned(), figures.circles.iter().map(circle).collect());
     object.insert("bidirectional".to_owned(), figures.bidirectional.iter().map(bidirectional).collect());
     object.insert("corners".to_owned(), figures.corners.iter().map(corner).collect());
-    Value::Object(object)
+    object
 }
 
 fn axis(axis: &AxisFigures) -> Value {
@@ -54,6 +60,7 @@ fn axis(axis: &AxisFigures) -> Value {
         },
         "peak_current_a": report.peak_current,
         "saturation_s": report.saturation_time,
+        "control_activity_a": report.control_activity,
         "friction_extrapolated": axis.friction_extrapolated,
     })
 }

@@ -13,8 +13,11 @@ mod period;
 mod progress;
 mod psec;
 mod report;
+mod robustness;
 mod run;
+mod search;
 mod table;
+mod tune;
 mod variant;
 
 use std::error::Error;
@@ -45,6 +48,10 @@ enum Command {
     Psec(psec::Arguments),
     /// Design position controllers: polynomials, closed-loop poles and stability margins.
     Design(design::Arguments),
+    /// Find the tuning of the position controllers that suits a path best.
+    Tune(Box<tune::Arguments>),
+    /// Run one tuning on plants whose inertia, friction and torque constant are off.
+    Robustness(Box<robustness::Arguments>),
     /// Check a file: a machine, a scenario, or set-points.
     Check(check::Arguments),
     /// List the machines that come with the program.
@@ -105,6 +112,8 @@ fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Run(arguments) => run::run(arguments),
         Command::Psec(arguments) => psec::run(arguments),
         Command::Design(arguments) => design::run(arguments),
+        Command::Tune(arguments) => tune::run(arguments),
+        Command::Robustness(arguments) => robustness::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Machines { json } => list::machines(*json),
         Command::Scenarios { show: Some(name), .. } => list::scenario(name),

@@ -1,8 +1,13 @@
 //! Progress on standard error, for work that takes more than a second.
 
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use virtual_axes::tune::Watch;
+
+use crate::interrupt;
 
 /// Work shorter than this shows nothing.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -56,5 +61,51 @@ impl Progress {
     /// Takes the bar away.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// Runs of a search, counted from any thread.
+#[derive(Debug)]
+pub struct Runs {
+    bar: ProgressBar,
+    began: Instant,
+    shown: AtomicBool,
+}
+
+impl Runs {
+    /// None yet.
+    pub fn new() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        if let Ok(style) = ProgressStyle::with_template("{prefix} {wide_bar} {pos} of {len} runs, {eta} left")
+        {
+            bar.set_style(style);
+        }
+        Runs { bar, began: Instant::now(), shown: AtomicBool::new(false) }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Watch for Runs {
+    fn begin(&self, part: &'static str, runs: usize) {
+        self.bar.set_position(0);
+        self.bar.set_length(runs as u64);
+        self.bar.set_prefix(part);
+        self.bar.reset_eta();
+    }
+
+    fn done(&self) {
+        self.bar.inc(1);
+        if self.began.elapsed() >= PATIENCE && !self.shown.swap(true, Ordering::Relaxed) {
+            // Hidden still where standard error is no terminal.
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+    }
+
+    fn go_on(&self) -> io::Result<()> {
+        interrupt::check()
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use virtual_axes::assess::Recording;
 use virtual_axes::files::OutputFile;
-use virtual_axes::report::{Report, ReportRun};
+use virtual_axes::report::{Report, ReportRun, Scatter};
 
 use crate::input::Input;
 use crate::run::Run;
@@ -21,7 +21,13 @@ pub fn check_name(path: &Path) -> Result<(), String> {
 }
 
 /// Writes the page; it stands under its name only when it is whole.
-pub fn write(path: &Path, input: &Input, machine: &str, runs: &[Run]) -> Result<(), Box<dyn Error>> {
+pub fn write(
+    path: &Path,
+    input: &Input,
+    machine: &str,
+    runs: &[Run],
+    scatters: &[Scatter],
+) -> Result<(), Box<dyn Error>> {
     let titles: Vec<String> = runs.iter().map(Run::title).collect();
     let empty = Recording::default();
     // All runs alike, so that their tables can be compared row by row.
@@ -48,6 +54,6 @@ pub fn write(path: &Path, input: &Input, machine: &str, runs: &[Run]) -> Result<
     });
     let report = Report { title: input.name(), description: input.description(), runs: runs.collect() };
     let mut file = OutputFile::create(path)?;
-    report.write(&mut file)?;
+    report.write_with(scatters, &mut file)?;
     Ok(file.finish()?)
 }

@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     }
     let name = machine.machine_config()?.name().to_owned();
     if let Some(path) = &arguments.report {
-        report::write(path, &input, &name, &runs)?;
+        report::write(path, &input, &name, &runs, &[])?;
     }
     if arguments.json {
         return Ok(format!("{:#}\n", json::object(&input, &name, &runs)));

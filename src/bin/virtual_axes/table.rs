@@ -65,6 +65,7 @@ pub fn axes(figures: &Figures) -> Table {
         ("RMS", ""),
         ("peak current", "A"),
         ("saturated", "s"),
+        ("activity", "A"),
     ];
     let mut table = table("Axes", &columns);
     let none_moves = figures.axes.iter().all(|axis| !axis.moves);
@@ -81,6 +82,7 @@ pub fn axes(figures: &Figures) -> Table {
         row.extend(errors.iter().map(|error| format!("{:.1}", error / scale)));
         row.push(format!("{:.2}", r.peak_current));
         row.push(format!("{:.3}", r.saturation_time));
+        row.push(format!("{:.3}", r.control_activity));
         table.rows.push(row);
     }
     table

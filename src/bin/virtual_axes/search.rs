@@ -1,0 +1,134 @@
+//! What `tune` and `robustness` share: paths that are run many times, and figures as cells and JSON.
+
+use std::error::Error;
+
+use serde_json::{Map, Value, json};
+use virtual_axes::config::MachineConfig;
+use virtual_axes::design::Margins;
+use virtual_axes::report::Column;
+use virtual_axes::trial::Figures;
+use virtual_axes::tune::{Candidate, Cost, Course, Term, TuneError, Tuning};
+use virtual_axes::units::{DEGREE, MILLISECOND};
+
+use crate::input::Input;
+use crate::interrupt;
+
+/// What stands in a cell that has no value.
+const NONE: &str = "–";
+
+/// Reads the set-points of `input` into memory.
+pub fn course(input: &Input, machine: &MachineConfig, feed: Option<f64>) -> Result<Course, Box<dyn Error>> {
+    let program = input.program(machine, feed)?;
+    let setpoints = input.setpoints(machine, program.as_ref())?;
+    Course::read(input.name(), program.clone(), setpoints, interrupt::check)
+        .map_err(|error| -> Box<dyn Error> { error })
+}
+
+/// The error with the name of the path, where it does not name a file itself.
+pub fn named(input: &Input, error: TuneError) -> Box<dyn Error> {
+    match error {
+        TuneError::Trial(error) => crate::run::named(input, error),
+        error => format!("{}: {error}", input.name()).into(),
+    }
+}
+
+/// Heads of the columns that say how a tuning does on a path with `figures`.
+pub fn columns(first: &str, cost: &Cost, figures: &Figures) -> Vec<Column> {
+    let rms = Term::ContourRms.unit(figures);
+    let columns = [
+        (first, ""),
+        ("cost", cost.unit(figures)),
+        ("RMS error", rms),
+        ("modulus margin", ""),
+        ("delay margin", "ms"),
+        ("phase margin", "°"),
+        ("peak current", "of the limit"),
+        ("activity", "A"),
+        ("saturated", "s"),
+    ];
+    columns.map(|(name, unit)| Column::new(name, unit)).to_vec()
+}
+
+/// Their cells.
+pub fn row(
+    name: String,
+    cost: f64,
+    margins: Option<&Margins>,
+    figures: &Figures,
+    machine: &MachineConfig,
+) -> Vec<String> {
+    let margin = |value: fn(&Margins) -> f64, decimals: usize| {
+        let value = margins.map(value).filter(|value| value.is_finite());
+        value.map_or(NONE.to_owned(), |value| format!("{value:.decimals$}"))
+    };
+    vec![
+        name,
+        format!("{cost:.2}"),
+        format!("{:.2}", Term::ContourRms.of(figures, machine)),
+        margin(|m| m.modulus, 3),
+        margin(|m| m.delay / MILLISECOND, 2),
+        margin(|m| m.phase / DEGREE, 1),
+        format!("{:.3}", Term::Current.of(figures, machine)),
+        format!("{:.3}", Term::Activity.of(figures, machine)),
+        format!("{:.3}", saturation(figures)),
+    ]
+}
+
+/// Time with a limit reached, of the axis that reached it for the longest, s.
+fn saturation(figures: &Figures) -> f64 {
+    figures.axes.iter().map(|axis| axis.report.saturation_time).fold(0.0, f64::max)
+}
+
+/// A run as JSON: what it is, cost, margins, and each figure that can be part of a cost.
+pub fn object(
+    what: Vec<(&str, Value)>,
+    cost: f64,
+    margins: Option<&Margins>,
+    figures: &Figures,
+    machine: &MachineConfig,
+) -> Map<String, Value> {
+    let mut object: Map<String, Value> =
+        what.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+    object.insert("cost".to_owned(), json!(cost));
+    let margins = margins.map_or(Value::Null, |m| {
+        json!({
+            // JSON knows no infinity: null where there is no such margin.
+            "modulus": m.modulus,
+            "phase_deg": m.phase / DEGREE,
+            "gain": m.gain,
+            "delay_ms": m.delay / MILLISECOND,
+        })
+    });
+    object.insert("margins".to_owned(), margins);
+    let terms = Term::ALL.map(|term| (term.name().replace('-', "_"), json!(term.of(figures, machine))));
+    object.insert("terms".to_owned(), Value::Object(terms.into_iter().collect()));
+    object.insert("saturation_s".to_owned(), json!(saturation(figures)));
+    object
+}
+
+/// A tuning that was run, as JSON.
+pub fn candidate(candidate: &Candidate, machine: &MachineConfig) -> Map<String, Value> {
+    let what = vec![("tuning", tuning(&candidate.tuning))];
+    object(what, candidate.cost, candidate.margins.as_ref(), &candidate.figures, machine)
+}
+
+fn tuning(tuning: &Tuning) -> Value {
+    match tuning {
+        Tuning::Present => json!("present"),
+        Tuning::Gpc { n1, n2, nu, lambda_rel } => {
+            json!({ "n1": n1, "n2": n2, "nu": nu, "lambda_rel": lambda_rel })
+        }
+        Tuning::Cascade(axes) => axes
+            .iter()
+            .map(|(joint, gains)| {
+                let gains = json!({
+                    "gain": gains.gain,
+                    "velocity_feedforward": gains.velocity,
+                    "torque_feedforward": gains.torque,
+                });
+                (joint.clone(), gains)
+            })
+            .collect::<Map<_, _>>()
+            .into(),
+    }
+}
