@@ -18,6 +18,7 @@ mod run;
 mod search;
 mod table;
 mod tune;
+mod tune_output;
 mod variant;
 
 use std::error::Error;
