@@ -148,5 +148,7 @@ def test_the_axis_does_not_know_whether_a_controller_is_predictive(start: Callab
         np.testing.assert_array_equal(by_service[series], wanted, err_msg=str(series))
 
     # Half of it is another controller: the comparison can fail.
-    drive.set_parameters_atomically(of_x({key: (np.array(polynomials[key]) / 2).tolist() for key in ("rst.r", "rst.t")}))
+    drive.set_parameters_atomically(
+        of_x({key: (np.array(polynomials[key]) / 2).tolist() for key in ("rst.r", "rst.t")})
+    )
     assert (run("rst")["position", "x"] != designed["position", "x"]).any()

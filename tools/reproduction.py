@@ -199,8 +199,8 @@ def page() -> str:
     parts.append(
         section(
             "Figure 10, right: the ballbar under predictive control",
-            "The rows name N1, N2, Nu and λ_rel; the paper does not print its tuning. The extremes are the spikes where "
-            "friction reverses, at the quadrants.",
+            "The rows name N1, N2, Nu and λ_rel; the paper does not print its tuning. The extremes are the spikes "
+            "where friction reverses, at the quadrants.",
             predictive("ballbar"),
             rows,
         )
