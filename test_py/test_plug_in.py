@@ -39,6 +39,11 @@ def design() -> dict[str, object]:
         ({"gpc.nu": 15}, [f"{LOOP}.gpc.nu", f"{LOOP}.gpc.n2", "15", "14"]),
         ({"gpc.n2": 11}, [f"{LOOP}.gpc.nu", f"{LOOP}.gpc.n2", "12", "11"]),
         ({"controller": "gpc", "gpc.n1": 9, "gpc.n2": 8, "gpc.nu": 6}, [f"{LOOP}.gpc.n1", "9", "8"]),
+        # Without a weight so many increments cannot be told apart.
+        (
+            {"controller": "gpc", "gpc.n2": 200, "gpc.nu": 200, "gpc.lambda": 0.0},
+            ["axis x", "singular", "n2 = 200", "nu = 200", "lambda = 0"],
+        ),
         ({"gpc.lambda_rel": -1e-3}, [f"{LOOP}.gpc.lambda_rel", "-1e-3|-0.001"]),
         ({"gpc.lambda": -1.0}, [f"{LOOP}.gpc.lambda", "-1"]),
         ({"controller": "pid"}, [f"{LOOP}.controller", "pid", "cascade", "gpc", "rst"]),
