@@ -29,7 +29,7 @@ page=$root/.build/ballbar.html
 echo
 echo "The same trial without ROS:"
 echo
-"${CARGO_TARGET_DIR:-$root/target}/release/virtual_axes" run ballbar --controller cascade,cascade-noff --report "$page"
+"${CARGO_TARGET_DIR:-$root/target}/release/virtual_axes" run ballbar --controller cascade,cascade-noff,gpc --report "$page"
 echo
 echo "page with plots: $page"
 python "$root/tools/screenshot.py" "$page" "${page%.html}-page.png"

@@ -1,4 +1,4 @@
-"""The ballbar of the paper's figure 10, driven over ROS 2: with and without feedforward.
+"""The ballbar of the paper's figure 10, driven over ROS 2: cascade with and without feedforward, predictive.
 
 ./demo.sh [--fast] [--out FILE.png]
 """
@@ -21,10 +21,17 @@ from matplotlib.ticker import FuncFormatter
 from drive import Ballbar, Drive, Node, Recording, ballbar, circular_deviation, joint_trajectory
 
 AXES = ("x", "y")
-FEEDFORWARD = [f"{axis}.feedforward.{part}" for axis in AXES for part in ("velocity", "torque_kg_m2")]
+RUNS: dict[str, dict[str, object]] = {
+    "cascade with feedforward": {},
+    "cascade without feedforward": {
+        f"{axis}.feedforward.{part}": 0.0 for axis in AXES for part in ("velocity", "torque_kg_m2")
+    },
+    "predictive control": {f"{axis}.position_loop.controller": "gpc" for axis in AXES},
+}
+"""What is set for each run, one after the other. Feedforward is the cascade's."""
 
-PAPER = {"with feedforward": "50 (fig. 10, left)", "without feedforward": "-"}
-MODEL_UM = {"with feedforward": +49.0, "without feedforward": -283.1}
+PAPER = {"cascade with feedforward": "50 (fig. 10, left)", "predictive control": "almost 0 (fig. 10, right)"}
+MODEL_UM = {"cascade with feedforward": +49.0, "cascade without feedforward": -283.1, "predictive control": -0.4}
 """Mean radial deviation that this package's model is specified to have, µm."""
 
 
@@ -50,7 +57,7 @@ def report(path: Ballbar, runs: dict[str, Recording]) -> str:
                 f"{deviation.max():+.1f}",
                 f"{circular_deviation(deviation):.1f}",
                 f"{MODEL_UM[title]:+.1f}",
-                PAPER[title],
+                PAPER.get(title, "-"),
                 f"{error[0]:.0f}, {error[1]:.0f}",
             )
         )
@@ -69,7 +76,7 @@ def report(path: Ballbar, runs: dict[str, Recording]) -> str:
 def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
     """Polar plots of the radial deviation, the deviation magnified as on a ballbar's chart."""
     figure, plots = plt.subplots(
-        1, len(runs), figsize=(11, 5.8), subplot_kw={"projection": "polar"}, layout="constrained"
+        1, len(runs), figsize=(14.5, 6.2), subplot_kw={"projection": "polar"}, layout="constrained"
     )
     # Black and one strong colour, solid and dashed: readable on a grey printer too.
     for plot, (title, run) in zip(np.atleast_1d(plots), runs.items()):
@@ -101,8 +108,10 @@ def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
         plot.set_title(
             f"{title}\nmean {deviation.mean():+.1f} µm, G = {circular_deviation(deviation):.1f} µm", fontsize=11
         )
-        plot.legend(loc="lower center", bbox_to_anchor=(0.5, -0.24), fontsize=9, frameon=False)
-    figure.suptitle("Ballbar in X–Y at 15 m/min: radial deviation in µm over the polar angle, magnified", fontsize=12)
+    figure.legend(*plot.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=10, frameon=False)
+    figure.suptitle(
+        "Ballbar in X–Y at 15 m/min: radial deviation in µm over the polar angle, each on its own scale", fontsize=12
+    )
     figure.savefig(file, dpi=150)
     plt.close(figure)
 
@@ -114,7 +123,7 @@ def _round_step(value: float) -> float:
 
 
 def main() -> int:
-    """Run both circles, print, draw."""
+    """Run the circles, print, draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--fast", action="store_true", help="as fast as the machine can, not in real time")
     parser.add_argument("--out", type=Path, default=Path(__file__).resolve().parent.parent / ".build" / "ballbar.png")
@@ -128,9 +137,8 @@ def main() -> int:
     runs: dict[str, Recording] = {}
     with Node(["-p", f"time:={clock}"]) as process, Drive(process=process) as drive:
         print(f"node {process.name}, process {process.pid}, domain {process.domain_id}, time: {clock}")
-        for title, feedforward in (("with feedforward", True), ("without feedforward", False)):
-            if not feedforward:
-                drive.set_parameters({name: 0.0 for name in FEEDFORWARD})
+        for title, values in RUNS.items():
+            drive.set_parameters(values)
             print(f"ballbar {title}: {path.time[-1]:.1f} s of motion ...", end=" ", flush=True)
             began = time.monotonic()
             runs[title] = measure(drive, path)

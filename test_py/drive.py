@@ -37,7 +37,13 @@ from builtin_interfaces.msg import Duration, Time
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterDescriptor
-from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 from rclpy._rclpy_pybind11 import InvalidHandle
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -596,14 +602,23 @@ class Drive:
         return {name: parameter_value_to_python(value) for name, value in zip(names, answer.values)}
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
-        """Set parameters; raises ParameterRefused with the node's reasons."""
-        parameters: list[ParameterMsg] = [
-            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
-        ]
-        answer = self.call(SetParameters, "set_parameters", SetParameters.Request(parameters=parameters))
-        reasons = [result.reason for result in answer.results if not result.successful]
-        if reasons or len(answer.results) != len(parameters):
+        """Set parameters, each by itself; raises ParameterRefused with the node's reasons."""
+        request = SetParameters.Request(parameters=_parameters(values))
+        results = self.call(SetParameters, "set_parameters", request).results
+        reasons = [result.reason for result in results if not result.successful]
+        if reasons or len(results) != len(values):
             raise ParameterRefused("; ".join(reasons))
+
+    def set_parameters_atomically(self, values: Mapping[str, Any]) -> None:
+        """Set parameters, all at the same position instant or none; raises ParameterRefused."""
+        request = SetParametersAtomically.Request(parameters=_parameters(values))
+        result = self.call(SetParametersAtomically, "set_parameters_atomically", request).result
+        if not result.successful:
+            raise ParameterRefused(result.reason)
+
+
+def _parameters(values: Mapping[str, Any]) -> list[ParameterMsg]:
+    return [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
 
 
 def _stamp_ns(sample: bytes) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import subprocess
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -26,42 +28,55 @@ def plan() -> tuple[np.ndarray, np.ndarray]:
     return time, np.column_stack(columns)
 
 
+Offline = Callable[[str], dict[str, np.ndarray]]
+
+
 @pytest.fixture(scope="module")
-def offline(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
-    """The trace of the command line, by column."""
+def offline(tmp_path_factory: pytest.TempPathFactory) -> Offline:
+    """The trace of the command line under a position controller, by column."""
     folder = tmp_path_factory.mktemp("offline")
-    psec, trace = folder / "psec.csv", folder / "trace.csv"
+    psec = folder / "psec.csv"
     time, positions = plan()
     with psec.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["time", *AXES])
         # repr of a float is read back exactly.
         writer.writerows([repr(float(t)), *map(repr, map(float, row))] for t, row in zip(time, positions))
-    command = [str(Path(node_binary()).with_name("virtual_axes")), "run", str(psec), "--trace", str(trace)]
-    subprocess.run(command, check=True, timeout=60, stdout=subprocess.DEVNULL)
-    with trace.open(newline="") as file:
-        header, *rows = csv.reader(file)
-    values = np.array(rows, dtype=float)
-    return {name: values[:, column] for column, name in enumerate(header)}
+
+    @cache
+    def run(controller: str) -> dict[str, np.ndarray]:
+        trace = folder / f"{controller}.csv"
+        program = str(Path(node_binary()).with_name("virtual_axes"))
+        command = [program, "run", str(psec), "--controller", controller, "--trace", str(trace)]
+        subprocess.run(command, check=True, timeout=60, stdout=subprocess.DEVNULL)
+        with trace.open(newline="") as file:
+            header, *rows = csv.reader(file)
+        values = np.array(rows, dtype=float)
+        return {name: values[:, column] for column, name in enumerate(header)}
+
+    return run
 
 
-def record(drive: Drive) -> Recording:
-    """The plan, run by the node from home."""
+def record(drive: Drive, controller: str) -> Recording:
+    """The plan, run by the node from home under a position controller."""
+    drive.set_parameters_atomically({f"{axis}.position_loop.controller": controller for axis in AXES})
     drive.reset()
     time, positions = plan()
     return drive.run(joint_trajectory(AXES, time, positions))
 
 
+@pytest.mark.parametrize("controller", ["cascade", "gpc"])
 @pytest.mark.parametrize("mode", ["fast", "real"])
 def test_the_node_computes_what_the_command_line_computes(
-    mode: str, offline: dict[str, np.ndarray], request: pytest.FixtureRequest
+    mode: str, controller: str, offline: Offline, request: pytest.FixtureRequest
 ):
     """Every instant of the motion, every signal that both have."""
-    recording = record(request.getfixturevalue(mode))
+    recording, wanted = record(request.getfixturevalue(mode), controller), offline(controller)
     instants = len(recording.states.stamp)
     assert instants == len(plan()[0])
     expected = np.arange(instants) * TSP_NS + recording.start
     np.testing.assert_array_equal(recording.states.stamp, expected)
+    assert set(recording.states["controller"].flat) == {controller}
     for axis in AXES:
         for series, field, signal in [
             (recording.states, "psec", "psec"),
@@ -73,5 +88,5 @@ def test_the_node_computes_what_the_command_line_computes(
             (recording.currents, "friction", "friction_current"),
         ]:
             np.testing.assert_array_equal(
-                series[field, axis], offline[f"{axis}.{signal}"][:instants], err_msg=f"{axis} {signal}"
+                series[field, axis], wanted[f"{axis}.{signal}"][:instants], err_msg=f"{axis} {signal}"
             )

@@ -1,0 +1,159 @@
+"""Position controllers by their numbers: what is refused, and that what is accepted runs."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from virtual_axes.msg import TrajectoryResult as R
+
+from drive import TSP_NS, Drive, ParameterRefused, joint_trajectory, node_binary
+from motion import assert_psec, go_home, start_swing, swing
+
+LOOP = "x.position_loop"
+UNSTABLE = {"controller": "rst", "rst.r": [250.0], "rst.s": [1.0], "rst.t": [250.0]}
+"""A proportional law of ten times the gain: more than the lag of the velocity loop can bear."""
+
+
+def of_x(values: dict[str, object]) -> dict[str, object]:
+    """Parameters of X's position loop."""
+    return {f"{LOOP}.{key}": value for key, value in values.items()}
+
+
+def design() -> dict[str, object]:
+    """What `virtual_axes design gpc` makes of X with the machine file's tuning."""
+    command = [str(Path(node_binary()).with_name("virtual_axes")), "design", "gpc", "--axis", "x", "--json"]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=60)
+    return json.loads(done.stdout)["axes"]["x"]
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"gpc.n1": 15}, [f"{LOOP}.gpc.n1", f"{LOOP}.gpc.n2", "15", "14"]),
+        ({"gpc.nu": 15}, [f"{LOOP}.gpc.nu", f"{LOOP}.gpc.n2", "15", "14"]),
+        ({"gpc.n2": 11}, [f"{LOOP}.gpc.nu", f"{LOOP}.gpc.n2", "12", "11"]),
+        ({"controller": "gpc", "gpc.n1": 9, "gpc.n2": 8, "gpc.nu": 6}, [f"{LOOP}.gpc.n1", "9", "8"]),
+        # Without a weight so many increments cannot be told apart.
+        (
+            {"controller": "gpc", "gpc.n2": 200, "gpc.nu": 200, "gpc.lambda": 0.0},
+            ["axis x", "singular", "n2 = 200", "nu = 200", "lambda = 0"],
+        ),
+        ({"gpc.lambda_rel": -1e-3}, [f"{LOOP}.gpc.lambda_rel", "-1e-3|-0.001"]),
+        ({"gpc.lambda": -1.0}, [f"{LOOP}.gpc.lambda", "-1"]),
+        ({"controller": "pid"}, [f"{LOOP}.controller", "pid", "cascade", "gpc", "rst"]),
+        ({"controller": "rst"}, [f"{LOOP}.rst.r"]),
+        (
+            {"controller": "rst", "rst.r": [25.0], "rst.s": [1.0], "rst.t": [24.0]},
+            ["axis x", r"T\(1\) = 24", r"R\(1\) = 25"],
+        ),
+        ({"rst.t": [25.0, float("nan")]}, [f"{LOOP}.rst.t", "NaN"]),
+        (UNSTABLE, ["axis x", "unstable", "pole"]),
+    ],
+    ids=lambda value: ",".join(value) if isinstance(value, dict) else "",
+)
+def test_a_controller_that_cannot_be_is_refused_and_the_motion_goes_on(
+    values: dict[str, object], words: list[str], real: Drive
+):
+    """With the key or the axis and the numbers in the reason; all is as it was before."""
+    go_home(real)
+    accepted, start, planned = start_swing(real, duration=6.0)
+    real.wait_until(start + 20 * TSP_NS, 10)
+    keys = list(of_x({**dict.fromkeys(UNSTABLE), **values}))
+    before = real.get_parameters(keys)
+    with pytest.raises(ParameterRefused) as refusal:
+        real.set_parameters_atomically(of_x(values))
+    for word in words:
+        assert re.search(word, str(refusal.value), re.IGNORECASE), f"no {word} in: {refusal.value}"
+    assert real.get_parameters(keys) == before
+
+    refused_at = real.now()
+    end = min(refused_at + 50 * TSP_NS, start + (len(planned["x"]) - 1) * TSP_NS)
+    assert_psec(real, start, planned, last=end)
+    states = real.record(start, end).states
+    assert set(states["controller", "x"]) == {"cascade"}
+    # What the cascade leaves on a motion as gentle as this one.
+    assert np.abs(states["synchronized_tracking_error", "x"]).max() < 100e-6
+    # Nobody was told that it ended before its time.
+    assert {result.status for result in real.results(accepted.sequence_number)} <= {R.ACCEPTED, R.COMPLETED}
+
+
+def test_an_unstable_loop_is_refused_by_its_pole_and_runs_when_it_is_allowed(start: Callable[..., Drive]):
+    """The pole is that of A S + B R; forced, the axis shows what it means."""
+    drive = start()
+    model = design()["model"]
+    (gain,) = UNSTABLE["rst.r"]
+    poles = np.roots(np.array(model["a"]) + gain * np.array(model["b_s"]))
+    worst = poles[np.abs(poles).argmax()]
+    assert abs(worst) > 1
+    with pytest.raises(ParameterRefused) as refusal:
+        drive.set_parameters_atomically(of_x(UNSTABLE))
+    named = re.search(r"pole (-?[\d.]+) [+±] ([\d.]+)j has the modulus ([\d.]+)", str(refusal.value))
+    assert named, refusal.value
+    assert [float(number) for number in named.groups()] == pytest.approx(
+        [worst.real, abs(worst.imag), abs(worst)], abs=1e-5
+    )
+
+    drive.set_parameters_atomically(of_x({**UNSTABLE, "allow_unstable": True}))
+    _, begin, _ = start_swing(drive, duration=1.5)
+    drive.wait_until(begin + 250 * TSP_NS, 20)
+    forced = drive.record(begin, begin + 250 * TSP_NS)
+    assert set(forced.states["controller", "x"]) == {"rst"}
+    assert forced.currents["saturated", "x"].any()
+    assert not forced.currents["saturated", "y"].any()
+
+    # Not to be taken back under the controller that needs it, only together with it.
+    with pytest.raises(ParameterRefused, match="unstable"):
+        drive.set_parameters({f"{LOOP}.allow_unstable": False})
+    drive.set_parameters_atomically(of_x({"allow_unstable": False, "controller": "cascade"}))
+    drive.wait_for(lambda: drive.latest("controller")["x"] == "cascade", 10, "controller cascade")
+    assert drive.get_parameters([f"{LOOP}.allow_unstable"]) == {f"{LOOP}.allow_unstable": False}
+
+
+def test_the_axis_does_not_know_whether_a_controller_is_predictive(start: Callable[..., Drive]):
+    """The polynomials of `virtual_axes design gpc` as arrays of doubles: the same bits as the design."""
+    found = design()
+    polynomials = {
+        "rst.r": found["r_per_s"],
+        "rst.s": found["s"],
+        "rst.t": found["t_per_s"],
+        "rst.t_first": found["t_first"],
+    }
+    given = [word for key, value in of_x(polynomials).items() for word in ("-p", f"{key}:={value}")]
+    drive = start("-p", "time:=fast", "-p", f"{LOOP}.controller:=rst", *given)
+    assert drive.get_parameters(list(of_x(polynomials))) == of_x(polynomials)
+    time, position = swing(3.0, rest=0.1)
+
+    def run(controller: str) -> dict[tuple[str, str], np.ndarray]:
+        go_home(drive)
+        recording = drive.run(joint_trajectory(["x", "y"], time, np.column_stack([position, -position])), settle=0.5)
+        assert set(recording.states["controller", "x"]) == {controller}
+        assert np.abs(recording.states["velocity", "x"]).max() > 0.04
+        return {
+            ("position", "x"): recording.joints["position", "x"],
+            ("velocity", "x"): recording.joints["velocity", "x"],
+            ("velocity_setpoint", "x"): recording.states["velocity_setpoint", "x"],
+            ("voltage", "x"): recording.states["voltage", "x"],
+            ("current", "x"): recording.currents["current", "x"],
+            ("position", "y"): recording.joints["position", "y"],
+        }
+
+    by_arguments = run("rst")
+    drive.set_parameters({f"{LOOP}.controller": "gpc"})
+    designed = run("gpc")
+    drive.set_parameters_atomically(of_x({"controller": "rst", **polynomials}))
+    by_service = run("rst")
+    for series, wanted in designed.items():
+        np.testing.assert_array_equal(by_arguments[series], wanted, err_msg=str(series))
+        np.testing.assert_array_equal(by_service[series], wanted, err_msg=str(series))
+
+    # Half of it is another controller: the comparison can fail.
+    drive.set_parameters_atomically(
+        of_x({key: (np.array(polynomials[key]) / 2).tolist() for key in ("rst.r", "rst.t")})
+    )
+    assert (run("rst")["position", "x"] != designed["position", "x"]).any()
