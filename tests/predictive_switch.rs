@@ -53,7 +53,8 @@ struct Seen {
     saturated: bool,
 }
 
-/// Follows the circle to instant `to`, and says what was seen from `from` on.
+/// Follows the circle to instant `to`, and says what was seen on the way.
+#[derive(Clone)]
 struct Run<'a> {
     ballbar: &'a Ballbar,
     machine: Machine,
@@ -109,12 +110,15 @@ fn cascade_to_predictive_and_back_on_a_circle_is_not_felt() {
         cascade.deviation[0].min(gpc.deviation[0]) - 60e-6,
         cascade.deviation[1].max(gpc.deviation[1]) + 60e-6,
     ];
-    // Instants all around the circle, reversals among them.
-    for first in (STEADY + turn / 8..STEADY + turn).step_by(17) {
-        let mut run = Run::new(&ballbar, parameters_of(CASCADE));
-        run.until(first);
-        for (changes, before) in [(GPC, cascade), (CASCADE, gpc)] {
-            run.machine.adopt(parameters_of(changes)).expect("the same machine");
+    let (to_cascade, to_gpc) = (parameters_of(CASCADE), parameters_of(GPC));
+    let mut undisturbed = Run::new(&ballbar, Arc::clone(&to_cascade));
+    undisturbed.until(STEADY + turn / 4);
+    // At every instant of a turn: a reversal is where a switch is felt most.
+    for first in STEADY + turn / 4..STEADY + 5 * turn / 4 {
+        undisturbed.until(first);
+        let mut run = undisturbed.clone();
+        for (parameters, before) in [(&to_gpc, cascade), (&to_cascade, gpc)] {
+            run.machine.adopt(Arc::clone(parameters)).expect("the same machine");
             let seen = run.until(run.next + 80);
             assert!(!seen.saturated);
             assert!(seen.change <= 2.0 * before.change, "{first}: {} and {}", seen.change, before.change);

@@ -148,6 +148,7 @@ impl Axis {
         if (&old.position, &old.feedforward) != (&p.position, &p.feedforward) {
             self.position.hand_over();
         }
+        self.sample.controller = p.controller;
     }
 
     /// The set-point of the position period that begins, and those behind it as far as they are known.

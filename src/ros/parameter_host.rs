@@ -64,8 +64,8 @@ impl ParameterHost for Host {
                     "{key} cannot be set while the node runs; set it at the start, with -p or --params-file"
                 ));
             }
-            let value =
-                from_ros(value).ok_or_else(|| format!("{key}: byte arrays are not parameters here"))?;
+            let value = from_ros(value)
+                .ok_or_else(|| format!("{key}: empty lists and byte arrays are not parameters here"))?;
             assignments.push(Assignment { key, value, source: source.clone() });
         }
         let mut changed = self.parameters.clone();
