@@ -4,10 +4,9 @@
 //! around [`simulation::Simulation`] in the room `ros` (cargo feature `ros`).
 //!
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
-//! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] →
-//! [`machine`] → [`trajectory`],
-//! [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] → [`tune`] → [`messages`], [`files`], [`report`] →
-//! `ros`.
+//! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] → [`machine`] →
+//! [`trajectory`], [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] → [`tune`] →
+//! [`messages`], [`files`], [`report`] → `ros`.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]

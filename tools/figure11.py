@@ -71,13 +71,13 @@ def draw(contrast: dict) -> None:
         ylabel="Y (mm)",
         title=f"{CORNER}: 10 m/min",
         xlim=(LEG_MM - AROUND_MM, LEG_MM + AROUND_MM),
-        ylim=(-AROUND_MM / 2, AROUND_MM / 2),
+        ylim=(-AROUND_MM / 5, AROUND_MM / 2),
         aspect="equal",
     )
     for axes in circle, corner:
         axes.grid(alpha=0.3)
-        axes.legend(loc="upper left", fontsize="small")
-    figure.tight_layout()
+    figure.tight_layout(rect=(0, 0.08, 1, 1))
+    figure.legend(*corner.get_legend_handles_labels(), loc="lower center", ncols=3)
     figure.savefig(PICTURE, metadata={"Date": None})
 
 
