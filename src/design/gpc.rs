@@ -60,6 +60,16 @@ impl GpcTuning {
 /// R = Σ kⱼ Fⱼ              S = Δ (1 + q⁻¹ Σ kⱼ Hⱼ)     T = Σ kⱼ qʲ
 /// ```
 ///
+/// ```
+/// use virtual_axes::design::{GpcTuning, PredictionModel, Weight, gpc};
+///
+/// let model = PredictionModel::new(vec![1.0, -0.8], vec![0.0, 0.4], 0.006)?;
+/// let rst = gpc(&model, &GpcTuning { n1: 1, n2: 4, nu: 1, weight: Weight::Absolute(0.1) })?;
+/// assert!((rst.r()[0] - 2.98449263).abs() < 1e-8 && (rst.r()[1] + 1.93600542).abs() < 1e-8);
+/// assert_eq!((rst.t_first(), rst.preview()), (1, 4));
+/// # Ok::<(), virtual_axes::design::DesignError>(())
+/// ```
+///
 /// # Errors
 /// [`DesignError::OutOfRange`] naming the parameter, [`DesignError::Singular`].
 pub fn gpc(model: &PredictionModel, tuning: &GpcTuning) -> Result<Rst, DesignError> {

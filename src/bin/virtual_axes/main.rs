@@ -16,6 +16,7 @@ mod report;
 mod robustness;
 mod run;
 mod search;
+mod subject;
 mod table;
 mod tune;
 mod tune_output;

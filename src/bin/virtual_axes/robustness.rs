@@ -3,37 +3,24 @@
 use std::error::Error;
 
 use serde_json::{Value, json};
-use virtual_axes::config::{DEFAULT_MACHINE, MachineConfig, Parameters};
+use virtual_axes::config::MachineConfig;
 use virtual_axes::report::Table;
 use virtual_axes::tune::{Cost, Deviated, Deviation, Robustness, robustness};
 
-use crate::input::Input;
 use crate::progress::Runs;
 use crate::search::{columns, course, named, object, row};
+use crate::subject::Subject;
 use crate::table;
 use crate::variant::{self, Controller};
 
 /// What to run.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A shipped scenario, a scenario file, or a file of set-points: CSV, MCAP or YAML as for `run`.
-    #[arg(value_name = "SCENARIO|FILE")]
-    input: String,
-    /// A shipped machine or a machine file.
-    #[arg(long, default_value = DEFAULT_MACHINE)]
-    machine: String,
+    #[command(flatten)]
+    subject: Subject,
     /// Position controller in the place of the machine's.
     #[arg(long, value_enum)]
     controller: Option<Controller>,
-    /// A parameter, as in `x.velocity_loop.gain=4.5`; can be given several times.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// Feed in the place of the scenario's, m/min (rpm for a scenario of rotary moves).
-    #[arg(long, allow_negative_numbers = true)]
-    feed: Option<f64>,
-    /// The topic to run, if a recording has several with a JointTrajectory.
-    #[arg(long)]
-    topic: Option<String>,
     /// By what part inertia, friction and torque constant are off.
     #[arg(long, default_value_t = 0.3, allow_negative_numbers = true, value_parser = part)]
     by: f64,
@@ -55,11 +42,11 @@ fn part(text: &str) -> Result<f64, String> {
 
 /// Runs it; the text is a table, or JSON.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    let machine = Parameters::load(&arguments.machine)?;
-    let parameters = variant::parameters(&machine, arguments.controller, &arguments.set, &[])?;
-    let input = Input::open(&arguments.input, arguments.topic.as_deref())?;
+    let machine = arguments.subject.machine()?;
+    let parameters = variant::parameters(&machine, arguments.controller, &arguments.subject.set, &[])?;
+    let input = arguments.subject.input()?;
     let config = parameters.machine_config()?;
-    let path = course(&input, &config, arguments.feed)?;
+    let path = course(&input, &config, arguments.subject.feed)?;
     let progress = Runs::new();
     let found = robustness(&parameters, &path, &arguments.cost, arguments.by, &progress);
     progress.finish();

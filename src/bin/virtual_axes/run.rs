@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use virtual_axes::config::{DEFAULT_MACHINE, MachineConfig, Parameters};
+use virtual_axes::config::{MachineConfig, Parameters};
 use virtual_axes::files::{TraceWriter, trace_writer};
 use virtual_axes::machine::AxisSample;
 use virtual_axes::trial::{Outcome, Tick, Trial, TrialError};
@@ -13,34 +13,21 @@ use virtual_axes::units::{Nanoseconds, seconds};
 use crate::input::Input;
 use crate::period::Period;
 use crate::progress::Progress;
+use crate::subject::Subject;
 use crate::variant::{self, Controller};
 use crate::{interrupt, json, report, table};
 
 /// What to run.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A shipped scenario, a scenario file, or a file of set-points: CSV (`time,x,y,…` in s, m, rad),
-    /// MCAP with a JointTrajectory, or the YAML that `ros2 topic pub` takes.
-    #[arg(value_name = "SCENARIO|FILE")]
-    input: String,
-    /// A shipped machine or a machine file.
-    #[arg(long, default_value = DEFAULT_MACHINE)]
-    machine: String,
+    #[command(flatten)]
+    subject: Subject,
     /// Position controller in the place of the machine's; several are run one after the other.
     #[arg(long, value_enum, value_delimiter = ',')]
     controller: Vec<Controller>,
-    /// A parameter, as in `x.velocity_loop.gain=4.5`; can be given several times.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
     /// One more run with these parameters, to be compared; can be given several times.
     #[arg(long, value_name = "KEY=VALUE[,KEY=VALUE]…")]
     compare: Vec<String>,
-    /// Feed in the place of the scenario's, m/min (rpm for a scenario of rotary moves).
-    #[arg(long, allow_negative_numbers = true)]
-    feed: Option<f64>,
-    /// The topic to run, if a recording has several with a JointTrajectory.
-    #[arg(long)]
-    topic: Option<String>,
     /// Where to write signals over time.
     #[arg(long, value_name = "FILE.csv|FILE.mcap")]
     trace: Option<PathBuf>,
@@ -81,20 +68,20 @@ impl Run {
 
 /// Runs it; the text is the tables of errors, or JSON.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    let machine = Parameters::load(&arguments.machine)?;
+    let machine = arguments.subject.machine()?;
     let mut variants = Vec::new();
     for controller in controllers(&arguments.controller) {
         for compared in std::iter::once(None).chain(arguments.compare.iter().map(Some)) {
             let compared: Vec<String> =
                 compared.iter().flat_map(|c| c.split(',')).map(|change| change.trim().to_owned()).collect();
-            let parameters = variant::parameters(&machine, controller, &arguments.set, &compared)?;
-            variants.push((parameters, [arguments.set.clone(), compared].concat()));
+            let parameters = variant::parameters(&machine, controller, &arguments.subject.set, &compared)?;
+            variants.push((parameters, [arguments.subject.set.clone(), compared].concat()));
         }
     }
     if arguments.trace.is_some() && variants.len() > 1 {
         return Err(format!("--trace takes one run, not {}", variants.len()).into());
     }
-    let input = Input::open(&arguments.input, arguments.topic.as_deref())?;
+    let input = arguments.subject.input()?;
     for output in [&arguments.trace, &arguments.report].into_iter().flatten() {
         input.must_not_be(output)?;
     }
@@ -133,7 +120,7 @@ fn trial(
     parameters: &Parameters,
     config: &MachineConfig,
 ) -> Result<Outcome, Box<dyn Error>> {
-    let program = input.program(config, arguments.feed)?;
+    let program = input.program(config, arguments.subject.feed)?;
     let trial = Trial {
         machine: config,
         program: program.clone(),

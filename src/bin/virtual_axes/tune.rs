@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
+use virtual_axes::config::Parameters;
 use virtual_axes::files::OutputFile;
 use virtual_axes::tune::{
     Bench, Candidate, Contrast, Cost, Course, MarginLimits, Search, TuneError, Tuning, contrast,
@@ -16,6 +16,7 @@ use crate::input::Input;
 use crate::progress::Runs;
 use crate::run::Run;
 use crate::search::{course, named};
+use crate::subject::Subject;
 use crate::{report, tune_output as output, variant};
 
 /// Controllers that can be tuned.
@@ -30,24 +31,11 @@ pub enum Tunable {
 /// What to tune.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A shipped scenario, a scenario file, or a file of set-points: CSV, MCAP or YAML as for `run`.
-    #[arg(value_name = "SCENARIO|FILE")]
-    input: String,
-    /// A shipped machine or a machine file.
-    #[arg(long, default_value = DEFAULT_MACHINE)]
-    machine: String,
+    #[command(flatten)]
+    subject: Subject,
     /// Controller to tune; that of the machine if it is not given.
     #[arg(long, value_enum)]
     controller: Option<Tunable>,
-    /// A parameter of the machine as it is, as in `x.velocity_loop.gain=4.5`; can be given several times.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// Feed in the place of the scenario's, m/min (rpm for a scenario of rotary moves).
-    #[arg(long, allow_negative_numbers = true)]
-    feed: Option<f64>,
-    /// The topic to run, if a recording has several with a JointTrajectory.
-    #[arg(long)]
-    topic: Option<String>,
     /// What to make small: terms with weights, contour, contour-rms, tracking, rms, current, activity.
     #[arg(long, default_value = "contour", value_name = "TERM=WEIGHT[,…]")]
     cost: Cost,
@@ -119,8 +107,8 @@ pub struct Found {
 
 /// Runs it; the text is tables, or JSON.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    let machine = Parameters::load(&arguments.machine)?;
-    let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
+    let machine = arguments.subject.machine()?;
+    let parameters = variant::parameters(&machine, None, &arguments.subject.set, &[])?;
     let tunable = arguments.controller.map_or_else(|| tunable(&parameters), Ok)?;
     if arguments.contrast && tunable != Tunable::Gpc {
         return Err("--contrast: is for --controller gpc".into());
@@ -128,10 +116,10 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     if arguments.contrast && arguments.also.len() > 1 {
         return Err(format!("--contrast: takes one --also path, not {}", arguments.also.len()).into());
     }
-    let input = Input::open(&arguments.input, arguments.topic.as_deref())?;
+    let input = arguments.subject.input()?;
     check_outputs(arguments, &input)?;
     let config = parameters.machine_config()?;
-    let path = course(&input, &config, arguments.feed)?;
+    let path = course(&input, &config, arguments.subject.feed)?;
     let others = arguments.also.iter().map(|name| Input::open(name, None)).collect::<Result<Vec<_>, _>>()?;
     let paths = others.iter().map(|other| course(other, &config, None)).collect::<Result<Vec<_>, _>>()?;
     let limits = limits(arguments);
@@ -191,7 +179,7 @@ fn limits(arguments: &Arguments) -> MarginLimits {
 fn check_outputs(arguments: &Arguments, input: &Input) -> Result<(), Box<dyn Error>> {
     for output in [&arguments.out, &arguments.report].into_iter().flatten() {
         input.must_not_be(output)?;
-        if Path::new(&arguments.machine) == output {
+        if Path::new(&arguments.subject.machine) == output {
             return Err(format!("{}: the output would replace the machine file", output.display()).into());
         }
     }
@@ -255,7 +243,7 @@ fn write_machine(
     let tuned = best.tuning.apply(bench.parameters(), bench.joints())?;
     let unit = bench.cost().unit(&best.figures);
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-    let feed = arguments.feed.map_or(String::new(), |feed| format!(" at feed {feed}"));
+    let feed = arguments.subject.feed.map_or(String::new(), |feed| format!(" at feed {feed}"));
     let margins = best.margins.map_or(String::new(), |m| {
         format!(", modulus margin {:.3}, delay margin {:.2} ms", m.modulus, m.delay / MILLISECOND)
     });
@@ -270,7 +258,7 @@ fn write_machine(
         "{}, from the machine {} by `virtual_axes tune`.\nWhere its other values come from stands there.\n\
          Tuned for {tuning}.",
         bench.config().name(),
-        arguments.machine,
+        arguments.subject.machine,
     );
     let keys: Vec<String> =
         best.tuning.values(bench.joints(), bench.parameters()).into_iter().map(|(key, _)| key).collect();

@@ -1,0 +1,40 @@
+//! What the commands that run something are given: set-points and a machine.
+
+use std::error::Error;
+
+use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
+
+use crate::input::Input;
+
+/// What is run, and on which machine.
+#[derive(Debug, clap::Args)]
+pub struct Subject {
+    /// A shipped scenario, a scenario file, or a file of set-points: CSV (`time,x,y,…` in s, m, rad),
+    /// MCAP with a JointTrajectory, or the YAML that `ros2 topic pub` takes.
+    #[arg(value_name = "SCENARIO|FILE")]
+    input: String,
+    /// A shipped machine or a machine file.
+    #[arg(long, default_value = DEFAULT_MACHINE)]
+    pub machine: String,
+    /// A parameter, as in `x.velocity_loop.gain=4.5`; can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Feed in the place of the scenario's, m/min (rpm for a scenario of rotary moves).
+    #[arg(long, allow_negative_numbers = true)]
+    pub feed: Option<f64>,
+    /// The topic to run, if a recording has several with a JointTrajectory.
+    #[arg(long)]
+    topic: Option<String>,
+}
+
+impl Subject {
+    /// The machine file, without what `--set` says.
+    pub fn machine(&self) -> Result<Parameters, Box<dyn Error>> {
+        Ok(Parameters::load(&self.machine)?)
+    }
+
+    /// The set-points.
+    pub fn input(&self) -> Result<Input, Box<dyn Error>> {
+        Input::open(&self.input, self.topic.as_deref())
+    }
+}
