@@ -280,3 +280,61 @@ fn an_unstable_loop_is_refused_with_its_pole_unless_it_is_forced() {
     }
     assert!(saturated, "the loop is stable after all");
 }
+
+#[test]
+fn inner_loops_that_diverge_are_refused_where_a_model_of_them_is_needed_only() {
+    use virtual_axes::machine::MachineParameters;
+
+    for gain in
+        ["current_loop.gain=500", "current_loop.gain=1e9", "velocity_loop.gain=1e5", "velocity_loop.gain=0"]
+    {
+        let cascade = MachineParameters::new(&configured(DEFAULT, &[gain]));
+        assert!(cascade.is_ok(), "{gain}: the cascade is simulated as it is");
+        let text = MachineParameters::new(&configured(DEFAULT, &[GPC, gain])).expect_err(gain).to_string();
+        assert!(text.starts_with("axis x: position_loop"), "{gain}: {text}");
+    }
+}
+
+#[test]
+fn coefficients_that_overflow_are_refused_and_an_overflow_that_is_left_stops_the_axis() {
+    use virtual_axes::machine::MachineParameters;
+
+    let forced = |r: &str, s: &str| {
+        let texts = [
+            "position_loop.controller=rst".to_owned(),
+            "position_loop.allow_unstable=true".to_owned(),
+            format!("position_loop.rst.r={r}"),
+            format!("position_loop.rst.s={s}"),
+            format!("position_loop.rst.t={r}"),
+        ];
+        let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+        configured(DEFAULT, &texts)
+    };
+    for (r, s, named) in
+        [("[1]", "[1e-310]", "r[0]"), ("[1e307]", "[1]", "r[0]"), ("[1]", "[1, 1e12]", "s[1]")]
+    {
+        let text = MachineParameters::new(&forced(r, s)).expect_err(r).to_string();
+        assert!(text.contains(named) && text.contains("at most"), "{text}");
+    }
+    let mut machine = at_rest(&forced("[1e9]", "[1, 1e9, 1e9]"));
+    for k in 0..300 {
+        advance_axis(
+            &mut machine,
+            0,
+            k,
+            |k| if k < 5 { 0.0 } else { 0.001 },
+            |m| {
+                let s = m.axis(0).sample();
+                assert!(s.position.abs() < 10.0 && s.velocity_setpoint.is_finite(), "{s:?}");
+            },
+        );
+    }
+}
+
+#[test]
+fn a_shift_of_a_compensation_that_is_off_delays_nothing() {
+    let delay = |changes: &[&str]| at_rest(&configured(DEFAULT, changes)).longest_delay();
+    let long = "delays.friction_ms=100";
+    assert_eq!(delay(&[long]), delay(&[]));
+    assert!(delay(&[long, "feedforward.friction=1"]) > delay(&[]));
+}

@@ -376,3 +376,30 @@ fn a_stream_wakes_the_axes_when_it_moves_them_and_asks_for_no_haste() {
     common::assert_near("x follows", s.samples()[0].position, 0.001, 2e-6);
     assert!(!s.is_streaming());
 }
+
+#[test]
+fn a_set_point_comes_with_the_delay_that_it_was_foreseen_with() {
+    for (before, after) in [(20, 0), (3, 14)] {
+        // The stream has paused by the instant at which a set-point and the change of delay meet.
+        for early in 0..4 {
+            let mut t = delayed(before);
+            stream(&mut t, 0, &[0.001]);
+            t.set_stream_delay(after);
+            run(&mut t, 0, before as usize + PAUSE - early);
+            assert_eq!(t.stream(0, 0.0039), Ok(true));
+            let foreseen: Vec<f64> = (1..40).filter_map(|j| t.psec_ahead(0, j)).collect();
+            assert_eq!(run(&mut t, 0, 39).0, foreseen, "{before} to {after}, {early} early");
+        }
+    }
+}
+
+#[test]
+fn a_reset_brings_a_waiting_delay_into_effect() {
+    let mut t = delayed(20);
+    stream(&mut t, 0, &ramp(0.0, 0.001, 10));
+    t.set_stream_delay(0);
+    assert_eq!(t.stream_delay(), 20);
+    t.reset(&vec![0.0; t.joints().len()]).expect("home");
+    assert_eq!(t.stream_delay(), 0);
+    assert_eq!(stream(&mut t, 0, &[0.001, 0.002]), [0.001, 0.002]);
+}

@@ -215,7 +215,7 @@ impl Definition {
         kept.ok_or_else(|| ConfigError::NotAllowed {
             at: at.clone(),
             key: shortened(key),
-            value: value.to_string(),
+            value: shortened(&value.to_string()),
             allowed: self.allowed(),
         })
     }

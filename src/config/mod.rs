@@ -36,5 +36,5 @@ pub use error::{ConfigError, Source};
 pub use machine::*;
 pub use parameter_file::{Assignment, parse_assignment};
 pub use parameters::{DEFAULT_MACHINE, Overlay, Parameters};
-pub use schema::DEFINITIONS;
+pub use schema::{DEFINITIONS, MAX_HORIZON, RST_TERMS};
 pub use value::Value;

@@ -23,7 +23,7 @@ const CURRENT: f64 = 1e4;
 /// steeper than e^V has no bearing that makes it.
 const FRICTION_EXPONENT: (f64, f64) = (-100.0, 1.0);
 /// Longest horizon of predictive control, and furthest set-point that T may read, position periods.
-const MAX_HORIZON: i64 = 200;
+pub const MAX_HORIZON: i64 = 200;
 /// Smallest and largest factor of a plant that deviates.
 const DEVIATION: (f64, f64) = (0.1, 10.0);
 /// Smallest value of what is divided by, or what has no sense at zero.
@@ -33,7 +33,7 @@ const GAIN: f64 = 1e9;
 /// Shortest and longest integral time, ms; zero would divide by zero.
 const INTEGRAL_TIME_MS: (f64, f64) = (1e-3, 1e6);
 /// Most coefficients of R and of S; a design on a model of the drive's order has fewer than ten.
-const RST_TERMS: usize = 32;
+pub const RST_TERMS: usize = 32;
 
 /// A coefficient of the friction law, A.
 const fn friction_current(key: &'static str) -> Definition {

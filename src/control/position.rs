@@ -56,7 +56,7 @@ pub struct PositionState {
     angles: [f64; MAX_COEFFICIENTS],
     /// Ω*(k − 1), Ω*(k − 2), …: as limited, with the velocity feedforward.
     commands: [f64; MAX_COEFFICIENTS],
-    /// Position instants since which the set-point has stood still over the whole horizon.
+    /// Position instants since which the set-point has stood still over the whole horizon of this controller.
     still: u32,
     /// Position instants since the motor's current was at its limit.
     unlimited: u32,
@@ -96,6 +96,7 @@ impl PositionState {
     /// Another controller takes over at the next position instant.
     pub fn hand_over(&mut self) {
         self.transfer.pending = true;
+        self.still = 0;
     }
 }
 
@@ -145,10 +146,10 @@ impl PositionController {
         feedforward: f64,
     ) -> f64 {
         shift_in(&mut s.angles, angle);
+        s.unlimited = s.unlimited.saturating_add(1);
         if self.guard.is_some() {
-            let is_still = (1..=self.preview()).all(|j| setpoint(j) == setpoint(0));
+            let is_still = (-self.lookback()..=self.preview()).all(|j| setpoint(j) == setpoint(0));
             s.still = if is_still { s.still.saturating_add(1) } else { 0 };
-            s.unlimited = s.unlimited.saturating_add(1);
         }
         if s.transfer.pending {
             let excess = self.output(s, &setpoint, angle) + feedforward - s.commands[0];

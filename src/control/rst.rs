@@ -1,9 +1,13 @@
-//! Linear position controllers in RST form, and what they remember.
+//! Linear position controllers in RST form.
+
+use crate::config::{MAX_HORIZON, RST_TERMS};
 
 /// Most coefficients of R and of S.
-pub const MAX_COEFFICIENTS: usize = 32;
+pub const MAX_COEFFICIENTS: usize = RST_TERMS;
 /// Furthest set-point that T may read, in position periods ahead (and, of its first, behind).
-pub const MAX_PREVIEW: i64 = 200;
+pub const MAX_PREVIEW: i64 = MAX_HORIZON;
+/// Largest coefficient, relative to s₀: as large as a gain may be.
+const MAX_COEFFICIENT: f64 = 1e9;
 /// How far T(1) may be from R(1), relative: 35 nm over a stroke of 350 mm.
 const GAIN_TOLERANCE: f64 = 1e-7;
 /// |S(1)| up to which S contains the factor 1 − q⁻¹, relative to the sum of its |sᵢ|.
@@ -30,6 +34,16 @@ pub enum RstError {
         /// Place, from 0.
         index: usize,
         /// What stands there.
+        value: f64,
+    },
+    /// A coefficient that is too large relative to s₀.
+    #[error("{polynomial}[{index}] is {value:e} times s[0]; it must be at most {max:e} times", max = MAX_COEFFICIENT)]
+    TooLarge {
+        /// r, s or t.
+        polynomial: &'static str,
+        /// Place, from 0.
+        index: usize,
+        /// Coefficient divided by s₀.
         value: f64,
     },
     /// S cannot be solved for Ω*(k).
@@ -91,6 +105,12 @@ impl Rst {
         let last = t_first.saturating_add(t.len() as i64 - 1);
         if t_first < -MAX_PREVIEW || last > MAX_PREVIEW {
             return Err(RstError::Preview { first: t_first, last });
+        }
+        for (polynomial, coefficients) in [("r", r), ("s", s), ("t", t)] {
+            let ratio = |c: &f64| c / leading;
+            if let Some(index) = coefficients.iter().position(|c| !(ratio(c).abs() <= MAX_COEFFICIENT)) {
+                return Err(RstError::TooLarge { polynomial, index, value: ratio(&coefficients[index]) });
+            }
         }
         let (r_gain, t_gain) = (r.iter().sum::<f64>(), t.iter().sum::<f64>());
         let scale = r.iter().map(|c| c.abs()).sum::<f64>();

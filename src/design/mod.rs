@@ -101,6 +101,11 @@ pub enum DesignError {
 
 /// A complex number for people.
 fn complex(re: f64, im: f64) -> String {
+    // Beyond, digits behind the point say nothing.
+    const LARGE: f64 = 1e6;
+    if re.abs() > LARGE || im.abs() > LARGE {
+        return format!("{re:e} {} {:e}j", if im < 0.0 { '−' } else { '+' }, im.abs());
+    }
     if im == 0.0 {
         return format!("{re:.6}");
     }

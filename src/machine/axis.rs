@@ -25,6 +25,7 @@ pub struct AxisParameters {
     ratio: f64,
     /// Kt that the drive reckons with.
     torque_constant: f64,
+    max_current: f64,
     resistance: f64,
     max_speed: f64,
     ticks_per_position: u64,
@@ -32,7 +33,7 @@ pub struct AxisParameters {
 }
 
 impl AxisParameters {
-    /// The longest of α, β and γ, ticks.
+    /// The longest delay of a set-point, ticks.
     pub fn longest_delay(&self) -> u64 {
         self.delays.longest()
     }
@@ -61,6 +62,9 @@ impl AxisParameters {
         let tick = seconds(periods.current);
         let (position, controller) = position_controller(axis, periods)?;
         let delays = Delays::new(&axis.delays, periods.current);
+        let compensation = FrictionCompensation::new(axis, periods, delays.friction);
+        // A shift of nothing delays nothing.
+        let delays = Delays { friction: if compensation.is_some() { delays.friction } else { 0 }, ..delays };
         Ok(AxisParameters {
             plant: Plant::new(axis, tick)?,
             position,
@@ -77,10 +81,11 @@ impl AxisParameters {
                 seconds(periods.position),
                 axis.transmission_ratio,
             ),
-            compensation: FrictionCompensation::new(axis, periods, delays.friction),
+            compensation,
             delays,
             ratio: axis.transmission_ratio,
             torque_constant: motor.torque_constant,
+            max_current: motor.max_current,
             resistance: motor.resistance,
             max_speed: motor.max_speed,
             ticks_per_position: periods.ticks_per_position(),
@@ -138,12 +143,14 @@ impl Axis {
 
     /// Takes over changed parameters in the place of `old`; the state goes on.
     ///
-    /// The velocity loop's integral takes over the torque that the feedforward gives up.
+    /// The velocity loop's integral takes over what TFFWS gives up.
     pub(super) fn adopt(&mut self, old: &AxisParameters, p: &AxisParameters, tick: u64) {
         let torque = |p: &AxisParameters| {
             p.feedforward.torque(&self.psec, self.psec.index(tick.saturating_sub(1), p.delays.torque))
         };
-        self.velocity_pi.integral += torque(old) - torque(p);
+        let limit = p.torque_constant * p.max_current;
+        let integral = self.velocity_pi.integral + (torque(old) - torque(p)).clamp(-limit, limit);
+        self.velocity_pi.integral = integral;
         self.psec.adopt(p.reach());
         if (&old.position, &old.feedforward) != (&p.position, &p.feedforward) {
             self.position.hand_over();
@@ -186,7 +193,9 @@ impl Axis {
         let feedforward = p.feedforward.velocity(psec, psec.index(tick, p.delays.velocity));
         let setpoint = |j| psec.at(k + j) / p.ratio;
         let wanted = p.position.update(&mut self.position, setpoint, self.motor.angle, feedforward);
-        self.sample.velocity_setpoint = wanted.clamp(-p.max_speed, p.max_speed);
+        // Coefficients that are forced can make it overflow: an axis that is asked for nothing stops.
+        let asked = if wanted.is_finite() { wanted } else { 0.0 };
+        self.sample.velocity_setpoint = asked.clamp(-p.max_speed, p.max_speed);
         self.speed_limited = wanted != self.sample.velocity_setpoint;
         self.position.record(self.sample.velocity_setpoint + feedforward);
     }

@@ -2,7 +2,7 @@
 
 use crate::config::{AxisConfig, AxisKind, FeedforwardConfig, GpcConfig, Periods, PositionControllerConfig};
 use crate::control::{Guard, PositionController, Rst, Transfer};
-use crate::design::{DesignError, GpcTuning, Weight, accept, gpc};
+use crate::design::{DesignError, GpcTuning, PredictionModel, Weight, accept, gpc};
 use crate::units::{DEGREE, MILLISECOND_NS, Nanoseconds, seconds};
 
 use super::AxisError;
@@ -26,6 +26,24 @@ impl From<&GpcConfig> for GpcTuning {
     }
 }
 
+/// The position controller of an axis by its polynomials, on the model that it is designed for; the cascade
+/// as what it is inside the loop, proportional.
+///
+/// # Errors
+/// [`DesignError`] if the configuration makes no controller.
+pub fn designed(axis: &AxisConfig, model: &PredictionModel) -> Result<Rst, DesignError> {
+    match &axis.position_loop.controller {
+        PositionControllerConfig::Cascade => {
+            let gain = axis.position_loop.gain;
+            Ok(Rst::new(&[gain], &[1.0], &[gain], 0)?)
+        }
+        PositionControllerConfig::Gpc(config) => gpc(model, &GpcTuning::from(config)),
+        PositionControllerConfig::Rst(config) => {
+            Ok(Rst::new(&config.r, &config.s, &config.t, config.t_first)?)
+        }
+    }
+}
+
 /// The controller and its name as in `position_loop.controller`.
 pub(super) fn position_controller(
     axis: &AxisConfig,
@@ -36,18 +54,15 @@ pub(super) fn position_controller(
         step: axis.limits.acceleration * period / axis.transmission_ratio,
         periods: (TRANSFER / periods.position) as u32,
     };
-    let model = &prediction_model(axis, periods)?;
-    let (rst, name) = match &axis.position_loop.controller {
+    let name = match &axis.position_loop.controller {
         PositionControllerConfig::Cascade => {
             return Ok((PositionController::proportional(gain, transfer), "cascade"));
         }
-        PositionControllerConfig::Gpc(config) => (gpc(model, &GpcTuning::from(config))?, "gpc"),
-        PositionControllerConfig::Rst(config) => {
-            let rst = Rst::new(&config.r, &config.s, &config.t, config.t_first);
-            (rst.map_err(DesignError::from)?, "rst")
-        }
+        PositionControllerConfig::Gpc(_) => "gpc",
+        PositionControllerConfig::Rst(_) => "rst",
     };
-    let rst = accept(model, rst, axis.position_loop.allow_unstable)?;
+    let model = prediction_model(axis, periods)?;
+    let rst = accept(&model, designed(axis, &model)?, axis.position_loop.allow_unstable)?;
     let rest_error = match axis.kind {
         AxisKind::Linear => REST_ERROR_LINEAR,
         AxisKind::Rotary => REST_ERROR_ROTARY,

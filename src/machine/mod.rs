@@ -10,6 +10,7 @@ mod prediction;
 mod sample;
 
 pub use axis::{Axis, AxisParameters};
+pub use controller::designed;
 pub use prediction::{deviating_model, prediction_model};
 pub use sample::AxisSample;
 
@@ -116,7 +117,7 @@ impl Machine {
 
     /// Takes over changed gains, weights, delays or physics; states go on as they are.
     ///
-    /// To be called between two position periods. Delays longer than any before lengthen the history
+    /// To be called between two position periods. Another reach of delays and preview makes a new history
     /// of set-points, which is the only case that allocates.
     ///
     /// # Errors

@@ -59,6 +59,9 @@ struct InnerLoops {
     ticks_per_velocity: u64,
 }
 
+/// Iterations for the singular values of a matrix of four rows; it takes some ten.
+const SVD_ITERATIONS: usize = 1000;
+
 type State = SVector<f64, STATES>;
 
 impl InnerLoops {
@@ -116,15 +119,16 @@ fn step_markov(transition: &SMatrix<f64, STATES, STATES>, input: &State, count: 
 fn minimal(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
     const SIZE: usize = VELOCITY_STATES;
     let hankel = |shift: usize| DMatrix::from_fn(SIZE, SIZE, |i, j| markov[i + j + shift]);
-    let decomposition = hankel(1).svd(true, true);
-    let no_model = || DesignError::Model("the inner loops do not move the axis".to_owned());
+    if !markov.iter().all(|h| h.is_finite()) {
+        return Err(DesignError::Model("the inner loops diverge within a position period".to_owned()));
+    }
+    let no_model =
+        || DesignError::Model("the singular values of the inner loops cannot be computed".to_owned());
+    let decomposition = hankel(1).try_svd(true, true, f64::EPSILON, SVD_ITERATIONS).ok_or_else(no_model)?;
     let (u, vt) = (decomposition.u.ok_or_else(no_model)?, decomposition.v_t.ok_or_else(no_model)?);
     let values = decomposition.singular_values;
     let largest = values.max();
     let kept: Vec<usize> = (0..SIZE).filter(|&k| values[k] > NEGLIGIBLE * largest).collect();
-    if !markov.iter().all(|h| h.is_finite()) {
-        return Err(no_model());
-    }
     let root = DVector::from_iterator(kept.len(), kept.iter().map(|&k| values[k].sqrt()));
     let (left, right) = (u.select_columns(&kept), vt.select_rows(&kept));
     let mut transition = left.transpose() * hankel(2) * right.transpose();

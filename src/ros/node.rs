@@ -219,7 +219,9 @@ async fn serve(
     signals.wait().await;
     // Outputs stop taking, so that the thread cannot wait for them; then the thread, then the rest.
     let _ = tokio::time::timeout(SHUTDOWN_TIMEOUT, commands.send(Command::Shutdown)).await;
-    tasks.shutdown().await;
+    if tokio::time::timeout(SHUTDOWN_TIMEOUT, tasks.shutdown()).await.is_err() {
+        warn!("a task did not end in time");
+    }
     if tokio::time::timeout(SHUTDOWN_TIMEOUT, has_ended).await.is_err() {
         warn!("the axes' thread did not end in time");
     }

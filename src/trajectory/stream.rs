@@ -35,7 +35,7 @@ pub(super) struct Stream {
     /// The instant at which a set-point last entered a buffer that differs from the one before it.
     moved_k: Option<i64>,
     /// The instant before which a set-point was last taken.
-    taken_k: Option<i64>,
+    pub(super) taken_k: Option<i64>,
 }
 
 impl LookAhead {
@@ -101,6 +101,8 @@ impl Timeline {
         };
         check_finite(limits, position)?;
         limits.check_stroke(0, position)?;
+        self.settle_stream_delay();
+        let limits = &self.joints[joint];
         let track = &mut self.tracks[joint];
         let waiting = track.queue.len() > 1;
         let Some(plan) = track.queue.front_mut().filter(|_| !waiting) else {

@@ -114,7 +114,10 @@ impl Timeline {
         let (k, period) = (self.next_k, self.period);
         self.events.clear();
         self.events.append(&mut self.pending);
-        self.settle_stream_delay();
+        // A set-point that was taken comes with the delay that it was foreseen with.
+        if self.stream.taken_k != Some(k) {
+            self.settle_stream_delay();
+        }
         for (joint, track) in self.tracks.iter_mut().enumerate() {
             if track.queue.get(1).is_some_and(|plan| plan.join_k <= k) {
                 let old = track.queue.pop_front();
@@ -246,6 +249,7 @@ impl Timeline {
             self.psec[joint] = position;
         }
         self.forget_stream();
+        self.settle_stream_delay();
         self.motions.settle(&mut self.pending);
         self.reserve_events();
         Ok(())

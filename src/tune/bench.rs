@@ -6,12 +6,12 @@ use rayon::prelude::*;
 
 use super::cost::Cost;
 use super::course::Course;
-use super::loops::{MarginLimits, controller, proportional, worst};
+use super::loops::{MarginLimits, proportional, worst};
 use super::tuning::Tuning;
 use super::{TuneError, Watch};
 use crate::config::{AxisConfig, MachineConfig, Parameters};
 use crate::design::{Margins, PredictionModel, gpc};
-use crate::machine::{MachineError, prediction_model};
+use crate::machine::{MachineError, designed, prediction_model};
 use crate::trial::{Figures, Outcome};
 use crate::units::POSITION_GAIN;
 
@@ -83,7 +83,7 @@ impl<'a> Bench<'a> {
                 .map_err(|source| MachineError::Axis { axis: axis.name().to_owned(), source })
         };
         let models = axes.iter().map(model).collect::<Result<Vec<_>, _>>()?;
-        let margins = worst(models.iter().zip(&axes).map(|(model, axis)| (model, controller(axis, model))));
+        let margins = worst(models.iter().zip(&axes).map(|(model, axis)| (model, designed(axis, model))));
         let joints = axes.iter().map(|axis| axis.name().to_owned()).collect();
         let present = candidate(Tuning::Present, margins, figures, cost, &config);
         Ok(Bench { parameters, course, cost, watch, config, moving, joints, models, present })

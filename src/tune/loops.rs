@@ -1,8 +1,7 @@
 //! Margins of the position loops of several axes.
 
-use crate::config::{AxisConfig, PositionControllerConfig};
 use crate::control::Rst;
-use crate::design::{DesignError, GpcTuning, Margins, PredictionModel, gpc, margins};
+use crate::design::{DesignError, Margins, PredictionModel, margins};
 
 /// What the worst axis of a tuning must keep.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,17 +26,6 @@ impl MarginLimits {
     /// Whether `margins` keep them.
     pub fn are_kept_by(&self, margins: &Margins) -> bool {
         margins.modulus >= self.modulus && margins.delay >= self.delay
-    }
-}
-
-/// The controller of an axis as its configuration asks for it, on the model that it is designed for.
-pub(super) fn controller(axis: &AxisConfig, model: &PredictionModel) -> Result<Rst, DesignError> {
-    match &axis.position_loop.controller {
-        PositionControllerConfig::Cascade => proportional(axis.position_loop.gain),
-        PositionControllerConfig::Gpc(config) => gpc(model, &GpcTuning::from(config)),
-        PositionControllerConfig::Rst(config) => {
-            Ok(Rst::new(&config.r, &config.s, &config.t, config.t_first)?)
-        }
     }
 }
 

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use super::bench::run;
 use super::cost::Cost;
 use super::course::Course;
-use super::loops::{controller, worst};
+use super::loops::worst;
 use super::{TuneError, Watch};
 use crate::config::{Assignment, MachineConfig, Parameters, Source, Value};
 use crate::design::Margins;
-use crate::machine::{MachineError, deviating_model, prediction_model};
+use crate::machine::{MachineError, designed, deviating_model, prediction_model};
 use crate::trial::Figures;
 
 /// Factors of the plant relative to what the controllers are designed for.
@@ -143,7 +143,7 @@ fn margins(config: &MachineConfig, figures: &Figures) -> Result<Option<Margins>,
         let named = |source| MachineError::Axis { axis: axis.name().to_owned(), source };
         let nominal = prediction_model(axis, &periods).map_err(named)?;
         let plant = deviating_model(axis, &periods).map_err(named)?;
-        loops.push((plant, controller(axis, &nominal)));
+        loops.push((plant, designed(axis, &nominal)));
     }
     Ok(worst(loops.iter().map(|(plant, rst)| (plant, rst.clone()))))
 }
