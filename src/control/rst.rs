@@ -108,7 +108,7 @@ impl Rst {
         }
         for (polynomial, coefficients) in [("r", r), ("s", s), ("t", t)] {
             let ratio = |c: &f64| c / leading;
-            if let Some(index) = coefficients.iter().position(|c| !(ratio(c).abs() <= MAX_COEFFICIENT)) {
+            if let Some(index) = coefficients.iter().position(|c| ratio(c).abs() > MAX_COEFFICIENT) {
                 return Err(RstError::TooLarge { polynomial, index, value: ratio(&coefficients[index]) });
             }
         }

@@ -35,7 +35,10 @@ impl GpcTuning {
             let refused = DesignError::OutOfRange {
                 name,
                 value: value as f64,
-                allowed: format!("lie in 1 … {last}{}", if last == self.n2 { ", n2" } else { "" }),
+                allowed: match name {
+                    "n2" => format!("lie in 1 … {last}"),
+                    _ => format!("lie in 1 … n2 = {last}"),
+                },
             };
             if (1..=last).contains(&value) { Ok(()) } else { Err(refused) }
         };

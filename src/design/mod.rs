@@ -24,7 +24,7 @@ pub enum DesignError {
     /// A tuning parameter out of its range.
     #[error("{name} = {value} must {allowed}")]
     OutOfRange {
-        /// Name of the parameter, as in a machine file.
+        /// Name of the parameter, in SI units.
         name: &'static str,
         /// What was given.
         value: f64,

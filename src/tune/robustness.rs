@@ -78,7 +78,7 @@ pub struct Robustness {
 
 /// Runs `parameters` on `course` with inertia, friction and torque constant off `by` a part.
 ///
-/// What the parameters deviate by themselves is replaced.
+/// It comes on top of what the parameters deviate by themselves.
 ///
 /// # Errors
 /// [`TuneError`].
@@ -120,10 +120,14 @@ fn deviated(
     ];
     let joints: Vec<String> =
         parameters.machine_config()?.axes().iter().map(|axis| axis.name().to_owned()).collect();
+    let own = |joint: &str, name: &str| match parameters.get(&format!("{joint}.deviation.{name}")) {
+        Some(Value::Double(factor)) => factor,
+        _ => 1.0,
+    };
     let of_joint = |joint: &String| {
         factors.map(|(name, factor)| Assignment {
             key: format!("{joint}.deviation.{name}"),
-            value: Value::Double(factor),
+            value: Value::Double(factor * own(joint, name)),
             source: source.clone(),
         })
     };

@@ -34,7 +34,7 @@ pub struct Arguments {
 
 fn part(text: &str) -> Result<f64, String> {
     /// Below nothing there is no plant; with nearly nothing of its inertia none that can be stepped.
-    const MOST: f64 = 0.9;
+    const MOST: f64 = 0.8;
     let refused = || format!("must lie in 0 … {MOST}, a part of the value");
     let value: f64 = text.parse().map_err(|_| refused())?;
     if (0.0..=MOST).contains(&value) { Ok(value) } else { Err(refused()) }
@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let machine = arguments.subject.machine()?;
     let parameters = variant::parameters(&machine, arguments.controller, &arguments.subject.set, &[])?;
     let input = arguments.subject.input()?;
-    let config = parameters.machine_config()?;
+    let config = variant::checked(&parameters, &machine, &arguments.subject.machine)?;
     let path = course(&input, &config, arguments.subject.feed)?;
     let progress = Runs::new();
     let found = robustness(&parameters, &path, &arguments.cost, arguments.by, &progress);

@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     }
     let mut runs = Vec::new();
     for (parameters, changes) in variants {
-        let config = parameters.machine_config()?;
+        let config = variant::checked(&parameters, &machine, &arguments.subject.machine)?;
         let outcome = trial(arguments, &input, &parameters, &config)?;
         runs.push(Run { controller: variant::controller_name(&parameters), changes, outcome });
     }

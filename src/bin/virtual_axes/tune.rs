@@ -118,7 +118,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     }
     let input = arguments.subject.input()?;
     check_outputs(arguments, &input)?;
-    let config = parameters.machine_config()?;
+    let config = variant::checked(&parameters, &machine, &arguments.subject.machine)?;
     let path = course(&input, &config, arguments.subject.feed)?;
     let others = arguments.also.iter().map(|name| Input::open(name, None)).collect::<Result<Vec<_>, _>>()?;
     let paths = others.iter().map(|other| course(other, &config, None)).collect::<Result<Vec<_>, _>>()?;

@@ -2,7 +2,8 @@
 
 use std::error::Error;
 
-use virtual_axes::config::{Assignment, Parameters, Source, Value, parse_assignment};
+use virtual_axes::config::{Assignment, MachineConfig, Parameters, Source, Value, parse_assignment};
+use virtual_axes::machine::MachineParameters;
 
 /// Position controllers that a run can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -79,4 +80,20 @@ pub fn parameters(
         parameters.set_all(assignments.collect::<Result<_, _>>()?)?;
     }
     Ok(parameters)
+}
+
+/// The machine that `parameters` make, over those of the machine file `name`; whoever is to blame is named if
+/// it cannot be built.
+pub fn checked(
+    parameters: &Parameters,
+    machine: &Parameters,
+    name: &str,
+) -> Result<MachineConfig, Box<dyn Error>> {
+    let config = parameters.machine_config()?;
+    MachineParameters::new(&config).map_err(|error| {
+        let by_itself = machine.machine_config().is_ok_and(|own| MachineParameters::new(&own).is_err());
+        let blamed = if by_itself { name } else { "--controller, --set or --compare" };
+        format!("{blamed}: {error}")
+    })?;
+    Ok(config)
 }
