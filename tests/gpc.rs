@@ -175,10 +175,10 @@ fn assert_refused(tuning: GpcTuning, words: &str) {
 fn tunings_out_of_range_are_refused_by_name() {
     let tuning = |n1, n2, nu, weight| GpcTuning { n1, n2, nu, weight };
     let light = Weight::Absolute(0.1);
-    assert_refused(tuning(5, 4, 1, light), "n1 = 5 must lie in 1 … 4, n2");
-    assert_refused(tuning(0, 4, 1, light), "n1 = 0 must lie in 1 … 4, n2");
-    assert_refused(tuning(1, 4, 5, light), "nu = 5 must lie in 1 … 4, n2");
-    assert_refused(tuning(1, 4, 0, light), "nu = 0 must lie in 1 … 4, n2");
+    assert_refused(tuning(5, 4, 1, light), "n1 = 5 must lie in 1 … n2 = 4");
+    assert_refused(tuning(0, 4, 1, light), "n1 = 0 must lie in 1 … n2 = 4");
+    assert_refused(tuning(1, 4, 5, light), "nu = 5 must lie in 1 … n2 = 4");
+    assert_refused(tuning(1, 4, 0, light), "nu = 0 must lie in 1 … n2 = 4");
     assert_refused(tuning(1, 0, 1, light), "n2 = 0 must lie in 1 … 200");
     assert_refused(tuning(1, 201, 1, light), "n2 = 201 must lie in 1 … 200");
     for (weight, name) in [
