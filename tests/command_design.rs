@@ -127,7 +127,10 @@ fn an_unstable_loop_is_refused_with_its_pole_unless_forced() {
 
 #[test]
 fn bad_input_is_refused_by_name() {
-    assert_refused(&["gpc", "--n1", "9", "--n2", "8", "--nu", "6"], &["axis x: n1 = 9 must lie in 1 … n2 = 8"]);
+    assert_refused(
+        &["gpc", "--n1", "9", "--n2", "8", "--nu", "6"],
+        &["axis x: n1 = 9 must lie in 1 … n2 = 8"],
+    );
     assert_refused(&["gpc", "--nu", "15"], &["axis x: nu = 15 must lie in 1 … n2 = 14"]);
     assert_refused(&["gpc", "--lambda-rel", "-1"], &["lambda_rel = -1 must be finite and not negative"]);
     assert_refused(&["gpc", "--lambda", "nan"], &["lambda = NaN must be finite"]);

@@ -220,7 +220,7 @@ fn options_that_cannot_be_are_refused_by_name() {
         assert_refused(&arguments, &parts);
     }
     for by in ["-0.1", "1", "nan"] {
-        assert_refused(&["robustness", corner, "--by", by], &["--by", "must lie in 0 … 0.9"]);
+        assert_refused(&["robustness", corner, "--by", by], &["--by", "must lie in 0 … 0.8"]);
     }
     assert_eq!(folder.names(), ["corner.yaml"]);
 }
