@@ -1,6 +1,7 @@
 //! `virtual_axes tune` and `robustness` as a user runs them.
 
 mod folder;
+mod tune_common;
 
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
@@ -8,25 +9,7 @@ use std::time::Duration;
 
 use folder::Folder;
 use serde_json::Value;
-
-/// A corner with short legs: a run takes milliseconds.
-const CORNER: &str = "\
-description: A corner of 90° in X–Y
-feed_m_min: 6
-rest_s: 0.06
-moves:
-  - line: {x_mm: 10}
-  - line: {x_mm: 10, y_mm: 10}
-";
-
-const CIRCLE: &str = "\
-description: A circle of 20 mm radius in X–Y
-feed_m_min: 10
-rest_s: 0.06
-moves:
-  - arc: {center: {x_mm: -20, y_mm: 0}, turns: 1}
-    ramp_s: 0.2
-";
+use tune_common::{CIRCLE, CORNER};
 
 /// Margins that few designs keep, so that the search is short.
 const FEW: [&str; 4] = ["--modulus-margin", "0.7", "--delay-margin-ms", "12"];

@@ -12,6 +12,7 @@ mod transfer;
 
 pub use pi::{Pi, PiState};
 pub use position::{Guard, PositionController, PositionState};
+pub(crate) use rst::INTEGRATOR_TOLERANCE;
 pub use rst::{MAX_COEFFICIENTS, MAX_PREVIEW, Rst, RstError};
 pub use setpoint::{Delays, Feedforward, Reach, SetpointHistory};
 pub use transfer::{Transfer, TransferState};

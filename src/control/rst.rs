@@ -11,7 +11,7 @@ const MAX_COEFFICIENT: f64 = 1e9;
 /// How far T(1) may be from R(1), relative: 35 nm over a stroke of 350 mm.
 const GAIN_TOLERANCE: f64 = 1e-7;
 /// |S(1)| up to which S contains the factor 1 − q⁻¹, relative to the sum of its |sᵢ|.
-const INTEGRATOR_TOLERANCE: f64 = 1e-9;
+pub(crate) const INTEGRATOR_TOLERANCE: f64 = 1e-9;
 
 /// Why three polynomials are no position controller.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -122,6 +122,14 @@ impl Rst {
         }
         let scaled = |polynomial: &[f64]| polynomial.iter().map(|c| c / leading).collect();
         Ok(Rst { r: scaled(r), s: scaled(s), t: scaled(t), t_first })
+    }
+
+    /// The proportional controller `Ω* = Kp (θ* − θ)` with `gain` Kp, s⁻¹.
+    ///
+    /// # Errors
+    /// [`RstError`] for a gain that is 0, too large or not finite.
+    pub fn proportional(gain: f64) -> Result<Self, RstError> {
+        Rst::new(&[gain], &[1.0], &[gain], 0)
     }
 
     /// R, in rising powers of q⁻¹, s⁻¹.

@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use nalgebra::Complex;
 
 use super::poles::{STABILITY_MARGIN, characteristic, check_stable};
-use super::polynomial::{INTEGRATOR, roots, roots_within, value, without_integrators};
+use super::polynomial::{roots, roots_within, value, without_integrators};
 use super::{DesignError, PredictionModel};
-use crate::control::Rst;
+use crate::control::{INTEGRATOR_TOLERANCE, Rst};
 
 /// First frequency looked at, rad per period: poles slower than it count as unstable.
 const FIRST_ANGLE: f64 = 1e-7;
@@ -124,7 +124,7 @@ impl OpenLoop<'_> {
         let size = |p: &[f64]| p.iter().map(|c| c.abs()).sum::<f64>();
         let (a, s) = (self.model.a(), self.rst.s());
         let below = sum(a) * sum(s);
-        let regular = below.abs() > INTEGRATOR * size(a) * size(s);
+        let regular = below.abs() > INTEGRATOR_TOLERANCE * size(a) * size(s);
         regular.then(|| sum(self.model.b()) * sum(self.rst.r()) / below)
     }
 }

@@ -4,11 +4,10 @@ use std::cmp::Ordering;
 
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 
+use crate::control::INTEGRATOR_TOLERANCE;
+
 /// Steps of the QR iteration for each root; it needs two or three.
 const ITERATIONS_PER_ROOT: usize = 40;
-
-/// Value at q = 1 up to which a polynomial has the factor 1 − q⁻¹, relative to the sum of its |cᵢ|.
-pub(super) const INTEGRATOR: f64 = 1e-9;
 
 /// Product of two polynomials.
 pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
@@ -80,7 +79,7 @@ pub(super) fn roots_within(polynomial: &[f64], radius: f64) -> bool {
 pub(super) fn without_integrators(polynomial: &[f64]) -> Vec<f64> {
     let mut left = polynomial.to_vec();
     let size: f64 = left.iter().map(|c| c.abs()).sum();
-    while left.len() > 1 && left.iter().sum::<f64>().abs() <= INTEGRATOR * size {
+    while left.len() > 1 && left.iter().sum::<f64>().abs() <= INTEGRATOR_TOLERANCE * size {
         // Division by 1 − q⁻¹ sums up the coefficients.
         let mut sum = 0.0;
         for c in &mut left {

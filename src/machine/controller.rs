@@ -33,10 +33,7 @@ impl From<&GpcConfig> for GpcTuning {
 /// [`DesignError`] if the configuration makes no controller.
 pub fn designed(axis: &AxisConfig, model: &PredictionModel) -> Result<Rst, DesignError> {
     match &axis.position_loop.controller {
-        PositionControllerConfig::Cascade => {
-            let gain = axis.position_loop.gain;
-            Ok(Rst::new(&[gain], &[1.0], &[gain], 0)?)
-        }
+        PositionControllerConfig::Cascade => Ok(Rst::proportional(axis.position_loop.gain)?),
         PositionControllerConfig::Gpc(config) => gpc(model, &GpcTuning::from(config)),
         PositionControllerConfig::Rst(config) => {
             Ok(Rst::new(&config.r, &config.s, &config.t, config.t_first)?)

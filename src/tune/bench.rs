@@ -6,11 +6,12 @@ use rayon::prelude::*;
 
 use super::cost::Cost;
 use super::course::Course;
-use super::loops::{MarginLimits, proportional, worst};
+use super::loops::{MarginLimits, worst};
 use super::tuning::Tuning;
 use super::{TuneError, Watch};
 use crate::config::{AxisConfig, MachineConfig, Parameters};
-use crate::design::{Margins, PredictionModel, gpc};
+use crate::control::Rst;
+use crate::design::{DesignError, Margins, PredictionModel, gpc};
 use crate::machine::{MachineError, designed, prediction_model};
 use crate::trial::{Figures, Outcome};
 use crate::units::POSITION_GAIN;
@@ -136,12 +137,9 @@ impl<'a> Bench<'a> {
                 let design = tuning.gpc()?;
                 worst(self.models.iter().map(|model| (model, gpc(model, &design))))
             }
-            Tuning::Cascade(axes) => worst(
-                self.models
-                    .iter()
-                    .zip(axes)
-                    .map(|(model, (_, gains))| (model, proportional(gains.gain * POSITION_GAIN))),
-            ),
+            Tuning::Cascade(axes) => worst(self.models.iter().zip(axes).map(|(model, (_, gains))| {
+                (model, Rst::proportional(gains.gain * POSITION_GAIN).map_err(DesignError::from))
+            })),
         }
     }
 

@@ -29,11 +29,6 @@ impl MarginLimits {
     }
 }
 
-/// The cascade's proportional law; its feedforward is outside the loop.
-pub(super) fn proportional(gain: f64) -> Result<Rst, DesignError> {
-    Ok(Rst::new(&[gain], &[1.0], &[gain], 0)?)
-}
-
 /// The least of each margin over the loops; none if one is unstable or is no loop.
 pub(super) fn worst<'a>(
     loops: impl IntoIterator<Item = (&'a PredictionModel, Result<Rst, DesignError>)>,
