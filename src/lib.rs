@@ -5,8 +5,8 @@
 //!
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
 //! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] → [`machine`] →
-//! [`trajectory`], [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] → [`tune`] →
-//! [`messages`], [`files`], [`report`] → `ros`.
+//! [`trajectory`], [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] →
+//! [`identify`], [`tune`] → [`messages`], [`files`], [`report`] → `ros`.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -17,6 +17,7 @@ pub mod control;
 pub mod design;
 pub mod drive;
 pub mod files;
+pub mod identify;
 pub mod kinematics;
 pub mod machine;
 pub mod messages;

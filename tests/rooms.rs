@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// As in ARCHITECTURE.md.
-const ORDER: [&str; 18] = [
+const ORDER: [&str; 19] = [
     "units",
     "config",
     "kinematics",
@@ -18,6 +18,7 @@ const ORDER: [&str; 18] = [
     "simulation",
     "scenario",
     "trial",
+    "identify",
     "tune",
     "messages",
     "files",
@@ -26,7 +27,7 @@ const ORDER: [&str; 18] = [
 ];
 
 /// Rooms before a room that it still must not know.
-const APART: [(&str, &str); 7] = [
+const APART: [(&str, &str); 8] = [
     ("control", "drive"),
     ("design", "drive"),
     ("report", "files"),
@@ -34,6 +35,7 @@ const APART: [(&str, &str); 7] = [
     ("ros", "files"),
     ("ros", "report"),
     ("ros", "trial"),
+    ("tune", "identify"),
 ];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {

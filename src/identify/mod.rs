@@ -1,0 +1,10 @@
+//! Identification: the parameters of an axis from recordings of it (Prévost section 3).
+//!
+//! A recording is read as a [`RawRecording`], checked and made even in time ([`Signals`]); the steps of the
+//! paper take it from there. What they could not tell, and what to record to mend it, are [`Finding`]s.
+
+mod finding;
+mod recording;
+
+pub use finding::{Finding, Severity};
+pub use recording::{RawRecording, Signals, Span};
