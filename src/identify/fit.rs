@@ -1,0 +1,272 @@
+//! Least squares: linear with weights, and nonlinear within bounds.
+
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use rayon::prelude::*;
+
+/// Part of its range within which a value lies at a bound.
+const AT_BOUND: f64 = 1e-3;
+/// Where an optimisation ends: relative change of the sum of squares and of the parameters.
+const TOLERANCE: f64 = 1e-10;
+/// Evaluations of an optimisation, for each parameter and one.
+const PATIENCE: usize = 60;
+/// Singular values below this part of the largest carry no information.
+const RANK: f64 = 1e-10;
+
+/// A parameter of a nonlinear fit.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Bounded {
+    pub start: f64,
+    pub low: f64,
+    pub high: f64,
+    /// Step of the difference quotients.
+    pub step: f64,
+}
+
+/// Where a nonlinear fit ended.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Minimum {
+    pub values: Vec<f64>,
+    /// Covariance of the values, from the residuals' variance.
+    pub covariance: DMatrix<f64>,
+    /// Sum of squares of the residuals.
+    pub squares: f64,
+    /// Whether each value lies at one of its bounds.
+    pub at_bound: Vec<bool>,
+}
+
+impl Minimum {
+    /// Standard error of a value.
+    pub fn error(&self, k: usize) -> f64 {
+        self.covariance.get((k, k)).map_or(f64::NAN, |variance| variance.max(0.0).sqrt())
+    }
+
+    /// Coefficient of correlation of two values.
+    pub fn correlation(&self, j: usize, k: usize) -> f64 {
+        self.covariance.get((j, k)).map_or(f64::NAN, |both| both / (self.error(j) * self.error(k)))
+    }
+}
+
+/// Minimises the sum of squares of `residuals` within bounds; none if they cannot be computed at the start.
+///
+/// Levenberg and Marquardt's method on z with `x = low + (high − low)(1 + sin z)/2`, which keeps the bounds.
+pub(super) fn minimise(
+    parameters: &[Bounded],
+    residuals: impl Fn(&[f64]) -> Option<DVector<f64>> + Sync,
+) -> Option<Minimum> {
+    let problem = Problem { z: start(parameters), parameters, residuals: &residuals };
+    let (problem, _) =
+        LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE).minimize(problem);
+    let values = problem.values();
+    let at_end = residuals(&values)?;
+    let jacobian = problem.derivatives(&values)?;
+    let freedom = at_end.len().saturating_sub(values.len()).max(1);
+    let squares = at_end.norm_squared();
+    let covariance = inverse(&(jacobian.transpose() * &jacobian))? * (squares / freedom as f64);
+    let at_bound = parameters
+        .iter()
+        .zip(&values)
+        .map(|(p, &x)| (x - p.low).min(p.high - x) < AT_BOUND * (p.high - p.low))
+        .collect();
+    Some(Minimum { values, covariance, squares, at_bound })
+}
+
+fn start(parameters: &[Bounded]) -> DVector<f64> {
+    let z = |p: &Bounded| {
+        // Away from the bounds, where the derivative vanishes.
+        let inside = ((p.start - p.low) / (p.high - p.low)).clamp(AT_BOUND, 1.0 - AT_BOUND);
+        (2.0 * inside - 1.0).asin()
+    };
+    DVector::from_iterator(parameters.len(), parameters.iter().map(z))
+}
+
+struct Problem<'a, R> {
+    z: DVector<f64>,
+    parameters: &'a [Bounded],
+    residuals: &'a R,
+}
+
+impl<R: Fn(&[f64]) -> Option<DVector<f64>> + Sync> Problem<'_, R> {
+    fn values(&self) -> Vec<f64> {
+        let value = |(p, z): (&Bounded, &f64)| p.low + (p.high - p.low) * 0.5 * (1.0 + z.sin());
+        self.parameters.iter().zip(self.z.iter()).map(value).collect()
+    }
+
+    /// Derivatives of the residuals by the values, central differences.
+    fn derivatives(&self, values: &[f64]) -> Option<DMatrix<f64>> {
+        let columns: Option<Vec<DVector<f64>>> = (0..values.len())
+            .into_par_iter()
+            .map(|k| {
+                let p = self.parameters.get(k)?;
+                let (low, high) = ((values[k] - p.step).max(p.low), (values[k] + p.step).min(p.high));
+                let at = |x: f64| {
+                    let mut moved = values.to_vec();
+                    moved[k] = x;
+                    (self.residuals)(&moved)
+                };
+                Some((at(high)? - at(low)?) / (high - low))
+            })
+            .collect();
+        let columns = columns?;
+        (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
+    }
+}
+
+impl<R: Fn(&[f64]) -> Option<DVector<f64>> + Sync> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, R> {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, z: &DVector<f64>) {
+        self.z.copy_from(z);
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.z.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        (self.residuals)(&self.values())
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let mut jacobian = self.derivatives(&self.values())?;
+        for ((mut column, p), z) in jacobian.column_iter_mut().zip(self.parameters).zip(self.z.iter()) {
+            column *= (p.high - p.low) * 0.5 * z.cos();
+        }
+        Some(jacobian)
+    }
+}
+
+/// A linear fit.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Linear {
+    pub values: Vec<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
+impl Linear {
+    /// Standard error of a value.
+    pub fn error(&self, k: usize) -> f64 {
+        self.covariance.get((k, k)).map_or(f64::NAN, |variance| variance.max(0.0).sqrt())
+    }
+}
+
+/// Weighted linear least squares: factors, what they are to give, and the weight of the row.
+///
+/// None if the rows do not determine the values.
+pub(super) fn linear(rows: impl Iterator<Item = (Vec<f64>, f64, f64)>) -> Option<Linear> {
+    let mut rows = rows.peekable();
+    let size = rows.peek()?.0.len();
+    let mut normal = DMatrix::zeros(size, size);
+    let mut right = DVector::zeros(size);
+    let (mut squares, mut count) = (0.0, 0_usize);
+    for (factors, value, weight) in rows.filter(|row| row.0.len() == size) {
+        let factors = DVector::from_vec(factors);
+        normal.ger(weight, &factors, &factors, 1.0);
+        right.axpy(value * weight, &factors, 1.0);
+        squares += weight * value * value;
+        count += 1;
+    }
+    if count < size {
+        return None;
+    }
+    let inverse = inverse(&normal)?;
+    let values = &inverse * &right;
+    let left = (squares - values.dot(&right)).max(0.0);
+    let variance = left / count.saturating_sub(size).max(1) as f64;
+    Some(Linear { values: values.iter().copied().collect(), covariance: inverse * variance })
+}
+
+/// The inverse of a symmetric matrix of unlike units; none if it is not of full rank.
+fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
+    if !scale.iter().all(|s| s.is_finite()) {
+        return None;
+    }
+    let scale = DMatrix::from_diagonal(&scale);
+    let scaled = &scale * matrix * &scale;
+    let values = scaled.singular_values();
+    let sound = values.min() > RANK * values.max();
+    sound.then(|| scaled.try_inverse()).flatten().map(|inverse| &scale * inverse * &scale)
+}
+
+/// Coefficient of determination R² of `(measured, modelled)` pairs; NaN if nothing varies.
+pub(super) fn determination(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+    let count = pairs.clone().count() as f64;
+    let mean = pairs.clone().map(|(measured, _)| measured).sum::<f64>() / count;
+    let (mut left, mut total) = (0.0, 0.0);
+    for (measured, modelled) in pairs {
+        left += (measured - modelled) * (measured - modelled);
+        total += (measured - mean) * (measured - mean);
+    }
+    1.0 - left / total
+}
+
+/// The middle of a list that is put in order; NaN if it is empty.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Median, and 1.4826 times the median distance from it: the standard deviation of a normal distribution.
+pub(super) fn robust(values: &[f64]) -> (f64, f64) {
+    /// Standard deviation of a normal distribution over its median distance from the median.
+    const NORMAL: f64 = 1.4826;
+    let middle = median(&mut values.to_vec());
+    let mut distances: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
+    (middle, NORMAL * median(&mut distances))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_through_three_points_has_the_textbook_errors() {
+        // y = 1, 2, 4 at x = 0, 1, 2: slope 3/2, intercept 5/6, residual sum of squares 1/6.
+        let rows = [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)];
+        let fit = linear(rows.into_iter().map(|(x, y)| (vec![1.0, x], y, 1.0))).expect("two of three");
+        assert!((fit.values[0] - 5.0 / 6.0).abs() < 1e-12 && (fit.values[1] - 1.5).abs() < 1e-12);
+        // s² / Sxx = (1/6) / 2, and s² (1/3 + 1/2).
+        assert!((fit.error(1) - (1.0_f64 / 12.0).sqrt()).abs() < 1e-9);
+        assert!((fit.error(0) - (5.0_f64 / 36.0).sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn collinear_factors_are_no_fit() {
+        assert!(linear((0..9).map(|k| (vec![1.0, 2.0], f64::from(k), 1.0))).is_none());
+    }
+
+    #[test]
+    fn an_exponential_is_found_and_a_bound_is_told() {
+        let residuals = |p: &[f64]| {
+            Some(DVector::from_iterator(
+                20,
+                (0..20).map(|k| {
+                    let x = f64::from(k) * 0.1;
+                    p[0] * (p[1] * x).exp() - 3.0 * (-0.7 * x).exp()
+                }),
+            ))
+        };
+        let bounded = |start, low, high| Bounded { start, low, high, step: 1e-5 };
+        let free =
+            minimise(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -5.0, 5.0)], residuals).expect("a minimum");
+        assert!((free.values[0] - 3.0).abs() < 1e-6 && (free.values[1] + 0.7).abs() < 1e-6);
+        assert_eq!(free.at_bound, [false, false]);
+        let held =
+            minimise(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -0.2, 5.0)], residuals).expect("a minimum");
+        assert_eq!(held.at_bound, [false, true]);
+        assert!(held.values[1] >= -0.2);
+    }
+
+    #[test]
+    fn the_robust_spread_of_a_normal_sample_is_its_standard_deviation() {
+        // Quantiles of a normal distribution of mean 2 and deviation 1: -1.5, -0.6745, 0, 0.6745, 1.5.
+        let (middle, spread) = robust(&[0.5, 1.3255, 2.0, 2.6745, 3.5]);
+        assert!((middle - 2.0).abs() < 1e-12 && (spread - 1.0).abs() < 1e-3);
+    }
+}
