@@ -1,12 +1,13 @@
 //! The whole axis, simulated on the set-points of a recording.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::recording::Signals;
-use super::setpoints::{Setpoints, interpolated};
+use super::recording::{Signals, Span};
+use super::setpoints::Setpoints;
 use crate::config::{AxisConfig, KinematicsConfig, MachineConfig, Periods};
 use crate::machine::{Machine, MachineError, MachineParameters};
 use crate::units::seconds;
@@ -53,6 +54,10 @@ impl FeedforwardMode {
 pub struct Experiment {
     /// Number of the recording.
     pub recording: usize,
+    /// Number of the span in [`Signals::spans`], and of its first sample that belongs here.
+    pub span: usize,
+    /// That sample.
+    pub sample: usize,
     /// What feedforward acted.
     pub mode: FeedforwardMode,
     /// PSEC at the position instants from the first one on, m or rad.
@@ -94,29 +99,97 @@ impl Experiment {
     }
 }
 
-/// The parts of a recording that begin at rest; none without PSEC.
+/// The parts of a recording that begin at rest and keep one kind of feedforward; none without PSEC.
 ///
-/// `mode` says what feedforward acted where the recording itself does not.
+/// `mode` says what feedforward acted where the recording does not show VFFWS and TFFWS.
 pub fn experiments(signals: &Signals, recording: usize, tsp: f64, mode: FeedforwardMode) -> Vec<Experiment> {
     let mut found = Vec::new();
-    for span in &signals.spans {
+    let instants = (AT_REST / tsp).ceil() as usize;
+    for (number, span) in signals.spans.iter().enumerate() {
         let Some(setpoints) = Setpoints::of(span, signals.period, tsp) else { continue };
-        let instants = (AT_REST / tsp).ceil() as usize;
-        let Some(begin) = rest_from(&setpoints.values, instants) else { continue };
-        let time = setpoints.first + begin as f64 * tsp;
-        let sample = (time / signals.period - 1e-6).ceil() as usize;
-        let of = |channel: &[f64]| channel.get(sample..).unwrap_or_default().to_vec();
-        found.push(Experiment {
-            recording,
-            mode,
-            psec: setpoints.values[begin..].to_vec(),
-            first: sample as f64 * signals.period - time,
-            period: signals.period,
-            start: span.start + sample as f64 * signals.period,
-            position: of(&span.position),
-            velocity: of(span.recorded_velocity.as_ref().unwrap_or(&span.velocity)),
-            current: span.current.as_deref().map(of),
-        });
+        for (mode, part) in parts(span, &setpoints, signals.period, tsp, mode) {
+            let (psec, end) = (&setpoints.values[part.clone()], part.end);
+            let Some(begin) = rest_from(psec, instants).map(|k| part.start + k) else { continue };
+            let sample_of = |instant: usize| {
+                let time = setpoints.first + instant as f64 * tsp;
+                (time / signals.period - 1e-6).ceil().max(0.0) as usize
+            };
+            let sample = sample_of(begin);
+            let last = if end == setpoints.values.len() { span.position.len() } else { sample_of(end) };
+            let of = |channel: &[f64]| channel.get(sample..last).unwrap_or_default().to_vec();
+            let time = setpoints.first + begin as f64 * tsp;
+            found.push(Experiment {
+                recording,
+                span: number,
+                sample,
+                mode,
+                psec: setpoints.values[begin..end].to_vec(),
+                first: sample as f64 * signals.period - time,
+                period: signals.period,
+                start: span.start + sample as f64 * signals.period,
+                position: of(&span.position),
+                velocity: of(span.recorded_velocity.as_ref().unwrap_or(&span.velocity)),
+                current: span.current.as_deref().map(of),
+            });
+        }
+    }
+    found
+}
+
+/// Position instants of a span with one kind of feedforward: cut in the standstill before it changes.
+fn parts(
+    span: &Span,
+    setpoints: &Setpoints,
+    period: f64,
+    tsp: f64,
+    given: FeedforwardMode,
+) -> Vec<(FeedforwardMode, Range<usize>)> {
+    let count = setpoints.values.len();
+    let Some(velocity) = &span.velocity_feedforward else { return vec![(given, 0..count)] };
+    let instants = (AT_REST / tsp).ceil() as usize;
+    let acts = |channel: Option<&Vec<f64>>, from: usize, to: usize| {
+        let sample = |k: usize| ((setpoints.first + k as f64 * tsp) / period) as usize;
+        let end = channel.map_or(0, Vec::len).min(sample(to));
+        channel.and_then(|c| c.get(sample(from).min(end)..end)).is_some_and(|c| c.iter().any(|v| *v != 0.0))
+    };
+    let mut found: Vec<(FeedforwardMode, Range<usize>)> = Vec::new();
+    for (from, to) in moves(&setpoints.values, instants) {
+        // Delays keep the feedforward acting for a while behind the set-points.
+        let to = (to + instants).min(count);
+        let mode = match (acts(Some(velocity), from, to), acts(span.torque_feedforward.as_ref(), from, to)) {
+            (false, _) => FeedforwardMode::Off,
+            (true, true) => FeedforwardMode::Both,
+            // Without its channel nobody sees whether the torque was fed forward.
+            (true, false) if span.torque_feedforward.is_none() && given == FeedforwardMode::Both => given,
+            (true, false) => FeedforwardMode::Velocity,
+        };
+        match found.last_mut() {
+            Some((last, range)) if *last == mode => range.end = to,
+            Some((_, range)) => {
+                let cut = from.saturating_sub(instants).max(range.end);
+                range.end = cut;
+                found.push((mode, cut..to));
+            }
+            None => found.push((mode, 0..to)),
+        }
+    }
+    if let Some((_, range)) = found.last_mut() {
+        range.end = count;
+    }
+    found
+}
+
+/// Instants from which to which PSEC moves; pauses shorter than `rest` instants belong to a move.
+fn moves(psec: &[f64], rest: usize) -> Vec<(usize, usize)> {
+    let mut found: Vec<(usize, usize)> = Vec::new();
+    for (k, pair) in psec.windows(2).enumerate() {
+        if pair[0] == pair[1] {
+            continue;
+        }
+        match found.last_mut() {
+            Some((_, to)) if k < *to + rest => *to = k + 1,
+            _ => found.push((k, k + 1)),
+        }
     }
     found
 }

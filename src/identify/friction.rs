@@ -23,7 +23,7 @@ const FAST_STARTS: [f64; 4] = [-0.15, -0.4, -1.0, -3.0];
 const STEP: f64 = 1e-6;
 /// b with which a straight line is written in the form of eq. 3, min/m or min/rev: `i0 cosh(bV) + s/b sinh(bV)`
 /// differs from `i0 + sV` by less than 2 parts in 10⁴ up to 20 m/min.
-const STRAIGHT: f64 = 1e-3;
+pub(super) const STRAIGHT: f64 = 1e-3;
 /// R² below which a law does not describe what was measured.
 pub const LEAST_DETERMINATION: f64 = 0.95;
 /// Difference between directions, part of the friction, beyond which it is told.
@@ -233,15 +233,19 @@ fn asymmetry(plus: &[Point], minus: &[Point]) -> f64 {
     pairs.fold(f64::NAN, f64::max)
 }
 
+/// `level + slope V` in the form of eq. 3.
+pub(super) fn straight_law(level: f64, slope: f64) -> FrictionConfig {
+    let (a, c) = ((level + slope / STRAIGHT) / 2.0, (level - slope / STRAIGHT) / 2.0);
+    FrictionConfig { a, b: STRAIGHT, c, d: -STRAIGHT, i0: level }
+}
+
 fn straight(points: &[Point]) -> Option<LawFit> {
     let fit = linear(points.iter().map(|&(v, current, weight)| (vec![1.0, v], current, weight)))?;
     let (level, slope) = (fit.values[0], fit.values[1]);
-    let (a, c) = ((level + slope / STRAIGHT) / 2.0, (level - slope / STRAIGHT) / 2.0);
     // Friction does not drive, also where a line through fast speeds meets standstill below zero.
-    let config = FrictionConfig { a, b: STRAIGHT, c, d: -STRAIGHT, i0: level.max(0.0) };
     (level > 0.0).then(|| LawFit {
         law: FrictionLaw::Linear,
-        config,
+        config: straight_law(level, slope),
         errors: [f64::NAN; 4],
         determination: determination(points.iter().map(|p| (p.1, level + slope * p.0))),
         covariance: fit.covariance,

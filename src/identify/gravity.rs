@@ -93,6 +93,19 @@ pub struct Gravity {
     pub at_rest: Option<(GravityCurrent, GravityCurrent)>,
 }
 
+impl Gravity {
+    /// Makes it the gravity of an axis.
+    pub(super) fn apply(&self, axis: &mut AxisConfig) {
+        if let Some((weight, _)) = self.weight {
+            axis.gravity.weight = weight;
+        }
+        if let Some((tilt, _)) = self.tilt {
+            axis.gravity.tilt = tilt;
+            axis.gravity.phase = self.phase.map_or(0.0, |(phase, _)| phase);
+        }
+    }
+}
+
 /// What steady segments hold.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Steady {

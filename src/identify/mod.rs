@@ -4,21 +4,29 @@
 //! paper take it from there. What they could not tell, and what to record to mend it, are [`Finding`]s.
 
 mod closed_loop;
+mod delays;
 mod feedforward;
 mod finding;
 mod fit;
 mod friction;
 mod gravity;
+mod identification;
 mod inertia;
 mod recording;
+mod refine;
 mod segments;
 mod setpoints;
+mod validate;
 
 pub use closed_loop::{Experiment, FeedforwardMode, Simulated, experiments, simulate, simulate_all};
+pub use delays::{Delay, DelayFit};
 pub use feedforward::{FeedforwardFit, Regression, feedforward};
 pub use finding::{Finding, Severity};
 pub use friction::{Breakaway, Friction, FrictionLaw, LawFit, friction};
 pub use gravity::{Gravity, GravityCurrent, GravitySource, Level, Rest, Steady, gravity};
+pub use identification::{Identification, Input, Options, identify};
 pub use inertia::{Inertia, inertia};
 pub use recording::{RawRecording, Signals, Span};
+pub use refine::{Parameter, Refined, Refinement, refine};
 pub use segments::{Segment, SegmentKind, segments};
+pub use validate::{Comparison, Deviation, InverseDynamics, compare, inverse_dynamics};
