@@ -3,6 +3,8 @@
 //! A recording is read as a [`RawRecording`], checked and made even in time ([`Signals`]); the steps of the
 //! paper take it from there. What they could not tell, and what to record to mend it, are [`Finding`]s.
 
+pub mod campaign;
+
 mod closed_loop;
 mod delays;
 mod feedforward;

@@ -2,6 +2,7 @@
 
 #![forbid(unsafe_code)]
 
+mod campaign;
 mod check;
 mod design;
 mod design_output;
@@ -46,7 +47,7 @@ struct Arguments {
 enum Command {
     /// Run a scenario or set-points through a machine and print its errors.
     Run(run::Arguments),
-    /// Write the set-points of a scenario to a file.
+    /// Write set-points to a file: those of a scenario, or of a campaign to identify an axis.
     Psec(psec::Arguments),
     /// Design position controllers: polynomials, closed-loop poles and stability margins.
     Design(design::Arguments),

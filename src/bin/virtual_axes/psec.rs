@@ -1,4 +1,4 @@
-//! `virtual_axes psec`: the set-points of a scenario as a file.
+//! `virtual_axes psec`: set-points as a file.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -9,11 +9,28 @@ use virtual_axes::simulation::joints;
 use virtual_axes::trial::Setpoints;
 
 use crate::input::Input;
-use crate::{interrupt, variant};
+use crate::{campaign, interrupt, variant};
+
+/// Those of a scenario, or a campaign.
+#[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct Arguments {
+    #[command(subcommand)]
+    kind: Option<Kind>,
+    #[command(flatten)]
+    scenario: Option<OfScenario>,
+}
+
+/// What is no scenario.
+#[derive(Debug, clap::Subcommand)]
+enum Kind {
+    /// Write what an axis is to be moved through to be identified, and say what to set when.
+    Campaign(campaign::Arguments),
+}
 
 /// Which set-points, and where to.
 #[derive(Debug, clap::Args)]
-pub struct Arguments {
+struct OfScenario {
     /// A shipped scenario or a scenario file.
     scenario: String,
     /// The file: CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory on `/psec`, or the YAML
@@ -31,8 +48,17 @@ pub struct Arguments {
     feed: Option<f64>,
 }
 
-/// Writes them; says nothing.
+/// Writes them.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+    match (&arguments.kind, &arguments.scenario) {
+        (Some(Kind::Campaign(arguments)), _) => campaign::run(arguments),
+        (None, Some(arguments)) => of_scenario(arguments),
+        (None, None) => Err("psec wants a scenario, or `campaign`".into()),
+    }
+}
+
+/// Writes those of a scenario; says nothing.
+fn of_scenario(arguments: &OfScenario) -> Result<String, Box<dyn Error>> {
     let machine = Parameters::load(&arguments.machine)?;
     let config = variant::parameters(&machine, None, &arguments.set, &[])?.machine_config()?;
     let input = Input::open(&arguments.scenario, None)?;
