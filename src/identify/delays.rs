@@ -17,6 +17,8 @@ const LONGEST: Nanoseconds = 100 * MILLISECOND_NS;
 const COARSE: Nanoseconds = 2 * MILLISECOND_NS;
 /// Change of the sum of squares that is noise, in units of the residuals' variance: three standard deviations.
 const NOISE: f64 = 9.0;
+/// Delays that are tried at once where an interval is followed.
+const BLOCK: i64 = 8;
 /// Longest correlation of residuals that is looked for, samples.
 const CORRELATION: usize = 200;
 
@@ -93,8 +95,8 @@ pub struct DelayFit {
 
 /// Finds a delay from the experiments with its feedforward; none if there are none.
 ///
-/// `nuisance` moves other parameters a little, each by its step: what a change of them explains is not counted
-/// for the delay.
+/// `nuisance` moves other parameters a little: what a change of them explains is not counted for the delay.
+/// Where it is given the axis is known well, and the delay is looked for around its present value only.
 pub(super) fn delay(
     which: Delay,
     axis: &AxisConfig,
@@ -115,8 +117,10 @@ pub(super) fn delay(
         deviations(&axis, periods, experiments)
     };
     let coarse = (COARSE / grid).max(1);
+    let present = (which.of(&axis.delays) + grid - 1) / grid;
+    let first = if nuisance.is_empty() { 0..=longest } else { present..=present };
     let mut tried: Vec<(i64, DVector<f64>)> =
-        tries((0..=longest).step_by(usize::try_from(coarse).unwrap_or(1)).collect(), &residuals);
+        tries(first.step_by(usize::try_from(coarse).unwrap_or(1)).collect(), &residuals);
     let best = |tried: &[(i64, DVector<f64>)]| {
         tried.iter().min_by(|a, b| a.1.norm_squared().total_cmp(&b.1.norm_squared())).map(|(m, _)| *m)
     };
@@ -147,20 +151,26 @@ pub(super) fn delay(
     // Residuals that are alike from sample to sample count less than their number.
     let limit = least * (1.0 + NOISE * inflation(at_minimum.as_slice()) / count) + count * f64::EPSILON;
 
-    // The accepted neighbourhood of the best, part by part.
-    let accepted = |m: i64, tried: &mut Vec<(i64, DVector<f64>)>| {
-        if !tried.iter().any(|(known, _)| *known == m) {
-            tried.extend(tries(vec![m], &residuals));
+    // The accepted neighbourhood of the best, part by part; several are tried at once.
+    let mut reach = |step: i64| {
+        let mut end = at_best;
+        loop {
+            let next = end + step;
+            if !(0..=longest).contains(&next) {
+                return end;
+            }
+            if !tried.iter().any(|(known, _)| *known == next) {
+                let block = (0..BLOCK).map(|k| next + k * step).filter(|m| (0..=longest).contains(m));
+                tried.extend(tries(block.collect(), &residuals));
+            }
+            let accepted = tried.iter().find(|(m, _)| *m == next).is_some_and(|(_, r)| squares(r) <= limit);
+            if !accepted {
+                return end;
+            }
+            end = next;
         }
-        tried.iter().find(|(known, _)| *known == m).is_some_and(|(_, r)| squares(r) <= limit)
     };
-    let (mut low, mut high) = (at_best, at_best);
-    while low > 0 && accepted(low - 1, &mut tried) {
-        low -= 1;
-    }
-    while high < longest && accepted(high + 1, &mut tried) {
-        high += 1;
-    }
+    let (low, high) = (reach(-1), reach(1));
     let interval = (if low == 0 { -1 } else { (low - 1) * grid }, high * grid);
     let own = which.of(&axis.delays);
     let left = own > interval.0 && own <= interval.1;

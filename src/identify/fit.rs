@@ -6,8 +6,25 @@ use rayon::prelude::*;
 
 /// Part of its range within which a value lies at a bound.
 const AT_BOUND: f64 = 1e-3;
-/// Where an optimisation ends: relative change of the sum of squares and of the parameters.
-const TOLERANCE: f64 = 1e-10;
+/// How much work an optimisation is worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Effort {
+    /// Formulas: central differences, to the last digits.
+    Formula,
+    /// Simulations: forward differences, until nothing changes that noise would not hide.
+    Simulation,
+}
+
+impl Effort {
+    /// Where it ends: relative change of the sum of squares and of the parameters.
+    fn tolerance(self) -> f64 {
+        match self {
+            Effort::Formula => 1e-10,
+            Effort::Simulation => 1e-6,
+        }
+    }
+}
+
 /// Evaluations of an optimisation, for each parameter and one.
 const PATIENCE: usize = 60;
 /// Singular values below this part of the largest carry no information.
@@ -52,11 +69,12 @@ impl Minimum {
 /// Levenberg and Marquardt's method on z with `x = low + (high − low)(1 + sin z)/2`, which keeps the bounds.
 pub(super) fn minimise(
     parameters: &[Bounded],
+    effort: Effort,
     residuals: impl Fn(&[f64]) -> Option<DVector<f64>> + Sync,
 ) -> Option<Minimum> {
-    let problem = Problem { z: start(parameters), parameters, residuals: &residuals };
+    let problem = Problem { z: start(parameters), parameters, effort, residuals: &residuals };
     let (problem, _) =
-        LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE).minimize(problem);
+        LevenbergMarquardt::new().with_tol(effort.tolerance()).with_patience(PATIENCE).minimize(problem);
     let values = problem.values();
     let at_end = residuals(&values)?;
     let jacobian = problem.derivatives(&values)?;
@@ -83,6 +101,7 @@ fn start(parameters: &[Bounded]) -> DVector<f64> {
 struct Problem<'a, R> {
     z: DVector<f64>,
     parameters: &'a [Bounded],
+    effort: Effort,
     residuals: &'a R,
 }
 
@@ -92,21 +111,27 @@ impl<R: Fn(&[f64]) -> Option<DVector<f64>> + Sync> Problem<'_, R> {
         self.parameters.iter().zip(self.z.iter()).map(value).collect()
     }
 
-    /// Derivatives of the residuals by the values, central differences.
+    /// Derivatives of the residuals by the values.
     fn derivatives(&self, values: &[f64]) -> Option<DMatrix<f64>> {
-        let columns: Option<Vec<DVector<f64>>> = (0..values.len())
-            .into_par_iter()
-            .map(|k| {
-                let p = self.parameters.get(k)?;
-                let (low, high) = ((values[k] - p.step).max(p.low), (values[k] + p.step).min(p.high));
-                let at = |x: f64| {
-                    let mut moved = values.to_vec();
-                    moved[k] = x;
-                    (self.residuals)(&moved)
-                };
-                Some((at(high)? - at(low)?) / (high - low))
-            })
-            .collect();
+        let at = |k: usize, x: f64| {
+            let mut moved = values.to_vec();
+            *moved.get_mut(k)? = x;
+            (self.residuals)(&moved)
+        };
+        let here = match self.effort {
+            Effort::Formula => None,
+            Effort::Simulation => Some((self.residuals)(values)?),
+        };
+        let column = |k: usize| {
+            let (p, x) = (self.parameters.get(k)?, *values.get(k)?);
+            let (low, high) = ((x - p.step).max(p.low), (x + p.step).min(p.high));
+            match &here {
+                None => Some((at(k, high)? - at(k, low)?) / (high - low)),
+                Some(here) if high > x => Some((at(k, high)? - here) / (high - x)),
+                Some(here) => Some((here - at(k, low)?) / (x - low)),
+            }
+        };
+        let columns: Option<Vec<DVector<f64>>> = (0..values.len()).into_par_iter().map(column).collect();
         let columns = columns?;
         (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
     }
@@ -253,12 +278,12 @@ mod tests {
             ))
         };
         let bounded = |start, low, high| Bounded { start, low, high, step: 1e-5 };
-        let free =
-            minimise(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -5.0, 5.0)], residuals).expect("a minimum");
+        let free = minimise(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -5.0, 5.0)], Effort::Formula, residuals)
+            .expect("a minimum");
         assert!((free.values[0] - 3.0).abs() < 1e-6 && (free.values[1] + 0.7).abs() < 1e-6);
         assert_eq!(free.at_bound, [false, false]);
-        let held =
-            minimise(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -0.2, 5.0)], residuals).expect("a minimum");
+        let held = minimise(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -0.2, 5.0)], Effort::Formula, residuals)
+            .expect("a minimum");
         assert_eq!(held.at_bound, [false, true]);
         assert!(held.values[1] >= -0.2);
     }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::finding::Finding;
-use super::fit::{Bounded, Minimum, determination, linear, minimise};
+use super::fit::{Bounded, Effort, Minimum, determination, linear, minimise};
 use super::gravity::Level;
 use crate::config::{AxisConfig, AxisKind, FrictionConfig};
 use crate::units::{METRE_PER_MINUTE, RPM};
@@ -284,7 +284,7 @@ fn from(points: &[Point], b: f64, d: f64, most: f64) -> Option<Minimum> {
         bounded(sum, low, high),
         bounded(d, FAST.0, FAST.1),
     ];
-    let mut fit = minimise(&parameters, |x| {
+    let mut fit = minimise(&parameters, Effort::Formula, |x| {
         let [a, b, sum, d] = *x else { return None };
         let law = FrictionConfig { a, b, c: sum - a, d, i0: sum };
         let left = points.iter().map(|&(v, measured, weight)| weight.sqrt() * (current(&law, v) - measured));

@@ -5,7 +5,7 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector};
 
 use super::closed_loop::{Experiment, Simulated, simulate_all};
-use super::fit::{Bounded, Minimum, minimise};
+use super::fit::{Bounded, Effort, Minimum, minimise};
 use super::friction::FrictionLaw;
 use crate::config::{AxisConfig, AxisKind, Periods};
 
@@ -269,7 +269,7 @@ pub fn refine(
                 Bounded { start, low, high, step: STEP * parameter.scale(axis) }
             })
             .collect();
-        let found = minimise(&bounded, |values| {
+        let found = minimise(&bounded, Effort::Simulation, |values| {
             let moved = with(&present, parameters, values, held);
             let simulated = simulate_all(&moved, periods, experiments).ok()?;
             let mut residuals: Vec<f64> =
