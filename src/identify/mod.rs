@@ -6,22 +6,33 @@
 pub mod campaign;
 
 mod closed_loop;
+mod condition;
 mod delays;
+mod fault;
 mod feedforward;
+mod filter;
 mod finding;
 mod fit;
 mod friction;
 mod gravity;
 mod identification;
 mod inertia;
+mod lag;
+mod order;
+mod plausible;
 mod recording;
 mod refine;
+mod regression;
 mod segments;
 mod setpoints;
+mod spans;
+mod stamps;
 mod validate;
 
 pub use closed_loop::{Experiment, FeedforwardMode, Simulated, experiments, simulate, simulate_all};
+pub use condition::{Conditioning, condition};
 pub use delays::{Delay, DelayFit};
+pub use fault::RecordingFault;
 pub use feedforward::{FeedforwardFit, Regression, feedforward};
 pub use finding::{Finding, Severity};
 pub use friction::{Breakaway, Friction, FrictionLaw, LawFit, friction};
