@@ -96,13 +96,14 @@ pub struct DelayFit {
 /// Finds a delay from the experiments with its feedforward; none if there are none.
 ///
 /// `nuisance` moves other parameters a little: what a change of them explains is not counted for the delay.
-/// Where it is given the axis is known well, and the delay is looked for around its present value only.
+/// `around` looks near the axis's present delay only, for an axis that is known well.
 pub(super) fn delay(
     which: Delay,
     axis: &AxisConfig,
     periods: &Periods,
     experiments: &[Experiment],
     nuisance: &[AxisConfig],
+    around: bool,
 ) -> Option<DelayFit> {
     if experiments.is_empty() {
         return None;
@@ -118,7 +119,7 @@ pub(super) fn delay(
     };
     let coarse = (COARSE / grid).max(1);
     let present = (which.of(&axis.delays) + grid - 1) / grid;
-    let first = if nuisance.is_empty() { 0..=longest } else { present..=present };
+    let first = if around { present..=present } else { 0..=longest };
     let mut tried: Vec<(i64, DVector<f64>)> =
         tries(first.step_by(usize::try_from(coarse).unwrap_or(1)).collect(), &residuals);
     let best = |tried: &[(i64, DVector<f64>)]| {

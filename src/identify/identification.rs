@@ -1,6 +1,8 @@
 //! The steps of the paper one after the other, and the refinement behind them.
 
-use super::closed_loop::{Experiment, FeedforwardMode, Simulated, experiments, simulate_all};
+use rayon::prelude::*;
+
+use super::closed_loop::{Experiment, FeedforwardMode, Simulated, deviations, experiments, simulate_all};
 use super::delays::{Delay, DelayFit, delay};
 use super::feedforward::{FeedforwardFit, feedforward};
 use super::finding::Finding;
@@ -18,6 +20,10 @@ use crate::units::seconds;
 const LEAST_DETERMINATION: f64 = 0.9;
 /// Step by which a parameter is moved to see what of a delay it could explain, part of its value.
 const NUISANCE: f64 = 1e-2;
+
+/// Inertias that are tried first, parts of that by eq. 5: most of the current is unseen where the drive is quick
+/// and the recording slow, never the other way round.
+const LADDER: [f64; 8] = [0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
 
 /// A recording and what is known about it.
 #[derive(Debug, Clone, Copy)]
@@ -238,6 +244,9 @@ impl<'a> Work<'a> {
         let first = if off.is_empty() { self.found.experiments.clone() } else { off };
         let physics = self.physics();
         if self.options.refine {
+            if let Some(inertia) = start_of_inertia(&self.found.axis, self.periods, &first) {
+                self.found.axis.motor.inertia = inertia;
+            }
             self.refine(&first, &physics);
         }
         self.take_delay(Delay::Beta, &[]);
@@ -320,7 +329,9 @@ impl<'a> Work<'a> {
         }
         let experiments: Vec<Experiment> =
             found.experiments.iter().filter(|e| e.mode == which.mode()).cloned().collect();
-        if let Some(fit) = delay(which, &found.axis, self.periods, &experiments, nuisance) {
+        // The long recordings are those that show α, which is found at once.
+        let around = which == Delay::Alpha && !nuisance.is_empty();
+        if let Some(fit) = delay(which, &found.axis, self.periods, &experiments, nuisance, around) {
             which.set(&mut found.axis, fit.value);
             found.delays.push(fit);
         }
@@ -371,19 +382,8 @@ impl<'a> Work<'a> {
             .zip(&found.segments)
             .map(|(input, segments)| inverse_dynamics(input.signals, segments, &found.axis))
             .collect();
-        for (input, inverse) in self.inputs.iter().zip(&found.inverse) {
-            if let Some(inverse) = inverse.as_ref().filter(|i| i.determination < LEAST_DETERMINATION) {
-                found.findings.push(Finding::warning(
-                    "poor-current",
-                    format!(
-                        "{}: the model explains {:.1} % of the current",
-                        input.signals.name,
-                        100.0 * inverse.determination
-                    ),
-                    "check units, torque constant and transmission; record without cutting forces",
-                ));
-            }
-        }
+        self.tell_currents();
+        let found = &mut self.found;
         if let Some(refinement) = &found.refinement {
             for refined in refinement.parameters.iter().filter(|p| p.at_bound) {
                 found.findings.push(Finding::warning(
@@ -401,4 +401,36 @@ impl<'a> Work<'a> {
         }
         self.found
     }
+
+    /// Says where the model does not explain the current, in closed loop if that was simulated.
+    fn tell_currents(&mut self) {
+        let found = &mut self.found;
+        for (number, input) in self.inputs.iter().enumerate() {
+            let simulated =
+                found.experiments.iter().zip(&found.comparisons).filter(|(e, _)| e.recording == number);
+            let worst = simulated.filter_map(|(_, c)| c.current_determination).reduce(f64::min);
+            let inverse = found.inverse.get(number).and_then(|i| i.as_ref()).map(|i| i.determination);
+            if let Some(r2) = worst.or(inverse).filter(|r2| *r2 < LEAST_DETERMINATION) {
+                found.findings.push(Finding::warning(
+                    "poor-current",
+                    format!("{}: the model explains {:.1} % of the current", input.signals.name, 100.0 * r2),
+                    "check units, torque constant and transmission; record without cutting forces",
+                ));
+            }
+        }
+    }
+}
+
+/// The inertia, of a ladder of them, whose closed loop moves most like the recorded one.
+///
+/// Eq. 5 can be far off where the current swings between two samples, and a search from there can end elsewhere.
+fn start_of_inertia(axis: &AxisConfig, periods: &Periods, experiments: &[Experiment]) -> Option<f64> {
+    let of = |inertia: f64| {
+        let mut axis = axis.clone();
+        axis.motor.inertia = inertia;
+        Some((inertia, deviations(&axis, periods, experiments)?.norm_squared()))
+    };
+    let ladder = LADDER.map(|factor| factor * axis.motor.inertia);
+    let found: Vec<(f64, f64)> = ladder.into_par_iter().filter_map(of).collect();
+    found.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(inertia, _)| inertia)
 }
