@@ -28,6 +28,7 @@ mod setpoints;
 mod spans;
 mod stamps;
 mod validate;
+mod values;
 
 pub use closed_loop::{Experiment, FeedforwardMode, Simulated, experiments, simulate, simulate_all};
 pub use condition::{Conditioning, condition};
@@ -43,3 +44,4 @@ pub use recording::{RawRecording, Signals, Span};
 pub use refine::{Parameter, Refined, Refinement, refine};
 pub use segments::{Segment, SegmentKind, segments};
 pub use validate::{Comparison, Deviation, InverseDynamics, compare, inverse_dynamics};
+pub use values::{Identified, adopt};
