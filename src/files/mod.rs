@@ -8,6 +8,7 @@
 mod cdr;
 mod input;
 mod lines;
+mod mcap_in;
 mod mcap_out;
 mod output;
 mod psec_csv;
@@ -21,6 +22,7 @@ mod trace_mcap;
 mod yaml;
 
 pub use input::{FileKind, Input, InputError};
+pub use mcap_in::McapFault;
 pub use output::OutputFile;
 pub use psec_csv::PsecCsv;
 pub use psec_error::PsecError;
