@@ -4,6 +4,7 @@ mod columns;
 mod csv;
 mod error;
 mod join;
+mod layout;
 mod mcap;
 mod series;
 mod unit;
@@ -57,7 +58,12 @@ pub fn read_recording(
     let mut head = Vec::new();
     (&mut file).take(::mcap::MAGIC.len() as u64).read_to_end(&mut head).map_err(unreadable)?;
     if kind_by_beginning(&head) == Some(FileKind::Mcap) {
-        return read_recording_mcap(file, &name, axis, options);
+        let (recording, mut findings) = read_recording_mcap(file, &name, axis, options)?;
+        if !options.columns.mappings.is_empty() {
+            let what = format!("{name}: MCAP has no columns: their mapping is not used");
+            findings.push(Finding::note("unused-columns", what));
+        }
+        return Ok((recording, findings));
     }
     let read = read_recording_csv(Cursor::new(head).chain(file), &name, axis, options);
     read.map_err(|error| match other_kind(path, &error) {

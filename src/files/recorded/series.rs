@@ -198,7 +198,7 @@ impl Series {
             }
         }
         let several = self.candidates.len() > 1;
-        if let (false, Some(found)) = (several, self.candidates.pop_first()) {
+        if !several && let Some(found) = self.candidates.pop_first() {
             return Ok(found);
         }
         let names: Vec<&String> = if several {
@@ -206,13 +206,13 @@ impl Series {
         } else {
             self.names.iter().collect()
         };
-        let (short, nearest) = match several {
+        let (reason, nearest) = match several {
             true => ("several joints end in", None),
             false => ("there is no joint", nearest(joint, names.iter().map(|name| name.as_str()))),
         };
         Err(AxisRecordingError::Joint {
             at: format!("{file}: {}", self.topic),
-            reason: short,
+            reason,
             joint: joint.to_owned(),
             joints: names.iter().map(|name| shortened(name)).collect(),
             nearest,
