@@ -130,7 +130,7 @@ impl Input {
     }
 }
 
-fn kind_by_beginning(head: &[u8]) -> Option<FileKind> {
+pub(super) fn kind_by_beginning(head: &[u8]) -> Option<FileKind> {
     if head.starts_with(mcap::MAGIC) {
         return Some(FileKind::Mcap);
     }

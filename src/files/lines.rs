@@ -20,7 +20,8 @@ impl<R: Read> Lines<R> {
         Lines { input: BufReader::new(input), line: String::new(), number: 0 }
     }
 
-    /// The next line that is not blank, without what ends it, and its number from 1.
+    /// The next line that is not blank, without what ends it, and its number from 1. A line of tabs is
+    /// blank.
     ///
     /// # Errors
     /// What is wrong with the file, and the line that is read.
@@ -41,13 +42,28 @@ impl<R: Read> Lines<R> {
             }
         }
         let line = if self.number == 1 { self.line.trim_start_matches(BYTE_ORDER_MARK) } else { &self.line };
-        Ok(Some((self.number, line.trim())))
+        Ok(Some((self.number, line.trim_end_matches(['\r', '\n']))))
+    }
+
+    /// Whether the line that was read last has an end.
+    pub fn is_ended(&self) -> bool {
+        self.line.ends_with(['\r', '\n'])
     }
 }
 
 /// The fields of a line of CSV, without the spaces and the quotation marks around them.
 pub(super) fn fields(line: &str) -> impl Iterator<Item = &str> {
-    line.split(',').map(|field| {
+    fields_between(line, ',')
+}
+
+/// The fields of a line between delimiters, likewise; one within quotation marks is part of the field.
+pub(super) fn fields_between(line: &str, delimiter: char) -> impl Iterator<Item = &str> {
+    let mut quoted = false;
+    let split = line.split(move |c| {
+        quoted ^= c == '"';
+        c == delimiter && !quoted
+    });
+    split.map(|field| {
         let field = field.trim();
         field.strip_prefix('"').and_then(|f| f.strip_suffix('"')).map_or(field, str::trim)
     })

@@ -1,13 +1,14 @@
-//! Files: set-points and traces, in and out.
+//! Files: set-points, traces and recordings, in and out.
 //!
 //! What a file is, is told by its content ([`Input`]) when it is read and by its extension when it is
 //! written. Set-points come from CSV ([`PsecCsv`], a stream), YAML ([`read_psec_yaml`]) and MCAP
-//! recordings ([`Trajectories`]). Traces ([`TraceWriter`]) and set-points ([`PsecWriter`]) go into
+//! recordings ([`Trajectories`]); what was recorded of an axis from CSV and MCAP ([`read_recording`]). Traces ([`TraceWriter`]) and set-points ([`PsecWriter`]) go into
 //! [`OutputFile`]s, which stand under their names only when they are whole.
 
 mod cdr;
 mod input;
 mod lines;
+mod mcap_in;
 mod mcap_out;
 mod output;
 mod psec_csv;
@@ -15,18 +16,24 @@ mod psec_error;
 mod psec_mcap;
 mod psec_out;
 mod psec_yaml;
+mod recorded;
 mod trace;
 mod trace_csv;
 mod trace_mcap;
 mod yaml;
 
 pub use input::{FileKind, Input, InputError};
+pub use mcap_in::McapFault;
 pub use output::OutputFile;
 pub use psec_csv::PsecCsv;
 pub use psec_error::PsecError;
 pub use psec_mcap::{RecordingError, Trajectories};
 pub use psec_out::{PsecCsvOut, PsecMcapOut, PsecWriter, PsecYamlOut, psec_writer};
 pub use psec_yaml::{TrajectoryYamlError, read_psec_yaml};
+pub use recorded::{
+    AxisRecordingError, Channel, Columns, ColumnsError, RecordingOptions, read_recording, read_recording_csv,
+    read_recording_mcap,
+};
 pub use trace::{TraceWriter, trace_writer};
 pub use trace_csv::TraceCsv;
 pub use trace_mcap::TraceMcap;

@@ -229,7 +229,7 @@ impl<R: Read> PsecCsv<R> {
         let time = header.next();
         self.columns = header.map(str::to_owned).collect();
         if time != Some(TIME) || self.columns.is_empty() || self.columns.iter().any(String::is_empty) {
-            return Err(PsecError::Header { at, found: super::shortened(text) });
+            return Err(PsecError::Header { at, found: super::shortened(text.trim()) });
         }
         for column in &self.columns {
             let Some(place) = joints.iter().position(|joint| joint.name == *column) else {

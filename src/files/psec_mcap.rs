@@ -3,15 +3,14 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek};
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
+use mcap::Message;
 use mcap::io::MessageReader;
-use mcap::records::{Record, op};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use mcap::{McapError, Message};
 
-use super::{cdr, nearest, nearest_name};
+use super::mcap_in::{McapFault, check_chunks, damaged, decode, start, type_of, unreadable};
+use super::{nearest, nearest_name};
 use crate::messages;
 use crate::messages::trajectory_msgs::msg::JointTrajectory;
 use crate::trajectory::{Rejection, Request};
@@ -19,32 +18,13 @@ use crate::units::{Nanoseconds, seconds};
 
 /// The type of message that is read.
 const TYPE: &str = "trajectory_msgs/msg/JointTrajectory";
-/// The encoding that is read.
-const ENCODING: &str = "cdr";
-/// Longest record, bytes: hours of set-points in one message. A damaged length asks for no more memory.
-const LONGEST_RECORD: usize = 256 << 20;
-/// Opcode and length before a record.
-const RECORD_HEAD: usize = 1 + 8;
 
 /// Why a recording cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RecordingError {
-    /// It cannot be opened or read.
-    #[error("{at}: {reason}")]
-    Unreadable {
-        /// The file.
-        at: String,
-        /// What the operating system says.
-        reason: String,
-    },
-    /// It is not MCAP, or not whole.
-    #[error("{at}: not a whole MCAP recording: {reason}")]
-    Damaged {
-        /// The file.
-        at: String,
-        /// What the reader says.
-        reason: String,
-    },
+    /// The file cannot be read, or is not whole.
+    #[error(transparent)]
+    File(#[from] McapFault),
     /// There is no trajectory in it.
     #[error("{at}: there is no message {TYPE}; {}", topics_text(.topics))]
     NoTrajectory {
@@ -215,7 +195,7 @@ impl<R: Read + Seek> Trajectories<R> {
             self.early.insert(found, message);
         }
         let reason = "it has become shorter while it was read".to_owned();
-        Err(RecordingError::Damaged { at: self.name.clone(), reason })
+        Err(McapFault::Damaged { at: self.name.clone(), reason }.into())
     }
 
     fn request(
@@ -226,13 +206,8 @@ impl<R: Read + Seek> Trajectories<R> {
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
         let at =
             || format!("{}: {}, message {number}, log time {} s", self.name, self.topic, seconds(log_time));
-        let encoding = &message.channel.message_encoding;
-        if encoding != ENCODING {
-            let reason = format!("its encoding is \"{encoding}\", must be \"{ENCODING}\"");
-            return Err(RecordingError::Message { at: at(), reason });
-        }
         let trajectory: JointTrajectory =
-            cdr::decode(&message.data).map_err(|reason| RecordingError::Message { at: at(), reason })?;
+            decode(message).map_err(|reason| RecordingError::Message { at: at(), reason })?;
         let request = messages::request(&trajectory, usize::MAX)
             .map_err(|rejection| RecordingError::Rejected { at: at(), rejection })?;
         Ok((log_time, request))
@@ -253,85 +228,5 @@ impl<R: Read + Seek> Iterator for Trajectories<R> {
 }
 
 fn is_trajectory(message: &Message<'_>) -> bool {
-    message.channel.schema.as_ref().is_some_and(|schema| schema.name == TYPE)
-}
-
-fn options() -> LinearReaderOptions {
-    LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD).with_validate_chunk_crcs(true)
-}
-
-/// From the beginning.
-fn start<R: Read + Seek>(mut input: R, name: &str) -> Result<MessageReader<BufReader<R>>, RecordingError> {
-    input.rewind().map_err(|error| unreadable(name, &error))?;
-    Ok(MessageReader::new_with_options(BufReader::new(input), options()))
-}
-
-/// Checks that the records of each chunk that is not compressed fill it, which the reader relies upon.
-fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<(), RecordingError> {
-    input.rewind().map_err(|error| match error.kind() {
-        io::ErrorKind::NotSeekable => RecordingError::Unreadable {
-            at: name.to_owned(),
-            reason: "a recording is read more than once: it must be a file, not a pipe".to_owned(),
-        },
-        _ => unreadable(name, &error),
-    })?;
-    let mut input = BufReader::new(input);
-    let mut reader = LinearReader::new_with_options(options().with_emit_chunks(true));
-    while let Some(event) = reader.next_event() {
-        match event.map_err(|error| damaged(name, &error))? {
-            LinearReadEvent::ReadRequest(wanted) => {
-                let read = loop {
-                    match input.read(reader.insert(wanted)) {
-                        Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                        read => break read.map_err(|error| unreadable(name, &error))?,
-                    }
-                };
-                reader.notify_read(read);
-            }
-            LinearReadEvent::Record { opcode: op::CHUNK, data } => {
-                let record = mcap::parse_record(op::CHUNK, data).map_err(|error| damaged(name, &error))?;
-                if let Record::Chunk { header, data } = record
-                    && header.compression.is_empty()
-                    && !is_filled(&data)
-                {
-                    return Err(damaged(name, &McapError::UnexpectedEoc));
-                }
-            }
-            LinearReadEvent::Record { .. } => {}
-        }
-    }
-    Ok(())
-}
-
-/// Whether `records` are whole records and nothing else.
-fn is_filled(mut records: &[u8]) -> bool {
-    while !records.is_empty() {
-        let Some((head, rest)) = records.split_first_chunk::<RECORD_HEAD>() else { return false };
-        let [_, length @ ..] = head;
-        let Some(rest) = usize::try_from(u64::from_le_bytes(*length)).ok().and_then(|l| rest.get(l..)) else {
-            return false;
-        };
-        records = rest;
-    }
-    true
-}
-
-fn unreadable(name: &str, error: &io::Error) -> RecordingError {
-    RecordingError::Unreadable { at: name.to_owned(), reason: error.to_string() }
-}
-
-/// What the reader says, with what stands behind it.
-fn damaged(name: &str, error: &McapError) -> RecordingError {
-    let reason = match error {
-        McapError::Io(error) => return unreadable(name, error),
-        McapError::UnexpectedEof => {
-            "it ends in the middle of a record (`mcap recover` saves what there is)".to_owned()
-        }
-        McapError::Parse(error) => {
-            format!("a record cannot be read: {}", super::shortened(&error.to_string()))
-        }
-        McapError::BadMagic => "it does not begin and end as MCAP does".to_owned(),
-        error => error.to_string(),
-    };
-    RecordingError::Damaged { at: name.to_owned(), reason }
+    type_of(message) == Some(TYPE)
 }

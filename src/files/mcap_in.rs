@@ -1,0 +1,139 @@
+//! MCAP recordings (rosbag2, profile `ros2`) as files: reading them whole, and what can be wrong with them.
+
+use std::io::{self, BufReader, Read, Seek};
+
+use mcap::io::MessageReader;
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, Message};
+use serde::de::DeserializeOwned;
+
+use super::{cdr, shortened};
+
+/// The encoding of messages that is read.
+const ENCODING: &str = "cdr";
+/// Longest record, bytes: hours of set-points in one message. A damaged length asks for no more memory.
+const LONGEST_RECORD: usize = 256 << 20;
+/// Opcode and length before a record.
+const RECORD_HEAD: usize = 1 + 8;
+
+/// Why a file is not an MCAP recording that can be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum McapFault {
+    /// It cannot be opened or read.
+    #[error("{at}: {reason}")]
+    Unreadable {
+        /// The file.
+        at: String,
+        /// What the operating system says.
+        reason: String,
+    },
+    /// It is not MCAP, or not whole.
+    #[error("{at}: not a whole MCAP recording: {reason}")]
+    Damaged {
+        /// The file.
+        at: String,
+        /// What the reader says.
+        reason: String,
+    },
+}
+
+/// The name of a message's type, if the recording says it.
+pub(super) fn type_of<'a>(message: &'a Message<'_>) -> Option<&'a str> {
+    message.channel.schema.as_ref().map(|schema| schema.name.as_str())
+}
+
+/// A message as a value.
+///
+/// # Errors
+/// A sentence that says what is wrong.
+pub(super) fn decode<T: DeserializeOwned>(message: &Message<'_>) -> Result<T, String> {
+    let encoding = &message.channel.message_encoding;
+    if encoding != ENCODING {
+        return Err(format!("its encoding is \"{encoding}\", must be \"{ENCODING}\""));
+    }
+    cdr::decode(&message.data)
+}
+
+fn options() -> LinearReaderOptions {
+    LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD).with_validate_chunk_crcs(true)
+}
+
+/// From the beginning.
+pub(super) fn start<R: Read + Seek>(
+    mut input: R,
+    name: &str,
+) -> Result<MessageReader<BufReader<R>>, McapFault> {
+    input.rewind().map_err(|error| unreadable(name, &error))?;
+    Ok(MessageReader::new_with_options(BufReader::new(input), options()))
+}
+
+/// Checks that the records of each chunk that is not compressed fill it, which the reader relies upon.
+pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<(), McapFault> {
+    input.rewind().map_err(|error| match error.kind() {
+        io::ErrorKind::NotSeekable => McapFault::Unreadable {
+            at: name.to_owned(),
+            reason: "a recording is read more than once: it must be a file, not a pipe".to_owned(),
+        },
+        _ => unreadable(name, &error),
+    })?;
+    let mut input = BufReader::new(input);
+    let mut reader = LinearReader::new_with_options(options().with_emit_chunks(true));
+    while let Some(event) = reader.next_event() {
+        match event.map_err(|error| damaged(name, &error))? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let read = loop {
+                    match input.read(reader.insert(wanted)) {
+                        Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                        read => break read.map_err(|error| unreadable(name, &error))?,
+                    }
+                };
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { opcode: op::CHUNK, data } => {
+                let record = mcap::parse_record(op::CHUNK, data).map_err(|error| damaged(name, &error))?;
+                if let Record::Chunk { header, data } = record
+                    && header.compression.is_empty()
+                    && !is_filled(&data)
+                {
+                    return Err(damaged(name, &McapError::UnexpectedEoc));
+                }
+            }
+            LinearReadEvent::Record { .. } => {}
+        }
+    }
+    Ok(())
+}
+
+/// Whether `records` are whole records and nothing else.
+fn is_filled(mut records: &[u8]) -> bool {
+    while !records.is_empty() {
+        let Some((head, rest)) = records.split_first_chunk::<RECORD_HEAD>() else { return false };
+        let [_, length @ ..] = head;
+        let Some(rest) = usize::try_from(u64::from_le_bytes(*length)).ok().and_then(|l| rest.get(l..)) else {
+            return false;
+        };
+        records = rest;
+    }
+    true
+}
+
+pub(super) fn unreadable(name: &str, error: &io::Error) -> McapFault {
+    McapFault::Unreadable { at: name.to_owned(), reason: error.to_string() }
+}
+
+/// What the reader says, with what stands behind it.
+pub(super) fn damaged(name: &str, error: &McapError) -> McapFault {
+    let reason = match error {
+        McapError::Io(error) => return unreadable(name, error),
+        McapError::UnexpectedEof => {
+            "it ends in the middle of a record (`mcap recover` saves what there is)".to_owned()
+        }
+        McapError::Parse(error) => {
+            format!("a record cannot be read: {}", shortened(&error.to_string()))
+        }
+        McapError::BadMagic => "it does not begin and end as MCAP does".to_owned(),
+        error => error.to_string(),
+    };
+    McapFault::Damaged { at: name.to_owned(), reason }
+}
