@@ -82,7 +82,8 @@ pub enum AxisRange {
     /// The same with zero.
     WithZero,
     /// From a value to a larger one, SI, and no more: a line is broken where it lies outside, and the
-    /// chart says how many values do.
+    /// chart says how many values lie above or below. A range of x is a window: what lies beside it
+    /// does not count, nor for the range of y.
     Within(f64, f64),
 }
 

@@ -19,8 +19,11 @@ const TOP: f64 = 8.0;
 const HEIGHT_ALONE: f64 = 330.0;
 const HEIGHT: f64 = 154.0;
 const GAP: f64 = 16.0;
-/// Pixels from tick to tick, about: a label across, a line of text upwards.
-const TICKS: [f64; 2] = [90.0, 36.0];
+/// Pixels from tick to tick, about: a label across, a line of text upwards; a low area has them near
+/// each other, since less than three say nothing.
+const X_TICKS: f64 = 90.0;
+const Y_TICKS_ALONE: f64 = 36.0;
+const Y_TICKS: f64 = 28.0;
 /// Room at the ends of the range, part of it: lines may end at the side, points must not be cut.
 const X_MARGIN: f64 = 0.03;
 const Y_MARGIN: f64 = 0.06;
@@ -69,9 +72,9 @@ impl Series {
         self.errors.get(place).copied().filter(|e| *e > 0.0 && e.is_finite())
     }
 
-    /// Values of y with the ends of the error bars, SI.
-    fn heights(&self) -> impl Iterator<Item = f64> + '_ {
-        let points = self.points.iter().enumerate().filter(|(_, p)| p[0].is_finite());
+    /// Values of y with the ends of the error bars, SI, of the points whose x (SI) is shown.
+    fn heights(&self, is_shown: impl Fn(f64) -> bool) -> impl Iterator<Item = f64> {
+        let points = self.points.iter().enumerate().filter(move |(_, point)| is_shown(point[0]));
         points.flat_map(|(i, &[_, y])| {
             let error = self.error(i).unwrap_or(0.0);
             [y, y - error, y + error]
@@ -105,14 +108,16 @@ impl Chart {
         let across = series().flat_map(|s| s.points.iter().map(|p| p[0]));
         let marked = self.bands.iter().flat_map(|b| [b.from, b.to]).chain(self.lines.iter().map(|g| g.at));
         let margin = if series().any(|s| s.style.is_points()) { X_MARGIN } else { 0.0 };
-        let horizontal = self.x.scale(across.chain(marked), margin, (RIGHT - LEFT) / TICKS[0]);
-        let height = if self.panels.len() > 1 { HEIGHT } else { HEIGHT_ALONE };
+        let horizontal = self.x.scale(across.chain(marked), margin, (RIGHT - LEFT) / X_TICKS);
+        let (height, ticks) =
+            if self.panels.len() > 1 { (HEIGHT, Y_TICKS) } else { (HEIGHT_ALONE, Y_TICKS_ALONE) };
         let frame = |(i, panel): (usize, &Panel)| {
             let top = TOP + i as f64 * (height + GAP);
             let marked =
                 panel.bands.iter().flat_map(|b| [b.from, b.to]).chain(panel.lines.iter().map(|g| g.at));
-            let upwards = panel.series.iter().flat_map(Series::heights).chain(marked);
-            let vertical = panel.y.scale(upwards, Y_MARGIN, height / TICKS[1]);
+            let is_shown = |x: f64| self.x.shown(x).is_some_and(|x| holds(&horizontal.extent, x));
+            let upwards = panel.series.iter().flat_map(|s| s.heights(is_shown)).chain(marked);
+            let vertical = panel.y.scale(upwards, Y_MARGIN, height / ticks);
             Frame { left: LEFT, right: RIGHT, top, bottom: top + height, horizontal, vertical }
         };
         self.panels.iter().enumerate().map(|one| (one.1, frame(one))).collect()
@@ -130,10 +135,13 @@ impl Chart {
         is_inside.then(|| frame.place(shown))
     }
 
-    /// Number of pairs that could be drawn but lie outside.
+    /// Number of pairs that lie above or below the area.
     fn outside(&self, panel: &Panel, frame: &Frame) -> usize {
         let points = panel.series.iter().flat_map(|series| &series.points);
-        points.filter(|p| self.shown(panel, **p).is_some() && self.place(panel, frame, **p).is_none()).count()
+        let shown = points.filter_map(|point| self.shown(panel, *point));
+        shown
+            .filter(|[x, y]| holds(&frame.horizontal.extent, *x) && !holds(&frame.vertical.extent, *y))
+            .count()
     }
 
     fn legend(&self) -> Vec<(String, String)> {
@@ -187,8 +195,16 @@ impl Chart {
                 let strokes: Vec<_> = kept.into_iter().flat_map(|i| mark.strokes(places[i], size)).collect();
                 svg.path(&class, &strokes);
             }
-            SeriesStyle::Steps(_) => svg.path(&class, &line(&staircase(&points))),
-            _ => svg.path(&class, &line(&points)),
+            style => {
+                let corners =
+                    if let SeriesStyle::Steps(_) = style { staircase(&points) } else { points.clone() };
+                let parts = line(&corners);
+                // Among points a line is seen by the room about it.
+                if panel.series.iter().any(|other| other.style.is_points()) {
+                    svg.path("casing", &parts);
+                }
+                svg.path(&class, &parts);
+            }
         }
         points.iter().any(Option::is_some)
     }

@@ -13,8 +13,10 @@ pub(super) type Point = [f64; 2];
 const TOLERANCE: f64 = 0.08;
 /// Steps of a curve below this are not seen, pixels.
 const SHORTEST_STEP: f64 = 0.25;
-/// Points of a curve at most; beyond, steps are made longer.
+/// Points of a curve at most; beyond, steps are made longer, up to the longest that keeps its shape,
+/// and of what is then still too much only every so many is kept.
 const MOST_POINTS: usize = 6000;
+const LONGEST_STEP: f64 = 4.0;
 /// Single points at most; beyond, those that are near others are left out.
 const MOST_DOTS: usize = 9000;
 
@@ -139,9 +141,13 @@ pub(super) fn steps(length: usize, same: impl Fn(usize, usize, f64) -> bool) -> 
                 kept.push(i);
             }
         }
-        // Nothing on a page is larger than this; more points than it allows cannot be had by steps.
-        if kept.len() <= MOST_POINTS || within > 1e4 {
+        if kept.len() <= MOST_POINTS {
             return kept;
+        }
+        if within >= LONGEST_STEP {
+            let last = kept.pop();
+            let every = kept.len().div_ceil(MOST_POINTS - 1);
+            return kept.into_iter().step_by(every).chain(last).collect();
         }
         within *= 2.0;
     }
@@ -254,6 +260,9 @@ mod tests {
     fn a_curve_has_a_bounded_number_of_points() {
         let kept = steps(100_000, |i, j, within| ((i as f64) - (j as f64)).abs() < within);
         assert!(kept.len() <= MOST_POINTS && kept.contains(&99_999));
+        // One that no step shortens without losing it.
+        let kept = steps(100_000, |_, _, _| false);
+        assert!((MOST_POINTS / 2..=MOST_POINTS).contains(&kept.len()) && kept.contains(&99_999));
     }
 
     #[test]
