@@ -38,7 +38,7 @@ const SLACK: f64 = 1e-9;
 /// Distance of a guide's label from its line and from the area's edge, and height of its text, pixels.
 const LABEL_GAP: f64 = 5.0;
 const TEXT_HEIGHT: f64 = 15.0;
-/// A label left of its line needs this much room, pixels.
+/// Room that a label takes, pixels.
 const LABEL_ROOM: f64 = 160.0;
 /// Labels of upright guides stand in so many rows, so that near ones do not cover each other.
 const LABEL_ROWS: usize = 3;
@@ -168,19 +168,20 @@ impl Chart {
             frame.draw(&mut svg, label.as_deref(), &panel.y.unit.label(&panel.y.quantity), zero);
             shade(&mut svg, frame, &self.bands, &self.x, false);
             shade(&mut svg, frame, &panel.bands, &panel.y, true);
-            let drawn = panel.series.iter().filter(|series| self.series(&mut svg, panel, frame, series));
-            if drawn.count() == 0 {
+            let drawn: Vec<Point> =
+                panel.series.iter().flat_map(|series| self.series(&mut svg, panel, frame, series)).collect();
+            if drawn.is_empty() {
                 let middle = frame.bottom - (frame.bottom - frame.top) / 2.0;
                 svg.text("tick", [(LEFT + RIGHT) / 2.0, middle], Anchor::Middle, "no values");
             }
             self.upright(&mut svg, frame);
-            panel.level(&mut svg, frame);
+            panel.level(&mut svg, frame, &drawn);
         }
         svg.finish(id, title, &self.description())
     }
 
-    /// Draws a series; whether there is anything to draw.
-    fn series(&self, svg: &mut Svg, panel: &Panel, frame: &Frame, series: &Series) -> bool {
+    /// Draws a series; the points that it goes through.
+    fn series(&self, svg: &mut Svg, panel: &Panel, frame: &Frame, series: &Series) -> Vec<Point> {
         let points: Vec<Option<Point>> =
             series.points.iter().map(|point| self.place(panel, frame, *point)).collect();
         self.error_bars(svg, panel, frame, series, &points);
@@ -199,14 +200,15 @@ impl Chart {
                 let corners =
                     if let SeriesStyle::Steps(_) = style { staircase(&points) } else { points.clone() };
                 let parts = line(&corners);
-                // Among points a line is seen by the room about it.
-                if panel.series.iter().any(|other| other.style.is_points()) {
+                // Among many points a line is seen by the room about it.
+                let hides = |other: &Series| other.style.is_points() && other.points.len() > MANY;
+                if panel.series.iter().any(hides) {
                     svg.path("casing", &parts);
                 }
                 svg.path(&class, &parts);
             }
         }
-        points.iter().any(Option::is_some)
+        points.into_iter().flatten().collect()
     }
 
     fn error_bars(
@@ -312,21 +314,28 @@ impl Guide {
 }
 
 impl Panel {
-    /// Marked values of y.
-    fn level(&self, svg: &mut Svg, frame: &Frame) {
-        let mut rights: Vec<f64> = Vec::new();
+    /// Marked values of y; the label stands at the side where fewer points are drawn.
+    fn level(&self, svg: &mut Svg, frame: &Frame, drawn: &[Point]) {
+        let mut taken: Vec<(bool, f64)> = Vec::new();
         for (value, label) in guides(&self.lines, &self.y, &frame.vertical) {
             let y = frame.y()(value);
             svg.line("guide", [frame.left, y], [frame.right, y]);
             let is_at_top = y - frame.top < TEXT_HEIGHT + LABEL_GAP;
             let base = if is_at_top { y + TEXT_HEIGHT } else { y - LABEL_GAP };
-            // Where another one stands at the right, this one stands at the left.
-            if rights.iter().any(|other| (other - base).abs() < TEXT_HEIGHT) {
-                svg.text("tick halo", [frame.left + LABEL_GAP, base], Anchor::Start, label);
+            let near = || drawn.iter().filter(|p| (base - TEXT_HEIGHT..=base).contains(&p[1]));
+            let at_left = near().filter(|p| p[0] < frame.left + LABEL_ROOM).count();
+            let at_right = near().filter(|p| p[0] > frame.right - LABEL_ROOM).count();
+            let covers = |is_left: bool| {
+                taken.iter().any(|(left, other)| *left == is_left && (other - base).abs() < TEXT_HEIGHT)
+            };
+            let is_left = if covers(false) != covers(true) { covers(false) } else { at_left < at_right };
+            taken.push((is_left, base));
+            let (x, anchor) = if is_left {
+                (frame.left + LABEL_GAP, Anchor::Start)
             } else {
-                svg.text("tick halo", [frame.right - LABEL_GAP, base], Anchor::End, label);
-                rights.push(base);
-            }
+                (frame.right - LABEL_GAP, Anchor::End)
+            };
+            svg.text("tick halo", [x, base], anchor, label);
         }
     }
 }
