@@ -2,11 +2,13 @@
 
 use crate::assess::AxisTrace;
 
-use super::page::{Caption, Page, run_class};
-use super::scale::{Extent, Unit};
+use super::html::{Caption, run_class};
+use super::page::Page;
+use super::scale::Extent;
 use super::strip::{Strip, error_strip, legend, peak, run_series, strip, time};
 use super::text::{capital, listed};
 use super::time_plot::{Series, TimePlot};
+use super::unit::Unit;
 
 /// A part of the current below this is none, A.
 const NO_CURRENT: f64 = 1e-3;
@@ -25,13 +27,13 @@ struct Axis<'a> {
 pub(super) fn sections(page: &mut Page) {
     let axes = axes(page);
     let Some(time) = time(page) else {
-        page.paragraph("Nothing was recorded.");
+        page.html.paragraph("Nothing was recorded.");
         return;
     };
     let (moving, standing): (Vec<_>, Vec<_>) =
         axes.into_iter().partition(|axis| axis.traces.iter().any(|(_, _, trace)| trace.moves));
     for axis in &moving {
-        page.open_section("axis", &format!("{} axis", axis.name));
+        page.html.open_section("axis", &format!("{} axis", axis.name));
         position(page, axis, time);
         let kind = axis.traces[0].2.kind;
         let of = format!("{} axis", axis.name);
@@ -51,14 +53,14 @@ pub(super) fn sections(page: &mut Page) {
         let lines = series(page, |t| &t.synchronized_tracking_error);
         error_strip(page, &of, time, synchronised, lines);
         currents(page, axis, time);
-        page.close_section();
+        page.html.close_section();
     }
     if !standing.is_empty() {
         let held: Vec<String> = standing.iter().enumerate().map(|(i, axis)| held(axis, i == 0)).collect();
         let verb = if held.len() == 1 { "stands" } else { "stand" };
-        page.open_section("standing", "Axes that stand still");
-        page.paragraph(&format!("{} {verb} still.", listed(&held)));
-        page.close_section();
+        page.html.open_section("standing", "Axes that stand still");
+        page.html.paragraph(&format!("{} {verb} still.", listed(&held)));
+        page.html.close_section();
     }
 }
 
@@ -112,7 +114,7 @@ fn position(page: &mut Page, axis: &Axis, time: Extent) {
     let caption = Caption { title: "Set-point and position".to_owned(), note: String::new(), legend };
     let plot = TimePlot { quantity: "Position", unit, from_zero: false, time, series, at_least: None };
     let title = format!("{} axis: set-point and position", axis.name);
-    page.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
+    page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
 }
 
 /// The current of each run with its parts, all at one scale.
@@ -157,6 +159,6 @@ fn currents(page: &mut Page, axis: &Axis, time: Extent) {
             at_least: range,
         };
         let title = page.of_run(&format!("{} axis: current and its parts", axis.name), run);
-        page.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
+        page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
     }
 }

@@ -6,23 +6,36 @@
 //! the size of the page does not grow with the length of a run.
 
 mod axes;
+mod chart;
+mod chart_draw;
+mod document;
+mod frame;
+mod html;
+mod marks;
 mod page;
 mod path_plot;
 mod polar;
 mod scale;
 mod scatter;
+mod shade;
 mod strip;
 mod svg;
+mod table;
 mod text;
 mod thin;
 mod time_plot;
 mod tool;
+mod unit;
 
 use std::io;
 
 use crate::assess::Recording;
 
+pub use chart::{AxisRange, Band, BandClass, Chart, ChartAxis, Guide, Panel, Series, SeriesStyle};
+pub use document::{Document, Notice, NoticeLevel, Section};
 pub use scatter::{PointGroup, PointStyle, Scatter};
+pub use table::{Column, Table};
+pub use unit::Unit;
 
 /// What a page shows.
 #[derive(Debug, Clone)]
@@ -47,33 +60,6 @@ pub struct ReportRun<'a> {
     pub tables: Vec<Table>,
     /// Signals to plot.
     pub recording: &'a Recording,
-}
-
-/// Figures of a run.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Table {
-    /// What the figures are of.
-    pub caption: String,
-    /// The first names what a row is about.
-    pub columns: Vec<Column>,
-    /// Cells of each row; what is missing stays empty.
-    pub rows: Vec<Vec<String>>,
-}
-
-/// Head of a column.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Column {
-    /// What it holds.
-    pub name: String,
-    /// Unit of its numbers; can be empty.
-    pub unit: String,
-}
-
-impl Column {
-    /// A column of numbers in `unit`, which can be empty.
-    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
-        Column { name: name.into(), unit: unit.into() }
-    }
 }
 
 impl Report<'_> {

@@ -2,10 +2,11 @@
 
 use crate::assess::ToolTrace;
 
-use super::scale::{Extent, Round, Scale, Unit, is_drawable};
+use super::scale::{Extent, Round, Scale, is_drawable};
 use super::svg::{Anchor, Svg};
 use super::text::number;
 use super::thin::{Point, steps};
+use super::unit::Unit;
 
 /// Names of the coordinates.
 const NAMES: [&str; 3] = ["X", "Y", "Z"];

@@ -4,10 +4,11 @@ use std::f64::consts::{FRAC_PI_4, FRAC_PI_8, PI};
 
 use crate::assess::CircleTrace;
 
-use super::scale::{Extent, Scale, Unit, is_drawable};
+use super::scale::{Extent, Scale, is_drawable};
 use super::svg::{Anchor, Svg};
 use super::text::{capital, number};
 use super::thin::steps;
+use super::unit::Unit;
 
 /// Pixels at natural size.
 const SIZE: f64 = 460.0;

@@ -1,9 +1,7 @@
-//! Extents of signals, round ticks, and units of axes.
-
-use crate::config::AxisKind;
-use crate::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, RPM};
+//! Extents of signals and round ticks.
 
 use super::text;
+use super::unit::Unit;
 
 /// Beyond this a value is no measurement of a machine (SI): it is left out like NaN, so that no
 /// difference of two values overflows.
@@ -12,57 +10,6 @@ const LARGEST: f64 = 1e12;
 /// Whether a value can be drawn.
 pub(super) fn is_drawable(value: f64) -> bool {
     value.abs() <= LARGEST
-}
-
-/// A unit in which an axis is labelled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Unit {
-    /// As written.
-    pub symbol: &'static str,
-    /// SI units in one of it.
-    pub size: f64,
-    /// A range smaller than this, in the unit, is drawn as large: noise must not look like a signal.
-    pub least_range: f64,
-}
-
-impl Unit {
-    pub(super) const SECOND: Unit = Unit { symbol: "s", size: 1.0, least_range: 1e-3 };
-    pub(super) const MILLIMETRE: Unit = Unit { symbol: "mm", size: MILLIMETRE, least_range: 1e-3 };
-    pub(super) const MICROMETRE: Unit = Unit { symbol: "µm", size: MILLIMETRE * 1e-3, least_range: 0.1 };
-    pub(super) const MILLIDEGREE: Unit = Unit { symbol: "mdeg", size: DEGREE * 1e-3, least_range: 0.1 };
-    pub(super) const AMPERE: Unit = Unit { symbol: "A", size: 1.0, least_range: 0.1 };
-    const DEGREE: Unit = Unit { symbol: "°", size: DEGREE, least_range: 1e-3 };
-    const METRE_PER_MINUTE: Unit = Unit { symbol: "m/min", size: METRE_PER_MINUTE, least_range: 0.01 };
-    const RPM: Unit = Unit { symbol: "rpm", size: RPM, least_range: 0.01 };
-
-    /// Of positions.
-    pub(super) fn position(kind: AxisKind) -> Unit {
-        match kind {
-            AxisKind::Linear => Unit::MILLIMETRE,
-            AxisKind::Rotary => Unit::DEGREE,
-        }
-    }
-
-    /// Of errors.
-    pub(super) fn error(kind: AxisKind) -> Unit {
-        match kind {
-            AxisKind::Linear => Unit::MICROMETRE,
-            AxisKind::Rotary => Unit::MILLIDEGREE,
-        }
-    }
-
-    /// Of velocities.
-    pub(super) fn velocity(kind: AxisKind) -> Unit {
-        match kind {
-            AxisKind::Linear => Unit::METRE_PER_MINUTE,
-            AxisKind::Rotary => Unit::RPM,
-        }
-    }
-
-    /// A value in SI, rounded, with the unit.
-    pub(super) fn show(&self, value: f64) -> String {
-        format!("{}\u{a0}{}", text::rounded(value / self.size), self.symbol)
-    }
 }
 
 /// The smallest and the largest of some values.

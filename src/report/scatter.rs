@@ -1,9 +1,11 @@
 //! Points in a plane: what a search found, in two respects.
 
-use super::page::{Caption, Page};
+use super::frame::{BELOW, Frame};
+use super::html::{Caption, Html};
 use super::scale::{Extent, Scale, is_drawable};
-use super::svg::{Anchor, Svg};
+use super::svg::Svg;
 use super::text::rounded;
+use super::thin::{dots, staircase};
 
 /// Pixels at natural size; the page scales the picture to its width.
 const WIDTH: f64 = 920.0;
@@ -11,7 +13,7 @@ const HEIGHT: f64 = 420.0;
 const LEFT: f64 = 78.0;
 const RIGHT: f64 = WIDTH - 16.0;
 const TOP: f64 = 8.0;
-const BOTTOM: f64 = HEIGHT - 48.0;
+const BOTTOM: f64 = HEIGHT - BELOW;
 /// Steps between ticks, about.
 const STEPS: [f64; 2] = [9.0, 7.0];
 /// Room about the points, part of their range.
@@ -21,8 +23,6 @@ const LEAST_RANGE: f64 = 1e-3;
 /// Radii of points and of marks.
 const DOT: f64 = 2.2;
 const MARK: f64 = 6.0;
-/// Points of one group that fall into the same cell of so many pixels are drawn once.
-const CELL: f64 = 1.0;
 
 /// A picture of points; its axes are linear.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,23 +66,23 @@ impl PointStyle {
         match self {
             PointStyle::Dots => "dot".to_owned(),
             PointStyle::Steps => "line solid front".to_owned(),
-            PointStyle::Run(run) => format!("mark {}", super::page::run_class(run)),
+            PointStyle::Run(run) => format!("mark {}", super::html::run_class(run)),
         }
     }
 }
 
 /// A section with the pictures, if there are any.
-pub(super) fn section(page: &mut Page, scatters: &[Scatter]) {
+pub(super) fn section(html: &mut Html, scatters: &[Scatter]) {
     if scatters.is_empty() {
         return;
     }
-    page.open_section("search", "Search");
+    html.open_section("search", "Search");
     for scatter in scatters {
         let legend = scatter.groups.iter().map(|g| (g.style.class(), g.label.clone())).collect();
         let caption = Caption { title: scatter.title.clone(), note: scatter.note.clone(), legend };
-        page.figure("strip", &caption, &scatter.title, |id, title| scatter.draw(id, title));
+        html.figure("strip", &caption, &scatter.title, |id, title| scatter.draw(id, title));
     }
-    page.close_section();
+    html.close_section();
 }
 
 impl PointGroup {
@@ -103,42 +103,20 @@ impl Scatter {
             Scale::within(extent, LEAST_RANGE, STEPS[axis])
         };
         let (horizontal, vertical) = (scale(0), scale(1));
-        let (x, y) = (horizontal.onto(LEFT, RIGHT), vertical.onto(BOTTOM, TOP));
+        let frame = Frame { left: LEFT, right: RIGHT, top: TOP, bottom: BOTTOM, horizontal, vertical };
         let mut svg = Svg::new(WIDTH, HEIGHT);
-        svg.rectangle("area", [LEFT, TOP], [RIGHT, BOTTOM]);
-        for (value, label) in vertical.ticks() {
-            svg.line("grid", [LEFT, y(value)], [RIGHT, y(value)]);
-            svg.text("tick", [LEFT - 9.0, y(value) + 4.5], Anchor::End, &label);
-        }
-        for (value, label) in horizontal.ticks() {
-            svg.line("grid", [x(value), TOP], [x(value), BOTTOM]);
-            svg.text("tick", [x(value), BOTTOM + 20.5], Anchor::Middle, &label);
-        }
-        svg.text("label", [RIGHT, HEIGHT - 6.0], Anchor::End, &self.x);
-        svg.upward_text("label", [14.0, (TOP + BOTTOM) / 2.0], &self.y);
+        frame.draw(&mut svg, Some(&self.x), &self.y, [false, false]);
         for group in &self.groups {
             let class = group.style.class();
-            let places: Vec<[f64; 2]> = group.drawable().map(|point| [x(point[0]), y(point[1])]).collect();
+            let places: Vec<[f64; 2]> = group.drawable().map(|point| frame.place(point)).collect();
             match group.style {
                 PointStyle::Dots => {
-                    let mut cells: Vec<[i64; 2]> =
-                        places.iter().map(|place| place.map(|v| (v / CELL).round() as i64)).collect();
-                    cells.sort_unstable();
-                    cells.dedup();
-                    for cell in cells {
-                        svg.circle(&class, cell.map(|v| v as f64 * CELL), DOT);
-                    }
+                    dots(&places).into_iter().for_each(|i| svg.circle(&class, places[i], DOT));
                 }
                 PointStyle::Run(_) => places.iter().for_each(|place| svg.circle(&class, *place, MARK)),
                 PointStyle::Steps => {
-                    let mut line: Vec<[f64; 2]> = Vec::with_capacity(2 * places.len());
-                    for place in places {
-                        if let Some(&[_, before]) = line.last() {
-                            line.push([place[0], before]);
-                        }
-                        line.push(place);
-                    }
-                    svg.path(&class, &[line]);
+                    let places: Vec<_> = places.into_iter().map(Some).collect();
+                    svg.path(&class, &[staircase(&places).into_iter().flatten().collect()]);
                 }
             }
         }

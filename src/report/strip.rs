@@ -1,8 +1,10 @@
 //! Figures of signals over time: the runs on each other, in one picture.
 
-use super::page::{Caption, Page, run_class};
-use super::scale::{Extent, Unit};
+use super::html::{Caption, run_class};
+use super::page::Page;
+use super::scale::Extent;
 use super::time_plot::{Series, TimePlot};
+use super::unit::Unit;
 
 /// A run whose error is smaller than the largest by this factor is a straight line beside it.
 pub(super) const COMPARABLE: f64 = 8.0;
@@ -52,7 +54,7 @@ pub(super) fn strip(page: &mut Page, of: &str, time: Extent, strip: Strip, serie
     let caption = Caption { title: title.to_owned(), note: note.to_owned(), legend };
     let plot = TimePlot { quantity, unit, from_zero: true, time, series, at_least: None };
     let title = if of.is_empty() { title.to_owned() } else { format!("{of}: {}", title.to_lowercase()) };
-    page.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
+    page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
 }
 
 /// An error of all runs; those that are much smaller than the largest once more on their own scale.

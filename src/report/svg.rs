@@ -9,6 +9,7 @@ use super::thin::{Point, simplified};
 /// Where a text stands relative to its point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Anchor {
+    Start,
     Middle,
     End,
 }
@@ -52,6 +53,12 @@ impl Svg {
         ));
     }
 
+    /// A level line from a point to the right, as a path.
+    pub(super) fn level(&mut self, class: &str, [x, y]: Point, length: f64) {
+        let [x, y, length] = [x, y, length].map(Pixel::of);
+        self.put(format_args!("<path class=\"{class}\" d=\"M{x}{}{y}h{length}\"/>", y.separator()));
+    }
+
     /// A line through points, in one or several parts; a part of one point is a dot.
     pub(super) fn path(&mut self, class: &str, parts: &[Vec<Point>]) {
         if parts.iter().all(Vec::is_empty) {
@@ -83,6 +90,7 @@ impl Svg {
     pub(super) fn text(&mut self, class: &str, [x, y]: Point, anchor: Anchor, text: &str) {
         let [x, y] = [x, y].map(Pixel::of);
         let anchor = match anchor {
+            Anchor::Start => "",
             Anchor::Middle => " text-anchor=\"middle\"",
             Anchor::End => " text-anchor=\"end\"",
         };
@@ -96,6 +104,13 @@ impl Svg {
             "<text class=\"{class}\" transform=\"translate({x} {y}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
             Text(text)
         ));
+    }
+
+    /// The picture as a part of a legend, which says what it means.
+    pub(super) fn into_swatch(self) -> String {
+        let Svg { width, height, body } = self;
+        let [width, height] = [width, height].map(Pixel::of);
+        format!("<svg class=\"swatch\" viewBox=\"0 0 {width} {height}\" aria-hidden=\"true\">{body}</svg>")
     }
 
     /// The picture with what it says to those who do not see it; `id` is unique in the page.

@@ -13,14 +13,77 @@ pub(super) type Point = [f64; 2];
 const TOLERANCE: f64 = 0.08;
 /// Steps of a curve below this are not seen, pixels.
 const SHORTEST_STEP: f64 = 0.25;
-/// Points of a curve at most; beyond, steps are made longer.
+/// Points of a curve at most; beyond, steps are made longer, up to the longest that keeps its shape,
+/// and of what is then still too much only every so many is kept.
 const MOST_POINTS: usize = 6000;
+const LONGEST_STEP: f64 = 4.0;
+/// Single points at most; beyond, those that are near others are left out.
+const MOST_DOTS: usize = 9000;
+
+/// The line through points, in the parts between those that cannot be drawn.
+///
+/// Where it never goes back it keeps the extremes of each column of pixels, else it is a curve.
+pub(super) fn line(points: &[Option<Point>]) -> Vec<Vec<Point>> {
+    let known = || points.iter().flatten();
+    if known().zip(known().skip(1)).all(|(a, b)| a[0] <= b[0]) {
+        let heights: Vec<f64> = points.iter().map(|point| point.map_or(f64::NAN, |p| p[1])).collect();
+        let parts = extremes(&heights, |i| points[i].map_or(0, |p| p[0] as i64));
+        return parts.into_iter().map(|part| part.into_iter().filter_map(|i| points[i]).collect()).collect();
+    }
+    // Each with the number of points before it that cannot be drawn.
+    let mut gaps = 0;
+    let mut curve: Vec<(usize, Point)> = Vec::with_capacity(points.len());
+    for point in points {
+        match point {
+            Some(point) => curve.push((gaps, *point)),
+            None => gaps += 1,
+        }
+    }
+    let kept = steps(curve.len(), |i, j, within| apart(curve[i].1, curve[j].1) < within);
+    let kept: Vec<(usize, Point)> = kept.into_iter().map(|i| curve[i]).collect();
+    kept.chunk_by(|a, b| a.0 == b.0).map(|part| part.iter().map(|(_, point)| *point).collect()).collect()
+}
+
+/// Places of the points that can be told from those before them, in order. Where there are many,
+/// one is kept of those that are near each other, so that a lonely one is never lost.
+pub(super) fn dots(points: &[Point]) -> Vec<usize> {
+    let mut cell = 1.0;
+    loop {
+        let mut cells: Vec<([i64; 2], usize)> =
+            points.iter().enumerate().map(|(i, p)| (p.map(|v| (v / cell).round() as i64), i)).collect();
+        cells.sort_unstable();
+        cells.dedup_by_key(|(cell, _)| *cell);
+        if cells.len() <= MOST_DOTS || cell > 1e4 {
+            let mut kept: Vec<usize> = cells.into_iter().map(|(_, i)| i).collect();
+            kept.sort_unstable();
+            return kept;
+        }
+        cell *= std::f64::consts::SQRT_2;
+    }
+}
+
+/// The corners of a staircase: each value holds until the next one.
+pub(super) fn staircase(points: &[Option<Point>]) -> Vec<Option<Point>> {
+    let mut corners: Vec<Option<Point>> = Vec::with_capacity(2 * points.len());
+    for point in points {
+        if let (Some([x, _]), Some(Some([_, before]))) = (point, corners.last()) {
+            corners.push(Some([*x, *before]));
+        }
+        corners.push(*point);
+    }
+    corners
+}
+
+/// Distance of two points.
+fn apart(a: Point, b: Point) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
 
 /// Places of the smallest and the largest value in each column, in order; one list for each part
 /// between values that cannot be drawn.
 ///
 /// `column(i)` is the column of sample i, not falling. A gap inside a column is not seen, and closed.
-pub(super) fn extremes(values: &[f64], column: impl Fn(usize) -> i64) -> Vec<Vec<usize>> {
+fn extremes(values: &[f64], column: impl Fn(usize) -> i64) -> Vec<Vec<usize>> {
     let mut parts: Vec<Vec<usize>> = Vec::new();
     // Column, smallest, largest.
     let mut open: Option<(i64, usize, usize)> = None;
@@ -78,9 +141,13 @@ pub(super) fn steps(length: usize, same: impl Fn(usize, usize, f64) -> bool) -> 
                 kept.push(i);
             }
         }
-        // Nothing on a page is larger than this; more points than it allows cannot be had by steps.
-        if kept.len() <= MOST_POINTS || within > 1e4 {
+        if kept.len() <= MOST_POINTS {
             return kept;
+        }
+        if within >= LONGEST_STEP {
+            let last = kept.pop();
+            let every = kept.len().div_ceil(MOST_POINTS - 1);
+            return kept.into_iter().step_by(every).chain(last).collect();
         }
         within *= 2.0;
     }
@@ -163,12 +230,39 @@ mod tests {
     fn a_gap_breaks_the_line() {
         let values = [1.0, 2.0, f64::NAN, f64::NAN, 3.0, f64::INFINITY];
         assert_eq!(extremes(&values, |i| i as i64), [vec![0, 1], vec![4]]);
+        let (a, b, c) = ([0.0, 1.0], [5.0, 2.0], [9.0, 1.0]);
+        assert_eq!(line(&[Some(a), Some(b), None, Some(c), None]), [vec![a, b], vec![c]]);
+        // One that goes back as well.
+        assert_eq!(line(&[Some(c), Some(b), None, None, Some(a)]), [vec![c, b], vec![a]]);
+    }
+
+    #[test]
+    fn a_staircase_goes_across_first_and_ends_at_a_gap() {
+        let (a, b, c) = ([0.0, 1.0], [5.0, 2.0], [9.0, 1.0]);
+        let corners = staircase(&[Some(a), Some(b), None, Some(c)]);
+        assert_eq!(corners, [Some(a), Some([5.0, 1.0]), Some(b), None, Some(c)]);
+    }
+
+    #[test]
+    fn a_lonely_point_among_many_is_kept() {
+        let mut points: Vec<Point> = (0..200_000).map(|i| [f64::from(i % 500), f64::from(i / 500)]).collect();
+        points.insert(123_456, [800.0, 700.0]);
+        let kept = dots(&points);
+        assert!(
+            kept.contains(&123_456) && kept.len() <= MOST_DOTS && kept.len() > MOST_DOTS / 3,
+            "{}",
+            kept.len()
+        );
+        assert!(kept.windows(2).all(|w| w[0] < w[1]));
     }
 
     #[test]
     fn a_curve_has_a_bounded_number_of_points() {
         let kept = steps(100_000, |i, j, within| ((i as f64) - (j as f64)).abs() < within);
         assert!(kept.len() <= MOST_POINTS && kept.contains(&99_999));
+        // One that no step shortens without losing it.
+        let kept = steps(100_000, |_, _, _| false);
+        assert!((MOST_POINTS / 2..=MOST_POINTS).contains(&kept.len()) && kept.contains(&99_999));
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! Signals over time, one strip of the page.
 
-use super::scale::{Extent, Scale, Unit, is_drawable};
-use super::svg::{Anchor, Svg};
-use super::thin::extremes;
+use super::frame::{BELOW, Frame};
+use super::scale::{Extent, Scale, is_drawable};
+use super::svg::Svg;
+use super::thin::{Point, line};
+use super::unit::Unit;
 
 /// Pixels at natural size; the page scales the picture to its width.
 const WIDTH: f64 = 920.0;
@@ -10,7 +12,7 @@ const HEIGHT: f64 = 198.0;
 const LEFT: f64 = 78.0;
 const RIGHT: f64 = WIDTH - 16.0;
 const TOP: f64 = 8.0;
-const BOTTOM: f64 = HEIGHT - 44.0;
+const BOTTOM: f64 = HEIGHT - BELOW;
 /// Steps between ticks, about: a label each 90 pixels, a line of text each 35.
 const TIME_STEPS: f64 = 10.0;
 const VALUE_STEPS: f64 = 5.0;
@@ -55,30 +57,18 @@ impl TimePlot<'_> {
         let values = values.in_unit(&self.unit).at_least(self.unit.least_range).with_margin(MARGIN);
         let vertical = Scale::within(values, self.unit.least_range, VALUE_STEPS);
         let horizontal = Scale::within(self.time, Unit::SECOND.least_range, TIME_STEPS);
-        let (x, y) = (horizontal.onto(LEFT, RIGHT), vertical.onto(BOTTOM, TOP));
-
+        let frame = Frame { left: LEFT, right: RIGHT, top: TOP, bottom: BOTTOM, horizontal, vertical };
         let mut svg = Svg::new(WIDTH, HEIGHT);
-        svg.rectangle("area", [LEFT, TOP], [RIGHT, BOTTOM]);
-        for (value, label) in vertical.ticks() {
-            let class = if value == 0.0 { "zero" } else { "grid" };
-            svg.line(class, [LEFT, y(value)], [RIGHT, y(value)]);
-            svg.text("tick", [LEFT - 9.0, y(value) + 4.5], Anchor::End, &label);
-        }
-        for (value, label) in horizontal.ticks() {
-            svg.line("grid", [x(value), TOP], [x(value), BOTTOM]);
-            svg.text("tick", [x(value), BOTTOM + 20.5], Anchor::Middle, &label);
-        }
-        svg.text("label", [RIGHT, HEIGHT - 6.0], Anchor::End, "Time (s)");
-        let label = format!("{} ({})", self.quantity, self.unit.symbol);
-        svg.upward_text("label", [14.0, (TOP + BOTTOM) / 2.0], &label);
-
+        let label = Unit::SECOND.label("Time");
+        frame.draw(&mut svg, Some(&label), &self.unit.label(self.quantity), [false, true]);
         for series in &self.series {
-            let length = series.time.len().min(series.values.len());
-            let (time, values) = (&series.time[..length], &series.values[..length]);
-            let parts = extremes(values, |i| if is_drawable(time[i]) { x(time[i]) as i64 } else { 0 });
-            let place = |i: usize| [x(time[i]), y(values[i] / self.unit.size)];
-            let lines: Vec<_> = parts.iter().map(|part| part.iter().map(|&i| place(i)).collect()).collect();
-            svg.path(&series.class, &lines);
+            let pairs = series.time.iter().zip(series.values);
+            let points: Vec<Option<Point>> = pairs
+                .map(|(&t, &v)| {
+                    (is_drawable(t) && is_drawable(v)).then(|| frame.place([t, v / self.unit.size]))
+                })
+                .collect();
+            svg.path(&series.class, &line(&points));
         }
         svg.finish(id, title, &self.description())
     }

@@ -3,13 +3,15 @@
 use crate::assess::{CircleTrace, ToolTrace};
 
 use super::axes::axis_name;
-use super::page::{Caption, Page, run_class};
+use super::html::{Caption, run_class};
+use super::page::Page;
 use super::path_plot::{PathPlot, View, at_one_scale};
 use super::polar::{DIRECTIONS, PolarPlot, range};
-use super::scale::{Extent, Unit};
+use super::scale::Extent;
 use super::strip::{COMPARABLE, Strip, error_strip, peak, run_series, smaller, time};
 use super::text::rounded;
 use super::time_plot::Series;
+use super::unit::Unit;
 
 /// Different circles that are drawn; the figures name them all.
 const MOST_CIRCLES: usize = 6;
@@ -27,13 +29,13 @@ pub(super) fn sections(page: &mut Page) {
     if tools.is_empty() && drawn.is_empty() {
         return;
     }
-    page.open_section("tool", "Tool in the workpiece frame");
+    page.html.open_section("tool", "Tool in the workpiece frame");
     let has_path = pictures(page, &tools, drawn);
     if !tools.is_empty() && !has_path {
-        page.paragraph("The path of the tool tip is a point.");
+        page.html.paragraph("The path of the tool tip is a point.");
     }
     if !left_out.is_empty() {
-        page.paragraph(&format!("More circles, not drawn: {}.", left_out.len()));
+        page.html.paragraph(&format!("More circles, not drawn: {}.", left_out.len()));
     }
     if let Some(time) = time(page) {
         let note = "distance of the tool tip from the path";
@@ -45,25 +47,25 @@ pub(super) fn sections(page: &mut Page) {
             });
         }
     }
-    page.close_section();
+    page.html.close_section();
 }
 
 /// Paths and circles: those of one run side by side, else a row of runs for each; whether there is a path.
 fn pictures(page: &mut Page, tools: &[(usize, &ToolTrace)], circles: &[Circles]) -> bool {
     if !page.is_comparison() {
-        page.open_row(1 + circles.len());
+        page.html.open_row(1 + circles.len());
         let has_path = paths(page, tools);
         circles.iter().for_each(|circle| polar_plots(page, circle));
-        page.close_row();
+        page.html.close_row();
         return has_path;
     }
-    page.open_row(page.runs.len());
+    page.html.open_row(page.runs.len());
     let has_path = paths(page, tools);
-    page.close_row();
+    page.html.close_row();
     for circle in circles {
-        page.open_row(page.runs.len());
+        page.html.open_row(page.runs.len());
         polar_plots(page, circle);
-        page.close_row();
+        page.html.close_row();
     }
     has_path
 }
@@ -113,7 +115,7 @@ fn paths(page: &mut Page, tools: &[(usize, &ToolTrace)]) -> bool {
         let plot = PathPlot { view, tool, magnification: magnification(peak), range, class };
         let title = page.of_run(&format!("{} path", view.name()), run);
         let caption = Caption { title: title.clone(), note: plot.note(), legend };
-        page.figure("plane", &caption, &title, |id, title| plot.draw(id, title));
+        page.html.figure("plane", &caption, &title, |id, title| plot.draw(id, title));
     }
     !drawn.is_empty()
 }
@@ -167,6 +169,6 @@ fn polar_plots(page: &mut Page, circle: &Circles) {
         let plot = PolarPlot { circles: list.clone(), range, class };
         let title = page.of_run(&name, *run);
         let caption = Caption { title: title.clone(), note: plot.note(), legend };
-        page.figure("plane", &caption, &title, |id, title| plot.draw(id, title));
+        page.html.figure("plane", &caption, &title, |id, title| plot.draw(id, title));
     }
 }

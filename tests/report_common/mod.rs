@@ -1,6 +1,8 @@
 //! Recordings of simulated runs, for reports.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod charts;
+
 use virtual_axes::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
 use virtual_axes::config::AxisKind;
 use virtual_axes::report::{Column, ReportRun, Table};
