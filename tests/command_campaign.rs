@@ -117,7 +117,7 @@ fn range_and_feed_are_kept() {
         "--range",
         "50,150",
         "--max-feed",
-        "8",
+        "6",
         "--out",
         &file,
     ]);
