@@ -16,7 +16,7 @@ const LEAST_SPREAD: f64 = 1.0 / 40.0;
 const SPEEDS: usize = 12;
 /// Speeds are even in ln(V + this · lowest): nearly logarithmic, but with more of the high ones.
 const EVEN_BELOW: f64 = 2.0;
-/// Enough of it; a leg with less is repeated.
+/// Settled time at constant speed, s, that is enough; a leg with less is repeated.
 const ENOUGH_CONSTANT: f64 = 1.5;
 /// Most there-and-backs at one speed: the least constant time four times is enough.
 const MOST_REPEATS: f64 = 4.0;
@@ -52,15 +52,13 @@ pub(super) struct Legs<'a> {
     place: usize,
     kinds: Vec<AxisKind>,
     position: f64,
-    /// Before the first leg, s.
-    rest: f64,
     moves: Vec<Move>,
 }
 
 impl<'a> Legs<'a> {
     pub fn new(machine: &MachineConfig, place: usize, room: &'a Room<'a>) -> Self {
         let kinds = machine.axes().iter().map(AxisConfig::kind).collect();
-        Legs { room, place, kinds, position: room.start, rest: REST, moves: Vec::new() }
+        Legs { room, place, kinds, position: room.start, moves: Vec::new() }
     }
 
     pub fn off(&mut self) -> Result<Vec<f64>, CampaignError> {
@@ -202,7 +200,7 @@ impl<'a> Legs<'a> {
     pub fn program(self, machine: &MachineConfig) -> Result<Program, CampaignError> {
         let limits: Vec<JointLimits> = machine.axes().iter().map(JointLimits::of_axis).collect();
         let period = machine.periods().position;
-        Program::plan(Kinematics::new(machine), Frame::Joints, &limits, period, self.rest, self.moves)
+        Program::plan(Kinematics::new(machine), Frame::Joints, &limits, period, REST, self.moves)
             .map_err(|error| CampaignError::Plan { axis: self.room.axis.name().to_owned(), error })
     }
 }
