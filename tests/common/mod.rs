@@ -1,6 +1,8 @@
 //! Motions of the reference trials, sampled on the position grid, and a run that shows every tick.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod recordings;
+
 use std::f64::consts::{PI, TAU};
 use std::sync::{Arc, LazyLock};
 

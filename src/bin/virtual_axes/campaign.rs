@@ -168,8 +168,9 @@ impl Told<'_> {
         let start = self.campaign.start() / self.units.length;
         let unit = self.units.length_name;
         let mut text = table::text(&table);
+        let first = if start == 0.0 { "" } else { ", to be brought there first" };
         text.push_str(&format!(
-            "{} starts and ends at {start:.3} {unit} and moves between {low:.3} and {high:.3} {unit}\n",
+            "{} starts and ends at {start:.3} {unit}{first}; it moves between {low:.3} and {high:.3} {unit}\n",
             self.axis
         ));
         for run in self.campaign.runs() {
