@@ -27,6 +27,8 @@ mod segments;
 mod setpoints;
 mod spans;
 mod stamps;
+mod steps;
+mod tell;
 mod validate;
 mod values;
 
@@ -43,5 +45,5 @@ pub use inertia::{Inertia, inertia};
 pub use recording::{RawRecording, Signals, Span};
 pub use refine::{Parameter, Refined, Refinement, refine};
 pub use segments::{Segment, SegmentKind, segments};
-pub use validate::{Comparison, Deviation, InverseDynamics, compare, inverse_dynamics};
+pub use validate::{Agreement, Comparison, Deviation, InverseDynamics, validate};
 pub use values::{Identified, adopt};

@@ -1,12 +1,15 @@
 //! A model against a recording: in closed loop where PSEC was recorded, by inverse dynamics where the current was.
 
-use super::closed_loop::{Experiment, Simulated};
+use super::closed_loop::{Experiment, FeedforwardMode, Simulated, experiments, simulate_all};
 use super::fit::determination;
 use super::friction::{current, speed_unit};
+use super::identification::Input;
 use super::recording::Signals;
-use super::segments::{Segment, SegmentKind};
-use crate::config::AxisConfig;
+use super::segments::{Segment, SegmentKind, segments};
+use crate::config::{AxisConfig, Periods};
 use crate::drive::Gravity;
+use crate::machine::MachineError;
+use crate::units::seconds;
 
 /// Largest and RMS deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +23,6 @@ pub struct Deviation {
 /// Simulated against recorded signals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// Number of the experiment.
-    pub experiment: usize,
     /// Position where the velocity is constant, m or rad; none if it never is.
     pub constant_velocity: Option<Deviation>,
     /// Position everywhere else, m or rad.
@@ -45,6 +46,53 @@ pub struct InverseDynamics {
     pub modelled: Vec<(usize, Vec<f64>)>,
 }
 
+/// How an axis agrees with a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Agreement {
+    /// What the recorded axis does when.
+    pub segments: Vec<Segment>,
+    /// Parts of the recording that were simulated; none without PSEC.
+    pub experiments: Vec<Experiment>,
+    /// Their simulations.
+    pub simulated: Vec<Simulated>,
+    /// How the two agree.
+    pub comparisons: Vec<Comparison>,
+    /// What the recorded motion asks for against the recorded current; none without one.
+    pub inverse: Option<InverseDynamics>,
+}
+
+impl Agreement {
+    /// R² of the current as recorded: the lowest of the simulated parts, else that of inverse dynamics.
+    pub fn current_determination(&self) -> Option<f64> {
+        let simulated = self.comparisons.iter().filter_map(|c| c.current_determination).reduce(f64::min);
+        simulated.or(self.inverse.as_ref().map(|inverse| inverse.determination))
+    }
+}
+
+/// Simulates `axis` on a recording that it was not identified from, and compares.
+///
+/// # Errors
+/// [`MachineError`] if the axis cannot be simulated.
+pub fn validate(input: &Input<'_>, axis: &AxisConfig, periods: &Periods) -> Result<Agreement, MachineError> {
+    let mode = input.feedforward.unwrap_or(FeedforwardMode::Both);
+    let experiments = experiments(input.signals, 0, seconds(periods.position), mode);
+    agreement(input.signals, segments(input.signals), experiments, axis, periods)
+}
+
+/// The agreement of an axis with the parts of a recording.
+pub(super) fn agreement(
+    signals: &Signals,
+    segments: Vec<Segment>,
+    experiments: Vec<Experiment>,
+    axis: &AxisConfig,
+    periods: &Periods,
+) -> Result<Agreement, MachineError> {
+    let simulated = simulate_all(axis, periods, &experiments)?;
+    let comparisons = experiments.iter().zip(&simulated).map(|(e, s)| compare(e, s, &segments)).collect();
+    let inverse = inverse_dynamics(signals, &segments, axis);
+    Ok(Agreement { segments, experiments, simulated, comparisons, inverse })
+}
+
 fn deviation(differences: impl Iterator<Item = f64>) -> Option<Deviation> {
     let (mut count, mut squares, mut max) = (0_usize, 0.0, 0.0_f64);
     for d in differences.filter(|d| !d.is_nan()) {
@@ -53,13 +101,8 @@ fn deviation(differences: impl Iterator<Item = f64>) -> Option<Deviation> {
     (count > 0).then(|| Deviation { max, rms: (squares / count as f64).sqrt() })
 }
 
-/// Compares an experiment, number `number`, with its simulation.
-pub fn compare(
-    number: usize,
-    experiment: &Experiment,
-    simulated: &Simulated,
-    segments: &[Segment],
-) -> Comparison {
+/// Compares an experiment with its simulation.
+fn compare(experiment: &Experiment, simulated: &Simulated, segments: &[Segment]) -> Comparison {
     let mut constant = vec![false; experiment.position.len()];
     let of_it =
         segments.iter().filter(|s| s.span == experiment.span && s.kind == SegmentKind::ConstantVelocity);
@@ -77,7 +120,6 @@ pub fn compare(
     let recorded = || currents().filter(|(r, _)| !r.is_nan());
     let r2 = determination(recorded());
     Comparison {
-        experiment: number,
         constant_velocity: position(true),
         elsewhere: position(false),
         velocity: deviation(simulated.velocity.iter().zip(&experiment.velocity).map(|(s, r)| s - r)),
@@ -90,11 +132,7 @@ pub fn compare(
 /// without a current.
 ///
 /// At rest any friction within ±i0 holds an axis: of the current what is within that of gravity is taken for it.
-pub fn inverse_dynamics(
-    signals: &Signals,
-    segments: &[Segment],
-    axis: &AxisConfig,
-) -> Option<InverseDynamics> {
+fn inverse_dynamics(signals: &Signals, segments: &[Segment], axis: &AxisConfig) -> Option<InverseDynamics> {
     let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, speed_unit(axis));
     let gravity = Gravity::new(&axis.gravity, r);
     let mut modelled = Vec::new();

@@ -1,0 +1,295 @@
+//! The steps of the paper one after the other, and the refinement behind them.
+
+use rayon::prelude::*;
+
+use super::closed_loop::{Experiment, FeedforwardMode, deviations, experiments};
+use super::delays::{Delay, delay};
+use super::feedforward::{FeedforwardFit, feedforward};
+use super::finding::Finding;
+use super::friction::{Breakaway, FrictionLaw, friction};
+use super::gravity::{GravityCurrent, Steady, gravity};
+use super::identification::{Identification, Input, Options};
+use super::inertia::inertia;
+use super::recording::Signals;
+use super::refine::{Parameter, refine, with};
+use super::segments::{Segment, segments};
+use super::tell::{replayed_inertia, tell, tell_delays};
+use super::validate::agreement;
+use crate::config::{AxisConfig, DeviationConfig, Periods, PositionControllerConfig};
+use crate::units::seconds;
+
+/// Step by which a parameter is moved to see what of a delay it could explain, part of its value.
+const NUISANCE: f64 = 1e-2;
+/// Inertias that are tried first, parts of that by eq. 5: most of the current is unseen where the drive is quick
+/// and the recording slow, never the other way round.
+const LADDER: [f64; 8] = [0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
+
+/// An identification in progress.
+pub(super) struct Steps<'a> {
+    inputs: &'a [Input<'a>],
+    periods: &'a Periods,
+    options: &'a Options,
+    /// Of each recording.
+    segments: Vec<Vec<Segment>>,
+    /// Parts of the recordings that can be simulated.
+    experiments: Vec<Experiment>,
+    found: Identification,
+}
+
+impl<'a> Steps<'a> {
+    pub(super) fn new(
+        inputs: &'a [Input<'a>],
+        axis: &AxisConfig,
+        periods: &'a Periods,
+        options: &'a Options,
+    ) -> Self {
+        let mut findings = Vec::new();
+        let as_designed = DeviationConfig { inertia: 1.0, friction: 1.0, torque_constant: 1.0 };
+        let mut found = axis.clone();
+        if found.deviation != as_designed {
+            findings.push(Finding::note(
+                "deviation-reset",
+                "the machine's `deviation` is set to 1: what is identified is the plant as it is",
+            ));
+            found.deviation = as_designed;
+        }
+        Steps {
+            inputs,
+            periods,
+            options,
+            segments: inputs.iter().map(|input| segments(input.signals)).collect(),
+            experiments: Vec::new(),
+            found: Identification {
+                before: axis.clone(),
+                axis: found,
+                steady: Steady::default(),
+                gravity: None,
+                friction: None,
+                inertia: None,
+                replayed_inertia: None,
+                feedforward: FeedforwardFit::default(),
+                delays: Vec::new(),
+                refinement: None,
+                agreements: Vec::new(),
+                findings,
+            },
+        }
+    }
+
+    /// Gravity, friction, inertia: twice, since the inertia takes what is left of accelerations off the first two.
+    pub(super) fn steady_steps(&mut self) {
+        let found = &mut self.found;
+        let recordings: Vec<(&Signals, &[Segment])> = self
+            .inputs
+            .iter()
+            .zip(&self.segments)
+            .filter(|(input, _)| input.signals.spans.iter().any(|span| span.current.is_some()))
+            .map(|(input, segments)| (input.signals, segments.as_slice()))
+            .collect();
+        if recordings.is_empty() {
+            found.findings.push(Finding::missing(
+                "no-current",
+                "no recording has a current: friction, gravity and inertia are seen through the position alone",
+                "record the motor current",
+            ));
+            return;
+        }
+        let axis = &mut found.axis;
+        let per_acceleration = 1.0 / (axis.motor.torque_constant * axis.transmission_ratio);
+        let mut current_per_acceleration = 0.0;
+        for last in [false, true] {
+            let mut findings = Vec::new();
+            let (steady, gravity) = gravity(&recordings, axis, current_per_acceleration);
+            let weight = gravity.as_ref().map_or_else(GravityCurrent::default, |g| g.model);
+            let friction = friction(&steady.levels, axis, None, self.options.i0, &mut findings);
+            let inertia = friction
+                .as_ref()
+                .and_then(|friction| inertia(&recordings, axis, &friction.law, &weight, &mut findings));
+            current_per_acceleration = inertia.as_ref().map_or(0.0, |found| found.value * per_acceleration);
+            (found.steady, found.gravity, found.friction, found.inertia) =
+                (steady, gravity, friction, inertia);
+            if last {
+                found.findings.append(&mut findings);
+            }
+        }
+        if let Some(gravity) = &found.gravity {
+            gravity.apply(axis);
+        }
+        if let Some(friction) = &found.friction {
+            axis.friction = friction.law.config;
+        }
+        if let Some(inertia) = &found.inertia {
+            axis.motor.inertia = inertia.value;
+        }
+    }
+
+    pub(super) fn feedforward(&mut self) {
+        let found = &mut self.found;
+        let signals: Vec<&Signals> = self.inputs.iter().map(|input| input.signals).collect();
+        let (tsp, ratio) = (seconds(self.periods.position), found.axis.transmission_ratio);
+        found.feedforward = feedforward(&signals, tsp, ratio, &mut found.findings);
+        if let Some(velocity) = &found.feedforward.velocity {
+            found.axis.feedforward.velocity = velocity.value.max(0.0);
+        }
+        if let Some(torque) = &found.feedforward.torque {
+            found.axis.feedforward.torque = torque.value.max(0.0);
+        }
+    }
+
+    /// Delays and refinement.
+    pub(super) fn closed_loop(&mut self) {
+        let tsp = seconds(self.periods.position);
+        let default = FeedforwardMode::Both;
+        let experiments: Vec<Experiment> = self
+            .inputs
+            .iter()
+            .enumerate()
+            .flat_map(|(k, input)| experiments(input.signals, k, tsp, input.feedforward.unwrap_or(default)))
+            .collect();
+        if experiments.is_empty() {
+            self.found.findings.push(Finding::missing(
+                "no-setpoints",
+                "no delays and no refinement: no recording has PSEC that begins at rest",
+                "record the position set-points (PSEC) from standstill on",
+            ));
+            return;
+        }
+        if self.found.axis.position_loop.controller != PositionControllerConfig::Cascade {
+            self.found.findings.push(Finding::missing(
+                "not-a-cascade",
+                "no delays and no refinement: the machine file's position controller is not the cascade",
+                "record with the cascade, and give `--set <joint>.position_loop.controller=cascade`",
+            ));
+            return;
+        }
+        self.experiments = experiments;
+        let of = |mode: FeedforwardMode, all: &[Experiment]| -> Vec<Experiment> {
+            all.iter().filter(|e| e.mode == mode).cloned().collect()
+        };
+        let off = of(FeedforwardMode::Off, &self.experiments);
+        self.take_delay(Delay::Alpha, &[]);
+        let first = if off.is_empty() { self.experiments.clone() } else { off };
+        let physics = self.physics();
+        if self.options.refine {
+            if let Some(inertia) = start_of_inertia(&self.found.axis, self.periods, &first) {
+                self.found.axis.motor.inertia = inertia;
+            }
+            self.refine(&first, &physics);
+        }
+        self.take_delay(Delay::Beta, &[]);
+        self.take_delay(Delay::Gamma, &[]);
+        if self.options.refine {
+            let mut parameters = physics;
+            parameters.extend(self.free_feedforward());
+            let all = self.experiments.clone();
+            self.refine(&all, &parameters);
+            self.found.delays.clear();
+            let nuisance = self.nuisance(&parameters);
+            for which in [Delay::Alpha, Delay::Beta, Delay::Gamma] {
+                self.take_delay(which, &nuisance);
+            }
+        }
+        tell_delays(&self.experiments, &mut self.found);
+    }
+
+    /// What the closed loop can refine of the plant.
+    fn physics(&self) -> Vec<Parameter> {
+        let found = &self.found;
+        let law = found.friction.as_ref().map_or(FrictionLaw::DoubleExponential, |f| f.law.law);
+        let mut parameters = vec![Parameter::Inertia];
+        parameters.extend(Parameter::of_friction(law));
+        let gravity = &found.axis.gravity;
+        if gravity.weight != 0.0 || gravity.tilt != 0.0 {
+            parameters.extend(Parameter::of_gravity(&found.axis));
+        }
+        parameters
+    }
+
+    /// Weights of the feedforward that no regression has given.
+    fn free_feedforward(&self) -> Vec<Parameter> {
+        let (found, modes) = (&self.found, |mode| self.experiments.iter().any(|e| e.mode == mode));
+        let mut parameters = Vec::new();
+        if found.feedforward.velocity.is_none() && modes(FeedforwardMode::Velocity) {
+            parameters.push(Parameter::VelocityFeedforward);
+        }
+        if found.feedforward.torque.is_none()
+            && modes(FeedforwardMode::Both)
+            && found.axis.feedforward.torque != 0.0
+        {
+            parameters.push(Parameter::TorqueFeedforward);
+        }
+        parameters
+    }
+
+    fn refine(&mut self, experiments: &[Experiment], parameters: &[Parameter]) {
+        let held = self.options.i0 == Breakaway::Held;
+        let refined = refine(&self.found.axis, self.periods, experiments, parameters, held);
+        match &refined {
+            Some(refinement) => self.found.axis = refinement.axis.clone(),
+            None => self.found.findings.push(Finding::warning(
+                "not-refined",
+                "the closed loop does not determine the parameters: they stay as the steps found them",
+                "record faster and slower moves, with their currents",
+            )),
+        }
+        self.found.refinement = refined;
+    }
+
+    fn nuisance(&self, parameters: &[Parameter]) -> Vec<AxisConfig> {
+        let axis = &self.found.axis;
+        let moved = |parameter: &Parameter| {
+            let value = parameter.get(axis) * (1.0 + NUISANCE);
+            with(axis, &[*parameter], &[value], self.options.i0 == Breakaway::Held)
+        };
+        parameters.iter().map(moved).collect()
+    }
+
+    fn take_delay(&mut self, which: Delay, nuisance: &[AxisConfig]) {
+        let found = &mut self.found;
+        let shows_nothing = match which {
+            Delay::Alpha => false,
+            Delay::Beta => found.axis.feedforward.velocity == 0.0,
+            Delay::Gamma => found.axis.feedforward.torque == 0.0,
+        };
+        if shows_nothing {
+            return;
+        }
+        let experiments: Vec<Experiment> =
+            self.experiments.iter().filter(|e| e.mode == which.mode()).cloned().collect();
+        // The long recordings are those that show α, which is found at once.
+        let around = which == Delay::Alpha && !nuisance.is_empty();
+        if let Some(fit) = delay(which, &found.axis, self.periods, &experiments, nuisance, around) {
+            which.set(&mut found.axis, fit.value);
+            found.delays.push(fit);
+        }
+    }
+
+    pub(super) fn finish(mut self) -> Identification {
+        for (number, input) in self.inputs.iter().enumerate() {
+            let segments = self.segments.get(number).cloned().unwrap_or_default();
+            let of_it = |e: &&Experiment| e.recording == number;
+            let experiments = self.experiments.iter().filter(of_it).cloned().collect();
+            let found = agreement(input.signals, segments, experiments, &self.found.axis, self.periods);
+            // An axis that has been simulated all along can be simulated.
+            self.found.agreements.extend(found.ok());
+        }
+        let replayed = replayed_inertia(self.inputs, &self.found);
+        self.found.replayed_inertia = replayed;
+        tell(self.inputs, &mut self.found);
+        self.found
+    }
+}
+
+/// The inertia, of a ladder of them, whose closed loop moves most like the recorded one.
+///
+/// Eq. 5 can be far off where the current swings between two samples, and a search from there can end elsewhere.
+fn start_of_inertia(axis: &AxisConfig, periods: &Periods, experiments: &[Experiment]) -> Option<f64> {
+    let of = |inertia: f64| {
+        let mut axis = axis.clone();
+        axis.motor.inertia = inertia;
+        Some((inertia, deviations(&axis, periods, experiments)?.norm_squared()))
+    };
+    let ladder = LADDER.map(|factor| factor * axis.motor.inertia);
+    let found: Vec<(f64, f64)> = ladder.into_par_iter().filter_map(of).collect();
+    found.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(inertia, _)| inertia)
+}
