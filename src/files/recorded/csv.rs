@@ -34,7 +34,7 @@ pub(super) fn read(
         Ok(layout) => layout,
         Err(mut error) => {
             if let AxisRecordingError::NoColumn { hint, .. } = &mut error {
-                *hint += &context.hint(line, &text, &mut lines, &factors);
+                *hint = context.hint(line, &text, &mut lines, &factors).into();
             }
             return Err(error);
         }

@@ -80,7 +80,7 @@ pub enum AxisRecordingError {
         /// The one that looks most like it.
         nearest: Option<String>,
         /// What may help.
-        hint: String,
+        hint: Box<str>,
     },
     /// A header stands above two columns.
     #[error(

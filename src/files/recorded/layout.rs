@@ -208,7 +208,7 @@ impl Context<'_> {
             wanted: wanted.join(" or "),
             found: listed(columns),
             nearest: nearest.or_else(axis),
-            hint: String::new(),
+            hint: Box::default(),
         }
     }
 
