@@ -4,13 +4,15 @@ use super::thin::Point;
 
 /// How far the strokes of a cross reach from its middle, pixels.
 const REACH: f64 = 4.0;
+/// Half the side of a square, pixels; the page's style makes its stroke as broad.
+const HALF_SIDE: f64 = 3.0;
 
 /// The shape of a point, made of strokes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mark {
     /// A disc: a stroke of no length with round ends.
     Round,
-    /// The same with square ends.
+    /// A stroke as long as it is broad: one of no length with square ends is not drawn on paper.
     Square,
     /// Two strokes, aslant.
     Cross,
@@ -48,7 +50,8 @@ impl Mark {
         // An arm aslant is as long as an upright one.
         let d = r * std::f64::consts::FRAC_1_SQRT_2;
         match self {
-            Mark::Round | Mark::Square => vec![vec![[x, y]]],
+            Mark::Round => vec![vec![[x, y]]],
+            Mark::Square => vec![vec![[x - HALF_SIDE * size, y], [x + HALF_SIDE * size, y]]],
             Mark::Cross => vec![vec![[x - d, y - d], [x + d, y + d]], vec![[x - d, y + d], [x + d, y - d]]],
             Mark::Plus => vec![vec![[x - r, y], [x + r, y]], vec![[x, y - r], [x, y + r]]],
         }
