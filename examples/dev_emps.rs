@@ -1,6 +1,6 @@
 //! dev
 use virtual_axes::config::*;
-use virtual_axes::files::*;
+use virtual_axes::files::{read_recording, RecordingOptions};
 use virtual_axes::identify::*;
 fn main() {
     let name = std::env::args().nth(1).unwrap();
@@ -63,10 +63,13 @@ fn main() {
     for v in id.values(&p, "x") {
         println!("{} {} {} {}", v.key, v.value, v.unit, v.comment());
     }
-    println!("R2 own {:?}", id.inverse[0].as_ref().map(|i| (i.determination, i.current)));
+    println!("R2 own {:?}", id.agreements[0].inverse.as_ref().map(|i| (i.determination, i.current)));
     let v = read("/work/shared/data/emps_validation.csv");
     println!(
         "R2 val {:?}",
-        inverse_dynamics(&v, &segments(&v), id.axis()).map(|i| (i.determination, i.current))
+        validate(&Input { signals: &v, feedforward: None }, id.axis(), &c.periods())
+            .unwrap()
+            .inverse
+            .map(|i| (i.determination, i.current))
     );
 }

@@ -16,8 +16,9 @@ const OUTLIERS: f64 = 0.001;
 /// Shortest segment of standstill or constant velocity, s.
 const SHORTEST: f64 = 0.1;
 /// Time that the drive needs to settle behind an acceleration, s: six time constants of a position loop of
-/// 25 s⁻¹.
+/// 25 s⁻¹; of short segments no more than this part.
 const SETTLING: f64 = 0.25;
+const SETTLING_PART: f64 = 0.5;
 /// Largest change of velocity within a segment of constant velocity, part of it.
 const STEADY: f64 = 0.02;
 /// Standard deviation of the filter's kernel, s, times its cut-off frequency in Hz: √(ln 2) / 2π.
@@ -113,6 +114,7 @@ impl Limits {
     fn divide(&self, number: usize, span: &Span, found: &mut Vec<Segment>) {
         let count = span.position.len();
         let settling = (SETTLING / self.period).round() as usize;
+        let part_of = |samples: usize| (SETTLING_PART * samples as f64) as usize;
         let shortest = (SHORTEST / self.period).ceil().max(3.0) as usize;
         let (mut begin, mut approach) = (0, 0.0);
         while begin < count {
