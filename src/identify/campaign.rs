@@ -2,8 +2,8 @@
 //!
 //! A campaign has up to three parts ([`Part`]). `off` excites everything that the steps of the paper need with the
 //! feedforward off: a slow start, legs there and back at constant speeds (Prévost eq. 3), standstills approached
-//! from both sides and, on a rotary axis, slow sweeps (gravity), ramps at half and at full acceleration
-//! (eq. 5). `velocity` and `both` are short: there and back at a middle and at the highest speed, for the
+//! from both sides and, on a rotary axis, slow sweeps (gravity), ramps at half and at full acceleration, as far
+//! as the highest speed lets the axis reach it (eq. 5). `velocity` and `both` are short: there and back at a middle and at the highest speed, for the
 //! feedforward and its delays (eqs. 6–8).
 //!
 //! Every part starts and ends at rest at [`Campaign::start`], on the grid of Tsp.

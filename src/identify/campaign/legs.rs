@@ -30,7 +30,8 @@ const PLACES: usize = 5;
 const MOVING_SPEED: f64 = 0.5;
 /// Speeds of the ramps, as parts of the highest.
 const RAMP_SPEEDS: [f64; 3] = [0.5, 0.75, 1.0];
-/// Their least speed over that at which the acceleration is just reached, so that it lasts for a while.
+/// Their least speed over that at which the acceleration is just reached, so that it lasts for a while; they
+/// are never faster than the highest.
 const RAMP_LASTS: f64 = 1.5;
 /// Their accelerations, as parts of Amax.
 const RAMP_ACCELERATIONS: [f64; 2] = [0.5, 1.0];

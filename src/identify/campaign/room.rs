@@ -169,12 +169,15 @@ fn allowed_range(axis: &AxisConfig, options: &Options) -> Result<[f64; 2], Campa
         return Ok([min, max]);
     }
     let (unit, length) = Units::of(axis).length;
-    let end = |value: f64| {
-        if value.is_finite() { format!("{:.6} {unit}", value / length) } else { "unlimited".to_owned() }
+    // Without the last digits, which are the rounding of the units.
+    let told = |value: f64| (value / length * 1e6).round() / 1e6;
+    let end = |value: f64| match value.is_finite() {
+        true => format!("{} {unit}", told(value)),
+        false => "unlimited".to_owned(),
     };
     Err(CampaignError::Range {
-        min: min / length,
-        max: max / length,
+        min: told(min),
+        max: told(max),
         unit,
         axis: axis.name().to_owned(),
         stroke: format!("{} … {}", end(stroke_min), end(stroke_max)),
