@@ -26,8 +26,9 @@ const COARSE: f64 = 0.1;
 const BURST: f64 = 0.85;
 /// How many intervals that mean takes.
 const BURST_MEAN: usize = 4;
-/// Samples from which the lateness before and behind an event is taken.
-const LEVEL: usize = 9;
+/// Samples from which the lateness before and behind an event is taken: with jitter of half a period at most
+/// their median is out by a tenth of one.
+const LEVEL: usize = 31;
 /// Fewest such samples behind an event.
 const FEWEST_LEVEL: usize = 3;
 /// A sample later than this many periods counts as stalled.
@@ -41,7 +42,7 @@ const LONGEST_GAP: f64 = 1e6;
 /// A period is rounded to a decimal if that moves no sample by more than this part of it.
 const ROUNDING: f64 = 0.02;
 /// Jitter below this part of a period is not worth a word.
-pub(super) const ON_GRID: f64 = 0.01;
+const ON_GRID: f64 = 0.01;
 /// Wandering (median distance from the grid, periods) from which on the sampling itself is irregular.
 const WANDERING: f64 = 0.5;
 /// Part of intervals that nothing catches up with, from which on the sampling itself is irregular.
@@ -114,10 +115,13 @@ pub(super) fn place(
         set_starts(&mut placed);
     }
     let distance = distances(&placed);
+    // A clock coarser than the sampling lets every stamp wander by its own step.
+    let step = if coarse { coarse_step(stamps) } else { 0.0 };
     let wandering = median(&mut distance.iter().map(|d| d.abs()).collect::<Vec<_>>());
     let uncaught = slots.gaps as f64 > UNCAUGHT * intervals.len() as f64;
-    if wandering > WANDERING || uncaught || stamped_smoother(&placed) {
-        placed = irregular(ordered, placed.period);
+    let smoother = || !coarse && stamped_smoother(&placed);
+    if wandering > WANDERING + step / placed.period || uncaught || smoother() {
+        placed = irregular(ordered, placed.period.max(step));
         let spread = |at| quantile(&mut intervals.clone(), at) * 1e3;
         let what = format!(
             "{name}: the sampling is irregular ({:.3} … {:.3} ms, 5th to 95th percentile); it is interpolated to {:.3} ms",
@@ -287,8 +291,11 @@ fn burst(stamps: &[f64], n: usize, period: f64, long: f64) -> (usize, Range<usiz
     loop {
         let from = settled;
         while settled < last {
-            let ahead = (settled + BURST_MEAN).min(last);
-            if stamps[ahead] - stamps[settled] >= BURST * period * (ahead - settled) as f64 {
+            let limit = (settled + BURST_MEAN).min(last);
+            let ahead = (settled..limit).find(|&j| interval(j + 1) > long).unwrap_or(limit);
+            if ahead == settled
+                || stamps[ahead] - stamps[settled] >= BURST * period * (ahead - settled) as f64
+            {
                 break;
             }
             settled += 1;
