@@ -150,11 +150,10 @@ pub(super) fn take_back(parts: &mut [Part], lag: f64, period: f64) {
         let count = part.piece.len();
         let (before, behind) = ((-shift).max(0.0).ceil() as usize, shift.max(0.0).ceil() as usize);
         let range = before.min(count)..count.saturating_sub(behind).max(before.min(count));
-        for current in [part.piece.columns[CURRENT].as_mut(), part.smooth_current.as_mut()] {
-            if let Some(current) = current {
-                let old = std::mem::take(current);
-                *current = (0..count).map(|n| at(&old, n as f64 + shift)).collect();
-            }
+        let currents = [part.piece.columns[CURRENT].as_mut(), part.smooth_current.as_mut()];
+        for current in currents.into_iter().flatten() {
+            let old = std::mem::take(current);
+            *current = (0..count).map(|n| at(&old, n as f64 + shift)).collect();
         }
         part.cut(range, period);
     }

@@ -12,6 +12,7 @@ mod order;
 mod plausible;
 mod recording;
 mod regression;
+mod sampling;
 mod spans;
 mod stamps;
 

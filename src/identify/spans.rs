@@ -304,8 +304,8 @@ fn bridge(column: &mut Option<Vec<f64>>, channel: usize) -> usize {
             let nodes: Vec<(f64, f64)> =
                 near.into_iter().filter_map(value).filter(|(_, v)| !v.is_nan()).collect();
             let before = usize::from(nodes.first().is_some_and(|node| node.0 < (n - 1) as f64));
-            for j in n..n + run {
-                values[j] = between(&nodes, before, j as f64, 1.0, channel <= VELOCITY);
+            for (j, missing) in values.iter_mut().enumerate().skip(n).take(run) {
+                *missing = between(&nodes, before, j as f64, 1.0, channel <= VELOCITY);
             }
             bridged += run;
         }
