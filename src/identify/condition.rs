@@ -46,12 +46,6 @@ impl<'a> Part<'a> {
         Part { filter, piece, motion, smooth_current }
     }
 
-    /// Direction of motion, 0 below `threshold`, behind the filter.
-    pub fn direction(&self, threshold: f64) -> Vec<f64> {
-        let sign = |v: &f64| if v.abs() > threshold { v.signum() } else { 0.0 };
-        self.filter.apply(&self.motion.first.iter().map(sign).collect::<Vec<_>>()).value
-    }
-
     /// Keeps the samples of `range`.
     pub fn cut(&mut self, range: std::ops::Range<usize>, period: f64) {
         let motion = &mut self.motion;
@@ -89,7 +83,7 @@ impl<'a> Part<'a> {
 /// positions that freeze amid motion part the recording into spans. Velocity, acceleration and smoothed current
 /// are those of one Gaussian without phase; at the ends of a span, over 5 standard deviations of 0.1325 / cutoff
 /// each, it sees the signal mirrored about its end value. A lag of the current is taken back where it explains
-/// the current clearly better and exceeds half a sampling period. All that was done is among the findings.
+/// the current clearly better and exceeds a sampling period. All that was done is among the findings.
 ///
 /// # Errors
 /// [`RecordingFault`] if the recording cannot be that of the axis as it was read, or nothing of it is left.
@@ -197,7 +191,7 @@ fn current_lag(
     }
     if lag.better {
         let what = format!(
-            "{name}: the current seems to lag the motion by {milliseconds:.2} ms, less than half a sampling period \
+            "{name}: the current seems to lag the motion by {milliseconds:.2} ms, no more than a sampling period \
              of {} ms; it is left so",
             period * 1e3
         );

@@ -1,5 +1,7 @@
 //! By how much the recorded current lags behind the motion.
 
+use std::ops::Range;
+
 use super::condition::Part;
 use super::order::quantile;
 use super::regression::Regression;
@@ -9,7 +11,7 @@ use crate::config::AxisKind;
 /// Lags that are tried, s: what buses and filters of oscilloscopes have been seen to do, with reserve.
 pub(super) const LOWEST_LAG: f64 = -0.010;
 pub(super) const HIGHEST_LAG: f64 = 0.020;
-/// Longest step of the scan, s; the parabola through three of them finds the top to a hundredth of it.
+/// Step of the scan, s; the parabola through three of them finds the top to a hundredth of it.
 const STEP: f64 = 5e-4;
 /// Part of the largest speed below which friction does not say its direction.
 const MOVING: f64 = 0.05;
@@ -18,11 +20,14 @@ const MOST_SAMPLES: usize = 100_000;
 /// Fewest samples that tell a lag.
 const FEWEST_SAMPLES: usize = 100;
 /// Part of the unexplained variance that must vanish for a lag to be believed.
-const BETTER: f64 = 0.2;
+const BETTER: f64 = 0.1;
 /// Explained part of the variance below which the current does not go with the motion at all.
 const EXPLAINED: f64 = 0.5;
-/// Part of a sampling period that a lag must exceed: the ripple of a sampled drive looks like less.
-const PART_OF_PERIOD: f64 = 0.5;
+/// Sampling periods that a lag must exceed: the ripple of a sampled drive, and its output that is held over a
+/// period, look like less.
+const PERIODS: f64 = 1.0;
+/// Part of a sample within which a shift is a whole number of samples.
+const WHOLE: f64 = 1e-9;
 
 /// What the scan finds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +47,8 @@ pub(super) struct Lag {
 }
 
 /// What the current is regressed on at the samples that move: acceleration, velocity, direction, and on a rotary
-/// axis the sine and cosine of the position; with where these samples are.
+/// axis the sine and cosine of the position; with where these samples are. Where the axis starts, stops or turns
+/// within reach of the filter or of a lag, friction says nothing for sure: these samples are not among them.
 pub(super) struct Moving {
     /// Part and sample.
     pub places: Vec<(usize, usize)>,
@@ -57,17 +63,20 @@ impl Moving {
         let threshold = MOVING * quantile(&mut speeds, 0.99);
         let mut places = Vec::new();
         for (p, part) in parts.iter().enumerate() {
-            let inside = before..part.motion.first.len().saturating_sub(behind);
-            places.extend(inside.filter(|&n| part.motion.first[n].abs() > threshold).map(|n| (p, n)));
+            let reach = part.filter.radius();
+            let runs = runs(&part.motion.first, threshold);
+            let inside = runs
+                .into_iter()
+                .map(|run| run.start + before + reach..run.end.saturating_sub(behind + reach));
+            places.extend(inside.flatten().map(|n| (p, n)));
         }
         let stride = places.len().div_ceil(MOST_SAMPLES).max(1);
         let places: Vec<(usize, usize)> = places.into_iter().step_by(stride).collect();
-        let directions: Vec<Vec<f64>> = parts.iter().map(|part| part.direction(threshold)).collect();
         let column = |of: &dyn Fn(usize, usize) -> f64| places.iter().map(|&(p, n)| of(p, n)).collect();
         let mut columns: Vec<Vec<f64>> = vec![
             column(&|p, n| parts[p].motion.second[n]),
             column(&|p, n| parts[p].motion.first[n]),
-            column(&|p, n| directions[p][n]),
+            column(&|p, n| parts[p].motion.first[n].signum()),
         ];
         if kind == AxisKind::Rotary {
             columns.push(column(&|p, n| parts[p].motion.value[n].sin()));
@@ -75,6 +84,23 @@ impl Moving {
         }
         Moving { places, columns }
     }
+}
+
+/// Where the axis moves faster than `threshold` in one direction.
+fn runs(velocity: &[f64], threshold: f64) -> Vec<Range<usize>> {
+    let direction = |v: f64| if v.abs() > threshold { v.signum() } else { 0.0 };
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    let mut before = 0.0;
+    for (n, &v) in velocity.iter().enumerate() {
+        let now = direction(v);
+        match runs.last_mut() {
+            Some(run) if now != 0.0 && now == before => run.end = n + 1,
+            _ if now != 0.0 => runs.push(n..n + 1),
+            _ => {}
+        }
+        before = now;
+    }
+    runs
 }
 
 /// The lag of the current of `parts`, samples `period` apart; none where nothing moves or nothing was recorded.
@@ -92,21 +118,20 @@ pub(super) fn estimate(parts: &[Part], kind: AxisKind, period: f64) -> Option<La
         });
         regression.fit(&currents.collect::<Vec<_>>()).r2
     };
-    let step = STEP.min(PART_OF_PERIOD * period);
     // Whole steps on either side of zero, so that no lag is one of the candidates.
-    let (first, last) = ((LOWEST_LAG / step).round() as i64, (HIGHEST_LAG / step).round() as i64);
-    let scan: Vec<f64> = (first..=last).map(|k| explained(k as f64 * step)).collect();
+    let (first, last) = ((LOWEST_LAG / STEP).round() as i64, (HIGHEST_LAG / STEP).round() as i64);
+    let scan: Vec<f64> = (first..=last).map(|k| explained(k as f64 * STEP)).collect();
     let best = (0..scan.len()).max_by(|&a, &b| scan[a].total_cmp(&scan[b]))?;
     let at_end = best == 0 || best + 1 == scan.len();
     let offset = if at_end { 0.0 } else { summit(scan[best - 1], scan[best], scan[best + 1]) };
-    let lag = (first as f64 + best as f64 + offset) * step;
+    let lag = (first as f64 + best as f64 + offset) * STEP;
     let (r2, r2_without) = (explained(lag.clamp(LOWEST_LAG, HIGHEST_LAG)), explained(0.0));
     Some(Lag {
         lag,
         r2,
         r2_without,
         better: r2 > EXPLAINED && 1.0 - r2 < (1.0 - BETTER) * (1.0 - r2_without),
-        long: lag.abs() > PART_OF_PERIOD * period,
+        long: lag.abs() > PERIODS * period,
         at_end,
     })
 }
@@ -119,16 +144,16 @@ fn summit(left: f64, middle: f64, right: f64) -> f64 {
 
 /// Takes back a `lag` (s): the current of each part is that of `lag` later; the ends without one are cut off.
 pub(super) fn take_back(parts: &mut [Part], lag: f64, period: f64) {
-    let shift = lag / period;
+    let exact = lag / period;
+    let shift = if (exact - exact.round()).abs() < WHOLE { exact.round() } else { exact };
     for part in parts {
         let count = part.piece.len();
         let (before, behind) = ((-shift).max(0.0).ceil() as usize, shift.max(0.0).ceil() as usize);
         let range = before.min(count)..count.saturating_sub(behind).max(before.min(count));
-        for current in [part.piece.columns[CURRENT].as_mut(), part.smooth_current.as_mut()] {
-            if let Some(current) = current {
-                let old = std::mem::take(current);
-                *current = (0..count).map(|n| at(&old, n as f64 + shift)).collect();
-            }
+        let currents = [part.piece.columns[CURRENT].as_mut(), part.smooth_current.as_mut()];
+        for current in currents.into_iter().flatten() {
+            let old = std::mem::take(current);
+            *current = (0..count).map(|n| at(&old, n as f64 + shift)).collect();
         }
         part.cut(range, period);
     }

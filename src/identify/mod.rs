@@ -25,6 +25,7 @@ mod refine;
 mod regression;
 mod segments;
 mod setpoints;
+mod sampling;
 mod spans;
 mod stamps;
 mod steps;

@@ -259,7 +259,7 @@ impl<'a> Look<'a> {
         let position = self.column(POSITION);
         let together = correlation(psec, position);
         // A NaN must not pass.
-        if !(together.abs() >= TOGETHER) {
+        if together.is_nan() || together.abs() < TOGETHER {
             return Err(RecordingFault::PsecUnrelated { name: self.name(), correlation: together });
         }
         let factor = spread(psec) / spread(position) * together.signum();

@@ -127,11 +127,8 @@ impl Limits {
                 SegmentKind::Accelerating => begin..end,
                 // The axis settles first, and the filter sees the next acceleration before it comes.
                 _ => {
-                    (if begin == 0 { 0 } else { begin + settling })..(if end == count {
-                        end
-                    } else {
-                        end.saturating_sub(self.filter)
-                    })
+                    let from = if begin == 0 { 0 } else { begin + settling.min(part_of(end - begin)) };
+                    from..if end == count { end } else { end.saturating_sub(self.filter) }
                 }
             };
             let long = kind == SegmentKind::Accelerating || samples.len() >= shortest;

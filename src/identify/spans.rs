@@ -1,7 +1,7 @@
 //! From placed samples to spans in which every channel has a value at every multiple of the period.
 
 use super::order::{median, quantile};
-use super::stamps::{Block, MAX_BRIDGED, ON_GRID, Placed};
+use super::stamps::{Block, MAX_BRIDGED, Placed};
 use super::{Finding, RawRecording};
 
 /// Channels of a recording; the first is the position.
@@ -18,6 +18,8 @@ pub(super) const NAMES: [&str; CHANNELS] =
 /// A value for each sample, by channel.
 pub(super) type Columns = [Option<Vec<f64>>; CHANNELS];
 
+/// Largest magnitude of a value in any unit: beyond it there is no number that was measured.
+const LARGEST: f64 = 1e15;
 /// Part of its samples that a channel must have to be used at all.
 const FEWEST_VALUES: f64 = 0.5;
 /// Samples on either side from which the speed about a frozen run is taken.
@@ -29,6 +31,8 @@ const LEAP_PER_SAMPLE: f64 = 0.5;
 const FROZEN: usize = 2;
 /// Part of samples from which on frozen positions are no accident.
 const MOSTLY_FROZEN: f64 = 0.05;
+/// Part of a period within which a sample is at a multiple of it, and keeps its value.
+const AT: f64 = 1e-3;
 /// Weights of two interpolations between the neighbours that differ less tell nothing about jitter.
 const TELLING: f64 = 0.05;
 /// Fewest samples that tell something about jitter.
@@ -60,20 +64,20 @@ impl Piece {
     }
 }
 
-/// The channels of `raw` that can be used; what is not finite is NaN.
+/// The channels of `raw` that can be used; what is no number that was measured is NaN.
 pub(super) fn columns(raw: &RawRecording, findings: &mut Vec<Finding>) -> Columns {
     let channels = channels(raw);
     let mut columns = Columns::default();
     for (n, channel) in channels.into_iter().enumerate() {
         let Some(values) = channel else { continue };
-        let there = values.iter().filter(|value| value.is_finite()).count();
+        let there = values.iter().filter(|value| value.abs() <= LARGEST).count();
         if (there as f64) < FEWEST_VALUES * values.len() as f64 {
             let what =
                 format!("{}: the {} has only {there} values for {} stamps", raw.name, NAMES[n], values.len());
             findings.push(Finding::warning("channel-dropped", what, "it is left out; record it fully"));
             continue;
         }
-        let finite = |value: &f64| if value.is_finite() { *value } else { f64::NAN };
+        let finite = |value: &f64| if value.abs() <= LARGEST { *value } else { f64::NAN };
         columns[n] = Some(values.iter().map(finite).collect());
     }
     columns
@@ -205,7 +209,7 @@ fn gridded(block: &Block, columns: &Columns) -> Columns {
 /// The samples of a block interpolated from their stamps to the grid.
 fn resampled(block: &Block, columns: &Columns, period: f64) -> Columns {
     let length = block.stamps.last().map_or(0.0, |last| last - block.start);
-    let count = (length / period + ON_GRID) as usize + 1;
+    let count = (length / period + AT) as usize + 1;
     let interpolate = |(n, values): (usize, &Vec<f64>)| {
         let nodes = block.stamps.iter().zip(&block.rows).map(|(stamp, row)| (*stamp, values[*row]));
         let nodes: Vec<(f64, f64)> = nodes.filter(|(_, value)| !value.is_nan()).collect();
@@ -213,7 +217,7 @@ fn resampled(block: &Block, columns: &Columns, period: f64) -> Columns {
         (0..count)
             .map(|j| {
                 let time = block.start + j as f64 * period;
-                while at + 1 < nodes.len() && nodes[at + 1].0 <= time + ON_GRID * period {
+                while at + 1 < nodes.len() && nodes[at + 1].0 <= time + AT * period {
                     at += 1;
                 }
                 between(&nodes, at, time, period, n <= VELOCITY)
@@ -226,7 +230,7 @@ fn resampled(block: &Block, columns: &Columns, period: f64) -> Columns {
 /// Value at `time` between node `at` and the next one: `smooth` by a cubic, otherwise by a straight line.
 fn between(nodes: &[(f64, f64)], at: usize, time: f64, period: f64, smooth: bool) -> f64 {
     let Some(&(t0, x0)) = nodes.get(at) else { return f64::NAN };
-    if (time - t0).abs() <= ON_GRID * period {
+    if (time - t0).abs() <= AT * period {
         return x0;
     }
     let Some(&(t1, x1)) = nodes.get(at + 1) else { return f64::NAN };
@@ -300,8 +304,8 @@ fn bridge(column: &mut Option<Vec<f64>>, channel: usize) -> usize {
             let nodes: Vec<(f64, f64)> =
                 near.into_iter().filter_map(value).filter(|(_, v)| !v.is_nan()).collect();
             let before = usize::from(nodes.first().is_some_and(|node| node.0 < (n - 1) as f64));
-            for j in n..n + run {
-                values[j] = between(&nodes, before, j as f64, 1.0, channel <= VELOCITY);
+            for (j, missing) in values.iter_mut().enumerate().skip(n).take(run) {
+                *missing = between(&nodes, before, j as f64, 1.0, channel <= VELOCITY);
             }
             bridged += run;
         }

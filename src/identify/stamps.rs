@@ -6,16 +6,12 @@
 use std::ops::Range;
 
 use super::order::{Ordered, median, quantile};
+use super::sampling::{REGULAR, check_period, coarse_step, nominal};
 use super::{Finding, RecordingFault};
 use crate::config::Periods;
-use crate::units::seconds;
 
 /// Longest run of missing samples that is bridged: cubic interpolation over it is harmless.
 pub(super) const MAX_BRIDGED: usize = 2;
-/// Longest sampling period, s: ten samples in the shortest acceleration of 0.5 s.
-const LONGEST_PERIOD: f64 = 0.05;
-/// Shortest sampling period as a part of the current loop's: nothing in a drive is sampled faster.
-const SHORTEST_PERIOD: f64 = 0.25;
 /// An interval longer than this many periods is looked at: half a period of jitter at both ends stays below.
 const LONG: f64 = 1.7;
 /// An interval shorter than this many periods is that of a repeated stamp.
@@ -26,22 +22,19 @@ const COARSE: f64 = 0.1;
 const BURST: f64 = 0.85;
 /// How many intervals that mean takes.
 const BURST_MEAN: usize = 4;
-/// Samples from which the lateness before and behind an event is taken.
-const LEVEL: usize = 9;
+/// Samples from which the lateness before and behind an event is taken: with jitter of half a period at most
+/// their median is out by a tenth of one.
+const LEVEL: usize = 31;
 /// Fewest such samples behind an event.
 const FEWEST_LEVEL: usize = 3;
 /// A sample later than this many periods counts as stalled.
 const STALL: f64 = 2.5;
-/// Intervals within this part of their median are regular.
-const REGULAR: f64 = 0.3;
-/// Part of regular intervals from which on their mean is the period.
-const MOSTLY: f64 = 0.6;
 /// Most periods that a gap is counted in; longer ones have their own phase anyway.
-const LONGEST_GAP: f64 = 1e6;
+const LONGEST_GAP: f64 = 1e12;
 /// A period is rounded to a decimal if that moves no sample by more than this part of it.
 const ROUNDING: f64 = 0.02;
 /// Jitter below this part of a period is not worth a word.
-pub(super) const ON_GRID: f64 = 0.01;
+const ON_GRID: f64 = 0.01;
 /// Wandering (median distance from the grid, periods) from which on the sampling itself is irregular.
 const WANDERING: f64 = 0.5;
 /// Part of intervals that nothing catches up with, from which on the sampling itself is irregular.
@@ -114,10 +107,13 @@ pub(super) fn place(
         set_starts(&mut placed);
     }
     let distance = distances(&placed);
+    // A clock coarser than the sampling lets every stamp wander by its own step.
+    let step = if coarse { coarse_step(stamps) } else { 0.0 };
     let wandering = median(&mut distance.iter().map(|d| d.abs()).collect::<Vec<_>>());
     let uncaught = slots.gaps as f64 > UNCAUGHT * intervals.len() as f64;
-    if wandering > WANDERING || uncaught || stamped_smoother(&placed) {
-        placed = irregular(ordered, placed.period);
+    let smoother = || !coarse && stamped_smoother(&placed);
+    if wandering > WANDERING + step / placed.period || uncaught || smoother() {
+        placed = irregular(ordered, placed.period.max(step));
         let spread = |at| quantile(&mut intervals.clone(), at) * 1e3;
         let what = format!(
             "{name}: the sampling is irregular ({:.3} … {:.3} ms, 5th to 95th percentile); it is interpolated to {:.3} ms",
@@ -162,57 +158,7 @@ fn tell(name: &str, slots: &Slots, distance: &[f64], period: f64, findings: &mut
     }
 }
 
-fn check_period(name: &str, period: f64, periods: &Periods) -> Result<(), RecordingFault> {
-    let shortest = SHORTEST_PERIOD * seconds(periods.current);
-    if period >= shortest && period <= LONGEST_PERIOD {
-        return Ok(());
-    }
-    let fits = |factor: f64| (shortest..=LONGEST_PERIOD).contains(&(period * factor));
-    let looks_like = if fits(1e-3) {
-        "the time looks like ms read as s: time=COLUMN[ms]"
-    } else if fits(1e-6) {
-        "the time looks like us read as s: time=COLUMN[us]"
-    } else if fits(1e-9) {
-        "the time looks like ns read as s: time=COLUMN[ns]"
-    } else if fits(1e3) {
-        "the time looks like s read as ms: time=COLUMN[s]"
-    } else if fits(1e6) || fits(1e9) {
-        "the time looks like s read as a far smaller unit: time=COLUMN[s]"
-    } else {
-        ""
-    };
-    let looks_like = looks_like.to_owned();
-    Err(RecordingFault::TimeUnit {
-        name: name.to_owned(),
-        period,
-        shortest,
-        longest: LONGEST_PERIOD,
-        looks_like,
-    })
-}
-
-/// First guess of the period, s.
-fn nominal(intervals: &[f64], coarse: bool) -> f64 {
-    let mean = |kept: &mut dyn Iterator<Item = f64>| {
-        let (sum, count) = kept.fold((0.0, 0_usize), |(sum, count), d| (sum + d, count + 1));
-        sum / count.max(1) as f64
-    };
-    if coarse {
-        let mut steps: Vec<f64> = intervals.iter().copied().filter(|d| *d > 0.0).collect();
-        let step = median(&mut steps);
-        return mean(&mut intervals.iter().copied().filter(|d| *d <= 3.0 * step));
-    }
-    let mut sorted = intervals.to_vec();
-    let middle = median(&mut sorted);
-    let regular = |d: &f64| (d - middle).abs() <= REGULAR * middle;
-    let count = intervals.iter().filter(|d| regular(d)).count();
-    if count as f64 >= MOSTLY * intervals.len() as f64 {
-        return mean(&mut intervals.iter().copied().filter(regular));
-    }
-    let (low, high) = (quantile(&mut sorted, 0.05), quantile(&mut sorted, 0.95));
-    mean(&mut intervals.iter().copied().filter(|d| (low..=high).contains(d)))
-}
-
+/// Counts the samples through jitter, stalls, gaps and repeated stamps.
 fn assign(stamps: &[f64], period: f64, coarse: bool) -> Slots {
     let count = stamps.len();
     let mut s = Slots {
@@ -242,7 +188,7 @@ fn assign(stamps: &[f64], period: f64, coarse: bool) -> Slots {
         let mut surplus = (-missing).max(0);
         let mut slot = base;
         let mut latest = 0.0_f64;
-        for j in n..=settled {
+        for (j, stamp) in stamps.iter().enumerate().take(settled + 1).skip(n) {
             let repeats = interval(j) <= REPEATED * period;
             if surplus > 0 && repeats && !coarse {
                 surplus -= 1;
@@ -255,7 +201,7 @@ fn assign(stamps: &[f64], period: f64, coarse: bool) -> Slots {
                 slot += missing.max(0);
             }
             s.slot[j] = slot;
-            let late = (stamps[j] - slot as f64 * period - before) / period;
+            let late = (stamp - slot as f64 * period - before) / period;
             latest = latest.max(late);
             s.late[j] = late > STALL;
         }
@@ -287,8 +233,11 @@ fn burst(stamps: &[f64], n: usize, period: f64, long: f64) -> (usize, Range<usiz
     loop {
         let from = settled;
         while settled < last {
-            let ahead = (settled + BURST_MEAN).min(last);
-            if stamps[ahead] - stamps[settled] >= BURST * period * (ahead - settled) as f64 {
+            let limit = (settled + BURST_MEAN).min(last);
+            let ahead = (settled..limit).find(|&j| interval(j + 1) > long).unwrap_or(limit);
+            if ahead == settled
+                || stamps[ahead] - stamps[settled] >= BURST * period * (ahead - settled) as f64
+            {
                 break;
             }
             settled += 1;
@@ -305,12 +254,6 @@ fn burst(stamps: &[f64], n: usize, period: f64, long: f64) -> (usize, Range<usiz
         }
         settled = end;
     }
-}
-
-/// Smallest step of a clock that repeats stamps, s.
-fn coarse_step(stamps: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = stamps.windows(2).map(|p| p[1] - p[0]).filter(|d| *d > 0.0).collect();
-    median(&mut steps)
 }
 
 fn blocks(ordered: &Ordered, slots: &Slots, period: f64) -> Vec<Block> {
