@@ -1,6 +1,6 @@
 //! dev
 use virtual_axes::config::*;
-use virtual_axes::files::{read_recording, RecordingOptions};
+use virtual_axes::files::{RecordingOptions, read_recording};
 use virtual_axes::identify::*;
 fn main() {
     let name = std::env::args().nth(1).unwrap();

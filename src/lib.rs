@@ -6,7 +6,7 @@
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
 //! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] → [`machine`] →
 //! [`trajectory`], [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] →
-//! [`identify`], [`tune`] → [`messages`], [`files`], [`report`] → `ros`.
+//! [`recording`] → [`identify`], [`tune`] → [`messages`], [`files`], [`report`] → `ros`.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -22,6 +22,7 @@ pub mod kinematics;
 pub mod machine;
 pub mod messages;
 pub mod path;
+pub mod recording;
 pub mod report;
 #[cfg(feature = "ros")]
 pub mod ros;

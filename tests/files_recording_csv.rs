@@ -12,8 +12,8 @@ use virtual_axes::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes::files::{
     AxisRecordingError, Columns, RecordingOptions, TraceCsv, read_recording, read_recording_csv,
 };
-use virtual_axes::identify::{Finding, RawRecording};
 use virtual_axes::machine::AxisSample;
+use virtual_axes::recording::{Finding, RawRecording};
 
 /// Screws of 20 mm on x, 2.64 N·m/A; a gear of 180 on a, 0.88 N·m/A.
 fn mill() -> &'static MachineConfig {

@@ -14,8 +14,8 @@ use virtual_axes::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes::files::{
     AxisRecordingError, Columns, RecordingOptions, TraceMcap, read_recording, read_recording_mcap,
 };
-use virtual_axes::identify::{Finding, RawRecording};
 use virtual_axes::machine::AxisSample;
+use virtual_axes::recording::{Finding, RawRecording};
 
 const STATE: &str = "sensor_msgs/msg/JointState";
 const CURRENTS: &str = "virtual_axes/msg/MotorCurrents";

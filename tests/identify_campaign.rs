@@ -6,7 +6,8 @@ use common::recordings::{Disturbance, feedforward, place, record};
 use common::{M_MIN, TSP, parameters};
 use proptest::prelude::*;
 use virtual_axes::config::{MachineConfig, Parameters};
-use virtual_axes::identify::campaign::{Campaign, CampaignError, Options, Part};
+use virtual_axes::identify::FeedforwardMode;
+use virtual_axes::identify::campaign::{Campaign, CampaignError, Options};
 use virtual_axes::trajectory::JointLimits;
 use virtual_axes::units::{DEGREE, MILLIMETRE, RPM, seconds};
 
@@ -19,7 +20,7 @@ fn shipped(machine: &str) -> MachineConfig {
     Parameters::builtin(machine).expect("shipped").machine_config().expect("valid")
 }
 
-fn plan(machine: &MachineConfig, axis: &str, parts: &[Part], options: &Options) -> Campaign {
+fn plan(machine: &MachineConfig, axis: &str, parts: &[FeedforwardMode], options: &Options) -> Campaign {
     Campaign::plan(machine, place(machine, axis), parts, options)
         .unwrap_or_else(|error| panic!("{} {axis}: {error}", machine.name()))
 }
@@ -89,7 +90,7 @@ fn campaigns_of_the_shipped_machines_keep_the_limits_of_their_axes() {
     for machine in MACHINES {
         let config = shipped(machine);
         for axis in AXES {
-            let campaign = plan(&config, axis, &Part::ALL, &Options::default());
+            let campaign = plan(&config, axis, &FeedforwardMode::ALL, &Options::default());
             let limits = JointLimits::of_axis(&config.axes()[place(&config, axis)]);
             let range = [limits.limits.stroke_min, limits.limits.stroke_max];
             let checked = check(&campaign, &limits, range, 0.95 * limits.limits.velocity);
@@ -100,7 +101,7 @@ fn campaigns_of_the_shipped_machines_keep_the_limits_of_their_axes() {
             assert!(lasts[0] < 200.0 && lasts[1] < 20.0 && lasts[2] < 20.0, "{machine} {axis}: {lasts:?}");
         }
     }
-    let x = plan(&shipped(MACHINES[0]), "x", &[Part::Off], &Options::default());
+    let x = plan(&shipped(MACHINES[0]), "x", &[FeedforwardMode::Off], &Options::default());
     assert!(x.psec().len() as f64 * TSP < 120.0);
 }
 
@@ -171,11 +172,11 @@ fn any_axis(
     let within = range.unwrap_or(stroke);
     let mut options = Options { range, max_feed: feed.map(|part| part * top) };
     let unit = if axis == "x" { M_MIN } else { RPM };
-    let mut found = Campaign::plan(&config, place, &Part::ALL, &options);
+    let mut found = Campaign::plan(&config, place, &FeedforwardMode::ALL, &options);
     if let Err(CampaignError::TooShort { possible, .. }) = found {
         // What is told helps.
         options.max_feed = Some(possible * unit);
-        found = Campaign::plan(&config, place, &Part::ALL, &options);
+        found = Campaign::plan(&config, place, &FeedforwardMode::ALL, &options);
         prop_assert!(!matches!(found, Err(CampaignError::TooShort { .. })), "{found:?}");
     }
     match found {
@@ -198,7 +199,7 @@ fn the_range_that_a_refusal_tells_is_long_enough() {
     let config = shipped(MACHINES[0]);
     let planned = |millimetres: f64| {
         let range = Some([0.0, millimetres * MILLIMETRE]);
-        Campaign::plan(&config, 0, &[Part::Off], &Options { range, max_feed: None })
+        Campaign::plan(&config, 0, &[FeedforwardMode::Off], &Options { range, max_feed: None })
     };
     let Err(CampaignError::TooShort { found, needed, .. }) = planned(100.0) else { panic!("100 mm do") };
     assert_eq!(found, 100.0);
@@ -214,7 +215,8 @@ fn the_range_that_a_refusal_tells_is_long_enough() {
 fn ranges_and_feeds_that_an_axis_does_not_have_are_refused() {
     let config = shipped(MACHINES[0]);
     let refused = |axis: usize, range: Option<[f64; 2]>, max_feed: Option<f64>| {
-        let error = Campaign::plan(&config, axis, &Part::ALL, &Options { range, max_feed }).unwrap_err();
+        let error =
+            Campaign::plan(&config, axis, &FeedforwardMode::ALL, &Options { range, max_feed }).unwrap_err();
         println!("{error}");
         error
     };
@@ -227,7 +229,7 @@ fn ranges_and_feeds_that_an_axis_does_not_have_are_refused() {
     assert_eq!(refused(5, None, None), CampaignError::NoAxis { place: 6, count: 5 });
     // Somebody would wait for days.
     let slow = Options { range: None, max_feed: Some(1e-4 * RPM) };
-    let error = Campaign::plan(&config, 4, &[Part::Off], &slow).unwrap_err();
+    let error = Campaign::plan(&config, 4, &[FeedforwardMode::Off], &slow).unwrap_err();
     assert!(matches!(error, CampaignError::TooLong { part: "off", .. }), "{error}");
 }
 
@@ -243,7 +245,7 @@ fn the_long_part_accelerates_dozens_of_times_at_half_and_at_full_acceleration() 
         let period = seconds(config.periods().position);
         for axis in AXES {
             let limits = JointLimits::of_axis(&config.axes()[place(&config, axis)]).limits;
-            let campaign = plan(&config, axis, &[Part::Off], &Options::default());
+            let campaign = plan(&config, axis, &[FeedforwardMode::Off], &Options::default());
             let velocity = velocities(campaign.psec(), period);
             // The most that a ramp from rest has with the jerk that there is: √(v j).
             let top = campaign.runs()[0].speeds.last().copied().expect("speeds");
@@ -274,7 +276,7 @@ fn standstills_are_approached_from_both_sides_all_over_the_range() {
         let config = shipped(machine);
         let period = seconds(config.periods().position);
         for axis in AXES {
-            let campaign = plan(&config, axis, &[Part::Off], &Options::default());
+            let campaign = plan(&config, axis, &[FeedforwardMode::Off], &Options::default());
             let psec = campaign.psec();
             let velocity = velocities(psec, period);
             // Places of rest for three quarters of a second or more, and the side from which they were reached.
@@ -308,7 +310,7 @@ fn a_rotary_axis_is_swept_through_its_range_at_two_speeds_and_a_full_turn_if_it_
         let config = shipped(machine);
         let period = seconds(config.periods().position);
         for (axis, wanted) in [("a", 0.8), ("c", 0.0)] {
-            let campaign = plan(&config, axis, &[Part::Off], &Options::default());
+            let campaign = plan(&config, axis, &[FeedforwardMode::Off], &Options::default());
             let velocity = velocities(campaign.psec(), period);
             let top = campaign.runs()[0].speeds.last().copied().expect("speeds");
             let [low, high] = campaign.range();
@@ -332,15 +334,21 @@ fn a_rotary_axis_is_swept_through_its_range_at_two_speeds_and_a_full_turn_if_it_
 #[test]
 fn parts_set_the_feedforward_that_they_are_named_after() {
     let parameters = Parameters::builtin("mikron_ucp710").expect("shipped");
-    let told = |part: Part| -> Vec<String> {
+    let told = |part: FeedforwardMode| -> Vec<String> {
         let list = part.assignments(&parameters, "x");
         list.iter().map(|assignment| format!("{}={}", assignment.key, assignment.value)).collect()
     };
     let friction = "x.feedforward.friction=0";
-    assert_eq!(told(Part::Off), ["x.feedforward.velocity=0", "x.feedforward.torque_kg_m2=0", friction]);
-    assert_eq!(told(Part::Velocity), ["x.feedforward.velocity=1", "x.feedforward.torque_kg_m2=0", friction]);
     assert_eq!(
-        told(Part::Both),
+        told(FeedforwardMode::Off),
+        ["x.feedforward.velocity=0", "x.feedforward.torque_kg_m2=0", friction]
+    );
+    assert_eq!(
+        told(FeedforwardMode::Velocity),
+        ["x.feedforward.velocity=1", "x.feedforward.torque_kg_m2=0", friction]
+    );
+    assert_eq!(
+        told(FeedforwardMode::Both),
         ["x.feedforward.velocity=1", "x.feedforward.torque_kg_m2=0.002034", friction]
     );
 }
@@ -354,8 +362,8 @@ fn friction_of_x(velocity: f64) -> f64 {
 #[test]
 fn legs_of_the_long_part_settle_at_twelve_speeds_in_both_directions() {
     let parameters = Parameters::builtin("mikron_ucp710").expect("shipped");
-    let machine = feedforward(&parameters, "x", Part::Off);
-    let campaign = plan(&machine, "x", &[Part::Off], &Options::default());
+    let machine = feedforward(&parameters, "x", FeedforwardMode::Off);
+    let campaign = plan(&machine, "x", &[FeedforwardMode::Off], &Options::default());
     let recording = record(&machine, "x", campaign.psec(), &Disturbance::default());
     let current = recording.current.expect("recorded");
     let velocity = velocities(recording.psec.as_deref().expect("recorded"), TSP);

@@ -4,7 +4,7 @@ use std::f64::consts::{LN_2, PI, TAU};
 
 use proptest::prelude::*;
 use virtual_axes::config::{AxisConfig, MachineConfig, Parameters};
-use virtual_axes::identify::{Conditioning, Finding, RawRecording, RecordingFault, Signals, condition};
+use virtual_axes::recording::{Conditioning, Finding, RawRecording, RecordingFault, Signals, condition};
 
 /// 1 kHz.
 const PERIOD: f64 = 1e-3;

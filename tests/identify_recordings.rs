@@ -5,8 +5,9 @@ mod common;
 use common::recordings::{CurrentNoise, Disturbance, Random, feedforward, record, record_campaign, stribeck};
 use common::{M_MIN, TSP, parameters};
 use virtual_axes::config::{AxisKind, MachineConfig};
-use virtual_axes::identify::RawRecording;
-use virtual_axes::identify::campaign::{Options, Part};
+use virtual_axes::identify::FeedforwardMode;
+use virtual_axes::identify::campaign::Options;
+use virtual_axes::recording::RawRecording;
 
 /// X there and back at 3 m/min, with ramps of constant acceleration, 0.2 s at rest before and after.
 fn there_and_back() -> Vec<f64> {
@@ -174,7 +175,7 @@ fn parts_of_a_campaign_differ_in_what_the_feedforward_does() {
     let parameters = parameters::<&str>(&[]);
     let clean = Disturbance::default();
     let short = Options { range: Some([0.0, 0.05]), max_feed: Some(3.0 * M_MIN) };
-    let recordings = record_campaign(&parameters, "x", &Part::ALL, &short, &clean);
+    let recordings = record_campaign(&parameters, "x", &FeedforwardMode::ALL, &short, &clean);
     let largest = |channel: &Option<Vec<f64>>| {
         channel.iter().flatten().fold(0.0_f64, |largest, value| largest.max(value.abs()))
     };
@@ -183,10 +184,10 @@ fn parts_of_a_campaign_differ_in_what_the_feedforward_does() {
         let velocity = largest(&recording.velocity_feedforward);
         let torque = largest(&recording.torque_feedforward);
         // 3 m/min is 0.05 m/s behind a screw of 20 mm.
-        let wanted = if *part == Part::Off { 0.0 } else { 0.05 / 0.020 * std::f64::consts::TAU };
+        let wanted = if *part == FeedforwardMode::Off { 0.0 } else { 0.05 / 0.020 * std::f64::consts::TAU };
         assert!((velocity - wanted).abs() < 1e-6, "{part:?}: {velocity}");
-        assert_eq!(torque > 0.0, *part == Part::Both, "{part:?}: {torque}");
+        assert_eq!(torque > 0.0, *part == FeedforwardMode::Both, "{part:?}: {torque}");
     }
-    let off = feedforward(&parameters, "x", Part::Off);
+    let off = feedforward(&parameters, "x", FeedforwardMode::Off);
     assert_eq!(off.axes()[1], default_machine().axes()[1]);
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// As in ARCHITECTURE.md.
-const ORDER: [&str; 19] = [
+const ORDER: [&str; 20] = [
     "units",
     "config",
     "kinematics",
@@ -18,6 +18,7 @@ const ORDER: [&str; 19] = [
     "simulation",
     "scenario",
     "trial",
+    "recording",
     "identify",
     "tune",
     "messages",
@@ -27,7 +28,7 @@ const ORDER: [&str; 19] = [
 ];
 
 /// Rooms before a room that it still must not know.
-const APART: [(&str, &str); 8] = [
+const APART: [(&str, &str); 9] = [
     ("control", "drive"),
     ("design", "drive"),
     ("report", "files"),
@@ -36,6 +37,7 @@ const APART: [(&str, &str); 8] = [
     ("ros", "report"),
     ("ros", "trial"),
     ("tune", "identify"),
+    ("tune", "recording"),
 ];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {

@@ -1,6 +1,6 @@
 //! The set-points of an identification campaign: what an axis is to be moved through.
 //!
-//! A campaign has up to three parts ([`Part`]). `off` excites everything that the steps of the paper need with the
+//! A campaign has up to three parts ([`FeedforwardMode`]). `off` excites everything that the steps of the paper need with the
 //! feedforward off: a slow start, legs there and back at constant speeds (Prévost eq. 3), standstills approached
 //! from both sides and, on a rotary axis, slow sweeps (gravity), ramps at half and at full acceleration, as far
 //! as the highest speed lets the axis reach it (eq. 5). `velocity` and `both` are short: there and back at a middle and at the highest speed, for the
@@ -14,7 +14,7 @@ mod room;
 
 use std::ops::Range;
 
-use crate::config::{Assignment, MachineConfig, Parameters, Source, Value};
+use crate::config::MachineConfig;
 use crate::units::{Nanoseconds, seconds};
 
 pub use error::CampaignError;
@@ -22,54 +22,12 @@ pub use error::CampaignError;
 use legs::Legs;
 use room::Room;
 
+use super::mode::FeedforwardMode;
+
 /// Rest between two parts, s: time to switch the feedforward.
 const PAUSE: f64 = 3.0;
 /// Longest part, s.
 const LONGEST: f64 = 3600.0;
-
-/// A part of a campaign: what of the feedforward is on while it is recorded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// None: the long part, with everything but the feedforward.
-    Off,
-    /// That of the velocity.
-    Velocity,
-    /// Those of velocity and torque.
-    Both,
-}
-
-impl Part {
-    /// All of them, in the order in which they are run.
-    pub const ALL: [Part; 3] = [Part::Off, Part::Velocity, Part::Both];
-
-    /// `off`, `velocity`, `both`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Part::Off => "off",
-            Part::Velocity => "velocity",
-            Part::Both => "both",
-        }
-    }
-
-    /// What to set on `axis` before this part is run: the feedforward, as `parameters` have it or 0, and the
-    /// cascade if the axis has another controller. Friction is never compensated.
-    pub fn assignments(self, parameters: &Parameters, axis: &str) -> Vec<Assignment> {
-        let of_key = |(key, value): (String, Value)| {
-            let name = key.strip_prefix(axis)?.strip_prefix('.')?;
-            let value = match name.strip_prefix("feedforward.") {
-                Some("velocity") if self != Part::Off => value,
-                Some(torque) if torque.starts_with("torque_") && self == Part::Both => value,
-                Some(_) => Value::Double(0.0),
-                None if name == "position_loop.controller" && value != Value::Text("cascade".to_owned()) => {
-                    Value::Text("cascade".to_owned())
-                }
-                None => return None,
-            };
-            Some(Assignment { key, value, source: Source::named("campaign") })
-        };
-        parameters.iter().filter_map(of_key).collect()
-    }
-}
 
 /// What limits a campaign besides the axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -84,7 +42,7 @@ pub struct Options {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     /// Which part.
-    pub part: Part,
+    pub part: FeedforwardMode,
     /// Its set-points in [`Campaign::psec`].
     pub rows: Range<usize>,
     /// Speeds of its legs, m/s or rad/s, rising.
@@ -114,7 +72,7 @@ impl Campaign {
     pub fn plan(
         machine: &MachineConfig,
         place: usize,
-        parts: &[Part],
+        parts: &[FeedforwardMode],
         options: &Options,
     ) -> Result<Self, CampaignError> {
         let room = Room::of(machine, place, options)?;
@@ -128,8 +86,8 @@ impl Campaign {
             }
             let mut legs = Legs::new(machine, place, &room);
             let speeds = match part {
-                Part::Off => legs.off()?,
-                Part::Velocity | Part::Both => legs.short()?,
+                FeedforwardMode::Off => legs.off()?,
+                FeedforwardMode::Velocity | FeedforwardMode::Both => legs.short()?,
             };
             let program = legs.program(machine)?;
             let duration = program.duration();

@@ -6,48 +6,15 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::recording::{Signals, Span};
+use super::mode::FeedforwardMode;
 use super::setpoints::Setpoints;
 use crate::config::{AxisConfig, KinematicsConfig, MachineConfig, Periods};
 use crate::machine::{Machine, MachineError, MachineParameters};
+use crate::recording::{Signals, Span};
 use crate::units::seconds;
 
 /// How long PSEC must stand, s, before an axis is taken for at rest.
 const AT_REST: f64 = 0.1;
-
-/// What feedforward an axis was recorded with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum FeedforwardMode {
-    /// None.
-    Off,
-    /// Velocity feedforward.
-    Velocity,
-    /// Velocity and torque feedforward.
-    Both,
-}
-
-impl FeedforwardMode {
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            FeedforwardMode::Off => "off",
-            FeedforwardMode::Velocity => "velocity",
-            FeedforwardMode::Both => "both",
-        }
-    }
-
-    /// An axis with this much of its feedforward.
-    pub(super) fn of(self, axis: &AxisConfig) -> AxisConfig {
-        let mut axis = axis.clone();
-        if self == FeedforwardMode::Off {
-            axis.feedforward.velocity = 0.0;
-        }
-        if self != FeedforwardMode::Both {
-            axis.feedforward.torque = 0.0;
-        }
-        axis
-    }
-}
 
 /// A part of a recording that begins at rest, and can be simulated.
 #[derive(Debug, Clone, PartialEq)]

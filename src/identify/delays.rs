@@ -7,7 +7,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::closed_loop::{Experiment, FeedforwardMode, deviations};
+use super::closed_loop::{Experiment, deviations};
+use super::mode::FeedforwardMode;
 use crate::config::{AxisConfig, DelaysConfig, Periods};
 use crate::units::{MILLISECOND_NS, Nanoseconds};
 

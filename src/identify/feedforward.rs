@@ -1,9 +1,8 @@
 //! Weights of the feedforward by regression on the derivatives of PSEC (Prévost section 3.5, eqs. 6 to 8).
 
-use super::finding::Finding;
 use super::fit::{determination, linear};
-use super::recording::{Signals, Span};
 use super::setpoints::Setpoints;
+use crate::recording::{Finding, Signals, Span};
 
 /// Longest delay of a feedforward that is looked for, s.
 const LONGEST_DELAY: f64 = 0.1;

@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::finding::Finding;
 use super::fit::{Bounded, Effort, Minimum, determination, linear, minimise};
 use super::gravity::Level;
 use crate::config::{AxisConfig, AxisKind, FrictionConfig};
+use crate::recording::Finding;
 use crate::units::{METRE_PER_MINUTE, RPM};
 
 /// Speeds that a law of four parameters asks for: two more than it has parameters.

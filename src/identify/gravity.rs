@@ -6,9 +6,9 @@
 //! changes its sign with the direction in which the axis came, and cancels where it came from both.
 
 use super::fit::linear;
-use super::recording::Signals;
 use super::segments::{Segment, SegmentKind, mean};
 use crate::config::{AxisConfig, AxisKind};
+use crate::recording::Signals;
 
 /// Samples of a segment are averaged over so long, s, before they enter a fit.
 const BATCH: f64 = 0.1;

@@ -1,17 +1,16 @@
 //! What recordings tell about an axis.
 
-use super::closed_loop::FeedforwardMode;
 use super::delays::DelayFit;
 use super::feedforward::FeedforwardFit;
-use super::finding::Finding;
 use super::friction::{Breakaway, Friction};
 use super::gravity::{Gravity, Steady};
 use super::inertia::Inertia;
-use super::recording::Signals;
+use super::mode::FeedforwardMode;
 use super::refine::Refinement;
 use super::steps::Steps;
 use super::validate::Agreement;
 use crate::config::{AxisConfig, Periods};
+use crate::recording::{Finding, Signals};
 
 /// A recording and what is known about it.
 #[derive(Debug, Clone, Copy)]

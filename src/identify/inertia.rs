@@ -1,12 +1,11 @@
 //! Equivalent inertia from accelerating instants (Prévost section 3.4, eq. 5).
 
-use super::finding::Finding;
 use super::fit::{median, robust};
 use super::friction::{LawFit, speed_unit};
 use super::gravity::GravityCurrent;
-use super::recording::Signals;
 use super::segments::{Segment, SegmentKind, largest, mean};
 use crate::config::AxisConfig;
+use crate::recording::{Finding, Signals};
 
 /// Instants count whose acceleration is at least this part of the largest.
 const STRONG: f64 = 0.5;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::fit::robust;
-use super::recording::{Signals, Span};
+use crate::recording::{Signals, Span};
 
 /// An axis accelerates beyond this part of its largest acceleration.
 const ACCELERATING: f64 = 0.05;

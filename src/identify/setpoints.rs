@@ -1,6 +1,6 @@
 //! The grid of position set-points under a recording.
 
-use super::recording::Span;
+use crate::recording::Span;
 
 /// Part of the changes of PSEC that must fall on one phase for a staircase.
 const STAIRCASE: f64 = 0.9;

@@ -2,20 +2,20 @@
 
 use rayon::prelude::*;
 
-use super::closed_loop::{Experiment, FeedforwardMode, deviations, experiments};
+use super::closed_loop::{Experiment, deviations, experiments};
 use super::delays::{Delay, delay};
 use super::feedforward::{FeedforwardFit, feedforward};
-use super::finding::Finding;
 use super::friction::{Breakaway, FrictionLaw, friction};
 use super::gravity::{GravityCurrent, Steady, gravity};
 use super::identification::{Identification, Input, Options};
 use super::inertia::inertia;
-use super::recording::Signals;
+use super::mode::FeedforwardMode;
 use super::refine::{Parameter, refine, with};
 use super::segments::{Segment, segments};
 use super::tell::{replayed_inertia, tell, tell_delays};
 use super::validate::agreement;
 use crate::config::{AxisConfig, DeviationConfig, Periods, PositionControllerConfig};
+use crate::recording::{Finding, Signals};
 use crate::units::seconds;
 
 /// Step by which a parameter is moved to see what of a delay it could explain, part of its value.

@@ -2,13 +2,11 @@
 
 use super::closed_loop::{Experiment, Simulated};
 use super::delays::Delay;
-use super::filter::Gaussian;
-use super::finding::Finding;
 use super::gravity::GravityCurrent;
 use super::identification::{Identification, Input};
 use super::inertia::inertia;
-use super::recording::{Signals, Span};
 use super::segments::{Segment, segments};
+use crate::recording::{Finding, Gaussian, Signals, Span};
 
 /// R² of the current below which a model is not what was recorded.
 const LEAST_DETERMINATION: f64 = 0.9;

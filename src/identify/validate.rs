@@ -1,14 +1,15 @@
 //! A model against a recording: in closed loop where PSEC was recorded, by inverse dynamics where the current was.
 
-use super::closed_loop::{Experiment, FeedforwardMode, Simulated, experiments, simulate_all};
+use super::closed_loop::{Experiment, Simulated, experiments, simulate_all};
 use super::fit::determination;
 use super::friction::{current, speed_unit};
 use super::identification::Input;
-use super::recording::Signals;
+use super::mode::FeedforwardMode;
 use super::segments::{Segment, SegmentKind, segments};
 use crate::config::{AxisConfig, Periods};
 use crate::drive::Gravity;
 use crate::machine::MachineError;
+use crate::recording::Signals;
 use crate::units::seconds;
 
 /// Largest and RMS deviation.

@@ -6,9 +6,10 @@ use std::ops::Range;
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 use virtual_axes::config::{AxisKind, MachineConfig, Parameters};
-use virtual_axes::identify::RawRecording;
-use virtual_axes::identify::campaign::{Campaign, Options, Part};
+use virtual_axes::identify::FeedforwardMode;
+use virtual_axes::identify::campaign::{Campaign, Options};
 use virtual_axes::machine::{AxisSample, Machine};
+use virtual_axes::recording::RawRecording;
 use virtual_axes::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, RPM, seconds};
 
 /// Noise of the recorded current, normally distributed.
@@ -91,7 +92,7 @@ pub fn place(machine: &MachineConfig, axis: &str) -> usize {
 }
 
 /// The machine while `part` of a campaign is run: all other parameters as they are.
-pub fn feedforward(parameters: &Parameters, axis: &str, part: Part) -> MachineConfig {
+pub fn feedforward(parameters: &Parameters, axis: &str, part: FeedforwardMode) -> MachineConfig {
     let mut parameters = parameters.clone();
     parameters.set_all(part.assignments(&parameters, axis)).expect("the changes are valid");
     parameters.machine_config().expect("the machine is valid")
@@ -101,11 +102,11 @@ pub fn feedforward(parameters: &Parameters, axis: &str, part: Part) -> MachineCo
 pub fn record_campaign(
     parameters: &Parameters,
     axis: &str,
-    parts: &[Part],
+    parts: &[FeedforwardMode],
     options: &Options,
     disturbance: &Disturbance,
-) -> Vec<(Part, RawRecording)> {
-    let record_part = |(i, &part): (usize, &Part)| {
+) -> Vec<(FeedforwardMode, RawRecording)> {
+    let record_part = |(i, &part): (usize, &FeedforwardMode)| {
         let machine = feedforward(parameters, axis, part);
         let campaign = Campaign::plan(&machine, place(&machine, axis), &[part], options).expect("planned");
         let disturbance = Disturbance { seed: disturbance.seed + i as u64, ..disturbance.clone() };

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, Parameters};
 use virtual_axes::files::psec_writer;
-use virtual_axes::identify::campaign::{Campaign, Options, Part, Run};
+use virtual_axes::identify::FeedforwardMode;
+use virtual_axes::identify::campaign::{Campaign, Options, Run};
 use virtual_axes::report::{Column, Table};
 use virtual_axes::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, RPM};
 
@@ -53,12 +54,12 @@ enum PartName {
     Both,
 }
 
-impl From<PartName> for Part {
+impl From<PartName> for FeedforwardMode {
     fn from(name: PartName) -> Self {
         match name {
-            PartName::Off => Part::Off,
-            PartName::Velocity => Part::Velocity,
-            PartName::Both => Part::Both,
+            PartName::Off => FeedforwardMode::Off,
+            PartName::Velocity => FeedforwardMode::Velocity,
+            PartName::Both => FeedforwardMode::Both,
         }
     }
 }
@@ -85,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         range: arguments.range.map(|range| range.map(|value| value * units.length)),
         max_feed: arguments.max_feed.map(|feed| feed * units.speed),
     };
-    let parts = arguments.part.map_or(Part::ALL.to_vec(), |part| vec![part.into()]);
+    let parts = arguments.part.map_or(FeedforwardMode::ALL.to_vec(), |part| vec![part.into()]);
     let campaign = Campaign::plan(&config, place, &parts, &options)?;
     let mut writer = psec_writer(&arguments.out, std::slice::from_ref(&arguments.axis))?;
     let mut time = 0;

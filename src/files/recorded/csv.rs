@@ -9,7 +9,7 @@ use super::unit::Channel;
 use crate::config::AxisConfig;
 use crate::files::lines::{Lines, fields_between};
 use crate::files::shortened;
-use crate::identify::{Finding, RawRecording};
+use crate::recording::{Finding, RawRecording};
 
 /// Most samples of a recording: at 1 kHz almost three hours.
 pub(super) const MOST_ROWS: usize = 10_000_000;

@@ -1,7 +1,7 @@
 //! Values of one topic at the stamps of another.
 
 use super::series::Row;
-use crate::identify::Finding;
+use crate::recording::Finding;
 use crate::units::{MILLISECOND, Nanoseconds, seconds};
 
 /// By what messages are put in time.

@@ -9,7 +9,7 @@ use super::unit::Channel;
 use crate::config::{AxisConfig, AxisKind};
 use crate::files::lines::{Lines, fields_between};
 use crate::files::{nearest, shortened};
-use crate::identify::Finding;
+use crate::recording::Finding;
 
 /// Lines in which a header is sought for a hint.
 const PREAMBLE: u64 = 100;

@@ -9,7 +9,7 @@ use super::series::{Kind, Row, Series};
 use crate::config::AxisConfig;
 use crate::files::mcap_in::{check_chunks, damaged, start, type_of};
 use crate::files::nearest;
-use crate::identify::{Finding, RawRecording};
+use crate::recording::{Finding, RawRecording};
 use crate::units::{Nanoseconds, seconds};
 
 type Found<T> = Result<T, AxisRecordingError>;

@@ -19,7 +19,7 @@ pub use unit::Channel;
 
 use super::input::{FileKind, Input, kind_by_beginning};
 use crate::config::AxisConfig;
-use crate::identify::{Finding, RawRecording};
+use crate::recording::{Finding, RawRecording};
 
 /// How recordings are to be read; by default as this project's own traces and recordings are.
 #[derive(Debug, Clone, Default, PartialEq)]

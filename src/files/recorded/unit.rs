@@ -5,7 +5,7 @@ use std::fmt;
 use crate::config::{AxisConfig, AxisKind};
 use crate::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, MILLISECOND, MINUTE, RPM};
 
-/// What is recorded of an axis, as in [`RawRecording`](crate::identify::RawRecording).
+/// What is recorded of an axis, as in [`RawRecording`](crate::recording::RawRecording).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Channel {
     /// Stamps.

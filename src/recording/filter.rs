@@ -25,7 +25,7 @@ pub(super) fn default_cutoff(period: f64) -> f64 {
 /// polynomials up to degree 2, the smoothed value on straight lines (a parabola is lifted by σ² of it, as by
 /// any Gaussian; its derivatives are not).
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Gaussian {
+pub struct Gaussian {
     /// Weights of x(n−k) + x(n+k) − 2 x(n), k = 1, 2 …, in the smoothed value.
     value: Vec<f64>,
     /// Weights of x(n+k) − x(n−k) in the first derivative, 1/s.
@@ -36,9 +36,12 @@ pub(super) struct Gaussian {
 
 /// What a [`Gaussian`] makes of a signal; each as long as it.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Filtered {
+pub struct Filtered {
+    /// Smoothed signal.
     pub value: Vec<f64>,
+    /// Its derivative, per s.
     pub first: Vec<f64>,
+    /// Its second derivative, per s².
     pub second: Vec<f64>,
 }
 
