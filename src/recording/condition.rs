@@ -113,7 +113,8 @@ pub fn condition(
     }
     let mut parts: Vec<Part> = pieces.into_iter().map(|piece| Part::new(piece, &filter)).collect();
     plausible::check(&raw.name, &parts, axis, period, deviation(cutoff))?;
-    let current_lag = current_lag(&raw.name, &parts, axis, period, options, &mut findings)?;
+    let current_lag =
+        current_lag(&raw.name, &parts, axis, periods, (period, cutoff), options, &mut findings)?;
     if current_lag != 0.0 {
         lag::take_back(&mut parts, current_lag, period);
         parts.retain(|part| part.piece.len() > 0);
@@ -160,7 +161,8 @@ fn current_lag(
     name: &str,
     parts: &[Part],
     axis: &AxisConfig,
-    period: f64,
+    periods: &Periods,
+    (period, cutoff): (f64, f64),
     options: &Conditioning,
     findings: &mut Vec<Finding>,
 ) -> Result<f64, RecordingFault> {
@@ -172,7 +174,11 @@ fn current_lag(
         }
         return Ok(found);
     }
-    let Some(lag) = lag::estimate(parts, axis.kind(), period) else { return Ok(0.0) };
+    // A filter of its own, so that the ripple at the position period is not matched with its neighbour.
+    let filter = Gaussian::new(lag::cutoff(periods).min(cutoff), period);
+    let long = parts.iter().filter(|part| part.piece.len() > 2 * filter.radius());
+    let smooth: Vec<Part> = long.map(|part| Part::new(part.piece.clone(), &filter)).collect();
+    let Some(lag) = lag::estimate(&smooth, axis.kind(), period) else { return Ok(0.0) };
     let milliseconds = lag.lag * 1e3;
     if lag.better && lag.at_end {
         let what =

@@ -6,11 +6,15 @@ use super::condition::Part;
 use super::order::quantile;
 use super::regression::Regression;
 use super::spans::CURRENT;
-use crate::config::AxisKind;
+use crate::config::{AxisKind, Periods};
+use crate::units::seconds;
 
 /// Lags that are tried, s: what buses and filters of oscilloscopes have been seen to do, with reserve.
 pub(super) const LOWEST_LAG: f64 = -0.010;
 pub(super) const HIGHEST_LAG: f64 = 0.020;
+/// Cut-off of the filter for the scan, times the position period: the set-point's staircase makes a ripple at
+/// that period, whose crests look like lags that are a period apart; a two-hundredth of it passes.
+const CUTOFF_PERIOD: f64 = 0.25;
 /// Step of the scan, s; the parabola through three of them finds the top to a hundredth of it.
 const STEP: f64 = 5e-4;
 /// Part of the largest speed below which friction does not say its direction.
@@ -28,6 +32,11 @@ const EXPLAINED: f64 = 0.5;
 const PERIODS: f64 = 1.0;
 /// Part of a sample within which a shift is a whole number of samples.
 const WHOLE: f64 = 1e-9;
+
+/// Highest cut-off, Hz, at which a lag is sought.
+pub(super) fn cutoff(periods: &Periods) -> f64 {
+    CUTOFF_PERIOD / seconds(periods.position)
+}
 
 /// What the scan finds.
 #[derive(Debug, Clone, Copy, PartialEq)]
