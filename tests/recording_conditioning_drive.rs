@@ -4,7 +4,7 @@ mod common;
 
 use common::{AXES, TSP, machine, parameters};
 use virtual_axes::config::LimitsConfig;
-use virtual_axes::identify::{Conditioning, RawRecording, condition};
+use virtual_axes::recording::{Conditioning, RawRecording, condition};
 
 /// Tick of the default machine, s.
 const TICK: f64 = 125e-6;
