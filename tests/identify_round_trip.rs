@@ -2,45 +2,11 @@
 
 mod common;
 
-use common::recordings::{Disturbance, place, record_campaign};
-use virtual_axes::config::{AxisKind, MachineConfig, Parameters, Source, Value};
+use common::recordings::{Disturbance, ignorant, place, record_campaign, truth};
+use virtual_axes::config::{AxisKind, MachineConfig, Parameters, Value};
 use virtual_axes::identify::campaign::Options as Campaign;
 use virtual_axes::identify::{FeedforwardMode, Identification, Identified, Input, Options, adopt, identify};
 use virtual_axes::recording::{Conditioning, Severity, Signals, condition};
-
-/// The truth (model.md section 6), and where an identification of it starts from: a machine whose plant, friction,
-/// feedforward and delays are wrong.
-fn truth() -> Parameters {
-    Parameters::embedded_default().expect("the default machine")
-}
-
-fn ignorant(axis: &str) -> Parameters {
-    let mut parameters = truth();
-    let rotary = ["a", "c"].contains(&axis);
-    let mut wrong = vec![
-        ("motor.inertia_kg_m2", if rotary { 0.002 } else { 0.015 }),
-        ("friction.a", 1.0),
-        ("friction.b", 0.01),
-        ("friction.c", -0.1),
-        ("friction.d", -1.0),
-        ("friction.i0", 0.9),
-        ("feedforward.velocity", 0.9),
-        ("feedforward.torque_kg_m2", 0.001),
-        ("delays.alpha_ms", 20.0),
-        ("delays.beta_ms", 3.0),
-        ("delays.gamma_ms", 1.0),
-    ];
-    match axis {
-        "z" => wrong.push(("gravity.weight_n", 100.0)),
-        "a" => wrong.extend([("gravity.tilt_nm", 5.0), ("gravity.tilt_phase_deg", 30.0)]),
-        _ => {}
-    }
-    for (key, value) in wrong {
-        let key = format!("{axis}.{key}");
-        parameters.set(&key, Value::Double(value), &Source::named("the test")).expect("a value in range");
-    }
-    parameters
-}
 
 fn conditioned(parameters: &Parameters, axis: &str, seed: u64) -> Vec<Signals> {
     let machine = parameters.machine_config().expect("a machine");

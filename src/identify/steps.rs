@@ -11,7 +11,7 @@ use super::identification::{Identification, Input, Options};
 use super::inertia::inertia;
 use super::mode::FeedforwardMode;
 use super::refine::{Parameter, refine, with};
-use super::segments::{Segment, segments};
+use super::segments::{Segment, SegmentKind, segments};
 use super::tell::{replayed_inertia, tell, tell_delays};
 use super::validate::agreement;
 use crate::config::{AxisConfig, DeviationConfig, Periods, PositionControllerConfig};
@@ -79,6 +79,13 @@ impl<'a> Steps<'a> {
     /// Gravity, friction, inertia: twice, since the inertia takes what is left of accelerations off the first two.
     pub(super) fn steady_steps(&mut self) {
         let found = &mut self.found;
+        if !self.segments.iter().flatten().any(|segment| segment.kind == SegmentKind::Static) {
+            found.findings.push(Finding::warning(
+                "no-standstill",
+                "no recording has a standstill: gravity is not checked at rest",
+                "record half a second of rest at several positions, each approached from both sides",
+            ));
+        }
         let recordings: Vec<(&Signals, &[Segment])> = self
             .inputs
             .iter()
@@ -101,7 +108,7 @@ impl<'a> Steps<'a> {
             let mut findings = Vec::new();
             let (steady, gravity) = gravity(&recordings, axis, current_per_acceleration);
             let weight = gravity.as_ref().map_or_else(GravityCurrent::default, |g| g.model);
-            let friction = friction(&steady.levels, axis, None, self.options.i0, &mut findings);
+            let friction = friction(&steady.levels, axis, &mut findings);
             let inertia = friction
                 .as_ref()
                 .and_then(|friction| inertia(&recordings, axis, &friction.law, &weight, &mut findings));
@@ -207,6 +214,9 @@ impl<'a> Steps<'a> {
         let law = found.friction.as_ref().map_or(FrictionLaw::DoubleExponential, |f| f.law.law);
         let mut parameters = vec![Parameter::Inertia];
         parameters.extend(Parameter::of_friction(law));
+        if self.options.i0 == Breakaway::Freed {
+            parameters.push(Parameter::Breakaway);
+        }
         let gravity = &found.axis.gravity;
         if gravity.weight != 0.0 || gravity.tilt != 0.0 {
             parameters.extend(Parameter::of_gravity(&found.axis));
@@ -281,6 +291,17 @@ impl<'a> Steps<'a> {
             let found = agreement(input.signals, segments, experiments, &self.found.axis, self.periods);
             // An axis that has been simulated all along can be simulated.
             self.found.agreements.extend(found.ok());
+        }
+        let refined = |parameter| {
+            let refinement = self.found.refinement.as_ref();
+            refinement.is_some_and(|r| r.parameters.iter().any(|refined| refined.parameter == parameter))
+        };
+        if self.options.i0 == Breakaway::Freed && !refined(Parameter::Breakaway) {
+            self.found.findings.push(Finding::warning(
+                "i0-held",
+                "i0 is held at a + c: it is freed in the refinement on the closed loop only",
+                "record PSEC, with slow starts from rest",
+            ));
         }
         let replayed = replayed_inertia(self.inputs, &self.found);
         self.found.replayed_inertia = replayed;

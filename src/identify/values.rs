@@ -135,14 +135,11 @@ impl Identification {
             // The terms of a straight line nearly cancel: they keep all of their digits.
             put(&[key], values[k], error.filter(|e| e.is_finite() && !straight), None, source.clone());
         }
-        let held = (law.i0 - (law.a + law.c)).abs() < 1e-9;
-        let source = if held { "i0 = a + c" } else { "largest current at which the axis still stood" };
-        let error = if held { fit.map(|fit| fit.error_at(0.0)) } else { self.breakaway_error() };
+        let (source, error) = match self.refined(Parameter::Breakaway) {
+            Some(refined) => ("refined on the closed loop", Some(refined.error)),
+            None => ("i0 = a + c", fit.map(|fit| fit.error_at(0.0))),
+        };
         put(&["friction.i0"], law.i0, error, None, source.to_owned());
-    }
-
-    fn breakaway_error(&self) -> Option<f64> {
-        self.friction.as_ref().and_then(|friction| friction.breakaway).map(|(_, error)| error)
     }
 
     fn put_gravity(&self, put: &mut Put<'_>) {
