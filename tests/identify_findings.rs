@@ -285,7 +285,8 @@ fn parts_in_one_recording_are_told_apart_by_their_feedforward() {
     let all = all.expect("three parts");
     let (signals, _) =
         condition(&all, axis, &machine.periods(), &Conditioning::default()).expect("a recording");
-    let parts = virtual_axes::identify::experiments(&signals, 0, TSP, FeedforwardMode::Both);
+    let parts =
+        virtual_axes::identify::experiments(&signals, 0, axis, &machine.periods(), FeedforwardMode::Both);
     let modes: Vec<FeedforwardMode> = parts.iter().map(|part| part.mode).collect();
     assert_eq!(modes, FeedforwardMode::ALL);
 }

@@ -8,13 +8,16 @@ use rayon::prelude::*;
 
 use super::mode::FeedforwardMode;
 use super::setpoints::Setpoints;
-use crate::config::{AxisConfig, KinematicsConfig, MachineConfig, Periods};
+use crate::config::{AxisConfig, AxisKind, KinematicsConfig, MachineConfig, Periods};
 use crate::machine::{Machine, MachineError, MachineParameters};
 use crate::recording::{Signals, Span};
-use crate::units::seconds;
+use crate::units::{DEGREE, seconds};
 
 /// How long PSEC must stand, s, before an axis is taken for at rest.
 const AT_REST: f64 = 0.1;
+/// How far the axis may move meanwhile, m: some steps of an encoder; and rad.
+const RESTING: f64 = 5e-6;
+const RESTING_ANGLE: f64 = 5e-3 * DEGREE;
 
 /// A part of a recording that begins at rest, and can be simulated.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,17 +72,32 @@ impl Experiment {
 /// The parts of a recording that begin at rest and keep one kind of feedforward; none without PSEC.
 ///
 /// `mode` says what feedforward acted where the recording does not show VFFWS and TFFWS.
-pub fn experiments(signals: &Signals, recording: usize, tsp: f64, mode: FeedforwardMode) -> Vec<Experiment> {
+pub fn experiments(
+    signals: &Signals,
+    recording: usize,
+    axis: &AxisConfig,
+    periods: &Periods,
+    mode: FeedforwardMode,
+) -> Vec<Experiment> {
     let mut found = Vec::new();
+    let tsp = seconds(periods.position);
+    let resting = match axis.kind() {
+        AxisKind::Linear => RESTING,
+        AxisKind::Rotary => RESTING_ANGLE,
+    };
     let instants = (AT_REST / tsp).ceil() as usize;
     for (number, span) in signals.spans.iter().enumerate() {
         let Some(setpoints) = Setpoints::of(span, signals.period, tsp) else { continue };
         for (mode, part) in parts(span, &setpoints, signals.period, tsp, mode) {
             let (psec, end) = (&setpoints.values[part.clone()], part.end);
-            let Some(begin) = rest_from(psec, instants).map(|k| part.start + k) else { continue };
             let sample_of = |instant: usize| {
                 let time = setpoints.first + instant as f64 * tsp;
                 (time / signals.period - 1e-6).ceil().max(0.0) as usize
+            };
+            let position =
+                |k: usize| span.position.get(sample_of(part.start + k)).copied().unwrap_or(f64::NAN);
+            let Some(begin) = rest_from(psec, instants, resting, position).map(|k| part.start + k) else {
+                continue;
             };
             let sample = sample_of(begin);
             let last = if end == setpoints.values.len() { span.position.len() } else { sample_of(end) };
@@ -161,9 +179,14 @@ fn moves(psec: &[f64], rest: usize) -> Vec<(usize, usize)> {
     found
 }
 
-/// The first instant from which PSEC stands for `count` instants.
-fn rest_from(psec: &[f64], count: usize) -> Option<usize> {
-    psec.windows(count.max(1)).position(|window| window.iter().all(|value| *value == window[0]))
+/// The first instant from which PSEC stands for `count` instants, and the axis with it: its lag has run out.
+fn rest_from(psec: &[f64], count: usize, resting: f64, position: impl Fn(usize) -> f64) -> Option<usize> {
+    let stands = |k: usize| (position(k + count.saturating_sub(1)) - position(k)).abs() <= resting;
+    let windows = psec.windows(count.max(1)).enumerate();
+    windows
+        .filter(|(_, window)| window.iter().all(|value| *value == window[0]))
+        .map(|(k, _)| k)
+        .find(|k| stands(*k))
 }
 
 /// Simulates an axis on an experiment.

@@ -153,13 +153,14 @@ impl<'a> Steps<'a> {
 
     /// Delays and refinement.
     pub(super) fn closed_loop(&mut self) {
-        let tsp = seconds(self.periods.position);
-        let default = FeedforwardMode::Both;
+        let (axis, default) = (&self.found.axis, FeedforwardMode::Both);
         let experiments: Vec<Experiment> = self
             .inputs
             .iter()
             .enumerate()
-            .flat_map(|(k, input)| experiments(input.signals, k, tsp, input.feedforward.unwrap_or(default)))
+            .flat_map(|(k, input)| {
+                experiments(input.signals, k, axis, self.periods, input.feedforward.unwrap_or(default))
+            })
             .collect();
         if experiments.is_empty() {
             self.found.findings.push(Finding::missing(

@@ -10,7 +10,6 @@ use crate::config::{AxisConfig, Periods};
 use crate::drive::Gravity;
 use crate::machine::MachineError;
 use crate::recording::Signals;
-use crate::units::seconds;
 
 /// Largest and RMS deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,7 +75,7 @@ impl Agreement {
 /// [`MachineError`] if the axis cannot be simulated.
 pub fn validate(input: &Input<'_>, axis: &AxisConfig, periods: &Periods) -> Result<Agreement, MachineError> {
     let mode = input.feedforward.unwrap_or(FeedforwardMode::Both);
-    let experiments = experiments(input.signals, 0, seconds(periods.position), mode);
+    let experiments = experiments(input.signals, 0, axis, periods, mode);
     agreement(input.signals, segments(input.signals), experiments, axis, periods)
 }
 

@@ -7,6 +7,8 @@ const FEWEST: usize = 32;
 /// Samples that lie before the latest stamp, from which on a step back is a clock that was set, not a
 /// message that was overtaken.
 const OVERTAKEN: usize = 20;
+/// Part of a period by which stamps step back and still have the order of the file.
+const JITTER: f64 = 0.9;
 /// Periods left free where a clock was set: how long it really took is not known.
 const CLOCK_STEP: f64 = 10.0;
 
@@ -51,17 +53,34 @@ pub(super) fn ordered(raw: &RawRecording, findings: &mut Vec<Finding>) -> Result
     }
     let mut ordered = Ordered { rows, stamps };
     if back > 0 {
+        hold_jitter(&mut ordered.stamps);
         undo_clock_steps(&mut ordered, &raw.name, findings);
         sort(&mut ordered, &raw.name, findings);
     }
     Ok(ordered)
 }
 
+/// Stamps that step back by less than a period are late stamps that jitter: the file has the order.
+fn hold_jitter(stamps: &mut [f64]) {
+    let period = period(stamps);
+    let mut latest = f64::NEG_INFINITY;
+    for stamp in stamps {
+        if *stamp < latest && latest - *stamp < JITTER * period {
+            *stamp = latest;
+        }
+        latest = *stamp;
+    }
+}
+
+/// The middle of the steps forward.
+fn period(stamps: &[f64]) -> f64 {
+    median(&mut stamps.windows(2).map(|pair| pair[1] - pair[0]).filter(|d| *d > 0.0).collect::<Vec<_>>())
+}
+
 /// Where the clock was set back for good, what follows is moved behind what was before.
 fn undo_clock_steps(ordered: &mut Ordered, name: &str, findings: &mut Vec<Finding>) {
     let stamps = &mut ordered.stamps;
-    let mut steps: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).filter(|d| *d > 0.0).collect();
-    let period = median(&mut steps);
+    let period = period(stamps);
     let (mut latest, mut shift, mut count, mut first) = (stamps[0], 0.0, 0_usize, f64::NAN);
     for n in 1..stamps.len() {
         let stamp = stamps[n] + shift;
