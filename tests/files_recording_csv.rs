@@ -146,7 +146,7 @@ fn a_unit_that_does_not_fit_is_refused_with_those_that_do() {
     );
     assert_eq!(
         said(a, "velocity", "[m/min]"),
-        "--column: velocity in [m/min]: must be in rad/s, deg/s, rpm on the rotary axis a"
+        "--column: velocity in [m/min]: must be in rad/s, deg/s, deg/min, rpm on the rotary axis a"
     );
     assert_eq!(
         said(x, "time", "[mm]"),
