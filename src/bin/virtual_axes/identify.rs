@@ -4,9 +4,10 @@ use std::cmp::Reverse;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use virtual_axes::config::{AxisConfig, DEFAULT_MACHINE, Kind, MachineConfig, Parameters};
+use virtual_axes::config::{AxisConfig, DEFAULT_MACHINE, Kind, MachineConfig, Parameters, Periods};
 use virtual_axes::identify::{Agreement, Breakaway, Identification, Identified, Input, Options};
-use virtual_axes::recording::Finding;
+use virtual_axes::recording::{Finding, Severity};
+use virtual_axes::units::MILLISECOND_NS;
 
 use crate::campaign::PartName;
 use crate::input::must_not_replace;
@@ -159,9 +160,17 @@ fn find(
     let options = Options { i0, refine: !arguments.no_refine };
     let identification = virtual_axes::identify::identify(&inputs, axis, &periods, &options);
     findings.extend(identification.findings.iter().cloned());
+    // A file can be given twice.
+    let mut told: Vec<Finding> = Vec::new();
+    for finding in findings {
+        if !told.contains(&finding) {
+            told.push(finding);
+        }
+    }
+    let mut findings = told;
     findings.sort_by_key(|finding| Reverse(finding.severity));
     let values = identification.values(parameters, axis.name());
-    if !values.iter().any(|value| tells(value, parameters)) {
+    if !values.iter().any(|value| tells(value, parameters, &periods)) {
         return Err(nothing(axis.name(), &findings).into());
     }
     let mut identified = parameters.clone();
@@ -182,10 +191,12 @@ fn find(
 }
 
 /// Whether a value says more than that any is as good.
-fn tells(value: &Identified, parameters: &Parameters) -> bool {
+fn tells(value: &Identified, parameters: &Parameters, periods: &Periods) -> bool {
     let Some([low, high]) = value.interval else { return true };
+    // Delays are tried in steps of a period, which need not end at the longest one.
+    let step = periods.position as f64 / MILLISECOND_NS as f64;
     match parameters.definition(&value.key).map(|definition| definition.kind) {
-        Some(Kind::Number { min, max }) => low > min || high < max,
+        Some(Kind::Number { min, max }) => low > min || high + step <= max,
         _ => true,
     }
 }
@@ -216,7 +227,7 @@ fn machine_text(arguments: &Arguments, found: &Found, identified: &Parameters) -
         let others = list(&mut found.validations.iter().map(|v| &v.recorded));
         head.push_str(&format!("\nValidated on {others}."));
     }
-    for finding in &found.findings {
+    for finding in found.findings.iter().filter(|finding| finding.severity > Severity::Note) {
         head.push_str(&format!("\n{}", identify_text::finding(finding)));
     }
     identified

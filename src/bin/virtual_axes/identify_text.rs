@@ -110,6 +110,11 @@ pub fn text(found: &Found) -> String {
     parts.join("\n")
 }
 
+/// Name of a recording that the axis was not identified from.
+fn validation(recorded: &Recorded) -> String {
+    format!("{} (validation)", recorded.signals.name)
+}
+
 fn recordings(found: &Found) -> Table {
     let mut table = table_of(&[
         ("recording", ""),
@@ -117,16 +122,18 @@ fn recordings(found: &Found) -> Table {
         ("samples", ""),
         ("period", "ms"),
         ("cut-off", "Hz"),
-        ("lag of the current taken back", "ms"),
+        ("current lag", "ms"),
         ("feedforward", ""),
     ]);
     let validations = found.validations.iter().map(|v| (&v.recorded, Some(&v.agreement)));
     let agreements = found.identification.agreements.iter().map(Some).chain(std::iter::repeat(None));
-    for (recorded, agreement) in found.recordings.iter().zip(agreements).chain(validations) {
+    let all = found.recordings.iter().zip(agreements).chain(validations);
+    for (number, (recorded, agreement)) in all.enumerate() {
         let signals = &recorded.signals;
+        let name = if number < found.recordings.len() { signals.name.clone() } else { validation(recorded) };
         let modes = agreement.map_or_else(Vec::new, |agreement| modes(recorded, agreement));
         table.rows.push(vec![
-            signals.name.clone(),
+            name,
             format!("{:.3}", recorded.duration()),
             recorded.samples().to_string(),
             digits(signals.period / MILLISECOND, 4),
@@ -345,9 +352,7 @@ fn agreement(found: &Found) -> Table {
     ]);
     let identified = found.recordings.iter().zip(&found.identification.agreements);
     let identified = identified.map(|(recorded, agreement)| (recorded.signals.name.clone(), agreement));
-    let validated = found.validations.iter().map(|validation| {
-        (format!("{} (validation)", validation.recorded.signals.name), &validation.agreement)
-    });
+    let validated = found.validations.iter().map(|v| (validation(&v.recorded), &v.agreement));
     for (name, agreement) in identified.chain(validated) {
         let max = |deviation: &Option<Deviation>| deviation.map(|d| d.max);
         let in_unit = |value: Option<f64>, unit: f64| or_none(value, |value| format!("{:.1}", value / unit));
