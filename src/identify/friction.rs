@@ -44,7 +44,7 @@ pub enum Breakaway {
     /// i0 = a + c.
     #[default]
     Held,
-    /// i0 is the largest current at which the axis still stood.
+    /// i0 is refined by itself, on starts and reversals of the closed loop.
     Freed,
 }
 
@@ -71,8 +71,6 @@ pub struct Friction {
     pub directions: [Option<LawFit>; 2],
     /// Largest difference between the directions, part of their mean; NaN where only one was moved in.
     pub asymmetry: f64,
-    /// i0 from breaking away, A, with its standard error, if the recording shows it.
-    pub breakaway: Option<(f64, f64)>,
 }
 
 /// Unit of V, m/s or rad/s.
@@ -128,13 +126,7 @@ pub(super) fn current(law: &FrictionConfig, v: f64) -> f64 {
 type Point = (f64, f64, f64);
 
 /// The friction law of `levels`, with what must be said about it; none without speeds enough.
-pub fn friction(
-    levels: &[Level],
-    axis: &AxisConfig,
-    breakaway: Option<(f64, f64)>,
-    i0: Breakaway,
-    findings: &mut Vec<Finding>,
-) -> Option<Friction> {
+pub fn friction(levels: &[Level], axis: &AxisConfig, findings: &mut Vec<Finding>) -> Option<Friction> {
     let unit = speed_unit(axis);
     let of = |directions: &[f64]| -> Vec<Point> {
         let chosen = levels.iter().filter(|l| directions.contains(&l.velocity.signum()));
@@ -175,16 +167,8 @@ pub fn friction(
         ));
         findings.push(Finding::warning("few-speeds", what, remedy));
     }
-    let mut law = fit(&both)?;
+    let law = fit(&both)?;
     told_bounds(&law, findings);
-    let free = breakaway.filter(|_| i0 == Breakaway::Freed);
-    if i0 == Breakaway::Freed && free.is_none() {
-        let what = "i0 is held at a + c: no standstill before a slow motion shows the breakaway";
-        findings.push(Finding::warning("no-breakaway", what, "record slow starts from rest"));
-    }
-    if let Some((current, _)) = free {
-        law.config.i0 = current;
-    }
     if law.determination < LEAST_DETERMINATION {
         findings.push(Finding::warning(
             "poor-friction-law",
@@ -210,7 +194,7 @@ pub fn friction(
             ),
         ));
     }
-    Some(Friction { directions: [fit(&plus), fit(&minus)], law, asymmetry, breakaway })
+    Some(Friction { directions: [fit(&plus), fit(&minus)], law, asymmetry })
 }
 
 /// Speeds count alike up to what their errors tell: weights are capped at that of the middle error.

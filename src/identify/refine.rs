@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::closed_loop::{Experiment, Simulated, simulate_all};
 use super::fit::{Bounded, Effort, Minimum, minimise};
 use super::friction::FrictionLaw;
-use crate::config::{AxisConfig, AxisKind, Periods};
+use crate::config::{AxisConfig, AxisKind, FrictionConfig, Periods};
 
 /// Rounds in which the weights of the channels are taken anew from what is left.
 const ROUNDS: usize = 2;
@@ -31,6 +31,8 @@ pub enum Parameter {
     FrictionC,
     /// d, min/m or min/rev.
     FrictionD,
+    /// i0 where it is not a + c, A.
+    Breakaway,
     /// Coulomb level of a straight law, A.
     Coulomb,
     /// Slope of a straight law, A per m/min or rev/min.
@@ -55,6 +57,7 @@ impl fmt::Display for Parameter {
             Parameter::FrictionB => "friction.b",
             Parameter::FrictionC => "friction.c",
             Parameter::FrictionD => "friction.d",
+            Parameter::Breakaway => "friction.i0",
             Parameter::Coulomb => "Coulomb level",
             Parameter::Viscous => "viscous slope",
             Parameter::Weight => "gravity.weight_n",
@@ -94,6 +97,7 @@ impl Parameter {
             Parameter::FrictionB => f.b,
             Parameter::FrictionC => f.c,
             Parameter::FrictionD => f.d,
+            Parameter::Breakaway => f.i0,
             Parameter::Coulomb => f.a + f.c,
             Parameter::Viscous => (f.a - f.c) * STRAIGHT,
             Parameter::Weight => g.weight,
@@ -110,7 +114,9 @@ impl Parameter {
         let force = axis.motor.torque_constant / axis.transmission_ratio;
         match self {
             Parameter::Inertia | Parameter::TorqueFeedforward => axis.motor.inertia,
-            Parameter::FrictionA | Parameter::FrictionC | Parameter::Coulomb => friction,
+            Parameter::FrictionA | Parameter::FrictionC | Parameter::Coulomb | Parameter::Breakaway => {
+                friction
+            }
             Parameter::FrictionB => 0.02,
             Parameter::FrictionD => axis.friction.d.abs().max(0.1),
             Parameter::Viscous => friction / 20.0,
@@ -125,7 +131,7 @@ impl Parameter {
             Parameter::Inertia => (value / 10.0, value * 10.0),
             Parameter::FrictionB => (-0.05, 0.1),
             Parameter::FrictionD => (-10.0, -0.05),
-            Parameter::Coulomb | Parameter::Viscous | Parameter::FrictionA => {
+            Parameter::Coulomb | Parameter::Viscous | Parameter::FrictionA | Parameter::Breakaway => {
                 (0.0, value.abs() * 5.0 + 5.0 * scale)
             }
             Parameter::VelocityFeedforward => (0.0, 2.0),
@@ -148,6 +154,7 @@ pub(super) fn with(axis: &AxisConfig, parameters: &[Parameter], values: &[f64], 
             Parameter::FrictionB => axis.friction.b = value,
             Parameter::FrictionC => axis.friction.c = value,
             Parameter::FrictionD => axis.friction.d = value,
+            Parameter::Breakaway => axis.friction.i0 = value,
             Parameter::Coulomb => line = Some((value, line.unwrap_or(straight).1)),
             Parameter::Viscous => line = Some((line.unwrap_or(straight).0, value)),
             Parameter::Weight => axis.gravity.weight = value,
@@ -158,7 +165,8 @@ pub(super) fn with(axis: &AxisConfig, parameters: &[Parameter], values: &[f64], 
         }
     }
     if let Some((level, slope)) = line {
-        axis.friction = super::friction::straight_law(level, slope);
+        axis.friction =
+            FrictionConfig { i0: axis.friction.i0, ..super::friction::straight_law(level, slope) };
     }
     if let Some((sine, cosine)) = tilt {
         (axis.gravity.tilt, axis.gravity.phase) = (sine.hypot(cosine), cosine.atan2(sine));

@@ -11,7 +11,7 @@ use super::identification::{Identification, Input, Options};
 use super::inertia::inertia;
 use super::mode::FeedforwardMode;
 use super::refine::{Parameter, refine, with};
-use super::segments::{Segment, segments};
+use super::segments::{Segment, SegmentKind, segments};
 use super::tell::{replayed_inertia, tell, tell_delays};
 use super::validate::agreement;
 use crate::config::{AxisConfig, DeviationConfig, Periods, PositionControllerConfig};
@@ -20,9 +20,9 @@ use crate::units::seconds;
 
 /// Step by which a parameter is moved to see what of a delay it could explain, part of its value.
 const NUISANCE: f64 = 1e-2;
-/// Inertias that are tried first, parts of that by eq. 5: most of the current is unseen where the drive is quick
-/// and the recording slow, never the other way round.
-const LADDER: [f64; 8] = [0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
+/// Inertias that are tried first, parts of what eq. 5 or the machine file says. Of eq. 5 most is unseen where the
+/// drive is quick and the recording slow.
+const LADDER: [f64; 11] = [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
 
 /// An identification in progress.
 pub(super) struct Steps<'a> {
@@ -79,6 +79,13 @@ impl<'a> Steps<'a> {
     /// Gravity, friction, inertia: twice, since the inertia takes what is left of accelerations off the first two.
     pub(super) fn steady_steps(&mut self) {
         let found = &mut self.found;
+        if !self.segments.iter().flatten().any(|segment| segment.kind == SegmentKind::Static) {
+            found.findings.push(Finding::warning(
+                "no-standstill",
+                "no recording has a standstill: gravity is not checked at rest",
+                "record half a second of rest at several positions, each approached from both sides",
+            ));
+        }
         let recordings: Vec<(&Signals, &[Segment])> = self
             .inputs
             .iter()
@@ -101,7 +108,7 @@ impl<'a> Steps<'a> {
             let mut findings = Vec::new();
             let (steady, gravity) = gravity(&recordings, axis, current_per_acceleration);
             let weight = gravity.as_ref().map_or_else(GravityCurrent::default, |g| g.model);
-            let friction = friction(&steady.levels, axis, None, self.options.i0, &mut findings);
+            let friction = friction(&steady.levels, axis, &mut findings);
             let inertia = friction
                 .as_ref()
                 .and_then(|friction| inertia(&recordings, axis, &friction.law, &weight, &mut findings));
@@ -133,6 +140,14 @@ impl<'a> Steps<'a> {
         }
         if let Some(torque) = &found.feedforward.torque {
             found.axis.feedforward.torque = torque.value.max(0.0);
+        } else if let Some(input) = self.inputs.iter().find(|input| shows_no_torque(input)) {
+            let what = format!(
+                "{}: TFFWS is 0 throughout with torque feedforward on: TFFW is 0",
+                input.signals.name
+            );
+            found.findings.push(Finding::note("no-torque-feedforward", what));
+            found.axis.feedforward.torque = 0.0;
+            found.feedforward.no_torque = true;
         }
     }
 
@@ -174,7 +189,8 @@ impl<'a> Steps<'a> {
             if let Some(inertia) = start_of_inertia(&self.found.axis, self.periods, &first) {
                 self.found.axis.motor.inertia = inertia;
             }
-            self.refine(&first, &physics);
+            // The delays ask for an inertia that is about right; everything else can wait for them.
+            self.refine(&first, &[Parameter::Inertia]);
         }
         self.take_delay(Delay::Beta, &[]);
         self.take_delay(Delay::Gamma, &[]);
@@ -198,6 +214,9 @@ impl<'a> Steps<'a> {
         let law = found.friction.as_ref().map_or(FrictionLaw::DoubleExponential, |f| f.law.law);
         let mut parameters = vec![Parameter::Inertia];
         parameters.extend(Parameter::of_friction(law));
+        if self.options.i0 == Breakaway::Freed {
+            parameters.push(Parameter::Breakaway);
+        }
         let gravity = &found.axis.gravity;
         if gravity.weight != 0.0 || gravity.tilt != 0.0 {
             parameters.extend(Parameter::of_gravity(&found.axis));
@@ -273,11 +292,32 @@ impl<'a> Steps<'a> {
             // An axis that has been simulated all along can be simulated.
             self.found.agreements.extend(found.ok());
         }
+        let refined = |parameter| {
+            let refinement = self.found.refinement.as_ref();
+            refinement.is_some_and(|r| r.parameters.iter().any(|refined| refined.parameter == parameter))
+        };
+        if self.options.i0 == Breakaway::Freed && !refined(Parameter::Breakaway) {
+            self.found.findings.push(Finding::warning(
+                "i0-held",
+                "i0 is held at a + c: it is freed in the refinement on the closed loop only",
+                "record PSEC, with slow starts from rest",
+            ));
+        }
         let replayed = replayed_inertia(self.inputs, &self.found);
         self.found.replayed_inertia = replayed;
         tell(self.inputs, &mut self.found);
         self.found
     }
+}
+
+/// Whether a recording that was made with torque feedforward shows that it is nothing.
+fn shows_no_torque(input: &Input<'_>) -> bool {
+    let channels = || input.signals.spans.iter().map(|span| span.torque_feedforward.as_ref());
+    let is_nothing =
+        |channel: Option<&Vec<f64>>| channel.is_some_and(|c| c.iter().all(|value| *value == 0.0));
+    input.feedforward == Some(FeedforwardMode::Both)
+        && !input.signals.spans.is_empty()
+        && channels().all(is_nothing)
 }
 
 /// The inertia, of a ladder of them, whose closed loop moves most like the recorded one.

@@ -21,10 +21,22 @@ pub(super) fn tell_delays(experiments: &[Experiment], found: &mut Identification
         }
         let name = which.name();
         let recorded = experiments.iter().any(|e| e.mode == which.mode());
-        found.findings.push(if recorded {
+        let weights = &found.axis.feedforward;
+        let without_effect = match which {
+            Delay::Alpha => false,
+            Delay::Beta => weights.velocity == 0.0,
+            Delay::Gamma => weights.torque == 0.0,
+        };
+        found.findings.push(if without_effect {
             Finding::note(
                 "unseen-delay",
                 format!("{name} is left as it is: its feedforward is 0, and any value gives the same motion"),
+            )
+        } else if recorded {
+            Finding::warning(
+                "unseen-delay",
+                format!("{name} is left as it is: the axis cannot be simulated around it"),
+                "check the machine file",
             )
         } else {
             Finding::warning(

@@ -135,14 +135,11 @@ impl Identification {
             // The terms of a straight line nearly cancel: they keep all of their digits.
             put(&[key], values[k], error.filter(|e| e.is_finite() && !straight), None, source.clone());
         }
-        let held = (law.i0 - (law.a + law.c)).abs() < 1e-9;
-        let source = if held { "i0 = a + c" } else { "largest current at which the axis still stood" };
-        let error = if held { fit.map(|fit| fit.error_at(0.0)) } else { self.breakaway_error() };
+        let (source, error) = match self.refined(Parameter::Breakaway) {
+            Some(refined) => ("refined on the closed loop", Some(refined.error)),
+            None => ("i0 = a + c", fit.map(|fit| fit.error_at(0.0))),
+        };
         put(&["friction.i0"], law.i0, error, None, source.to_owned());
-    }
-
-    fn breakaway_error(&self) -> Option<f64> {
-        self.friction.as_ref().and_then(|friction| friction.breakaway).map(|(_, error)| error)
     }
 
     fn put_gravity(&self, put: &mut Put<'_>) {
@@ -193,6 +190,10 @@ impl Identification {
             })
         {
             put(&["feedforward.torque_kg_m2", "feedforward.torque_kg"], weights.torque, error, None, source);
+        }
+        if self.feedforward.no_torque {
+            let keys = ["feedforward.torque_kg_m2", "feedforward.torque_kg"];
+            put(&keys, 0.0, None, None, "TFFWS is 0 throughout".to_owned());
         }
         let ms = |delay: i64| delay as f64 / MILLISECOND_NS as f64;
         for fit in &self.delays {

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
-use virtual_axes::config::{AxisKind, MachineConfig, Parameters};
+use virtual_axes::config::{AxisKind, MachineConfig, Parameters, Source, Value};
 use virtual_axes::identify::FeedforwardMode;
 use virtual_axes::identify::campaign::{Campaign, Options};
 use virtual_axes::machine::{AxisSample, Machine};
@@ -238,4 +238,39 @@ impl Random {
         let radius = (-2.0 * self.uniform().ln()).sqrt();
         radius * (TAU * self.uniform() - PI).cos()
     }
+}
+
+/// The machine that recordings are made with (model.md section 6).
+pub fn truth() -> Parameters {
+    Parameters::embedded_default().expect("the default machine")
+}
+
+/// What an identification of `axis` starts from: the same machine with another plant, friction, feedforward and
+/// other delays.
+pub fn ignorant(axis: &str) -> Parameters {
+    let mut parameters = truth();
+    let rotary = ["a", "c"].contains(&axis);
+    let mut wrong = vec![
+        ("motor.inertia_kg_m2", if rotary { 0.002 } else { 0.015 }),
+        ("friction.a", 1.0),
+        ("friction.b", 0.01),
+        ("friction.c", -0.1),
+        ("friction.d", -1.0),
+        ("friction.i0", 0.9),
+        ("feedforward.velocity", 0.9),
+        ("feedforward.torque_kg_m2", 0.001),
+        ("delays.alpha_ms", 20.0),
+        ("delays.beta_ms", 3.0),
+        ("delays.gamma_ms", 1.0),
+    ];
+    match axis {
+        "z" => wrong.push(("gravity.weight_n", 100.0)),
+        "a" => wrong.extend([("gravity.tilt_nm", 5.0), ("gravity.tilt_phase_deg", 30.0)]),
+        _ => {}
+    }
+    for (key, value) in wrong {
+        let key = format!("{axis}.{key}");
+        parameters.set(&key, Value::Double(value), &Source::named("the test")).expect("a value in range");
+    }
+    parameters
 }
