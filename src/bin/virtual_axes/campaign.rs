@@ -46,7 +46,7 @@ pub struct Arguments {
 /// What of the feedforward is on.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 pub enum PartName {
-    /// None: friction, gravity and inertia.
+    /// None, to show friction, gravity and inertia.
     Off,
     /// That of the velocity.
     Velocity,

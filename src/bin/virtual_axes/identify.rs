@@ -37,8 +37,8 @@ pub struct Arguments {
     /// recording does not show it (VFFWS, TFFWS).
     #[arg(long, value_enum, value_delimiter = ',', value_name = "off|velocity|both[,…]")]
     feedforward: Vec<PartName>,
-    /// Take i0 from the currents at which the axis still stood, not as a + c.
-    #[arg(long)]
+    /// Find i0 in the refinement, in the place of a + c; asks for several slow starts from rest.
+    #[arg(long, conflicts_with = "no_refine")]
     free_i0: bool,
     /// Only the steps of the paper, without the refinement on the whole closed loop.
     #[arg(long)]

@@ -200,9 +200,6 @@ impl Scales {
         object["asymmetry"] = json!(friction.asymmetry);
         let [plus, minus] = &friction.directions;
         object["directions"] = json!({ "plus": plus.as_ref().map(law), "minus": minus.as_ref().map(law) });
-        object["breakaway"] = json!(
-            friction.breakaway.map(|(current, error)| json!({ "current_a": current, "error_a": error }))
-        );
         object
     }
 

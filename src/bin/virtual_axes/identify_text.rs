@@ -222,9 +222,6 @@ fn friction(friction: &Friction, levels: &[Level], units: Units) -> String {
     if friction.asymmetry.is_finite() {
         text.push_str(&format!("; directions differ by up to {:.1} %", 100.0 * friction.asymmetry));
     }
-    if let Some((current, error)) = friction.breakaway {
-        text.push_str(&format!("; breaks away at {} ± {} A", digits(current, 4), digits(error, 2)));
-    }
     text.push('\n');
     let mut laws =
         table_of(&[("law", ""), ("a", "A"), ("b", ""), ("c", "A"), ("d", ""), ("i0", "A"), ("R²", "")]);
