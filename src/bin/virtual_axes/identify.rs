@@ -142,11 +142,10 @@ fn find(
     };
     let other_modes = recordings::feedforward(for_others, others.len(), "--validate-feedforward")?;
     let options = arguments.reading.options()?;
-    let mut findings = Vec::new();
-    let mut read = |path: &PathBuf, feedforward, option| {
+    let read = |path: &PathBuf, feedforward, option| {
         spinner.now(format!("reading {}", path.display()))?;
         let reading = (&arguments.reading, &options);
-        recordings::read(path, (axis, &periods), reading, (feedforward, option), &mut findings)
+        recordings::read(path, (axis, &periods), reading, (feedforward, option))
     };
     let recordings = files.iter().zip(modes).map(|(path, mode)| read(path, mode, "--feedforward"));
     let recordings: Vec<Recorded> = recordings.collect::<Result<_, _>>()?;
@@ -159,15 +158,14 @@ fn find(
     let i0 = if arguments.free_i0 { Breakaway::Freed } else { Breakaway::Held };
     let options = Options { i0, refine: !arguments.no_refine };
     let identification = virtual_axes::identify::identify(&inputs, axis, &periods, &options);
-    findings.extend(identification.findings.iter().cloned());
+    let of_files = recordings.iter().chain(&others).flat_map(|recorded| &recorded.findings);
     // A file can be given twice.
-    let mut told: Vec<Finding> = Vec::new();
-    for finding in findings {
-        if !told.contains(&finding) {
-            told.push(finding);
+    let mut findings: Vec<Finding> = Vec::new();
+    for finding in of_files.chain(&identification.findings) {
+        if !findings.contains(finding) {
+            findings.push(finding.clone());
         }
     }
-    let mut findings = told;
     findings.sort_by_key(|finding| Reverse(finding.severity));
     let values = identification.values(parameters, axis.name());
     if !values.iter().any(|value| tells(value, parameters, &periods)) {

@@ -65,6 +65,8 @@ pub struct Recorded {
     pub signals: Signals,
     /// The feedforward that was said to act.
     pub feedforward: Option<FeedforwardMode>,
+    /// What reading and conditioning found.
+    pub findings: Vec<Finding>,
 }
 
 impl Recorded {
@@ -86,7 +88,7 @@ impl Recorded {
     }
 }
 
-/// Reads the recording `path` of `axis`; what must be said about it is added to `findings`.
+/// Reads the recording `path` of `axis`; `feedforward` is what was said to act, by `option`.
 ///
 /// # Errors
 /// What is wrong with the file; or that its feedforward is not known.
@@ -95,12 +97,10 @@ pub fn read(
     (axis, periods): (&AxisConfig, &Periods),
     (reading, options): (&Reading, &RecordingOptions),
     (feedforward, option): (Option<FeedforwardMode>, &str),
-    findings: &mut Vec<Finding>,
 ) -> Result<Recorded, Box<dyn Error>> {
-    let (raw, mut found) = read_recording(path, axis, options)?;
-    findings.append(&mut found);
-    let (signals, mut found) = condition(&raw, axis, periods, &reading.conditioning())?;
-    findings.append(&mut found);
+    let (raw, mut findings) = read_recording(path, axis, options)?;
+    let (signals, more) = condition(&raw, axis, periods, &reading.conditioning())?;
+    findings.extend(more);
     if let (None, Some(unseen)) = (feedforward, unseen_feedforward(&signals)) {
         return Err(format!(
             "{}: it has no {unseen}, so that the feedforward that acted must be said: {option} off, velocity or both",
@@ -108,7 +108,7 @@ pub fn read(
         )
         .into());
     }
-    Ok(Recorded { signals, feedforward })
+    Ok(Recorded { signals, feedforward, findings })
 }
 
 /// What would show the feedforward that acted on the set-points, if that is not there.
