@@ -101,6 +101,8 @@ fn each_unit_is_worth_what_it_is() {
         (x, "velocity", "[m/min]", "30", 0.5),
         (x, "velocity", "[mm/min]", "30", 0.0005),
         (a, "velocity", "[deg/s]", "180", PI),
+        (a, "velocity", "[deg/min]", "10800", PI),
+        (a, "velocity", "[°/min]", "10800", PI),
         (a, "velocity", "[rpm]", "30", PI),
         (a, "velocity", "[rev/min]", "30", PI),
         (x, "current", "", "1.5", 1.5),
@@ -146,7 +148,7 @@ fn a_unit_that_does_not_fit_is_refused_with_those_that_do() {
     );
     assert_eq!(
         said(a, "velocity", "[m/min]"),
-        "--column: velocity in [m/min]: must be in rad/s, deg/s, rpm on the rotary axis a"
+        "--column: velocity in [m/min]: must be in rad/s, deg/s, deg/min, rpm on the rotary axis a"
     );
     assert_eq!(
         said(x, "time", "[mm]"),

@@ -4,13 +4,13 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
-use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, Parameters};
+use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
 use virtual_axes::files::psec_writer;
 use virtual_axes::identify::FeedforwardMode;
 use virtual_axes::identify::campaign::{Campaign, Options, Run};
 use virtual_axes::report::{Column, Table};
-use virtual_axes::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, RPM};
 
+use crate::axis::{self, Units};
 use crate::{interrupt, table, variant};
 
 /// Which axis, and where to.
@@ -45,8 +45,8 @@ pub struct Arguments {
 
 /// What of the feedforward is on.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum PartName {
-    /// None: friction, gravity and inertia.
+pub enum PartName {
+    /// None, to show friction, gravity and inertia.
     Off,
     /// That of the velocity.
     Velocity,
@@ -76,12 +76,8 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let machine = Parameters::load(&arguments.machine)?;
     let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
     let config = parameters.machine_config()?;
-    let axes = config.axes();
-    let place = axes.iter().position(|axis| axis.name() == arguments.axis).ok_or_else(|| {
-        let known: Vec<&str> = axes.iter().map(|axis| axis.name()).collect();
-        format!("--axis {}: the machine has {}", arguments.axis, known.join(", "))
-    })?;
-    let units = Units::of(axes[place].kind());
+    let place = axis::place(&config, &arguments.axis)?;
+    let units = Units::of(config.axes()[place].kind());
     let options = Options {
         range: arguments.range.map(|range| range.map(|value| value * units.length)),
         max_feed: arguments.max_feed.map(|feed| feed * units.speed),
@@ -98,40 +94,6 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     writer.finish()?;
     let told = Told { campaign: &campaign, parameters: &parameters, axis: &arguments.axis, units };
     Ok(if arguments.json { format!("{:#}\n", told.json()) } else { told.text() })
-}
-
-/// Units of an axis on the command line.
-#[derive(Debug, Clone, Copy)]
-struct Units {
-    length: f64,
-    length_name: &'static str,
-    length_key: &'static str,
-    speed: f64,
-    speed_name: &'static str,
-    speed_key: &'static str,
-}
-
-impl Units {
-    fn of(kind: AxisKind) -> Self {
-        match kind {
-            AxisKind::Linear => Units {
-                length: MILLIMETRE,
-                length_name: "mm",
-                length_key: "mm",
-                speed: METRE_PER_MINUTE,
-                speed_name: "m/min",
-                speed_key: "m_min",
-            },
-            AxisKind::Rotary => Units {
-                length: DEGREE,
-                length_name: "°",
-                length_key: "deg",
-                speed: RPM,
-                speed_name: "rpm",
-                speed_key: "rpm",
-            },
-        }
-    }
 }
 
 /// What the command says of a campaign.

@@ -67,12 +67,7 @@ impl Input {
 
     /// Refuses to write where it is read from.
     pub fn must_not_be(&self, output: &Path) -> Result<(), String> {
-        let same =
-            fs::canonicalize(output).is_ok_and(|out| fs::canonicalize(&self.name).is_ok_and(|i| i == out));
-        if same && fs::metadata(output).is_ok_and(|m| m.is_file()) {
-            return Err(format!("{}: the output would replace what is read", output.display()));
-        }
-        Ok(())
+        must_not_replace(output, Path::new(&self.name))
     }
 
     /// Path and law of time, of a scenario.
@@ -118,6 +113,15 @@ impl Input {
             }
         }
     }
+}
+
+/// Refuses to write `output` where `input` is read from.
+pub fn must_not_replace(output: &Path, input: &Path) -> Result<(), String> {
+    let same = fs::canonicalize(output).is_ok_and(|out| fs::canonicalize(input).is_ok_and(|i| i == out));
+    if same && fs::metadata(output).is_ok_and(|m| m.is_file()) {
+        return Err(format!("{}: the output would replace what is read", output.display()));
+    }
+    Ok(())
 }
 
 fn content_of(file: files::Input, topic: Option<&str>) -> Result<Content, Box<dyn Error>> {

@@ -2,17 +2,23 @@
 
 #![forbid(unsafe_code)]
 
+mod axis;
 mod campaign;
 mod check;
 mod design;
 mod design_output;
+mod identify;
+mod identify_json;
+mod identify_text;
 mod input;
 mod interrupt;
 mod json;
 mod list;
+mod machine_file;
 mod period;
 mod progress;
 mod psec;
+mod recordings;
 mod report;
 mod robustness;
 mod run;
@@ -55,6 +61,8 @@ enum Command {
     Tune(Box<tune::Arguments>),
     /// Run one tuning on plants whose inertia, friction and torque constant are off.
     Robustness(Box<robustness::Arguments>),
+    /// Find the parameters of an axis from recordings of it, and write a machine file with them.
+    Identify(Box<identify::Arguments>),
     /// Check a file: a machine, a scenario, or set-points.
     Check(check::Arguments),
     /// List the machines that come with the program.
@@ -117,6 +125,7 @@ fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Design(arguments) => design::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),
         Command::Robustness(arguments) => robustness::run(arguments),
+        Command::Identify(arguments) => identify::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Machines { json } => list::machines(*json),
         Command::Scenarios { show: Some(name), .. } => list::scenario(name),

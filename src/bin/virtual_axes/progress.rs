@@ -2,6 +2,8 @@
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -107,5 +109,58 @@ impl Watch for Runs {
 
     fn go_on(&self) -> io::Result<()> {
         interrupt::check()
+    }
+}
+
+/// Time between two pictures of a spinner.
+const TURN: Duration = Duration::from_millis(100);
+
+/// A spinner that turns by itself, for work that does not tell how far it is.
+#[derive(Debug)]
+pub struct Spinner {
+    bar: ProgressBar,
+    /// Dropped when the work is done.
+    working: Option<Sender<()>>,
+    turning: Option<JoinHandle<()>>,
+}
+
+impl Spinner {
+    /// Not seen in the first second.
+    pub fn new() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {
+            bar.set_style(style);
+        }
+        let (working, work) = mpsc::channel();
+        let seen = bar.clone();
+        let turning = thread::spawn(move || {
+            let mut wait = PATIENCE;
+            while work.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
+                if wait == PATIENCE {
+                    // Hidden still where standard error is no terminal.
+                    seen.set_draw_target(ProgressDrawTarget::stderr());
+                    wait = TURN;
+                }
+                seen.tick();
+            }
+        });
+        Spinner { bar, working: Some(working), turning: Some(turning) }
+    }
+
+    /// Says what is being done; an error once the command has been interrupted.
+    pub fn now(&self, what: impl Into<String>) -> io::Result<()> {
+        self.bar.set_message(what.into());
+        interrupt::check()
+    }
+}
+
+impl Drop for Spinner {
+    fn drop(&mut self) {
+        self.working = None;
+        if let Some(turning) = self.turning.take() {
+            // It only draws: how it ended changes nothing.
+            let _ = turning.join();
+        }
+        self.bar.finish_and_clear();
     }
 }

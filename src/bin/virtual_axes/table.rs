@@ -23,6 +23,11 @@ pub fn scale(kind: AxisKind) -> (&'static str, &'static str, f64) {
 
 /// A table for a terminal: the first column to the left, the others to the right.
 pub fn text(table: &Table) -> String {
+    aligned(table, &[0])
+}
+
+/// A table for a terminal: the columns `left` to the left, the others to the right.
+pub fn aligned(table: &Table, left: &[usize]) -> String {
     let header: Vec<String> = table.columns.iter().map(heading).collect();
     let all = || std::iter::once(&header).chain(&table.rows);
     let width = |column: usize| all().filter_map(|row| row.get(column)).map(|c| c.chars().count()).max();
@@ -31,10 +36,11 @@ pub fn text(table: &Table) -> String {
         let mut line = String::new();
         for (column, cell) in row.iter().enumerate() {
             let pad = " ".repeat(width(column).unwrap_or(0) - cell.chars().count());
-            match column {
-                0 => line.extend([cell.as_str(), &pad]),
-                _ => line.extend(["  ", &pad, cell]),
+            if column > 0 {
+                line.push_str("  ");
             }
+            let parts = if left.contains(&column) { [cell.as_str(), &pad] } else { [pad.as_str(), cell] };
+            line.extend(parts);
         }
         text.push_str(line.trim_end());
         text.push('\n');

@@ -1,11 +1,9 @@
 //! `virtual_axes tune`: the controllers' tuning that suits a path best.
 
 use std::error::Error;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use virtual_axes::config::Parameters;
-use virtual_axes::files::OutputFile;
 use virtual_axes::tune::{
     Bench, Candidate, Contrast, Cost, Course, MarginLimits, Search, TuneError, Tuning, contrast,
     tune_cascade, tune_gpc,
@@ -17,7 +15,7 @@ use crate::progress::Runs;
 use crate::run::Run;
 use crate::search::{course, named};
 use crate::subject::Subject;
-use crate::{report, tune_output as output, variant};
+use crate::{machine_file, report, tune_output as output, variant};
 
 /// Controllers that can be tuned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -189,10 +187,7 @@ fn check_outputs(arguments: &Arguments, input: &Input) -> Result<(), Box<dyn Err
         return Err(format!("{}: given for the machine and for the report", out.display()).into());
     }
     if let Some(out) = &arguments.out {
-        let extension = out.extension().map(|e| e.to_string_lossy().to_lowercase());
-        if !matches!(extension.as_deref(), None | Some("yaml" | "yml")) {
-            return Err(format!("{}: a machine file is YAML: .yaml", out.display()).into());
-        }
+        machine_file::check_name(out)?;
     }
     match &arguments.report {
         Some(page) => Ok(report::check_name(page)?),
@@ -264,9 +259,7 @@ fn write_machine(
         best.tuning.values(bench.joints(), bench.parameters()).into_iter().map(|(key, _)| key).collect();
     let text =
         tuned.to_yaml(&head, |key| keys.iter().any(|k| k == key).then(|| format!("tuned for {tuning}")));
-    let mut file = OutputFile::create(path)?;
-    file.write_all(text.as_bytes())?;
-    Ok(file.finish()?)
+    Ok(machine_file::write(path, &text)?)
 }
 
 /// The machine as it is and the tuning that was found on a path, with recordings.

@@ -118,17 +118,18 @@ const NANO: f64 = 1e-9;
 const LINEAR_SPEEDS: [(&str, f64); 4] =
     [("m/s", 1.0), ("mm/s", MILLIMETRE), ("m/min", METRE_PER_MINUTE), ("mm/min", MILLIMETRE / MINUTE)];
 /// Speeds of a rotary axis in rad/s.
-const ANGULAR_SPEEDS: [(&str, f64); 3] = [("rad/s", 1.0), ("deg/s", DEGREE), ("rpm", RPM)];
+const ANGULAR_SPEEDS: [(&str, f64); 4] =
+    [("rad/s", 1.0), ("deg/s", DEGREE), ("deg/min", DEGREE / MINUTE), ("rpm", RPM)];
 /// Currents in A.
 const CURRENTS: [(&str, f64); 2] = [("A", 1.0), ("mA", MILLI)];
 
 /// Every symbol.
-const SYMBOLS: [&str; 20] = [
+const SYMBOLS: [&str; 21] = [
     "s", "ms", "us", "ns", "m", "mm", "um", "rad", "deg", "mdeg", "m/s", "mm/s", "m/min", "mm/min", "rad/s",
-    "deg/s", "rpm", "A", "mA", "N",
+    "deg/s", "deg/min", "rpm", "A", "mA", "N",
 ];
 /// Other ways to write a symbol.
-const SPELLINGS: [(&str, &str); 11] = [
+const SPELLINGS: [(&str, &str); 12] = [
     ("N.m", "N.m"),
     ("Nm", "N.m"),
     ("N·m", "N.m"),
@@ -138,6 +139,7 @@ const SPELLINGS: [(&str, &str); 11] = [
     ("μm", "um"),
     ("°", "deg"),
     ("°/s", "deg/s"),
+    ("°/min", "deg/min"),
     ("rev/min", "rpm"),
     ("1/min", "rpm"),
 ];
