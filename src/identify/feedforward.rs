@@ -33,6 +33,8 @@ pub struct FeedforwardFit {
     pub velocity: Option<Regression>,
     /// TFFW.
     pub torque: Option<Regression>,
+    /// Whether a recording with torque feedforward shows that TFFW is 0.
+    pub no_torque: bool,
 }
 
 /// (Prévost eqs. 6, 7) ratios of the recorded VFFWS and TFFWS to the derivatives of PSEC.
@@ -65,7 +67,7 @@ pub fn feedforward(
             ));
         }
     }
-    FeedforwardFit { velocity, torque }
+    FeedforwardFit { velocity, torque, no_torque: false }
 }
 
 fn regression<'a>(

@@ -20,9 +20,9 @@ use crate::units::seconds;
 
 /// Step by which a parameter is moved to see what of a delay it could explain, part of its value.
 const NUISANCE: f64 = 1e-2;
-/// Inertias that are tried first, parts of that by eq. 5: most of the current is unseen where the drive is quick
-/// and the recording slow, never the other way round.
-const LADDER: [f64; 8] = [0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
+/// Inertias that are tried first, parts of what eq. 5 or the machine file says. Of eq. 5 most is unseen where the
+/// drive is quick and the recording slow.
+const LADDER: [f64; 11] = [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
 
 /// An identification in progress.
 pub(super) struct Steps<'a> {
@@ -133,6 +133,14 @@ impl<'a> Steps<'a> {
         }
         if let Some(torque) = &found.feedforward.torque {
             found.axis.feedforward.torque = torque.value.max(0.0);
+        } else if let Some(input) = self.inputs.iter().find(|input| shows_no_torque(input)) {
+            let what = format!(
+                "{}: TFFWS is 0 throughout with torque feedforward on: TFFW is 0",
+                input.signals.name
+            );
+            found.findings.push(Finding::note("no-torque-feedforward", what));
+            found.axis.feedforward.torque = 0.0;
+            found.feedforward.no_torque = true;
         }
     }
 
@@ -174,7 +182,8 @@ impl<'a> Steps<'a> {
             if let Some(inertia) = start_of_inertia(&self.found.axis, self.periods, &first) {
                 self.found.axis.motor.inertia = inertia;
             }
-            self.refine(&first, &physics);
+            // The delays ask for an inertia that is about right; everything else can wait for them.
+            self.refine(&first, &[Parameter::Inertia]);
         }
         self.take_delay(Delay::Beta, &[]);
         self.take_delay(Delay::Gamma, &[]);
@@ -278,6 +287,16 @@ impl<'a> Steps<'a> {
         tell(self.inputs, &mut self.found);
         self.found
     }
+}
+
+/// Whether a recording that was made with torque feedforward shows that it is nothing.
+fn shows_no_torque(input: &Input<'_>) -> bool {
+    let channels = || input.signals.spans.iter().map(|span| span.torque_feedforward.as_ref());
+    let is_nothing =
+        |channel: Option<&Vec<f64>>| channel.is_some_and(|c| c.iter().all(|value| *value == 0.0));
+    input.feedforward == Some(FeedforwardMode::Both)
+        && !input.signals.spans.is_empty()
+        && channels().all(is_nothing)
 }
 
 /// The inertia, of a ladder of them, whose closed loop moves most like the recorded one.

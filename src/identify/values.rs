@@ -194,6 +194,10 @@ impl Identification {
         {
             put(&["feedforward.torque_kg_m2", "feedforward.torque_kg"], weights.torque, error, None, source);
         }
+        if self.feedforward.no_torque {
+            let keys = ["feedforward.torque_kg_m2", "feedforward.torque_kg"];
+            put(&keys, 0.0, None, None, "TFFWS is 0 throughout".to_owned());
+        }
         let ms = |delay: i64| delay as f64 / MILLISECOND_NS as f64;
         for fit in &self.delays {
             let left = if fit.left { "; left as it was" } else { "" };
