@@ -24,7 +24,7 @@ impl Step {
                 Step::Friction
             }
             "saturated-current" | "no-acceleration" | "negative-inertia" | "unseen-current" => Step::Inertia,
-            "feedforward-not-constant" => Step::Feedforward,
+            "feedforward-not-constant" | "no-torque-feedforward" => Step::Feedforward,
             "unseen-delay" => Step::Delays,
             "at-bound" if !refined => Step::Friction,
             "at-bound" | "correlated" | "not-refined" => Step::Refinement,
