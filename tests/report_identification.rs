@@ -86,7 +86,7 @@ impl Bench {
         validations: &[IdentificationCheck<'_>],
     ) -> Document {
         let page = IdentificationPage {
-            machine: "mikron_ucp710",
+            machine: self.machine.name(),
             periods: self.machine.periods(),
             inputs: &self.inputs(),
             findings: &self.findings,
@@ -342,6 +342,8 @@ fn what_is_missing_is_told() {
     assert_sound(&text_of_page);
     assert_eq!(headings(&document), SECTIONS);
     for (heading, wanted) in [
+        ("Gravity", "record the motor current"),
+        ("Delays", "record the position set-points"),
         ("What was found", "no parameter"),
         ("What was found", "record the motor current"),
         ("What was found", "record the position set-points"),

@@ -52,8 +52,8 @@ fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Input, &Agr
             let name = &input.signals.name;
             section.paragraphs.push(match &agreement.inverse {
                 Some(_) => format!(
-                    "{name} has no PSEC that begins at rest: its current is compared with the one that the recorded \
-                     motion asks for (Prévost eqs. 1 and 3); at rest friction holds anything within ±i0."
+                    "{name} has no PSEC that begins at rest: its current is compared with that of inverse dynamics; at \
+                     rest friction holds anything within ±i0."
                 ),
                 None => format!(
                     "{name} has neither PSEC that begins at rest nor a current: there is nothing to compare."
@@ -67,9 +67,14 @@ fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Input, &Agr
     }
     let inverse: Vec<Vec<String>> = pairs.iter().filter_map(|(input, a)| inverse_row(input, a)).collect();
     if !inverse.is_empty() {
+        section.paragraphs.push(
+            "Inverse dynamics is the current that the recorded motion asks for (Prévost eqs. 1 and 3), without a \
+             simulation: what swings between two samples, and what the filter of the acceleration takes, is not in it."
+                .to_owned(),
+        );
         let heads = [("recording", ""), ("largest", "A"), ("RMS", "A"), ("R²", "")];
         section.tables.push(Table {
-            caption: "Current that the recorded motion asks for against the recorded one".to_owned(),
+            caption: "Current by inverse dynamics minus measured".to_owned(),
             columns: columns(heads),
             rows: inverse,
         });

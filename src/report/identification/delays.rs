@@ -4,13 +4,13 @@ use super::super::chart::{Band, Chart, ChartAxis, Guide, Panel, Series, SeriesSt
 use super::super::document::Section;
 use super::super::table::Table;
 use super::super::unit::Unit;
-use super::words::{columns, digits};
+use super::words::{columns, digits, exact};
 use super::{IdentificationPage, Step};
 use crate::identify::{Delay, DelayFit};
 use crate::units::{Nanoseconds, seconds};
 
 /// A picture of the interval's surroundings is made where all delays span more than this times it.
-const WIDE: f64 = 6.0;
+const WIDE: f64 = 10.0;
 /// What it shows on either side, in widths of the interval.
 const SURROUNDINGS: f64 = 2.0;
 
@@ -45,7 +45,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
 }
 
 fn ms(delay: Nanoseconds) -> String {
-    digits(seconds(delay) * 1e3, 4)
+    exact(seconds(delay) * 1e3)
 }
 
 fn letter(delay: Delay) -> &'static str {
@@ -83,7 +83,10 @@ fn chart(page: &IdentificationPage, fit: &DelayFit, near: bool) -> Chart {
     let y = if near { y } else { y.with_zero() };
     let title = format!("Delay {name}{}", if near { ", near the interval" } else { "" });
     Chart {
-        note: format!("feedforward {}", fit.delay.mode().name()),
+        note: format!(
+            "feedforward {}; of each part that acts alike the middle is tried",
+            fit.delay.mode().name()
+        ),
         bands: vec![Band::interval("accepted", low, high)],
         lines: vec![Guide::new(seconds(fit.value), format!("{name} = {} ms", ms(fit.value)))],
         ..Chart::new(title, x, vec![Panel::new(y, series)])

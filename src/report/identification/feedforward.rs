@@ -4,7 +4,7 @@ use super::super::chart::{Chart, ChartAxis, Panel, Series, SeriesStyle};
 use super::super::document::Section;
 use super::super::scale::Extent;
 use super::super::unit::Unit;
-use super::words::{determination, digits};
+use super::words::{determination, digits, exact};
 use super::{IdentificationPage, Step};
 use crate::identify::Regression;
 
@@ -67,8 +67,11 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
 impl Weight<'_> {
     fn text(&self, page: &IdentificationPage) -> String {
         let Weight { name, equation, unit, value, .. } = self;
-        let of = |value: f64| format!("{} {unit}", digits(value, 5)).trim_end().to_owned();
+        let of = |value: f64| format!("{} {unit}", exact(value)).trim_end().to_owned();
         let Some(found) = self.found else {
+            if *equation == 7 && page.identification.feedforward.no_torque {
+                return "TFFW = 0: TFFWS is 0 throughout with torque feedforward on.".to_owned();
+            }
             let refined = page.identification.refinement.as_ref().is_some_and(|refinement| {
                 let own = format!("feedforward.{}", if *equation == 6 { "velocity" } else { "torque" });
                 refinement.parameters.iter().any(|refined| refined.parameter.to_string() == own)
@@ -88,8 +91,8 @@ impl Weight<'_> {
             digits(found.value, 5),
             format!("{} {unit}", digits(found.error, 2)).trim_end(),
             determination(found.determination),
-            digits(low * 1e3, 3),
-            digits(high * 1e3, 3)
+            exact(low * 1e3),
+            exact(high * 1e3)
         )
     }
 
@@ -98,8 +101,8 @@ impl Weight<'_> {
         let line = Extent::of(found.points.iter().map(|point| point.0))
             .map_or_else(Vec::new, |e| [e.min, e.max].map(|x| [x, found.value * x]).to_vec());
         let series = vec![
+            Series::new("regression", SeriesStyle::Commanded, line),
             Series::new("recorded", SeriesStyle::Points(0), points),
-            Series::new("regression", SeriesStyle::Simulated, line),
         ];
         let axis = |(quantity, unit): (&str, Unit)| ChartAxis::new(quantity, unit);
         Chart {

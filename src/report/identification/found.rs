@@ -2,7 +2,7 @@
 
 use super::super::document::Section;
 use super::super::table::Table;
-use super::words::{columns, counted, digits, full};
+use super::words::{columns, counted, digits, exact, full};
 use super::{IdentificationPage, Step, notices};
 use crate::identify::Identified;
 use crate::recording::Severity;
@@ -13,7 +13,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let mut told: Vec<_> = found
         .findings
         .iter()
-        .filter(|f| f.severity > Severity::Note || Step::of(f, refined) == Step::Whole)
+        .filter(|f| f.severity > Severity::Note || Step::of(f, refined).contains(&Step::Whole))
         .collect();
     // What is missing first.
     told.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
@@ -42,7 +42,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
 
 fn row(value: &Identified) -> Vec<String> {
     let uncertainty = match (value.interval, value.error) {
-        (Some([low, high]), _) => format!("{} … {}", digits(low, 3), digits(high, 3)),
+        (Some([low, high]), _) => format!("{}\u{a0}…\u{a0}{}", exact(low), exact(high)),
         (None, Some(error)) => digits(error, 2),
         (None, None) => String::new(),
     };

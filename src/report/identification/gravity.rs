@@ -89,7 +89,13 @@ fn chart(page: &IdentificationPage, gravity: &Gravity, rests: &[Rest]) -> Chart 
         came("had not moved", 2, 0.0),
     ];
     series.retain(|series| !series.points.is_empty());
+    let unit = page.position_unit();
+    let mut x = ChartAxis::new("Position", unit);
     if let Some(extent) = Extent::of(rests.iter().map(|rest| rest.position)) {
+        if extent.span() < unit.size {
+            // One place: its digits are no scale.
+            x = x.within(extent.middle() - unit.size, extent.middle() + unit.size);
+        }
         let place = |i: usize| extent.min + extent.span() * i as f64 / (FINE - 1) as f64;
         let law = |law: &GravityCurrent| (0..FINE).map(|i| [place(i), law.at(place(i))]).collect();
         series.push(Series::new("gravity of the model", SeriesStyle::Simulated, law(&gravity.model)));
@@ -101,7 +107,7 @@ fn chart(page: &IdentificationPage, gravity: &Gravity, rests: &[Rest]) -> Chart 
         note: "friction holds up to ±i0 of it on either side".to_owned(),
         ..Chart::new(
             "Current at standstill",
-            ChartAxis::new("Position", page.position_unit()),
+            x,
             vec![Panel::new(ChartAxis::new("Current", Unit::AMPERE), series)],
         )
     }

@@ -8,8 +8,8 @@ use super::words::{counted, digits, percent};
 use super::{IdentificationPage, Step};
 use crate::identify::Inertia;
 
-/// What is shown on either side of the mean, standard deviations of single instants.
-const SHOWN: f64 = 6.0;
+/// Part of the instants, of the smallest and of the largest, that need not be seen.
+const OUTLIERS: f64 = 0.02;
 /// Room beyond a guide, part of the range.
 const MARGIN: f64 = 0.06;
 
@@ -40,10 +40,9 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     if let Some(replayed) = found.replayed_inertia {
         let off = replayed / page.axis().motor.inertia - 1.0;
         section.paragraphs.push(format!(
-            "On the simulation of the axis as it was found, sampled as the recordings are, eq. 5 gives {}: it is off \
-             by {} % there, where the truth is known. So far the method itself misses, since the current swings \
-             between two samples and the filter carries accelerations on; as far as both values of eq. 5 differ, the \
-             recorded axis is not the simulated one.",
+            "On the simulation of the axis as it was found, sampled as the recordings are, eq. 5 gives {}: {} % off the \
+             inertia that was simulated. So much the method misses here by itself, since the current swings between \
+             two samples; as far as it does the same on the recordings, the inertia of the closed loop counts.",
             with_unit(page, replayed),
             percent(off)
         ));
@@ -75,11 +74,12 @@ fn chart(page: &IdentificationPage, inertia: &Inertia) -> Chart {
         let refined = page.axis().motor.inertia;
         lines.push(Guide::new(refined, format!("refined: {}", with_unit(page, refined))));
     }
-    let extent = |values: &mut dyn Iterator<Item = f64>| Extent::of(values);
-    let values = || inertia.instants.iter().map(|instant| instant.2);
-    let near = |value: &f64| (value - inertia.value).abs() <= SHOWN * inertia.spread;
-    let shown =
-        Extent::join(extent(&mut values().filter(near)), extent(&mut lines.iter().map(|line| line.at)));
+    let mut values: Vec<f64> = inertia.instants.iter().map(|instant| instant.2).collect();
+    values.sort_by(f64::total_cmp);
+    let outliers = (OUTLIERS * values.len() as f64) as usize;
+    let inner = values.get(outliers..values.len() - outliers).unwrap_or_default();
+    let marked = Extent::of(lines.iter().map(|line| line.at));
+    let shown = Extent::join(Extent::of(inner.iter().copied()), marked);
     let mut y = ChartAxis::new("Equivalent inertia", page.inertia_unit());
     if let Some(shown) = shown.filter(|shown| shown.span() > 0.0) {
         let room = MARGIN * shown.span();

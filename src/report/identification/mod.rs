@@ -19,7 +19,7 @@ use crate::units::seconds;
 
 use super::document::{Document, Section};
 use notices::Step;
-use words::digits;
+use words::exact;
 
 /// What the page of an identification is made of.
 #[derive(Debug, Clone, Copy)]
@@ -83,7 +83,7 @@ impl IdentificationPage<'_> {
             (AxisKind::Linear, false) => "linear",
             (AxisKind::Rotary, _) => "rotary",
         };
-        let ms = |period| format!("{} ms", digits(seconds(period) * 1e3, 4));
+        let ms = |period| format!("{} ms", exact(seconds(period) * 1e3));
         let Periods { position, velocity, current } = self.periods;
         let mut facts = vec![
             ("machine".to_owned(), self.machine.to_owned()),
@@ -102,7 +102,7 @@ impl IdentificationPage<'_> {
     /// A section with what was found about its step.
     fn step(&self, heading: &str, step: Step) -> Section {
         let refined = self.identification.refinement.is_some();
-        let about = |finding: &&Finding| Step::of(finding, refined) == step;
+        let about = |finding: &&Finding| Step::of(finding, refined).contains(&step);
         let notices = self.identification.findings.iter().filter(about).map(notices::notice).collect();
         Section { notices, ..Section::new(heading) }
     }

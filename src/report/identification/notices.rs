@@ -18,19 +18,25 @@ pub(super) enum Step {
 
 impl Step {
     /// By the finding's code; what is not known is of the whole. `refined`: whether there is a refinement.
-    pub(super) fn of(finding: &Finding, refined: bool) -> Step {
+    pub(super) fn of(finding: &Finding, refined: bool) -> &'static [Step] {
         match finding.code {
+            "no-current" => &[Step::Gravity, Step::Friction, Step::Inertia],
             "few-speeds" | "one-direction" | "asymmetric-friction" | "poor-friction-law" | "no-breakaway" => {
-                Step::Friction
+                &[Step::Friction]
             }
-            "saturated-current" | "no-acceleration" | "negative-inertia" | "unseen-current" => Step::Inertia,
-            "feedforward-not-constant" | "no-torque-feedforward" => Step::Feedforward,
-            "unseen-delay" => Step::Delays,
-            "at-bound" if !refined => Step::Friction,
-            "at-bound" | "correlated" | "not-refined" => Step::Refinement,
-            "poor-current" => Step::Agreement,
-            code if code.contains("gravity") || code.contains("static") => Step::Gravity,
-            _ => Step::Whole,
+            "saturated-current" | "no-acceleration" | "negative-inertia" | "unseen-current" => {
+                &[Step::Inertia]
+            }
+            "feedforward-not-constant" | "no-torque-feedforward" => &[Step::Feedforward],
+            "no-setpoints" | "not-a-cascade" => &[Step::Delays, Step::Refinement],
+            "unseen-delay" => &[Step::Delays],
+            "at-bound" if !refined => &[Step::Friction],
+            "at-bound" | "not-refined" => &[Step::Refinement],
+            // The text of the refinement names the pairs.
+            "correlated" => &[],
+            "poor-current" => &[Step::Agreement],
+            code if code.contains("gravity") || code.contains("static") => &[Step::Gravity],
+            _ => &[Step::Whole],
         }
     }
 }

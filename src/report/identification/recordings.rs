@@ -4,7 +4,7 @@ use super::super::chart::{Band, BandClass, Chart, ChartAxis, Panel, Series, Seri
 use super::super::document::Section;
 use super::super::table::Table;
 use super::super::unit::Unit;
-use super::words::{columns, digits};
+use super::words::{columns, digits, exact};
 use super::{IdentificationPage, modes, notices};
 use crate::identify::{Agreement, Input, Segment, SegmentKind};
 use crate::recording::{Finding, Signals, Span};
@@ -69,7 +69,7 @@ fn row(input: &Input, agreement: Option<&Agreement>) -> Vec<String> {
     vec![
         signals.name.clone(),
         samples.to_string(),
-        digits(signals.period * 1e3, 4),
+        exact(signals.period * 1e3),
         digits(signals.cutoff, 3),
         digits(signals.current_lag * 1e3, 3),
         signals.spans.len().to_string(),

@@ -25,7 +25,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     section.paragraphs.push(if pairs.is_empty() {
         "No two of the parameters are hard to tell apart.".to_owned()
     } else {
-        format!("Hard to tell apart, by their coefficient of correlation: {}.", listed(&pairs))
+        format!("Hard to tell apart, by their coefficient of correlation: {}. What they make together is told better than each of \
+             them.", listed(&pairs))
     });
     let heads = [
         ("parameter", ""),

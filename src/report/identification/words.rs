@@ -10,6 +10,8 @@ use crate::config::AxisKind;
 const SMALL: f64 = 1e-4;
 /// What is not below this is.
 const LARGE: f64 = 1e7;
+/// Digits of what is exact.
+const EXACT: usize = 6;
 /// Most decimals of an R².
 const DETERMINATION: usize = 6;
 
@@ -26,6 +28,16 @@ pub(super) fn digits(value: f64, count: usize) -> String {
     }
     let before = value.abs().log10().floor() as i32 + 1;
     number(value, usize::try_from(count as i32 - before).unwrap_or(0))
+}
+
+/// The same without zeros at the end: for what is exact.
+pub(super) fn exact(value: f64) -> String {
+    let text = digits(value, EXACT);
+    if text.contains('.') && !text.contains('e') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }
 
 /// A number in full, as in a machine file.
@@ -118,6 +130,7 @@ mod tests {
         assert_eq!(digits(1.234e-6, 3), "1.23e−6");
         assert_eq!(digits(f64::NAN, 3), "–");
         assert_eq!(digits(0.0, 3), "0");
+        assert_eq!([exact(6.0), exact(0.25), exact(1.2e-5)], ["6", "0.25", "1.20000e−5"]);
     }
 
     #[test]
