@@ -168,7 +168,7 @@ impl Run<'_> {
         if count as f64 * self.experiment.period() > LONG
             && let Some(window) = self.fast_move()
         {
-            charts.push(self.chart(format!("{name}: one fast move"), window));
+            charts.push(self.chart(format!("{name}: a fast move"), window));
         }
         charts
     }
@@ -190,7 +190,8 @@ impl Run<'_> {
             // None is constant for long enough: where it is fastest.
             None => velocity.iter().position(|v| v.abs() >= top)?,
         };
-        let is_moving = |v: &f64| v.abs() > MOVING * top;
+        let way = velocity.get(inside)?.signum();
+        let is_moving = |v: &f64| *v * way > MOVING * top;
         let before = velocity.get(..inside)?.iter().rev().take_while(|v| is_moving(v)).count();
         let after = velocity.get(inside..)?.iter().take_while(|v| is_moving(v)).count();
         let about = (ABOUT * (before + after) as f64) as usize;
