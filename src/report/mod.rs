@@ -11,6 +11,7 @@ mod chart_draw;
 mod document;
 mod frame;
 mod html;
+mod identification;
 mod marks;
 mod page;
 mod path_plot;
@@ -33,6 +34,7 @@ use crate::assess::Recording;
 
 pub use chart::{AxisRange, Band, BandClass, Chart, ChartAxis, Guide, Panel, Series, SeriesStyle};
 pub use document::{Document, Notice, NoticeLevel, Section};
+pub use identification::{IdentificationCheck, IdentificationPage};
 pub use scatter::{PointGroup, PointStyle, Scatter};
 pub use table::{Column, Table};
 pub use unit::Unit;

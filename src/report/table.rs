@@ -3,6 +3,9 @@
 use super::html::Html;
 use super::text::{Text, cell, is_number};
 
+/// Cells of more characters than this are text that wraps, but not word by word.
+const LONG: usize = 24;
+
 /// Figures.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
@@ -97,7 +100,11 @@ impl Html {
                 }
                 for i in 1..first.columns.len() {
                     let text = table.rows.get(r).and_then(|row| row.get(i)).map_or("", String::as_str);
-                    let class = if is_numeric(tables, i) { " class=\"number\"" } else { "" };
+                    let class = match text {
+                        _ if is_numeric(tables, i) => " class=\"number\"",
+                        _ if text.chars().count() > LONG => " class=\"text\"",
+                        _ => "",
+                    };
                     self.put(format_args!("<td{class}>{}</td>", Text(&cell(text))));
                 }
                 self.put(format_args!("</tr>\n"));
