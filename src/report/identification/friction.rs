@@ -57,16 +57,7 @@ fn text(page: &IdentificationPage, friction: &Friction) -> String {
             in_words(page, &law.config)
         ),
     };
-    text += &format!(" i0 = {} A", digits(law.config.i0, 4));
-    text += match friction.breakaway {
-        Some((current, error)) => format!(
-            "; the largest current at which the axis still stood is {} ± {} A.",
-            digits(current, 4),
-            digits(error, 2)
-        ),
-        None => ".".to_owned(),
-    }
-    .as_str();
+    text += &format!(" i0 = {} A.", digits(law.config.i0, 4));
     if friction.asymmetry.is_finite() {
         text += &format!(
             " The directions differ by up to {} % of the friction; the law is the same for both.",

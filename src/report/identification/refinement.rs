@@ -69,7 +69,9 @@ fn text(page: &IdentificationPage, refinement: &Refinement) -> String {
 fn row(page: &IdentificationPage, refined: &Refined) -> Vec<String> {
     let unit = match refined.parameter {
         Parameter::Inertia | Parameter::TorqueFeedforward => page.inertia_unit().symbol.to_owned(),
-        Parameter::FrictionA | Parameter::FrictionC | Parameter::Coulomb => "A".to_owned(),
+        Parameter::FrictionA | Parameter::FrictionC | Parameter::Coulomb | Parameter::Breakaway => {
+            "A".to_owned()
+        }
         Parameter::FrictionB | Parameter::FrictionD => page.exponent_unit().to_owned(),
         Parameter::Viscous => format!("A/({})", page.velocity_unit().symbol),
         Parameter::Weight => "N".to_owned(),
