@@ -98,7 +98,9 @@ fn a_campaign_gives_back_the_machine_that_was_recorded() {
     let folder = Folder::new("identify_out");
     let recordings = &*RECORDINGS;
     let out = folder.0.join("new.yaml").to_string_lossy().into_owned();
+    let page = folder.0.join("page.html").to_string_lossy().into_owned();
     let mut arguments = vec!["identify", &recordings.off, &recordings.velocity, &recordings.both];
+    arguments.extend(["--report", &page]);
     arguments.extend(["--axis", "x", "--feedforward", "off,velocity,both", "--json", "--out", &out]);
     arguments.extend(["--validate", &recordings.mcap, "--set", "y.velocity_loop.gain=4.25"]);
     // The MCAP shows VFFWS and TFFWS: nothing wrong is believed about it.
@@ -182,7 +184,11 @@ fn a_campaign_gives_back_the_machine_that_was_recorded() {
     let error =
         |run: &Value| run["runs"][0]["axes"]["x"]["tracking_error"]["max"].as_f64().expect("a number");
     assert!((error(&ran) - error(&shipped)).abs() < 1.0, "{} and {} µm", error(&ran), error(&shipped));
-    assert_eq!(folder.names(), ["new.yaml"]);
+    let page = std::fs::read_to_string(&page).expect("it is there");
+    assert!(page.starts_with("<!DOCTYPE html>") && page.contains("Identification of the x axis"));
+    assert!(page.contains("velocity.mcap") && page.contains("x.motor.inertia_kg_m2"));
+    assert!(!page.contains("NaN"));
+    assert_eq!(folder.names(), ["new.yaml", "page.html"]);
 }
 
 #[test]
@@ -294,6 +300,11 @@ fn bad_input_is_refused_with_its_name() {
     refused(&["--feedforward", "torque"], &["off, velocity, both"]);
     refused(&["--validate-feedforward", "off"], &["--validate"]);
     // Outputs.
+    refused(&["--report", &out("page.yaml")], &["page.yaml: a report is a page: .html"]);
+    refused(
+        &["--out", &out("new"), "--report", &out("new")],
+        &["new: given for the machine and for the report"],
+    );
     refused(&["--out", &out("new.csv")], &["new.csv: a machine file is YAML"]);
     refused(
         &["--machine", &machine, "--out", &machine],

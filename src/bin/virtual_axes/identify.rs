@@ -2,18 +2,21 @@
 
 use std::cmp::Reverse;
 use std::error::Error;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use virtual_axes::config::{AxisConfig, DEFAULT_MACHINE, Kind, MachineConfig, Parameters, Periods};
+use virtual_axes::files::OutputFile;
 use virtual_axes::identify::{Agreement, Breakaway, Identification, Identified, Input, Options};
 use virtual_axes::recording::{Finding, Severity};
+use virtual_axes::report::{IdentificationCheck, IdentificationPage};
 use virtual_axes::units::MILLISECOND_NS;
 
 use crate::campaign::PartName;
 use crate::input::must_not_replace;
 use crate::progress::Spinner;
 use crate::recordings::{self, Reading, Recorded};
-use crate::{axis, identify_json, identify_text, machine_file, variant};
+use crate::{axis, identify_json, identify_text, machine_file, report, variant};
 
 /// What to identify, from what.
 #[derive(Debug, clap::Args)]
@@ -59,6 +62,9 @@ pub struct Arguments {
     /// Where to write the machine with what was identified.
     #[arg(long, value_name = "FILE.yaml")]
     out: Option<PathBuf>,
+    /// Where to write a page with each step and with plots of measured against simulated signals.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
     /// Print the result as one JSON object.
     #[arg(long)]
     json: bool,
@@ -94,7 +100,7 @@ pub struct Found {
 
 /// Runs it; the text is tables, or JSON.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    check_output(arguments)?;
+    check_outputs(arguments)?;
     let machine = Parameters::load(&arguments.machine)?;
     let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
     let config = variant::checked(&parameters, &machine, &arguments.machine)?;
@@ -106,6 +112,9 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     if let Some(out) = &arguments.out {
         machine_file::write(out, &machine_text(arguments, &found, &identified))?;
     }
+    if let Some(page) = &arguments.report {
+        write_report(page, &found, config.periods())?;
+    }
     drop(spinner);
     if arguments.json {
         return Ok(format!("{:#}\n", identify_json::object(&found)));
@@ -114,15 +123,49 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
 }
 
 /// Refuses, before the work begins, what could not be written behind it.
-fn check_output(arguments: &Arguments) -> Result<(), String> {
-    let Some(out) = &arguments.out else { return Ok(()) };
-    machine_file::check_name(out)?;
-    let read = arguments.recordings.iter().chain(&arguments.validate).map(PathBuf::as_path);
-    let read = read.chain(arguments.reading.map()).chain([Path::new(&arguments.machine)]);
-    for input in read {
-        must_not_replace(out, input)?;
+fn check_outputs(arguments: &Arguments) -> Result<(), String> {
+    if let (Some(out), Some(page)) = (&arguments.out, &arguments.report)
+        && out == page
+    {
+        return Err(format!("{}: given for the machine and for the report", out.display()));
+    }
+    if let Some(out) = &arguments.out {
+        machine_file::check_name(out)?;
+    }
+    if let Some(page) = &arguments.report {
+        report::check_name(page)?;
+    }
+    let read = || {
+        let recordings = arguments.recordings.iter().chain(&arguments.validate).map(PathBuf::as_path);
+        recordings.chain(arguments.reading.map()).chain([Path::new(&arguments.machine)])
+    };
+    for output in [&arguments.out, &arguments.report].into_iter().flatten() {
+        read().try_for_each(|input| must_not_replace(output, input))?;
     }
     Ok(())
+}
+
+/// Writes the page; it stands under its name only when it is whole.
+fn write_report(path: &Path, found: &Found, periods: Periods) -> io::Result<()> {
+    let inputs: Vec<Input<'_>> = found.recordings.iter().map(Recorded::input).collect();
+    let findings: Vec<Vec<Finding>> = found.recordings.iter().map(|r| r.findings.clone()).collect();
+    fn check(validation: &Validation) -> IdentificationCheck<'_> {
+        let Validation { recorded, agreement } = validation;
+        IdentificationCheck { input: recorded.input(), findings: &recorded.findings, agreement }
+    }
+    let validations: Vec<IdentificationCheck<'_>> = found.validations.iter().map(check).collect();
+    let page = IdentificationPage {
+        machine: &found.machine,
+        periods,
+        inputs: &inputs,
+        findings: &findings,
+        identification: &found.identification,
+        values: &found.values,
+        validations: &validations,
+    };
+    let mut file = OutputFile::create(path)?;
+    page.document().write(&mut file)?;
+    file.finish()
 }
 
 /// What was found, and the machine with it.
