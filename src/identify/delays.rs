@@ -94,6 +94,13 @@ pub struct DelayFit {
     pub profile: Vec<(Nanoseconds, f64)>,
 }
 
+impl DelayFit {
+    /// Whether the best delay is the longest that there is.
+    pub fn is_at_end(&self) -> bool {
+        self.interval.1 >= LONGEST
+    }
+}
+
 /// Finds a delay from the experiments with its feedforward; none if there are none.
 ///
 /// `nuisance` moves other parameters a little: what a change of them explains is not counted for the delay.

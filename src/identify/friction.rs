@@ -149,10 +149,10 @@ pub fn friction(levels: &[Level], axis: &AxisConfig, findings: &mut Vec<Finding>
         (what, remedy)
     };
     if speeds.len() < 2 {
-        let (what, remedy) = missing(format!(
-            "no friction law: {} speed(s) at constant velocity ({list} {name})",
-            speeds.len()
-        ));
+        let (what, remedy) = missing(match speeds.first() {
+            None => "no friction law: the axis never moves at constant velocity".to_owned(),
+            Some(only) => format!("no friction law: 1 speed at constant velocity ({only:.3} {name})"),
+        });
         findings.push(Finding::missing("few-speeds", what, remedy));
         return None;
     }

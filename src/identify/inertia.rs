@@ -25,7 +25,7 @@ pub struct Inertia {
     pub error: f64,
     /// Robust standard deviation of single instants.
     pub spread: f64,
-    /// Every instant: its recording, its time in s, and eq. 5 there.
+    /// Every instant: the number of its recording among those with a current, its time in s, and eq. 5 there.
     pub instants: Vec<(usize, f64, f64)>,
     /// Accelerations that they belong to.
     pub accelerations: usize,

@@ -222,11 +222,14 @@ impl Refinement {
     }
 }
 
+/// A channel as it was recorded, if it was, and as it is simulated.
+type Channel<'a> = (Option<&'a Vec<f64>>, &'a Vec<f64>);
+
 /// Deviations of one channel, simulated minus recorded; recorded values that are missing are left out.
 fn differences<'a>(
     experiments: &'a [Experiment],
     simulated: &'a [Simulated],
-    channel: fn(&'a Experiment, &'a Simulated) -> (Option<&'a Vec<f64>>, &'a Vec<f64>),
+    channel: fn(&'a Experiment, &'a Simulated) -> Channel<'a>,
 ) -> impl Iterator<Item = f64> + 'a {
     experiments.iter().zip(simulated).flat_map(move |(experiment, simulated)| {
         let (recorded, simulated) = channel(experiment, simulated);
@@ -234,11 +237,11 @@ fn differences<'a>(
     })
 }
 
-fn positions<'a>(e: &'a Experiment, s: &'a Simulated) -> (Option<&'a Vec<f64>>, &'a Vec<f64>) {
+fn positions<'a>(e: &'a Experiment, s: &'a Simulated) -> Channel<'a> {
     (Some(&e.position), &s.position)
 }
 
-fn currents<'a>(e: &'a Experiment, s: &'a Simulated) -> (Option<&'a Vec<f64>>, &'a Vec<f64>) {
+fn currents<'a>(e: &'a Experiment, s: &'a Simulated) -> Channel<'a> {
     (e.current.as_ref(), &s.current)
 }
 

@@ -193,14 +193,20 @@ impl<'a> Steps<'a> {
             // The delays ask for an inertia that is about right; everything else can wait for them.
             self.refine(&first, &[Parameter::Inertia]);
         }
-        self.take_delay(Delay::Beta, &[]);
-        self.take_delay(Delay::Gamma, &[]);
+        // With a wrong delay the weight comes out a little wrong, which the next step would see.
+        for _ in 0..self.rounds(Parameter::VelocityFeedforward) {
+            self.take_feedforward(FeedforwardMode::Velocity, Parameter::VelocityFeedforward);
+            self.take_delay(Delay::Beta, &[]);
+        }
+        for _ in 0..self.rounds(Parameter::TorqueFeedforward) {
+            self.take_feedforward(FeedforwardMode::Both, Parameter::TorqueFeedforward);
+            self.take_delay(Delay::Gamma, &[]);
+        }
         if self.options.refine {
             let mut parameters = physics;
             parameters.extend(self.free_feedforward());
             let all = self.experiments.clone();
             self.refine(&all, &parameters);
-            self.found.delays.clear();
             let nuisance = self.nuisance(&parameters);
             for which in [Delay::Alpha, Delay::Beta, Delay::Gamma] {
                 self.take_delay(which, &nuisance);
@@ -255,6 +261,29 @@ impl<'a> Steps<'a> {
         self.found.refinement = refined;
     }
 
+    /// How often a weight and its delay are looked for one after the other.
+    fn rounds(&self, weight: Parameter) -> usize {
+        if self.free_feedforward().contains(&weight) { 2 } else { 1 }
+    }
+
+    /// A weight that no regression has given, before its delay is looked for: with a wrong weight any delay
+    /// may come closest. γ is begun at β, since both are delays of the same card.
+    fn take_feedforward(&mut self, mode: FeedforwardMode, parameter: Parameter) {
+        if !self.options.refine || !self.free_feedforward().contains(&parameter) {
+            return;
+        }
+        let mut axis = self.found.axis.clone();
+        let known = |delay| self.found.delays.iter().any(|fit| fit.delay == delay);
+        if mode == FeedforwardMode::Both && known(Delay::Beta) && !known(Delay::Gamma) {
+            axis.delays.gamma = axis.delays.beta;
+        }
+        let of_mode: Vec<Experiment> = self.experiments.iter().filter(|e| e.mode == mode).cloned().collect();
+        let held = self.options.i0 == Breakaway::Held;
+        if let Some(refined) = refine(&axis, self.periods, &of_mode, &[parameter], held) {
+            self.found.axis = refined.axis;
+        }
+    }
+
     fn nuisance(&self, parameters: &[Parameter]) -> Vec<AxisConfig> {
         let axis = &self.found.axis;
         let moved = |parameter: &Parameter| {
@@ -280,6 +309,7 @@ impl<'a> Steps<'a> {
         let around = which == Delay::Alpha && !nuisance.is_empty();
         if let Some(fit) = delay(which, &found.axis, self.periods, &experiments, nuisance, around) {
             which.set(&mut found.axis, fit.value);
+            found.delays.retain(|known| known.delay != which);
             found.delays.push(fit);
         }
     }

@@ -2,6 +2,7 @@
 
 use super::closed_loop::{Experiment, Simulated};
 use super::delays::Delay;
+use super::friction::{current, speed_unit};
 use super::gravity::GravityCurrent;
 use super::identification::{Identification, Input};
 use super::inertia::inertia;
@@ -10,13 +11,22 @@ use crate::recording::{Finding, Gaussian, Signals, Span};
 
 /// R² of the current below which a model is not what was recorded.
 const LEAST_DETERMINATION: f64 = 0.9;
+/// Part by which refined and measured friction can differ.
+const DISAGREEING: f64 = 0.05;
 /// Part by which eq. 5 can differ from the refined inertia before it is told.
 const UNSEEN: f64 = 0.03;
 
 /// Says which delays were not seen, and why.
 pub(super) fn tell_delays(experiments: &[Experiment], found: &mut Identification) {
     for which in [Delay::Alpha, Delay::Beta, Delay::Gamma] {
-        if found.delays.iter().any(|fit| fit.delay == which) {
+        if let Some(fit) = found.delays.iter().find(|fit| fit.delay == which) {
+            if fit.is_at_end() {
+                found.findings.push(Finding::warning(
+                    "delay-at-end",
+                    format!("{} ends at the end of its range", which.name()),
+                    "check the gains of the machine file and the feedforward that acted",
+                ));
+            }
             continue;
         }
         let name = which.name();
@@ -88,19 +98,8 @@ fn replayed(signals: &Signals, experiment: &Experiment, simulated: &Simulated) -
 
 /// Says where eq. 5, the current, bounds and correlations ask for care.
 pub(super) fn tell(inputs: &[Input<'_>], found: &mut Identification) {
-    let truth = found.axis.motor.inertia;
-    if let (Some(by_steps), Some(replayed)) = (&found.inertia, found.replayed_inertia)
-        && (by_steps.value / truth - 1.0).abs() > UNSEEN
-    {
-        found.findings.push(Finding::note(
-            "unseen-current",
-            format!(
-                "eq. 5 gives {:.4e} of the recorded axis and {replayed:.4e} of the simulated one, whose inertia is \
-                 {truth:.4e}: between two samples the current swings with each set-point; the refined value counts",
-                by_steps.value
-            ),
-        ));
-    }
+    tell_inertia(found);
+    tell_friction(found);
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
         if let Some(r2) = agreement.current_determination().filter(|r2| *r2 < LEAST_DETERMINATION) {
             found.findings.push(Finding::warning(
@@ -124,6 +123,48 @@ pub(super) fn tell(inputs: &[Input<'_>], found: &mut Identification) {
             format!(
                 "{a} and {b} can hardly be told apart (correlation {rho:.3}); what they make together can"
             ),
+        ));
+    }
+}
+
+/// Says where eq. 5 does not see all of the current.
+fn tell_inertia(found: &mut Identification) {
+    let (Some(by_steps), Some(replayed)) = (&found.inertia, found.replayed_inertia) else { return };
+    let (truth, found_one) = (found.axis.motor.inertia, by_steps.value);
+    let differs = |a: f64, b: f64| (a / b - 1.0).abs() > UNSEEN;
+    if !differs(found_one, truth) && !differs(found_one, replayed) {
+        return;
+    }
+    let what = format!(
+        "eq. 5 gives {found_one:.4e} of the recorded axis and {replayed:.4e} of the simulated one, whose inertia is \
+         {truth:.4e}: between two samples the current swings with each set-point"
+    );
+    found.findings.push(if differs(found_one, replayed) {
+        let remedy = "record the current every millisecond, or refine on the closed loop";
+        Finding::warning("unseen-current", what, remedy)
+    } else {
+        Finding::note("unseen-current", format!("{what}; the refined value counts"))
+    });
+}
+
+/// Says where the refined friction is another one than that of the constant velocities.
+fn tell_friction(found: &mut Identification) {
+    let Some(friction) = found.friction.as_ref().filter(|_| found.refinement.is_some()) else { return };
+    let unit = speed_unit(&found.axis);
+    let part = |velocity: f64| {
+        let v = velocity / unit;
+        (current(&found.axis.friction, v) / friction.law.at(v) - 1.0).abs()
+    };
+    let worst = found.steady.levels.iter().map(|level| part(level.velocity)).fold(0.0, f64::max);
+    if worst > DISAGREEING {
+        found.findings.push(Finding::warning(
+            "friction-disagrees",
+            format!(
+                "the refined friction differs by {:.1} % from what constant velocities show: something else of the \
+                 closed loop is wrong",
+                100.0 * worst
+            ),
+            "check the gains and periods of the machine file and the feedforward that acted; record VFFWS and TFFWS",
         ));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::delays::Delay;
 use super::friction::{FrictionLaw, LawFit};
-use super::gravity::GravitySource;
+use super::gravity::{GravityCurrent, GravitySource};
 use super::identification::Identification;
 use super::refine::{Parameter, Refined};
 use crate::config::{Assignment, ConfigError, Parameters, Source, Value};
@@ -137,16 +137,30 @@ impl Identification {
         }
         let (source, error) = match self.refined(Parameter::Breakaway) {
             Some(refined) => ("refined on the closed loop", Some(refined.error)),
-            None => ("i0 = a + c", fit.map(|fit| fit.error_at(0.0))),
+            None => ("i0 = a + c", self.error_of_sum().or(fit.map(|fit| fit.error_at(0.0)))),
         };
         put(&["friction.i0"], law.i0, error, None, source.to_owned());
     }
 
+    /// Standard error of a + c from the refinement.
+    fn error_of_sum(&self) -> Option<f64> {
+        let refinement = self.refinement.as_ref()?;
+        let place = |parameter| refinement.parameters.iter().position(|p| p.parameter == parameter);
+        if let Some(level) = place(Parameter::Coulomb) {
+            return Some(refinement.parameters[level].error);
+        }
+        let (a, c) = (place(Parameter::FrictionA)?, place(Parameter::FrictionC)?);
+        let (x, y) = (refinement.parameters[a].error, refinement.parameters[c].error);
+        let rho = refinement.correlations.get(a)?.get(c)?;
+        Some((x * x + y * y + 2.0 * rho * x * y).max(0.0).sqrt())
+    }
+
     fn put_gravity(&self, put: &mut Put<'_>) {
         let Some(gravity) = &self.gravity else { return };
+        let nothing = if gravity.model == GravityCurrent::default() { ": not significant" } else { "" };
         let source = || match gravity.source {
-            GravitySource::Motion => "constant velocities in both directions".to_owned(),
-            GravitySource::Rest => "standstills".to_owned(),
+            GravitySource::Motion => format!("constant velocities in both directions{nothing}"),
+            GravitySource::Rest => format!("standstills{nothing}"),
         };
         if let Some((_, error)) = gravity.weight
             && let Some((error, source)) = self.told(Parameter::Weight, Some(error), source)
