@@ -7,7 +7,7 @@ use common::recordings::{Disturbance, feedforward, ignorant, place, record, trut
 use virtual_axes::config::{Parameters, Source, Value};
 use virtual_axes::identify::campaign::{Campaign, Options as Limits};
 use virtual_axes::identify::{
-    Breakaway, FeedforwardMode, FrictionLaw, Identification, Input, Options, Parameter, identify,
+    Breakaway, FeedforwardMode, FrictionLaw, Identification, Input, Options, Parameter, Refine, identify,
 };
 use virtual_axes::recording::{Conditioning, RawRecording, Severity, condition};
 
@@ -65,7 +65,7 @@ fn identified(raw: &[RawRecording], start: &Parameters, options: &Options) -> Id
     identify(&inputs, axis, &machine.periods(), options)
 }
 
-const STEPS_ONLY: Options = Options { i0: Breakaway::Held, refine: false };
+const STEPS_ONLY: Options = Options { i0: Breakaway::Held, refine: Refine::NONE };
 
 /// The text of the one finding with this code, and its remedy.
 fn finding(found: &Identification, severity: Severity, code: &str) -> String {
@@ -227,7 +227,7 @@ fn a_breakaway_above_the_law_is_found_where_it_is_freed() {
     let sticky = with(truth(), "x.friction.i0", Value::Double(1.4));
     let psec = legs(&[0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0], true);
     let raw = recorded(&sticky, &psec, &Disturbance::usual(virtual_axes::config::AxisKind::Linear, 5));
-    let options = Options { i0: Breakaway::Freed, refine: true };
+    let options = Options { i0: Breakaway::Freed, refine: Refine::ALL };
     let found = identified(&[raw], &ignorant("x"), &options);
     let i0 = Parameter::Breakaway.get(found.axis());
     println!("i0 {i0:.4} A");
@@ -289,4 +289,18 @@ fn parts_in_one_recording_are_told_apart_by_their_feedforward() {
         virtual_axes::identify::experiments(&signals, 0, axis, &machine.periods(), FeedforwardMode::Both);
     let modes: Vec<FeedforwardMode> = parts.iter().map(|part| part.mode).collect();
     assert_eq!(modes, FeedforwardMode::ALL);
+}
+
+#[test]
+fn only_what_is_chosen_is_refined() {
+    let psec = legs(&[0.5, 1.0, 2.0, 4.0, 8.0, 12.0], true);
+    let raw = recorded(&truth(), &psec, &clean());
+    let chosen = Refine { inertia: true, ..Refine::NONE };
+    let found = identified(&[raw], &ignorant("x"), &Options { i0: Breakaway::Held, refine: chosen });
+    let refinement = found.refinement.as_ref().expect("a refinement");
+    let moved: Vec<Parameter> = refinement.parameters.iter().map(|refined| refined.parameter).collect();
+    assert_eq!(moved, [Parameter::Inertia]);
+    assert!((inertia_of(&found) / 0.028 - 1.0).abs() < 0.01);
+    let law = &found.friction.as_ref().expect("a law").law.config;
+    assert_eq!(Parameter::FrictionA.get(found.axis()), law.a, "as the step found it");
 }

@@ -9,7 +9,7 @@ use common::{M_MIN, TSP, parameters};
 use virtual_axes::config::{AxisConfig, AxisKind, MachineConfig, Parameters};
 use virtual_axes::identify::campaign::Options as Course;
 use virtual_axes::identify::{
-    Agreement, FeedforwardMode, Identification, Identified, Input, Options, identify, validate,
+    Agreement, FeedforwardMode, Identification, Identified, Input, Options, Refine, identify, validate,
 };
 use virtual_axes::recording::{Conditioning, Finding, RawRecording, Signals, condition};
 use virtual_axes::report::{
@@ -69,6 +69,7 @@ impl Bench {
     }
 
     fn identify(&self, refine: bool) -> (Identification, Vec<Identified>) {
+        let refine = if refine { Refine::ALL } else { Refine::NONE };
         let options = Options { refine, ..Options::default() };
         let found = identify(&self.inputs(), self.config(), &self.machine.periods(), &options);
         let values = found.values(&self.parameters, &self.axis);

@@ -1,47 +1,20 @@
 //! `virtual_axes tune` and `robustness` as a user runs them.
 
+mod command_common;
 mod folder;
 mod tune_common;
 
 use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use command_common::{assert_refused, json, printed};
 use folder::Folder;
 use serde_json::Value;
 use tune_common::{CIRCLE, CORNER};
 
 /// Margins that few designs keep, so that the search is short.
 const FEW: [&str; 4] = ["--modulus-margin", "0.7", "--delay-margin-ms", "12"];
-
-fn run(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_virtual_axes")).args(arguments).output().expect("the command starts")
-}
-
-#[track_caller]
-fn printed(arguments: &[&str]) -> String {
-    let output = run(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    // No bar where standard error is no terminal.
-    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("UTF-8")
-}
-
-#[track_caller]
-fn json(arguments: &[&str]) -> Value {
-    serde_json::from_str(&printed(arguments)).expect("one JSON object")
-}
-
-#[track_caller]
-fn assert_refused(arguments: &[&str], parts: &[&str]) {
-    let output = run(arguments);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(output.stdout.is_empty());
-    for part in parts {
-        assert!(message.contains(part), "{part:?} in {message}");
-    }
-}
 
 fn text(path: &PathBuf) -> String {
     std::fs::read_to_string(path).expect("it is there")

@@ -26,13 +26,33 @@ pub struct Input<'a> {
 pub struct Options {
     /// Where i0 comes from.
     pub i0: Breakaway,
-    /// Whether to refine on the closed loop.
-    pub refine: bool,
+    /// What the refinement on the closed loop moves.
+    pub refine: Refine,
+}
+
+/// What the refinement on the closed loop moves; what is left out stays as the steps found it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Refine {
+    /// Jeq.
+    pub inertia: bool,
+    /// The friction law, and i0 where it is freed.
+    pub friction: bool,
+    /// W, or k and φ, where there is a gravity.
+    pub gravity: bool,
+    /// VFFW and TFFW, where their set-points were not recorded.
+    pub feedforward: bool,
+}
+
+impl Refine {
+    /// All of it.
+    pub const ALL: Refine = Refine { inertia: true, friction: true, gravity: true, feedforward: true };
+    /// Nothing: only the steps of the paper.
+    pub const NONE: Refine = Refine { inertia: false, friction: false, gravity: false, feedforward: false };
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { i0: Breakaway::Held, refine: true }
+        Options { i0: Breakaway::Held, refine: Refine::ALL }
     }
 }
 

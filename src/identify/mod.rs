@@ -28,7 +28,7 @@ pub use delays::{Delay, DelayFit};
 pub use feedforward::{FeedforwardFit, Regression, feedforward};
 pub use friction::{Breakaway, Friction, FrictionLaw, LawFit, friction};
 pub use gravity::{Gravity, GravityCurrent, GravitySource, Level, Rest, Steady, gravity};
-pub use identification::{Identification, Input, Options, identify};
+pub use identification::{Identification, Input, Options, Refine, identify};
 pub use inertia::{Inertia, inertia};
 pub use mode::FeedforwardMode;
 pub use refine::{Parameter, Refined, Refinement, refine};

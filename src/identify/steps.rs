@@ -186,7 +186,7 @@ impl<'a> Steps<'a> {
         self.take_delay(Delay::Alpha, &[]);
         let first = if off.is_empty() { self.experiments.clone() } else { off };
         let physics = self.physics();
-        if self.options.refine {
+        if self.options.refine.inertia {
             if let Some(inertia) = start_of_inertia(&self.found.axis, self.periods, &first) {
                 self.found.axis.motor.inertia = inertia;
             }
@@ -202,9 +202,9 @@ impl<'a> Steps<'a> {
             self.take_feedforward(FeedforwardMode::Both, Parameter::TorqueFeedforward);
             self.take_delay(Delay::Gamma, &[]);
         }
-        if self.options.refine {
-            let mut parameters = physics;
-            parameters.extend(self.free_feedforward());
+        let mut parameters = physics;
+        parameters.extend(self.free_feedforward());
+        if !parameters.is_empty() {
             let all = self.experiments.clone();
             self.refine(&all, &parameters);
             let nuisance = self.nuisance(&parameters);
@@ -219,13 +219,17 @@ impl<'a> Steps<'a> {
     fn physics(&self) -> Vec<Parameter> {
         let found = &self.found;
         let law = found.friction.as_ref().map_or(FrictionLaw::DoubleExponential, |f| f.law.law);
-        let mut parameters = vec![Parameter::Inertia];
-        parameters.extend(Parameter::of_friction(law));
-        if self.options.i0 == Breakaway::Freed {
-            parameters.push(Parameter::Breakaway);
+        let wanted = self.options.refine;
+        let mut parameters = Vec::new();
+        if wanted.inertia {
+            parameters.push(Parameter::Inertia);
+        }
+        if wanted.friction {
+            parameters.extend(Parameter::of_friction(law));
+            parameters.extend((self.options.i0 == Breakaway::Freed).then_some(Parameter::Breakaway));
         }
         let gravity = &found.axis.gravity;
-        if gravity.weight != 0.0 || gravity.tilt != 0.0 {
+        if wanted.gravity && (gravity.weight != 0.0 || gravity.tilt != 0.0) {
             parameters.extend(Parameter::of_gravity(&found.axis));
         }
         parameters
@@ -235,6 +239,9 @@ impl<'a> Steps<'a> {
     fn free_feedforward(&self) -> Vec<Parameter> {
         let (found, modes) = (&self.found, |mode| self.experiments.iter().any(|e| e.mode == mode));
         let mut parameters = Vec::new();
+        if !self.options.refine.feedforward {
+            return parameters;
+        }
         if found.feedforward.velocity.is_none() && modes(FeedforwardMode::Velocity) {
             parameters.push(Parameter::VelocityFeedforward);
         }
@@ -269,7 +276,7 @@ impl<'a> Steps<'a> {
     /// A weight that no regression has given, before its delay is looked for: with a wrong weight any delay
     /// may come closest. γ is begun at β, since both are delays of the same card.
     fn take_feedforward(&mut self, mode: FeedforwardMode, parameter: Parameter) {
-        if !self.options.refine || !self.free_feedforward().contains(&parameter) {
+        if !self.free_feedforward().contains(&parameter) {
             return;
         }
         let mut axis = self.found.axis.clone();

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use virtual_axes::config::{AxisConfig, DEFAULT_MACHINE, Kind, MachineConfig, Parameters, Periods};
 use virtual_axes::files::OutputFile;
-use virtual_axes::identify::{Agreement, Breakaway, Identification, Identified, Input, Options};
+use virtual_axes::identify::{Agreement, Breakaway, Identification, Identified, Input, Options, Refine};
 use virtual_axes::recording::{Finding, Severity};
 use virtual_axes::report::{IdentificationCheck, IdentificationPage};
 use virtual_axes::units::MILLISECOND_NS;
@@ -17,6 +17,19 @@ use crate::input::must_not_replace;
 use crate::progress::Spinner;
 use crate::recordings::{self, Reading, Recorded};
 use crate::{axis, identify_json, identify_text, machine_file, report, variant};
+
+/// What the refinement can move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Group {
+    /// Jeq.
+    Inertia,
+    /// The friction law.
+    Friction,
+    /// Weight, or tilting torque and phase.
+    Gravity,
+    /// VFFW and TFFW, where their set-points were not recorded.
+    Feedforward,
+}
 
 /// What to identify, from what.
 #[derive(Debug, clap::Args)]
@@ -43,6 +56,9 @@ pub struct Arguments {
     /// Find i0 in the refinement, in the place of a + c; asks for several slow starts from rest.
     #[arg(long, conflicts_with = "no_refine")]
     free_i0: bool,
+    /// What the refinement on the whole closed loop moves, a list; all by default.
+    #[arg(long, value_enum, value_delimiter = ',', conflicts_with = "no_refine", value_name = "WHAT,…")]
+    refine: Vec<Group>,
     /// Only the steps of the paper, without the refinement on the whole closed loop.
     #[arg(long)]
     no_refine: bool,
@@ -199,7 +215,7 @@ fn find(
     spinner.now(format!("identifying {}", axis.name()))?;
     let inputs: Vec<Input<'_>> = recordings.iter().map(Recorded::input).collect();
     let i0 = if arguments.free_i0 { Breakaway::Freed } else { Breakaway::Held };
-    let options = Options { i0, refine: !arguments.no_refine };
+    let options = Options { i0, refine: refine(arguments) };
     let identification = virtual_axes::identify::identify(&inputs, axis, &periods, &options);
     let of_files = recordings.iter().chain(&others).flat_map(|recorded| &recorded.findings);
     // A file can be given twice.
@@ -273,4 +289,19 @@ fn machine_text(arguments: &Arguments, found: &Found, identified: &Parameters) -
     }
     identified
         .to_yaml(&head, |key| found.values.iter().find(|value| value.key == key).map(Identified::comment))
+}
+
+/// What the refinement moves.
+fn refine(arguments: &Arguments) -> Refine {
+    let of = |group: Group| arguments.refine.contains(&group);
+    match (arguments.no_refine, arguments.refine.is_empty()) {
+        (true, _) => Refine::NONE,
+        (false, true) => Refine::ALL,
+        (false, false) => Refine {
+            inertia: of(Group::Inertia),
+            friction: of(Group::Friction),
+            gravity: of(Group::Gravity),
+            feedforward: of(Group::Feedforward),
+        },
+    }
 }
