@@ -44,16 +44,33 @@ TABLES_CUT_OFF = """
 """Tables that are wider than their place."""
 
 
-@pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(*arguments: object) -> None:
+    """The command line beside the node."""
+    command = [Path(node_binary()).with_name("virtual_axes"), *arguments]
+    subprocess.run([str(word) for word in command], check=True, timeout=120, stdout=subprocess.DEVNULL)
+
+
+def comparison(page: Path) -> None:
     """Two runs of the ballbar trial."""
+    run("run", "ballbar", "--controller", "cascade", "--controller", "cascade-noff", "--report", page)
+
+
+def identification(page: Path) -> None:
+    """An identification of X from a short campaign."""
+    psec, trace = page.with_name("psec.csv"), page.with_name("off.csv")
+    run("psec", "campaign", "--axis", "x", "--part", "off", "--range=-40,40", "--max-feed", 5, "--out", psec)
+    off = ["--set", "x.feedforward.velocity=0", "--set", "x.feedforward.torque_kg_m2=0"]
+    run("run", psec, *off, "--trace", trace)
+    run("identify", trace, "--feedforward", "off", "--axis", "x", "--validate", trace, "--report", page)
+
+
+@pytest.fixture(scope="module", params=[comparison, identification], ids=lambda make: make.__name__)
+def report(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page of each kind."""
     if given := os.environ.get("VIRTUAL_AXES_REPORT"):
         return Path(given).resolve()
-    page = tmp_path_factory.mktemp("report") / "ballbar.html"
-    program = Path(node_binary()).with_name("virtual_axes")
-    runs = ["--controller", "cascade", "--controller", "cascade-noff"]
-    command = [str(program), "run", "ballbar", *runs, "--report", str(page)]
-    subprocess.run(command, check=True, timeout=120, stdout=subprocess.DEVNULL)
+    page = tmp_path_factory.mktemp("report") / f"{request.param.__name__}.html"
+    request.param(page)
     return page
 
 
