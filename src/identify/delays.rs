@@ -104,6 +104,7 @@ impl DelayFit {
 /// Finds a delay from the experiments with its feedforward; none if there are none.
 ///
 /// `nuisance` moves other parameters a little: what a change of them explains is not counted for the delay.
+/// `own` is the machine file's delay, which is kept if the data do not speak against it.
 /// `around` looks near the axis's present delay only, for an axis that is known well.
 pub(super) fn delay(
     which: Delay,
@@ -111,6 +112,7 @@ pub(super) fn delay(
     periods: &Periods,
     experiments: &[Experiment],
     nuisance: &[AxisConfig],
+    own: Nanoseconds,
     around: bool,
 ) -> Option<DelayFit> {
     if experiments.is_empty() {
@@ -181,7 +183,6 @@ pub(super) fn delay(
     };
     let (low, high) = (reach(-1), reach(1));
     let interval = (if low == 0 { -1 } else { (low - 1) * grid }, high * grid);
-    let own = which.of(&axis.delays);
     let left = own > interval.0 && own <= interval.1;
     let mut profile: Vec<(Nanoseconds, f64)> =
         tried.iter().map(|(m, r)| (middle(*m), (r.norm_squared() / count).sqrt())).collect();

@@ -23,10 +23,16 @@ impl Effort {
             Effort::Simulation => 1e-6,
         }
     }
+
+    /// Evaluations, for each parameter and one: a simulation that still gets better after these is of a wrong model.
+    fn patience(self) -> usize {
+        match self {
+            Effort::Formula => 60,
+            Effort::Simulation => 8,
+        }
+    }
 }
 
-/// Evaluations of an optimisation, for each parameter and one.
-const PATIENCE: usize = 60;
 /// Singular values below this part of the largest carry no information.
 const RANK: f64 = 1e-10;
 
@@ -73,8 +79,10 @@ pub(super) fn minimise(
     residuals: impl Fn(&[f64]) -> Option<DVector<f64>> + Sync,
 ) -> Option<Minimum> {
     let problem = Problem { z: start(parameters), parameters, effort, residuals: &residuals };
-    let (problem, _) =
-        LevenbergMarquardt::new().with_tol(effort.tolerance()).with_patience(PATIENCE).minimize(problem);
+    let (problem, _) = LevenbergMarquardt::new()
+        .with_tol(effort.tolerance())
+        .with_patience(effort.patience())
+        .minimize(problem);
     let values = problem.values();
     let at_end = residuals(&values)?;
     let jacobian = problem.derivatives(&values)?;

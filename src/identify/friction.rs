@@ -122,17 +122,16 @@ pub(super) fn current(law: &FrictionConfig, v: f64) -> f64 {
     if v == 0.0 { 0.0 } else { magnitude.copysign(v) }
 }
 
-/// A point of the law: |V|, friction current against the motion, weight.
-type Point = (f64, f64, f64);
+/// A point of the law: |V| and friction current against the motion. Each speed and direction counts alike: what
+/// keeps them off the law is more than the noise of their means.
+type Point = (f64, f64);
 
 /// The friction law of `levels`, with what must be said about it; none without speeds enough.
 pub fn friction(levels: &[Level], axis: &AxisConfig, findings: &mut Vec<Finding>) -> Option<Friction> {
     let unit = speed_unit(axis);
     let of = |directions: &[f64]| -> Vec<Point> {
         let chosen = levels.iter().filter(|l| directions.contains(&l.velocity.signum()));
-        chosen
-            .map(|l| (l.velocity.abs() / unit, l.friction * l.velocity.signum(), weight(levels, l)))
-            .collect()
+        chosen.map(|l| (l.velocity.abs() / unit, l.friction * l.velocity.signum())).collect()
     };
     let both = of(&[-1.0, 1.0]);
     let mut speeds: Vec<f64> = both.iter().map(|point| point.0).collect();
@@ -197,13 +196,6 @@ pub fn friction(levels: &[Level], axis: &AxisConfig, findings: &mut Vec<Finding>
     Some(Friction { directions: [fit(&plus), fit(&minus)], law, asymmetry })
 }
 
-/// Speeds count alike up to what their errors tell: weights are capped at that of the middle error.
-fn weight(levels: &[Level], level: &Level) -> f64 {
-    let middle = super::fit::median(&mut levels.iter().map(|l| l.error).collect::<Vec<_>>());
-    let error = level.error.max(middle);
-    if error > 0.0 { 1.0 / (error * error) } else { 1.0 }
-}
-
 fn texts(speeds: &[f64]) -> String {
     speeds.iter().map(|v| format!("{v:.3}")).collect::<Vec<_>>().join(", ")
 }
@@ -224,7 +216,7 @@ pub(super) fn straight_law(level: f64, slope: f64) -> FrictionConfig {
 }
 
 fn straight(points: &[Point]) -> Option<LawFit> {
-    let fit = linear(points.iter().map(|&(v, current, weight)| (vec![1.0, v], current, weight)))?;
+    let fit = linear(points.iter().map(|&(v, current)| (vec![1.0, v], current, 1.0)))?;
     let (level, slope) = (fit.values[0], fit.values[1]);
     // Friction does not drive, also where a line through fast speeds meets standstill below zero.
     (level > 0.0).then(|| LawFit {
@@ -254,9 +246,8 @@ fn double_exponential(points: &[Point]) -> Option<LawFit> {
 
 /// A fit of a, b, c, d from one start of the exponents.
 fn from(points: &[Point], b: f64, d: f64, most: f64) -> Option<Minimum> {
-    let amplitudes = linear(
-        points.iter().map(|&(v, current, weight)| (vec![(b * v).exp(), (d * v).exp()], current, weight)),
-    )?;
+    let amplitudes =
+        linear(points.iter().map(|&(v, current)| (vec![(b * v).exp(), (d * v).exp()], current, 1.0)))?;
     // Amplitudes: friction does not exceed a few times what was measured; a + c ≥ 0 is kept by bounding the
     // sum, not c.
     let (low, high) = (0.0, 3.0 * most);
@@ -271,7 +262,7 @@ fn from(points: &[Point], b: f64, d: f64, most: f64) -> Option<Minimum> {
     let mut fit = minimise(&parameters, Effort::Formula, |x| {
         let [a, b, sum, d] = *x else { return None };
         let law = FrictionConfig { a, b, c: sum - a, d, i0: sum };
-        let left = points.iter().map(|&(v, measured, weight)| weight.sqrt() * (current(&law, v) - measured));
+        let left = points.iter().map(|&(v, measured)| current(&law, v) - measured);
         Some(DVector::from_iterator(points.len(), left))
     })?;
     // From a + c back to c.

@@ -7,7 +7,7 @@ use super::delays::{Delay, delay};
 use super::feedforward::{FeedforwardFit, feedforward};
 use super::friction::{Breakaway, FrictionLaw, friction};
 use super::gravity::{GravityCurrent, Steady, gravity};
-use super::identification::{Identification, Input, Options};
+use super::identification::{Identification, Input, Options, Refine};
 use super::inertia::inertia;
 use super::mode::FeedforwardMode;
 use super::refine::{Parameter, refine, with};
@@ -165,7 +165,12 @@ impl<'a> Steps<'a> {
         if experiments.is_empty() {
             self.found.findings.push(Finding::missing(
                 "no-setpoints",
-                "no delays and no refinement: no recording has PSEC that begins at rest",
+                if self.inputs.iter().any(|input| input.signals.spans.iter().any(|span| span.psec.is_some()))
+                {
+                    "no delays and no refinement: no recording has PSEC that begins at rest"
+                } else {
+                    "no delays and no refinement: no recording has PSEC"
+                },
                 "record the position set-points (PSEC) from standstill on",
             ));
             return;
@@ -185,7 +190,6 @@ impl<'a> Steps<'a> {
         let off = of(FeedforwardMode::Off, &self.experiments);
         self.take_delay(Delay::Alpha, &[]);
         let first = if off.is_empty() { self.experiments.clone() } else { off };
-        let physics = self.physics();
         if self.options.refine.inertia {
             if let Some(inertia) = start_of_inertia(&self.found.axis, self.periods, &first) {
                 self.found.axis.motor.inertia = inertia;
@@ -202,24 +206,23 @@ impl<'a> Steps<'a> {
             self.take_feedforward(FeedforwardMode::Both, Parameter::TorqueFeedforward);
             self.take_delay(Delay::Gamma, &[]);
         }
-        let mut parameters = physics;
+        let mut parameters = self.parameters(self.options.refine);
         parameters.extend(self.free_feedforward());
         if !parameters.is_empty() {
             let all = self.experiments.clone();
             self.refine(&all, &parameters);
-            let nuisance = self.nuisance(&parameters);
-            for which in [Delay::Alpha, Delay::Beta, Delay::Gamma] {
-                self.take_delay(which, &nuisance);
-            }
+        }
+        let nuisance = self.nuisance(&self.parameters(Refine::ALL));
+        for which in [Delay::Alpha, Delay::Beta, Delay::Gamma] {
+            self.take_delay(which, &nuisance);
         }
         tell_delays(&self.experiments, &mut self.found);
     }
 
     /// What the closed loop can refine of the plant.
-    fn physics(&self) -> Vec<Parameter> {
+    fn parameters(&self, wanted: Refine) -> Vec<Parameter> {
         let found = &self.found;
         let law = found.friction.as_ref().map_or(FrictionLaw::DoubleExponential, |f| f.law.law);
-        let wanted = self.options.refine;
         let mut parameters = Vec::new();
         if wanted.inertia {
             parameters.push(Parameter::Inertia);
@@ -313,8 +316,9 @@ impl<'a> Steps<'a> {
         let experiments: Vec<Experiment> =
             self.experiments.iter().filter(|e| e.mode == which.mode()).cloned().collect();
         // The long recordings are those that show α, which is found at once.
+        let own = which.of(&found.before.delays);
         let around = which == Delay::Alpha && !nuisance.is_empty();
-        if let Some(fit) = delay(which, &found.axis, self.periods, &experiments, nuisance, around) {
+        if let Some(fit) = delay(which, &found.axis, self.periods, &experiments, nuisance, own, around) {
             which.set(&mut found.axis, fit.value);
             found.delays.retain(|known| known.delay != which);
             found.delays.push(fit);
@@ -343,7 +347,7 @@ impl<'a> Steps<'a> {
         }
         let replayed = replayed_inertia(self.inputs, &self.found);
         self.found.replayed_inertia = replayed;
-        tell(self.inputs, &mut self.found);
+        tell(self.inputs, seconds(self.periods.position), &mut self.found);
         self.found
     }
 }

@@ -2,10 +2,12 @@
 
 use super::closed_loop::{Experiment, Simulated};
 use super::delays::Delay;
+use super::fit::median;
 use super::friction::{current, speed_unit};
 use super::gravity::GravityCurrent;
 use super::identification::{Identification, Input};
 use super::inertia::inertia;
+use super::refine::Parameter;
 use super::segments::{Segment, segments};
 use crate::recording::{Finding, Gaussian, Signals, Span};
 
@@ -13,6 +15,8 @@ use crate::recording::{Finding, Gaussian, Signals, Span};
 const LEAST_DETERMINATION: f64 = 0.9;
 /// Part by which refined and measured friction can differ.
 const DISAGREEING: f64 = 0.05;
+/// Part of the position period beyond which a sampling period hides what a drive does between set-points.
+const COARSE: f64 = 0.34;
 /// Part by which eq. 5 can differ from the refined inertia before it is told.
 const UNSEEN: f64 = 0.03;
 
@@ -97,8 +101,8 @@ fn replayed(signals: &Signals, experiment: &Experiment, simulated: &Simulated) -
 }
 
 /// Says where eq. 5, the current, bounds and correlations ask for care.
-pub(super) fn tell(inputs: &[Input<'_>], found: &mut Identification) {
-    tell_inertia(found);
+pub(super) fn tell(inputs: &[Input<'_>], tsp: f64, found: &mut Identification) {
+    tell_inertia(inputs, tsp, found);
     tell_friction(found);
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
         if let Some(r2) = agreement.current_determination().filter(|r2| *r2 < LEAST_DETERMINATION) {
@@ -128,22 +132,47 @@ pub(super) fn tell(inputs: &[Input<'_>], found: &mut Identification) {
 }
 
 /// Says where eq. 5 does not see all of the current.
-fn tell_inertia(found: &mut Identification) {
-    let (Some(by_steps), Some(replayed)) = (&found.inertia, found.replayed_inertia) else { return };
-    let (truth, found_one) = (found.axis.motor.inertia, by_steps.value);
+fn tell_inertia(inputs: &[Input<'_>], tsp: f64, found: &mut Identification) {
+    let Some(by_steps) = &found.inertia else { return };
+    let refined = found
+        .refinement
+        .as_ref()
+        .is_some_and(|r| r.parameters.iter().any(|p| p.parameter == Parameter::Inertia));
+    let with_current =
+        inputs.iter().filter(|input| input.signals.spans.iter().any(|span| span.current.is_some()));
+    let mut parts = Vec::new();
+    let mut coarse = false;
+    for (number, input) in with_current.enumerate() {
+        let of_it = by_steps.instants.iter().filter(|instant| instant.0 == number);
+        let mut values: Vec<f64> = of_it.map(|instant| instant.2).collect();
+        if !values.is_empty() {
+            coarse |= input.signals.period > COARSE * tsp;
+            parts.push((median(&mut values), input.signals.name.as_str()));
+        }
+    }
+    let truth = found.axis.motor.inertia;
     let differs = |a: f64, b: f64| (a / b - 1.0).abs() > UNSEEN;
-    if !differs(found_one, truth) && !differs(found_one, replayed) {
+    let told = if refined { differs(by_steps.value, truth) } else { coarse };
+    if !told {
         return;
     }
+    let values: Vec<String> = parts.iter().map(|(value, name)| format!("{value:.4} ({name})")).collect();
     let what = format!(
-        "eq. 5 gives {found_one:.4e} of the recorded axis and {replayed:.4e} of the simulated one, whose inertia is \
-         {truth:.4e}: between two samples the current swings with each set-point"
+        "the current swings with each set-point, and a recording sampled no faster sees it at one phase: eq. 5 gives \
+         an inertia of {}",
+        values.join(", ")
     );
-    found.findings.push(if differs(found_one, replayed) {
-        let remedy = "record the current every millisecond, or refine on the closed loop";
-        Finding::warning("unseen-current", what, remedy)
+    found.findings.push(if refined {
+        let again = found
+            .replayed_inertia
+            .map_or_else(String::new, |again| format!(", {again:.4} on the simulated axis"));
+        Finding::note("unseen-current", format!("{what}{again}; the refined {truth:.4} counts"))
     } else {
-        Finding::note("unseen-current", format!("{what}; the refined value counts"))
+        Finding::warning(
+            "unseen-current",
+            format!("{what}; it can be wrong by more than half"),
+            "record PSEC, for the refinement on the closed loop, or the current every millisecond",
+        )
     });
 }
 

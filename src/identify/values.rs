@@ -1,7 +1,7 @@
 //! What was identified, as parameters of a machine file.
 
 use super::delays::Delay;
-use super::friction::{FrictionLaw, LawFit};
+use super::friction::{FrictionLaw, LawFit, speed_name};
 use super::gravity::{GravityCurrent, GravitySource};
 use super::identification::Identification;
 use super::refine::{Parameter, Refined};
@@ -120,7 +120,11 @@ impl Identification {
         let line = (Parameter::Coulomb.get(&self.axis), Parameter::Viscous.get(&self.axis));
         let what = |fit: &LawFit| match fit.law {
             FrictionLaw::Linear => {
-                format!("the line {:.4} A + {:.5} A V in the form of Prévost eq. 3", line.0, line.1)
+                let unit = speed_name(&self.axis);
+                format!(
+                    "the line {:.4} A + {:.5} A/({unit}) · V in the form of Prévost eq. 3",
+                    line.0, line.1
+                )
             }
             FrictionLaw::DoubleExponential => format!("Prévost eq. 3, R² {:.4}", fit.determination),
         };

@@ -10,11 +10,14 @@ use super::spans::{
 use super::stamps::{Placed, place};
 use super::{Finding, RawRecording, RecordingFault, Signals, Span, plausible};
 use crate::config::{AxisConfig, Periods};
+use crate::units::seconds;
 
 /// Fewest samples of a span, however short the filter is.
 const SHORTEST_SPAN: usize = 16;
 /// Standard deviations of the filter that the longest span must have at least.
 const SPAN_DEVIATIONS: f64 = 20.0;
+/// Part of the position period up to which a sampling period can show a lag of the current.
+const COARSEST: f64 = 0.5;
 /// Rounding that a given cut-off is forgiven.
 const ROUNDING: f64 = 1e-9;
 
@@ -173,6 +176,10 @@ fn current_lag(
             return Err(RecordingFault::Lag { name: name.to_owned(), found, lowest, highest });
         }
         return Ok(found);
+    }
+    // Sampled about as slowly as the set-points come, the current shows their ripple, which looks like a lag.
+    if period > COARSEST * seconds(periods.position) {
+        return Ok(0.0);
     }
     // A filter of its own, so that the ripple at the position period is not matched with its neighbour.
     let filter = Gaussian::new(lag::cutoff(periods).min(cutoff), period);
