@@ -62,6 +62,11 @@ impl Experiment {
         self.period
     }
 
+    /// Whether PSEC moves.
+    pub fn moves(&self) -> bool {
+        self.psec.windows(2).any(|pair| pair[0] != pair[1])
+    }
+
     /// PSEC under sample i as the staircase shows it, m or rad.
     pub fn psec_at(&self, i: usize, tsp: f64) -> f64 {
         let instant = ((self.first + i as f64 * self.period) / tsp + 1e-9).floor().max(0.0) as usize;

@@ -88,17 +88,12 @@ pub struct DelayFit {
     pub interval: (Nanoseconds, Nanoseconds),
     /// The delay to take, ns: that of the machine where it is in the interval, else the middle of the best part.
     pub value: Nanoseconds,
+    /// Whether the data would bear longer delays than there are.
+    pub at_end: bool,
     /// Whether the machine's own delay was left as it is.
     pub left: bool,
     /// Delays that were tried (ns), with the RMS of the deviations, m or rad.
     pub profile: Vec<(Nanoseconds, f64)>,
-}
-
-impl DelayFit {
-    /// Whether the best delay is the longest that there is.
-    pub fn is_at_end(&self) -> bool {
-        self.interval.1 >= LONGEST
-    }
 }
 
 /// Finds a delay from the experiments with its feedforward; none if there are none.
@@ -191,6 +186,7 @@ pub(super) fn delay(
         delay: which,
         interval: (interval.0.max(0), interval.1),
         value: if left { own } else { middle(at_best) },
+        at_end: high == longest,
         left,
         profile,
     })

@@ -27,9 +27,10 @@ impl FeedforwardMode {
         }
     }
 
-    /// An axis with this much of its feedforward.
+    /// An axis with this much of its feedforward; friction is never compensated.
     pub(super) fn of(self, axis: &AxisConfig) -> AxisConfig {
         let mut axis = axis.clone();
+        axis.feedforward.friction = 0.0;
         if self == FeedforwardMode::Off {
             axis.feedforward.velocity = 0.0;
         }

@@ -109,7 +109,7 @@ impl Parameter {
     }
 
     /// What its changes are measured by.
-    fn scale(self, axis: &AxisConfig) -> f64 {
+    pub(super) fn scale(self, axis: &AxisConfig) -> f64 {
         let friction = (axis.friction.a + axis.friction.c).abs().max(1e-3 * axis.motor.max_current);
         let force = axis.motor.torque_constant / axis.transmission_ratio;
         match self {

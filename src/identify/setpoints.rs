@@ -5,7 +5,7 @@ use crate::recording::Span;
 /// Part of the changes of PSEC that must fall on one phase for a staircase.
 const STAIRCASE: f64 = 0.9;
 /// Deviation of the ratio of two periods from an integer that is rounding.
-const COMMENSURATE: f64 = 1e-6;
+const COMMENSURATE: f64 = 1e-4;
 
 /// PSEC at the position instants of a span.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,22 +19,21 @@ pub(super) struct Setpoints {
 impl Setpoints {
     /// Of a span that is sampled with `period`, on the grid of the position period `tsp` (both s).
     ///
-    /// A recording that is finer than the grid shows PSEC as a staircase, whose steps are the instants; one that
-    /// is coarser is interpolated.
+    /// A recording that is finer than the grid shows PSEC as a staircase, whose steps are the instants. None where
+    /// the period is no whole fraction of the grid's: the instants cannot be told then.
     pub fn of(span: &Span, period: f64, tsp: f64) -> Option<Self> {
         let psec = span.psec.as_ref().filter(|psec| psec.len() > 1)?;
-        let ratio = tsp / period;
-        let stride = ratio.round();
-        if stride >= 1.0 && (ratio - stride).abs() < COMMENSURATE * stride {
-            let stride = stride as usize;
-            let first = phase(psec, stride);
-            let values = psec.iter().skip(first).step_by(stride).copied().collect();
-            return Some(Setpoints { first: first as f64 * period, values });
-        }
-        let count = ((psec.len() - 1) as f64 / ratio).floor() as usize;
-        let values = (0..=count).map(|k| interpolated(psec, k as f64 * ratio)).collect();
-        Some(Setpoints { first: 0.0, values })
+        let stride = stride(period, tsp)?;
+        let first = phase(psec, stride);
+        let values = psec.iter().skip(first).step_by(stride).copied().collect();
+        Some(Setpoints { first: first as f64 * period, values })
     }
+}
+
+/// Samples in a position period; none if that is no whole number.
+pub(super) fn stride(period: f64, tsp: f64) -> Option<usize> {
+    let (ratio, whole) = (tsp / period, (tsp / period).round());
+    (whole >= 1.0 && (ratio - whole).abs() < COMMENSURATE * whole).then_some(whole as usize)
 }
 
 /// The sample, of the first `stride`, at which a staircase changes; 0 if it is none.
@@ -49,18 +48,6 @@ fn phase(psec: &[f64], stride: usize) -> usize {
     let most = changes.iter().enumerate().max_by_key(|(_, count)| **count);
     most.filter(|(_, count)| **count as f64 >= STAIRCASE * all as f64 && all > 0)
         .map_or(0, |(phase, _)| phase)
-}
-
-/// A channel at a place between two samples.
-pub(super) fn interpolated(channel: &[f64], place: f64) -> f64 {
-    let last = channel.len().saturating_sub(1);
-    let before = (place.max(0.0).floor() as usize).min(last);
-    let after = (before + 1).min(last);
-    let part = (place - before as f64).clamp(0.0, 1.0);
-    match (channel.get(before), channel.get(after)) {
-        (Some(a), Some(b)) => a + (b - a) * part,
-        _ => f64::NAN,
-    }
 }
 
 #[cfg(test)]
@@ -78,10 +65,8 @@ mod tests {
     }
 
     #[test]
-    fn a_coarse_recording_is_interpolated() {
+    fn a_recording_beside_the_grid_has_no_instants() {
         let span = Span { psec: Some(vec![0.0, 10.0, 20.0]), ..Span::default() };
-        let found = Setpoints::of(&span, 10e-3, 4e-3).expect("a grid");
-        let expected = [0.0, 4.0, 8.0, 12.0, 16.0, 20.0];
-        assert!(found.values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+        assert_eq!([5e-3, 7e-3, 12e-3].map(|period| Setpoints::of(&span, period, 6e-3)), [None, None, None]);
     }
 }

@@ -12,17 +12,18 @@ use super::inertia::inertia;
 use super::mode::FeedforwardMode;
 use super::refine::{Parameter, refine, with};
 use super::segments::{Segment, SegmentKind, segments};
+use super::setpoints::stride;
 use super::tell::{replayed_inertia, tell, tell_delays};
 use super::validate::agreement;
 use crate::config::{AxisConfig, DeviationConfig, Periods, PositionControllerConfig};
 use crate::recording::{Finding, Signals};
 use crate::units::seconds;
 
-/// Step by which a parameter is moved to see what of a delay it could explain, part of its value.
+/// Step by which a parameter is moved to see what of a delay it could explain, part of its scale.
 const NUISANCE: f64 = 1e-2;
 /// Inertias that are tried first, parts of what eq. 5 or the machine file says. Of eq. 5 most is unseen where the
 /// drive is quick and the recording slow.
-const LADDER: [f64; 11] = [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
+const LADDER: [f64; 13] = [0.06, 0.12, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
 
 /// An identification in progress.
 pub(super) struct Steps<'a> {
@@ -165,13 +166,9 @@ impl<'a> Steps<'a> {
         if experiments.is_empty() {
             self.found.findings.push(Finding::missing(
                 "no-setpoints",
-                if self.inputs.iter().any(|input| input.signals.spans.iter().any(|span| span.psec.is_some()))
-                {
-                    "no delays and no refinement: no recording has PSEC that begins at rest"
-                } else {
-                    "no delays and no refinement: no recording has PSEC"
-                },
-                "record the position set-points (PSEC) from standstill on",
+                why_no_experiments(self.inputs, self.periods),
+                "record the position set-points (PSEC) from standstill on, at every position instant or a whole \
+                 fraction of the position period",
             ));
             return;
         }
@@ -297,7 +294,7 @@ impl<'a> Steps<'a> {
     fn nuisance(&self, parameters: &[Parameter]) -> Vec<AxisConfig> {
         let axis = &self.found.axis;
         let moved = |parameter: &Parameter| {
-            let value = parameter.get(axis) * (1.0 + NUISANCE);
+            let value = parameter.get(axis) + NUISANCE * parameter.scale(axis);
             with(axis, &[*parameter], &[value], self.options.i0 == Breakaway::Held)
         };
         parameters.iter().map(moved).collect()
@@ -350,6 +347,24 @@ impl<'a> Steps<'a> {
         tell(self.inputs, seconds(self.periods.position), &mut self.found);
         self.found
     }
+}
+
+/// Why nothing can be simulated.
+fn why_no_experiments(inputs: &[Input<'_>], periods: &Periods) -> String {
+    let tsp = seconds(periods.position);
+    let with_psec: Vec<&Signals> =
+        inputs.iter().map(|i| i.signals).filter(|s| s.spans.iter().any(|span| span.psec.is_some())).collect();
+    let why = match with_psec.iter().find(|signals| stride(signals.period, tsp).is_none()) {
+        _ if with_psec.is_empty() => "no recording has PSEC".to_owned(),
+        Some(signals) => format!(
+            "{} is sampled every {:.3} ms, which is no whole fraction of the position period of {:.3} ms",
+            signals.name,
+            1e3 * signals.period,
+            1e3 * tsp
+        ),
+        None => "no recording has PSEC that begins at rest".to_owned(),
+    };
+    format!("no delays and no refinement: {why}")
 }
 
 /// Whether a recording that was made with torque feedforward shows that it is nothing.

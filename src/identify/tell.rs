@@ -9,12 +9,17 @@ use super::identification::{Identification, Input};
 use super::inertia::inertia;
 use super::refine::Parameter;
 use super::segments::{Segment, segments};
+use crate::config::AxisKind;
 use crate::recording::{Finding, Gaussian, Signals, Span};
+use crate::units::DEGREE;
 
 /// R² of the current below which a model is not what was recorded.
 const LEAST_DETERMINATION: f64 = 0.9;
 /// Part by which refined and measured friction can differ.
 const DISAGREEING: f64 = 0.05;
+/// Deviation of the position beyond which a model is not the axis: twice what the paper saw, m and rad.
+const DEVIATING: f64 = 20e-6;
+const DEVIATING_ANGLE: f64 = 20e-3 * DEGREE;
 /// Part of the position period beyond which a sampling period hides what a drive does between set-points.
 const COARSE: f64 = 0.34;
 /// Part by which eq. 5 can differ from the refined inertia before it is told.
@@ -24,7 +29,7 @@ const UNSEEN: f64 = 0.03;
 pub(super) fn tell_delays(experiments: &[Experiment], found: &mut Identification) {
     for which in [Delay::Alpha, Delay::Beta, Delay::Gamma] {
         if let Some(fit) = found.delays.iter().find(|fit| fit.delay == which) {
-            if fit.is_at_end() {
+            if fit.at_end {
                 found.findings.push(Finding::warning(
                     "delay-at-end",
                     format!("{} ends at the end of its range", which.name()),
@@ -102,6 +107,7 @@ fn replayed(signals: &Signals, experiment: &Experiment, simulated: &Simulated) -
 
 /// Says where eq. 5, the current, bounds and correlations ask for care.
 pub(super) fn tell(inputs: &[Input<'_>], tsp: f64, found: &mut Identification) {
+    tell_positions(inputs, found);
     tell_inertia(inputs, tsp, found);
     tell_friction(found);
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
@@ -131,13 +137,42 @@ pub(super) fn tell(inputs: &[Input<'_>], tsp: f64, found: &mut Identification) {
     }
 }
 
+/// Says where the simulated position is not the recorded one.
+fn tell_positions(inputs: &[Input<'_>], found: &mut Identification) {
+    let (limit, unit, name) = match found.axis.kind() {
+        AxisKind::Linear => (DEVIATING, 1e-6, "µm"),
+        AxisKind::Rotary => (DEVIATING_ANGLE, 1e-3 * DEGREE, "mdeg"),
+    };
+    for (input, agreement) in inputs.iter().zip(&found.agreements) {
+        let deviations = agreement.comparisons.iter().flat_map(|c| [c.constant_velocity, c.elsewhere]);
+        let worst = deviations.flatten().map(|d| d.max).fold(0.0, f64::max);
+        if worst > limit {
+            found.findings.push(Finding::warning(
+                "poor-position",
+                format!(
+                    "{}: the simulated position is off by up to {:.0} {name}: no result that rests on the closed loop \
+                     can be trusted",
+                    input.signals.name,
+                    worst / unit
+                ),
+                "check position_loop.gain, the other gains and the periods of the machine file, the feedforward that \
+                 acted, and that PSEC and position have the same zero",
+            ));
+        }
+    }
+}
+
 /// Says where eq. 5 does not see all of the current.
 fn tell_inertia(inputs: &[Input<'_>], tsp: f64, found: &mut Identification) {
-    let Some(by_steps) = &found.inertia else { return };
     let refined = found
         .refinement
         .as_ref()
         .is_some_and(|r| r.parameters.iter().any(|p| p.parameter == Parameter::Inertia));
+    if refined {
+        // What the step did not find the refinement did.
+        found.findings.retain(|finding| finding.code != "negative-inertia");
+    }
+    let Some(by_steps) = &found.inertia else { return };
     let with_current =
         inputs.iter().filter(|input| input.signals.spans.iter().any(|span| span.current.is_some()));
     let mut parts = Vec::new();

@@ -124,7 +124,8 @@ fn compare(experiment: &Experiment, simulated: &Simulated, segments: &[Segment])
         elsewhere: position(false),
         velocity: deviation(simulated.velocity.iter().zip(&experiment.velocity).map(|(s, r)| s - r)),
         current: deviation(recorded().map(|(r, s)| s - r)),
-        current_determination: r2.is_finite().then_some(r2),
+        // At rest there is nothing to explain.
+        current_determination: (experiment.moves() && r2.is_finite()).then_some(r2),
     }
 }
 

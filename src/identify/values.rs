@@ -141,7 +141,7 @@ impl Identification {
         }
         let (source, error) = match self.refined(Parameter::Breakaway) {
             Some(refined) => ("refined on the closed loop", Some(refined.error)),
-            None => ("i0 = a + c", self.error_of_sum().or(fit.map(|fit| fit.error_at(0.0)))),
+            None => ("i0 = a + c, assumed", self.error_of_sum().or(fit.map(|fit| fit.error_at(0.0)))),
         };
         put(&["friction.i0"], law.i0, error, None, source.to_owned());
     }

@@ -99,7 +99,8 @@ pub fn condition(
     let mut findings = Vec::new();
     check_lengths(raw)?;
     let ordered = ordered(raw, &mut findings)?;
-    let columns = columns(raw, &mut findings);
+    let mut columns = columns(raw, &mut findings);
+    drop_constant_current(&raw.name, &mut columns, &mut findings);
     let Some(position) = &columns[POSITION] else {
         return Err(RecordingFault::NoPosition { name: raw.name.clone() });
     };
@@ -125,7 +126,8 @@ pub fn condition(
             return Err(nothing_left());
         }
     }
-    let spans = parts.into_iter().map(Part::into_span).collect();
+    let mut spans: Vec<Span> = parts.into_iter().map(Part::into_span).collect();
+    keep_apart(&mut spans, period);
     Ok((Signals { name: raw.name.clone(), period, cutoff, current_lag, spans }, findings))
 }
 
@@ -143,6 +145,35 @@ fn check_lengths(raw: &RawRecording) -> Result<(), RecordingFault> {
     match channels[POSITION] {
         Some(position) if position.is_empty() || position.iter().any(|x| x.is_finite()) => Ok(()),
         _ => Err(RecordingFault::NoPosition { name: raw.name.clone() }),
+    }
+}
+
+/// Where the first stamps of a span jitter it could begin before the one before has ended: it is moved behind it.
+fn keep_apart(spans: &mut [Span], period: f64) {
+    let mut earliest = f64::NEG_INFINITY;
+    for span in spans {
+        span.start = span.start.max(earliest);
+        earliest = span.start + span.position.len() as f64 * period;
+    }
+}
+
+/// A current that does not change although the axis moves was not measured.
+fn drop_constant_current(
+    name: &str,
+    columns: &mut [Option<Vec<f64>>; CHANNELS],
+    findings: &mut Vec<Finding>,
+) {
+    let varies = |channel: usize| {
+        let values = columns.get(channel).and_then(Option::as_ref);
+        let mut finite = values.into_iter().flatten().filter(|value| value.is_finite());
+        let first = finite.next().copied();
+        first.is_some_and(|first| finite.any(|value| *value != first))
+    };
+    if columns[CURRENT].is_some() && varies(POSITION) && !varies(CURRENT) {
+        columns[CURRENT] = None;
+        let what =
+            format!("{name}: the current is the same throughout although the axis moves; it is left out");
+        findings.push(Finding::warning("constant-current", what, "record the motor current"));
     }
 }
 
