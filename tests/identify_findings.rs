@@ -271,7 +271,7 @@ fn parts_in_one_recording_are_told_apart_by_their_feedforward() {
                 let offset = all.time.last().expect("samples") + TSP;
                 all.time.extend(raw.time.iter().map(|t| t + offset));
                 let join = |a: &mut Option<Vec<f64>>, b: Option<Vec<f64>>| {
-                    a.as_mut().zip(b).map(|(a, b)| a.extend(b));
+                    a.iter_mut().zip(b).for_each(|(a, b)| a.extend(b));
                 };
                 join(&mut all.psec, raw.psec);
                 join(&mut all.position, raw.position);
