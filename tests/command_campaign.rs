@@ -1,28 +1,13 @@
 //! `virtual_axes psec campaign` as a user runs it.
 
+mod command_common;
 mod folder;
 
 use std::fs;
-use std::process::{Command, Output};
 
+use command_common::{assert_refused, json, printed, run};
 use folder::Folder;
 use serde_json::Value;
-
-fn run(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_virtual_axes")).args(arguments).output().expect("the command starts")
-}
-
-#[track_caller]
-fn assert_runs(arguments: &[&str]) -> String {
-    let output = run(arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("text")
-}
-
-#[track_caller]
-fn json(arguments: &[&str]) -> Value {
-    serde_json::from_str(&assert_runs(arguments)).expect("JSON")
-}
 
 /// Times and positions of a CSV file of one joint, in m or rad.
 fn rows(path: &str, joint: &str) -> Vec<(f64, f64)> {
@@ -77,7 +62,7 @@ fn a_part_alone_is_that_of_the_whole() {
     let whole = rows(&whole, "a");
     for (i, part) in ["off", "velocity", "both"].into_iter().enumerate() {
         let alone = path(&folder, "part.csv");
-        assert_runs(&["psec", "campaign", "--axis", "a", "--part", part, "--out", &alone]);
+        printed(&["psec", "campaign", "--axis", "a", "--part", part, "--out", &alone]);
         let alone: Vec<f64> = rows(&alone, "a").into_iter().map(|row| row.1).collect();
         let from = told["parts"][i]["from_s"].as_f64().expect("a number");
         let same: Vec<f64> =
@@ -94,7 +79,7 @@ fn every_format_runs_and_brings_the_axis_back() {
         let file = path(&folder, &format!("c.{extension}"));
         let machine = ["--machine", "linear_motor_center"];
         let campaign = ["psec", "campaign", "--axis", "c", "--part", "velocity", "--out", &file];
-        let text = assert_runs(&[&campaign[..], &machine].concat());
+        let text = printed(&[&campaign[..], &machine].concat());
         assert!(text.contains("before velocity: c.feedforward.velocity=1"), "{text}");
         let found = json(&[&["run", &file, "--json"], &machine[..]].concat());
         figures.push(found["runs"][0]["axes"].clone());
@@ -109,18 +94,8 @@ fn every_format_runs_and_brings_the_axis_back() {
 fn range_and_feed_are_kept() {
     let folder = Folder::new("campaign_range");
     let file = path(&folder, "x.csv");
-    let text = assert_runs(&[
-        "psec",
-        "campaign",
-        "--axis",
-        "x",
-        "--range",
-        "50,150",
-        "--max-feed",
-        "6",
-        "--out",
-        &file,
-    ]);
+    let text =
+        printed(&["psec", "campaign", "--axis", "x", "--range", "50,150", "--max-feed", "6", "--out", &file]);
     assert!(text.contains("x starts and ends at 55.000 mm, to be brought there first"), "{text}");
     let rows = rows(&file, "x");
     assert!(rows.iter().all(|(_, x)| (0.055..=0.145).contains(x)));
@@ -152,8 +127,7 @@ fn what_cannot_be_is_refused_in_one_line_and_leaves_no_file() {
     }
     // The parser's own messages.
     for wrong in [&["--range", "5"][..], &["--range", "a,b"], &["--part", "torque"]] {
-        let output = run(&[&["psec", "campaign", "--axis", "x", "--out", &file], wrong].concat());
-        assert_eq!(output.status.code(), Some(2));
+        assert_refused(&[&["psec", "campaign", "--axis", "x", "--out", &file], wrong].concat(), &wrong[..1]);
         assert!(folder.names().is_empty());
     }
 }
