@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use common::{Ballbar, assert_near, parameters};
-use virtual_axes::simulation::{MotionEnd, Outcome, Simulation, joints};
+use virtual_axes::simulation::{Abort, MotionEnd, Outcome, Simulation, joints};
 use virtual_axes::trajectory::{Context, JointLimits, MotionId, Request, Row, Start, Trajectory};
 use virtual_axes::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS};
 
@@ -169,7 +169,7 @@ fn a_reset_aborts_what_moves_and_forgets_it() {
     }
     bench.simulation.reset();
     let ends: Vec<_> = bench.simulation.take_ends().collect();
-    assert_eq!((ends.len(), ends[0].outcome), (1, Outcome::Aborted));
+    assert_eq!((ends.len(), ends[0].outcome), (1, Outcome::Aborted(Abort::Reset)));
     bench.simulation.step();
     assert_eq!(bench.simulation.samples()[X].position, 0.0);
     assert!(!bench.simulation.is_moving());

@@ -19,6 +19,8 @@ mod error;
 mod layout;
 pub mod listing;
 mod machine;
+mod node;
+mod node_schema;
 mod parameter_file;
 mod parameters;
 mod schema;
@@ -29,11 +31,11 @@ mod yaml;
 #[cfg(test)]
 mod tests;
 
-pub use build::{NodeConfig, QosConfig, TimeMode};
 pub use definition::{DefaultValue, Definition, Kind, MotorKind, Presence, Scope};
 pub(crate) use error::shortened;
 pub use error::{ConfigError, Source};
 pub use machine::*;
+pub use node::{NodeConfig, QosConfig, TimeMode};
 pub use parameter_file::{Assignment, parse_assignment};
 pub use parameters::{DEFAULT_MACHINE, Overlay, Parameters};
 pub use schema::{DEFINITIONS, MAX_HORIZON, RST_TERMS};

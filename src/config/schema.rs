@@ -8,6 +8,7 @@ use super::definition::DefaultValue::{Flag, Integer, Number, Text};
 use super::definition::MotorKind::{Linear as LinearMotor, Rotating as RotatingMotor};
 use super::definition::{Definition, Kind};
 use super::machine::AxisKind::{Linear, Rotary};
+use super::node_schema::NODE;
 
 /// Shortest and longest sampling period, ms; the node's pacing knows nothing below 1 µs.
 const PERIOD_MS: (f64, f64) = (1e-3, 50.0);
@@ -83,32 +84,21 @@ const fn coordinate(key: &'static str) -> Definition {
     Definition::number(key, "mm", -DISTANCE_MM, DISTANCE_MM).default(Number(0.0))
 }
 
-/// Whether samples of a topic are repeated until they have arrived.
-const fn qos_reliability(key: &'static str, default: &'static str) -> Definition {
-    Definition::new(key, "", Kind::Choice(&["reliable", "best_effort"]))
-        .of_node()
-        .default(Text(default))
-        .is("Whether lost samples of the topic are sent again.")
-}
-
-/// Whether a late joiner gets the last samples of a topic.
-const fn qos_durability(key: &'static str, default: &'static str) -> Definition {
-    Definition::new(key, "", Kind::Choice(&["volatile", "transient_local"]))
-        .of_node()
-        .default(Text(default))
-        .is("Whether late joiners of the topic get its last samples.")
-}
-
-/// How many samples of a topic are kept.
-const fn qos_depth(key: &'static str, default: i64) -> Definition {
-    Definition::new(key, "", Kind::Integer { min: 1, max: 100_000 })
-        .of_node()
-        .default(Integer(default))
-        .is("Samples of the topic that are kept (keep last).")
-}
-
 /// Every parameter there is. A key stands twice where its unit depends on the axis or the motor.
-pub static DEFINITIONS: &[Definition] = &[
+pub static DEFINITIONS: &[Definition] = &joined::<{ MACHINE.len() + NODE.len() }>(MACHINE, NODE);
+
+const fn joined<const N: usize>(first: &[Definition], second: &[Definition]) -> [Definition; N] {
+    let mut all = [second[0]; N];
+    let mut place = 0;
+    while place < N {
+        all[place] = if place < first.len() { first[place] } else { second[place - first.len()] };
+        place += 1;
+    }
+    all
+}
+
+/// Parameters of the machine and its axes.
+const MACHINE: &[Definition] = &[
     // Machine.
     Definition::new("machine", "", Kind::Text).is("Name of the machine."),
     Definition::new("joints", "", Kind::TextList)
@@ -334,63 +324,4 @@ pub static DEFINITIONS: &[Definition] = &[
         .on(Rotary)
         .optional()
         .is("Upper end of the stroke; none when left out. Home is 0."),
-    // Node.
-    Definition::new("time", "", Kind::Choice(&["real", "fast"]))
-        .of_node()
-        .default(Text("real"))
-        .is("Pace of the simulation: real time, or as fast as it goes with its own /clock."),
-    Definition::number("publish_rate", "Hz", 0.0, 1e6)
-        .of_node()
-        .default(Number(0.0))
-        .is("Rate of joint_states, at most one per position period; 0 is every position period."),
-    Definition::new("joint_prefix", "", Kind::Text)
-        .of_node()
-        .default(Text(""))
-        .is("Text before the joint names in messages."),
-    Definition::number("load_timeout", "s", 1e-3, 3600.0)
-        .of_node()
-        .default(Number(0.1))
-        .is("Time after which an external load that is not renewed is zero again."),
-    Definition::new("max_points", "", Kind::Integer { min: 1, max: 100_000_000 })
-        .of_node()
-        .default(Integer(1_000_000))
-        .is("Largest number of points of a trajectory."),
-    Definition::new("allow_nonzero_velocity_at_trajectory_end", "", Kind::Flag)
-        .of_node()
-        .default(Flag(false))
-        .live()
-        .is("Accept trajectories whose last point has a velocity."),
-    Definition::new("use_sim_time", "", Kind::Flag)
-        .of_node()
-        .default(Flag(false))
-        .is("Follow /clock."),
-    // Quality of service.
-    qos_reliability("qos.psec.reliability", "reliable"),
-    qos_durability("qos.psec.durability", "volatile"),
-    qos_depth("qos.psec.depth", 64),
-    // As ros2_control's topic-based hardware publishes; it sends the last set-point of a move once.
-    qos_reliability("qos.psec_stream.reliability", "reliable"),
-    qos_durability("qos.psec_stream.durability", "volatile"),
-    qos_depth("qos.psec_stream.depth", 10),
-    qos_reliability("qos.load.reliability", "best_effort"),
-    qos_durability("qos.load.durability", "volatile"),
-    qos_depth("qos.load.depth", 10),
-    qos_reliability("qos.joint_states.reliability", "reliable"),
-    qos_durability("qos.joint_states.durability", "volatile"),
-    qos_depth("qos.joint_states.depth", 10),
-    qos_reliability("qos.motor_currents.reliability", "reliable"),
-    qos_durability("qos.motor_currents.durability", "volatile"),
-    qos_depth("qos.motor_currents.depth", 10),
-    qos_reliability("qos.drive_states.reliability", "reliable"),
-    qos_durability("qos.drive_states.durability", "volatile"),
-    qos_depth("qos.drive_states.depth", 10),
-    qos_reliability("qos.trajectory_result.reliability", "reliable"),
-    qos_durability("qos.trajectory_result.durability", "transient_local"),
-    qos_depth("qos.trajectory_result.depth", 50),
-    qos_reliability("qos.diagnostics.reliability", "reliable"),
-    qos_durability("qos.diagnostics.durability", "volatile"),
-    qos_depth("qos.diagnostics.depth", 10),
-    qos_reliability("qos.clock.reliability", "reliable"),
-    qos_durability("qos.clock.durability", "volatile"),
-    qos_depth("qos.clock.depth", 10),
 ];

@@ -66,7 +66,7 @@ impl PsecInput {
                 let trajectory = Arc::new(trajectory);
                 self.results.expect(id, origin, Arc::clone(&trajectory)).await;
                 // The simulation is gone only when the node shuts down.
-                let _ = self.commands.send(Command::Offer { id, trajectory }).await;
+                let _ = self.commands.send(Command::Offer { id, trajectory, tolerances: None }).await;
             }
             Err(rejection) => {
                 let now = self.health.borrow().time;

@@ -20,7 +20,7 @@ use super::environment::Environment;
 use super::fan_out::{ClockOutput, FanOut, publish_diagnostics, watch_clock};
 use super::inputs::{PsecInput, next_id, take_loads, take_stream};
 use super::log::LogRecord;
-use super::outputs::{Output, WhenFull, queue_length};
+use super::outputs::{Publishing, WhenFull, queue_length};
 use super::pace::{self, Channels, Command, Health};
 use super::parameter_host::{Host, LiveNodeParameters};
 use super::parameter_services::ParameterServices;
@@ -146,9 +146,24 @@ async fn serve(
     let dropped = Arc::new(AtomicU64::new(0));
     let live = Arc::new(LiveNodeParameters::default());
     let ids = Arc::new(AtomicU64::new(1));
-    let results =
-        Results::new(Output::start(topics.results, WhenFull::Wait, &dropped, &mut tasks), joints.clone());
+
+    // What goes out.
+    let mut publishing = Publishing { dropped: &dropped, tasks: &mut tasks };
+    let results = Results::new(publishing.start(topics.results, WhenFull::Wait), joints.clone());
     let results = Arc::new(results);
+    let diagnostics = publishing.start(topics.diagnostics, WhenFull::Drop);
+    let every = node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * seconds(period))).round() as i64);
+    let outputs = FanOut {
+        joint_states: publishing.start(topics.joint_states, when_full),
+        motor_currents: publishing.start(topics.motor_currents, when_full),
+        drive_states: publishing.start(topics.drive_states, when_full),
+        clock: topics.clock.map(|(publisher, name)| ClockOutput {
+            output: publishing.start(publisher, when_full),
+            silent: watch_clock(dds.clone(), name, publishing.tasks),
+        }),
+        joints: joints.clone(),
+        every: every.max(1),
+    };
 
     tasks.spawn(rosout::publish(&node, log));
 
@@ -177,32 +192,19 @@ async fn serve(
     let to_reset = commands.clone();
     tasks.spawn(reset.serve(move || reset_axes(to_reset.clone())));
 
-    // What goes out.
+    // What the axes say.
     let diagnostics_text = Diagnostics {
         node: args.node().to_string(),
         machine: config.name().to_owned(),
         joints: joints.clone(),
         time_mode: if fast { "fast" } else { "real" },
     };
-    let diagnostics = Output::start(topics.diagnostics, WhenFull::Drop, &dropped, &mut tasks);
     tasks.spawn(publish_diagnostics(diagnostics_text, diagnostics, health, Arc::clone(&dropped)));
     tasks.spawn(async move {
         while let Some(report) = reports.recv().await {
             results.report(report).await;
         }
     });
-    let every = node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * seconds(period))).round() as i64);
-    let outputs = FanOut {
-        joint_states: Output::start(topics.joint_states, when_full, &dropped, &mut tasks),
-        motor_currents: Output::start(topics.motor_currents, when_full, &dropped, &mut tasks),
-        drive_states: Output::start(topics.drive_states, when_full, &dropped, &mut tasks),
-        clock: topics.clock.map(|(publisher, name)| ClockOutput {
-            output: Output::start(publisher, when_full, &dropped, &mut tasks),
-            silent: watch_clock(dds.clone(), name, &mut tasks),
-        }),
-        joints,
-        every: every.max(1),
-    };
     tasks.spawn(outputs.run(frames));
 
     topics.names.print(args, config.name(), node_config.time);
@@ -271,7 +273,7 @@ async fn stop_axes(
     stop: Option<Arc<Trajectory>>,
 ) -> Result<String, String> {
     let trajectory = stop.ok_or("this machine has no joint to stop")?;
-    commands.send(Command::Offer { id, trajectory }).await.map_err(shutting_down)?;
+    commands.send(Command::Offer { id, trajectory, tolerances: None }).await.map_err(shutting_down)?;
     Ok("stopping every axis within its limits".to_owned())
 }
 

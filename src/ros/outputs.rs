@@ -39,25 +39,34 @@ pub struct Output<M> {
     dropped: Arc<AtomicU64>,
 }
 
-impl<M: Serialize + Send + Sync + 'static> Output<M> {
+/// Starts the tasks that publish, one for each topic.
+pub struct Publishing<'a> {
+    /// Counts what is dropped, of all topics.
+    pub dropped: &'a Arc<AtomicU64>,
+    /// Where the tasks run.
+    pub tasks: &'a mut JoinSet<()>,
+}
+
+impl Publishing<'_> {
     /// Starts the task that publishes what comes through the queue; it ends when the output is dropped.
-    pub fn start(
+    pub fn start<M: Serialize + Send + Sync + 'static>(
+        &mut self,
         publisher: Publisher<M>,
         when_full: WhenFull,
-        dropped: &Arc<AtomicU64>,
-        tasks: &mut JoinSet<()>,
-    ) -> Self {
+    ) -> Output<M> {
         let (queue, mut messages) = mpsc::channel(queue_length(when_full));
-        tasks.spawn(async move {
+        self.tasks.spawn(async move {
             while let Some(message) = messages.recv().await {
                 if publisher.async_publish(message).await.is_err() {
                     warn!("a message could not be published");
                 }
             }
         });
-        Output { queue, when_full, dropped: Arc::clone(dropped) }
+        Output { queue, when_full, dropped: Arc::clone(self.dropped) }
     }
+}
 
+impl<M: Serialize + Send + Sync + 'static> Output<M> {
     /// Hands a message over.
     pub async fn send(&self, message: M) {
         match self.when_full {

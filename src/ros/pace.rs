@@ -15,7 +15,7 @@ use tracing::{info, warn};
 use super::stream::{Setpoints, StreamHealth, StreamLog};
 use crate::config::TimeMode;
 use crate::machine::{AxisSample, MachineParameters};
-use crate::simulation::{MotionEnd, Simulation};
+use crate::simulation::{MotionEnd, Simulation, Tolerances};
 use crate::trajectory::{MotionId, Rejection, Trajectory};
 use crate::units::Nanoseconds;
 
@@ -31,7 +31,11 @@ pub enum Command {
         id: MotionId,
         /// The trajectory, checked as far as it can be without the state of the axes.
         trajectory: Arc<Trajectory>,
+        /// How far it may stray.
+        tolerances: Option<Box<Tolerances>>,
     },
+    /// Call a motion off, and say whether there was one.
+    Cancel(MotionId, oneshot::Sender<bool>),
     /// Put loads (N or N·m) on axes for a while.
     Load {
         /// Place of the axis, and load.
@@ -180,12 +184,19 @@ fn obey(simulation: &mut Simulation, command: Command, reports: &mpsc::Unbounded
     // Between two instants, the time is that of the first.
     let now = simulation.time_of(simulation.next_instant() - 1);
     match command {
-        Command::Offer { id, trajectory } => {
-            let decision = simulation.offer(id, trajectory).map(|admission| Accepted {
+        Command::Offer { id, trajectory, tolerances } => {
+            let admission = match tolerances {
+                Some(tolerances) => simulation.offer_within(id, trajectory, *tolerances),
+                None => simulation.offer(id, trajectory),
+            };
+            let decision = admission.map(|admission| Accepted {
                 start: simulation.time_of(admission.start_k),
                 joined_late: admission.joined_late,
             });
             let _ = reports.send(Report::Decided(id, now, decision));
+        }
+        Command::Cancel(id, done) => {
+            let _ = done.send(simulation.cancel(id));
         }
         Command::Load { loads, hold } => {
             for (axis, load) in loads {

