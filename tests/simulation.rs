@@ -1,83 +1,22 @@
 //! Trajectories through the whole simulation: who moves what, when, and the same bits every time.
 
 mod common;
+mod simulation_common;
 
-use std::sync::Arc;
-
-use common::{Ballbar, assert_near, parameters};
-use virtual_axes::simulation::{Abort, MotionEnd, Outcome, Simulation, joints};
-use virtual_axes::trajectory::{Context, JointLimits, MotionId, Request, Row, Start, Trajectory};
-use virtual_axes::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS};
-
-const TSP: Nanoseconds = 6 * MILLISECOND_NS;
-const X: usize = 0;
-const NONE: &[(&str, f64)] = &[];
-
-struct Bench {
-    simulation: Simulation,
-    joints: Vec<JointLimits>,
-    origin: Nanoseconds,
-}
-
-impl Bench {
-    fn new(origin: Nanoseconds) -> Self {
-        let config = parameters(NONE).machine_config().expect("valid");
-        let joints = joints(&config, "");
-        let simulation = Simulation::new(&config, joints.clone(), origin).expect("can be simulated");
-        Bench { simulation, joints, origin }
-    }
-
-    fn trajectory(&self, start: Start, names: &[&str], points: &[(Nanoseconds, &[f64])]) -> Arc<Trajectory> {
-        let mut request = Request::new(start, names.iter().map(|n| n.to_string()).collect());
-        for &(time, positions) in points {
-            request.push(time, Row { positions, ..Row::default() }).expect("well formed");
-        }
-        let context = Context {
-            joints: &self.joints,
-            period: TSP,
-            max_points: 100_000,
-            allow_nonzero_end_velocity: false,
-        };
-        Arc::new(Trajectory::new(request, &context).expect("within limits"))
-    }
-
-    fn ballbar(&self, start: Start) -> Arc<Trajectory> {
-        let trial = Ballbar::paper();
-        let last = (trial.duration() * 1e9 / TSP as f64).ceil() as i64;
-        let points: Vec<_> = (0..=last)
-            .map(|k| {
-                let p = trial.psec(k as f64 * 0.006);
-                (k * TSP, [p[0], p[1]])
-            })
-            .collect();
-        let points: Vec<(i64, &[f64])> = points.iter().map(|(t, p)| (*t, &p[..])).collect();
-        self.trajectory(start, &["x", "y"], &points)
-    }
-
-    /// Steps until nothing is asked; every axis's signals at each instant, and how motions ended.
-    fn run(&mut self) -> (Vec<Vec<u64>>, Vec<MotionEnd>) {
-        let (mut rows, mut ends) = (Vec::new(), Vec::new());
-        while self.simulation.is_busy() {
-            self.simulation.step();
-            let bits = |s: &virtual_axes::machine::AxisSample| {
-                [s.psec, s.position, s.velocity, s.current, s.voltage].map(f64::to_bits)
-            };
-            rows.push(self.simulation.samples().iter().flat_map(bits).collect());
-            ends.extend(self.simulation.take_ends());
-            assert!(rows.len() < 100_000, "it never settles");
-        }
-        (rows, ends)
-    }
-}
+use common::assert_near;
+use simulation_common::{Bench, NONE, TSP, X};
+use virtual_axes::simulation::{Abort, Outcome};
+use virtual_axes::trajectory::{MotionId, Start};
+use virtual_axes::units::SECOND_NS;
 
 #[test]
 fn waiting_before_a_trajectory_changes_no_bit_of_it() {
-    let mut at_once = Bench::new(0);
+    let mut at_once = Bench::new(NONE, 0);
     at_once.simulation.offer(MotionId(1), at_once.ballbar(Start::Now)).expect("accepted");
     let (rows, ends) = at_once.run();
     assert_eq!(ends.len(), 1);
 
-    let mut later = Bench::new(1_700_000_000 * SECOND_NS);
+    let mut later = Bench::new(NONE, 1_700_000_000 * SECOND_NS);
     for _ in 0..777 {
         later.simulation.step();
     }
@@ -98,7 +37,7 @@ fn waiting_before_a_trajectory_changes_no_bit_of_it() {
 
 #[test]
 fn the_report_of_the_ballbar_has_the_reference_numbers() {
-    let mut bench = Bench::new(0);
+    let mut bench = Bench::new(NONE, 0);
     bench.simulation.offer(MotionId(1), bench.ballbar(Start::Now)).expect("accepted");
     let (_, ends) = bench.run();
     let end = &ends[0];
@@ -114,7 +53,7 @@ fn the_report_of_the_ballbar_has_the_reference_numbers() {
 
 #[test]
 fn a_trajectory_of_one_joint_leaves_the_others_to_theirs() {
-    let mut bench = Bench::new(0);
+    let mut bench = Bench::new(NONE, 0);
     let slow = bench.trajectory(Start::Now, &["x", "y"], &[(0, &[0.0, 0.0]), (SECOND_NS, &[0.05, 0.05])]);
     let y = bench.trajectory(Start::At(SECOND_NS / 2), &["y"], &[(SECOND_NS, &[0.0])]);
     bench.simulation.offer(MotionId(1), slow).expect("accepted");
@@ -132,7 +71,7 @@ fn a_trajectory_of_one_joint_leaves_the_others_to_theirs() {
 
 #[test]
 fn a_load_acts_for_its_time_and_then_is_gone() {
-    let mut bench = Bench::new(0);
+    let mut bench = Bench::new(NONE, 0);
     bench.simulation.set_load(X, -800.0, SECOND_NS / 10);
     let mut loaded = 0;
     for _ in 0..100 {
@@ -146,7 +85,7 @@ fn a_load_acts_for_its_time_and_then_is_gone() {
 
 #[test]
 fn the_largest_load_leaves_every_number_finite() {
-    let mut bench = Bench::new(0);
+    let mut bench = Bench::new(NONE, 0);
     bench.simulation.set_load(X, f64::INFINITY, SECOND_NS);
     bench.simulation.set_load(2, f64::NAN, SECOND_NS);
     for _ in 0..300 {
@@ -162,7 +101,7 @@ fn the_largest_load_leaves_every_number_finite() {
 
 #[test]
 fn a_reset_aborts_what_moves_and_forgets_it() {
-    let mut bench = Bench::new(0);
+    let mut bench = Bench::new(NONE, 0);
     bench.simulation.offer(MotionId(1), bench.ballbar(Start::Now)).expect("accepted");
     for _ in 0..300 {
         bench.simulation.step();

@@ -3,6 +3,7 @@
 //! The node and the offline command run the same [`Simulation`]; the node paces it and computes
 //! nothing that the offline run does not.
 
+mod ask;
 mod load;
 mod motion;
 mod tolerance;
@@ -15,13 +16,12 @@ use std::sync::Arc;
 
 use crate::config::{AxisKind, MachineConfig, Periods};
 use crate::machine::{AxisSample, Machine, MachineError, MachineParameters};
-use crate::trajectory::{
-    Admission, Event, JointLimits, MotionId, Rejection, Timeline, TimelineError, Trajectory,
-};
+use crate::trajectory::{Event, JointLimits, Timeline, TimelineError};
 use crate::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
 
 use load::Loads;
-use motion::Motions;
+use motion::{Grid, Motions};
+use tolerance::Errors;
 
 /// Velocity below which an axis counts as standing, m/s or rad/s.
 const STANDSTILL: f64 = 1e-4;
@@ -56,8 +56,7 @@ pub struct Simulation {
     timeline: Timeline,
     /// Set-points of the next periods, as many for each axis.
     ahead: Vec<f64>,
-    origin: Nanoseconds,
-    period: Nanoseconds,
+    grid: Grid,
     /// The position instant that the next step computes.
     next: i64,
     /// Whether anything has moved the machine since it was last put at rest.
@@ -70,6 +69,8 @@ pub struct Simulation {
     /// Whether an axis was at a limit at any tick since the last sample.
     saturated: Vec<bool>,
     ends: Vec<MotionEnd>,
+    /// Of each axis, at the last instants.
+    errors: Vec<Errors>,
 }
 
 impl Simulation {
@@ -99,19 +100,19 @@ impl Simulation {
             saturated: vec![false; axes.len()],
             ahead: Vec::with_capacity(machine.horizon() * axes.len()),
             machine,
-            origin,
-            period,
+            grid: Grid { origin, period },
             next: 0,
             awake: false,
             settled_from: 0,
             samples,
             ends: Vec::new(),
+            errors: vec![Errors::default(); axes.len()],
         })
     }
 
     /// Time of position instant k, ns.
     pub fn time_of(&self, k: i64) -> Nanoseconds {
-        self.origin + k * self.period
+        self.grid.time_of(k)
     }
 
     /// The position instant that the next [`step`](Self::step) computes.
@@ -121,114 +122,12 @@ impl Simulation {
 
     /// Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
-        self.period
+        self.grid.period
     }
 
     /// The machine.
     pub fn machine(&self) -> &Machine {
         &self.machine
-    }
-
-    /// Gives the axes a trajectory; it takes effect at its start.
-    ///
-    /// # Errors
-    /// [`Rejection`] if it cannot follow what is commanded at its start; nothing changes then.
-    pub fn offer(&mut self, id: MotionId, trajectory: Arc<Trajectory>) -> Result<Admission, Rejection> {
-        let places = trajectory.joints().to_vec();
-        let admission = self.timeline.offer(id, trajectory, self.origin)?;
-        self.motions.accept(id, &places);
-        Ok(admission)
-    }
-
-    /// Likewise, and the motion ends as soon as it does not keep `tolerances`; see [`Outcome`].
-    ///
-    /// # Errors
-    /// As [`offer`](Self::offer).
-    pub fn offer_within(
-        &mut self,
-        id: MotionId,
-        trajectory: Arc<Trajectory>,
-        tolerances: Tolerances,
-    ) -> Result<Admission, Rejection> {
-        let _ = tolerances;
-        self.offer(id, trajectory)
-    }
-
-    /// Calls a motion off: its joints come to rest within their limits, and it ends as
-    /// [`Outcome::Cancelled`] when they are commanded to rest. One that waits is discarded. `false` if
-    /// there is no such motion.
-    pub fn cancel(&mut self, id: MotionId) -> bool {
-        let _ = id;
-        false
-    }
-
-    /// Continues at `time` (ns) with the next position instant, because the clock that is followed
-    /// jumped there: motions end as aborted, the axes come to rest where they are commanded to be.
-    pub fn jump_to(&mut self, time: Nanoseconds) {
-        let _ = time;
-    }
-
-    /// Sets one set-point of a stream, m or rad, for the next position instant; `false` while a
-    /// trajectory or a stop has the joint. It is commanded [`stream_delay`](Self::stream_delay)
-    /// later. A stream is no motion: it has no figures and no end.
-    ///
-    /// # Errors
-    /// [`Rejection`] as of [`Timeline::stream`]; nothing changes then.
-    pub fn stream(&mut self, place: usize, position: f64) -> Result<bool, Rejection> {
-        self.timeline.stream(place, position)
-    }
-
-    /// Delay of streamed set-points that is in effect, ns: as many position periods as the controllers
-    /// look ahead. After [`adopt`](Self::adopt) it changes when the stream pauses, see
-    /// [`Timeline::set_stream_delay`].
-    pub fn stream_delay(&self) -> Nanoseconds {
-        Nanoseconds::from(self.timeline.stream_delay()) * self.period
-    }
-
-    /// Whether a stream drives, moving or not: see [`Timeline::is_streaming`].
-    pub fn is_streaming(&self) -> bool {
-        self.timeline.is_streaming()
-    }
-
-    /// External force or torque on an axis (N or N·m, positive towards plus) from the next position
-    /// instant on, for `hold` ns; limited to ±[`MAX_LOAD`], and none if it is NaN.
-    pub fn set_load(&mut self, axis: usize, load: f64, hold: Nanoseconds) {
-        let until = self.next + hold.max(0).div_euclid(self.period).max(1);
-        self.loads.set(axis, load, until);
-    }
-
-    /// Takes over changed gains, weights or delays at the next position instant.
-    ///
-    /// # Errors
-    /// [`MachineError::AnotherMachine`] if joints or periods differ; nothing changes then.
-    pub fn adopt(&mut self, parameters: Arc<MachineParameters>) -> Result<(), MachineError> {
-        self.machine.adopt(parameters)?;
-        self.timeline.set_stream_delay(stream_delay(&self.machine));
-        Ok(())
-    }
-
-    /// Puts the machine back to rest at home; motions under way end as aborted.
-    pub fn reset(&mut self) {
-        let home = vec![0.0; self.machine.axis_count()];
-        // Home is finite and has one value per joint: this cannot be refused.
-        let _ = self.reset_to(&home);
-    }
-
-    /// Puts the machine to rest at `positions` (m or rad, one per joint); motions under way end as
-    /// aborted.
-    ///
-    /// # Errors
-    /// [`Rejection`] for a position that is not finite or not one per joint; nothing changes then.
-    pub fn reset_to(&mut self, positions: &[f64]) -> Result<(), Rejection> {
-        self.timeline.reset(positions)?;
-        self.machine.reset(positions);
-        self.loads.clear();
-        self.motions.abort_all(Abort::Reset, self.time_of(self.next), &mut self.ends);
-        self.saturated.fill(false);
-        self.awake = false;
-        self.settled_from = self.next;
-        self.take_samples();
-        Ok(())
     }
 
     /// Computes the next position instant: its samples, and the ticks up to the one after.
@@ -253,9 +152,16 @@ impl Simulation {
             self.look_ahead();
             self.run_ticks(observe);
         }
-        self.motions.finish(k, self.origin + k * self.period, &mut self.ends);
+        for (errors, sample) in self.errors.iter_mut().zip(&self.samples) {
+            errors.note(sample);
+        }
+        while let Some((id, violation)) = self.motions.strayed(&self.errors, self.grid.period) {
+            self.timeline.cancel(id);
+            self.motions.end(id, Outcome::PathTolerance(violation), self.time_of(k), &mut self.ends);
+        }
+        self.motions.finish(k, &self.errors, self.grid, &mut self.ends);
         if self.is_asked() {
-            self.settled_from = k + 1 + SETTLING / self.period;
+            self.settled_from = k + 1 + SETTLING / self.grid.period;
         }
         self.next = k + 1;
     }
@@ -274,6 +180,9 @@ impl Simulation {
         for event in self.timeline.events() {
             match *event {
                 Event::Started(id) => self.motions.start(id),
+                Event::Ended(id) if self.motions.is_cancelled(id) => {
+                    self.motions.end(id, Outcome::Cancelled, now, &mut self.ends);
+                }
                 Event::Ended(id) => self.motions.finish_at(id, k + delay),
                 Event::Displaced { id, by, .. } => {
                     self.motions.end(id, Outcome::Displaced { by }, now, &mut self.ends);
@@ -289,7 +198,7 @@ impl Simulation {
     fn longest_delay(&self) -> i64 {
         let tick = self.machine.periods().current;
         let delay = self.machine.longest_delay() as Nanoseconds * tick;
-        delay.unsigned_abs().div_ceil(self.period.unsigned_abs()) as i64
+        delay.unsigned_abs().div_ceil(self.grid.period.unsigned_abs()) as i64
     }
 
     /// The set-points that controllers read ahead, as they are known now.

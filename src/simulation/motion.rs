@@ -6,7 +6,7 @@ use crate::machine::Machine;
 use crate::trajectory::{MotionId, Timeline};
 use crate::units::Nanoseconds;
 
-use super::tolerance::Violation;
+use super::tolerance::{Errors, Tolerances, Violation, first_violation};
 
 /// How a motion ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +54,33 @@ pub struct MotionEnd {
     pub report: MotionReport,
 }
 
+/// Position instants as times.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    /// Time of instant 0, ns.
+    pub origin: Nanoseconds,
+    /// Tsp, ns.
+    pub period: Nanoseconds,
+}
+
+impl Grid {
+    /// Time of instant `k`, ns.
+    pub fn time_of(self, k: i64) -> Nanoseconds {
+        self.origin.saturating_add(k.saturating_mul(self.period))
+    }
+}
+
+/// What there is to be called off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Cancel {
+    /// No such motion.
+    Unknown,
+    /// A motion that is called off for the first time,
+    New,
+    /// or once more.
+    Known,
+}
+
 #[derive(Debug, Clone)]
 struct Motion {
     id: MotionId,
@@ -62,10 +89,20 @@ struct Motion {
     running: bool,
     /// The instant at which its last set-point has passed the delays.
     finishes: Option<i64>,
+    tolerances: Option<Tolerances>,
+    /// It has been called off, and is being stopped.
+    cancelled: bool,
 }
 
 impl Motion {
     fn into_end(self, outcome: Outcome, time: Nanoseconds) -> MotionEnd {
+        let outcome = match outcome {
+            // It was over for whoever asked for it before a successor or a stop came.
+            Outcome::Completed | Outcome::Displaced { .. } | Outcome::Stopped if self.cancelled => {
+                Outcome::Cancelled
+            }
+            outcome => outcome,
+        };
         MotionEnd { id: self.id, time, outcome, report: self.assessor.report(), places: self.places }
     }
 }
@@ -84,13 +121,15 @@ impl Motions {
         Motions { kinds, tick, horizon, list: Vec::new() }
     }
 
-    pub(super) fn accept(&mut self, id: MotionId, places: &[usize]) {
+    pub(super) fn accept(&mut self, id: MotionId, places: &[usize], tolerances: Option<Tolerances>) {
         self.list.push(Motion {
             id,
             places: places.to_vec(),
             assessor: MotionAssessor::new(places, &self.kinds, self.tick, self.horizon),
             running: false,
             finishes: None,
+            tolerances,
+            cancelled: false,
         });
     }
 
@@ -112,10 +151,21 @@ impl Motions {
         }
     }
 
+    /// The last set-point of a motion has been commanded; it has passed the delays at instant `k`.
     pub(super) fn finish_at(&mut self, id: MotionId, k: i64) {
         if let Some(motion) = self.find(id) {
             motion.finishes = Some(k);
         }
+    }
+
+    /// Notes that a motion is called off.
+    pub(super) fn cancel(&mut self, id: MotionId) -> Cancel {
+        let Some(motion) = self.find(id) else { return Cancel::Unknown };
+        if std::mem::replace(&mut motion.cancelled, true) { Cancel::Known } else { Cancel::New }
+    }
+
+    pub(super) fn is_cancelled(&self, id: MotionId) -> bool {
+        self.list.iter().any(|m| m.id == id && m.cancelled)
     }
 
     pub(super) fn end(
@@ -130,11 +180,51 @@ impl Motions {
         }
     }
 
-    /// Completes the motions whose last set-points have passed the delays at instant `k`.
-    pub(super) fn finish(&mut self, k: i64, time: Nanoseconds, ends: &mut Vec<MotionEnd>) {
-        while let Some(place) = self.list.iter().position(|m| m.finishes.is_some_and(|f| k >= f)) {
-            ends.push(self.list.remove(place).into_end(Outcome::Completed, time));
+    /// The first motion that strays from its path further than its tolerances allow.
+    pub(super) fn strayed(&self, errors: &[Errors], period: Nanoseconds) -> Option<(MotionId, Violation)> {
+        let under_way = self.list.iter().filter(|m| m.running && !m.cancelled);
+        under_way.filter_map(|m| Some((m, m.tolerances.as_ref()?))).find_map(|(motion, tolerances)| {
+            let violation = first_violation(&motion.places, &tolerances.path, errors, period)?;
+            Some((motion.id, violation))
+        })
+    }
+
+    /// Ends the motions whose last set-points have passed the delays at instant `k`, as soon as they are
+    /// within their goal tolerances, have no time left to get there, or lost an axis to a successor.
+    pub(super) fn finish(&mut self, k: i64, errors: &[Errors], grid: Grid, ends: &mut Vec<MotionEnd>) {
+        let mut place = 0;
+        while let Some(motion) = self.list.get(place) {
+            match motion
+                .finishes
+                .and_then(|finishes| self.outcome_at_goal(motion, k - finishes, errors, grid))
+            {
+                Some(outcome) => ends.push(self.list.remove(place).into_end(outcome, grid.time_of(k))),
+                None => place += 1,
+            }
         }
+    }
+
+    /// How a motion ends `late` instants after its set-points have passed the delays; none: not yet.
+    fn outcome_at_goal(&self, motion: &Motion, late: i64, errors: &[Errors], grid: Grid) -> Option<Outcome> {
+        if late < 0 {
+            return None;
+        }
+        let Some(tolerances) = motion.tolerances.as_ref().filter(|_| !motion.cancelled) else {
+            return Some(Outcome::Completed);
+        };
+        let Some(violation) = first_violation(&motion.places, &tolerances.goal, errors, grid.period) else {
+            return Some(Outcome::Completed);
+        };
+        let takes_over = |other: &&Motion| {
+            other.running
+                && other.finishes.is_none()
+                && other.places.iter().any(|p| motion.places.contains(p))
+        };
+        if let Some(successor) = self.list.iter().find(takes_over) {
+            return Some(Outcome::Displaced { by: successor.id });
+        }
+        let in_time = tolerances.goal_time.is_none_or(|allowed| late.saturating_mul(grid.period) < allowed);
+        (!in_time).then_some(Outcome::GoalTolerance(violation))
     }
 
     pub(super) fn abort_all(&mut self, why: Abort, time: Nanoseconds, ends: &mut Vec<MotionEnd>) {

@@ -1,6 +1,13 @@
 //! How far a motion may stray, as `control_msgs/FollowJointTrajectory` asks for it.
+//!
+//! With e the synchronised tracking error of an axis at position instant k, the errors are
+//!
+//! ```text
+//! position e[k]    velocity (e[k] − e[k−1])/Tsp    acceleration (e[k] − 2 e[k−1] + e[k−2])/Tsp²
+//! ```
 
-use crate::units::Nanoseconds;
+use crate::machine::AxisSample;
+use crate::units::{Nanoseconds, seconds};
 
 /// Largest error of a joint that is allowed; none is any.
 ///
@@ -50,4 +57,45 @@ pub struct Violation {
     pub error: f64,
     /// What was allowed.
     pub limit: f64,
+}
+
+/// The errors of one axis at the last three position instants, the newest first.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Errors([f64; 3]);
+
+impl Errors {
+    /// Takes the next instant in.
+    pub fn note(&mut self, sample: &AxisSample) {
+        let [newest, before, _] = self.0;
+        self.0 = [sample.synchronized_tracking_error(), newest, before];
+    }
+
+    /// Of the axis at `place`, the first quantity that is not within `tolerance`; `period` is Tsp, ns.
+    pub fn violation(&self, place: usize, tolerance: &Tolerance, period: Nanoseconds) -> Option<Violation> {
+        let [newest, before, earlier] = self.0;
+        let tsp = seconds(period);
+        [
+            (Quantity::Position, newest, tolerance.position),
+            (Quantity::Velocity, (newest - before) / tsp, tolerance.velocity),
+            (Quantity::Acceleration, (newest - 2.0 * before + earlier) / tsp.powi(2), tolerance.acceleration),
+        ]
+        .into_iter()
+        .find_map(|(quantity, error, limit)| {
+            let limit = limit?;
+            (error.abs() > limit).then_some(Violation { place, quantity, error, limit })
+        })
+    }
+}
+
+/// The first violation among the axes at `places`, one tolerance each.
+pub(super) fn first_violation(
+    places: &[usize],
+    tolerances: &[Tolerance],
+    errors: &[Errors],
+    period: Nanoseconds,
+) -> Option<Violation> {
+    places
+        .iter()
+        .zip(tolerances)
+        .find_map(|(&place, tolerance)| errors.get(place)?.violation(place, tolerance, period))
 }

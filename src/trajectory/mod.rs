@@ -15,6 +15,7 @@ pub mod stop;
 pub mod stream;
 pub mod timeline;
 
+mod cancel;
 mod check;
 mod motions;
 mod offer;

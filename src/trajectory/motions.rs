@@ -63,6 +63,11 @@ impl Motions {
         }
     }
 
+    /// The slot of a motion that is not over.
+    pub fn find(&self, id: MotionId) -> Option<usize> {
+        self.slots.iter().position(|motion| motion.as_ref().is_some_and(|m| m.id == id && !m.closed))
+    }
+
     pub fn start(&mut self, slot: Option<usize>, events: &mut Vec<Event>) {
         if let Some(motion) = slot.and_then(|slot| self.slots[slot].as_mut())
             && !motion.started

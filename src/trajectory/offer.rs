@@ -89,21 +89,7 @@ impl Timeline {
         let mut last_k = join_k;
         for &joint in trajectory.joints() {
             self.stop_all(joint, Some(id));
-            let track = &mut self.tracks[joint];
-            let stop = self.planner.plan(track.state, &self.joints[joint].limits);
-            let periods = (stop.duration() / seconds(self.period)).ceil() as i64;
-            let end_k = (join_k - 1).saturating_add(periods).max(join_k);
-            last_k = last_k.max(end_k);
-            let begin = i128::from(join_k) * i128::from(self.period);
-            track.queue.truncate(1);
-            track.queue.push_back(Plan {
-                slot: Some(slot),
-                join_k,
-                end_k,
-                nominal_start: begin,
-                nominal_end: i128::from(end_k) * i128::from(self.period),
-                kind: Kind::Stop { from_k: join_k - 1, stop },
-            });
+            last_k = last_k.max(self.brake(joint, Some(slot)));
         }
         self.motions.settle(&mut self.pending);
         Admission { start_k: join_k, join_k, end_k: last_k, joined_late: false }
