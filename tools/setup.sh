@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes what the Python side needs, inside the checkout: .venv (rclpy and the message generators),
-# .build/install (this package's messages) and .build/env.sh, which a shell sources to use both.
+# .build/install (the messages of this package and of control_msgs) and .build/env.sh, which a shell sources to use both.
 #
 #     tools/setup.sh [--browser] && source .build/env.sh
 #
@@ -13,6 +13,8 @@ root=$PWD
 venv=$root/.venv
 build=$root/.build
 logs=$build/logs
+# The interfaces of control_msgs that the tests speak; PyPI does not have that package.
+overlay=test_py/overlay/control_msgs
 
 fail() {
   echo "setup: $*" >&2
@@ -103,9 +105,11 @@ make_messages() {
   rm -rf "$build/install" "$build/messages"
   mkdir -p "$source"
   cp -r package.xml CMakeLists.txt msg "$source"
+  # Beside it, since colcon looks into no package for others.
+  cp -r "$overlay" "$build/messages"
   PATH=$venv/bin:$PATH VIRTUAL_ENV=$venv AMENT_PREFIX_PATH=$venv CMAKE_PREFIX_PATH=$venv PYTHONPATH='' \
     COLCON_HOME=$build/colcon "$venv/bin/colcon" --log-base "$logs/colcon" build --merge-install \
-    --paths "$source" --build-base "$build/messages/build" --install-base "$build/install" \
+    --paths "$source" "$build/messages/control_msgs" --build-base "$build/messages/build" --install-base "$build/install" \
     --cmake-args -G Ninja -DPython3_EXECUTABLE="$venv/bin/python" -DBUILD_TESTING=OFF \
     -DVIRTUAL_AXES_BUILD_NODE=OFF -DCMAKE_BUILD_TYPE=Release
   cat >"$build/env.sh" <<END
@@ -116,7 +120,8 @@ export LD_LIBRARY_PATH="$build/install/lib:$venv/lib\${LD_LIBRARY_PATH:+:\$LD_LI
 export PYTHONPATH="$(echo "$build"/install/lib/python3*/site-packages)"
 END
   # shellcheck source=/dev/null
-  (source "$build/env.sh" && python -c 'from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult')
+  (source "$build/env.sh" && python -c 'from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult
+from control_msgs.action import FollowJointTrajectory')
 }
 
 # The checkout's own path is an input: a virtual environment does not survive being moved.
@@ -129,7 +134,8 @@ is_done() { # stamp file, hash
 }
 
 venv_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt)
-messages_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt package.xml CMakeLists.txt msg/*.msg)
+messages_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt package.xml CMakeLists.txt msg/*.msg \
+  "$overlay"/package.xml "$overlay"/CMakeLists.txt "$overlay"/*/*.msg "$overlay"/*/*.action)
 venv_stamp=$venv/setup.stamp
 messages_stamp=$build/messages.stamp
 
