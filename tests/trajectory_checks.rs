@@ -32,6 +32,9 @@ fn codes_keep_their_numbers() {
         (Code::VelocityAtEnd, 12),
         (Code::InvalidTime, 13),
         (Code::QueueFull, 14),
+        (Code::InvalidTolerance, 15),
+        (Code::MultiDof, 16),
+        (Code::TooManyGoals, 17),
     ];
     for (code, number) in codes {
         assert_eq!(code as u8, number);

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Makes what the Python side needs, inside the checkout: .venv (rclpy and the message generators),
-# .build/install (the messages of this package and of control_msgs) and .build/env.sh, which a shell sources to use both.
+# .build/install (the messages of this package, and of control_msgs as far as the node speaks them)
+# and .build/env.sh, which a shell sources to use both.
 #
 #     tools/setup.sh [--browser] && source .build/env.sh
 #
@@ -153,7 +154,7 @@ fi
 if ! is_done "$messages_stamp" "$messages_hash"; then
   check_tools
   rm -f "$messages_stamp"
-  step "messages of virtual_axes into .build" messages make_messages
+  step "messages into .build" messages make_messages
   echo "$messages_hash" >"$messages_stamp"
 fi
 if [ "${1:-}" = --browser ]; then install_browser; fi

@@ -3,7 +3,7 @@
 use super::check::to_ns;
 use super::parameters::Parameters;
 use super::value::Value;
-use crate::units::{Nanoseconds, SECOND_NS};
+use crate::units::{DEGREE, MILLIMETRE, Nanoseconds, SECOND_NS};
 
 /// What the node's clock follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +42,19 @@ pub struct NodeConfig {
     pub max_points: usize,
     /// Whether a trajectory may end with a velocity.
     pub allow_nonzero_velocity_at_trajectory_end: bool,
+    /// Rate of the action's feedback, Hz.
+    pub action_monitor_rate: f64,
+}
+
+/// Tolerances of action goals that name none themselves.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct GoalDefaults {
+    /// Largest error of each axis on the way, m or rad; `None` is any.
+    pub path: Vec<Option<f64>>,
+    /// Likewise at the end.
+    pub goal: Vec<Option<f64>>,
+    /// How much later than its end a goal may be reached, ns; `None` is any time.
+    pub goal_time: Option<Nanoseconds>,
 }
 
 impl Parameters {
@@ -79,6 +92,29 @@ impl Parameters {
             load_timeout: to_ns(number("load_timeout"), SECOND_NS),
             max_points,
             allow_nonzero_velocity_at_trajectory_end: self.flag("allow_nonzero_velocity_at_trajectory_end"),
+            action_monitor_rate: number("action_monitor_rate"),
+        }
+    }
+
+    /// Tolerances of action goals that name none themselves, for the axes in the order of `joints`.
+    pub fn goal_defaults(&self) -> GoalDefaults {
+        // 0 and a key that an axis of this kind does not have are no tolerance.
+        let positive = |key: &str| self.number(key).ok().filter(|&value| value > 0.0);
+        let column = |what: &str| {
+            let tolerance = |joint: &String| {
+                let key = |unit: &str| format!("{joint}.tolerances.{what}_{unit}");
+                let linear = positive(&key("mm")).map(|value| value * MILLIMETRE);
+                linear.or_else(|| positive(&key("deg")).map(|value| value * DEGREE))
+            };
+            match self.get("joints") {
+                Some(Value::TextList(joints)) => joints.iter().map(tolerance).collect(),
+                _ => Vec::new(),
+            }
+        };
+        GoalDefaults {
+            path: column("path"),
+            goal: column("goal"),
+            goal_time: positive("goal_time_tolerance").map(|value| to_ns(value, SECOND_NS)),
         }
     }
 }

@@ -31,6 +31,10 @@ const DEVIATION: (f64, f64) = (0.1, 10.0);
 const POSITIVE: f64 = 1e-9;
 /// Largest gain of a loop, in its unit.
 const GAIN: f64 = 1e9;
+/// Largest default tolerance of an action goal: any error is smaller.
+const TOLERANCE_MM: f64 = 1e6;
+/// Likewise.
+const TOLERANCE_DEG: f64 = 1e6;
 /// Shortest and longest integral time, ms; zero would divide by zero.
 const INTEGRAL_TIME_MS: (f64, f64) = (1e-3, 1e6);
 /// Most coefficients of R and of S; a design on a model of the drive's order has fewer than ten.
@@ -77,6 +81,11 @@ const fn horizon(key: &'static str, default: i64) -> Definition {
 /// A factor of the plant, live.
 const fn deviation(key: &'static str) -> Definition {
     Definition::number(key, "", DEVIATION.0, DEVIATION.1).of_axis().default(Number(1.0)).live()
+}
+
+/// The largest error of an axis that goals of the action are held to, live.
+const fn tolerance(key: &'static str, unit: &'static str, max: f64) -> Definition {
+    Definition::number(key, unit, 0.0, max).default(Number(0.0)).live()
 }
 
 /// A coordinate of a point of the machine, home in the origin.
@@ -324,4 +333,17 @@ const MACHINE: &[Definition] = &[
         .on(Rotary)
         .optional()
         .is("Upper end of the stroke; none when left out. Home is 0."),
+    // Default tolerances of action goals, on the synchronised tracking error.
+    tolerance("tolerances.path_mm", "mm", TOLERANCE_MM)
+        .on(Linear)
+        .is("Largest error on the way of an action goal that names none; 0 is any."),
+    tolerance("tolerances.path_deg", "°", TOLERANCE_DEG)
+        .on(Rotary)
+        .is("Largest error on the way of an action goal that names none; 0 is any."),
+    tolerance("tolerances.goal_mm", "mm", TOLERANCE_MM)
+        .on(Linear)
+        .is("Largest error at the end of an action goal that names none; 0 is any."),
+    tolerance("tolerances.goal_deg", "°", TOLERANCE_DEG)
+        .on(Rotary)
+        .is("Largest error at the end of an action goal that names none; 0 is any."),
 ];

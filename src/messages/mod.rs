@@ -1,16 +1,22 @@
 //! ROS messages as values, without a network: this package's own, conversions from and to what the
 //! library computes with, and their definitions. Messages are converted here and nowhere else.
 
+mod control;
 mod own;
 mod schema;
 mod state;
 mod time;
 mod trajectory;
 
+pub use control::{
+    CONTROL_PACKAGE, ErrorCode, FeedbackMessage, FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult, GetResultRequest, GetResultResponse, JointComponentTolerance,
+    JointTolerance, JointTrajectoryControllerState, SendGoalRequest, SendGoalResponse,
+};
 pub use own::{DriveStates, MotorCurrents, PACKAGE, Source, Status, TrajectoryResult};
 pub use ros2_interfaces_jazzy_serde::{
-    builtin_interfaces, diagnostic_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs,
-    trajectory_msgs,
+    action_msgs, builtin_interfaces, diagnostic_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs, std_msgs,
+    std_srvs, trajectory_msgs, unique_identifier_msgs,
 };
 pub use schema::Schema;
 pub use state::Sampled;

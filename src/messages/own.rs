@@ -74,6 +74,8 @@ pub struct TrajectoryResult {
 pub enum Source {
     /// The topic `psec`.
     Topic = 0,
+    /// A goal of `~/follow_joint_trajectory`.
+    Action = 1,
 }
 
 /// `ACCEPTED` … `ABORTED` of `msg/TrajectoryResult.msg`.
@@ -88,9 +90,9 @@ pub enum Status {
     Completed = 2,
     /// A newer one took axes over.
     Displaced = 3,
-    /// Ended by a controlled stop.
+    /// Ended by a controlled stop, or called off.
     Stopped = 4,
-    /// Ended by a reset.
+    /// Ended by a reset, a clock that jumped, or a tolerance that was not kept.
     Aborted = 5,
 }
 

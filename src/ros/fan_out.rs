@@ -12,11 +12,13 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 use tracing::info;
 
+use super::action::Feedback;
 use super::convert;
 use super::diagnostics::Diagnostics;
 use super::outputs::Output;
 use super::pace::{Frame, Health};
-use crate::messages::{DriveStates, MotorCurrents};
+use super::setpoints::{SetpointVelocities, controller_state};
+use crate::messages::{DriveStates, JointTrajectoryControllerState, MotorCurrents};
 
 /// Period of `/diagnostics` (REP-107).
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
@@ -39,6 +41,10 @@ pub struct FanOut {
     pub motor_currents: Output<MotorCurrents>,
     /// `~/drive_states`.
     pub drive_states: Output<DriveStates>,
+    /// `~/controller_state`.
+    pub controller_state: Output<JointTrajectoryControllerState>,
+    /// Of the action.
+    pub feedback: Feedback,
     /// `/clock`, in `fast`.
     pub clock: Option<ClockOutput>,
     /// Joints, with prefix.
@@ -50,7 +56,9 @@ pub struct FanOut {
 impl FanOut {
     /// Publishes frames until the simulation ends.
     pub async fn run(self, mut frames: mpsc::Receiver<Frame>) {
+        let mut setpoints = SetpointVelocities::default();
         while let Some(frame) = frames.recv().await {
+            let velocities = setpoints.update(&frame);
             if let Some(clock) = &self.clock
                 && !clock.silent.load(Ordering::Relaxed)
             {
@@ -60,7 +68,9 @@ impl FanOut {
                 self.joint_states.send(convert::joint_state(&frame, &self.joints)).await;
                 self.motor_currents.send(convert::motor_currents(&frame, &self.joints)).await;
                 self.drive_states.send(convert::drive_states(&frame, &self.joints)).await;
+                self.controller_state.send(controller_state(&frame, velocities, &self.joints)).await;
             }
+            self.feedback.frame(&frame, velocities).await;
         }
     }
 }

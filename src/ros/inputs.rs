@@ -15,20 +15,42 @@ use super::pace::{Command, Health};
 use super::parameter_host::LiveNodeParameters;
 use super::results::{Origin, Results};
 use super::stream::Setpoints;
-use crate::config::NodeConfig;
 use crate::trajectory::{Context, JointLimits, MotionId, Rejection, Trajectory};
 use crate::units::Nanoseconds;
 
-/// Takes trajectories in, makes the checks that need no state, and hands them to the simulation.
-pub struct PsecInput {
+/// The checks of a trajectory that need no state of the axes.
+pub struct Checks {
     /// Joints that trajectories may name, with their limits.
     pub joints: Vec<JointLimits>,
     /// Tsp, ns.
     pub period: Nanoseconds,
-    /// Parameters of the node.
-    pub node: NodeConfig,
-    /// Those of them that can be set.
+    /// Largest number of points.
+    pub max_points: usize,
+    /// Parameters of the node that can be set.
     pub live: Arc<LiveNodeParameters>,
+}
+
+impl Checks {
+    /// A message as a trajectory that can be offered to the axes.
+    ///
+    /// # Errors
+    /// The first fault found.
+    pub fn check(&self, message: &JointTrajectory) -> Result<Trajectory, Rejection> {
+        let request = convert::request(message, self.max_points)?;
+        let context = Context {
+            joints: &self.joints,
+            period: self.period,
+            max_points: self.max_points,
+            allow_nonzero_end_velocity: self.live.allow_nonzero_end_velocity.load(Ordering::Relaxed),
+        };
+        Trajectory::new(request, &context)
+    }
+}
+
+/// Takes trajectories in, makes the checks that need no state, and hands them to the simulation.
+pub struct PsecInput {
+    /// Those checks.
+    pub checks: Arc<Checks>,
     /// To the simulation.
     pub commands: mpsc::Sender<Command>,
     /// Where decisions are published.
@@ -59,7 +81,7 @@ impl PsecInput {
     async fn take(&self, message: JointTrajectory, info: &MessageInfo) {
         let origin = Origin::of(&message.header.stamp, info);
         // A large trajectory takes a while to check; other tasks go on meanwhile.
-        let checked = tokio::task::block_in_place(|| self.check(&message));
+        let checked = tokio::task::block_in_place(|| self.checks.check(&message));
         match checked {
             Ok(trajectory) => {
                 let id = next_id(&self.ids);
@@ -73,17 +95,6 @@ impl PsecInput {
                 self.results.rejected(&origin, now, &rejection).await;
             }
         }
-    }
-
-    fn check(&self, message: &JointTrajectory) -> Result<Trajectory, Rejection> {
-        let request = convert::request(message, self.node.max_points)?;
-        let context = Context {
-            joints: &self.joints,
-            period: self.period,
-            max_points: self.node.max_points,
-            allow_nonzero_end_velocity: self.live.allow_nonzero_end_velocity.load(Ordering::Relaxed),
-        };
-        Trajectory::new(request, &context)
     }
 }
 

@@ -3,6 +3,7 @@
 //! `pace` owns the simulation and the clock and never waits for the network in real time; the rest
 //! runs on tokio and talks to it through bounded channels.
 
+mod action;
 pub mod args;
 mod ask_again;
 mod convert;
@@ -25,6 +26,7 @@ mod results;
 pub mod rosout;
 mod rtps;
 mod service;
+mod setpoints;
 mod stream;
 mod topics;
 mod trigger;

@@ -11,6 +11,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 use tracing::{info, warn};
 
+use super::action::{ActionServer, Ending, Feedback, GoalChecks, Tell, Work, feedback_period};
 use super::args::RosArgs;
 use super::ask_again;
 use super::convert;
@@ -18,7 +19,7 @@ use super::diagnostics::Diagnostics;
 use super::endpoints::EndpointError;
 use super::environment::Environment;
 use super::fan_out::{ClockOutput, FanOut, publish_diagnostics, watch_clock};
-use super::inputs::{PsecInput, next_id, take_loads, take_stream};
+use super::inputs::{Checks, PsecInput, next_id, take_loads, take_stream};
 use super::log::LogRecord;
 use super::outputs::{Publishing, WhenFull, queue_length};
 use super::pace::{self, Channels, Command, Health};
@@ -129,7 +130,9 @@ async fn serve(
     let options = NodeOptions::new().start_parameter_services(false).enable_rosout(args.log_sinks().rosout);
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
-    let topics = Topics::create(&mut node, args, &parameters, fast)?;
+    let mut topics = Topics::create(&mut node, args, &parameters, fast)?;
+    let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
+    topics.names.goals_on.push(action_topics.name);
     let reset = Trigger::new(&mut node, &context, args, "reset")?;
     let stop = Trigger::new(&mut node, &context, args, "stop")?;
     let parameter_services = ParameterServices::new(&mut node, &context, args)?;
@@ -149,14 +152,24 @@ async fn serve(
 
     // What goes out.
     let mut publishing = Publishing { dropped: &dropped, tasks: &mut tasks };
-    let results = Results::new(publishing.start(topics.results, WhenFull::Wait), joints.clone());
-    let results = Arc::new(results);
+    let (goal_events, events) = mpsc::unbounded_channel();
+    let results_output = publishing.start(topics.results, WhenFull::Wait);
+    let results = Arc::new(Results::new(results_output, joint_limits.clone(), goal_events));
     let diagnostics = publishing.start(topics.diagnostics, WhenFull::Drop);
     let every = node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * seconds(period))).round() as i64);
+    let (running, running_goals) = watch::channel(Arc::from([]));
+    let status = publishing.start(action_topics.status, WhenFull::Wait);
     let outputs = FanOut {
         joint_states: publishing.start(topics.joint_states, when_full),
         motor_currents: publishing.start(topics.motor_currents, when_full),
         drive_states: publishing.start(topics.drive_states, when_full),
+        controller_state: publishing.start(topics.controller_state, when_full),
+        feedback: Feedback {
+            goals: running_goals,
+            output: publishing.start(action_topics.feedback, when_full),
+            joints: joints.clone(),
+            every: feedback_period(node_config.action_monitor_rate, period),
+        },
         clock: topics.clock.map(|(publisher, name)| ClockOutput {
             output: publishing.start(publisher, when_full),
             silent: watch_clock(dds.clone(), name, publishing.tasks),
@@ -170,11 +183,23 @@ async fn serve(
     // What comes in.
     tasks.spawn(ask_again::run(dds.clone()));
     let stop_all = stop_request(&joint_limits, period, node_config.max_points);
-    let psec_input = PsecInput {
+    let checks = Arc::new(Checks {
         joints: joint_limits,
         period,
-        node: node_config.clone(),
+        max_points: node_config.max_points,
         live: Arc::clone(&live),
+    });
+    let (action_end, end) = Ending::pair();
+    let tell = Tell {
+        checks: GoalChecks { checks: Arc::clone(&checks) },
+        commands: commands.clone(),
+        results: Arc::clone(&results),
+        health: health.clone(),
+        ids: Arc::clone(&ids),
+    };
+    tasks.spawn(action.serve(Work { tell, events, running, status, end }));
+    let psec_input = PsecInput {
+        checks,
         commands: commands.clone(),
         results: Arc::clone(&results),
         health: health.clone(),
@@ -219,6 +244,7 @@ async fn serve(
         .map_err(|source| NodeError::System { what: "start the axes' thread", source })?;
 
     signals.wait().await;
+    let _ = tokio::time::timeout(SHUTDOWN_TIMEOUT, action_end.end()).await;
     // Outputs stop taking, so that the thread cannot wait for them; then the thread, then the rest.
     let _ = tokio::time::timeout(SHUTDOWN_TIMEOUT, commands.send(Command::Shutdown)).await;
     if tokio::time::timeout(SHUTDOWN_TIMEOUT, tasks.shutdown()).await.is_err() {

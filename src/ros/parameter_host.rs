@@ -1,13 +1,13 @@
 //! The schema's parameters as the parameter services see them.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use tokio::sync::mpsc;
 
 use super::pace::Command;
 use super::parameter_services::{Descriptor, ParameterHost, ParameterType, ParameterValue, Range};
-use crate::config::{Assignment, Definition, Kind, Parameters, Source, Value};
+use crate::config::{Assignment, Definition, GoalDefaults, Kind, Parameters, Source, Value};
 use crate::machine::MachineParameters;
 
 /// Node parameters that other tasks read while they can be set.
@@ -15,6 +15,14 @@ use crate::machine::MachineParameters;
 pub struct LiveNodeParameters {
     /// `allow_nonzero_velocity_at_trajectory_end`.
     pub allow_nonzero_end_velocity: AtomicBool,
+    goal_defaults: Mutex<Arc<GoalDefaults>>,
+}
+
+impl LiveNodeParameters {
+    /// Tolerances of action goals that name none themselves.
+    pub fn goal_defaults(&self) -> Arc<GoalDefaults> {
+        Arc::clone(&self.goal_defaults.lock().unwrap_or_else(PoisonError::into_inner))
+    }
 }
 
 /// Checks what is set against the schema, and hands it to the simulation as a command.
@@ -39,6 +47,8 @@ impl Host {
     fn update_live(&self) {
         let allow = self.parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
         self.live.allow_nonzero_end_velocity.store(allow, Ordering::Relaxed);
+        let defaults = Arc::new(self.parameters.goal_defaults());
+        *self.live.goal_defaults.lock().unwrap_or_else(PoisonError::into_inner) = defaults;
     }
 }
 

@@ -1,37 +1,59 @@
 //! `~/trajectory_result`: what became of each trajectory, so that its publisher finds its own.
 
 use std::collections::HashMap;
+use std::fmt;
 use std::sync::Arc;
 
 use ros2_client::MessageInfo;
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
-use tokio::sync::Mutex;
+use tokio::sync::{Mutex, mpsc};
 use tracing::{info, warn};
 
+use super::action::{GoalEvent, GoalId, goal_name};
 use super::convert::{header, stamp};
 use super::outputs::Output;
 use super::pace::{Accepted, Report};
 use crate::assess::AxisReport;
 use crate::messages::{Source, Status, TrajectoryResult};
-use crate::simulation::{Abort, MotionEnd, Outcome};
-use crate::trajectory::{MotionId, Rejection, Trajectory};
+use crate::simulation::{Abort, MotionEnd, Outcome, Quantity, Violation};
+use crate::trajectory::{JointLimits, MotionId, Rejection, Trajectory};
 use crate::units::{Nanoseconds, seconds};
 
 /// Where a trajectory came from.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Origin {
-    /// `header.stamp` as it came.
-    pub stamp: Time,
-    /// The middleware's, per publisher.
-    pub sequence_number: u64,
-    /// The middleware's id of the publisher.
-    pub publisher_gid: [u8; 16],
+pub enum Origin {
+    /// The topic `psec`.
+    Topic {
+        /// `header.stamp` as it came.
+        stamp: Time,
+        /// The middleware's, per publisher.
+        sequence_number: u64,
+        /// The middleware's id of the publisher.
+        publisher_gid: [u8; 16],
+    },
+    /// A goal of the action.
+    Action {
+        /// `header.stamp` of its trajectory as it came.
+        stamp: Time,
+        /// Its name.
+        goal_id: GoalId,
+    },
+}
+
+/// As texts name it.
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Origin::Topic { sequence_number, .. } => write!(f, "trajectory {sequence_number} of psec"),
+            Origin::Action { goal_id, .. } => f.write_str(&goal_name(goal_id)),
+        }
+    }
 }
 
 impl Origin {
     /// Origin of a message on `psec`.
     pub fn of(stamp: &Time, info: &MessageInfo) -> Self {
-        Origin {
+        Origin::Topic {
             stamp: stamp.clone(),
             sequence_number: u64::try_from(info.sequence_number()).unwrap_or(0),
             publisher_gid: info.publisher_gid().to_bytes16(),
@@ -39,14 +61,19 @@ impl Origin {
     }
 
     fn result(&self, time: Nanoseconds, status: Status) -> TrajectoryResult {
-        TrajectoryResult {
-            header: header(time),
-            source: Source::Topic as u8,
-            trajectory_stamp: self.stamp.clone(),
-            sequence_number: self.sequence_number,
-            publisher_gid: self.publisher_gid,
-            status: status as u8,
-            ..TrajectoryResult::default()
+        let result =
+            TrajectoryResult { header: header(time), status: status as u8, ..TrajectoryResult::default() };
+        match self.clone() {
+            Origin::Topic { stamp, sequence_number, publisher_gid } => TrajectoryResult {
+                source: Source::Topic as u8,
+                trajectory_stamp: stamp,
+                sequence_number,
+                publisher_gid,
+                ..result
+            },
+            Origin::Action { stamp, goal_id } => {
+                TrajectoryResult { source: Source::Action as u8, trajectory_stamp: stamp, goal_id, ..result }
+            }
         }
     }
 }
@@ -62,14 +89,20 @@ struct Known {
 /// Publishes results, and remembers the trajectories that have none yet.
 pub struct Results {
     output: Output<TrajectoryResult>,
-    joints: Vec<String>,
+    joints: Vec<JointLimits>,
+    /// What becomes of goals; at most two events for each.
+    goals: mpsc::UnboundedSender<GoalEvent>,
     known: Mutex<HashMap<MotionId, Known>>,
 }
 
 impl Results {
-    /// Results of a machine with `joints`.
-    pub fn new(output: Output<TrajectoryResult>, joints: Vec<String>) -> Self {
-        Results { output, joints, known: Mutex::new(HashMap::new()) }
+    /// Results of a machine with `joints`; those of action goals go to `goals` too.
+    pub fn new(
+        output: Output<TrajectoryResult>,
+        joints: Vec<JointLimits>,
+        goals: mpsc::UnboundedSender<GoalEvent>,
+    ) -> Self {
+        Results { output, joints, goals, known: Mutex::new(HashMap::new()) }
     }
 
     /// Remembers where a trajectory came from, before the simulation is asked.
@@ -86,6 +119,9 @@ impl Results {
                 let known = self.known.lock().await.remove(&id);
                 if let Some(known) = known {
                     self.rejected(&known.origin, time, &rejection).await;
+                    if let Origin::Action { goal_id, .. } = known.origin {
+                        self.tell(GoalEvent::Refused(goal_id, rejection));
+                    }
                 }
             }
             Report::Ended(end) => self.ended(end).await,
@@ -94,7 +130,7 @@ impl Results {
 
     /// Publishes a refusal at `time` (ns).
     pub async fn rejected(&self, origin: &Origin, time: Nanoseconds, rejection: &Rejection) {
-        warn!("trajectory {} refused: {rejection}", origin.sequence_number);
+        warn!("{origin} refused: {rejection}");
         let index = rejection.index.and_then(|index| i32::try_from(index).ok());
         self.output
             .send(TrajectoryResult {
@@ -109,6 +145,25 @@ impl Results {
             .await;
     }
 
+    /// Passes an event on; nobody hears it when the node shuts down.
+    fn tell(&self, event: GoalEvent) {
+        let _ = self.goals.send(event);
+    }
+
+    /// Which tolerance was not kept: `path` or `goal`.
+    fn violation(&self, tolerance: &str, violation: &Violation) -> String {
+        let Violation { place, quantity, error, limit } = *violation;
+        let (name, unit) = self.joints.get(place).map_or(("", ""), |j| (j.name.as_str(), j.unit()));
+        let (what, per) = match quantity {
+            Quantity::Position => ("position", ""),
+            Quantity::Velocity => ("velocity", "/s"),
+            Quantity::Acceleration => ("acceleration", "/s²"),
+        };
+        format!(
+            "joint {name}: {what} error {error} {unit}{per} exceeds the {tolerance} tolerance {limit} {unit}{per}"
+        )
+    }
+
     async fn accepted(&self, id: MotionId, time: Nanoseconds, accepted: Accepted) {
         let start = stamp(accepted.start);
         let origin = {
@@ -117,13 +172,16 @@ impl Results {
             known.start = start.clone();
             known.origin.clone()
         };
+        if let Origin::Action { goal_id, .. } = origin {
+            self.tell(GoalEvent::Started(goal_id, accepted.start));
+        }
         let text = if accepted.joined_late {
             let late = seconds(time - accepted.start);
             let text = format!("joined {late} s after its start");
-            warn!("trajectory {}: {text}", origin.sequence_number);
+            warn!("{origin}: {text}");
             text
         } else {
-            info!("trajectory {} accepted", origin.sequence_number);
+            info!("{origin} accepted");
             String::new()
         };
         self.output.send(TrajectoryResult { start, text, ..origin.result(time, Status::Accepted) }).await;
@@ -135,21 +193,24 @@ impl Results {
         let (status, text) = match end.outcome {
             Outcome::Completed => (Status::Completed, String::new()),
             Outcome::Displaced { by } => {
-                let by = known_list.get(&by).map_or(0, |k| k.origin.sequence_number);
-                (Status::Displaced, format!("axes were taken over by trajectory {by}"))
+                let by =
+                    known_list.get(&by).map_or("another trajectory".to_owned(), |k| k.origin.to_string());
+                (Status::Displaced, format!("axes were taken over by {by}"))
             }
             Outcome::Stopped => (Status::Stopped, "controlled stop".to_owned()),
             Outcome::Cancelled => (Status::Stopped, "cancelled".to_owned()),
-            Outcome::PathTolerance(violation) | Outcome::GoalTolerance(violation) => {
-                (Status::Aborted, format!("{violation:?}"))
-            }
+            Outcome::PathTolerance(violation) => (Status::Aborted, self.violation("path", &violation)),
+            Outcome::GoalTolerance(violation) => (Status::Aborted, self.violation("goal", &violation)),
             Outcome::Aborted(Abort::Reset) => (Status::Aborted, "reset".to_owned()),
             Outcome::Aborted(Abort::ClockJump) => (Status::Aborted, "the clock jumped".to_owned()),
         };
         drop(known_list);
-        info!("trajectory {}: {status:?}", known.origin.sequence_number);
+        info!("{}: {status:?}{}{text}", known.origin, if text.is_empty() { "" } else { ", " });
+        if let Origin::Action { goal_id, .. } = known.origin {
+            self.tell(GoalEvent::Ended(goal_id, end.outcome, text.clone()));
+        }
         let column = |value: fn(&AxisReport) -> f64| end.report.axes.iter().map(value).collect();
-        let name = end.places.iter().filter_map(|&p| self.joints.get(p).cloned()).collect();
+        let name = end.places.iter().filter_map(|&p| Some(self.joints.get(p)?.name.clone())).collect();
         self.output
             .send(TrajectoryResult {
                 start: known.start,

@@ -6,12 +6,19 @@ use std::time::Duration;
 use futures::{FutureExt, StreamExt, future::BoxFuture, stream::BoxStream};
 use ros2_client::qos::{History, QosProfile, WhenFull};
 use ros2_client::service::RmwRequestId;
-use ros2_client::{Context, Message, Name, Node, Server, ServiceMapping, ServiceTypeName};
-use rustdds::DomainParticipant;
+use ros2_client::{
+    Context, Message, MessageInfo, Name, Node, Server, ServiceMapping, ServiceTypeName, Subscription,
+};
+use rustdds::no_key::DataWriterCdr;
+use rustdds::{
+    DomainParticipant, QosPolicies, RTPSEntity, SampleIdentity, SequenceNumber, Timestamp, TopicKind,
+    WriteOptionsBuilder,
+};
 use tokio::sync::Mutex;
 
 use super::args::RosArgs;
 use super::large_response::{self, LargeResponses};
+use super::rtps::Guid;
 
 /// How long a write may wait for a slow reader.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
@@ -40,10 +47,18 @@ pub fn profile(depth: usize) -> QosProfile {
         .history(History::KeepLast { depth })
 }
 
+/// The two ends of a service.
+enum Ends<Q: Message, A: Message> {
+    /// The crate's.
+    Server(Server<Q, A>),
+    /// Of a type that the crate cannot name: a subscription and a writer.
+    Topics { requests: Subscription<Q>, responses: DataWriterCdr<A> },
+}
+
 /// One service: its server, and the DDS topic on which its responses go out.
 pub struct Service<Q: Message, A: Message> {
     label: &'static str,
-    server: Server<Q, A>,
+    ends: Ends<Q, A>,
     response_topic: String,
     participant: DomainParticipant,
     large: LargeResponses,
@@ -69,7 +84,26 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
     {
         let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
         let resolved = args.resolve_service(&format!("~/{label}")).map_err(|e| failed(e.to_string()))?;
-        let name = Name::parse(&resolved).map_err(|e| failed(e.to_string()))?;
+        Self::named(node, context, &resolved, label, type_name, depth)
+    }
+
+    /// The service of this name in the graph, called `label` in the log.
+    ///
+    /// # Errors
+    /// [`ServiceError`] when the middleware refuses it.
+    pub fn named(
+        node: &mut Node,
+        context: &Context,
+        resolved: &str,
+        label: &'static str,
+        type_name: &ServiceTypeName,
+        depth: usize,
+    ) -> Result<Self, ServiceError>
+    where
+        Q: Clone,
+    {
+        let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
+        let name = Name::parse(resolved).map_err(|e| failed(e.to_string()))?;
         let before = large_response::writers(context);
         let server = node
             .create_server(ServiceMapping::Enhanced, &name, type_name, profile(depth), profile(depth))
@@ -79,9 +113,55 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         // A server has one writer, and keeps its GUID to itself.
         let writer = large_response::writers(context).difference(&before).next().copied();
         let writer = writer.ok_or_else(|| failed("its response writer is not announced".to_owned()))?;
-        let large = LargeResponses::new(writer, response_topic.clone(), participant.clone())
-            .map_err(|error| failed(format!("no socket: {error}")))?;
-        Ok(Service { label, server, response_topic, participant, large, written: Mutex::new(0) })
+        Self::of_ends(Ends::Server(server), writer, label, response_topic, participant)
+    }
+
+    /// Likewise, of a type that an action brings with it, whose name in DDS `type_name` begins:
+    /// `package::action::dds_::Action_SendGoal`. The crate has names for types of `srv` only.
+    ///
+    /// # Errors
+    /// [`ServiceError`] when the middleware refuses it.
+    pub fn of_action(
+        node: &mut Node,
+        context: &Context,
+        resolved: &str,
+        label: &'static str,
+        type_name: &str,
+        depth: usize,
+    ) -> Result<Self, ServiceError> {
+        let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
+        let participant = context.domain_participant();
+        let qos = QosPolicies::from(&profile(depth));
+        let topic = |name: &str, kind: &str| {
+            participant
+                .create_topic(name.to_owned(), format!("{type_name}_{kind}_"), &qos, TopicKind::NoKey)
+                .map_err(|e| failed(e.to_string()))
+        };
+        let requests = topic(&format!("rq{resolved}Request"), "Request")?;
+        let response_topic = format!("rr{resolved}Reply");
+        let responses = topic(&response_topic, "Response")?;
+        let requests =
+            node.create_subscription(&requests, Some(profile(depth))).map_err(|e| failed(e.to_string()))?;
+        let responses = participant
+            .create_publisher(&qos)
+            .and_then(|publisher| publisher.create_datawriter_no_key_cdr(&responses, Some(qos.clone())))
+            .map_err(|e| failed(e.to_string()))?;
+        let writer = responses.guid().to_bytes();
+        Self::of_ends(Ends::Topics { requests, responses }, writer, label, response_topic, participant)
+    }
+
+    fn of_ends(
+        ends: Ends<Q, A>,
+        writer: Guid,
+        label: &'static str,
+        response_topic: String,
+        participant: DomainParticipant,
+    ) -> Result<Self, ServiceError> {
+        let large =
+            LargeResponses::new(writer, response_topic.clone(), participant.clone()).map_err(|error| {
+                ServiceError { name: label.to_owned(), reason: format!("no socket: {error}") }
+            })?;
+        Ok(Service { label, ends, response_topic, participant, large, written: Mutex::new(0) })
     }
 
     /// Requests as they come, or why one could not be read.
@@ -91,12 +171,19 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         A: Send + Sync,
     {
         let label = self.label;
-        self.server
-            .receive_request_stream()
-            .map(move |received| {
-                received.map_err(|error| format!("a request to {label} could not be read: {error:?}"))
-            })
-            .boxed()
+        let unreadable = move |error| format!("a request to {label} could not be read: {error:?}");
+        match &self.ends {
+            Ends::Server(server) => {
+                server.receive_request_stream().map(move |received| received.map_err(unreadable)).boxed()
+            }
+            Ends::Topics { requests, .. } => requests
+                .async_stream()
+                .map(move |received| match received {
+                    Ok((request, info)) => Ok((request_id(&info), request)),
+                    Err(error) => Err(unreadable(error)),
+                })
+                .boxed(),
+        }
     }
 
     /// Sends the response to a request, once its client is known.
@@ -136,7 +223,18 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         // Held while writing, so that the count keeps the order of the writer, and while a large one
         // is sent, so that many of them do not come at once.
         let mut written = self.written.lock().await;
-        self.server.async_send_response(id, response).await.map_err(|error| format!("{error:?}"))?;
+        match &self.ends {
+            Ends::Server(server) => {
+                server.async_send_response(id, response).await.map_err(|error| format!("{error:?}"))?;
+            }
+            Ends::Topics { responses, .. } => {
+                let options = WriteOptionsBuilder::new()
+                    .source_timestamp(Timestamp::now())
+                    .related_sample_identity(SampleIdentity::from(id));
+                let written = responses.async_write_with_options(response, options.build()).await;
+                written.map_err(|error| error.to_string())?;
+            }
+        }
         *written += 1;
         let Some(payload) = large else { return Ok(None) };
         let datagram = self.large.datagram(&id, *written, &payload);
@@ -168,5 +266,18 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
             reader.subscription_topic_data.topic_name() == &self.response_topic
                 && reader.reader_proxy.remote_reader_guid.to_bytes()[..12] == client[..12]
         })
+    }
+}
+
+/// The identity of a request, which its response repeats.
+fn request_id(info: &MessageInfo) -> RmwRequestId {
+    let own = RmwRequestId { writer_gid: info.publisher_gid(), sequence_number: info.sequence_number() };
+    match info.related_request_id() {
+        // Fast DDS names its response reader there, and leaves the number to the sample.
+        Some(id) if id.sequence_number == i64::from(SequenceNumber::UNKNOWN) => {
+            RmwRequestId { sequence_number: own.sequence_number, ..id }
+        }
+        Some(id) => id,
+        None => own,
     }
 }

@@ -11,7 +11,9 @@ use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 use super::args::RosArgs;
 use super::endpoints::{EndpointError, Endpoints};
 use crate::config::{Parameters, TimeMode};
-use crate::messages::{DriveStates, MotorCurrents, PACKAGE, TrajectoryResult};
+use crate::messages::{
+    CONTROL_PACKAGE, DriveStates, JointTrajectoryControllerState, MotorCurrents, PACKAGE, TrajectoryResult,
+};
 
 impl Message for MotorCurrents {}
 impl Message for DriveStates {}
@@ -31,6 +33,8 @@ pub struct Topics {
     pub motor_currents: Publisher<MotorCurrents>,
     /// `~/drive_states`.
     pub drive_states: Publisher<DriveStates>,
+    /// `~/controller_state`.
+    pub controller_state: Publisher<JointTrajectoryControllerState>,
     /// `~/trajectory_result`.
     pub results: Publisher<TrajectoryResult>,
     /// `/diagnostics`.
@@ -46,6 +50,8 @@ pub struct Names {
     subscribed: Vec<String>,
     published: Vec<String>,
     served: Vec<String>,
+    /// Actions.
+    pub goals_on: Vec<String>,
 }
 
 impl Topics {
@@ -72,6 +78,9 @@ impl Topics {
         let (motor_currents, currents_name) =
             endpoints.publisher("~/motor_currents", own("MotorCurrents"))?;
         let (drive_states, states_name) = endpoints.publisher("~/drive_states", own("DriveStates"))?;
+        let controller_type = MessageTypeName::new(CONTROL_PACKAGE, "JointTrajectoryControllerState");
+        let (controller_state, controller_name) =
+            endpoints.publisher("~/controller_state", controller_type)?;
         let (results, results_name) = endpoints.publisher("~/trajectory_result", own("TrajectoryResult"))?;
         let (diagnostics, diagnostics_name) = endpoints.publisher("/diagnostics", diagnostic)?;
         let clock = if fast {
@@ -82,11 +91,19 @@ impl Topics {
         };
         let names = Names {
             subscribed: vec![psec_name, stream_name, load_name],
-            published: [joint_states_name, currents_name, states_name, results_name, diagnostics_name]
-                .into_iter()
-                .chain(clock.iter().map(|(_, name)| name.clone()))
-                .collect(),
+            published: [
+                joint_states_name,
+                currents_name,
+                states_name,
+                controller_name,
+                results_name,
+                diagnostics_name,
+            ]
+            .into_iter()
+            .chain(clock.iter().map(|(_, name)| name.clone()))
+            .collect(),
             served: ["~/reset", "~/stop"].iter().filter_map(|s| args.resolve_service(s).ok()).collect(),
+            goals_on: Vec::new(),
         };
         Ok(Topics {
             psec,
@@ -95,6 +112,7 @@ impl Topics {
             joint_states,
             motor_currents,
             drive_states,
+            controller_state,
             results,
             diagnostics,
             clock,
@@ -111,9 +129,12 @@ impl Names {
             TimeMode::Real | TimeMode::SimTime => "real",
         };
         let mut screen = format!("{}: {machine}, time: {time}\n", args.node());
-        for (what, names) in
-            [("listens to", &self.subscribed), ("publishes", &self.published), ("serves", &self.served)]
-        {
+        for (what, names) in [
+            ("listens to", &self.subscribed),
+            ("publishes", &self.published),
+            ("serves", &self.served),
+            ("goals on", &self.goals_on),
+        ] {
             for (place, name) in names.iter().enumerate() {
                 screen += &format!("  {:<11}{name}\n", if place == 0 { what } else { "" });
             }

@@ -34,6 +34,37 @@ pub enum Code {
     InvalidTime = 13,
     /// Too many trajectories wait for the same joint.
     QueueFull = 14,
+    /// A tolerance that cannot be kept to.
+    InvalidTolerance = 15,
+    /// Joints with several degrees of freedom, which the machine does not have.
+    MultiDof = 16,
+    /// More goals at once than the node keeps.
+    TooManyGoals = 17,
+}
+
+impl Code {
+    /// Its name in the message `TrajectoryResult`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Code::UnknownJoint => "UNKNOWN_JOINT",
+            Code::DuplicateJoint => "DUPLICATE_JOINT",
+            Code::WrongSize => "WRONG_SIZE",
+            Code::TimesNotIncreasing => "TIMES_NOT_INCREASING",
+            Code::NegativeTime => "NEGATIVE_TIME",
+            Code::NotFinite => "NOT_FINITE",
+            Code::OutsideStroke => "OUTSIDE_STROKE",
+            Code::Jump => "JUMP",
+            Code::Speed => "SPEED",
+            Code::EndedInThePast => "ENDED_IN_THE_PAST",
+            Code::TooManyPoints => "TOO_MANY_POINTS",
+            Code::VelocityAtEnd => "VELOCITY_AT_END",
+            Code::InvalidTime => "INVALID_TIME",
+            Code::QueueFull => "QUEUE_FULL",
+            Code::InvalidTolerance => "INVALID_TOLERANCE",
+            Code::MultiDof => "MULTI_DOF",
+            Code::TooManyGoals => "TOO_MANY_GOALS",
+        }
+    }
 }
 
 /// A refused trajectory: what broke which limit, where.

@@ -1,0 +1,33 @@
+//! The action `~/follow_joint_trajectory` (control_msgs/FollowJointTrajectory).
+//!
+//! It stands on [`super::service`], because the crate's own `ActionServer` sends a response before the
+//! client that asked is known, and so loses it. A goal passes the same checks as a trajectory on
+//! `psec`; one that cannot be run is accepted and aborted at once, since only a goal that was accepted
+//! has a result that can say why.
+
+mod cancel;
+mod feedback;
+mod goal;
+mod goals;
+mod outcome;
+mod server;
+
+pub use feedback::{Feedback, feedback_period};
+pub use goal::GoalChecks;
+pub use outcome::GoalEvent;
+pub use server::{ActionServer, Ending, Tell, Work};
+
+use crate::messages::unique_identifier_msgs::msg::UUID;
+
+/// Names a goal; its client chose it.
+pub type GoalId = [u8; 16];
+
+fn uuid(id: GoalId) -> UUID {
+    UUID { uuid: id }
+}
+
+/// How texts name a goal.
+pub fn goal_name(id: &GoalId) -> String {
+    let hex: String = id.iter().map(|octet| format!("{octet:02x}")).collect();
+    format!("goal {hex}")
+}

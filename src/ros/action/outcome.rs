@@ -1,0 +1,68 @@
+//! How goals end, in the words of control_msgs/FollowJointTrajectory.
+
+use super::GoalId;
+use super::goals::State;
+use crate::messages::{ErrorCode, FollowJointTrajectoryResult};
+use crate::simulation::Outcome;
+use crate::trajectory::{Code, Rejection};
+use crate::units::Nanoseconds;
+
+/// What became of a goal that was handed to the simulation.
+#[derive(Debug)]
+pub enum GoalEvent {
+    /// The axes follow it, from this time on, ns.
+    Started(GoalId, Nanoseconds),
+    /// The axes cannot follow it.
+    Refused(GoalId, Rejection),
+    /// It has ended; the text says how.
+    Ended(GoalId, Outcome, String),
+}
+
+fn result(code: ErrorCode, text: String) -> FollowJointTrajectoryResult {
+    FollowJointTrajectoryResult { error_code: code as i32, error_string: text }
+}
+
+/// The result of a goal that cannot be run.
+pub(super) fn refused(rejection: &Rejection) -> FollowJointTrajectoryResult {
+    let code = match rejection.code {
+        Code::UnknownJoint | Code::DuplicateJoint => ErrorCode::InvalidJoints,
+        Code::EndedInThePast => ErrorCode::OldHeaderTimestamp,
+        _ => ErrorCode::InvalidGoal,
+    };
+    result(code, format!("{}: {rejection}", rejection.code.name()))
+}
+
+/// The result of a goal that something else than its own motion ended. control_msgs has no code for
+/// that; joint_trajectory_controller too says `INVALID_GOAL` of a goal that another one displaced.
+pub(super) fn aborted(text: String) -> FollowJointTrajectoryResult {
+    result(ErrorCode::InvalidGoal, text)
+}
+
+/// State and result of a goal that has ended like this.
+pub(super) fn ended(outcome: &Outcome, text: String) -> (State, FollowJointTrajectoryResult) {
+    match outcome {
+        Outcome::Completed => (State::Succeeded, result(ErrorCode::Successful, text)),
+        Outcome::Cancelled => (State::Canceled, result(ErrorCode::Successful, text)),
+        Outcome::PathTolerance(_) => (State::Aborted, result(ErrorCode::PathToleranceViolated, text)),
+        Outcome::GoalTolerance(_) => (State::Aborted, result(ErrorCode::GoalToleranceViolated, text)),
+        Outcome::Displaced { .. } | Outcome::Stopped | Outcome::Aborted(_) => (State::Aborted, aborted(text)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_has_the_code_that_clients_know_and_the_name_that_we_have() {
+        for (code, number, name) in [
+            (Code::UnknownJoint, -2, "UNKNOWN_JOINT: why"),
+            (Code::DuplicateJoint, -2, "DUPLICATE_JOINT: why"),
+            (Code::EndedInThePast, -3, "ENDED_IN_THE_PAST: why"),
+            (Code::Speed, -1, "SPEED: why"),
+        ] {
+            let found = refused(&Rejection::new(code, "why"));
+            assert_eq!((found.error_code, found.error_string.as_str()), (number, name));
+        }
+    }
+}
