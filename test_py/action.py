@@ -1,0 +1,139 @@
+"""Goals of the node's action, as any client of FollowJointTrajectory sends them.
+
+    with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive, Follow(drive) as follow:
+        sent = follow.send(goal(joint_trajectory(["x"], [0, 1], [0, 0.1])))
+        print(sent.result().error_string)
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from action_msgs.msg import GoalInfo, GoalStatusArray
+from action_msgs.srv import CancelGoal
+from builtin_interfaces.msg import Duration, Time
+from control_msgs.action import FollowJointTrajectory
+from control_msgs.msg import JointTolerance
+from drive import NANOSECONDS, SETTLE_S, Drive
+from rclpy.action import ActionClient
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from trajectory_msgs.msg import JointTrajectory
+from unique_identifier_msgs.msg import UUID
+
+Result = FollowJointTrajectory.Result
+STATUS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def goal(
+    trajectory: JointTrajectory,
+    path: Mapping[str, float] | None = None,
+    end: Mapping[str, float] | None = None,
+    end_time: float = 0.0,
+) -> FollowJointTrajectory.Goal:
+    """A goal with position tolerances `path` and `end` by joint (m, rad), and `end_time` s to get there."""
+
+    def tolerances(values: Mapping[str, float] | None) -> list[JointTolerance]:
+        return [JointTolerance(name=name, position=value) for name, value in (values or {}).items()]
+
+    seconds, nanoseconds = divmod(round(end_time * NANOSECONDS), NANOSECONDS)
+    return FollowJointTrajectory.Goal(
+        trajectory=trajectory,
+        path_tolerance=tolerances(path),
+        goal_tolerance=tolerances(end),
+        goal_time_tolerance=Duration(sec=seconds, nanosec=nanoseconds),
+    )
+
+
+class Sent:
+    """A goal that was sent, and what came back so far."""
+
+    def __init__(self, drive: Drive, client: ActionClient, message: FollowJointTrajectory.Goal, uuid: UUID | None):
+        """Send it."""
+        self._drive = drive
+        self._client = client
+        self.feedback: list[FollowJointTrajectory.Feedback] = []
+        self._accepting = client.send_goal_async(
+            message, feedback_callback=lambda received: self.feedback.append(received.feedback), goal_uuid=uuid
+        )
+
+    @property
+    def handle(self) -> Any:
+        """The client's handle, once the node has answered."""
+        self._drive.wait_for(self._accepting.done, 20.0, "answer to a goal")
+        return self._accepting.result()
+
+    @property
+    def id(self) -> bytes:
+        """Its name."""
+        return bytes(self.handle.goal_id.uuid)
+
+    def ended(self, timeout: float = 30.0) -> Any:
+        """Status and result."""
+        future = self.handle.get_result_async()
+        self._drive.wait_for(future.done, timeout, "result of a goal")
+        return future.result()
+
+    def status(self, timeout: float = 30.0) -> int:
+        """How it ended, action_msgs/GoalStatus."""
+        return self.ended(timeout).status
+
+    def result(self, timeout: float = 30.0) -> Result:
+        """Its result."""
+        return self.ended(timeout).result
+
+    def wait_for_feedback(self, count: int = 1, timeout: float = 20.0) -> FollowJointTrajectory.Feedback:
+        """The newest feedback, once there are `count`."""
+        self._drive.wait_for(lambda: len(self.feedback) >= count, timeout, "feedback")
+        return self.feedback[-1]
+
+    def cancel(self) -> CancelGoal.Response:
+        """Ask for its end."""
+        future = self.handle.cancel_goal_async()
+        self._drive.wait_for(future.done, 20.0, "answer to a cancel request")
+        return future.result()
+
+
+class Follow:
+    """A client of the action, in the graph as part of a Drive."""
+
+    def __init__(self, drive: Drive, name: str | None = None, timeout: float = 20.0):
+        """Wait until the action is there; `name` if it is remapped."""
+        self.name = name or f"{drive.target}/follow_joint_trajectory"
+        self.drive = drive
+        self.statuses: list[GoalStatusArray] = []
+        self._client = ActionClient(drive.node, FollowJointTrajectory, self.name)
+        self._cancelling = drive.node.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
+        self._statuses = drive.node.create_subscription(
+            GoalStatusArray, f"{self.name}/_action/status", self.statuses.append, STATUS_QOS
+        )
+        drive.wait_for(self._client.server_is_ready, timeout, f"action {self.name}")
+        drive.wait_for(self._cancelling.service_is_ready, timeout, f"cancelling of {self.name}")
+        time.sleep(SETTLE_S)
+
+    def __enter__(self) -> Follow:
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Leave the action; the Drive stays."""
+        self._client.destroy()
+        self.drive.node.destroy_client(self._cancelling)
+        self.drive.node.destroy_subscription(self._statuses)
+
+    def send(self, message: FollowJointTrajectory.Goal, uuid: bytes | None = None) -> Sent:
+        """Send a goal, under an id if it is to have a certain one."""
+        return Sent(self.drive, self._client, message, UUID(uuid=list(uuid)) if uuid else None)
+
+    def cancel(self, uuid: bytes = bytes(16), stamp: Time | None = None) -> CancelGoal.Response:
+        """Cancel by the rules of action_msgs/CancelGoal."""
+        info = GoalInfo(goal_id=UUID(uuid=list(uuid)), stamp=stamp or Time())
+        future = self._cancelling.call_async(CancelGoal.Request(goal_info=info))
+        self.drive.wait_for(future.done, 20.0, "answer to a cancel request")
+        return future.result()
+
+    def status_of(self, uuid: bytes) -> int | None:
+        """What the status topic said last about a goal."""
+        listed = self.statuses[-1].status_list if self.statuses else []
+        return next((entry.status for entry in listed if bytes(entry.goal_info.goal_id.uuid) == uuid), None)
