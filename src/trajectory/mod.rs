@@ -15,11 +15,13 @@ pub mod stop;
 pub mod stream;
 pub mod timeline;
 
+mod arrivals;
 mod check;
 mod motions;
 mod offer;
 mod plan;
 
+pub use arrivals::STREAM_JITTER;
 pub use event::{Event, JointSet, MotionId};
 pub use limits::JointLimits;
 pub use offer::Admission;
@@ -27,4 +29,5 @@ pub use path::{Context, Trajectory};
 pub use rejection::{Code, Rejection};
 pub use request::{Request, Row, Start};
 pub use spline::State;
+pub use stream::{StreamCounts, StreamEnd};
 pub use timeline::{Timeline, TimelineError};
