@@ -74,6 +74,8 @@ pub struct TrajectoryResult {
 pub enum Source {
     /// The topic `psec`.
     Topic = 0,
+    /// The topic `psec_stream`.
+    Stream = 2,
 }
 
 /// `ACCEPTED` … `ABORTED` of `msg/TrajectoryResult.msg`.

@@ -14,7 +14,7 @@ use super::pace::{Accepted, Report};
 use crate::assess::AxisReport;
 use crate::messages::{Source, Status, TrajectoryResult};
 use crate::simulation::{Abort, MotionEnd, Outcome};
-use crate::trajectory::{MotionId, Rejection, Trajectory};
+use crate::trajectory::{JointSet, MotionId, Rejection, StreamEnd, Trajectory};
 use crate::units::{Nanoseconds, seconds};
 
 /// Where a trajectory came from.
@@ -89,6 +89,7 @@ impl Results {
                 }
             }
             Report::Ended(end) => self.ended(end).await,
+            Report::StreamEnded(time, end, joints) => self.stream_ended(time, end, joints).await,
         }
     }
 
@@ -127,6 +128,33 @@ impl Results {
             String::new()
         };
         self.output.send(TrajectoryResult { start, text, ..origin.result(time, Status::Accepted) }).await;
+    }
+
+    /// Publishes what took joints away from a stream.
+    async fn stream_ended(&self, time: Nanoseconds, end: StreamEnd, joints: JointSet) {
+        let (status, text) = match end {
+            StreamEnd::Displaced(by) => {
+                let by = self.known.lock().await.get(&by).map_or(0, |k| k.origin.sequence_number);
+                (Status::Displaced, format!("axes were taken over by trajectory {by}"))
+            }
+            StreamEnd::Stopped(_) => {
+                let text = "controlled stop; the stream is ignored until it pauses";
+                (Status::Stopped, text.to_owned())
+            }
+            StreamEnd::Reset => (Status::Aborted, "reset".to_owned()),
+        };
+        let name: Vec<_> = joints.iter().filter_map(|place| self.joints.get(place).cloned()).collect();
+        info!("stream of {}: {status:?}, {text}", name.join(", "));
+        self.output
+            .send(TrajectoryResult {
+                header: header(time),
+                source: Source::Stream as u8,
+                status: status as u8,
+                text,
+                name,
+                ..TrajectoryResult::default()
+            })
+            .await;
     }
 
     async fn ended(&self, end: MotionEnd) {
