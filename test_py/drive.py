@@ -306,8 +306,11 @@ class Drive:
         domain_id: int | None = None,
         timeout: float = 20.0,
         connect: bool = True,
+        remaps: Sequence[str] = (),
     ):
         """Join the graph and, unless `connect` is false, wait until the axes are there.
+
+        `remaps` are the names that the axes' node was given others for, as in "joint_states:=/states".
 
         `node` is the full name of the axes' node; `process` the process if it was started from
         here, which gives name and domain, and whose early end ends the wait.
@@ -327,8 +330,13 @@ class Drive:
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
         self.name = f"drive_{os.getpid()}_{next(self._count)}"
+        cli_args = ["--ros-args", *(word for remap in remaps for word in ("-r", remap))] if remaps else None
         self.node = rclpy.create_node(
-            self.name, context=self._context, enable_rosout=False, start_parameter_services=False
+            self.name,
+            context=self._context,
+            cli_args=cli_args,
+            enable_rosout=False,
+            start_parameter_services=False,
         )
         self._psec = self.node.create_publisher(JointTrajectory, f"{namespace}/psec", PSEC_QOS)
         self._stream = self.node.create_publisher(JointState, f"{namespace}/psec_stream", STREAM_QOS)
@@ -546,9 +554,14 @@ class Drive:
             message = deserialize_message(self._samples["states"][-1], DriveStates)
         return dict(zip(message.name, getattr(message, field)))
 
-    def stream(self, names: Sequence[str], positions: Sequence[float]) -> None:
-        """Publish one set-point of a stream (m, rad); NaN, or none, leaves the joint alone."""
-        self._stream.publish(JointState(name=list(names), position=[float(value) for value in positions]))
+    def stream(self, names: Sequence[str], positions: Sequence[float], stamp: int = 0) -> None:
+        """Publish one set-point of a stream (m, rad); NaN, or none, leaves the joint alone.
+
+        `stamp` is when it was sent, ns of a clock of the sender's own; 0 does not say.
+        """
+        message = JointState(name=list(names), position=[float(value) for value in positions])
+        message.header.stamp = to_time(stamp)
+        self._stream.publish(message)
 
     def load(self, effort: Mapping[str, float]) -> None:
         """Apply external forces or torques (N, N.m of the axis, towards plus); they time out."""

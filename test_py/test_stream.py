@@ -50,8 +50,8 @@ def values(status: DiagnosticStatus) -> dict[str, str]:
     return {value.key: value.value for value in status.values}
 
 
-def counts(drive: Drive) -> tuple[int, int]:
-    """Set-points refused and ignored so far, by diagnostics that are younger than now."""
+def numbers(drive: Drive, *keys: str) -> tuple[int, ...]:
+    """Counts of the node so far, by diagnostics that are younger than now."""
     now = drive.now()
     seen = len(drive.diagnostics())
 
@@ -59,7 +59,19 @@ def counts(drive: Drive) -> tuple[int, int]:
         return [values(a.status[0]) for a in drive.diagnostics()[seen:] if to_ns(a.header.stamp) > now + 2 * TSP_NS]
 
     newest = drive.wait_for(young, 5, "diagnostics")[-1]
-    return int(newest["stream_setpoints_refused"]), int(newest["stream_setpoints_ignored"])
+    return tuple(int(newest[key]) for key in keys)
+
+
+def counts(drive: Drive) -> tuple[int, int]:
+    """Set-points refused and ignored so far."""
+    refused, ignored = numbers(drive, "stream_setpoints_refused", "stream_setpoints_ignored")
+    return refused, ignored
+
+
+def told_of_stream(drive: Drive, begin: int) -> list[R]:
+    """What the results since `begin` (ns) say about the stream."""
+    found = [result for result in drive.results() if result.source == R.SOURCE_STREAM]
+    return [result for result in found if to_ns(result.header.stamp) >= begin]
 
 
 def wave(amplitude: float, count: int = 100) -> np.ndarray:
@@ -121,9 +133,14 @@ def test_a_trajectory_takes_over_and_the_stream_is_ignored_meanwhile(real: Drive
     """From the joint's streamed set-point; the joints that it leaves go on with the stream."""
     go_home(real)
     follow(real, ["x", "y"], np.array([[0.001, 0.001], [0.002, 0.002]]))
-    ignored = counts(real)[1]
+    begin, ignored = real.now(), counts(real)[1]
+    # The count took a second: the stream has to go on to be the one that is displaced.
+    follow(real, ["x", "y"], np.array([[0.001, 0.001], [0.002, 0.002]]))
     plan = 0.002 + wave(0.02, 500)
     accepted = real.accept(joint_trajectory(["x"], np.arange(500) * TSP, plan))
+    told = real.wait_for(lambda: told_of_stream(real, begin), 5, "word of the displacement")
+    assert [(result.status, result.name) for result in told] == [(R.DISPLACED, ["x"])]
+    assert told[0].text == f"axes were taken over by trajectory {accepted.sequence_number}"
     start = to_ns(accepted.start)
     real.wait_until(start, 5)
     for position in np.arange(3, 13) * 1e-3:
@@ -174,14 +191,59 @@ def test_a_reset_leaves_nothing_of_the_stream(real: Drive):
     np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, REACH / 2])
 
 
-def test_a_stop_moves_the_joint_away_from_the_stream_until_it_stands(real: Drive):
-    """A stop at rest is over at once; the stream goes on from there."""
+def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):
+    """Though it goes on within reach of where the axis stands; told, and not for ever."""
     go_home(real)
-    follow(real, ["x"], np.array([[0.002]]))
+    follow(real, ["x", "y"], np.array([[0.001, 0.0]]))
+    begin = real.now()
     real.stop()
-    real.wait_until(real.now() + 3 * TSP_NS, 5)
-    assert real.latest("psec")["x"] == 0.002
+    stopped = real.wait_for(lambda: told_of_stream(real, begin), 5, "word of the stop")
+    assert [(result.status, result.name) for result in stopped] == [(R.STOPPED, ["x", "y"])]
+    seen = len(real.diagnostics())
+    positions = iter(np.linspace(0.001, 0.002, 10_000))
+
+    def ignored() -> bool:
+        real.stream(["x"], [next(positions)])
+        statuses = [array.status[0] for array in real.diagnostics()[seen:]]
+        return any(values(s)["stream_held_off"] == "true" and s.level == DiagnosticStatus.WARN for s in statuses)
+
+    real.wait_for(ignored, 5, "diagnostics of a stream that is held off")
+    assert real.latest("psec")["x"] == 0.001
+    time.sleep(0.2)
     follow(real, ["x"], np.array([[0.003]]))
+    assert len(told_of_stream(real, begin)) == 1
+    node_status(real, lambda v: v["stream_held_off"] == "false")
+
+
+def test_what_comes_twice_counts_once_and_what_was_overtaken_is_left_out(real: Drive):
+    """By the stamps, which nobody has to give."""
+    go_home(real)
+    begin, before = real.now(), numbers(real, "stream_messages_out_of_order", "stream_setpoints_refused")
+    base = 10**9
+    for stamp, position in [(1, 0.001), (1, 0.001), (3, 0.003), (2, 0.002), (0, 0.0031), (4, 0.004), (4, 0.004)]:
+        real.stream(["x"], [position], stamp and base + stamp * TSP_NS)
+        if stamp != 2:
+            real.wait_for(lambda p=position: real.latest("psec")["x"] == p, 5, f"set-point {position}")
+    after = numbers(real, "stream_messages_out_of_order", "stream_setpoints_refused")
+    assert (after[0] - before[0], after[1] - before[1]) == (1, 0)
+    np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, 0.001, 0.003, 0.0031, 0.004])
+
+
+def test_a_stream_that_breaks_off_in_motion_holds_and_is_told(start: Callable[..., Drive]):
+    """Once in the log, counted in the diagnostics; one that comes to rest and is silent is fine."""
+    drive = start()
+    follow(drive, ["x"], REACH * np.arange(1, 6).reshape(-1, 1) * 0.9)
+    status = node_status(drive, lambda v: v["stream_gaps"] != "0")
+    assert status.level == DiagnosticStatus.WARN and "broke off in motion" in status.message
+    # More than one on a machine that stood still for a tenth of a second.
+    gaps = int(values(status)["stream_gaps"])
+    assert drive.latest("psec")["x"] == REACH * 5 * 0.9
+    # A tenth of the speed that the axis can brake from in one period.
+    follow(drive, ["x"], REACH * 4.5 + np.arange(1, 6).reshape(-1, 1) * 1e-6)
+    time.sleep(0.2)
+    assert numbers(drive, "stream_gaps") == (gaps,)
+    lines = [line for line in drive.process.output().splitlines() if "broke off" in line]
+    assert 1 <= len(lines) <= gaps, lines
 
 
 def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):

@@ -76,6 +76,8 @@ pub enum Source {
     Topic = 0,
     /// A goal of `~/follow_joint_trajectory`.
     Action = 1,
+    /// The topic `psec_stream`.
+    Stream = 2,
 }
 
 /// `ACCEPTED` … `ABORTED` of `msg/TrajectoryResult.msg`.

@@ -1,12 +1,19 @@
 //! The door: ROS messages to typed values and back, by the conversions of [`crate::messages`] and those
 //! that only the node needs.
 
+use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 
 use super::pace::Frame;
 use crate::messages::{DriveStates, MotorCurrents, Sampled};
 pub use crate::messages::{header, request, stamp};
 use crate::simulation::MAX_LOAD;
+use crate::units::{Nanoseconds, SECOND_NS};
+
+/// A stamp as it came, ns.
+pub fn nanoseconds(stamp: &Time) -> Nanoseconds {
+    Nanoseconds::from(stamp.sec) * SECOND_NS + Nanoseconds::from(stamp.nanosec)
+}
 
 /// The loads of a message: place of the axis in `joints` and load, N or N·m.
 ///

@@ -66,6 +66,15 @@ impl Diagnostics {
         if now.stream.refused > before.stream.refused {
             problems.push("set-points of the stream were refused");
         }
+        if now.stream.counts.gaps > before.stream.counts.gaps {
+            problems.push("the stream broke off in motion");
+        }
+        if now.stream.counts.limited > before.stream.counts.limited {
+            problems.push("the stream asked for more than the axes' largest speed");
+        }
+        if now.stream.held_off {
+            problems.push("a stream is ignored after a stop until it pauses");
+        }
         let fine = if now.moving {
             "running"
         } else if now.stream.drives {
@@ -88,6 +97,10 @@ impl Diagnostics {
             value("stream_delay_ms", now.stream.delay as f64 / MILLISECOND_NS as f64),
             value("stream_setpoints_refused", now.stream.refused),
             value("stream_setpoints_ignored", now.stream.ignored),
+            value("stream_messages_out_of_order", now.stream.overtaken),
+            value("stream_gaps", now.stream.counts.gaps),
+            value("stream_speed_limited_periods", now.stream.counts.limited),
+            value("stream_held_off", now.stream.held_off),
         ];
         self.status(format!("{}: axes", self.node), &problems, fine, values)
     }

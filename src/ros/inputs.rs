@@ -8,13 +8,15 @@ use ros2_client::{MessageInfo, Subscription};
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 use tokio::sync::{mpsc, watch};
+use tokio::time::Instant;
 use tracing::warn;
 
 use super::convert;
 use super::pace::{Command, Health};
 use super::parameter_host::LiveNodeParameters;
 use super::results::{Origin, Results};
-use super::stream::Setpoints;
+use super::stream::{Order, Setpoints};
+use super::throttle::Throttle;
 use crate::trajectory::{Context, JointLimits, MotionId, Rejection, Trajectory};
 use crate::units::Nanoseconds;
 
@@ -105,10 +107,13 @@ pub async fn take_stream(
     commands: mpsc::Sender<Command>,
 ) {
     let mut messages = std::pin::pin!(subscription.async_stream());
+    let mut order = Order::default();
     while let Some(received) = messages.next().await {
         match received {
-            Ok((message, _)) => {
-                let _ = commands.send(Command::Stream(Setpoints::of(&message, &joints))).await;
+            Ok((message, info)) => {
+                let publisher = info.publisher_gid().to_bytes16();
+                let setpoints = Setpoints::in_order(&message, &joints, publisher, &mut order);
+                let _ = commands.send(Command::Stream(setpoints)).await;
             }
             Err(error) => warn!("a message on psec_stream could not be read: {error:?}"),
         }
@@ -123,12 +128,18 @@ pub async fn take_loads(
     commands: mpsc::Sender<Command>,
 ) {
     let mut messages = std::pin::pin!(subscription.async_stream());
+    let (mut told, started) = (Throttle::default(), Instant::now());
     while let Some(received) = messages.next().await {
         match received.map_err(|e| format!("{e:?}")).and_then(|(m, _)| convert::loads(&m, &joints)) {
             Ok(loads) => {
                 let _ = commands.send(Command::Load { loads, hold }).await;
             }
-            Err(reason) => warn!("a message on load is left out: {reason}"),
+            Err(reason) => {
+                let now = Nanoseconds::try_from(started.elapsed().as_nanos()).unwrap_or(Nanoseconds::MAX);
+                if told.is_due(reason.clone(), now) {
+                    warn!("a message on load is left out: {reason}");
+                }
+            }
         }
     }
 }

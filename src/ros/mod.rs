@@ -28,5 +28,6 @@ mod rtps;
 mod service;
 mod setpoints;
 mod stream;
+mod throttle;
 mod topics;
 mod trigger;

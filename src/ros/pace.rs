@@ -16,7 +16,7 @@ use super::stream::{Setpoints, StreamHealth, StreamLog};
 use crate::config::TimeMode;
 use crate::machine::{AxisSample, MachineParameters};
 use crate::simulation::{MotionEnd, Simulation, Tolerances};
-use crate::trajectory::{MotionId, Rejection, Trajectory};
+use crate::trajectory::{JointSet, MotionId, Rejection, StreamEnd, Trajectory};
 use crate::units::Nanoseconds;
 
 /// Commands that wait for the next position instant; a sender of more waits.
@@ -69,6 +69,8 @@ pub enum Report {
     Decided(MotionId, Nanoseconds, Result<Accepted, Rejection>),
     /// A motion has ended.
     Ended(MotionEnd),
+    /// Joints were taken away from a stream at a time (ns).
+    StreamEnded(Nanoseconds, StreamEnd, JointSet),
 }
 
 /// The samples of one position instant.
@@ -156,12 +158,19 @@ pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
             match channels.commands.try_recv() {
                 Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => return,
                 Ok(Command::Stream(setpoints)) => stream.take(&mut simulation, setpoints),
-                Ok(command) => obey(&mut simulation, command, &channels.reports),
+                Ok(command) => {
+                    obey(&mut simulation, command, &channels.reports);
+                    if let Some((end, joints)) = simulation.take_stream_end() {
+                        let now = simulation.time_of(simulation.next_instant() - 1);
+                        let _ = channels.reports.send(Report::StreamEnded(now, end, joints));
+                    }
+                }
                 Err(mpsc::error::TryRecvError::Empty) => break,
             }
         }
         let instant = simulation.next_instant();
         simulation.step();
+        stream.watch(&simulation);
         let frame =
             Frame { instant, time: simulation.time_of(instant), samples: simulation.samples().to_vec() };
         let taken = match mode {

@@ -16,7 +16,7 @@ use super::pace::{Accepted, Report};
 use crate::assess::AxisReport;
 use crate::messages::{Source, Status, TrajectoryResult};
 use crate::simulation::{Abort, MotionEnd, Outcome, Quantity, Violation};
-use crate::trajectory::{JointLimits, MotionId, Rejection, Trajectory};
+use crate::trajectory::{JointLimits, JointSet, MotionId, Rejection, StreamEnd, Trajectory};
 use crate::units::{Nanoseconds, seconds};
 
 /// Where a trajectory came from.
@@ -125,6 +125,7 @@ impl Results {
                 }
             }
             Report::Ended(end) => self.ended(end).await,
+            Report::StreamEnded(time, end, joints) => self.stream_ended(time, end, joints).await,
         }
     }
 
@@ -187,16 +188,38 @@ impl Results {
         self.output.send(TrajectoryResult { start, text, ..origin.result(time, Status::Accepted) }).await;
     }
 
+    /// Publishes what took joints away from a stream.
+    async fn stream_ended(&self, time: Nanoseconds, end: StreamEnd, joints: JointSet) {
+        let (status, text) = match end {
+            StreamEnd::Displaced(by) => (Status::Displaced, taken_over(&*self.known.lock().await, by)),
+            StreamEnd::Stopped(_) => {
+                let text = "controlled stop; the stream is ignored until it pauses";
+                (Status::Stopped, text.to_owned())
+            }
+            StreamEnd::Reset => (Status::Aborted, "reset".to_owned()),
+            StreamEnd::ClockJump => (Status::Aborted, "the clock jumped".to_owned()),
+        };
+        let name: Vec<_> =
+            joints.iter().filter_map(|place| Some(self.joints.get(place)?.name.clone())).collect();
+        info!("stream of {}: {status:?}, {text}", name.join(", "));
+        self.output
+            .send(TrajectoryResult {
+                header: header(time),
+                source: Source::Stream as u8,
+                status: status as u8,
+                text,
+                name,
+                ..TrajectoryResult::default()
+            })
+            .await;
+    }
+
     async fn ended(&self, end: MotionEnd) {
         let mut known_list = self.known.lock().await;
         let Some(known) = known_list.remove(&end.id) else { return };
         let (status, text) = match end.outcome {
             Outcome::Completed => (Status::Completed, String::new()),
-            Outcome::Displaced { by } => {
-                let by =
-                    known_list.get(&by).map_or("another trajectory".to_owned(), |k| k.origin.to_string());
-                (Status::Displaced, format!("axes were taken over by {by}"))
-            }
+            Outcome::Displaced { by } => (Status::Displaced, taken_over(&known_list, by)),
             Outcome::Stopped => (Status::Stopped, "controlled stop".to_owned()),
             Outcome::Cancelled => (Status::Stopped, "cancelled".to_owned()),
             Outcome::PathTolerance(violation) => (Status::Aborted, self.violation("path", &violation)),
@@ -228,4 +251,10 @@ impl Results {
             })
             .await;
     }
+}
+
+/// What is told to a displaced one.
+fn taken_over(known: &HashMap<MotionId, Known>, by: MotionId) -> String {
+    let by = known.get(&by).map_or_else(|| "another trajectory".to_owned(), |k| k.origin.to_string());
+    format!("axes were taken over by {by}")
 }

@@ -1,14 +1,21 @@
 //! `psec_stream`: set-points one at a time, and what becomes of them.
 
+use std::collections::VecDeque;
+
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use tracing::warn;
 
+use super::convert::nanoseconds;
+use super::throttle::Throttle;
 use crate::simulation::Simulation;
-use crate::trajectory::{Code, Rejection};
+use crate::trajectory::{Code, Rejection, StreamCounts};
 use crate::units::{Nanoseconds, SECOND_NS};
 
-/// How often the log tells of refusals for the same reason at most.
-const LOG_PERIOD: Nanoseconds = SECOND_NS;
+/// A message whose stamp is older than the one before by more than this comes from a clock that was
+/// set back; by less, it was overtaken on its way.
+const CLOCK_SET_BACK: Nanoseconds = SECOND_NS;
+/// Publishers whose last stamp is remembered.
+const MOST_PUBLISHERS: usize = 64;
 
 /// The set-points of one message.
 #[derive(Debug, Default)]
@@ -17,6 +24,17 @@ pub struct Setpoints {
     positions: Vec<(usize, f64)>,
     /// What is refused without asking the axes.
     refused: Vec<Rejection>,
+    /// When it was sent by the sender's clock, ns; none if it does not say.
+    sent: Option<Nanoseconds>,
+    /// Whether a younger message of its publisher came before it.
+    overtaken: bool,
+}
+
+/// The youngest stamp of each publisher.
+#[derive(Debug, Default)]
+pub struct Order {
+    /// The publisher's id, and its youngest stamp, ns.
+    youngest: VecDeque<([u8; 16], Nanoseconds)>,
 }
 
 /// What the diagnostics say about the stream.
@@ -24,12 +42,18 @@ pub struct Setpoints {
 pub struct StreamHealth {
     /// Whether a stream drives, moving or not.
     pub drives: bool,
+    /// Whether set-points come that are ignored after a stop.
+    pub held_off: bool,
     /// Its delay, ns.
     pub delay: Nanoseconds,
     /// Set-points refused since the start.
     pub refused: u64,
-    /// Set-points since the start that came while a trajectory or a stop had the joint.
+    /// Set-points since the start that came while a trajectory or a stop had the joint, or after a stop.
     pub ignored: u64,
+    /// Messages since the start that a younger one had overtaken.
+    pub overtaken: u64,
+    /// What the axes counted since the start.
+    pub counts: StreamCounts,
 }
 
 /// Hands set-points to the simulation, counts those that are not taken, and tells of them now and then.
@@ -37,8 +61,35 @@ pub struct StreamHealth {
 pub struct StreamLog {
     refused: u64,
     ignored: u64,
-    /// When the log last told of a reason, ns of the node's time.
-    told: Vec<(Code, Nanoseconds)>,
+    overtaken: u64,
+    gaps: u64,
+    told: Throttle<Told>,
+}
+
+/// What the log tells about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Told {
+    Refused(Code),
+    Gap,
+}
+
+impl Order {
+    /// Whether a message of `publisher` that was sent at `sent` comes after a younger one.
+    pub fn is_overtaken(&mut self, publisher: [u8; 16], sent: Option<Nanoseconds>) -> bool {
+        let Some(sent) = sent else { return false };
+        let Some((_, youngest)) = self.youngest.iter_mut().find(|(known, _)| *known == publisher) else {
+            if self.youngest.len() == MOST_PUBLISHERS {
+                self.youngest.pop_front();
+            }
+            self.youngest.push_back((publisher, sent));
+            return false;
+        };
+        let is_overtaken = sent < *youngest && *youngest - sent <= CLOCK_SET_BACK;
+        if !is_overtaken {
+            *youngest = sent;
+        }
+        is_overtaken
+    }
 }
 
 impl Setpoints {
@@ -47,7 +98,8 @@ impl Setpoints {
     /// As ros2_control's topic-based hardware means it: NaN and a `position` shorter than `name` leave
     /// the joint alone.
     pub fn of(message: &JointState, joints: &[String]) -> Self {
-        let mut setpoints = Self::default();
+        let sent = Some(nanoseconds(&message.header.stamp)).filter(|&stamp| stamp != 0);
+        let mut setpoints = Self { sent, ..Self::default() };
         let (names, positions) = (&message.name, &message.position);
         if positions.len() > names.len() {
             let (found, wanted) = (positions.len(), names.len());
@@ -74,17 +126,27 @@ impl Setpoints {
         }
         setpoints
     }
+
+    /// Likewise, of a message of `publisher`; one that was overtaken has none.
+    pub fn in_order(message: &JointState, joints: &[String], publisher: [u8; 16], order: &mut Order) -> Self {
+        let setpoints = Self::of(message, joints);
+        if order.is_overtaken(publisher, setpoints.sent) {
+            return Self { overtaken: true, ..Self::default() };
+        }
+        setpoints
+    }
 }
 
 impl StreamLog {
     /// Gives `setpoints` to the axes for the next position instant.
     pub fn take(&mut self, simulation: &mut Simulation, setpoints: Setpoints) {
         let now = simulation.time_of(simulation.next_instant());
+        self.overtaken += u64::from(setpoints.overtaken);
         for rejection in &setpoints.refused {
             self.refuse(rejection, now);
         }
         for (place, position) in setpoints.positions {
-            match simulation.stream(place, position) {
+            match simulation.stream_sent(place, position, setpoints.sent) {
                 Ok(true) => {}
                 Ok(false) => self.ignored += 1,
                 Err(rejection) => self.refuse(&rejection, now),
@@ -94,31 +156,30 @@ impl StreamLog {
 
     fn refuse(&mut self, rejection: &Rejection, now: Nanoseconds) {
         self.refused += 1;
-        if self.is_due(rejection.code, now) {
+        if self.told.is_due(Told::Refused(rejection.code), now) {
             warn!("set-point of the stream refused: {rejection}");
         }
     }
 
-    /// Whether a reason has not been told for [`LOG_PERIOD`]; it counts as told then.
-    fn is_due(&mut self, code: Code, now: Nanoseconds) -> bool {
-        let Some((_, told)) = self.told.iter_mut().find(|(known, _)| *known == code) else {
-            self.told.push((code, now));
-            return true;
-        };
-        let is_due = now - *told >= LOG_PERIOD;
-        if is_due {
-            *told = now;
+    /// Tells when the stream broke off, after each position instant.
+    pub fn watch(&mut self, simulation: &Simulation) {
+        let gaps = simulation.stream_counts().gaps;
+        if gaps > self.gaps && self.told.is_due(Told::Gap, simulation.time_of(simulation.next_instant())) {
+            warn!("the stream broke off in motion; the axes hold its last set-points");
         }
-        is_due
+        self.gaps = gaps;
     }
 
     /// What the diagnostics say.
     pub fn health(&self, simulation: &Simulation) -> StreamHealth {
         StreamHealth {
             drives: simulation.is_streaming(),
+            held_off: simulation.is_stream_held_off(),
             delay: simulation.stream_delay(),
             refused: self.refused,
             ignored: self.ignored,
+            overtaken: self.overtaken,
+            counts: simulation.stream_counts(),
         }
     }
 }
@@ -157,12 +218,16 @@ mod tests {
     }
 
     #[test]
-    fn the_log_tells_of_each_reason_once_a_second() {
-        let mut log = StreamLog::default();
-        assert!(log.is_due(Code::Jump, 0));
-        assert!(!log.is_due(Code::Jump, SECOND_NS - 1));
-        assert!(log.is_due(Code::OutsideStroke, SECOND_NS - 1));
-        assert!(log.is_due(Code::Jump, SECOND_NS));
-        assert!(!log.is_due(Code::Jump, 2 * SECOND_NS - 1));
+    fn of_each_publisher_what_was_overtaken_is_left_out() {
+        let mut order = Order::default();
+        let (one, other) = ([1; 16], [2; 16]);
+        let mut is_overtaken = |publisher, sent| order.is_overtaken(publisher, sent);
+        assert!(!is_overtaken(one, Some(10 * SECOND_NS)));
+        assert!(!is_overtaken(one, Some(10 * SECOND_NS)), "twice the same");
+        assert!(is_overtaken(one, Some(10 * SECOND_NS - 1)));
+        assert!(!is_overtaken(one, None), "no stamp");
+        assert!(!is_overtaken(other, Some(9 * SECOND_NS)));
+        assert!(!is_overtaken(one, Some(8 * SECOND_NS)), "its clock was set back");
+        assert!(!is_overtaken(one, Some(8 * SECOND_NS + 1)));
     }
 }

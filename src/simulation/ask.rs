@@ -6,7 +6,7 @@ use super::motion::{Abort, Cancel, Outcome};
 use super::tolerance::{Errors, Tolerances};
 use super::{Simulation, stream_delay};
 use crate::machine::{MachineError, MachineParameters};
-use crate::trajectory::{Admission, MotionId, Rejection, Trajectory};
+use crate::trajectory::{Admission, JointSet, MotionId, Rejection, StreamCounts, StreamEnd, Trajectory};
 use crate::units::Nanoseconds;
 
 impl Simulation {
@@ -71,13 +71,42 @@ impl Simulation {
     }
 
     /// Sets one set-point of a stream, m or rad, for the next position instant; `false` while a
-    /// trajectory or a stop has the joint. It is commanded [`stream_delay`](Self::stream_delay)
-    /// later. A stream is no motion: it has no figures and no end.
+    /// trajectory or a stop has the joint, and after a stop until the stream has paused. It is commanded
+    /// [`stream_delay`](Self::stream_delay) later. A stream is no motion: it has no figures and no end.
     ///
     /// # Errors
     /// [`Rejection`] as of [`Timeline::stream`](crate::trajectory::Timeline::stream); nothing changes then.
     pub fn stream(&mut self, place: usize, position: f64) -> Result<bool, Rejection> {
         self.timeline.stream(place, position)
+    }
+
+    /// Likewise, `sent` (ns) by the sender's clock; see
+    /// [`stream_sent`](crate::trajectory::Timeline::stream_sent).
+    ///
+    /// # Errors
+    /// As [`stream`](Self::stream).
+    pub fn stream_sent(
+        &mut self,
+        place: usize,
+        position: f64,
+        sent: Option<Nanoseconds>,
+    ) -> Result<bool, Rejection> {
+        self.timeline.stream_sent(place, position, sent)
+    }
+
+    /// Whether set-points come that are ignored after a stop.
+    pub fn is_stream_held_off(&self) -> bool {
+        self.timeline.is_stream_held_off()
+    }
+
+    /// What the streams did, since the beginning.
+    pub fn stream_counts(&self) -> StreamCounts {
+        self.timeline.stream_counts()
+    }
+
+    /// What last took joints away from a stream that drove them, and which; told once.
+    pub fn take_stream_end(&mut self) -> Option<(StreamEnd, JointSet)> {
+        self.timeline.take_stream_end()
     }
 
     /// Delay of streamed set-points that is in effect, ns: as many position periods as the controllers

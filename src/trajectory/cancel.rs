@@ -3,6 +3,7 @@
 use super::event::MotionId;
 use super::motions::Release;
 use super::plan::{Kind, Plan};
+use super::stream::StreamEnd;
 use super::timeline::Timeline;
 use crate::units::seconds;
 
@@ -40,6 +41,7 @@ impl Timeline {
     /// Brings every joint to rest by a controlled stop; all that moved or waited, the stream too, is
     /// told to have been stopped.
     pub fn halt(&mut self) {
+        self.end_stream(0..self.tracks.len(), StreamEnd::ClockJump);
         for joint in 0..self.tracks.len() {
             self.stop_all(joint, None);
             self.brake(joint, None);

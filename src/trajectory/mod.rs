@@ -15,12 +15,14 @@ pub mod stop;
 pub mod stream;
 pub mod timeline;
 
+mod arrivals;
 mod cancel;
 mod check;
 mod motions;
 mod offer;
 mod plan;
 
+pub use arrivals::STREAM_JITTER;
 pub use event::{Event, JointSet, MotionId};
 pub use limits::JointLimits;
 pub use offer::Admission;
@@ -28,4 +30,5 @@ pub use path::{Context, Trajectory};
 pub use rejection::{Code, Rejection};
 pub use request::{Request, Row, Start};
 pub use spline::State;
+pub use stream::{StreamCounts, StreamEnd};
 pub use timeline::{Timeline, TimelineError};

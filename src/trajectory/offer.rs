@@ -8,6 +8,7 @@ use super::plan::{Kind, Path, Plan, elapsed};
 use super::rejection::{Code, Rejection};
 use super::request::Start;
 use super::spline::Segment;
+use super::stream::StreamEnd;
 use super::timeline::{MAX_WAITING, Timeline};
 use crate::units::{Nanoseconds, SECOND_NS, seconds};
 use std::sync::Arc;
@@ -79,6 +80,8 @@ impl Timeline {
         } else {
             self.follow(id, &trajectory, origin)?
         };
+        let end = if trajectory.is_stop() { StreamEnd::Stopped } else { StreamEnd::Displaced };
+        self.end_stream(trajectory.joints().iter().copied(), end(id));
         self.reserve_events();
         Ok(admission)
     }

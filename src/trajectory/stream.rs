@@ -4,9 +4,17 @@
 //! waits in a look-ahead buffer of D position periods: what arrives before instant k is commanded at
 //! instant k + D, and until then [`Timeline::psec_ahead`] answers with it. When nothing arrives the
 //! last set-point holds, and goes on being pushed through the buffer.
+//!
+//! A sender has a clock and a rate of its own, and a network delays: two set-points can come in one
+//! period and none in the next. What enters the buffer therefore goes towards the newest set-point by
+//! Vmax·Tsp in each period at most, and which set-points are taken is judged against those before
+//! them: see `arrivals`.
 
 use std::collections::VecDeque;
 
+use super::arrivals::{Place, Verdict};
+use super::event::{JointSet, MotionId};
+use super::limits::{JointLimits, SPEED_TOLERANCE};
 use super::plan::Kind;
 use super::rejection::{Code, Rejection};
 use super::spline::State;
@@ -23,6 +31,44 @@ pub const STREAM_PAUSE: Nanoseconds = 100 * MILLISECOND_NS;
 #[derive(Debug, Default)]
 pub(super) struct LookAhead {
     buffer: VecDeque<f64>,
+    /// What had entered when the newest set-point was taken, m or rad.
+    from: f64,
+    /// Instants since then.
+    since: i64,
+}
+
+/// What enters `instants` after a set-point `newest` was taken, when `from` had entered before it:
+/// the set-point, or what is on the way to it at `reach` (m or rad) a period.
+fn approach(from: f64, newest: f64, instants: i64, reach: f64) -> f64 {
+    let way = newest - from;
+    let instants = instants as f64;
+    if way.abs() <= reach * (instants + SPEED_TOLERANCE) {
+        newest
+    } else {
+        from + (reach * instants).copysign(way)
+    }
+}
+
+/// What a stream did that is worth telling, since the beginning.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct StreamCounts {
+    /// How often it broke off in motion: nothing came for [`STREAM_PAUSE`].
+    pub gaps: u64,
+    /// Position periods in which a joint went towards its set-point at Vmax and was not there yet.
+    pub limited: u64,
+}
+
+/// What took joints away from a stream that drove them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StreamEnd {
+    /// A trajectory.
+    Displaced(MotionId),
+    /// A controlled stop.
+    Stopped(MotionId),
+    /// All was put at rest.
+    Reset,
+    /// The clock jumped.
+    ClockJump,
 }
 
 /// The stream as a whole: one delay for all joints, so that they stay together.
@@ -36,35 +82,69 @@ pub(super) struct Stream {
     moved_k: Option<i64>,
     /// The instant before which a set-point was last taken.
     pub(super) taken_k: Option<i64>,
+    pub(super) counts: StreamCounts,
+    /// What ended it, and the joints that were taken, until that is asked for.
+    ended: Option<(StreamEnd, JointSet)>,
 }
 
 impl LookAhead {
-    /// The set-point that entered last; `state` is what is commanded.
+    /// At rest at `position`, m or rad.
+    pub fn at_rest(position: f64) -> Self {
+        Self { from: position, ..Self::default() }
+    }
+
+    /// What entered last; `state` is what is commanded.
     pub fn entered(&self, state: State) -> f64 {
         self.buffer.back().copied().unwrap_or(state.position)
     }
 
-    /// Takes `newest` in and gives the next state to command; `state` is the one before it.
-    pub fn next(&mut self, newest: f64, state: State, period: Nanoseconds) -> State {
-        let position = self.buffer.pop_front().map_or(newest, |position| {
-            self.buffer.push_back(newest);
-            position
-        });
-        between(state.position, position, period)
+    /// Goes towards another set-point from the next instant on.
+    pub fn turn(&mut self, state: State) {
+        (self.from, self.since) = (self.entered(state), 0);
     }
 
-    /// State to be commanded `instants` after the next instant, if `newest` holds.
-    pub fn at(&self, instants: i64, newest: f64, state: State, period: Nanoseconds) -> State {
-        let instants = usize::try_from(instants).unwrap_or(0);
-        let entry = |place: usize| self.buffer.get(place).copied().unwrap_or(newest);
-        let before = instants.checked_sub(1).map_or(state.position, entry);
+    /// Lets the way to `newest` enter, `reach` (m or rad) further at most, and gives the next state to
+    /// command and whether `newest` has entered; `state` is the one before it.
+    pub fn next(&mut self, newest: f64, reach: f64, state: State, period: Nanoseconds) -> (State, bool) {
+        self.since = self.since.saturating_add(1);
+        let entry = approach(self.from, newest, self.since, reach);
+        let position = self.buffer.pop_front().map_or(entry, |position| {
+            self.buffer.push_back(entry);
+            position
+        });
+        (between(state.position, position, period), entry == newest)
+    }
+
+    /// State to be commanded `instants` after the next instant, if `newest` remains the newest.
+    pub fn at(&self, instants: i64, newest: f64, reach: f64, state: State, period: Nanoseconds) -> State {
+        let length = self.buffer.len() as i64;
+        let entry = |place: i64| match usize::try_from(place).ok().and_then(|p| self.buffer.get(p)) {
+            Some(&position) => position,
+            None => {
+                let since = self.since.saturating_add((place - length).saturating_add(1));
+                approach(self.from, newest, since, reach)
+            }
+        };
+        let instants = instants.max(0);
+        let before = if instants == 0 { state.position } else { entry(instants - 1) };
         between(before, entry(instants), period)
     }
 
     /// Leaves nothing but `position`, m or rad.
     pub fn empty(&mut self, position: f64) {
         self.buffer.iter_mut().for_each(|entry| *entry = position);
+        (self.from, self.since) = (position, 0);
     }
+}
+
+/// Position periods of a pause.
+pub(super) fn pause(period: Nanoseconds) -> i64 {
+    STREAM_PAUSE / period + 1
+}
+
+/// Vmax·Tsp, m or rad.
+pub(super) fn reach(limits: &JointLimits, period: Nanoseconds) -> f64 {
+    limits.limits.velocity * seconds(period)
 }
 
 /// The state at `position`, one period after `before`.
@@ -82,19 +162,37 @@ impl Stream {
 }
 
 impl Timeline {
-    /// Sets one set-point of a stream, m or rad: `true` if it is taken, `false` while a trajectory or
-    /// a stop moves the joint or waits for it. The set-point enters the look-ahead buffer at the next
-    /// instant and is commanded [`Timeline::stream_delay`] instants after that; of several before one
-    /// instant the last one counts.
+    /// Sets one set-point of a stream, m or rad: `true` if it is taken; `false` while a trajectory or a
+    /// stop moves the joint or waits for it, and after a stop until the stream has paused: until nothing
+    /// has changed in it for [`STREAM_PAUSE`].
     ///
-    /// A trajectory or a stop that begins takes the joint over from its commanded state, with the
-    /// velocity of the stream, and forgets what is in the buffer.
+    /// What enters the look-ahead buffer from the next instant on goes to it, by Vmax·Tsp in each period
+    /// at most, and is commanded [`Timeline::stream_delay`] instants after it has entered; of several
+    /// before one instant the last one counts. A trajectory or a stop that begins takes the joint over
+    /// from its commanded state, with the velocity of the stream, and forgets what is in the buffer.
     ///
     /// # Errors
-    /// [`Code::UnknownJoint`], [`Code::NotFinite`], [`Code::OutsideStroke`]; [`Code::Jump`] if the
-    /// joint cannot reach it in one period from the set-point that entered before it. Nothing changes
-    /// then.
+    /// [`Code::UnknownJoint`], [`Code::NotFinite`], [`Code::OutsideStroke`]. [`Code::Jump`] if a stream
+    /// begins further than one period's reach from what entered last, or goes on further from its last
+    /// set-point than the joint comes in the time between, [`STREAM_JITTER`] more. What was taken
+    /// remains as it is then.
+    ///
+    /// [`STREAM_JITTER`]: super::STREAM_JITTER
     pub fn stream(&mut self, joint: usize, position: f64) -> Result<bool, Rejection> {
+        self.stream_sent(joint, position, None)
+    }
+
+    /// Likewise, `sent` (ns) by the sender's clock: the time between two set-points is that by this
+    /// clock, if it is longer than that between their arrivals.
+    ///
+    /// # Errors
+    /// As of [`Timeline::stream`].
+    pub fn stream_sent(
+        &mut self,
+        joint: usize,
+        position: f64,
+        sent: Option<Nanoseconds>,
+    ) -> Result<bool, Rejection> {
         let Some(limits) = self.joints.get(joint) else {
             let text = format!("there is no joint with index {joint}");
             return Err(Rejection::new(Code::UnknownJoint, text));
@@ -102,19 +200,23 @@ impl Timeline {
         check_finite(limits, position)?;
         limits.check_stroke(0, position)?;
         self.settle_stream_delay();
+        let (k, period) = (self.next_k, self.period);
         let limits = &self.joints[joint];
         let track = &mut self.tracks[joint];
-        let waiting = track.queue.len() > 1;
-        let Some(plan) = track.queue.front_mut().filter(|_| !waiting) else {
-            return Ok(false);
-        };
-        if plan.slot.is_some() || !matches!(plan.kind, Kind::Hold(_)) {
-            return Ok(false);
+        let is_free = track.queue.len() == 1
+            && track.queue[0].slot.is_none()
+            && matches!(track.queue[0].kind, Kind::Hold(_));
+        let entered = track.ahead.entered(track.state);
+        let place = Place { limits, period, k, entered, is_free };
+        match track.arrivals.judge(place, position, sent)? {
+            Verdict::Ignored => Ok(false),
+            Verdict::Taken => {
+                track.ahead.turn(track.state);
+                track.queue[0].kind = Kind::Hold(position);
+                self.stream.taken_k = Some(k);
+                Ok(true)
+            }
         }
-        limits.check_jump(0, track.ahead.entered(track.state), position, seconds(self.period))?;
-        plan.kind = Kind::Hold(position);
-        self.stream.taken_k = Some(self.next_k);
-        Ok(true)
     }
 
     /// Sets the delay of streamed set-points, position periods, at most [`MAX_STREAM_DELAY`].
@@ -149,6 +251,47 @@ impl Timeline {
         !self.has_passed(self.stream.moved_k, 1)
     }
 
+    /// Whether set-points come for a joint that are ignored after a stop.
+    pub fn is_stream_held_off(&self) -> bool {
+        self.tracks.iter().any(|track| track.arrivals.is_held_off(self.next_k, self.period))
+    }
+
+    /// What the streams did, since the beginning.
+    pub fn stream_counts(&self) -> StreamCounts {
+        self.stream.counts
+    }
+
+    /// What last took joints away from a stream that drove them, and which; told once.
+    pub fn take_stream_end(&mut self) -> Option<(StreamEnd, JointSet)> {
+        self.stream.ended.take()
+    }
+
+    /// Takes `joints` away from a stream, which a stop does until the stream pauses.
+    pub(super) fn end_stream(&mut self, joints: impl IntoIterator<Item = usize>, end: StreamEnd) {
+        let mut driven = JointSet::default();
+        for joint in joints {
+            let arrivals = &mut self.tracks[joint].arrivals;
+            if arrivals.drives(self.next_k, self.period) {
+                driven.insert(joint);
+            }
+            arrivals.end(self.next_k, matches!(end, StreamEnd::Stopped(_)));
+        }
+        if !driven.is_empty() {
+            self.stream.ended = Some((end, driven));
+        }
+    }
+
+    /// Counts what is worth telling about the set-points that entered at instant `k`; `limited` if one
+    /// has not entered yet.
+    pub(super) fn count_stream(&mut self, k: i64, limited: bool) {
+        let mut broke_off = false;
+        for track in &mut self.tracks {
+            broke_off |= track.arrivals.broke_off(k, self.period);
+        }
+        self.stream.counts.gaps += u64::from(broke_off);
+        self.stream.counts.limited += u64::from(limited);
+    }
+
     /// Brings the delay that was set into effect, if the stream has paused.
     pub(super) fn settle_stream_delay(&mut self) {
         if self.stream.wanted == self.stream.delay || !self.has_passed(self.stream.moved_k, self.pause()) {
@@ -168,7 +311,7 @@ impl Timeline {
     }
 
     fn pause(&self) -> i64 {
-        STREAM_PAUSE / self.period + 1
+        pause(self.period)
     }
 
     /// Whether what happened at instant `k` left the buffer `instants` ago or more.

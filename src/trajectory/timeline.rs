@@ -1,5 +1,6 @@
 //! The real-time side: what each joint is commanded at each position instant.
 
+use super::arrivals::Arrivals;
 use super::event::{Event, JointSet, MotionId};
 use super::limits::JointLimits;
 use super::motions::{Motions, Release};
@@ -7,7 +8,7 @@ use super::plan::{Kind, Plan};
 use super::rejection::{Code, Rejection};
 use super::spline::State;
 use super::stop::StopPlanner;
-use super::stream::{LookAhead, Stream};
+use super::stream::{LookAhead, Stream, StreamEnd, reach};
 use crate::units::Nanoseconds;
 use std::collections::VecDeque;
 
@@ -47,6 +48,8 @@ pub(super) struct Track {
     pub state: State,
     /// Streamed set-points between the last commanded one and the one that the joint holds.
     pub ahead: LookAhead,
+    /// The streamed set-points that came.
+    pub arrivals: Arrivals,
 }
 
 /// Why there is no timeline for these joints.
@@ -90,7 +93,8 @@ impl Timeline {
         let track = |&position: &f64| Track {
             queue: VecDeque::from([Plan::hold(position)]),
             state: State::rest(position),
-            ahead: LookAhead::default(),
+            ahead: LookAhead::at_rest(position),
+            arrivals: Arrivals::default(),
         };
         Ok(Self {
             tracks: positions.iter().map(track).collect(),
@@ -118,6 +122,7 @@ impl Timeline {
         if self.stream.taken_k != Some(k) {
             self.settle_stream_delay();
         }
+        let mut limited = false;
         for (joint, track) in self.tracks.iter_mut().enumerate() {
             if track.queue.get(1).is_some_and(|plan| plan.join_k <= k) {
                 let old = track.queue.pop_front();
@@ -134,7 +139,10 @@ impl Timeline {
             track.state = match plan.kind {
                 Kind::Hold(newest) => {
                     self.stream.note(k, newest != track.ahead.entered(track.state));
-                    track.ahead.next(newest, track.state, period)
+                    let reach = reach(&self.joints[joint], period);
+                    let (state, arrived) = track.ahead.next(newest, reach, track.state, period);
+                    limited |= !arrived;
+                    state
                 }
                 _ => plan.state(k, period),
             };
@@ -151,6 +159,7 @@ impl Timeline {
             }
         }
         self.motions.settle(&mut self.events);
+        self.count_stream(k, limited);
         self.next_k += 1;
         k
     }
@@ -203,7 +212,8 @@ impl Timeline {
         let after = track.queue.partition_point(|plan| plan.join_k <= k);
         match track.queue.get(after.saturating_sub(1)) {
             Some(Plan { kind: Kind::Hold(newest), .. }) => {
-                track.ahead.at(k - self.next_k, *newest, track.state, self.period)
+                let reach = reach(&self.joints[joint], self.period);
+                track.ahead.at(k - self.next_k, *newest, reach, track.state, self.period)
             }
             Some(plan) => plan.state(k, self.period),
             None => track.state,
@@ -239,6 +249,7 @@ impl Timeline {
         for (joint, &position) in self.joints.iter().zip(positions) {
             check_finite(joint, position)?;
         }
+        self.end_stream(0..positions.len(), StreamEnd::Reset);
         for (joint, &position) in positions.iter().enumerate() {
             self.stop_all(joint, None);
             let track = &mut self.tracks[joint];

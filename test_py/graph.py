@@ -1,0 +1,241 @@
+"""A graph of four processes: a source of trajectories, the node, a process model, a recorder.
+
+The process model answers the axes' velocity with a load in proportion to it and against the motion, as
+a cutting process does; the recorder keeps what the axes publish and how late it came. `tools/run_graph.py`
+runs it for a minute, a test for a few seconds. Each of the three is this file as a program:
+
+    python test_py/graph.py source|process-model|recorder SECONDS [FILE]
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+from virtual_axes.msg import DriveStates, MotorCurrents
+
+from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, to_ns
+
+JOINTS = ("x", "y")
+DAMPING = 4000.0
+"""N s/m: at 15 m/min a load of 1000 N."""
+SWING = 2.0
+"""s, a swing of the source's there and back."""
+AMPLITUDE = 0.15
+"""m"""
+READY = "ready"
+"""What a process says once it is connected."""
+TOPICS = {"joint_states": JointState, "motor_currents": MotorCurrents, "drive_states": DriveStates}
+
+
+# ------------------------------------------------------------------------------ the three processes
+
+
+def source(seconds: float) -> None:
+    """Swings of both axes, one trajectory after the other without a gap."""
+    with Drive() as drive:
+        print(READY, flush=True)
+        periods = round(SWING * 1e9 / TSP_NS)
+        times = np.arange(periods) * TSP_NS / 1e9
+        wave = AMPLITUDE / 2 * (1 - np.cos(2 * np.pi * np.arange(periods) / periods))
+        start = drive.now() + 50 * TSP_NS
+        for _ in range(math.ceil(seconds / SWING)):
+            drive.accept(joint_trajectory(JOINTS, times, np.column_stack([wave, wave]), stamp=start))
+            start += periods * TSP_NS
+            # A swing ahead, not more: as one who makes them while the axes move.
+            drive.wait_until(start - periods * TSP_NS, 4 * SWING)
+
+
+def process_model(seconds: float) -> None:
+    """A load for each joint state, -DAMPING times the velocity, until the end."""
+    with rclpy.init():
+        node = rclpy.create_node("process_model")
+        publisher = node.create_publisher(JointState, "/load", 10)
+
+        def react(state: JointState) -> None:
+            velocity = dict(zip(state.name, state.velocity))
+            effort = [-DAMPING * velocity[joint] for joint in JOINTS]
+            publisher.publish(JointState(name=list(JOINTS), effort=effort))
+
+        node.create_subscription(JointState, "/joint_states", react, qos_profile_sensor_data)
+        wait_for_match(node, lambda: publisher.get_subscription_count() > 0)
+        spin(node, seconds)
+
+
+def recorder(seconds: float, file: Path) -> None:
+    """All samples with when they came, and the diagnostics; written to `file` at the end."""
+    with rclpy.init():
+        node = rclpy.create_node("recorder")
+        came: dict[str, list[tuple[int, int]]] = {topic: [] for topic in TOPICS}
+        rows: dict[str, list[list[float]]] = {"load": [], "velocity": []}
+        statuses: list[dict[str, str]] = []
+
+        def keep(topic: str, message: JointState | MotorCurrents | DriveStates) -> None:
+            came[topic].append((to_ns(message.header.stamp), time.time_ns()))
+            for field in rows:
+                if topic != "joint_states" and hasattr(message, field):
+                    rows[field].append([getattr(message, field)[message.name.index(joint)] for joint in JOINTS])
+
+        for topic, kind in TOPICS.items():
+            name = f"/{topic}" if topic == "joint_states" else f"/virtual_axes/{topic}"
+            node.create_subscription(kind, name, lambda message, topic=topic: keep(topic, message), DEEP_QOS)
+        node.create_subscription(
+            DiagnosticArray,
+            "/diagnostics",
+            lambda array: statuses.append({v.key: v.value for v in array.status[0].values}),
+            QoSProfile(depth=10),
+        )
+        wait_for_match(node, lambda: all(came.values()))
+        spin(node, seconds)
+        file.write_text(json.dumps({"came": came, **rows, "diagnostics": statuses}))
+
+
+def wait_for_match(node: rclpy.node.Node, is_matched) -> None:
+    """Spin until it is so, 20 s at most."""
+    deadline = time.monotonic() + 20
+    while not is_matched():
+        if time.monotonic() > deadline:
+            sys.exit("nobody there")
+        rclpy.spin_once(node, timeout_sec=0.05)
+    print(READY, flush=True)
+
+
+def spin(node: rclpy.node.Node, seconds: float) -> None:
+    """Serve the node for a while."""
+    executor = rclpy.executors.SingleThreadedExecutor()
+    executor.add_node(node)
+    deadline = time.monotonic() + seconds
+    while (left := deadline - time.monotonic()) > 0:
+        executor.spin_once(timeout_sec=left)
+
+
+# ------------------------------------------------------------------------------------- the graph
+
+
+@dataclass
+class Figures:
+    """What the recorder saw."""
+
+    stamps: dict[str, np.ndarray]
+    """By topic, ns, in the order in which they came."""
+    lateness: dict[str, np.ndarray]
+    """By topic, s from a sample's stamp until it came."""
+    load: np.ndarray
+    """A, a row per sample of motor_currents, a column per joint."""
+    velocity: np.ndarray
+    """m/s, likewise of drive_states."""
+    diagnostics: dict[str, str]
+    """The node's last values."""
+
+    def faults(self) -> list[str]:
+        """What is wrong with the grid of stamps: nothing, if none is missing and none comes twice."""
+        found = []
+        for topic, stamps in self.stamps.items():
+            steps, numbers = np.unique(np.diff(stamps), return_counts=True)
+            if steps.tolist() != [TSP_NS]:
+                odd = {f"{step / 1e6:g} ms": int(n) for step, n in zip(steps, numbers) if step != TSP_NS}
+                found.append(f"{topic}: {odd} among {len(stamps)} samples")
+        return found
+
+    def load_per_velocity(self) -> tuple[float, float, float]:
+        """Load current over velocity (A s/m, least squares), its correlation, and the lag in periods.
+
+        A load acts some periods after the velocity that it answers.
+        """
+        _, at_currents, at_states = np.intersect1d(
+            self.stamps["motor_currents"], self.stamps["drive_states"], return_indices=True
+        )
+        load, velocity = self.load[at_currents].T, self.velocity[at_states].T
+
+        def fit(lag: int) -> tuple[float, float, float]:
+            v, i = velocity[:, : velocity.shape[1] - lag].ravel(), load[:, lag:].ravel()
+            return float(v @ i / (v @ v)), float(np.corrcoef(v, i)[0, 1]), float(lag)
+
+        return max((fit(lag) for lag in range(21)), key=lambda found: found[1])
+
+
+class Process:
+    """One of the three, of this file; ended by its id."""
+
+    def __init__(self, role: str, seconds: float, domain_id: int, *more: str):
+        """Start it."""
+        env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        command = [sys.executable, str(Path(__file__).resolve()), role, str(seconds), *more]
+        self.role = role
+        self._process = subprocess.Popen(command, env=env, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+
+    def wait_until_ready(self) -> None:
+        """It waits 20 s itself."""
+        assert self._process.stdout is not None
+        if self._process.stdout.readline().strip() != READY:
+            raise ChildProcessError(f"{self.role} did not start")
+
+    def wait(self, timeout: float) -> None:
+        """Until it ends by itself."""
+        if self._process.wait(timeout) != 0:
+            raise ChildProcessError(f"{self.role} ended with status {self._process.returncode}")
+
+    def __enter__(self) -> Process:
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End it."""
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait(10)
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+
+def run_graph(seconds: float, file: Path) -> Figures:
+    """Run the four processes for `seconds` of motion; what the recorder wrote to `file`."""
+    with Node(["-p", "time:=real"]) as node:
+        domain = node.domain_id
+        assert domain is not None
+        # The others go on while the source ends.
+        margin = 1.0
+        with (
+            Process("process-model", seconds + 30, domain) as model,
+            Process("recorder", seconds + margin, domain, str(file)) as keeper,
+        ):
+            model.wait_until_ready()
+            with Process("source", seconds, domain) as swings:
+                swings.wait_until_ready()
+                keeper.wait_until_ready()
+                keeper.wait(seconds + 60)
+    kept = json.loads(file.read_text())
+    came = {topic: np.array(pairs, dtype=np.int64) for topic, pairs in kept["came"].items()}
+    return Figures(
+        stamps={topic: pairs[:, 0] for topic, pairs in came.items()},
+        lateness={topic: (pairs[:, 1] - pairs[:, 0]) / 1e9 for topic, pairs in came.items()},
+        load=np.array(kept["load"]),
+        velocity=np.array(kept["velocity"]),
+        diagnostics=kept["diagnostics"][-1],
+    )
+
+
+def main() -> None:
+    """Be one of the three."""
+    role, seconds, *more = sys.argv[1:]
+    if role == "source":
+        source(float(seconds))
+    elif role == "process-model":
+        process_model(float(seconds))
+    else:
+        recorder(float(seconds), Path(more[0]))
+
+
+if __name__ == "__main__":
+    main()

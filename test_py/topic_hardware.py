@@ -1,0 +1,147 @@
+"""A stand-in for ros2_control's joint_state_topic_hardware_interface, and a network that is not kind.
+
+It does what that hardware does in each update of the controller manager: `read` takes the newest joint
+states over, `write` sends one JointState with the command of every joint in the order of its URDF, and
+holds it back while commands and states differ by no more than the threshold, in sum. A joint that no
+controller has claimed is sent as NaN. One without a position command interface is in `name` and not in
+`position`, which is then shorter: such joints stand last.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+import random
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+
+COMMANDS_TOPIC = "/robot_joint_commands"
+STATES_TOPIC = "/robot_joint_states"
+THRESHOLD = 1e-5
+"""Below this a command is held back, unless another one is set; -1 sends always."""
+
+
+@dataclass(frozen=True)
+class Network:
+    """What happens to messages on their way, by a fixed seed."""
+
+    seed: int = 0
+    jitter: float = 0.0
+    """s, each message is late by up to this; one that is later than the next is overtaken."""
+    duplicates: float = 0.0
+    """Share of the messages that come twice."""
+    gaps: float = 0.0
+    """Share of the messages with which a gap begins."""
+    gap: float = 0.0
+    """s, for so long nothing comes."""
+
+    def schedule(self, count: int, rate: float) -> list[tuple[float, int]]:
+        """When (s) each of `count` messages at `rate` (Hz) comes, in order; lost ones are left out."""
+        rng = random.Random(self.seed)
+        arrivals: list[tuple[float, int]] = []
+        silent_until = -1.0
+        # Whole to begin with and in the end: what is lost there nobody sends again.
+        for index in range(count):
+            sent = index / rate
+            if 0.2 < sent < count / rate - 0.5 and sent >= silent_until and rng.random() < self.gaps:
+                silent_until = sent + self.gap
+            late = rng.uniform(0.0, self.jitter)
+            copies = 1 + (rng.random() < self.duplicates)
+            if sent < silent_until:
+                continue
+            arrivals += [(sent + late, index)] * copies
+        heapq.heapify(arrivals)
+        return [heapq.heappop(arrivals) for _ in range(len(arrivals))]
+
+
+class TopicHardware:
+    """The hardware: states in, commands out."""
+
+    def __init__(
+        self,
+        node: Node,
+        joints: Sequence[str],
+        position_interfaces: Sequence[str],
+        threshold: float = THRESHOLD,
+    ):
+        """`joints` in the URDF's order; those of `position_interfaces` can be commanded."""
+        self.joints = list(joints)
+        self.threshold = threshold
+        self._has_position = [joint in position_interfaces for joint in joints]
+        self.command = dict.fromkeys(joints, math.nan)
+        """m or rad; NaN: no controller has claimed it."""
+        self.state = dict.fromkeys(joints, math.nan)
+        """m or rad, as of the last `read`."""
+        self._newest: JointState | None = None
+        self.node = node
+        self._publisher = node.create_publisher(JointState, COMMANDS_TOPIC, QoSProfile(depth=1))
+        self._subscription = node.create_subscription(JointState, STATES_TOPIC, self._keep, qos_profile_sensor_data)
+
+    def _keep(self, message: JointState) -> None:
+        self._newest = message
+
+    def is_connected(self) -> bool:
+        """Whether somebody takes the commands and states have come."""
+        return self._publisher.get_subscription_count() > 0 and self._newest is not None
+
+    def read(self) -> None:
+        """Take the newest states over."""
+        if (newest := self._newest) is not None:
+            self.state.update({j: p for j, p in zip(newest.name, newest.position) if j in self.state})
+
+    def write(self) -> JointState | None:
+        """The message with the commands, or none while it is held back."""
+        # A NaN makes the sum one, which is not below any threshold.
+        difference = sum(abs(self.state[joint] - self.command[joint]) for joint in self.joints)
+        if difference <= self.threshold:
+            return None
+        message = JointState(name=self.joints)
+        message.header.stamp = self.node.get_clock().now().to_msg()
+        message.position = [self.command[j] for j, has in zip(self.joints, self._has_position) if has]
+        return message
+
+    def send(self, message: JointState) -> None:
+        """Publish it."""
+        self._publisher.publish(message)
+
+    def close(self) -> None:
+        """Leave."""
+        self.node.destroy_publisher(self._publisher)
+        self.node.destroy_subscription(self._subscription)
+
+    def run(
+        self,
+        controller: Callable[[float], Mapping[str, float]],
+        duration: float,
+        rate: float,
+        network: Network | None = None,
+    ) -> list[dict[str, float]]:
+        """Update at `rate` (Hz) for `duration` s; `controller(t)` commands joints at t s.
+
+        The controller's time is the count of updates, as with a controller that is given the period.
+        Returns what was commanded at each update.
+        """
+        count = round(duration * rate)
+        commanded: list[dict[str, float]] = []
+        messages: list[JointState | None] = []
+        began = time.monotonic()
+        for due, index in (network or Network()).schedule(count, rate):
+            while len(messages) <= index:
+                _sleep_until(began + len(messages) / rate)
+                self.read()
+                self.command.update(controller(len(messages) / rate))
+                commanded.append(dict(self.command))
+                messages.append(self.write())
+            _sleep_until(began + due)
+            if (message := messages[index]) is not None:
+                self.send(message)
+        return commanded
+
+
+def _sleep_until(moment: float) -> None:
+    time.sleep(max(0.0, moment - time.monotonic()))

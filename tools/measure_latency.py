@@ -1,0 +1,96 @@
+#!/usr/bin/env python3
+"""How long a set-point of `psec_stream` takes to the joint state that contains its effect.
+
+    cargo build --release && source .build/env.sh
+    tools/measure_latency.py --messages 500
+
+One set-point at a time at a random phase of the position period; wall-clock time from the call of
+publish to the callback of the first message
+
+- of ~/drive_states that has it as psec: what the graph costs;
+- of joint_states in which the axis has moved: that, and the pure delay of the drive that is simulated.
+
+As ratios to the position period. A sample is published once its period has been computed. What bounds
+the first: the next position instant (uniform between 0 and 1 period), the computing of that period, and
+the transport there and back.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from sensor_msgs.msg import JointState
+from virtual_axes.msg import DriveStates
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+from drive import DEEP_QOS, TSP_NS, Drive, Node  # noqa: E402
+
+STEP = 2e-3
+"""m, within reach of the axis in one period."""
+MOVED = 1e-7
+"""m, more than an axis at rest creeps in the time that is measured."""
+REST = 0.4
+"""s until the axis stands again."""
+
+
+def measure(drive: Drive, messages: int, seed: int) -> dict[str, np.ndarray]:
+    """Latencies of either kind, s."""
+    rng = random.Random(seed)
+    came: dict[str, list[tuple[int, float]]] = {"psec": [], "position": []}
+
+    def keep_states(message: DriveStates) -> None:
+        came["psec"].append((time.monotonic_ns(), message.psec[message.name.index("x")]))
+
+    def keep_joints(message: JointState) -> None:
+        came["position"].append((time.monotonic_ns(), message.position[message.name.index("x")]))
+
+    drive.node.create_subscription(DriveStates, f"{drive.target}/drive_states", keep_states, DEEP_QOS)
+    drive.node.create_subscription(JointState, "/joint_states", keep_joints, DEEP_QOS)
+    drive.wait_for(lambda: all(came.values()), 10, "samples")
+    found: dict[str, list[float]] = {key: [] for key in came}
+    for number in range(messages):
+        target = 0.0 if number % 2 else STEP
+        time.sleep(REST + rng.random() * TSP_NS / 1e9)
+        before = came["position"][-1][1]
+        for samples in came.values():
+            samples.clear()
+        sent = time.monotonic_ns()
+        drive.stream(["x"], [target])
+        for key, has_come in (
+            ("psec", lambda value, target=target: value == target),
+            ("position", lambda value, before=before: abs(value - before) > MOVED),
+        ):
+
+            def first(key: str = key, has_come=has_come) -> list[int]:
+                return [at for at, value in list(came[key]) if has_come(value)][:1]
+
+            found[key].append((drive.wait_for(first, 2, f"{key} of message {number}")[0] - sent) / 1e9)
+    return {key: np.array(latencies) for key, latencies in found.items()}
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--messages", type=int, default=300, help="set-points (300)")
+    parser.add_argument("--seed", type=int, default=1, help="of the phases (1)")
+    args = parser.parse_args()
+    with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:
+        latencies = measure(drive, args.messages, args.seed)
+    print(f"{args.messages} set-points, position period {TSP_NS / 1e6:g} ms, {os.cpu_count()} cores; in periods:")
+    for key, name in (("psec", "commanded"), ("position", "axis has moved")):
+        periods = latencies[key] * 1e9 / TSP_NS
+        low, median, high = np.percentile(periods, [5, 50, 95])
+        print(f"  {name:<15} p5 {low:.2f}, median {median:.2f}, p95 {high:.2f}, max {periods.max():.2f}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,53 @@
+#!/usr/bin/env python3
+"""Four processes in real time: how whole the grid of stamps is, and how late samples come.
+
+    cargo build --release && source .build/env.sh
+    tools/run_graph.py --seconds 60
+
+A source of trajectories, the node, a process model that loads the axes in proportion to their velocity,
+and a recorder. The exit status tells whether a stamp was missing or came twice.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+from graph import DAMPING, run_graph  # noqa: E402
+from motion import RATIO  # noqa: E402
+
+TORQUE_CONSTANT = 2.64
+
+
+def main() -> int:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=60.0, help="of motion (60)")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        figures = run_graph(args.seconds, Path(folder) / "recorded.json")
+    print(f"{args.seconds:g} s on {os.cpu_count()} cores")
+    for topic, late in figures.lateness.items():
+        p50, p99 = np.percentile(late * 1e3, [50, 99])
+        times = f"p50 {p50:.2f}, p99 {p99:.2f}, max {late.max() * 1e3:.2f}"
+        print(f"  {topic:<15}{len(late)} samples; from stamp to recorder, ms: {times}")
+    for fault in figures.faults():
+        print(f"  {fault}")
+    slope, correlation, lag = figures.load_per_velocity()
+    nominal = DAMPING * RATIO / TORQUE_CONSTANT
+    print(f"  load over velocity: {slope:.3f} A s/m ({nominal:.3f}), correlation {correlation:.5f}, lag {lag:g} periods")
+    for key in ("position_periods", "missed_periods", "dropped_samples", "mean_lateness_ms", "max_lateness_ms"):
+        print(f"  {key}: {figures.diagnostics[key]}")
+    return int(bool(figures.faults()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
