@@ -54,6 +54,18 @@ pub(super) const NODE: &[Definition] = &[
         .default(Flag(false))
         .live()
         .is("Accept trajectories whose last point has a velocity."),
+    Definition::new("workpiece_frame", "", Kind::Text)
+        .of_node()
+        .default(Text("workpiece"))
+        .is("Frame that tool poses and paths are given in."),
+    Definition::number("tool_path_rate", "Hz", 0.0, 100.0)
+        .of_node()
+        .default(Number(2.0))
+        .is("Rate of the paths of the tool tip while it moves; 0 is never."),
+    Definition::new("tool_path_length", "", Kind::Integer { min: 2, max: 100_000 })
+        .of_node()
+        .default(Integer(2000))
+        .is("Largest number of poses of a path of the tool tip; the oldest are left out."),
     Definition::new("use_sim_time", "", Kind::Flag).of_node().default(Flag(false)).is("Follow /clock."),
     // Quality of service.
     qos_reliability("qos.psec.reliability", "reliable"),
@@ -75,6 +87,15 @@ pub(super) const NODE: &[Definition] = &[
     qos_reliability("qos.drive_states.reliability", "reliable"),
     qos_durability("qos.drive_states.durability", "volatile"),
     qos_depth("qos.drive_states.depth", 10),
+    qos_reliability("qos.tool_pose.reliability", "reliable"),
+    qos_durability("qos.tool_pose.durability", "volatile"),
+    qos_depth("qos.tool_pose.depth", 10),
+    qos_reliability("qos.tool_path.reliability", "reliable"),
+    qos_durability("qos.tool_path.durability", "volatile"),
+    qos_depth("qos.tool_path.depth", 1),
+    qos_reliability("qos.tool_path_setpoint.reliability", "reliable"),
+    qos_durability("qos.tool_path_setpoint.durability", "volatile"),
+    qos_depth("qos.tool_path_setpoint.depth", 1),
     qos_reliability("qos.trajectory_result.reliability", "reliable"),
     qos_durability("qos.trajectory_result.durability", "transient_local"),
     qos_depth("qos.trajectory_result.depth", 50),

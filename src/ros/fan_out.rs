@@ -16,6 +16,7 @@ use super::convert;
 use super::diagnostics::Diagnostics;
 use super::outputs::Output;
 use super::pace::{Frame, Health};
+use super::tool::ToolOutput;
 use crate::messages::{DriveStates, MotorCurrents};
 
 /// Period of `/diagnostics` (REP-107).
@@ -39,6 +40,8 @@ pub struct FanOut {
     pub motor_currents: Output<MotorCurrents>,
     /// `~/drive_states`.
     pub drive_states: Output<DriveStates>,
+    /// Pose and paths of the tool, if the machine moves one.
+    pub tool: Option<ToolOutput>,
     /// `/clock`, in `fast`.
     pub clock: Option<ClockOutput>,
     /// Joints, with prefix.
@@ -56,7 +59,11 @@ impl FanOut {
             {
                 clock.output.send(Clock { clock: convert::stamp(frame.time) }).await;
             }
-            if frame.instant % self.every == 0 {
+            let publish = frame.instant % self.every == 0;
+            if let Some(tool) = &self.tool {
+                tool.take(&frame, publish).await;
+            }
+            if publish {
                 self.joint_states.send(convert::joint_state(&frame, &self.joints)).await;
                 self.motor_currents.send(convert::motor_currents(&frame, &self.joints)).await;
                 self.drive_states.send(convert::drive_states(&frame, &self.joints)).await;

@@ -26,5 +26,6 @@ pub mod rosout;
 mod rtps;
 mod service;
 mod stream;
+mod tool;
 mod topics;
 mod trigger;

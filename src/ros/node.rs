@@ -28,9 +28,11 @@ use super::participant::{Participant, ParticipantError};
 use super::results::Results;
 use super::rosout;
 use super::service::ServiceError;
+use super::tool::ToolTopics;
 use super::topics::Topics;
 use super::trigger::Trigger;
 use crate::config::{ConfigError, Parameters, TimeMode};
+use crate::kinematics::Kinematics;
 use crate::simulation::{self, Simulation, SimulationError};
 use crate::trajectory::{Context, JointLimits, MotionId, Request, Start, Trajectory};
 use crate::units::{Nanoseconds, seconds};
@@ -129,7 +131,9 @@ async fn serve(
     let options = NodeOptions::new().start_parameter_services(false).enable_rosout(args.log_sinks().rosout);
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
-    let topics = Topics::create(&mut node, args, &parameters, fast)?;
+    let mut topics = Topics::create(&mut node, args, &parameters, fast)?;
+    let tool = ToolTopics::create(&mut node, args, &parameters, Kinematics::new(&config))?;
+    topics.names.also_publishes(tool.as_ref().map_or(&[], |tool| &tool.names));
     let reset = Trigger::new(&mut node, &context, args, "reset")?;
     let stop = Trigger::new(&mut node, &context, args, "stop")?;
     let parameter_services = ParameterServices::new(&mut node, &context, args)?;
@@ -157,6 +161,7 @@ async fn serve(
         joint_states: publishing.start(topics.joint_states, when_full),
         motor_currents: publishing.start(topics.motor_currents, when_full),
         drive_states: publishing.start(topics.drive_states, when_full),
+        tool: tool.map(|tool| tool.start(&mut publishing, node_config.tool.clone(), when_full)),
         clock: topics.clock.map(|(publisher, name)| ClockOutput {
             output: publishing.start(publisher, when_full),
             silent: watch_clock(dds.clone(), name, publishing.tasks),

@@ -80,6 +80,8 @@ pub struct Frame {
     pub time: Nanoseconds,
     /// One per axis.
     pub samples: Vec<AxisSample>,
+    /// How often the axes have been reset before it.
+    pub resets: u64,
 }
 
 /// How the thread fares; read by the diagnostics.
@@ -142,6 +144,7 @@ pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
     let clock = PaceClock::new(&simulation);
     channels.health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
     let mut stream = StreamLog::default();
+    let mut resets = 0;
     loop {
         let lateness = match mode {
             TimeMode::Real => clock.wait_for(simulation.next_instant()),
@@ -156,14 +159,17 @@ pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
             match channels.commands.try_recv() {
                 Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => return,
                 Ok(Command::Stream(setpoints)) => stream.take(&mut simulation, setpoints),
-                Ok(command) => obey(&mut simulation, command, &channels.reports),
+                Ok(command) => {
+                    resets += u64::from(matches!(command, Command::Reset(_)));
+                    obey(&mut simulation, command, &channels.reports);
+                }
                 Err(mpsc::error::TryRecvError::Empty) => break,
             }
         }
         let instant = simulation.next_instant();
         simulation.step();
-        let frame =
-            Frame { instant, time: simulation.time_of(instant), samples: simulation.samples().to_vec() };
+        let time = simulation.time_of(instant);
+        let frame = Frame { instant, time, samples: simulation.samples().to_vec(), resets };
         let taken = match mode {
             TimeMode::Real => channels.frames.try_send(frame).is_ok(),
             TimeMode::Fast | TimeMode::SimTime => channels.frames.blocking_send(frame).is_ok(),
