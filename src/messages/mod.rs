@@ -11,8 +11,8 @@ mod trajectory;
 pub use own::{DriveStates, MotorCurrents, PACKAGE, Source, Status, TrajectoryResult};
 pub use pose::{path, pose_stamped};
 pub use ros2_interfaces_jazzy_serde::{
-    builtin_interfaces, diagnostic_msgs, geometry_msgs, nav_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs,
-    trajectory_msgs,
+    builtin_interfaces, diagnostic_msgs, geometry_msgs, nav_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs,
+    std_msgs, std_srvs, trajectory_msgs,
 };
 pub use schema::Schema;
 pub use state::Sampled;

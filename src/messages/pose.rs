@@ -15,10 +15,8 @@ pub fn pose_stamped(
     orientation: &UnitQuaternion<f64>,
 ) -> PoseStamped {
     let [x, y, z, w] = orientation.coords.into();
-    let pose = Pose {
-        position: Point { x: tip.x, y: tip.y, z: tip.z },
-        orientation: Quaternion { x, y, z, w },
-    };
+    let pose =
+        Pose { position: Point { x: tip.x, y: tip.y, z: tip.z }, orientation: Quaternion { x, y, z, w } };
     let mut header = header(time);
     header.frame_id = frame.to_owned();
     PoseStamped { header, pose }

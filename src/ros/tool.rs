@@ -114,7 +114,8 @@ impl Place {
     }
 
     fn is_far_from(&self, other: &Self) -> bool {
-        (self.pose.tip - other.pose.tip).norm() >= SPACING || (self.pose.axis - other.pose.axis).norm() >= TURN
+        (self.pose.tip - other.pose.tip).norm() >= SPACING
+            || (self.pose.axis - other.pose.axis).norm() >= TURN
     }
 }
 

@@ -21,6 +21,8 @@ const SPINDLE_RADIUS: f64 = 0.05;
 const SPINDLE_LENGTH: f64 = 0.2;
 /// Radius of the tool, m.
 const TOOL_RADIUS: f64 = 0.006;
+/// What edges and places of shapes are rounded to, 1/m: 0.1 mm.
+const ROUNDING: f64 = 1e4;
 /// Radius of the bearings of A, m.
 const BEARING_RADIUS: f64 = 0.07;
 
@@ -55,17 +57,21 @@ pub(super) struct Visual {
     pub material: &'static str,
 }
 
+fn rounded(value: f64) -> f64 {
+    (value * ROUNDING).round() / ROUNDING
+}
+
 /// The box between two corners.
 fn block(from: [f64; 3], to: [f64; 3], (material, _): Material) -> Visual {
-    let edges = std::array::from_fn(|i| (to[i] - from[i]).abs());
-    let middle = std::array::from_fn(|i| 0.5 * (from[i] + to[i]));
+    let edges = std::array::from_fn(|i| rounded((to[i] - from[i]).abs()));
+    let middle = std::array::from_fn(|i| rounded(0.5 * (from[i] + to[i])));
     Visual { geometry: Geometry::Box(edges), origin: middle, turned: [0.0; 3], material }
 }
 
 /// The cylinder about Z from one height to another.
 fn cylinder(radius: f64, from: f64, to: f64, (material, _): Material) -> Visual {
-    let geometry = Geometry::Cylinder { radius, length: (to - from).abs() };
-    Visual { geometry, origin: [0.0, 0.0, 0.5 * (from + to)], turned: [0.0; 3], material }
+    let geometry = Geometry::Cylinder { radius, length: rounded((to - from).abs()) };
+    Visual { geometry, origin: [0.0, 0.0, rounded(0.5 * (from + to))], turned: [0.0; 3], material }
 }
 
 /// The shapes of one machine.
@@ -80,10 +86,7 @@ pub(super) struct Shapes {
 }
 
 impl Shapes {
-    pub fn new<'a>(
-        geometry: &KinematicsConfig,
-        limits: impl Fn(Role) -> Option<&'a LimitsConfig>,
-    ) -> Self {
+    pub fn new<'a>(geometry: &KinematicsConfig, limits: impl Fn(Role) -> Option<&'a LimitsConfig>) -> Self {
         let half = Role::LINEAR.map(|role| {
             let reach = limits(role).map(|limits| limits.stroke_max.max(-limits.stroke_min));
             reach.filter(|reach| reach.is_finite()).unwrap_or(HALF_STROKE).min(LARGEST_HALF_STROKE)
@@ -150,7 +153,7 @@ impl Shapes {
         };
         let bearing = |side: f64| Visual {
             geometry: Geometry::Cylinder { radius: BEARING_RADIUS, length: PLATE + GAP },
-            origin: [side * (inner + PLATE), 0.0, 0.0],
+            origin: [rounded(side * (inner + PLATE)), 0.0, 0.0],
             turned: [0.0, std::f64::consts::FRAC_PI_2, 0.0],
             material: CRADLE.0,
         };

@@ -67,9 +67,10 @@ fn visual(xml: &mut Xml, visual: &Visual) -> io::Result<()> {
         origin(xml, visual.origin, visual.turned)?;
         xml.create_element("geometry").write_inner_content(|xml| {
             match visual.geometry {
-                Geometry::Box(edges) => {
-                    xml.create_element("box").with_attribute(("size", numbers(&edges).as_str())).write_empty()?
-                }
+                Geometry::Box(edges) => xml
+                    .create_element("box")
+                    .with_attribute(("size", numbers(&edges).as_str()))
+                    .write_empty()?,
                 Geometry::Cylinder { radius, length } => xml
                     .create_element("cylinder")
                     .with_attribute(("radius", number(radius).as_str()))

@@ -31,11 +31,15 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     for text in &arguments.joints {
         let joints = positions(&config, text).map_err(|reason| format!("--joints {text}: {reason}"))?;
         let pose = kinematics.forward(&joints);
-        let ([x, y, z], [u, v, w]): ([f64; 3], [f64; 3]) = (pose.tip.into(), pose.axis.into());
+        // No minus before a zero.
+        let [[x, y, z], [u, v, w]]: [[f64; 3]; 2] =
+            [pose.tip, pose.axis].map(|v| v.map(|value| value + 0.0).into());
         lines += &format!("tip {x} {y} {z} m, axis {u} {v} {w}\n");
         // In the order of ROS: x, y, z, w.
         let orientation: [f64; 4] = kinematics.orientation(&joints).coords.into();
-        list.push(json!({ "joints": joints, "tip": [x, y, z], "axis": [u, v, w], "orientation": orientation }));
+        list.push(
+            json!({ "joints": joints, "tip": [x, y, z], "axis": [u, v, w], "orientation": orientation }),
+        );
     }
     Ok(if arguments.json { format!("{:#}\n", json!(list)) } else { lines })
 }
@@ -45,14 +49,16 @@ fn positions(machine: &MachineConfig, text: &str) -> Result<Vec<f64>, String> {
     let axes = machine.axes();
     let mut positions = vec![None; axes.len()];
     for entry in text.split(',') {
-        let (name, number) = entry.split_once('=').ok_or_else(|| format!("'{entry}' is not JOINT=POSITION"))?;
+        let (name, number) =
+            entry.split_once('=').ok_or_else(|| format!("'{entry}' is not JOINT=POSITION"))?;
         let name = name.trim();
         let Some(place) = axes.iter().position(|axis| axis.name() == name) else {
             let known: Vec<&str> = axes.iter().map(|axis| axis.name()).collect();
             return Err(format!("unknown joint {name}; there are {}", known.join(", ")));
         };
         let position = number.trim().parse().ok().filter(|number: &f64| number.is_finite());
-        let position = position.ok_or_else(|| format!("{name} is '{number}', must be a number in m or rad"))?;
+        let position =
+            position.ok_or_else(|| format!("{name} is '{number}', must be a number in m or rad"))?;
         if positions[place].replace(position).is_some() {
             return Err(format!("joint {name} is named twice"));
         }

@@ -26,7 +26,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let machine = &arguments.machine;
     let config = machine.parameters()?.machine_config()?;
-    let text = urdf(&config, &arguments.joint_prefix).map_err(|error| format!("{}: {error}", machine.name()))?;
+    let text =
+        urdf(&config, &arguments.joint_prefix).map_err(|error| format!("{}: {error}", machine.name()))?;
     let Some(path) = &arguments.out else { return Ok(text) };
     let mut file = OutputFile::create(path)?;
     file.write_all(text.as_bytes())?;
