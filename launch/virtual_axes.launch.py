@@ -1,50 +1,189 @@
-"""Start the virtual axes in a ROS 2 graph.
+"""Start the virtual axes in a ROS 2 graph, with a model of the machine for RViz.
 
-ros2 launch virtual_axes virtual_axes.launch.py machine:=my_machine.yaml namespace:=cell time:=fast
+ros2 launch virtual_axes virtual_axes.launch.py machine:=my_machine.yaml controller:=gpc rviz:=true
+ros2 launch virtual_axes virtual_axes.launch.py namespace:=cell frame_prefix:=cell/ time:=fast record:=run.mcap
 """
 
+import subprocess
+import tempfile
+from pathlib import Path
+
+import yaml
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import ExecutableInPackage
+
+PACKAGE = "virtual_axes"
+SHARE = Path(__file__).resolve().parent.parent
+DEFAULT_MACHINE = "mikron_ucp710"
+PUBLISH_FREQUENCY = 50.0
+"""Transforms of robot_state_publisher a second; its own default of 20 looks jerky."""
+
+ARGUMENTS = [
+    ("machine", DEFAULT_MACHINE, None, "Machine file (ROS 2 parameters), or the name of a shipped machine"),
+    (
+        "controller",
+        "as_machine",
+        ["as_machine", "cascade", "gpc", "rst"],
+        "Position controller of every joint; as_machine: what the machine file says",
+    ),
+    ("namespace", "", None, "Namespace of the nodes"),
+    ("name", PACKAGE, None, "Name of the node"),
+    ("joint_prefix", "", None, "Text before the joint names"),
+    ("frame_prefix", "", None, "Text before the names of the frames, as in cell/"),
+    (
+        "time",
+        "real",
+        ["real", "fast", "sim"],
+        "Real time; as fast as possible with a /clock of its own; or after the /clock of others",
+    ),
+    ("robot_state_publisher", "true", ["true", "false"], "Publish the model of the machine and its transforms"),
+    ("rviz", "false", ["true", "false"], "Show the machine in RViz"),
+    ("record", "", None, "MCAP file that the node records its topics to; empty: none"),
+    ("log_level", "info", None, "Level of the node's log"),
+]
 
 
-def start_node(context: LaunchContext) -> list[Node]:
-    """Make the node; without a machine file it runs the embedded machine."""
-    argument = {
-        key: LaunchConfiguration(key).perform(context) for key in ("machine", "namespace", "name", "time", "log_level")
-    }
-    parameters: list[object] = [argument["machine"]] if argument["machine"] else []
-    parameters.append({"time": argument["time"]})
-    return [
+def machine_file(machine: str) -> Path:
+    """Find the parameter file of a machine: a path, or the name of a shipped one."""
+    shipped = SHARE / "config" / f"{machine}.yaml"
+    for path in (Path(machine).expanduser(), shipped):
+        if path.is_file():
+            return path.resolve()
+    names = ", ".join(sorted(path.stem for path in shipped.parent.glob("*.yaml")))
+    raise RuntimeError(f"machine:={machine}: there is no such file, and the shipped machines are {names}")
+
+
+def joints_of(machine: Path) -> list[str]:
+    """Names of a machine's joints."""
+
+
+    def found(node: object) -> list[str]:
+        if not isinstance(node, dict):
+            return []
+        own = node.get("ros__parameters")
+        if isinstance(own, dict):
+            return [str(joint) for joint in own.get("joints") or []]
+        return next((joints for value in node.values() if (joints := found(value))), [])
+
+    with machine.open(encoding="utf-8") as file:
+        joints = found(yaml.safe_load(file))
+    if not joints:
+        raise RuntimeError(f"{machine}: no joints under ros__parameters")
+    return joints
+
+
+def controller_parameters(controller: str, machine: Path) -> dict[str, object]:
+    """Say which parameters give every joint this controller."""
+    if controller == "as_machine":
+        return {}
+    return {f"{joint}.position_loop.controller": controller for joint in joints_of(machine)}
+
+
+def robot_description(context: LaunchContext, machine: Path, joint_prefix: str) -> tuple[str, list[LogInfo]]:
+    """Have the package's command write the URDF of the machine; what is to be said comes second."""
+    try:
+        program = ExecutableInPackage(PACKAGE, PACKAGE).perform(context)
+    except Exception as error:
+        if machine.stem != DEFAULT_MACHINE or joint_prefix:
+            raise RuntimeError(f"no URDF of {machine}: {error}") from error
+        installed = SHARE / "urdf" / f"{DEFAULT_MACHINE}.urdf"
+        return installed.read_text(encoding="utf-8"), [LogInfo(msg=f"{error}; taking {installed}")]
+    command = [program, "urdf", "--machine", str(machine), "--joint-prefix", joint_prefix]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    if result.returncode:
+        raise RuntimeError(f"{result.stderr.strip()} (or leave the model out: robot_state_publisher:=false)")
+    return result.stdout, []
+
+
+def rviz_config(namespace: str, name: str, frame_prefix: str) -> Path:
+    """Give the RViz configuration for these names: the installed one, or a copy with other names."""
+    installed = SHARE / "rviz" / "virtual_axes.rviz"
+    if not namespace and name == PACKAGE and not frame_prefix:
+        return installed
+    prefix = f"/{namespace.strip('/')}" if namespace else ""
+
+    def renamed(value: object, key: str = "") -> object:
+        if isinstance(value, dict):
+            return {inner: renamed(content, inner) for inner, content in value.items()}
+        if isinstance(value, list):
+            return [renamed(content) for content in value]
+        if key == "TF Prefix":
+            return frame_prefix.rstrip("/")
+        if key in ("Fixed Frame", "Reference Frame") and value == "machine":
+            return f"{frame_prefix}{value}"
+        if isinstance(value, str) and value.startswith(f"/{PACKAGE}/"):
+            return f"{prefix}/{name}/{value.removeprefix(f'/{PACKAGE}/')}"
+        return f"{prefix}{value}" if value == "/robot_description" else value
+
+    content = renamed(yaml.safe_load(installed.read_text(encoding="utf-8")))
+    with tempfile.NamedTemporaryFile("w", prefix=f"{PACKAGE}_", suffix=".rviz", delete=False) as file:
+        yaml.safe_dump(content, file, sort_keys=False)
+    return Path(file.name)
+
+
+def start(context: LaunchContext) -> list[object]:
+    """Make the nodes."""
+    argument = {key: LaunchConfiguration(key).perform(context) for key, *_ in ARGUMENTS}
+    machine = machine_file(argument["machine"])
+    namespace, name, frame_prefix = argument["namespace"], argument["name"], argument["frame_prefix"]
+    clock = {"use_sim_time": argument["time"] != "real"}
+
+    parameters: dict[str, object] = controller_parameters(argument["controller"], machine)
+    parameters |= {"use_sim_time": True} if argument["time"] == "sim" else {"time": argument["time"]}
+    parameters["joint_prefix"] = ParameterValue(argument["joint_prefix"], value_type=str)
+    parameters["workpiece_frame"] = ParameterValue(f"{frame_prefix}workpiece", value_type=str)
+    if argument["record"]:
+        parameters["record"] = ParameterValue(argument["record"], value_type=str)
+    actions: list[object] = [
         Node(
-            package="virtual_axes",
+            package=PACKAGE,
             executable="virtual_axes_node",
-            name=argument["name"],
-            namespace=argument["namespace"],
-            parameters=parameters,
-            arguments=["--ros-args", "--log-level", argument["log_level"]],
+            name=name,
+            namespace=namespace,
+            parameters=[str(machine), parameters],
+            ros_arguments=["--log-level", argument["log_level"]],
             output="screen",
         )
     ]
+    if argument["robot_state_publisher"] == "true":
+        description, messages = robot_description(context, machine, argument["joint_prefix"])
+        actions += messages
+        actions.append(
+            Node(
+                package="robot_state_publisher",
+                executable="robot_state_publisher",
+                namespace=namespace,
+                parameters=[
+                    {
+                        "robot_description": ParameterValue(description, value_type=str),
+                        "frame_prefix": ParameterValue(frame_prefix, value_type=str),
+                        "publish_frequency": PUBLISH_FREQUENCY,
+                        **clock,
+                    }
+                ],
+            )
+        )
+    if argument["rviz"] == "true":
+        actions.append(
+            Node(
+                package="rviz2",
+                executable="rviz2",
+                namespace=namespace,
+                arguments=["-d", str(rviz_config(namespace, name, frame_prefix))],
+                parameters=[clock],
+            )
+        )
+    return actions
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Declare the arguments and start the node."""
-    return LaunchDescription(
-        [
-            DeclareLaunchArgument(
-                "machine", default_value="", description="Parameter file of the machine; empty: the embedded one"
-            ),
-            DeclareLaunchArgument("namespace", default_value="", description="Namespace of the node"),
-            DeclareLaunchArgument("name", default_value="virtual_axes", description="Name of the node"),
-            DeclareLaunchArgument(
-                "time",
-                default_value="real",
-                choices=["real", "fast"],
-                description="Real time, or as fast as possible with a /clock of its own",
-            ),
-            DeclareLaunchArgument("log_level", default_value="info", description="Level of the node's log"),
-            OpaqueFunction(function=start_node),
-        ]
-    )
+    """Declare the arguments and start the nodes."""
+    declared = [
+        DeclareLaunchArgument(key, default_value=default, choices=choices, description=description)
+        for key, default, choices, description in ARGUMENTS
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=start)])

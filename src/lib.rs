@@ -6,7 +6,7 @@
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
 //! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] → [`machine`] →
 //! [`trajectory`], [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] →
-//! [`recording`] → [`identify`], [`tune`] → [`messages`], [`files`], [`report`] → `ros`.
+//! [`recording`] → [`identify`], [`tune`] → [`messages`], [`files`], [`report`], [`urdf`] → `ros`.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -32,3 +32,4 @@ pub mod trajectory;
 pub mod trial;
 pub mod tune;
 pub mod units;
+pub mod urdf;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// As in ARCHITECTURE.md.
-const ORDER: [&str; 20] = [
+const ORDER: [&str; 21] = [
     "units",
     "config",
     "kinematics",
@@ -24,11 +24,12 @@ const ORDER: [&str; 20] = [
     "messages",
     "files",
     "report",
+    "urdf",
     "ros",
 ];
 
 /// Rooms before a room that it still must not know.
-const APART: [(&str, &str); 9] = [
+const APART: [(&str, &str); 13] = [
     ("control", "drive"),
     ("design", "drive"),
     ("report", "files"),
@@ -36,8 +37,12 @@ const APART: [(&str, &str); 9] = [
     ("ros", "files"),
     ("ros", "report"),
     ("ros", "trial"),
+    ("ros", "urdf"),
     ("tune", "identify"),
     ("tune", "recording"),
+    ("urdf", "files"),
+    ("urdf", "messages"),
+    ("urdf", "report"),
 ];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {

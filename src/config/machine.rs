@@ -273,6 +273,11 @@ impl AxisConfig {
         self.delays.alpha
     }
 
+    /// The most that the motor exerts at the axis, Kt·imax/r, N or N·m.
+    pub fn largest_effort(&self) -> f64 {
+        self.motor.torque_constant * self.motor.max_current / self.transmission_ratio
+    }
+
     /// Limits for trajectories.
     pub fn limits(&self) -> &LimitsConfig {
         &self.limits

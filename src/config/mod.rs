@@ -35,7 +35,7 @@ pub use definition::{DefaultValue, Definition, Kind, MotorKind, Presence, Scope}
 pub(crate) use error::shortened;
 pub use error::{ConfigError, Source};
 pub use machine::*;
-pub use node::{GoalDefaults, NodeConfig, QosConfig, TimeMode};
+pub use node::{GoalDefaults, NodeConfig, QosConfig, TimeMode, ToolConfig};
 pub use parameter_file::{Assignment, parse_assignment};
 pub use parameters::{DEFAULT_MACHINE, Overlay, Parameters};
 pub use schema::{DEFINITIONS, MAX_HORIZON, RST_TERMS};

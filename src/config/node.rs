@@ -44,6 +44,8 @@ pub struct NodeConfig {
     pub allow_nonzero_velocity_at_trajectory_end: bool,
     /// Rate of the action's feedback, Hz.
     pub action_monitor_rate: f64,
+    /// What is published of the tool.
+    pub tool: ToolConfig,
 }
 
 /// Tolerances of action goals that name none themselves.
@@ -55,6 +57,17 @@ pub struct GoalDefaults {
     pub goal: Vec<Option<f64>>,
     /// How much later than its end a goal may be reached, ns; `None` is any time.
     pub goal_time: Option<Nanoseconds>,
+}
+
+/// What the node publishes of the tool.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToolConfig {
+    /// Frame that poses and paths are given in.
+    pub frame: String,
+    /// Rate of the paths, Hz; `None` is never.
+    pub path_rate: Option<f64>,
+    /// Most poses of a path.
+    pub path_length: usize,
 }
 
 impl Parameters {
@@ -81,18 +94,24 @@ impl Parameters {
         // Each has a default, so that the fallbacks here are never used.
         let number = |key: &str| self.number(key).unwrap_or_default();
         let rate = number("publish_rate");
-        let max_points = match self.get("max_points") {
-            Some(Value::Integer(points)) => usize::try_from(points).unwrap_or(usize::MAX),
+        let count = |key: &str| match self.get(key) {
+            Some(Value::Integer(count)) => usize::try_from(count).unwrap_or(usize::MAX),
             _ => usize::MAX,
         };
+        let path_rate = number("tool_path_rate");
         NodeConfig {
             time,
             publish_rate: (rate > 0.0).then_some(rate),
             joint_prefix: self.text("joint_prefix"),
             load_timeout: to_ns(number("load_timeout"), SECOND_NS),
-            max_points,
+            max_points: count("max_points"),
             allow_nonzero_velocity_at_trajectory_end: self.flag("allow_nonzero_velocity_at_trajectory_end"),
             action_monitor_rate: number("action_monitor_rate"),
+            tool: ToolConfig {
+                frame: self.text("workpiece_frame"),
+                path_rate: (path_rate > 0.0).then_some(path_rate),
+                path_length: count("tool_path_length"),
+            },
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::config::{AxisConfig, AxisKind, KinematicsConfig, MachineConfig};
 
@@ -32,8 +32,9 @@ pub enum Role {
 
 impl Role {
     /// The linear ones, in the order of coordinates.
-    pub(super) const LINEAR: [Role; 3] = [Role::X, Role::Y, Role::Z];
-    const ALL: [Role; 5] = [Role::X, Role::Y, Role::Z, Role::A, Role::C];
+    pub(crate) const LINEAR: [Role; 3] = [Role::X, Role::Y, Role::Z];
+    /// All of them.
+    pub(crate) const ALL: [Role; 5] = [Role::X, Role::Y, Role::Z, Role::A, Role::C];
 
     /// Name of a joint that has the role.
     pub fn name(self) -> &'static str {
@@ -141,6 +142,21 @@ impl Kinematics {
         let tables = self.tables_at(joints);
         let linear = Role::LINEAR.map(|role| self.value(joints, role));
         ToolPose { tip: tables.tip(Vector3::from(linear)), axis: tables.tool_axis() }
+    }
+
+    /// Orientation of the tool frame in the workpiece frame, `Rz(c) Rx(a)`; its Z axis is the tool axis.
+    ///
+    /// It is continuous in the joints, also over whole turns of C: after one it is the opposite quaternion,
+    /// which is the same orientation.
+    pub fn orientation(&self, joints: &[f64]) -> UnitQuaternion<f64> {
+        let (sin_a, cos_a) = (0.5 * self.value(joints, Role::A)).sin_cos();
+        let (sin_c, cos_c) = (0.5 * self.value(joints, Role::C)).sin_cos();
+        UnitQuaternion::new_unchecked(Quaternion::new(
+            cos_c * cos_a,
+            cos_c * sin_a,
+            sin_c * sin_a,
+            sin_c * cos_a,
+        ))
     }
 
     /// Tool-centre-point programming: `coordinates` holds for each joint its value, but for x, y and z

@@ -3,6 +3,7 @@
 
 mod control;
 mod own;
+mod pose;
 mod schema;
 mod state;
 mod time;
@@ -14,9 +15,10 @@ pub use control::{
     JointTolerance, JointTrajectoryControllerState, SendGoalRequest, SendGoalResponse,
 };
 pub use own::{DriveStates, MotorCurrents, PACKAGE, Source, Status, TrajectoryResult};
+pub use pose::{path, pose_stamped};
 pub use ros2_interfaces_jazzy_serde::{
-    action_msgs, builtin_interfaces, diagnostic_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs, std_msgs,
-    std_srvs, trajectory_msgs, unique_identifier_msgs,
+    action_msgs, builtin_interfaces, diagnostic_msgs, geometry_msgs, nav_msgs, rcl_interfaces, rosgraph_msgs,
+    sensor_msgs, std_msgs, std_srvs, trajectory_msgs, unique_identifier_msgs,
 };
 pub use schema::Schema;
 pub use state::Sampled;

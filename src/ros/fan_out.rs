@@ -18,6 +18,7 @@ use super::diagnostics::Diagnostics;
 use super::outputs::Output;
 use super::pace::{Frame, Health};
 use super::setpoints::{SetpointVelocities, controller_state};
+use super::tool::ToolOutput;
 use crate::messages::{DriveStates, JointTrajectoryControllerState, MotorCurrents};
 
 /// Period of `/diagnostics` (REP-107).
@@ -45,6 +46,8 @@ pub struct FanOut {
     pub controller_state: Output<JointTrajectoryControllerState>,
     /// Of the action.
     pub feedback: Feedback,
+    /// Pose and paths of the tool, if the machine moves one.
+    pub tool: Option<ToolOutput>,
     /// `/clock`, in `fast`.
     pub clock: Option<ClockOutput>,
     /// Joints, with prefix.
@@ -64,7 +67,11 @@ impl FanOut {
             {
                 clock.output.send(Clock { clock: convert::stamp(frame.time) }).await;
             }
-            if frame.instant % self.every == 0 {
+            let publish = frame.instant % self.every == 0;
+            if let Some(tool) = &self.tool {
+                tool.take(&frame, publish).await;
+            }
+            if publish {
                 self.joint_states.send(convert::joint_state(&frame, &self.joints)).await;
                 self.motor_currents.send(convert::motor_currents(&frame, &self.joints)).await;
                 self.drive_states.send(convert::drive_states(&frame, &self.joints)).await;

@@ -29,5 +29,6 @@ mod service;
 mod setpoints;
 mod stream;
 mod throttle;
+mod tool;
 mod topics;
 mod trigger;

@@ -29,9 +29,11 @@ use super::participant::{Participant, ParticipantError};
 use super::results::Results;
 use super::rosout;
 use super::service::ServiceError;
+use super::tool::ToolTopics;
 use super::topics::Topics;
 use super::trigger::Trigger;
 use crate::config::{ConfigError, Parameters, TimeMode};
+use crate::kinematics::Kinematics;
 use crate::simulation::{self, Simulation, SimulationError};
 use crate::trajectory::{Context, JointLimits, MotionId, Request, Start, Trajectory};
 use crate::units::{Nanoseconds, seconds};
@@ -133,6 +135,8 @@ async fn serve(
     let mut topics = Topics::create(&mut node, args, &parameters, fast)?;
     let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
     topics.names.goals_on.push(action_topics.name);
+    let tool = ToolTopics::create(&mut node, args, &parameters, Kinematics::new(&config))?;
+    topics.names.also_publishes(tool.as_ref().map_or(&[], |tool| &tool.names));
     let reset = Trigger::new(&mut node, &context, args, "reset")?;
     let stop = Trigger::new(&mut node, &context, args, "stop")?;
     let parameter_services = ParameterServices::new(&mut node, &context, args)?;
@@ -170,6 +174,7 @@ async fn serve(
             joints: joints.clone(),
             every: feedback_period(node_config.action_monitor_rate, period),
         },
+        tool: tool.map(|tool| tool.start(&mut publishing, node_config.tool.clone(), when_full)),
         clock: topics.clock.map(|(publisher, name)| ClockOutput {
             output: publishing.start(publisher, when_full),
             silent: watch_clock(dds.clone(), name, publishing.tasks),

@@ -82,6 +82,8 @@ pub struct Frame {
     pub time: Nanoseconds,
     /// One per axis.
     pub samples: Vec<AxisSample>,
+    /// How often the axes have been reset before it.
+    pub resets: u64,
 }
 
 /// How the thread fares; read by the diagnostics.
@@ -144,6 +146,7 @@ pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
     let clock = PaceClock::new(&simulation);
     channels.health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
     let mut stream = StreamLog::default();
+    let mut resets = 0;
     loop {
         let lateness = match mode {
             TimeMode::Real => clock.wait_for(simulation.next_instant()),
@@ -159,6 +162,7 @@ pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
                 Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => return,
                 Ok(Command::Stream(setpoints)) => stream.take(&mut simulation, setpoints),
                 Ok(command) => {
+                    resets += u64::from(matches!(command, Command::Reset(_)));
                     obey(&mut simulation, command, &channels.reports);
                     if let Some((end, joints)) = simulation.take_stream_end() {
                         let now = simulation.time_of(simulation.next_instant() - 1);
@@ -171,8 +175,8 @@ pub fn run(mut simulation: Simulation, mode: TimeMode, mut channels: Channels) {
         let instant = simulation.next_instant();
         simulation.step();
         stream.watch(&simulation);
-        let frame =
-            Frame { instant, time: simulation.time_of(instant), samples: simulation.samples().to_vec() };
+        let time = simulation.time_of(instant);
+        let frame = Frame { instant, time, samples: simulation.samples().to_vec(), resets };
         let taken = match mode {
             TimeMode::Real => channels.frames.try_send(frame).is_ok(),
             TimeMode::Fast | TimeMode::SimTime => channels.frames.blocking_send(frame).is_ok(),

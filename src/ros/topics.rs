@@ -122,6 +122,11 @@ impl Topics {
 }
 
 impl Names {
+    /// Names that are published beside those of [`Topics`].
+    pub fn also_publishes(&mut self, names: &[String]) {
+        self.published.extend_from_slice(names);
+    }
+
     /// One screen for whoever started the node.
     pub fn print(&self, args: &RosArgs, machine: &str, time: TimeMode) {
         let time = match time {

@@ -16,6 +16,7 @@ mod json;
 mod list;
 mod machine_file;
 mod period;
+mod pose;
 mod progress;
 mod psec;
 mod recordings;
@@ -27,6 +28,7 @@ mod subject;
 mod table;
 mod tune;
 mod tune_output;
+mod urdf;
 mod variant;
 
 use std::error::Error;
@@ -65,6 +67,10 @@ enum Command {
     Identify(Box<identify::Arguments>),
     /// Check a file: a machine, a scenario, or set-points.
     Check(check::Arguments),
+    /// Print the URDF of a machine, for robot_state_publisher and RViz.
+    Urdf(urdf::Arguments),
+    /// Print where the tool is in the workpiece frame for positions of the joints.
+    Pose(pose::Arguments),
     /// List the machines that come with the program.
     Machines {
         /// As a JSON list.
@@ -127,6 +133,8 @@ fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Robustness(arguments) => robustness::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
         Command::Check(arguments) => check::run(arguments),
+        Command::Urdf(arguments) => urdf::run(arguments),
+        Command::Pose(arguments) => pose::run(arguments),
         Command::Machines { json } => list::machines(*json),
         Command::Scenarios { show: Some(name), .. } => list::scenario(name),
         Command::Scenarios { json, show: None } => list::scenarios(*json),

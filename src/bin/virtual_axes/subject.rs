@@ -5,6 +5,30 @@ use std::error::Error;
 use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
 
 use crate::input::Input;
+use crate::variant;
+
+/// A machine as a command is given it.
+#[derive(Debug, clap::Args)]
+pub struct MachineChoice {
+    /// A shipped machine or a machine file.
+    #[arg(long, default_value = DEFAULT_MACHINE)]
+    machine: String,
+    /// A parameter, as in `kinematics.tool_length_mm=150`; can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+impl MachineChoice {
+    /// As the user named it.
+    pub fn name(&self) -> &str {
+        &self.machine
+    }
+
+    /// The machine file, with what `--set` says.
+    pub fn parameters(&self) -> Result<Parameters, Box<dyn Error>> {
+        variant::parameters(&Parameters::load(&self.machine)?, None, &self.set, &[])
+    }
+}
 
 /// What is run, and on which machine.
 #[derive(Debug, clap::Args)]

@@ -1,0 +1,81 @@
+"""Two machines side by side in the namespaces left and right, to compare them.
+
+ros2 launch virtual_axes two_machines.launch.py right_controller:=gpc rviz:=true
+
+Give both the same set-points, on /left/psec and /right/psec. With time:=fast the second follows the
+clock of the first.
+"""
+
+from pathlib import Path
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, GroupAction, IncludeLaunchDescription, OpaqueFunction
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+SHARE = Path(__file__).resolve().parent.parent
+CONTROLLERS = ["as_machine", "cascade", "gpc", "rst"]
+ARGUMENTS = [
+    ("left_machine", "mikron_ucp710", None, "Machine on the left: a file, or the name of a shipped one"),
+    ("right_machine", "mikron_ucp710", None, "Machine on the right"),
+    ("left_controller", "as_machine", CONTROLLERS, "Position controller of every joint on the left"),
+    ("right_controller", "as_machine", CONTROLLERS, "Position controller of every joint on the right"),
+    ("distance", "2.5", None, "From the left machine frame to the right one along X, m"),
+    ("time", "real", ["real", "fast", "sim"], "As in virtual_axes.launch.py"),
+    ("robot_state_publisher", "true", ["true", "false"], "Publish models and transforms"),
+    ("rviz", "false", ["true", "false"], "Show both in RViz"),
+    ("record", "", None, "Folder for the recordings left.mcap and right.mcap; empty: none"),
+    ("log_level", "info", None, "Level of the nodes' logs"),
+]
+SIDES = ["left", "right"]
+
+
+def start(context: LaunchContext) -> list[object]:
+    """Make both machines, and the frame `world` that they stand in."""
+    argument = {key: LaunchConfiguration(key).perform(context) for key, *_ in ARGUMENTS}
+    clock = {"use_sim_time": argument["time"] != "real"}
+    source = str(SHARE / "launch" / "virtual_axes.launch.py")
+    actions: list[object] = []
+    for place, side in enumerate(SIDES):
+        of_side = {
+            "machine": argument[f"{side}_machine"],
+            "controller": argument[f"{side}_controller"],
+            "namespace": side,
+            "name": "virtual_axes",
+            "joint_prefix": "",
+            "frame_prefix": f"{side}/",
+            "rviz": "false",
+            "record": str(Path(argument["record"], f"{side}.mcap")) if argument["record"] else "",
+            **{key: argument[key] for key in ("time", "robot_state_publisher", "log_level")},
+        }
+        # In a group: the arguments of one must not reach the other.
+        include = IncludeLaunchDescription(
+            PythonLaunchDescriptionSource(source), launch_arguments=of_side.items()
+        )
+        actions.append(GroupAction([include]))
+        if argument["robot_state_publisher"] == "true":
+            x = float(argument["distance"]) * place
+            actions.append(
+                Node(
+                    package="tf2_ros",
+                    executable="static_transform_publisher",
+                    name=f"world_to_{side}",
+                    arguments=["--x", str(x), "--frame-id", "world", "--child-frame-id", f"{side}/machine"],
+                )
+            )
+    if argument["rviz"] == "true":
+        config = SHARE / "rviz" / "two_machines.rviz"
+        actions.append(
+            Node(package="rviz2", executable="rviz2", arguments=["-d", str(config)], parameters=[clock])
+        )
+    return actions
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Declare the arguments and start the nodes."""
+    declared = [
+        DeclareLaunchArgument(key, default_value=default, choices=choices, description=description)
+        for key, default, choices, description in ARGUMENTS
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=start)])

@@ -1,0 +1,167 @@
+"""The URDF: read by ROS's own parsers, its limits against the machine file, its geometry against the kinematics.
+
+`urdf_parser_py` and `check_urdf` (urdfdom, which robot_state_publisher uses) come from PyPI.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from drive import node_binary
+from urdf_parser_py.urdf import URDF, Joint
+
+ROOT = Path(__file__).resolve().parent.parent
+MACHINES = ["mikron_ucp710", "linear_motor_center"]
+# Every offset, each another, so that none can stand for another.
+OFFSETS = {
+    "tool_length": 123.0,
+    "pivot_a_y": 11.0,
+    "pivot_a_z": -37.0,
+    "pivot_c_x": 5.0,
+    "pivot_c_y": -7.0,
+    "workpiece_x": 60.0,
+    "workpiece_y": 17.0,
+    "workpiece_z": -29.0,
+}
+
+
+def command(*arguments: str) -> str:
+    """Run `virtual_axes`, which stands beside the node, and return what it prints."""
+    program = node_binary().with_name("virtual_axes")
+    return subprocess.run([program, *arguments], check=True, capture_output=True, text=True, timeout=60).stdout
+
+
+def machine_file(name: str) -> dict:
+    """Read the parameters of a shipped machine by another YAML reader than ours."""
+    return yaml.safe_load((ROOT / "config" / f"{name}.yaml").read_text())["/**"]["ros__parameters"]
+
+
+def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rodrigues: the rotation by `angle` about the unit vector `axis`."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+
+
+def transform(joint: Joint, value: float) -> np.ndarray:
+    """Child in parent, as the URDF specification has it."""
+    roll, pitch, yaw = joint.origin.rpy
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation(np.eye(3)[2], yaw) @ rotation(np.eye(3)[1], pitch) @ rotation(np.eye(3)[0], roll)
+    matrix[:3, 3] = joint.origin.xyz
+    motion = np.eye(4)
+    if joint.type == "prismatic":
+        motion[:3, 3] = value * np.array(joint.axis)
+    elif joint.type != "fixed":
+        motion[:3, :3] = rotation(np.array(joint.axis), value)
+    return matrix @ motion
+
+
+def frame(robot: URDF, link: str, joints: dict[str, float]) -> np.ndarray:
+    """The link in the root."""
+    matrix = np.eye(4)
+    for name in robot.get_chain(robot.get_root(), link, links=False):
+        joint = robot.joint_map[name]
+        matrix = matrix @ transform(joint, joints.get(name, 0.0))
+    return matrix
+
+
+def formula(p: dict[str, float], x: float, y: float, z: float, a: float, c: float) -> tuple[np.ndarray, np.ndarray]:
+    """Tip and tool axis in the workpiece frame: the equations of the documentation, solved for p."""
+    turn_a, turn_c = rotation(np.eye(3)[0], a), rotation(np.eye(3)[2], c)
+    pivot_a = np.array([0.0, p["pivot_a_y"], p["pivot_a_z"]])
+    pivot_c = np.array([p["pivot_c_x"], p["pivot_c_y"], 0.0])
+    workpiece = np.array([p["workpiece_x"], p["workpiece_y"], p["workpiece_z"]])
+    tip = np.array([x, y, z - p["tool_length"]])
+    tip = turn_c @ (turn_a @ (tip - pivot_a) + pivot_a - pivot_c) + pivot_c - workpiece
+    return tip, np.array([math.sin(a) * math.sin(c), -math.sin(a) * math.cos(c), math.cos(a)])
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_limits_are_the_machine_files(machine: str):
+    """Names and kinds as in joint_states; stroke, velocity and effort in SI."""
+    robot = URDF.from_xml_string(command("urdf", "--machine", machine, "--joint-prefix", "mill_"))
+    parameters = machine_file(machine)
+    moving = {name: joint for name, joint in robot.joint_map.items() if joint.type != "fixed"}
+    assert sorted(moving) == sorted(f"mill_{joint}" for joint in parameters["joints"])
+    for name in parameters["joints"]:
+        axis, joint = parameters[name], moving[f"mill_{name}"]
+        limits, motor, transmission = axis["limits"], axis["motor"], axis["transmission"]
+        linear = axis["type"] == "linear"
+        velocity = limits["velocity_m_min"] / 60 if linear else limits["velocity_rpm"] * 2 * math.pi / 60
+        ends = [limits.get(f"stroke_{end}_{'mm' if linear else 'deg'}") for end in ("min", "max")]
+        if ends == [None, None] and not linear:
+            assert joint.type == "continuous"
+        else:
+            assert joint.type == ("prismatic" if linear else "revolute")
+            unit = 1e-3 if linear else math.pi / 180
+            stroke = [end * unit for end in ends]
+            assert [joint.limit.lower, joint.limit.upper] == pytest.approx(stroke, rel=1e-12)
+        if transmission.get("direct"):
+            ratio = 1.0
+        else:
+            ratio = transmission["screw_lead_mm"] * 1e-3 / (2 * math.pi) if linear else 1 / transmission["gear_ratio"]
+        torque = motor["force_constant_n_a"] if "force_constant_n_a" in motor else motor["torque_constant_nm_a"]
+        assert joint.limit.velocity == pytest.approx(velocity, rel=1e-12)
+        assert joint.limit.effort == pytest.approx(torque * motor["max_current_a"] / ratio, rel=1e-12)
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_the_tool_in_the_workpiece_is_the_kinematics(machine: str):
+    """URDF, `virtual_axes pose` and the documented equations at random joints, with every offset in play."""
+    settings = [text for key, value in OFFSETS.items() for text in ("--set", f"kinematics.{key}_mm={value}")]
+    robot = URDF.from_xml_string(command("urdf", "--machine", machine, *settings))
+    assert robot.get_root() == "machine"
+    random = np.random.default_rng(710)
+    names = ["x", "y", "z", "a", "c"]
+    trials = random.uniform([-0.3, -0.2, -0.2, -math.pi, -20.0], [0.3, 0.2, 0.2, math.pi, 20.0], (60, 5))
+    asked = [f"--joints={','.join(f'{n}={v!r}' for n, v in zip(names, row))}" for row in trials.tolist()]
+    poses = json.loads(command("pose", "--machine", machine, "--json", *settings, *asked))
+    metres = {key: value * 1e-3 for key, value in OFFSETS.items()}
+    largest = 0.0
+    for row, pose in zip(trials.tolist(), poses, strict=True):
+        joints = dict(zip(names, row))
+        seen = np.linalg.inv(frame(robot, "workpiece", joints)) @ frame(robot, "tool", joints)
+        tip, axis = formula(metres, **joints)
+        x, y, z, w = pose["orientation"]
+        sine = math.sqrt(x * x + y * y + z * z)
+        turned = rotation(np.array([x, y, z]) / sine, 2 * math.atan2(sine, w))
+        errors = [seen[:3, 3] - pose["tip"], seen[:3, 2] - pose["axis"], seen[:3, :3] - turned]
+        errors += [tip - pose["tip"], axis - pose["axis"]]
+        largest = max(largest, *(np.abs(error).max() for error in errors))
+    print(f"{machine}: largest difference {largest:.1e}")
+    assert largest < 1e-9
+
+
+def test_a_positive_joint_moves_the_tool_relative_to_the_workpiece():
+    """ISO 841, axis by axis: with the tool at home, and what turns seen from the table."""
+    robot = URDF.from_xml_string(command("urdf"))
+
+    def tool(**joints: float) -> np.ndarray:
+        return np.linalg.inv(frame(robot, "workpiece", joints)) @ frame(robot, "tool", joints)
+
+    for place, name in enumerate("xyz"):
+        assert tool(**{name: 0.1})[:3, 3] - tool()[:3, 3] == pytest.approx(0.1 * np.eye(3)[place], abs=1e-15)
+    # A right-handed turn of the tool about X brings its axis from Z towards -Y; about Z, X towards Y.
+    assert tool(a=math.pi / 2)[:3, 2] == pytest.approx([0.0, -1.0, 0.0], abs=1e-15)
+    assert tool(c=math.pi / 2)[:3, 0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-15)
+    # The tables themselves turn the other way.
+    assert frame(robot, "cradle", {"a": math.pi / 2})[:3, 2] == pytest.approx([0.0, 1.0, 0.0], abs=1e-15)
+    assert frame(robot, "table", {"c": math.pi / 2})[:3, 0] == pytest.approx([0.0, -1.0, 0.0], abs=1e-15)
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_urdfdom_takes_it(machine: str, tmp_path: Path):
+    """The parser that robot_state_publisher uses sees one tree without complaints."""
+    path = tmp_path / "machine.urdf"
+    command("urdf", "--machine", machine, "--out", str(path))
+    answer = subprocess.run(["check_urdf", path], capture_output=True, text=True, timeout=20, check=False)
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert "root Link: machine has 2 child(ren)" in answer.stdout
+    assert answer.stderr == ""
