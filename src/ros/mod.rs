@@ -5,6 +5,7 @@
 
 pub mod args;
 mod ask_again;
+mod clock;
 mod convert;
 mod diagnostics;
 mod endpoints;

@@ -144,7 +144,10 @@ impl Results {
                 (Status::Aborted, format!("{violation:?}"))
             }
             Outcome::Aborted(Abort::Reset) => (Status::Aborted, "reset".to_owned()),
-            Outcome::Aborted(Abort::ClockJump) => (Status::Aborted, "the clock jumped".to_owned()),
+            Outcome::Aborted(Abort::ClockJump { from, to }) => {
+                let (from, to) = (seconds(from), seconds(to));
+                (Status::Aborted, format!("the clock jumped from {from:.3} s to {to:.3} s"))
+            }
         };
         drop(known_list);
         info!("trajectory {}: {status:?}", known.origin.sequence_number);
