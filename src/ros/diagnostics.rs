@@ -5,7 +5,7 @@ use std::fmt::Display;
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 
 use super::convert::header;
-use super::pace::{AxisHealth, Health};
+use super::pace::{AxisHealth, ClockSource, Health};
 use crate::units::{MILLISECOND_NS, Nanoseconds};
 
 /// What stays the same from message to message.
@@ -17,7 +17,7 @@ pub struct Diagnostics {
     pub machine: String,
     /// Joints, with prefix.
     pub joints: Vec<String>,
-    /// `real` or `fast`.
+    /// `real`, `fast` or `sim`.
     pub time_mode: &'static str,
 }
 
@@ -75,7 +75,17 @@ impl Diagnostics {
         if now.stream.held_off {
             problems.push("a stream is ignored after a stop until it pauses");
         }
-        let fine = if now.moving {
+        if now.clock.jumps > before.clock.jumps {
+            problems.push("the clock jumped");
+        }
+        let stands = periods == 0 && now.clock.source != ClockSource::Wall;
+        let fine = if stands && now.clock.source == ClockSource::None {
+            "waiting for /clock"
+        } else if stands && now.clock.held_back {
+            "waiting for a slow subscriber"
+        } else if stands {
+            "paused"
+        } else if now.moving {
             "running"
         } else if now.stream.drives {
             "streaming"
@@ -87,6 +97,9 @@ impl Diagnostics {
         let values = vec![
             value("state", fine),
             value("time", self.time_mode),
+            value("clock", now.clock.source.name()),
+            value("clock_jumps", now.clock.jumps),
+            value("behind_clock_ms", now.clock.behind as f64 / MILLISECOND_NS as f64),
             value("position_periods", now.periods),
             value("missed_periods", now.missed),
             value("missed_periods_last_second", missed),

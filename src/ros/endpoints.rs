@@ -45,15 +45,21 @@ pub struct Endpoints<'a> {
 }
 
 impl Endpoints<'_> {
+    fn configured(&self, name: &str) -> Result<QosConfig, EndpointError> {
+        let own_name = name.trim_start_matches(['~', '/']);
+        self.parameters.qos(own_name).ok_or_else(|| EndpointError {
+            name: name.to_owned(),
+            reason: "it is not in the schema".to_owned(),
+        })
+    }
+
     fn topic(
         &mut self,
         name: &str,
         type_name: MessageTypeName,
+        qos: QosConfig,
     ) -> Result<(rustdds::Topic, String), EndpointError> {
         let failed = |reason: String| EndpointError { name: name.to_owned(), reason };
-        let own_name = name.trim_start_matches(['~', '/']);
-        let qos =
-            self.parameters.qos(own_name).ok_or_else(|| failed("it is not in the schema".to_owned()))?;
         let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
         let ros_name = Name::parse(&resolved).map_err(|e| failed(e.to_string()))?;
         let topic =
@@ -70,7 +76,7 @@ impl Endpoints<'_> {
         name: &str,
         type_name: MessageTypeName,
     ) -> Result<(Publisher<M>, String), EndpointError> {
-        let (topic, resolved) = self.topic(name, type_name)?;
+        let (topic, resolved) = self.topic(name, type_name, self.configured(name)?)?;
         let publisher = self
             .node
             .create_publisher(&topic, None)
@@ -87,7 +93,20 @@ impl Endpoints<'_> {
         name: &str,
         type_name: MessageTypeName,
     ) -> Result<(Subscription<M>, String), EndpointError> {
-        let (topic, resolved) = self.topic(name, type_name)?;
+        self.subscription_of(name, type_name, self.configured(name)?)
+    }
+
+    /// Likewise, of a quality that is not a parameter.
+    ///
+    /// # Errors
+    /// [`EndpointError`] naming the topic.
+    pub fn subscription_of<M: Message + 'static>(
+        &mut self,
+        name: &str,
+        type_name: MessageTypeName,
+        qos: QosConfig,
+    ) -> Result<(Subscription<M>, String), EndpointError> {
+        let (topic, resolved) = self.topic(name, type_name, qos)?;
         let subscription = self
             .node
             .create_subscription(&topic, None)

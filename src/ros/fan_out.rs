@@ -1,18 +1,15 @@
 //! From the simulation to the topics: each position instant, the clock, and the diagnostics.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
-use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
-use rustdds::{DomainParticipant, RTPSEntity};
 use tokio::sync::{mpsc, watch};
-use tokio::task::JoinSet;
-use tracing::info;
 
 use super::action::Feedback;
+use super::clock::ClockOutput;
 use super::convert;
 use super::diagnostics::Diagnostics;
 use super::outputs::Output;
@@ -23,16 +20,6 @@ use crate::messages::{DriveStates, JointTrajectoryControllerState, MotorCurrents
 
 /// Period of `/diagnostics` (REP-107).
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
-/// How often it is looked whether somebody else publishes `/clock`.
-const CLOCK_WATCH_PERIOD: Duration = Duration::from_millis(500);
-
-/// The clock, unless another node publishes it.
-pub struct ClockOutput {
-    /// Where it goes.
-    pub output: Output<Clock>,
-    /// Whether somebody else publishes it.
-    pub silent: Arc<AtomicBool>,
-}
 
 /// The outputs of every position instant.
 pub struct FanOut {
@@ -62,10 +49,8 @@ impl FanOut {
         let mut setpoints = SetpointVelocities::default();
         while let Some(frame) = frames.recv().await {
             let velocities = setpoints.update(&frame);
-            if let Some(clock) = &self.clock
-                && !clock.silent.load(Ordering::Relaxed)
-            {
-                clock.output.send(Clock { clock: convert::stamp(frame.time) }).await;
+            if let Some(clock) = &self.clock {
+                clock.send(frame.time).await;
             }
             let publish = frame.instant % self.every == 0;
             if let Some(tool) = &self.tool {
@@ -98,26 +83,4 @@ pub async fn publish_diagnostics(
         output.send(text.message(now.time, &before, &now, (dropped_before, dropped_now))).await;
         (before, dropped_before) = (now, dropped_now);
     }
-}
-
-/// Starts a task that notes whether another participant publishes the clock `name`.
-pub fn watch_clock(participant: DomainParticipant, name: String, tasks: &mut JoinSet<()>) -> Arc<AtomicBool> {
-    let others = Arc::new(AtomicBool::new(false));
-    let noted = Arc::clone(&others);
-    tasks.spawn(async move {
-        let topic = format!("rt{name}");
-        let own = participant.guid().prefix;
-        loop {
-            let found = participant.discovered_writers().iter().any(|writer| {
-                writer.publication_topic_data.topic_name == topic
-                    && writer.writer_proxy.remote_writer_guid.prefix != own
-            });
-            if found != noted.swap(found, Ordering::Relaxed) {
-                let what = if found { "somebody else publishes it; holding back" } else { "publishing it" };
-                info!("{name}: {what}");
-            }
-            tokio::time::sleep(CLOCK_WATCH_PERIOD).await;
-        }
-    });
-    others
 }

@@ -6,6 +6,7 @@
 mod action;
 pub mod args;
 mod ask_again;
+mod clock;
 mod convert;
 mod diagnostics;
 mod endpoints;

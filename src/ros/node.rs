@@ -6,6 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use ros2_client::{NodeName, NodeOptions};
+use tokio::runtime::Handle;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinSet;
@@ -14,15 +15,16 @@ use tracing::{info, warn};
 use super::action::{ActionServer, Ending, Feedback, GoalChecks, Tell, Work, feedback_period};
 use super::args::RosArgs;
 use super::ask_again;
+use super::clock::{ClockInput, ClockOutput, ClockState};
 use super::convert;
 use super::diagnostics::Diagnostics;
 use super::endpoints::EndpointError;
 use super::environment::Environment;
-use super::fan_out::{ClockOutput, FanOut, publish_diagnostics, watch_clock};
+use super::fan_out::{FanOut, publish_diagnostics};
 use super::inputs::{Checks, PsecInput, next_id, take_loads, take_stream};
 use super::log::LogRecord;
 use super::outputs::{Publishing, WhenFull, queue_length};
-use super::pace::{self, Channels, Command, Health};
+use super::pace::{self, Channels, Command, Health, Pace};
 use super::parameter_host::{Host, LiveNodeParameters};
 use super::parameter_services::ParameterServices;
 use super::participant::{Participant, ParticipantError};
@@ -75,12 +77,6 @@ pub enum NodeError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// `use_sim_time` is asked for.
-    #[error(
-        "use_sim_time is true, but the axes do not follow /clock of others; leave it false, with time: real \
-         or time: fast"
-    )]
-    SimTime,
 }
 
 /// Runs the node until SIGINT, SIGTERM or SIGHUP; what comes through `log` goes to `/rosout`.
@@ -115,14 +111,11 @@ async fn serve(
     let signals = Signals::new()?;
     let config = parameters.machine_config()?;
     let node_config = parameters.node_config();
-    if node_config.time == TimeMode::SimTime {
-        return Err(NodeError::SimTime);
-    }
+    let mode = node_config.time;
     let joint_limits = simulation::joints(&config, &node_config.joint_prefix);
     let joints: Vec<String> = joint_limits.iter().map(|j| j.name.clone()).collect();
     let period = config.periods().position;
-    let fast = node_config.time == TimeMode::Fast;
-    let when_full = if fast { WhenFull::Wait } else { WhenFull::Drop };
+    let when_full = if mode == TimeMode::Real { WhenFull::Drop } else { WhenFull::Wait };
 
     let context = participant.context()?;
     let dds = context.domain_participant();
@@ -132,7 +125,7 @@ async fn serve(
     let options = NodeOptions::new().start_parameter_services(false).enable_rosout(args.log_sinks().rosout);
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
-    let mut topics = Topics::create(&mut node, args, &parameters, fast)?;
+    let mut topics = Topics::create(&mut node, args, &parameters, mode)?;
     let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
     topics.names.goals_on.push(action_topics.name);
     let tool = ToolTopics::create(&mut node, args, &parameters, Kinematics::new(&config))?;
@@ -141,13 +134,15 @@ async fn serve(
     let stop = Trigger::new(&mut node, &context, args, "stop")?;
     let parameter_services = ParameterServices::new(&mut node, &context, args)?;
 
-    let simulation = Simulation::new(&config, joint_limits.clone(), pace::grid_origin(period))?;
+    let simulation = Simulation::new(&config, joint_limits.clone(), pace::origin(mode, period))?;
     let (commands, commands_in) = mpsc::channel(pace::COMMAND_QUEUE);
     let (frames_out, frames) = mpsc::channel(queue_length(when_full));
     let (reports_out, mut reports) = mpsc::unbounded_channel();
     let (health_out, health) = watch::channel(Health::default());
     let channels =
         Channels { commands: commands_in, frames: frames_out, reports: reports_out, health: health_out };
+
+    let (clock_out, clock) = watch::channel(ClockState::new(mode == TimeMode::Fast));
 
     let mut tasks = JoinSet::new();
     let dropped = Arc::new(AtomicU64::new(0));
@@ -175,9 +170,9 @@ async fn serve(
             every: feedback_period(node_config.action_monitor_rate, period),
         },
         tool: tool.map(|tool| tool.start(&mut publishing, node_config.tool.clone(), when_full)),
-        clock: topics.clock.map(|(publisher, name)| ClockOutput {
+        clock: topics.clock.map(|publisher| ClockOutput {
             output: publishing.start(publisher, when_full),
-            silent: watch_clock(dds.clone(), name, publishing.tasks),
+            state: clock.clone(),
         }),
         joints: joints.clone(),
         every: every.max(1),
@@ -187,6 +182,11 @@ async fn serve(
 
     // What comes in.
     tasks.spawn(ask_again::run(dds.clone()));
+    if let Some((subscription, name)) = topics.clock_input {
+        let (participant, health) = (dds.clone(), health.clone());
+        let input = ClockInput { subscription, name, participant, period, health, state: clock_out };
+        tasks.spawn(input.run(mode == TimeMode::Fast));
+    }
     let stop_all = stop_request(&joint_limits, period, node_config.max_points);
     let checks = Arc::new(Checks {
         joints: joint_limits,
@@ -227,7 +227,11 @@ async fn serve(
         node: args.node().to_string(),
         machine: config.name().to_owned(),
         joints: joints.clone(),
-        time_mode: if fast { "fast" } else { "real" },
+        time_mode: match mode {
+            TimeMode::Real => "real",
+            TimeMode::Fast => "fast",
+            TimeMode::SimTime => "sim",
+        },
     };
     tasks.spawn(publish_diagnostics(diagnostics_text, diagnostics, health, Arc::clone(&dropped)));
     tasks.spawn(async move {
@@ -237,13 +241,16 @@ async fn serve(
     });
     tasks.spawn(outputs.run(frames));
 
-    topics.names.print(args, config.name(), node_config.time);
+    topics.names.print(args, config.name(), mode);
     let (ended, has_ended) = oneshot::channel();
-    let mode = node_config.time;
+    let pace = match mode {
+        TimeMode::Real => Pace::Real,
+        TimeMode::Fast | TimeMode::SimTime => Pace::Clock { state: clock, runtime: Handle::current() },
+    };
     thread::Builder::new()
         .name("axes".into())
         .spawn(move || {
-            pace::run(simulation, mode, channels);
+            pace::run(simulation, pace, channels);
             let _ = ended.send(());
         })
         .map_err(|source| NodeError::System { what: "start the axes' thread", source })?;

@@ -225,7 +225,10 @@ impl Results {
             Outcome::PathTolerance(violation) => (Status::Aborted, self.violation("path", &violation)),
             Outcome::GoalTolerance(violation) => (Status::Aborted, self.violation("goal", &violation)),
             Outcome::Aborted(Abort::Reset) => (Status::Aborted, "reset".to_owned()),
-            Outcome::Aborted(Abort::ClockJump) => (Status::Aborted, "the clock jumped".to_owned()),
+            Outcome::Aborted(Abort::ClockJump { from, to }) => {
+                let (from, to) = (seconds(from), seconds(to));
+                (Status::Aborted, format!("the clock jumped from {from:.3} s to {to:.3} s"))
+            }
         };
         drop(known_list);
         info!("{}: {status:?}{}{text}", known.origin, if text.is_empty() { "" } else { ", " });

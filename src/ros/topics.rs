@@ -10,7 +10,7 @@ use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 
 use super::args::RosArgs;
 use super::endpoints::{EndpointError, Endpoints};
-use crate::config::{Parameters, TimeMode};
+use crate::config::{Parameters, QosConfig, TimeMode};
 use crate::messages::{
     CONTROL_PACKAGE, DriveStates, JointTrajectoryControllerState, MotorCurrents, PACKAGE, TrajectoryResult,
 };
@@ -18,6 +18,10 @@ use crate::messages::{
 impl Message for MotorCurrents {}
 impl Message for DriveStates {}
 impl Message for TrajectoryResult {}
+
+/// Publishers of `/clock` may be reliable or not, and of what they say only the newest counts; the
+/// depth is for several of them.
+const CLOCK_QOS: QosConfig = QosConfig { reliable: false, transient_local: false, depth: 10 };
 
 /// Every topic of the node.
 pub struct Topics {
@@ -39,8 +43,10 @@ pub struct Topics {
     pub results: Publisher<TrajectoryResult>,
     /// `/diagnostics`.
     pub diagnostics: Publisher<DiagnosticArray>,
-    /// `/clock` and its resolved name, in `fast`.
-    pub clock: Option<(Publisher<Clock>, String)>,
+    /// `/clock`, in `fast`.
+    pub clock: Option<Publisher<Clock>>,
+    /// `/clock` of others and its resolved name, in `fast` and with `use_sim_time`.
+    pub clock_input: Option<(Subscription<Clock>, String)>,
     /// Resolved names.
     pub names: Names,
 }
@@ -55,7 +61,7 @@ pub struct Names {
 }
 
 impl Topics {
-    /// Creates them; `/clock` only in `fast`.
+    /// Creates them; `/clock` not in real time, and its publisher only in `fast`.
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic that the middleware refuses.
@@ -63,7 +69,7 @@ impl Topics {
         node: &mut Node,
         args: &RosArgs,
         parameters: &Parameters,
-        fast: bool,
+        time: TimeMode,
     ) -> Result<Self, EndpointError> {
         let mut endpoints = Endpoints { node, args, parameters };
         let joint_state = || MessageTypeName::new("sensor_msgs", "JointState");
@@ -83,14 +89,22 @@ impl Topics {
             endpoints.publisher("~/controller_state", controller_type)?;
         let (results, results_name) = endpoints.publisher("~/trajectory_result", own("TrajectoryResult"))?;
         let (diagnostics, diagnostics_name) = endpoints.publisher("/diagnostics", diagnostic)?;
-        let clock = if fast {
-            let clock_type = MessageTypeName::new("rosgraph_msgs", "Clock");
-            Some(endpoints.publisher("/clock", clock_type)?)
-        } else {
-            None
+        let clock_type = || MessageTypeName::new("rosgraph_msgs", "Clock");
+        let clock = match time {
+            TimeMode::Fast => Some(endpoints.publisher("/clock", clock_type())?),
+            TimeMode::Real | TimeMode::SimTime => None,
+        };
+        let clock_input = match time {
+            TimeMode::Fast | TimeMode::SimTime => {
+                Some(endpoints.subscription_of("/clock", clock_type(), CLOCK_QOS)?)
+            }
+            TimeMode::Real => None,
         };
         let names = Names {
-            subscribed: vec![psec_name, stream_name, load_name],
+            subscribed: [psec_name, stream_name, load_name]
+                .into_iter()
+                .chain(clock_input.iter().map(|(_, name)| name.clone()))
+                .collect(),
             published: [
                 joint_states_name,
                 currents_name,
@@ -115,7 +129,8 @@ impl Topics {
             controller_state,
             results,
             diagnostics,
-            clock,
+            clock: clock.map(|(publisher, _)| publisher),
+            clock_input,
             names,
         })
     }
@@ -131,7 +146,8 @@ impl Names {
     pub fn print(&self, args: &RosArgs, machine: &str, time: TimeMode) {
         let time = match time {
             TimeMode::Fast => "as fast as subscribers take it",
-            TimeMode::Real | TimeMode::SimTime => "real",
+            TimeMode::SimTime => "of /clock",
+            TimeMode::Real => "real",
         };
         let mut screen = format!("{}: {machine}, time: {time}\n", args.node());
         for (what, names) in [

@@ -64,7 +64,8 @@ impl Simulation {
     /// there: motions end as aborted, every axis comes to rest within its limits, loads and the stream
     /// are forgotten. What the axes do does not depend on the time that it is said to be.
     pub fn jump_to(&mut self, time: Nanoseconds) {
-        self.motions.abort_all(Abort::ClockJump, self.time_of(self.next - 1), &mut self.ends);
+        let from = self.time_of(self.next - 1);
+        self.motions.abort_all(Abort::ClockJump { from, to: time }, from, &mut self.ends);
         self.timeline.halt();
         self.loads.clear();
         self.grid.origin = time.saturating_sub(self.next.saturating_mul(self.grid.period));

@@ -35,8 +35,13 @@ pub enum Outcome {
 pub enum Abort {
     /// The machine was put at rest.
     Reset,
-    /// The clock that the node follows jumped.
-    ClockJump,
+    /// The clock that is followed jumped.
+    ClockJump {
+        /// Time of the position instant before it, ns.
+        from: Nanoseconds,
+        /// Time of the one after it, ns.
+        to: Nanoseconds,
+    },
 }
 
 /// The end of a motion.

@@ -1,0 +1,138 @@
+//! The simulation, its commands and its reports, whatever it keeps step with.
+
+use std::time::Duration;
+
+use tokio::sync::{mpsc, watch};
+use tracing::{info, warn};
+
+use super::super::stream::StreamLog;
+use super::{Accepted, AxisHealth, COMMAND_QUEUE, ClockHealth, Command, Frame, Health, Report};
+use crate::simulation::Simulation;
+use crate::trajectory::{Code, MotionId, Rejection};
+use crate::units::Nanoseconds;
+
+/// The simulation with what it answers.
+pub(super) struct Axes {
+    simulation: Simulation,
+    reports: mpsc::UnboundedSender<Report>,
+    health: watch::Sender<Health>,
+    stream: StreamLog,
+    /// How often the axes have been reset.
+    resets: u64,
+}
+
+impl Axes {
+    pub(super) fn new(
+        simulation: Simulation,
+        reports: mpsc::UnboundedSender<Report>,
+        health: watch::Sender<Health>,
+    ) -> Self {
+        health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
+        Axes { simulation, reports, health, stream: StreamLog::default(), resets: 0 }
+    }
+
+    pub(super) fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// Time of the position instant that is computed next, ns.
+    pub(super) fn next_time(&self) -> Nanoseconds {
+        self.simulation.time_of(self.simulation.next_instant())
+    }
+
+    /// Computes the next position instant.
+    pub(super) fn step(&mut self) -> Frame {
+        let instant = self.simulation.next_instant();
+        self.simulation.step();
+        self.stream.watch(&self.simulation);
+        let samples = self.simulation.samples().to_vec();
+        Frame { instant, time: self.simulation.time_of(instant), samples, resets: self.resets }
+    }
+
+    /// Tells what has become of the instant that was computed last.
+    pub(super) fn released(&mut self, lateness: Duration, missed: bool, dropped: bool) {
+        self.report_ends();
+        let Axes { simulation, stream, .. } = self;
+        self.health.send_modify(|h| {
+            h.update(simulation, lateness, missed, dropped);
+            h.stream = stream.health(simulation);
+        });
+    }
+
+    /// Tells of motions and streams that have ended, whether or not time goes on.
+    pub(super) fn report_ends(&mut self) {
+        if let Some((end, joints)) = self.simulation.take_stream_end() {
+            let now = self.simulation.time_of(self.simulation.next_instant() - 1);
+            let _ = self.reports.send(Report::StreamEnded(now, end, joints));
+        }
+        for end in self.simulation.take_ends() {
+            // The receiver lives as long as the node; when it is gone, so is whoever wants to know.
+            let _ = self.reports.send(Report::Ended(end));
+        }
+    }
+
+    /// Changes what the diagnostics say about the clock.
+    pub(super) fn tell_clock(&self, change: impl FnOnce(&mut ClockHealth)) {
+        self.health.send_if_modified(|h| {
+            let before = h.clock;
+            change(&mut h.clock);
+            h.clock != before
+        });
+    }
+
+    /// Goes on at `time` (ns), a position instant.
+    pub(super) fn jump_to(&mut self, time: Nanoseconds) {
+        self.simulation.jump_to(time);
+        self.report_ends();
+    }
+
+    /// Refuses a trajectory because too many wait for the clock.
+    pub(super) fn refuse_full(&self, id: MotionId) {
+        let text = format!("{COMMAND_QUEUE} trajectories wait for the first /clock");
+        let limit = COMMAND_QUEUE as f64;
+        let rejection = Rejection::new(Code::QueueFull, text).numbers(limit + 1.0, limit);
+        let _ = self.reports.send(Report::Decided(id, 0, Err(rejection)));
+    }
+
+    /// Takes a command; the next step is the first to show it.
+    pub(super) fn obey(&mut self, command: Command) {
+        let Axes { simulation, reports, stream, resets, .. } = self;
+        // Between two instants, the time is that of the first.
+        let now = simulation.time_of(simulation.next_instant() - 1);
+        match command {
+            Command::Offer { id, trajectory, tolerances } => {
+                let admission = match tolerances {
+                    Some(tolerances) => simulation.offer_within(id, trajectory, *tolerances),
+                    None => simulation.offer(id, trajectory),
+                };
+                let decision = admission.map(|admission| Accepted {
+                    start: simulation.time_of(admission.start_k),
+                    joined_late: admission.joined_late,
+                });
+                let _ = reports.send(Report::Decided(id, now, decision));
+            }
+            Command::Cancel(id, done) => {
+                let _ = done.send(simulation.cancel(id));
+            }
+            Command::Load { loads, hold } => {
+                for (axis, load) in loads {
+                    simulation.set_load(axis, load, hold);
+                }
+            }
+            Command::Stream(setpoints) => stream.take(simulation, setpoints),
+            Command::Adopt(parameters) => {
+                if let Err(error) = simulation.adopt(parameters) {
+                    warn!("changed parameters could not be taken over: {error}");
+                }
+            }
+            Command::Reset(done) => {
+                info!("reset: at rest at home");
+                simulation.reset();
+                *resets += 1;
+                let _ = done.send(());
+            }
+            // Whoever calls ends then.
+            Command::Shutdown => {}
+        }
+    }
+}

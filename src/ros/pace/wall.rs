@@ -1,0 +1,77 @@
+//! The wall clock.
+
+use std::thread;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use crate::config::TimeMode;
+use crate::simulation::Simulation;
+use crate::units::Nanoseconds;
+
+/// Ticks of an idle clock that are made up for when the machine is busy; beyond that, they are lost.
+const CATCH_UP: u32 = 10;
+
+/// When position instant 0 is, ns since the Unix epoch: the next one of the grid of `period` ns
+/// through the epoch. A clock that is followed says so itself when it comes.
+pub fn origin(mode: TimeMode, period: Nanoseconds) -> Nanoseconds {
+    match mode {
+        TimeMode::Real | TimeMode::Fast => grid_origin(period),
+        TimeMode::SimTime => 0,
+    }
+}
+
+fn grid_origin(period: Nanoseconds) -> Nanoseconds {
+    let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let now = Nanoseconds::try_from(since_epoch.as_nanos()).unwrap_or(Nanoseconds::MAX / 2);
+    (now.div_euclid(period) + 1) * period
+}
+
+/// The wall clock as position instants.
+pub(super) struct PaceClock {
+    /// When instant 0 is due.
+    start: Instant,
+    pub(super) period: Duration,
+}
+
+impl PaceClock {
+    /// That of the instants of `simulation`.
+    pub(super) fn new(simulation: &Simulation) -> Self {
+        let now_unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let origin = Duration::from_nanos(u64::try_from(simulation.time_of(0)).unwrap_or(0));
+        let start = Instant::now() + origin.saturating_sub(now_unix);
+        let period = Duration::from_nanos(u64::try_from(simulation.period()).unwrap_or(1));
+        PaceClock { start, period }
+    }
+
+    /// Sleeps until instant `k` is due, and says how late it has become.
+    pub(super) fn wait_for(&self, k: i64) -> Duration {
+        let nanoseconds = self.period.as_nanos() * u128::try_from(k).unwrap_or(0);
+        let due = self.start + Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX));
+        let now = Instant::now();
+        if now < due {
+            thread::sleep(due - now);
+        }
+        Instant::now().saturating_duration_since(due)
+    }
+}
+
+/// An idle clock of our own: it ticks at real pace, and need not be exact.
+#[derive(Debug, Default)]
+pub(super) struct Pulse {
+    due: Option<tokio::time::Instant>,
+}
+
+impl Pulse {
+    /// When it ticks next, `period` after the tick before, or after now when it has just begun.
+    pub(super) fn next(&mut self, period: Duration) -> tokio::time::Instant {
+        let now = tokio::time::Instant::now();
+        let earliest = now.checked_sub(period * CATCH_UP).unwrap_or(now);
+        let due = self.due.map_or(now, |due| due.max(earliest)) + period;
+        self.due = Some(due);
+        due
+    }
+
+    /// Begins anew with the next tick.
+    pub(super) fn stop(&mut self) {
+        self.due = None;
+    }
+}

@@ -1,0 +1,231 @@
+"""`use_sim_time`: the axes follow /clock of somebody else, through pauses, changes of speed and jumps."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from rclpy.qos import ReliabilityPolicy
+from virtual_axes.msg import TrajectoryResult
+
+from drive import NANOSECONDS, TSP_NS, Drive, Node, _stamp_ns, joint_trajectory, to_ns
+from motion import assert_psec, swing
+from sim_clock import SimClock
+
+BEGIN = 1_000 * NANOSECONDS + 1_234_567
+"""Between two position instants."""
+
+
+@pytest.fixture(scope="module")
+def clock() -> Iterator[SimClock]:
+    """Axes that follow a clock turned by hand, shared by the module."""
+    with (
+        Node(["-p", "use_sim_time:=true"]) as process,
+        Drive(process=process, connect=False) as drive,
+    ):
+        clock = SimClock(drive, BEGIN)
+        clock.connect()
+        yield clock
+
+
+def state_of(drive: Drive, wanted: str, timeout: float = 8.0) -> dict[str, str]:
+    """The values of the node's diagnostics once its state is the wanted one."""
+    seen = len(drive.diagnostics())
+
+    def found() -> dict[str, str] | None:
+        for array in drive.diagnostics()[seen:]:
+            values = {value.key: value.value for value in array.status[0].values}
+            if values.get("state") == wanted:
+                return values
+        return None
+
+    return drive.wait_for(found, timeout, f"diagnostics that say {wanted}")
+
+
+def begin_anew(clock: SimClock, first: int) -> None:
+    """Jump to a position instant, and keep no sample from before it."""
+    clock.set(first)
+    samples = clock.drive._samples.values()
+    clock.drive.wait_for(lambda: all(_stamp_ns(s[-1]) == first for s in samples), 5, f"samples of {first}")
+    clock.drive.forget()
+
+
+def stamps_since(drive: Drive, begin: int, end: int) -> np.ndarray:
+    """Stamps of all joint states from one time to another, ns."""
+    return drive.record(begin, end).joints.stamp
+
+
+def test_before_the_first_message_there_is_no_time(start: Callable[..., Drive]):
+    """Nothing is published, services answer, and a trajectory waits for the clock."""
+    drive = start("-p", "use_sim_time:=true", connect=False)
+    drive.wait_for(lambda: drive._psec.get_subscription_count() > 0, 10, "subscription of psec")
+    values = state_of(drive, "waiting for /clock")
+    assert (values["time"], values["clock"], values["position_periods"]) == ("sim", "none", "0")
+    drive.reset()
+    drive.set_parameters({"x.velocity_loop.gain": 4.9})
+    begin = BEGIN + 3 * NANOSECONDS
+    times, position = swing(0.6)
+    soon = drive.send(joint_trajectory(["y"], times, position))
+    later = drive.send(joint_trajectory(["x"], times, position, stamp=begin))
+    past = drive.send(joint_trajectory(["x"], times, position, stamp=BEGIN - NANOSECONDS))
+    drive.stop()
+    assert drive.results() == [] and not any(drive._samples.values())
+    clock = SimClock(drive, BEGIN, ReliabilityPolicy.RELIABLE)
+    drive.wait_for(lambda: clock._publisher.get_subscription_count() > 0, 10, "subscription of /clock")
+    clock.connect()
+    first = -(-(BEGIN + TSP_NS) // TSP_NS) * TSP_NS
+    assert to_ns(drive.decision(soon).start) == first
+    assert to_ns(drive.decision(later).start) == -(-begin // TSP_NS) * TSP_NS
+    assert drive.decision(past).code == 10, "ended in the past"
+    # The stop that was asked for last is what they meet first.
+    clock.advance(0.1, 0.006)
+    assert drive.end(soon, 5).status == TrajectoryResult.STOPPED
+
+
+@pytest.mark.parametrize("step", [0.1, 0.001, 0.0137, 2.0], ids=lambda step: f"{1e3 * step:g} ms")
+def test_the_grid_is_unbroken_whatever_the_clocks_own(clock: SimClock, step: float):
+    """Coarse or fine, every position instant up to the clock is there, and none beyond it."""
+    begin = clock.now
+    clock.advance(max(0.3, 2 * step), step)
+    stamps = stamps_since(clock.drive, begin, clock.now + NANOSECONDS)
+    assert np.array_equal(stamps, np.arange(-(-begin // TSP_NS) * TSP_NS, clock.now + 1, TSP_NS))
+
+
+def test_a_motion_has_the_same_bits_at_any_speed(clock: SimClock, fast: Drive):
+    """Slow, ten times faster, in leaps and with a pause, against the run of another node in `fast`."""
+    drive = clock.drive
+    drive.set_parameters({"x.velocity_loop.gain": 5.0})
+    drive.reset()
+    times, position = swing(3.0)
+    motion = joint_trajectory(["x", "c"], times, np.column_stack([position, 3 * position]))
+    sent = drive.send(motion)
+    drive.decision(sent)
+    clock.advance(0.1, 0.001)
+    clock.advance(0.5, 0.01)
+    time.sleep(0.2)
+    for _ in range(5):
+        clock.set(clock.now)
+    clock.advance(0.5, 0.1)
+    clock.advance(0.6, 0.25)
+    clock.advance(2.0, 0.05)
+    end = drive.end(sent, 10)
+    assert end.status == TrajectoryResult.COMPLETED
+    followed = drive.record(to_ns(end.start), to_ns(end.start) + 3 * NANOSECONDS)
+    fast.reset()
+    free = fast.run(motion)
+    assert len(followed.joints) == len(free.joints) == len(times)
+    for kind, field in [
+        ("joints", "position"),
+        ("joints", "velocity"),
+        ("states", "psec"),
+        ("currents", "current"),
+        ("states", "voltage"),
+    ]:
+        np.testing.assert_array_equal(getattr(followed, kind)[field], getattr(free, kind)[field], err_msg=field)
+    assert end.max_tracking_error == free.result.max_tracking_error
+
+
+def test_while_the_clock_stands_nothing_moves_and_everything_answers(clock: SimClock):
+    """Also more trajectories than any queue holds: each is told what became of it."""
+    drive = clock.drive
+    drive.reset()
+    clock.advance(0.06, 0.006)
+    times, position = swing(1.2)
+    sent = drive.send(joint_trajectory(["x"], times, position))
+    drive.decision(sent)
+    clock.advance(0.3, 0.006)
+    stood_at = drive.now()
+    values = state_of(drive, "paused")
+    assert values["clock"] == "followed" and values["behind_clock_ms"] == "0"
+    drive.set_parameters({"x.velocity_loop.gain": 4.5})
+    assert drive.get_parameters(["x.velocity_loop.gain"]) == {"x.velocity_loop.gain": 4.5}
+    # One swing each, one after the other, on another joint.
+    begin = stood_at + NANOSECONDS
+    many = [
+        drive.send(joint_trajectory(["y"], times[:11], 0 * times[:11], stamp=begin + n * NANOSECONDS))
+        for n in range(200)
+    ]
+    decided = [drive.decision(number).status for number in many]
+    assert decided == [TrajectoryResult.ACCEPTED] * len(many)
+    assert drive.stop() and drive.now() == stood_at
+    drive.reset()
+    assert drive.end(sent, 5).status == TrajectoryResult.ABORTED
+    assert {drive.end(number, 5).status for number in many} <= {TrajectoryResult.ABORTED, TrajectoryResult.STOPPED}
+    assert drive.now() == stood_at
+    # It goes on where it stood, at rest at home.
+    clock.advance(0.06, 0.006)
+    stamps = stamps_since(drive, stood_at, clock.now)
+    assert set(np.diff(stamps)) == {TSP_NS}
+    assert drive.latest("position")["x"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("to", "what"),
+    [
+        (lambda now: now - NANOSECONDS, "back"),
+        (lambda now: now + 60 * NANOSECONDS, "far ahead"),
+        (lambda _: 0, "back to zero"),
+        (lambda _: BEGIN, "where it was"),
+    ],
+    ids=["back", "far-ahead", "to-zero", "to-where-it-was"],
+)
+def test_a_jump_ends_the_motion_and_begins_a_new_grid(clock: SimClock, to: Callable[[int], int], what: str):
+    """The axes come to rest within their limits, and take trajectories by the new time."""
+    drive = clock.drive
+    times, position = swing(2.0)
+    sent = drive.send(joint_trajectory(["x"], times, position + drive.latest("psec")["x"]))
+    assert drive.decision(sent).status == TrajectoryResult.ACCEPTED
+    clock.advance(0.5, 0.006)
+    drive.stream(["z"], [0.001])
+    before, target = clock.now, to(clock.now)
+    first = -(-target // TSP_NS) * TSP_NS
+    clock.set(target)
+    end = drive.end(sent, 5)
+    assert end.status == TrajectoryResult.ABORTED
+    assert end.text == f"the clock jumped from {before // TSP_NS * TSP_NS / 1e9:.3f} s to {first / 1e9:.3f} s"
+    assert "the clock jumped from" in drive.process.output()
+    begin_anew(clock, first)
+    # More than the axis needs to stop.
+    clock.advance(1.0, 0.02)
+    series = drive.record(first, clock.now)
+    assert np.array_equal(series.joints.stamp, np.arange(first, clock.now + 1, TSP_NS)), what
+    assert abs(drive.latest("velocity")["x"]) < 1e-4
+    psec = series.states["psec", "x"]
+    assert np.all(psec[-20:] == psec[-1])
+    begin = clock.now + NANOSECONDS // 2
+    again = drive.accept(joint_trajectory(["x"], [0.0, 0.06], [[psec[-1]]] * 2, stamp=begin))
+    clock.advance(1.0, 0.02)
+    assert drive.end(again.sequence_number, 5).status == TrajectoryResult.COMPLETED
+
+
+def test_jumps_are_counted(clock: SimClock):
+    """And a stretch of nine seconds is none: it is simulated."""
+    drive = clock.drive
+    jumps = int(state_of(drive, "paused")["clock_jumps"])
+    begin = clock.now
+    clock.reach(begin + 9 * NANOSECONDS)
+    stamps = stamps_since(drive, begin, clock.now)
+    assert len(stamps) == 9 * NANOSECONDS // TSP_NS and set(np.diff(stamps)) == {TSP_NS}
+    assert int(state_of(drive, "paused")["clock_jumps"]) == jumps
+    begin_anew(clock, begin // TSP_NS * TSP_NS)
+    drive.wait_for(
+        lambda: any(v.key == "clock_jumps" and int(v.value) == jumps + 1 for v in drive.diagnostics()[-1].status[0].values),
+        5,
+        "count of the jump",
+    )
+    assert any("the clock jumped" in array.status[0].message for array in drive.diagnostics()[-3:])
+
+
+def test_a_chunk_by_absolute_times_is_followed_by_the_clock(clock: SimClock):
+    """The stamps of trajectories are times of the clock that is followed."""
+    drive = clock.drive
+    drive.reset()
+    clock.advance(0.06, 0.006)
+    times, position = swing(0.6)
+    begin = -(-(clock.now + NANOSECONDS) // TSP_NS) * TSP_NS
+    accepted = drive.accept(joint_trajectory(["x"], times, position, stamp=begin))
+    assert to_ns(accepted.start) == begin
+    clock.advance(2.0, 0.05)
+    assert_psec(drive, begin, {"x": position})
