@@ -1,0 +1,52 @@
+"""The node in the graph: there soon after its start, gone soon after its end."""
+
+from __future__ import annotations
+
+import signal
+
+from drive import Drive, Node
+from tables import interfaces
+
+
+def of_the_node(drive: Drive) -> set[str]:
+    """Topics and services of the node, by name in the graph."""
+    namespace, name = drive.target.rsplit("/", 1)
+    if not drive.sees():
+        return set()
+    ask = drive.node
+    return {
+        found
+        for get in (
+            ask.get_publisher_names_and_types_by_node,
+            ask.get_subscriber_names_and_types_by_node,
+            ask.get_service_names_and_types_by_node,
+        )
+        for found, _ in get(name, namespace or "/")
+    }
+
+
+def test_comes_and_goes_within_two_seconds():
+    """All that it has, and none of it afterwards."""
+    process = Node()
+    wanted = {row.resolved(process.name, {}) for row in interfaces() if row.condition is None and row.direction != "action"}
+    try:
+        with Drive(process=process, connect=False) as drive:
+            process.start()
+            drive.wait_for(lambda: wanted <= of_the_node(drive), 2, "complete node in the graph")
+            drive.process = None
+            assert process.stop(signal.SIGTERM) == 0
+
+            def left() -> list[str]:
+                ask = drive.node
+                topics = [name for name, _ in ask.get_topic_names_and_types()]
+                endpoints = [
+                    f"{name} of {info.node_name}"
+                    for name in topics
+                    for info in (*ask.get_publishers_info_by_topic(name), *ask.get_subscriptions_info_by_topic(name))
+                    if info.node_name != drive.name
+                ]
+                return endpoints + [name for name, _ in ask.get_service_names_and_types() if drive.target in name]
+
+            drive.wait_for(lambda: not drive.sees() and not left(), 2, "end of the node")
+    finally:
+        process.__exit__()
