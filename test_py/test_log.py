@@ -62,7 +62,8 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
     # Only now: all three are history.
     found = rosout(drive)
     drive.wait_for(lambda: len(found) >= 3, 5, "messages on /rosout")
-    said = {(message.level, word) for message in found for word in ("holding", "no_such_joint", "not sent") if word in message.msg}
+    words = ("holding", "no_such_joint", "not sent")
+    said = {(message.level, word) for message in found for word in words if word in message.msg}
     assert said == {(20, "holding"), (30, "no_such_joint"), (40, "not sent")}
     assert (Log.INFO, Log.WARN, Log.ERROR) == (20, 30, 40)
     twin = rclpy.create_node("mill", namespace="/cell", context=drive.node.context, start_parameter_services=False)
