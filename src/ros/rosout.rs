@@ -79,3 +79,31 @@ fn severity(level: LogLevel) -> u8 {
         LogLevel::Fatal => Log::FATAL,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_those_of_the_interface_file() {
+        for (level, number) in [
+            (LogLevel::Debug, 10),
+            (LogLevel::Info, 20),
+            (LogLevel::Warn, 30),
+            (LogLevel::Error, 40),
+            (LogLevel::Fatal, 50),
+        ] {
+            let record = LogRecord {
+                stamp: Duration::new(1_700_000_000, 123_456_789),
+                level,
+                logger: "cell.mill".to_owned(),
+                message: "text".to_owned(),
+                file: None,
+                line: None,
+            };
+            let message = message(record);
+            assert_eq!(message.level, number);
+            assert_eq!((message.stamp.sec, message.stamp.nanosec), (1_700_000_000, 123_456_789));
+        }
+    }
+}
