@@ -394,8 +394,8 @@ class Drive:
             self._executor.spin()
         except ExternalShutdownException:
             pass
-        except InvalidHandle:
-            # A callback that was under way when the node left.
+        except (InvalidHandle, AttributeError):
+            # A callback, or a wait of rclpy's executor, that was under way when the node left.
             if not self._closing:
                 raise
 

@@ -17,6 +17,7 @@ mod inputs;
 mod large_response;
 pub mod log;
 pub mod names;
+mod namesake;
 pub mod node;
 mod outputs;
 mod pace;

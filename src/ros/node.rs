@@ -23,6 +23,7 @@ use super::environment::Environment;
 use super::fan_out::{FanOut, publish_diagnostics};
 use super::inputs::{Checks, PsecInput, next_id, take_loads, take_stream};
 use super::log::LogRecord;
+use super::namesake;
 use super::outputs::{Publishing, WhenFull, queue_length};
 use super::pace::{self, Channels, Command, Health, Pace};
 use super::parameter_host::{Host, LiveNodeParameters};
@@ -122,9 +123,10 @@ async fn serve(
     let node_error = |reason: String| NodeError::Node { name: args.node().to_string(), reason };
     let name = NodeName::new(args.node().namespace(), args.node().name())
         .map_err(|e| node_error(format!("{e:?}")))?;
-    let options = NodeOptions::new().start_parameter_services(false).enable_rosout(args.log_sinks().rosout);
+    let options = NodeOptions::new().start_parameter_services(false).enable_rosout(false);
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
+    let rosout_publisher = rosout::publisher(&mut node, args)?;
     let mut topics = Topics::create(&mut node, args, &parameters, mode)?;
     let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
     topics.names.goals_on.push(action_topics.name);
@@ -178,7 +180,10 @@ async fn serve(
         every: every.max(1),
     };
 
-    tasks.spawn(rosout::publish(&node, log));
+    if let Some(publisher) = rosout_publisher {
+        tasks.spawn(rosout::publish(publisher, log));
+    }
+    tasks.spawn(namesake::watch(dds.clone(), args.node().clone()));
 
     // What comes in.
     tasks.spawn(ask_again::run(dds.clone()));

@@ -1,43 +1,109 @@
 //! The node's own log messages on `/rosout`.
+//!
+//! The crate's own publisher keeps one message for late joiners; this one keeps as many as rcl's.
 
-use ros2_client::builtin_interfaces::Time;
-use ros2_client::log::{Log, LogLevel as Severity};
-use ros2_client::{Node, rosout::RosoutRaw};
+use std::time::Duration;
+
+use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
+use ros2_client::{MessageTypeName, Name, Node, Publisher};
+use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
+use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
 use tokio::sync::mpsc;
 
-use super::args::LogLevel;
+use super::args::{LogLevel, RosArgs};
+use super::endpoints::EndpointError;
 use super::log::LogRecord;
 
 /// Messages that may wait; more are dropped, so that logging never waits.
 pub const QUEUE: usize = 256;
 
-/// A task that publishes what comes until the log is closed; nothing where `/rosout` is off.
-pub fn publish(node: &Node, mut records: mpsc::Receiver<LogRecord>) -> impl Future<Output = ()> + use<> {
-    let writer = node.logging_handle().rosout_writer();
-    async move {
-        let Some(publisher) = writer.as_ref() else { return };
-        while let Some(record) = records.recv().await {
-            let message = Log {
-                stamp: Time::from_nanos(i64::try_from(record.stamp.as_nanos()).unwrap_or(i64::MAX)),
-                level: severity(record.level) as u8,
-                name: record.logger,
-                msg: record.message,
-                file: record.file.unwrap_or_default().to_owned(),
-                function: String::new(),
-                line: record.line.unwrap_or_default(),
-            };
-            // To log a failure here would make the next one.
-            let _ = publisher.async_publish(message).await;
-        }
+/// The topic.
+const NAME: &str = "/rosout";
+/// Depth and lifespan of rcl's publisher (`rcl_qos_profile_rosout_default`).
+const DEPTH: usize = 1000;
+const LIFESPAN: Duration = Duration::from_secs(10);
+/// How long a message may wait for a slow reader.
+const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
+
+/// The publisher, where the arguments want one: reliable, transient local, as rcl's.
+///
+/// # Errors
+/// [`EndpointError`] when the middleware refuses it.
+pub fn publisher(node: &mut Node, args: &RosArgs) -> Result<Option<Publisher<Log>>, EndpointError> {
+    if !args.log_sinks().rosout {
+        return Ok(None);
+    }
+    let failed = |reason: String| EndpointError { name: NAME.to_owned(), reason };
+    let resolved = args.resolve_topic(NAME).map_err(|e| failed(e.to_string()))?;
+    let name = Name::parse(&resolved).map_err(|e| failed(e.to_string()))?;
+    let profile = QosProfile {
+        durability: Durability::TransientLocal,
+        history: History::KeepLast { depth: DEPTH },
+        lifespan: Some(LIFESPAN),
+        ..QosProfile::publisher_default().reliability_reliable(WhenFull::Wait(WRITE_TIMEOUT))
+    };
+    let type_name = MessageTypeName::new("rcl_interfaces", "Log");
+    let topic = node.create_topic(&name, type_name, &profile).map_err(|e| failed(e.to_string()))?;
+    node.create_publisher(&topic, None).map(Some).map_err(|e| failed(e.to_string()))
+}
+
+/// Publishes what comes until the log is closed.
+pub async fn publish(publisher: Publisher<Log>, mut records: mpsc::Receiver<LogRecord>) {
+    while let Some(record) = records.recv().await {
+        // To log a failure here would make the next one.
+        let _ = publisher.async_publish(message(record)).await;
     }
 }
 
-fn severity(level: LogLevel) -> Severity {
+fn message(record: LogRecord) -> Log {
+    Log {
+        stamp: Time {
+            sec: i32::try_from(record.stamp.as_secs()).unwrap_or(i32::MAX),
+            nanosec: record.stamp.subsec_nanos(),
+        },
+        level: severity(record.level),
+        name: record.logger,
+        msg: record.message,
+        file: record.file.unwrap_or_default().to_owned(),
+        function: String::new(),
+        line: record.line.unwrap_or_default(),
+    }
+}
+
+fn severity(level: LogLevel) -> u8 {
     match level {
-        LogLevel::Unset | LogLevel::Debug => Severity::Debug,
-        LogLevel::Info => Severity::Info,
-        LogLevel::Warn => Severity::Warn,
-        LogLevel::Error => Severity::Error,
-        LogLevel::Fatal => Severity::Fatal,
+        LogLevel::Unset | LogLevel::Debug => Log::DEBUG,
+        LogLevel::Info => Log::INFO,
+        LogLevel::Warn => Log::WARN,
+        LogLevel::Error => Log::ERROR,
+        LogLevel::Fatal => Log::FATAL,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_those_of_the_interface_file() {
+        for (level, number) in [
+            (LogLevel::Debug, 10),
+            (LogLevel::Info, 20),
+            (LogLevel::Warn, 30),
+            (LogLevel::Error, 40),
+            (LogLevel::Fatal, 50),
+        ] {
+            let record = LogRecord {
+                stamp: Duration::new(1_700_000_000, 123_456_789),
+                level,
+                logger: "cell.mill".to_owned(),
+                message: "text".to_owned(),
+                file: None,
+                line: None,
+            };
+            let message = message(record);
+            assert_eq!(message.level, number);
+            assert_eq!((message.stamp.sec, message.stamp.nanosec), (1_700_000_000, 123_456_789));
+        }
     }
 }

@@ -1,0 +1,25 @@
+"""Four processes at once: a source, the node, a process model that loads the axes, a recorder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from graph import DAMPING, run_graph
+from motion import RATIO
+
+TORQUE_CONSTANT = 2.64
+
+
+def test_four_processes_on_an_unbroken_grid(tmp_path: Path):
+    """No stamp is missing or comes twice; the load acts against the motion, in proportion to the velocity."""
+    figures = run_graph(3.0, tmp_path / "recorded.json")
+    assert figures.faults() == []
+    assert all(len(stamps) > 3.0 / 0.006 for stamps in figures.stamps.values())
+    slope, correlation, lag = figures.load_per_velocity()
+    print(f"\nload over velocity {slope:.2f} A s/m, correlation {correlation:.4f}, {lag:g} periods later")
+    # `load` of motor_currents is positive where it opposes motion towards plus. A sample that comes
+    # late makes a load that is that much too old, which costs proportion.
+    assert slope == pytest.approx(DAMPING * RATIO / TORQUE_CONSTANT, rel=0.05)
+    assert correlation > 0.98

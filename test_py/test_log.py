@@ -1,0 +1,172 @@
+"""The log: on stderr and on /rosout, as of any ROS node, and without the middleware's noise."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rcl_interfaces.msg import Log
+from rcl_interfaces.srv import DescribeParameters
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
+
+from drive import Drive, Node, joint_trajectory
+
+ROSOUT_QOS = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+IN_THE_CELL = ("-r", "__ns:=/cell", "-r", "__node:=mill")
+LINE = re.compile(r"\[(?P<level>[A-Z]+)\] \[(?P<stamp>\d+\.\d{9})\] \[(?P<logger>[\w.]+)\]: (?P<text>.*)")
+
+
+def rosout(drive: Drive) -> list[Log]:
+    """What comes on /rosout from now on, and what is kept there for late joiners."""
+    found: list[Log] = []
+    drive.node.create_subscription(Log, "/rosout", found.append, ROSOUT_QOS)
+    return found
+
+
+def refuse(drive: Drive) -> None:
+    """Have a trajectory refused, which is logged as a warning."""
+    result = drive.decision(drive.send(joint_trajectory(["no_such_joint"], [1.0], [[0.0]])))
+    assert result.code != 0
+
+
+def lines(process: Node) -> list[re.Match[str]]:
+    """The log on the terminal; nothing else may follow the screen at the start."""
+    text = process.output()
+    log = text[text.index("stop it with Ctrl-C") :].splitlines()[1:]
+    found = [LINE.fullmatch(line) for line in log]
+    assert None not in found, text
+    return [match for match in found if match]
+
+
+def test_levels_logger_and_time(start: Callable[..., Drive]):
+    """INFO 20, WARN 30, ERROR 40, by the logger that rclpy gives a node of this name, also to late joiners."""
+    drive = start(*IN_THE_CELL, "-p", "time:=fast", name="/cell/mill")
+    process = drive.process
+    began = time.time()
+    drive.node.create_publisher(Clock, "/clock", 10)
+    drive.wait_for(lambda: "holding back" in process.output(), 5, "notice of another clock")
+    refuse(drive)
+    names = drive.list_parameters() * 4
+    with pytest.raises(TimeoutError):
+        drive.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names), timeout=0.5)
+    # Only now: all three are history.
+    found = rosout(drive)
+    drive.wait_for(lambda: len(found) >= 3, 5, "messages on /rosout")
+    words = ("holding", "no_such_joint", "not sent")
+    said = {(message.level, word) for message in found for word in words if word in message.msg}
+    assert said == {(20, "holding"), (30, "no_such_joint"), (40, "not sent")}
+    assert (Log.INFO, Log.WARN, Log.ERROR) == (20, 30, 40)
+    twin = rclpy.create_node("mill", namespace="/cell", context=drive.node.context, start_parameter_services=False)
+    try:
+        assert {message.name for message in found} == {twin.get_logger().name}
+    finally:
+        twin.destroy_node()
+    for message in found:
+        stamp = message.stamp.sec + message.stamp.nanosec / 1e9
+        assert began - 1 <= stamp <= time.time()
+    # The terminal has the same, in the same words.
+    shown = {match["text"]: (match["level"], match["logger"]) for match in lines(process)}
+    level_names = {20: "INFO", 30: "WARN", 40: "ERROR"}
+    assert shown == {message.msg: (level_names[message.level], message.name) for message in found}
+
+
+def test_level_of_one_logger(start: Callable[..., Drive]):
+    """--log-level name:=level, on the terminal and on /rosout alike."""
+    drive = start(*IN_THE_CELL, "--log-level", "cell.mill:=error", name="/cell/mill")
+    found = rosout(drive)
+    drive.wait_for(lambda: drive.node.count_publishers("/rosout") > 0, 5, "publisher of /rosout")
+    refuse(drive)
+    time.sleep(0.3)
+    assert found == [] and lines(drive.process) == []
+
+
+def test_a_node_of_the_same_name_is_told_of(start: Callable[..., Drive]):
+    """Once by each of the two, and only where the namespace is the same too."""
+    first = start(*IN_THE_CELL, name="/cell/mill")
+    domain = first.process.domain_id
+    start(*IN_THE_CELL[2:], name="/mill", domain_id=domain)
+    assert "named /" not in first.process.output()
+    second = start(*IN_THE_CELL, name="/cell/mill", domain_id=domain, connect=False)
+    for drive in (first, second):
+        drive.wait_for(lambda drive=drive: "named /cell/mill" in drive.process.output(), 5, "warning")
+        warnings = [match["text"] for match in lines(drive.process) if match["level"] == "WARN"]
+        assert len(warnings) == 1, warnings
+
+
+# ------------------------------------------------------------------------------------------- noise
+
+# A participant that is given up a second after it was last heard of, not after the usual 20.
+SHORT_LEASE = """<?xml version="1.0" encoding="UTF-8"?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <participant profile_name="short" is_default_profile="true"><rtps><builtin><discovery_config>
+    <leaseDuration><sec>1</sec></leaseDuration>
+    <leaseAnnouncement><sec>0</sec><nanosec>300000000</nanosec></leaseAnnouncement>
+  </discovery_config></builtin></rtps></participant>
+</profiles>
+"""
+# A node that publishes and subscribes until it is killed.
+GUEST = """
+import rclpy
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+
+rclpy.init()
+node = rclpy.create_node("guest")
+psec = node.create_publisher(JointTrajectory, "/psec", 10)
+node.create_publisher(JointState, "/psec_stream", 10)
+node.create_subscription(JointState, "/joint_states", lambda _: psec.publish(JointTrajectory()), 10)
+rclpy.spin_once(node)
+print("matched", flush=True)
+rclpy.spin(node)
+"""
+
+
+def killed_guest(domain_id: int, profile: Path, failures: list[Any]) -> None:
+    """A guest that comes, and is gone without a word."""
+    env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile)}
+    with subprocess.Popen([sys.executable, "-c", GUEST], env=env, stdout=subprocess.PIPE, text=True) as guest:
+        bounded = threading.Timer(20, guest.kill)
+        bounded.start()
+        said = guest.stdout.readline() if guest.stdout else ""
+        bounded.cancel()
+        guest.kill()
+    if said != "matched\n":
+        failures.append(said)
+
+
+def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
+    """From the start to the end, while others come, leave, and die."""
+    drive = start()
+    process = drive.process
+    found = rosout(drive)
+    profile = tmp_path / "profile.xml"
+    profile.write_text(SHORT_LEASE)
+    failures: list[Any] = []
+    guests = [threading.Thread(target=killed_guest, args=(process.domain_id, profile, failures)) for _ in range(2)]
+    for guest in guests:
+        guest.start()
+    for _ in range(3):
+        with Drive(process=process) as other:
+            other.reset()
+    for guest in guests:
+        guest.join(30)
+    assert not failures
+    # Their leases end.
+    drive.wait_for(lambda: drive.node.count_subscribers("/joint_states") == 1, 10, "end of the guests")
+    time.sleep(1.0)
+    drive.process = None
+    assert process.stop() == 0
+    # What it was asked for it says, and that it ends; nothing that is worse, and nobody else says anything.
+    assert {(match["level"], match["logger"]) for match in lines(process)} == {("INFO", "virtual_axes")}
+    assert {(message.level, message.name) for message in found} == {(20, "virtual_axes")}

@@ -1,0 +1,264 @@
+"""README.md's tables against the running node: all that is written is there, and nothing else."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from rcl_interfaces.msg import ParameterType
+from rclpy.action import graph
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+from drive import DEFAULT_NODE, Drive, Node
+from tables import Interface, interfaces, parameters
+
+CONFIG = Path(__file__).resolve().parent.parent / "config"
+DEFAULT_MACHINE = CONFIG / "mikron_ucp710.yaml"
+LINEAR_MOTORS = CONFIG / "linear_motor_center.yaml"
+
+HIDDEN = "/_action/"
+"""What an action consists of has this in its names."""
+ACTION_SERVICES = ["cancel_goal", "get_result", "send_goal"]
+ACTION_TOPICS = ["feedback", "status"]
+EVERY_NODE_HAS = {"/rosout", "/parameter_events"}
+"""And does not put it on the screen; nor the parameter services."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A way to start the node, and what is to be seen then."""
+
+    name: str = DEFAULT_NODE
+    settings: dict[str, str] = field(default_factory=dict)
+    remaps: dict[str, str] = field(default_factory=dict)
+    machine: Path | None = None
+
+    @property
+    def ros_args(self) -> list[str]:
+        """What it is started with."""
+        namespace, name = self.name.rsplit("/", 1)
+        rules = {"__ns": namespace or "/", "__node": name, **self.remaps} if self.name != DEFAULT_NODE else self.remaps
+        args = [part for old, new in rules.items() for part in ("-r", f"{old}:={new}")]
+        args += ["--params-file", str(self.machine)] if self.machine else []
+        return args + [part for key, value in self.settings.items() for part in ("-p", f"{key}:={value}")]
+
+    def expected(self, *directions: str) -> dict[str, Interface]:
+        """By name in the graph, what the README has of these directions."""
+        return {
+            row.resolved(self.name, self.remaps): row
+            for row in interfaces()
+            if row.direction in directions
+            and (row.condition is None or self.settings.get(row.condition[0]) == row.condition[1])
+        }
+
+
+CONDITIONS = sorted({row.condition for row in interfaces() if row.condition})
+RUNS = {
+    "default": Run(),
+    # Names of every kind, in another namespace, and what is there only with a certain parameter.
+    **{
+        f"{key} {value}": Run("/cell/mill", {key: value}, {"joint_states": "/axes", "~/stop": "halt"})
+        for key, value in CONDITIONS
+    },
+    "linear motors": Run(machine=LINEAR_MOTORS),
+}
+# What a rule puts in a name's place is a name in the node's namespace.
+HALT = {"halt": "/cell/halt"}
+
+
+@pytest.fixture(scope="module", params=RUNS)
+def seen(request: pytest.FixtureRequest) -> Iterator[tuple[Run, Drive]]:
+    """A node that was started in one of these ways, once all that the README has of it is there."""
+    run = RUNS[request.param]
+    with Node(run.ros_args, name=run.name) as process, Drive(process=process, connect=False) as drive:
+        drive.wait_for(drive.sees, 10, "node in the graph")
+        wanted = {HALT.get(name, name) for name in run.expected("in", "out", "service")}
+
+        def there() -> bool:
+            return wanted <= {name for what in ("publisher", "subscriber", "service") for name in by_node(drive, what)}
+
+        deadline = time.monotonic() + 5
+        # Not an error here: each test says what it misses.
+        while not there() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        time.sleep(0.3)
+        yield run, drive
+
+
+def by_node(drive: Drive, what: str) -> dict[str, list[str]]:
+    """Names and types of the node's publishers, subscribers, services or clients."""
+    namespace, name = drive.target.rsplit("/", 1)
+    return dict(getattr(drive.node, f"get_{what}_names_and_types_by_node")(name, namespace or "/"))
+
+
+def types_of(expected: dict[str, Interface]) -> dict[str, list[str]]:
+    """Names and types as the graph gives them."""
+    return {HALT.get(name, name): [row.type] for name, row in expected.items()}
+
+
+def visible(found: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Without what actions consist of."""
+    return {name: types for name, types in found.items() if HIDDEN not in name}
+
+
+@pytest.mark.parametrize(
+    ("direction", "what"), [("out", "publisher"), ("in", "subscriber"), ("service", "service")], ids=lambda value: value
+)
+def test_names_and_types(seen: tuple[Run, Drive], direction: str, what: str):
+    """Both ways: what is documented, with its type, and nothing else."""
+    run, drive = seen
+    assert visible(by_node(drive, what)) == types_of(run.expected(direction))
+
+
+def test_actions(seen: tuple[Run, Drive]):
+    """With their types, and no hidden topic or service but theirs."""
+    run, drive = seen
+    namespace, name = run.name.rsplit("/", 1)
+    actions = types_of(run.expected("action"))
+    assert dict(graph.get_action_server_names_and_types_by_node(drive.node, name, namespace or "/")) == actions
+    for what, parts in (("service", ACTION_SERVICES), ("publisher", ACTION_TOPICS), ("subscriber", [])):
+        hidden = {name for name in by_node(drive, what) if HIDDEN in name}
+        assert hidden == {f"{action}{HIDDEN}{part}" for action in actions for part in parts}, what
+
+
+def test_the_node_asks_nobody(seen: tuple[Run, Drive]):
+    """It has no client of a service."""
+    _, drive = seen
+    assert by_node(drive, "client") == {}
+
+
+def test_quality_of_service_and_owner_of_every_topic(seen: tuple[Run, Drive]):
+    """Reliability and durability as documented; every endpoint has its node's name."""
+    run, drive = seen
+    infos: dict[str, Callable[[str], Any]] = {
+        "out": drive.node.get_publishers_info_by_topic,
+        "in": drive.node.get_subscriptions_info_by_topic,
+    }
+    known = {run.name, f"/{drive.name}"}
+    for direction, ask in infos.items():
+        for topic, row in run.expected(direction).items():
+            found = {(f"{info.node_namespace.rstrip('/')}/{info.node_name}", quality(info)) for info in ask(topic)}
+            assert {node for node, _ in found} <= known, topic
+            reliability = ReliabilityPolicy.RELIABLE if row.reliable else ReliabilityPolicy.BEST_EFFORT
+            durability = DurabilityPolicy.TRANSIENT_LOCAL if row.transient_local else DurabilityPolicy.VOLATILE
+            assert (run.name, (reliability, durability)) in found, topic
+
+
+def quality(info: Any) -> tuple[ReliabilityPolicy, DurabilityPolicy]:
+    """What the graph shows of an endpoint's profile; its depth is not among it."""
+    return info.qos_profile.reliability, info.qos_profile.durability
+
+
+def test_depths(seen: tuple[Run, Drive]):
+    """As the parameters that set them."""
+    run, drive = seen
+    documented = {
+        f"qos.{row.name.removeprefix('~').strip('/')}.depth": row.depth
+        for row in run.expected("in", "out").values()
+        if row.depth
+    }
+    assert drive.get_parameters(list(documented)) == documented
+
+
+def test_the_screen_at_the_start(seen: tuple[Run, Drive]):
+    """It names the same topics, services and actions."""
+    run, drive = seen
+    lines = drive.wait_for(lambda: drive.process.output(), 5, "screen").splitlines()
+    listed: dict[str, set[str]] = {}
+    label = ""
+    for line in lines[1:]:
+        if not line.startswith("  ") or line.startswith("  and "):
+            break
+        label = line[2:13].strip() or label
+        listed.setdefault(label, set()).add(line[13:].strip())
+    assert listed.pop("listens to") == set(types_of(run.expected("in")))
+    assert listed.pop("publishes") == set(types_of(run.expected("out"))) - EVERY_NODE_HAS
+    served = {name for name in types_of(run.expected("service", "action")) if "parameter" not in name}
+    assert set().union(*listed.values()) == served
+
+
+# ------------------------------------------------------------------------------------- parameters
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What a node's parameters are to be."""
+
+    rows: dict[str, Any]
+    """row of the table by parameter"""
+    given: dict[str, Any]
+    """values that the machine file or the arguments set"""
+
+
+@pytest.fixture(scope="module")
+def machine(seen: tuple[Run, Drive]) -> Machine:
+    """Parameters of the node that was started, from the README and from the file that it read."""
+    run, drive = seen
+    file = yaml.safe_load((run.machine or DEFAULT_MACHINE).read_text(encoding="utf-8"))
+    given = {**flat(file["/**"]["ros__parameters"]), **run.settings}
+    joints = {joint: kinds_of(joint, given) for joint in given["joints"]}
+    rows = [(name, row) for row in parameters() for name in row.names(joints)]
+    assert len(dict(rows)) == len(rows), "a parameter has two rows"
+    return Machine(dict(rows), given)
+
+
+def flat(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested keys joined by dots."""
+    found: dict[str, Any] = {}
+    for key, value in tree.items():
+        # To YAML a bare y is a flag.
+        key = prefix + {True: "y"}.get(key, key) if not isinstance(key, str) else prefix + key
+        found |= flat(value, key + ".") if isinstance(value, dict) else {key: value}
+    return found
+
+
+def kinds_of(joint: str, given: dict[str, Any]) -> set[str]:
+    """What the column "for" may call the joint."""
+    axis = given[f"{joint}.type"]
+    linear_motor = axis == "linear" and given.get(f"{joint}.transmission.direct") is True
+    return {"axis", f"{axis} axis", "linear motor" if linear_motor else "rotating motor"}
+
+
+def test_parameter_names(seen: tuple[Run, Drive], machine: Machine):
+    """Both ways."""
+    assert sorted(seen[1].list_parameters()) == sorted(machine.rows)
+
+
+def test_parameter_descriptions(seen: tuple[Run, Drive], machine: Machine):
+    """Text, unit, type, range, choices, and whether it can be set while the node runs."""
+    for said in seen[1].describe(list(machine.rows)):
+        row = machine.rows[said.name]
+        assert said.description == row.description + (f" Unit: {row.unit}." if row.unit else ""), said.name
+        assert said.read_only != row.live, said.name
+        assert said.additional_constraints == row.constraint, said.name
+        ranges = [(r.from_value, r.to_value) for r in (*said.floating_point_range, *said.integer_range)]
+        assert ranges == ([row.bounds] if row.bounds else []), said.name
+        kinds = {
+            "text": [ParameterType.PARAMETER_STRING],
+            "list of texts": [ParameterType.PARAMETER_STRING_ARRAY],
+            "true, false": [ParameterType.PARAMETER_BOOL],
+        }
+        numbers = [ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER]
+        if row.bounds:
+            assert said.type in numbers, said.name
+        elif "numbers" in row.range:
+            assert said.type == ParameterType.PARAMETER_DOUBLE_ARRAY, said.name
+        else:
+            assert said.type in kinds.get(row.range, kinds["text"]), said.name
+
+
+def test_parameter_values(seen: tuple[Run, Drive], machine: Machine):
+    """What the machine file gives, and the documented default of everything else."""
+    values = seen[1].get_parameters(list(machine.rows))
+    for name, value in values.items():
+        row = machine.rows[name]
+        if name in machine.given:
+            assert value == machine.given[name], name
+        else:
+            assert row.default != "required", name
+            assert value == row.default_value(value), name
