@@ -68,7 +68,7 @@ fn run(args: &RosArgs) -> ExitCode {
     };
     match node::run(args, &environment, parameters, log) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error @ NodeError::SimTime) => refuse(&error),
+        Err(error @ (NodeError::SimTime | NodeError::Record(_))) => refuse(&error),
         Err(error) => {
             complain(&error);
             ExitCode::FAILURE

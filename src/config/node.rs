@@ -1,9 +1,14 @@
 //! The parameters of the node itself, typed.
 
+use std::path::PathBuf;
+
 use super::check::to_ns;
 use super::parameters::Parameters;
 use super::value::Value;
 use crate::units::{Nanoseconds, SECOND_NS};
+
+/// A megabyte, bytes.
+const MEGABYTE: u64 = 1_000_000;
 
 /// What the node's clock follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +47,10 @@ pub struct NodeConfig {
     pub max_points: usize,
     /// Whether a trajectory may end with a velocity.
     pub allow_nonzero_velocity_at_trajectory_end: bool,
+    /// The file that the topics are recorded in.
+    pub record: Option<PathBuf>,
+    /// The most that it may become, bytes.
+    pub record_max: u64,
 }
 
 impl Parameters {
@@ -72,6 +81,11 @@ impl Parameters {
             Some(Value::Integer(points)) => usize::try_from(points).unwrap_or(usize::MAX),
             _ => usize::MAX,
         };
+        let record = self.text("record");
+        let record_max = match self.get("record_max_mb") {
+            Some(Value::Integer(size)) => u64::try_from(size).unwrap_or_default() * MEGABYTE,
+            _ => u64::MAX,
+        };
         NodeConfig {
             time,
             publish_rate: (rate > 0.0).then_some(rate),
@@ -79,6 +93,8 @@ impl Parameters {
             load_timeout: to_ns(number("load_timeout"), SECOND_NS),
             max_points,
             allow_nonzero_velocity_at_trajectory_end: self.flag("allow_nonzero_velocity_at_trajectory_end"),
+            record: (!record.is_empty()).then(|| PathBuf::from(record)),
+            record_max,
         }
     }
 }

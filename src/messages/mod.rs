@@ -2,15 +2,17 @@
 //! library computes with, and their definitions. Messages are converted here and nowhere else.
 
 mod own;
+mod recorded;
 mod schema;
 mod state;
 mod time;
 mod trajectory;
 
 pub use own::{DriveStates, MotorCurrents, PACKAGE, Source, Status, TrajectoryResult};
+pub use recorded::Recorded;
 pub use ros2_interfaces_jazzy_serde::{
-    builtin_interfaces, diagnostic_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs,
-    trajectory_msgs,
+    builtin_interfaces, diagnostic_msgs, geometry_msgs, nav_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs,
+    std_msgs, std_srvs, trajectory_msgs,
 };
 pub use schema::Schema;
 pub use state::Sampled;

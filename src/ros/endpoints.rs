@@ -1,11 +1,39 @@
 //! Topics of the node under their resolved names, with their QoS profiles.
 
+use futures::{Stream, StreamExt};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
-use ros2_client::{Message, MessageTypeName, Name, Node, Publisher, Subscription};
-use serde::Serialize;
+use ros2_client::{Message, MessageInfo, MessageTypeName, Name, Node, ReadResult};
 
 use super::args::RosArgs;
+use super::recorder::{Direction, Recorder, Tap};
 use crate::config::{Parameters, QosConfig};
+use crate::messages::Recorded;
+
+/// A publisher of a topic that is recorded.
+pub struct Publisher<M: Recorded> {
+    /// To the network.
+    pub network: ros2_client::Publisher<M>,
+    /// To the recording.
+    pub tap: Tap<M>,
+}
+
+/// A subscription of a topic that is recorded.
+pub struct Subscription<M> {
+    network: ros2_client::Subscription<M>,
+    tap: Tap<M>,
+}
+
+impl<M: Message + Recorded + Send + Sync + 'static> Subscription<M> {
+    /// The messages as they come, recorded as they came.
+    pub fn async_stream(&self) -> impl Stream<Item = ReadResult<(M, MessageInfo)>> + '_ {
+        self.network.async_stream().then(async |received| {
+            if let Ok((message, _)) = &received {
+                self.tap.record(message).await;
+            }
+            received
+        })
+    }
+}
 
 /// A topic that could not be created.
 #[derive(Debug, thiserror::Error)]
@@ -42,6 +70,8 @@ pub struct Endpoints<'a> {
     pub args: &'a RosArgs,
     /// What configures their quality of service.
     pub parameters: &'a Parameters,
+    /// What records their messages.
+    pub recorder: &'a mut Recorder,
 }
 
 impl Endpoints<'_> {
@@ -49,7 +79,7 @@ impl Endpoints<'_> {
         &mut self,
         name: &str,
         type_name: MessageTypeName,
-    ) -> Result<(rustdds::Topic, String), EndpointError> {
+    ) -> Result<(rustdds::Topic, String, QosConfig), EndpointError> {
         let failed = |reason: String| EndpointError { name: name.to_owned(), reason };
         let own_name = name.trim_start_matches(['~', '/']);
         let qos =
@@ -58,40 +88,42 @@ impl Endpoints<'_> {
         let ros_name = Name::parse(&resolved).map_err(|e| failed(e.to_string()))?;
         let topic =
             self.node.create_topic(&ros_name, type_name, &profile(qos)).map_err(|e| failed(e.to_string()))?;
-        Ok((topic, resolved))
+        Ok((topic, resolved, qos))
     }
 
     /// A publisher, and the name that it publishes under.
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
-    pub fn publisher<M: Serialize>(
+    pub fn publisher<M: Recorded>(
         &mut self,
         name: &str,
         type_name: MessageTypeName,
     ) -> Result<(Publisher<M>, String), EndpointError> {
-        let (topic, resolved) = self.topic(name, type_name)?;
-        let publisher = self
+        let (topic, resolved, qos) = self.topic(name, type_name)?;
+        let network = self
             .node
             .create_publisher(&topic, None)
             .map_err(|e| EndpointError { name: name.to_owned(), reason: e.to_string() })?;
-        Ok((publisher, resolved))
+        let tap = self.recorder.tap(&resolved, qos, Direction::Out);
+        Ok((Publisher { network, tap }, resolved))
     }
 
     /// A subscription, and the name that it listens to.
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
-    pub fn subscription<M: Message + 'static>(
+    pub fn subscription<M: Message + Recorded + 'static>(
         &mut self,
         name: &str,
         type_name: MessageTypeName,
     ) -> Result<(Subscription<M>, String), EndpointError> {
-        let (topic, resolved) = self.topic(name, type_name)?;
-        let subscription = self
+        let (topic, resolved, qos) = self.topic(name, type_name)?;
+        let network = self
             .node
             .create_subscription(&topic, None)
             .map_err(|e| EndpointError { name: name.to_owned(), reason: e.to_string() })?;
-        Ok((subscription, resolved))
+        let tap = self.recorder.tap(&resolved, qos, Direction::In);
+        Ok((Subscription { network, tap }, resolved))
     }
 }

@@ -25,6 +25,7 @@ use super::pace::{self, Channels, Command, Health};
 use super::parameter_host::{Host, LiveNodeParameters};
 use super::parameter_services::ParameterServices;
 use super::participant::{Participant, ParticipantError};
+use super::recorder::{RecordError, Recorder};
 use super::results::Results;
 use super::rosout;
 use super::service::ServiceError;
@@ -72,6 +73,9 @@ pub enum NodeError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// There is nothing to record to.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// `use_sim_time` is asked for.
     #[error(
         "use_sim_time is true, but the axes do not follow /clock of others; leave it false, with time: real \
@@ -120,6 +124,8 @@ async fn serve(
     let period = config.periods().position;
     let fast = node_config.time == TimeMode::Fast;
     let when_full = if fast { WhenFull::Wait } else { WhenFull::Drop };
+    let (health_out, health) = watch::channel(Health::default());
+    let mut recorder = Recorder::open(&node_config, when_full, &health)?;
 
     let context = participant.context()?;
     let dds = context.domain_participant();
@@ -129,7 +135,7 @@ async fn serve(
     let options = NodeOptions::new().start_parameter_services(false).enable_rosout(args.log_sinks().rosout);
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
-    let topics = Topics::create(&mut node, args, &parameters, fast)?;
+    let topics = Topics::create(&mut node, args, &parameters, &mut recorder, fast)?;
     let reset = Trigger::new(&mut node, &context, args, "reset")?;
     let stop = Trigger::new(&mut node, &context, args, "stop")?;
     let parameter_services = ParameterServices::new(&mut node, &context, args)?;
@@ -138,7 +144,6 @@ async fn serve(
     let (commands, commands_in) = mpsc::channel(pace::COMMAND_QUEUE);
     let (frames_out, frames) = mpsc::channel(queue_length(when_full));
     let (reports_out, mut reports) = mpsc::unbounded_channel();
-    let (health_out, health) = watch::channel(Health::default());
     let channels =
         Channels { commands: commands_in, frames: frames_out, reports: reports_out, health: health_out };
 
@@ -165,7 +170,8 @@ async fn serve(
         every: every.max(1),
     };
 
-    tasks.spawn(rosout::publish(&node, log));
+    tasks.spawn(rosout::publish(&node, log, rosout::tap(&mut recorder)));
+    let recording = recorder.start()?;
 
     // What comes in.
     tasks.spawn(ask_again::run(dds.clone()));
@@ -199,7 +205,9 @@ async fn serve(
         joints: joints.clone(),
         time_mode: if fast { "fast" } else { "real" },
     };
-    tasks.spawn(publish_diagnostics(diagnostics_text, diagnostics, health, Arc::clone(&dropped)));
+    let recording_status = recording.as_ref().map(|recording| recording.status());
+    let dropped = Arc::clone(&dropped);
+    tasks.spawn(publish_diagnostics(diagnostics_text, diagnostics, health, dropped, recording_status));
     tasks.spawn(async move {
         while let Some(report) = reports.recv().await {
             results.report(report).await;
@@ -226,6 +234,9 @@ async fn serve(
     }
     if tokio::time::timeout(SHUTDOWN_TIMEOUT, has_ended).await.is_err() {
         warn!("the axes' thread did not end in time");
+    }
+    if let Some(recording) = recording {
+        recording.close().await;
     }
     drop(dds);
     drop(node);
