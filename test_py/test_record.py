@@ -20,9 +20,10 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rcl_interfaces.msg import Log
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import serialize_message
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import TrajectoryResult
 
 from drive import DEEP_QOS, NANOSECONDS, RESULT_QOS, TSP_NS, Drive, Node, joint_trajectory, node_binary, to_ns
@@ -30,8 +31,8 @@ from drive import DEEP_QOS, NANOSECONDS, RESULT_QOS, TSP_NS, Drive, Node, joint_
 MEGABYTE = 1_000_000
 STATES, CURRENTS, DRIVES = "/joint_states", "/virtual_axes/motor_currents", "/virtual_axes/drive_states"
 RESULTS = "/virtual_axes/trajectory_result"
-SERVICES = {"/parameter_events"}
-"""Topics of every node that say nothing about the axes."""
+NOT_RECORDED = {"/parameter_events"}
+"""Topics of every node that come with its parameter services."""
 
 
 @dataclass
@@ -136,8 +137,11 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
             (drive.node.get_subscriber_names_and_types_by_node, drive.node.get_subscriptions_info_by_topic),
         ):
             for topic, (kind, *_) in of_node(name, namespace):
-                (info,) = [info for info in infos(topic) if info.node_name == name]
-                offered[topic] = (kind, info.qos_profile.reliability, info.qos_profile.durability)
+                if topic in NOT_RECORDED:
+                    continue
+                profiles_found = [info.qos_profile for info in infos(topic) if info.node_name == name]
+                ((reliability, durability),) = {(qos.reliability, qos.durability) for qos in profiles_found}
+                offered[topic] = (kind, reliability, durability)
         drive.process = None
         exit_status = process.stop(signal.SIGTERM)
         drive.wait_for(lambda: not drive.sees(), 5, "goodbye")
@@ -151,7 +155,7 @@ def test_every_topic_is_there_with_its_type_and_profile(session: Session):
     """What the graph says the node has, and nothing else."""
     assert session.exit == 0, session.output
     messages, channels, types = read(session.path)
-    wanted = {topic: value for topic, value in session.offered.items() if topic not in SERVICES}
+    wanted = session.offered
     assert len(wanted) >= 9
     assert types == {topic: kind for topic, (kind, *_) in wanted.items()}
     for topic, (_, reliability, durability) in wanted.items():
@@ -169,7 +173,8 @@ def test_what_was_published_is_recorded_bit_for_bit(session: Session):
     messages, _, _ = read(session.path)
     assert set(session.heard) | set(session.sent) == set(messages)
     for topic, heard in session.heard.items():
-        recorded = [entry.data for entry in messages[topic]]
+        # RTPS carries them in words of four bytes.
+        recorded = [entry.data + bytes(-len(entry.data) % 4) for entry in messages[topic]]
         # Who publishes for late joiners may hand over old samples first.
         first = recorded.index(heard[0])
         assert recorded[first : first + len(heard)] == heard, topic
@@ -182,11 +187,14 @@ def test_what_came_in_is_recorded_as_it_came(session: Session):
     messages, _, _ = read(session.path)
     for topic, sent in session.sent.items():
         received = messages[topic]
+        kind = JointTrajectory if topic == "/psec" else JointState
+        # rclpy makes its bytes longer than they need to be.
+        found = [serialize_message(deserialize_message(entry.data, kind)) for entry in received]
         if topic == "/psec":
-            assert [entry.data for entry in received] == sent
+            assert found == sent
         else:  # best effort, or reliable with a depth of one
             remaining = iter(sent)
-            assert received and all(entry.data in remaining for entry in received), topic
+            assert found and all(message in remaining for message in found), topic
         assert all(entry.publish == entry.log for entry in received), "they had no stamps"
     began, ended = (messages[DRIVES][place].log for place in (0, -1))
     assert all(began <= entry.log <= ended for topic in session.sent for entry in messages[topic])
@@ -230,7 +238,7 @@ def test_killed_it_is_readable_up_to_its_last_chunk(start: Callable[..., Drive],
     until = drive.now()
 
     def is_written() -> bool:
-        return path.stat().st_size > 0 and stamps(read(path, whole=False)[0][DRIVES])[-1] >= until
+        return any(entry.publish >= until for entry in read(path, whole=False)[0][DRIVES])
 
     drive.wait_for(is_written, 20, "chunk on the disk")
     process, drive.process = drive.process, None
@@ -249,7 +257,7 @@ def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive
     path = tmp_path / "bounded.mcap"
     drive = start("-p", f"record:={path}", "-p", "record_max_mb:=1", "-p", "time:=fast")
     # Set-points that no compression makes much of.
-    noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (4000, 2)).round(12)
+    noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (4000, 2))
     times = np.arange(1, len(noise) + 1) * (2 * TSP_NS / NANOSECONDS)
     drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120)
     ended = drive.wait_for(
