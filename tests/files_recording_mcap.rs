@@ -408,6 +408,32 @@ fn a_file_that_is_cut_off_is_said() {
     }
 }
 
+#[test]
+fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
+    let bytes = sample_recording();
+    let (whole, _) = read_with(&bytes, &RecordingOptions::default()).expect("good");
+    let summary = mcap::Summary::read(&bytes).expect("whole").expect("has a summary");
+    // Behind a chunk and its indexes.
+    let ends: Vec<usize> = summary
+        .chunk_indexes
+        .iter()
+        .map(|chunk| (chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length) as usize)
+        .collect();
+    assert!(ends.len() > 2, "{ends:?}");
+    let mut rows = Vec::new();
+    for end in &ends[1..] {
+        let (found, findings) = read_with(&bytes[..*end], &RecordingOptions::default()).expect("goes on");
+        assert_eq!(findings[0].code, "unfinished", "{findings:?}");
+        rows.push(found.time.len());
+        assert_eq!(found.time, whole.time[..found.time.len()]);
+        assert_eq!(found.position.as_deref(), whole.position.as_deref().map(|p| &p[..found.time.len()]));
+    }
+    assert!(
+        rows.is_sorted() && rows.first() < rows.last() && rows.last() == Some(&whole.time.len()),
+        "{rows:?}"
+    );
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 

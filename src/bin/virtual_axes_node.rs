@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use virtual_axes::config::{Parameters, Source, parse_assignment};
 use virtual_axes::ros::args::{Command, ParameterSource, RosArgs};
 use virtual_axes::ros::environment::Environment;
-use virtual_axes::ros::node;
+use virtual_axes::ros::node::{self, NodeError};
 use virtual_axes::ros::{log, rosout};
 
 /// Exit status of a wrong command line, environment or machine file.
@@ -68,6 +68,7 @@ fn run(args: &RosArgs) -> ExitCode {
     };
     match node::run(args, &environment, parameters, log) {
         Ok(()) => ExitCode::SUCCESS,
+        Err(error @ NodeError::Record(_)) => refuse(&error),
         Err(error) => {
             complain(&error);
             ExitCode::FAILURE

@@ -1,9 +1,14 @@
 //! The parameters of the node itself, typed.
 
+use std::path::PathBuf;
+
 use super::check::to_ns;
 use super::parameters::Parameters;
 use super::value::Value;
 use crate::units::{DEGREE, MILLIMETRE, Nanoseconds, SECOND_NS};
+
+/// A megabyte, bytes.
+const MEGABYTE: u64 = 1_000_000;
 
 /// What the node's clock follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +51,10 @@ pub struct NodeConfig {
     pub action_monitor_rate: f64,
     /// What is published of the tool.
     pub tool: ToolConfig,
+    /// The file that the topics are recorded in.
+    pub record: Option<PathBuf>,
+    /// The most that it may become, bytes.
+    pub record_max: u64,
 }
 
 /// Tolerances of action goals that name none themselves.
@@ -99,6 +108,11 @@ impl Parameters {
             _ => usize::MAX,
         };
         let path_rate = number("tool_path_rate");
+        let record = self.text("record");
+        let record_max = match self.get("record_max_mb") {
+            Some(Value::Integer(size)) => u64::try_from(size).unwrap_or_default() * MEGABYTE,
+            _ => u64::MAX,
+        };
         NodeConfig {
             time,
             publish_rate: (rate > 0.0).then_some(rate),
@@ -112,6 +126,8 @@ impl Parameters {
                 path_rate: (path_rate > 0.0).then_some(path_rate),
                 path_length: count("tool_path_length"),
             },
+            record: (!record.is_empty()).then(|| PathBuf::from(record)),
+            record_max,
         }
     }
 

@@ -76,6 +76,14 @@ pub(super) const NODE: &[Definition] = &[
         .live()
         .is("Time behind its end in which an action goal that names none is to be reached; 0 is any."),
     Definition::new("use_sim_time", "", Kind::Flag).of_node().default(Flag(false)).is("Follow /clock."),
+    Definition::new("record", "", Kind::Text)
+        .of_node()
+        .default(Text(""))
+        .is("MCAP file that all topics of the node are recorded in; it must not exist; empty is none."),
+    Definition::new("record_max_mb", "MB", Kind::Integer { min: 1, max: 1_000_000 })
+        .of_node()
+        .default(Integer(1024))
+        .is("Size at which the recording is closed; the axes go on."),
     // Quality of service.
     qos_reliability("qos.psec.reliability", "reliable"),
     qos_durability("qos.psec.durability", "volatile"),

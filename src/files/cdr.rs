@@ -13,7 +13,7 @@ const CDR_BE: [u8; 2] = [0, 0];
 ///
 /// # Errors
 /// What the encoder says; a value that CDR has cannot fail.
-pub(super) fn encode(message: &impl Serialize, bytes: &mut Vec<u8>) -> Result<(), cdr_encoding::Error> {
+pub fn encode(message: &impl Serialize, bytes: &mut Vec<u8>) -> Result<(), cdr_encoding::Error> {
     bytes.clear();
     bytes.extend_from_slice(&CDR_LE);
     cdr_encoding::to_writer::<_, LittleEndian, _>(bytes, message)

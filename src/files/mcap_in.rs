@@ -16,6 +16,17 @@ const ENCODING: &str = "cdr";
 const LONGEST_RECORD: usize = 256 << 20;
 /// Opcode and length before a record.
 const RECORD_HEAD: usize = 1 + 8;
+/// What a file begins with, bytes.
+const MAGIC: usize = 8;
+
+/// How a recording ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ending {
+    /// As MCAP does.
+    Whole,
+    /// Behind a whole record, but not with the last: its writer was killed.
+    Unfinished,
+}
 
 /// Why a file is not an MCAP recording that can be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -68,8 +79,9 @@ pub(super) fn start<R: Read + Seek>(
     Ok(MessageReader::new_with_options(BufReader::new(input), options()))
 }
 
-/// Checks that the records of each chunk that is not compressed fill it, which the reader relies upon.
-pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<(), McapFault> {
+/// Checks that the records of each chunk that is not compressed fill it, which the reader relies upon, and says
+/// how the file ends.
+pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<Ending, McapFault> {
     input.rewind().map_err(|error| match error.kind() {
         io::ErrorKind::NotSeekable => McapFault::Unreadable {
             at: name.to_owned(),
@@ -79,8 +91,19 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
     })?;
     let mut input = BufReader::new(input);
     let mut reader = LinearReader::new_with_options(options().with_emit_chunks(true));
+    let (mut found, mut whole) = (0, MAGIC);
     while let Some(event) = reader.next_event() {
-        match event.map_err(|error| damaged(name, &error))? {
+        let event = match event {
+            // A file of nothing but its beginning holds nothing to go on with.
+            Err(McapError::UnexpectedEof) if found == whole && whole > MAGIC => {
+                return Ok(Ending::Unfinished);
+            }
+            event => event.map_err(|error| damaged(name, &error))?,
+        };
+        if let LinearReadEvent::Record { data, .. } = &event {
+            whole += RECORD_HEAD + data.len();
+        }
+        match event {
             LinearReadEvent::ReadRequest(wanted) => {
                 let read = loop {
                     match input.read(reader.insert(wanted)) {
@@ -88,6 +111,7 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
                         read => break read.map_err(|error| unreadable(name, &error))?,
                     }
                 };
+                found += read;
                 reader.notify_read(read);
             }
             LinearReadEvent::Record { opcode: op::CHUNK, data } => {
@@ -102,7 +126,13 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
             LinearReadEvent::Record { .. } => {}
         }
     }
-    Ok(())
+    Ok(Ending::Whole)
+}
+
+/// A recording that was not finished, where only a whole one will do.
+pub(super) fn unfinished(name: &str) -> McapFault {
+    let reason = "it has no end, its writer was killed (`mcap recover` makes what there is whole)".to_owned();
+    McapFault::Damaged { at: name.to_owned(), reason }
 }
 
 /// Whether `records` are whole records and nothing else.

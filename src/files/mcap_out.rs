@@ -10,27 +10,38 @@ use mcap::{McapError, WriteOptions, Writer};
 use serde::Serialize;
 
 use super::cdr;
+use crate::config::QosConfig;
 use crate::messages::Schema;
 use crate::units::Nanoseconds;
 
-/// What `ros2 bag play` offers the topics with: reliable, volatile, keep last 10, in the words of
-/// rosbag2 since Jazzy; the times are infinite.
-const QOS: &str = "\
-- history: keep_last
-  depth: 10
-  reliability: reliable
-  durability: volatile
-  deadline:
-    sec: 9223372036
-    nsec: 854775807
-  lifespan:
-    sec: 9223372036
-    nsec: 854775807
-  liveliness: automatic
-  liveliness_lease_duration:
-    sec: 9223372036
-    nsec: 854775807
-  avoid_ros_namespace_conventions: false";
+/// How the whole file is to be understood.
+pub(super) const PROFILE: &str = "ros2";
+/// Who writes it.
+pub(super) const LIBRARY: &str = concat!("virtual_axes ", env!("CARGO_PKG_VERSION"));
+/// How messages are encoded.
+pub(super) const ENCODING: &str = "cdr";
+/// How their definitions are written.
+pub(super) const SCHEMAS: &str = "ros2msg";
+/// Where a channel says what it was offered with.
+pub(super) const QOS_KEY: &str = "offered_qos_profiles";
+
+/// The time that stands for none, in seconds and nanoseconds: 2^63 - 1 ns.
+const INFINITE: &str = "\n    sec: 9223372036\n    nsec: 854775807";
+
+/// The quality of service of topics that no node offers: reliable, volatile, keep last 10.
+pub(super) const USUAL_QOS: QosConfig = QosConfig { reliable: true, transient_local: false, depth: 10 };
+
+/// What `ros2 bag play` offers a topic with, in the words of rosbag2 since Jazzy; the times are infinite.
+pub(super) fn qos_text(qos: QosConfig) -> String {
+    let reliability = if qos.reliable { "reliable" } else { "best_effort" };
+    let durability = if qos.transient_local { "transient_local" } else { "volatile" };
+    format!(
+        "- history: keep_last\n  depth: {}\n  reliability: {reliability}\n  durability: {durability}\n  \
+         deadline:{INFINITE}\n  lifespan:{INFINITE}\n  liveliness: automatic\n  \
+         liveliness_lease_duration:{INFINITE}\n  avoid_ros_namespace_conventions: false",
+        qos.depth
+    )
+}
 
 /// A recording that is being written.
 pub(super) struct Recording<W: Write> {
@@ -53,25 +64,39 @@ pub(super) struct Topic {
     sequence: u32,
 }
 
+impl Topic {
+    fn next(&mut self, log_time: u64, publish_time: u64) -> MessageHeader {
+        let sequence = self.sequence;
+        self.sequence = sequence.wrapping_add(1);
+        MessageHeader { channel_id: self.channel, sequence, log_time, publish_time }
+    }
+}
+
 impl<W: Write> Recording<W> {
     /// Begins a recording; `output` need not be able to seek.
     pub fn new(output: W) -> io::Result<Self> {
+        Self::with_chunks(output, Some(WriteOptions::DEFAULT_CHUNK_SIZE))
+    }
+
+    /// Likewise, with chunks that end when they hold `chunk` bytes, or at each [`flush`](Self::flush) only.
+    pub fn with_chunks(output: W, chunk: Option<u64>) -> io::Result<Self> {
         let options = WriteOptions::new()
-            .profile("ros2")
-            .library(concat!("virtual_axes ", env!("CARGO_PKG_VERSION")))
+            .profile(PROFILE)
+            .library(LIBRARY)
             .disable_seeking(true)
+            .chunk_size(chunk)
             // In the thread that writes: the same bytes on each machine.
             .compression_threads(0);
         let writer = options.create(NoSeek::new(output)).map_err(into_io)?;
         Ok(Recording { writer, bytes: Vec::new() })
     }
 
-    /// Adds a topic.
-    pub fn topic(&mut self, name: &str, schema: &Schema) -> io::Result<Topic> {
+    /// Adds a topic with the profile that it is offered with.
+    pub fn topic(&mut self, name: &str, schema: &Schema, qos: QosConfig) -> io::Result<Topic> {
         let schema =
-            self.writer.add_schema(&schema.name, "ros2msg", schema.text.as_bytes()).map_err(into_io)?;
-        let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), QOS.to_owned())]);
-        let channel = self.writer.add_channel(schema, name, "cdr", &metadata).map_err(into_io)?;
+            self.writer.add_schema(&schema.name, SCHEMAS, schema.text.as_bytes()).map_err(into_io)?;
+        let metadata = BTreeMap::from([(QOS_KEY.to_owned(), qos_text(qos))]);
+        let channel = self.writer.add_channel(schema, name, ENCODING, &metadata).map_err(into_io)?;
         Ok(Topic { channel, sequence: 0 })
     }
 
@@ -87,14 +112,19 @@ impl<W: Write> Recording<W> {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
         };
         cdr::encode(message, &mut self.bytes).map_err(io::Error::other)?;
-        let header = MessageHeader {
-            channel_id: topic.channel,
-            sequence: topic.sequence,
-            log_time: time,
-            publish_time: time,
-        };
-        topic.sequence = topic.sequence.wrapping_add(1);
+        let header = topic.next(time, time);
         self.writer.write_to_known_channel(&header, &self.bytes).map_err(into_io)
+    }
+
+    /// Adds a message that was recorded and published at these times (ns since the Unix epoch).
+    pub fn write_bytes(&mut self, topic: &mut Topic, log: u64, publish: u64, cdr: &[u8]) -> io::Result<()> {
+        let header = topic.next(log, publish);
+        self.writer.write_to_known_channel(&header, cdr).map_err(into_io)
+    }
+
+    /// Ends the chunk and hands it over, so that all of it can be read.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush().map_err(into_io)
     }
 
     /// Writes the summary and gives the output back.

@@ -8,6 +8,7 @@
 mod cdr;
 mod input;
 mod lines;
+mod mcap_bounded;
 mod mcap_in;
 mod mcap_out;
 mod output;
@@ -22,7 +23,9 @@ mod trace_csv;
 mod trace_mcap;
 mod yaml;
 
+pub use cdr::encode;
 pub use input::{FileKind, Input, InputError};
+pub use mcap_bounded::{BoundedRecording, RecordedTopic};
 pub use mcap_in::McapFault;
 pub use output::OutputFile;
 pub use psec_csv::PsecCsv;

@@ -9,7 +9,9 @@ use std::path::Path;
 use mcap::Message;
 use mcap::io::MessageReader;
 
-use super::mcap_in::{McapFault, check_chunks, damaged, decode, start, type_of, unreadable};
+use super::mcap_in::{
+    Ending, McapFault, check_chunks, damaged, decode, start, type_of, unfinished, unreadable,
+};
 use super::{nearest, nearest_name};
 use crate::messages;
 use crate::messages::trajectory_msgs::msg::JointTrajectory;
@@ -123,7 +125,10 @@ impl<R: Read + Seek> Trajectories<R> {
     /// [`RecordingError`] if the recording is damaged, or if there is not exactly one topic with
     /// trajectories and none is named.
     pub fn new(mut input: R, name: &str, topic: Option<&str>) -> Result<Self, RecordingError> {
-        check_chunks(&mut input, name)?;
+        if check_chunks(&mut input, name)? == Ending::Unfinished {
+            // What was still to come would be left out of the motion.
+            return Err(unfinished(name).into());
+        }
         let mut others = Vec::new();
         let mut found: BTreeMap<String, Vec<u64>> = BTreeMap::new();
         let mut reader = start(input, name)?;

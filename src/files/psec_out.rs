@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use super::OutputFile;
-use super::mcap_out::{Recording, Topic};
+use super::mcap_out::{Recording, Topic, USUAL_QOS};
 use super::psec_csv::TIME;
 use super::trace::extension;
 use crate::messages::trajectory_msgs::msg::JointTrajectory;
@@ -146,7 +146,7 @@ impl<W: Write> PsecMcapOut<W> {
     /// Those of the output.
     pub fn new(output: W, joints: &[String]) -> io::Result<Self> {
         let mut recording = Recording::new(output)?;
-        let topic = recording.topic(TOPIC, &Schema::joint_trajectory())?;
+        let topic = recording.topic(TOPIC, &Schema::joint_trajectory(), USUAL_QOS)?;
         let message = JointTrajectory { joint_names: joints.to_vec(), ..JointTrajectory::default() };
         Ok(PsecMcapOut { recording, topic, message })
     }

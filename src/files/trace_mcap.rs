@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::mcap_out::{Recording, Topic};
+use super::mcap_out::{Recording, Topic, USUAL_QOS};
 use crate::machine::AxisSample;
 use crate::messages::sensor_msgs::msg::JointState;
 use crate::messages::{DriveStates, MotorCurrents, Sampled, Schema};
@@ -25,9 +25,10 @@ impl<W: Write> TraceMcap<W> {
     /// Those of the output.
     pub fn new(output: W, joints: &[String]) -> io::Result<Self> {
         let mut recording = Recording::new(output)?;
-        let states = recording.topic("/joint_states", &Schema::joint_state())?;
-        let currents = recording.topic("/virtual_axes/motor_currents", &Schema::motor_currents())?;
-        let drives = recording.topic("/virtual_axes/drive_states", &Schema::drive_states())?;
+        let states = recording.topic("/joint_states", &Schema::joint_state(), USUAL_QOS)?;
+        let currents =
+            recording.topic("/virtual_axes/motor_currents", &Schema::motor_currents(), USUAL_QOS)?;
+        let drives = recording.topic("/virtual_axes/drive_states", &Schema::drive_states(), USUAL_QOS)?;
         Ok(TraceMcap {
             recording,
             states: (states, JointState::named(joints)),

@@ -28,6 +28,11 @@ pub fn parts(time: Nanoseconds) -> (i32, u32) {
     (sec as i32, time.rem_euclid(SECOND_NS) as u32)
 }
 
+/// A ROS time in ns since the Unix epoch.
+pub fn nanoseconds(time: &Time) -> Nanoseconds {
+    Nanoseconds::from(time.sec) * SECOND_NS + Nanoseconds::from(time.nanosec)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -35,6 +40,7 @@ mod tests {
     #[test]
     fn stamps_before_the_epoch_keep_their_nanoseconds_positive() {
         assert_eq!(stamp(-1), Time { sec: -1, nanosec: 999_999_999 });
+        assert_eq!(nanoseconds(&stamp(-1)), -1);
         assert_eq!(duration(-1_700_000_000), Duration { sec: -2, nanosec: 300_000_000 });
     }
 }

@@ -1,11 +1,48 @@
 //! Topics of the node under their resolved names, with their QoS profiles.
 
+use futures::{Stream, StreamExt};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
-use ros2_client::{Message, MessageTypeName, Name, Node, Publisher, Subscription};
-use serde::Serialize;
+use ros2_client::{Message, MessageInfo, MessageTypeName, Name, Node, ReadResult};
 
 use super::args::RosArgs;
+use super::recorder::{Direction, Recorder, Tap};
+use serde::Serialize;
+
 use crate::config::{Parameters, QosConfig};
+use crate::messages::Recorded;
+
+/// A publisher of a topic that is recorded.
+pub struct Publisher<M: Serialize> {
+    /// To the network.
+    pub network: ros2_client::Publisher<M>,
+    /// To the recording.
+    pub tap: Tap<M>,
+}
+
+impl<M: Serialize> Publisher<M> {
+    /// One whose messages are not recorded.
+    pub fn unrecorded(network: ros2_client::Publisher<M>) -> Self {
+        Publisher { network, tap: Tap::none() }
+    }
+}
+
+/// A subscription of a topic that is recorded.
+pub struct Subscription<M> {
+    network: ros2_client::Subscription<M>,
+    tap: Tap<M>,
+}
+
+impl<M: Message + Recorded + Send + Sync + 'static> Subscription<M> {
+    /// The messages as they come, recorded as they came.
+    pub fn async_stream(&self) -> impl Stream<Item = ReadResult<(M, MessageInfo)>> + '_ {
+        self.network.async_stream().then(async |received| {
+            if let Ok((message, _)) = &received {
+                self.tap.record(message).await;
+            }
+            received
+        })
+    }
+}
 
 /// A topic that could not be created.
 #[derive(Debug, thiserror::Error)]
@@ -42,6 +79,8 @@ pub struct Endpoints<'a> {
     pub args: &'a RosArgs,
     /// What configures their quality of service.
     pub parameters: &'a Parameters,
+    /// What records their messages.
+    pub recorder: &'a mut Recorder,
 }
 
 impl Endpoints<'_> {
@@ -71,24 +110,26 @@ impl Endpoints<'_> {
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
-    pub fn publisher<M: Serialize>(
+    pub fn publisher<M: Recorded>(
         &mut self,
         name: &str,
         type_name: MessageTypeName,
     ) -> Result<(Publisher<M>, String), EndpointError> {
-        let (topic, resolved) = self.topic(name, type_name, self.configured(name)?)?;
-        let publisher = self
+        let qos = self.configured(name)?;
+        let (topic, resolved) = self.topic(name, type_name, qos)?;
+        let network = self
             .node
             .create_publisher(&topic, None)
             .map_err(|e| EndpointError { name: name.to_owned(), reason: e.to_string() })?;
-        Ok((publisher, resolved))
+        let tap = self.recorder.tap(&resolved, qos, Direction::Out);
+        Ok((Publisher { network, tap }, resolved))
     }
 
     /// A subscription, and the name that it listens to.
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
-    pub fn subscription<M: Message + 'static>(
+    pub fn subscription<M: Message + Recorded + 'static>(
         &mut self,
         name: &str,
         type_name: MessageTypeName,
@@ -100,17 +141,18 @@ impl Endpoints<'_> {
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
-    pub fn subscription_of<M: Message + 'static>(
+    pub fn subscription_of<M: Message + Recorded + 'static>(
         &mut self,
         name: &str,
         type_name: MessageTypeName,
         qos: QosConfig,
     ) -> Result<(Subscription<M>, String), EndpointError> {
         let (topic, resolved) = self.topic(name, type_name, qos)?;
-        let subscription = self
+        let network = self
             .node
             .create_subscription(&topic, None)
             .map_err(|e| EndpointError { name: name.to_owned(), reason: e.to_string() })?;
-        Ok((subscription, resolved))
+        let tap = self.recorder.tap(&resolved, qos, Direction::In);
+        Ok((Subscription { network, tap }, resolved))
     }
 }

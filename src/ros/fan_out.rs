@@ -14,6 +14,7 @@ use super::convert;
 use super::diagnostics::Diagnostics;
 use super::outputs::Output;
 use super::pace::{Frame, Health};
+use super::recorder::RecordingStatus;
 use super::setpoints::{SetpointVelocities, controller_state};
 use super::tool::ToolOutput;
 use crate::messages::{DriveStates, JointTrajectoryControllerState, MotorCurrents};
@@ -73,6 +74,7 @@ pub async fn publish_diagnostics(
     output: Output<DiagnosticArray>,
     health: watch::Receiver<Health>,
     dropped: Arc<AtomicU64>,
+    mut recording: Option<RecordingStatus>,
 ) {
     let mut timer = tokio::time::interval(DIAGNOSTICS_PERIOD);
     let (mut before, mut dropped_before) = (Health::default(), 0);
@@ -80,7 +82,9 @@ pub async fn publish_diagnostics(
         timer.tick().await;
         let now = health.borrow().clone();
         let dropped_now = dropped.load(Ordering::Relaxed);
-        output.send(text.message(now.time, &before, &now, (dropped_before, dropped_now))).await;
+        let mut message = text.message(now.time, &before, &now, (dropped_before, dropped_now));
+        message.status.extend(recording.as_mut().map(|status| status.message(&text.node, &text.machine)));
+        output.send(message).await;
         (before, dropped_before) = (now, dropped_now);
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use futures::StreamExt;
-use ros2_client::{MessageInfo, Subscription};
+use ros2_client::MessageInfo;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 use tokio::sync::{mpsc, watch};
@@ -12,6 +12,7 @@ use tokio::time::Instant;
 use tracing::warn;
 
 use super::convert;
+use super::endpoints::Subscription;
 use super::pace::{Command, Health};
 use super::parameter_host::LiveNodeParameters;
 use super::results::{Origin, Results};

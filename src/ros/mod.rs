@@ -24,6 +24,7 @@ mod pace;
 mod parameter_host;
 pub mod parameter_services;
 pub mod participant;
+mod recorder;
 mod results;
 pub mod rosout;
 mod rtps;

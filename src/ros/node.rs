@@ -18,7 +18,7 @@ use super::ask_again;
 use super::clock::{ClockInput, ClockOutput, ClockState};
 use super::convert;
 use super::diagnostics::Diagnostics;
-use super::endpoints::EndpointError;
+use super::endpoints::{EndpointError, Publisher};
 use super::environment::Environment;
 use super::fan_out::{FanOut, publish_diagnostics};
 use super::inputs::{Checks, PsecInput, next_id, take_loads, take_stream};
@@ -29,6 +29,7 @@ use super::pace::{self, Channels, Command, Health, Pace};
 use super::parameter_host::{Host, LiveNodeParameters};
 use super::parameter_services::ParameterServices;
 use super::participant::{Participant, ParticipantError};
+use super::recorder::{RecordError, Recorder};
 use super::results::Results;
 use super::rosout;
 use super::service::ServiceError;
@@ -78,6 +79,9 @@ pub enum NodeError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// There is nothing to record to.
+    #[error(transparent)]
+    Record(#[from] RecordError),
 }
 
 /// Runs the node until SIGINT, SIGTERM or SIGHUP; what comes through `log` goes to `/rosout`.
@@ -117,6 +121,8 @@ async fn serve(
     let joints: Vec<String> = joint_limits.iter().map(|j| j.name.clone()).collect();
     let period = config.periods().position;
     let when_full = if mode == TimeMode::Real { WhenFull::Drop } else { WhenFull::Wait };
+    let (health_out, health) = watch::channel(Health::default());
+    let mut recorder = Recorder::open(&node_config, when_full, &health)?;
 
     let context = participant.context()?;
     let dds = context.domain_participant();
@@ -126,11 +132,11 @@ async fn serve(
     let options = NodeOptions::new().start_parameter_services(false).enable_rosout(false);
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
-    let rosout_publisher = rosout::publisher(&mut node, args)?;
-    let mut topics = Topics::create(&mut node, args, &parameters, mode)?;
+    let rosout_publisher = rosout::publisher(&mut node, args, &mut recorder)?;
+    let mut topics = Topics::create(&mut node, args, &parameters, &mut recorder, mode)?;
     let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
     topics.names.goals_on.push(action_topics.name);
-    let tool = ToolTopics::create(&mut node, args, &parameters, Kinematics::new(&config))?;
+    let tool = ToolTopics::create(&mut node, args, &parameters, &mut recorder, Kinematics::new(&config))?;
     topics.names.also_publishes(tool.as_ref().map_or(&[], |tool| &tool.names));
     let reset = Trigger::new(&mut node, &context, args, "reset")?;
     let stop = Trigger::new(&mut node, &context, args, "stop")?;
@@ -140,7 +146,6 @@ async fn serve(
     let (commands, commands_in) = mpsc::channel(pace::COMMAND_QUEUE);
     let (frames_out, frames) = mpsc::channel(queue_length(when_full));
     let (reports_out, mut reports) = mpsc::unbounded_channel();
-    let (health_out, health) = watch::channel(Health::default());
     let channels =
         Channels { commands: commands_in, frames: frames_out, reports: reports_out, health: health_out };
 
@@ -159,7 +164,7 @@ async fn serve(
     let diagnostics = publishing.start(topics.diagnostics, WhenFull::Drop);
     let every = node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * seconds(period))).round() as i64);
     let (running, running_goals) = watch::channel(Arc::from([]));
-    let status = publishing.start(action_topics.status, WhenFull::Wait);
+    let status = publishing.start(Publisher::unrecorded(action_topics.status), WhenFull::Wait);
     let outputs = FanOut {
         joint_states: publishing.start(topics.joint_states, when_full),
         motor_currents: publishing.start(topics.motor_currents, when_full),
@@ -167,7 +172,7 @@ async fn serve(
         controller_state: publishing.start(topics.controller_state, when_full),
         feedback: Feedback {
             goals: running_goals,
-            output: publishing.start(action_topics.feedback, when_full),
+            output: publishing.start(Publisher::unrecorded(action_topics.feedback), when_full),
             joints: joints.clone(),
             every: feedback_period(node_config.action_monitor_rate, period),
         },
@@ -184,6 +189,7 @@ async fn serve(
         tasks.spawn(rosout::publish(publisher, log));
     }
     tasks.spawn(namesake::watch(dds.clone(), args.node().clone()));
+    let recording = recorder.start()?;
 
     // What comes in.
     tasks.spawn(ask_again::run(dds.clone()));
@@ -238,7 +244,9 @@ async fn serve(
             TimeMode::SimTime => "sim",
         },
     };
-    tasks.spawn(publish_diagnostics(diagnostics_text, diagnostics, health, Arc::clone(&dropped)));
+    let recording_status = recording.as_ref().map(|recording| recording.status());
+    let dropped = Arc::clone(&dropped);
+    tasks.spawn(publish_diagnostics(diagnostics_text, diagnostics, health, dropped, recording_status));
     tasks.spawn(async move {
         while let Some(report) = reports.recv().await {
             results.report(report).await;
@@ -269,6 +277,9 @@ async fn serve(
     }
     if tokio::time::timeout(SHUTDOWN_TIMEOUT, has_ended).await.is_err() {
         warn!("the axes' thread did not end in time");
+    }
+    if let Some(recording) = recording {
+        recording.close().await;
     }
     drop(dds);
     drop(node);

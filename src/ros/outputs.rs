@@ -4,11 +4,13 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use ros2_client::Publisher;
 use serde::Serialize;
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tracing::warn;
+
+use super::endpoints::Publisher;
+use super::recorder::Tap;
 
 /// What happens when a queue is full because its subscribers are slow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +37,7 @@ pub fn queue_length(when_full: WhenFull) -> usize {
 /// The sending end of a topic.
 pub struct Output<M> {
     queue: mpsc::Sender<M>,
+    tap: Tap<M>,
     when_full: WhenFull,
     dropped: Arc<AtomicU64>,
 }
@@ -55,20 +58,22 @@ impl Publishing<'_> {
         when_full: WhenFull,
     ) -> Output<M> {
         let (queue, mut messages) = mpsc::channel(queue_length(when_full));
+        let Publisher { network, tap } = publisher;
         self.tasks.spawn(async move {
             while let Some(message) = messages.recv().await {
-                if publisher.async_publish(message).await.is_err() {
+                if network.async_publish(message).await.is_err() {
                     warn!("a message could not be published");
                 }
             }
         });
-        Output { queue, when_full, dropped: Arc::clone(self.dropped) }
+        Output { queue, tap, when_full, dropped: Arc::clone(self.dropped) }
     }
 }
 
 impl<M: Serialize + Send + Sync + 'static> Output<M> {
-    /// Hands a message over.
+    /// Hands a message over, to the recording first: a subscriber that is slow leaves no gap there.
     pub async fn send(&self, message: M) {
+        self.tap.record(&message).await;
         match self.when_full {
             WhenFull::Wait => {
                 // The task ends only after this output has been dropped.

@@ -5,14 +5,16 @@
 use std::time::Duration;
 
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
-use ros2_client::{MessageTypeName, Name, Node, Publisher};
+use ros2_client::{MessageTypeName, Name, Node};
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
 use tokio::sync::mpsc;
 
 use super::args::{LogLevel, RosArgs};
-use super::endpoints::EndpointError;
+use super::endpoints::{EndpointError, Publisher};
 use super::log::LogRecord;
+use super::recorder::{Direction, Recorder};
+use crate::config::QosConfig;
 
 /// Messages that may wait; more are dropped, so that logging never waits.
 pub const QUEUE: usize = 256;
@@ -29,7 +31,11 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 ///
 /// # Errors
 /// [`EndpointError`] when the middleware refuses it.
-pub fn publisher(node: &mut Node, args: &RosArgs) -> Result<Option<Publisher<Log>>, EndpointError> {
+pub fn publisher(
+    node: &mut Node,
+    args: &RosArgs,
+    recorder: &mut Recorder,
+) -> Result<Option<Publisher<Log>>, EndpointError> {
     if !args.log_sinks().rosout {
         return Ok(None);
     }
@@ -44,14 +50,19 @@ pub fn publisher(node: &mut Node, args: &RosArgs) -> Result<Option<Publisher<Log
     };
     let type_name = MessageTypeName::new("rcl_interfaces", "Log");
     let topic = node.create_topic(&name, type_name, &profile).map_err(|e| failed(e.to_string()))?;
-    node.create_publisher(&topic, None).map(Some).map_err(|e| failed(e.to_string()))
+    let network = node.create_publisher(&topic, None).map_err(|e| failed(e.to_string()))?;
+    let qos = QosConfig { reliable: true, transient_local: true, depth: DEPTH };
+    let tap = recorder.tap(&resolved, qos, Direction::Out);
+    Ok(Some(Publisher { network, tap }))
 }
 
 /// Publishes what comes until the log is closed.
 pub async fn publish(publisher: Publisher<Log>, mut records: mpsc::Receiver<LogRecord>) {
     while let Some(record) = records.recv().await {
+        let message = message(record);
+        publisher.tap.record(&message).await;
         // To log a failure here would make the next one.
-        let _ = publisher.async_publish(message(record)).await;
+        let _ = publisher.network.async_publish(message).await;
     }
 }
 

@@ -6,15 +6,16 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use nalgebra::UnitQuaternion;
-use ros2_client::{MessageTypeName, Node, Publisher};
+use ros2_client::{MessageTypeName, Node};
 use ros2_interfaces_jazzy_serde::geometry_msgs::msg::PoseStamped;
 use ros2_interfaces_jazzy_serde::nav_msgs::msg::Path;
 use tokio::time::{Instant, MissedTickBehavior};
 
 use super::args::RosArgs;
-use super::endpoints::{EndpointError, Endpoints};
+use super::endpoints::{EndpointError, Endpoints, Publisher};
 use super::outputs::{Output, Publishing, WhenFull};
 use super::pace::Frame;
+use super::recorder::Recorder;
 use crate::config::{Parameters, ToolConfig};
 use crate::kinematics::{Kinematics, ToolPose};
 use crate::machine::AxisSample;
@@ -47,12 +48,13 @@ impl ToolTopics {
         node: &mut Node,
         args: &RosArgs,
         parameters: &Parameters,
+        recorder: &mut Recorder,
         kinematics: Kinematics,
     ) -> Result<Option<Self>, EndpointError> {
         if !kinematics.has_linear_axis() && !kinematics.has_rotary_axis() {
             return Ok(None);
         }
-        let mut endpoints = Endpoints { node, args, parameters };
+        let mut endpoints = Endpoints { node, args, parameters, recorder };
         let path_type = || MessageTypeName::new("nav_msgs", "Path");
         let (pose, pose_name) =
             endpoints.publisher("~/tool_pose", MessageTypeName::new("geometry_msgs", "PoseStamped"))?;

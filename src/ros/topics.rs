@@ -2,14 +2,15 @@
 
 use std::io::Write;
 
-use ros2_client::{Message, MessageTypeName, Node, Publisher, Subscription};
+use ros2_client::{Message, MessageTypeName, Node};
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
 use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 
 use super::args::RosArgs;
-use super::endpoints::{EndpointError, Endpoints};
+use super::endpoints::{EndpointError, Endpoints, Publisher, Subscription};
+use super::recorder::Recorder;
 use crate::config::{Parameters, QosConfig, TimeMode};
 use crate::messages::{
     CONTROL_PACKAGE, DriveStates, JointTrajectoryControllerState, MotorCurrents, PACKAGE, TrajectoryResult,
@@ -69,9 +70,10 @@ impl Topics {
         node: &mut Node,
         args: &RosArgs,
         parameters: &Parameters,
+        recorder: &mut Recorder,
         time: TimeMode,
     ) -> Result<Self, EndpointError> {
-        let mut endpoints = Endpoints { node, args, parameters };
+        let mut endpoints = Endpoints { node, args, parameters, recorder };
         let joint_state = || MessageTypeName::new("sensor_msgs", "JointState");
         let trajectory = MessageTypeName::new("trajectory_msgs", "JointTrajectory");
         let diagnostic = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 
+use mcap::McapError;
+
 use super::error::AxisRecordingError;
 use super::join::{Clock, Times, put};
 use super::series::{Kind, Row, Series};
 use crate::config::AxisConfig;
-use crate::files::mcap_in::{check_chunks, damaged, start, type_of};
+use crate::files::mcap_in::{Ending, check_chunks, damaged, start, type_of};
 use crate::files::nearest;
 use crate::recording::{Finding, RawRecording};
 use crate::units::{Nanoseconds, seconds};
@@ -30,19 +32,34 @@ pub(super) fn read(
     (joint, is_whole): (&str, bool),
     topics: &[String],
 ) -> Found<(RawRecording, Vec<Finding>)> {
-    check_chunks(&mut input, name)?;
+    let ending = check_chunks(&mut input, name)?;
+    let is_end =
+        |error: &McapError| ending == Ending::Unfinished && matches!(error, McapError::UnexpectedEof);
     let mut reader = start(input, name)?;
     let mut contents = Contents::default();
     for message in reader.by_ref() {
-        let message = message.map_err(|error| damaged(name, &error))?;
+        let message = match message {
+            Err(error) if is_end(&error) => break,
+            message => message.map_err(|error| damaged(name, &error))?,
+        };
         contents.add(&message.channel.topic, type_of(&message));
     }
     let mut findings = Vec::new();
+    if ending == Ending::Unfinished {
+        findings.push(Finding::warning(
+            "unfinished",
+            format!("{name}: it has no end, its writer was killed: what it holds is read, the last second may be missing"),
+            "let the recorder finish",
+        ));
+    }
     let mut wanted = contents.choose(name, topics, &mut findings)?;
     let mut reader = start(reader.into_inner().into_inner(), name)?;
     let mut rows = 0;
     for message in reader.by_ref() {
-        let message = message.map_err(|error| damaged(name, &error))?;
+        let message = match message {
+            Err(error) if is_end(&error) => break,
+            message => message.map_err(|error| damaged(name, &error))?,
+        };
         let of = |series: &&mut Series| {
             series.topic == message.channel.topic && type_of(&message) == Some(series.kind.name())
         };

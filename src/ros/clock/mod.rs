@@ -13,13 +13,14 @@ use std::collections::HashSet;
 use std::time::Duration;
 
 use futures::StreamExt;
-use ros2_client::{MessageInfo, Subscription};
+use ros2_client::MessageInfo;
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
 use rustdds::{DomainParticipant, RTPSEntity};
 use tokio::sync::watch;
 use tracing::{info, warn};
 
+use super::endpoints::Subscription;
 use super::outputs::Output;
 use super::pace::Health;
 use crate::units::{Nanoseconds, SECOND_NS};

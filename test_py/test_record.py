@@ -1,0 +1,321 @@
+"""The node's own recording (parameter `record`), read by an independent reader."""
+
+from __future__ import annotations
+
+import signal
+import stat
+import subprocess
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader, make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rcl_interfaces.msg import Log
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+from virtual_axes.msg import TrajectoryResult
+
+from drive import DEEP_QOS, NANOSECONDS, RESULT_QOS, TSP_NS, Drive, Node, joint_trajectory, node_binary, to_ns
+
+MEGABYTE = 1_000_000
+STATES, CURRENTS, DRIVES = "/joint_states", "/virtual_axes/motor_currents", "/virtual_axes/drive_states"
+RESULTS = "/virtual_axes/trajectory_result"
+NOT_RECORDED = {"/parameter_events"}
+"""Topics of every node that come with its parameter services."""
+
+
+@dataclass
+class Entry:
+    """A message of a recording."""
+
+    log: int
+    publish: int
+    data: bytes
+
+
+def read(path: Path, whole: bool = True) -> tuple[dict[str, list[Entry]], dict[str, Any], dict[str, Any]]:
+    """Messages, channels and types by topic, decoded too; of a file that is not `whole`, up to its end."""
+    messages: dict[str, list[Entry]] = defaultdict(list)
+    channels: dict[str, Any] = {}
+    types: dict[str, str] = {}
+    decoded = 0
+    decoders = DecoderFactory()
+    with path.open("rb") as file:
+        reader = NonSeekingReader(file, validate_crcs=True, decoder_factories=[decoders])
+        try:
+            for schema, channel, message, value in reader.iter_decoded_messages(log_time_order=False):
+                channels[channel.topic], types[channel.topic] = channel, schema.name
+                assert message.sequence == len(messages[channel.topic])
+                messages[channel.topic].append(Entry(message.log_time, message.publish_time, message.data))
+                decoded += value is not None
+        except EndOfFile:
+            assert not whole
+        else:
+            assert whole
+    assert decoded == sum(map(len, messages.values()))
+    if whole:
+        with path.open("rb") as file:
+            reader = make_reader(file, validate_crcs=True)
+            summary = reader.get_summary()
+            assert reader.get_header().profile == "ros2"
+        assert summary.statistics.message_count == decoded
+        channels = {channel.topic: channel for channel in summary.channels.values()}
+        types = {channel.topic: summary.schemas[channel.schema_id].name for channel in summary.channels.values()}
+    return messages, channels, types
+
+
+def stamps(entries: list[Entry]) -> np.ndarray:
+    """Publish times, ns."""
+    return np.array([entry.publish for entry in entries], dtype=np.int64)
+
+
+def recording_status(drive: Drive) -> DiagnosticStatus | None:
+    """The newest diagnostics of the recording."""
+    for message in reversed(drive.diagnostics()):
+        for status in message.status:
+            if status.name == f"{drive.target}: recording":
+                return status
+    return None
+
+
+def values(status: DiagnosticStatus) -> dict[str, str]:
+    return {value.key: value.value for value in status.values}
+
+
+@dataclass
+class Session:
+    """A recording of everything, with what was sent and heard meanwhile."""
+
+    path: Path
+    sent: dict[str, list[bytes]]
+    heard: dict[str, list[bytes]]
+    offered: dict[str, tuple[str, ReliabilityPolicy, DurabilityPolicy]]
+    """Type and profile of each topic in the graph."""
+    status: DiagnosticStatus
+    exit: int
+    output: str
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
+    """A node in real time that records, is moved, streamed to and loaded, and ended by SIGTERM."""
+    path = tmp_path_factory.mktemp("record") / "session.mcap"
+    with Node(["-p", f"record:={path}", "-p", "qos.drive_states.depth:=7"]) as process:
+        drive = Drive(process=process)
+        heard: dict[str, list[bytes]] = {RESULTS: [], "/diagnostics": [], "/rosout": []}
+        profiles = {RESULTS: RESULT_QOS, "/diagnostics": DEEP_QOS, "/rosout": RESULT_QOS}
+        kinds = {RESULTS: TrajectoryResult, "/diagnostics": DiagnosticArray, "/rosout": Log}
+        for topic, store in heard.items():
+            drive.node.create_subscription(kinds[topic], topic, drive._keep(store), profiles[topic], raw=True)
+        sent: dict[str, list[bytes]] = {"/psec": [], "/psec_stream": [], "/load": []}
+        trajectory = joint_trajectory(["x", "c"], [0.0, 0.4], [[0.0, 0.0], [0.004, 0.1]])
+        drive.run(trajectory, settle=0.1)
+        sent["/psec"].append(serialize_message(trajectory))
+        for k in range(20):
+            drive.stream(["x"], [0.004 + 1e-6 * k])
+            sent["/psec_stream"].append(serialize_message(JointState(name=["x"], position=[0.004 + 1e-6 * k])))
+            drive.load({"y": float(k)})
+            sent["/load"].append(serialize_message(JointState(name=["y"], effort=[float(k)])))
+            time.sleep(0.01)
+        drive.wait_for(lambda: all(heard.values()), 10, "every topic")
+        status = drive.wait_for(lambda: recording_status(drive), 10, "diagnostics of the recording")
+        offered = {}
+        name, namespace = drive.target.rsplit("/", 1)[1], drive.target.rsplit("/", 1)[0] or "/"
+        for of_node, infos in (
+            (drive.node.get_publisher_names_and_types_by_node, drive.node.get_publishers_info_by_topic),
+            (drive.node.get_subscriber_names_and_types_by_node, drive.node.get_subscriptions_info_by_topic),
+        ):
+            for topic, (kind, *_) in of_node(name, namespace):
+                if topic in NOT_RECORDED:
+                    continue
+                profiles_found = [info.qos_profile for info in infos(topic) if info.node_name == name]
+                ((reliability, durability),) = {(qos.reliability, qos.durability) for qos in profiles_found}
+                offered[topic] = (kind, reliability, durability)
+        drive.process = None
+        exit_status = process.stop(signal.SIGTERM)
+        drive.wait_for(lambda: not drive.sees(), 5, "goodbye")
+        for topic, key in ((STATES, "joints"), (CURRENTS, "currents"), (DRIVES, "states")):
+            heard[topic] = list(drive._samples[key])
+        drive.close()
+        yield Session(path, sent, heard, offered, status, exit_status, process.output())
+
+
+def test_every_topic_is_there_with_its_type_and_profile(session: Session):
+    """What the graph says the node has, and nothing else."""
+    assert session.exit == 0, session.output
+    messages, channels, types = read(session.path)
+    wanted = session.offered
+    assert len(wanted) >= 9
+    assert types == {topic: kind for topic, (kind, *_) in wanted.items()}
+    for topic, (_, reliability, durability) in wanted.items():
+        (profile,) = yaml.safe_load(channels[topic].metadata["offered_qos_profiles"])
+        assert profile["reliability"] == reliability.name.lower(), topic
+        assert profile["durability"] == durability.name.lower(), topic
+        assert profile["history"] == "keep_last" and profile["depth"] >= 1
+    assert all(messages[topic] for topic in wanted)
+    (profile,) = yaml.safe_load(channels[DRIVES].metadata["offered_qos_profiles"])
+    assert profile["depth"] == 7
+
+
+def test_what_was_published_is_recorded_bit_for_bit(session: Session):
+    """All that a subscriber got, in its order, without a gap between."""
+    messages, _, _ = read(session.path)
+    assert set(session.heard) | set(session.sent) == set(messages)
+    for topic, heard in session.heard.items():
+        # RTPS carries them in words of four bytes.
+        recorded = [entry.data + bytes(-len(entry.data) % 4) for entry in messages[topic]]
+        # Who publishes for late joiners may hand over old samples first.
+        first = recorded.index(heard[0])
+        assert recorded[first : first + len(heard)] == heard, topic
+        assert len(heard) > 0
+    assert len(session.heard[DRIVES]) > 100
+
+
+def test_what_came_in_is_recorded_as_it_came(session: Session):
+    """Bit for bit, at the node's time of receipt."""
+    messages, _, _ = read(session.path)
+    for topic, sent in session.sent.items():
+        received = messages[topic]
+        kind = JointTrajectory if topic == "/psec" else JointState
+        # rclpy makes its bytes longer than they need to be.
+        found = [serialize_message(deserialize_message(entry.data, kind)) for entry in received]
+        if topic == "/psec":
+            assert found == sent
+        else:  # best effort, or reliable with a depth of one
+            remaining = iter(sent)
+            assert found and all(message in remaining for message in found), topic
+        assert all(entry.publish == entry.log for entry in received), "they had no stamps"
+    began, ended = (messages[DRIVES][place].log for place in (0, -1))
+    assert all(began <= entry.log <= ended for topic in session.sent for entry in messages[topic])
+
+
+def test_times_are_the_nodes(session: Session):
+    """Stamps as publish times, not after the log times; the grid of position instants is unbroken."""
+    messages, _, _ = read(session.path)
+    for topic in (STATES, CURRENTS, DRIVES):
+        times = stamps(messages[topic])
+        assert set(np.diff(times)) == {TSP_NS}
+        assert all(entry.log >= entry.publish for entry in messages[topic])
+        assert to_ns_of(messages[topic][0].data) == times[0]
+
+
+def to_ns_of(data: bytes) -> int:
+    """Stamp of a message with a header (CDR, little endian)."""
+    return int.from_bytes(data[4:8], "little") * NANOSECONDS + int.from_bytes(data[8:12], "little")
+
+
+def test_the_diagnostics_and_the_log_tell_of_it(session: Session):
+    """Where it goes, and that nothing is missing."""
+    found = values(session.status)
+    assert session.status.level == DiagnosticStatus.OK and found["recording"] == "true"
+    assert found["file"] == str(session.path) and found["left_out"] == "0"
+    messages, _, _ = read(session.path)
+    assert f"{sum(map(len, messages.values()))} messages, 0 left out" in session.output
+
+
+def test_our_own_command_takes_set_points_from_it(session: Session):
+    """`virtual_axes run` of the recording."""
+    command = node_binary().with_name("virtual_axes")
+    done = subprocess.run([command, "run", session.path], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_killed_it_is_readable_up_to_its_last_chunk(start: Callable[..., Drive], tmp_path: Path):
+    """SIGKILL: every message up to then, unbroken; identify reads it and says so."""
+    path = tmp_path / "killed.mcap"
+    drive = start("-p", f"record:={path}")
+    until = drive.now()
+
+    def is_written() -> bool:
+        return any(entry.publish >= until for entry in read(path, whole=False)[0][DRIVES])
+
+    drive.wait_for(is_written, 20, "chunk on the disk")
+    process, drive.process = drive.process, None
+    process.stop(signal.SIGKILL)
+    messages, _, _ = read(path, whole=False)
+    for topic in (STATES, CURRENTS, DRIVES):
+        times = stamps(messages[topic])
+        assert times[-1] >= until - TSP_NS and set(np.diff(times)) == {TSP_NS}
+    command = [node_binary().with_name("virtual_axes"), "identify", path, "--axis", "x"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert "its writer was killed" in done.stdout + done.stderr
+
+
+def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive], tmp_path: Path):
+    """At 1 MB the file is closed, whole and told; in `fast` nothing before that is missing."""
+    path = tmp_path / "bounded.mcap"
+    drive = start("-p", f"record:={path}", "-p", "record_max_mb:=1", "-p", "time:=fast")
+    # Set-points that no compression makes much of.
+    noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (4000, 2))
+    times = np.arange(1, len(noise) + 1) * (2 * TSP_NS / NANOSECONDS)
+    drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120)
+    ended = drive.wait_for(
+        lambda: (status := recording_status(drive)) and values(status)["recording"] == "false" and status,
+        20,
+        "end of the recording",
+    )
+    assert ended.level == DiagnosticStatus.WARN
+    assert ended.message == "recording has ended: it has reached 1 MB"
+    drive.wait_for(lambda: int(values(recording_status(drive))["left_out"]) > int(values(ended)["left_out"]), 10, "more")
+    assert 0.9 * MEGABYTE < path.stat().st_size <= MEGABYTE
+    messages, _, types = read(path)
+    assert types["/clock"] == "rosgraph_msgs/msg/Clock" and len(messages["/clock"]) > 100
+    last = [stamps(messages[topic])[-1] for topic in (STATES, CURRENTS, DRIVES)]
+    assert all(set(np.diff(stamps(messages[topic]))) == {TSP_NS} for topic in (STATES, CURRENTS, DRIVES, "/clock"))
+    assert max(last) - min(last) <= TSP_NS
+    assert str(sum(map(len, messages.values()))) == values(ended)["messages"]
+    assert drive.process.output().count("has ended: it has reached 1 MB; the axes go on") == 1
+
+
+def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
+    """The system takes no more than 200 KiB in a file: what was written before stays readable."""
+    path, binary = tmp_path / "full.mcap", tmp_path / "limited.sh"
+    binary.write_text(f'#!/bin/bash\ntrap "" XFSZ\nulimit -f 200\nexec {node_binary()} "$@"\n')
+    binary.chmod(binary.stat().st_mode | stat.S_IXUSR)
+    ros_args = ["-p", f"record:={path}", "-p", "time:=fast"]
+    with Node(ros_args, binary=binary) as process, Drive(process=process) as drive:
+        noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (1500, 2))
+        times = np.arange(1, len(noise) + 1) * (2 * TSP_NS / NANOSECONDS)
+        assert drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120).result.status == TrajectoryResult.COMPLETED
+        ended = drive.wait_for(
+            lambda: (status := recording_status(drive)) and values(status)["recording"] == "false" and status,
+            20,
+            "end of the recording",
+        )
+        assert "too large" in ended.message and ended.level == DiagnosticStatus.WARN
+        assert process.stop(signal.SIGTERM) == 0
+    assert path.stat().st_size <= 200 * 1024
+    messages, _, _ = read(path, whole=False)
+    assert len(messages[DRIVES]) > 0 and set(np.diff(stamps(messages[DRIVES]))) <= {TSP_NS}
+
+
+def refusal(record: object) -> str:
+    """Start a node that must refuse to record there: what it says, with status 2."""
+    with Node(["-p", f"record:={record}"]) as process:
+        assert process.wait(10) == 2, process.output()
+        return process.output()
+
+
+def test_what_it_cannot_record_to_is_refused(tmp_path: Path):
+    """An existing file stays as it is; a folder that is missing or takes nothing is named."""
+    existing = tmp_path / "old.mcap"
+    existing.write_text("kept")
+    assert f"record: {existing} exists already" in refusal(existing)
+    assert existing.read_text() == "kept"
+    missing = tmp_path / "missing" / "new.mcap"
+    assert f"cannot be made in the folder {missing.parent}: No such file" in refusal(missing)
+    assert f"cannot be made in the folder {existing}: Not a directory" in refusal(existing / "new.mcap")
+    # A folder that takes no file of anybody's.
+    assert "cannot be made in the folder /proc: " in refusal("/proc/new.mcap")
+    assert list(tmp_path.iterdir()) == [existing]

@@ -1,0 +1,175 @@
+//! Recordings of a node: their bound, and what can be read of them at any moment.
+
+use std::io::{self, Cursor, Write};
+use std::sync::{Arc, Mutex};
+
+use mcap::{McapError, MessageStream, Summary};
+use proptest::prelude::*;
+use virtual_axes::config::QosConfig;
+use virtual_axes::files::{BoundedRecording, RecordedTopic};
+use virtual_axes::messages::Schema;
+
+const QOS: QosConfig = QosConfig { reliable: true, transient_local: false, depth: 10 };
+/// Longest record of a message without its data, with its entry in the index, and what a last chunk adds: its
+/// head and indexes for the three topics here.
+const OVERHEAD: u64 = 31 + 16 + 300;
+
+fn topics() -> Vec<RecordedTopic> {
+    let schemas = [Schema::joint_state(), Schema::motor_currents(), Schema::diagnostic_array()];
+    let topic = |(place, schema)| RecordedTopic { name: format!("/topic_{place}"), schema, qos: QOS };
+    schemas.into_iter().enumerate().map(topic).collect()
+}
+
+/// What stands in the file without a message.
+fn empty() -> u64 {
+    let recording = BoundedRecording::new(Vec::new(), u64::MAX, &topics()).expect("in memory");
+    recording.finish().expect("in memory").len() as u64
+}
+
+/// A message of `length` bytes: noise that no compression makes shorter, or all the same.
+fn data(length: usize, is_noise: bool, seed: u64) -> Vec<u8> {
+    let mut state = seed | 1;
+    let mut noise = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state as u8
+    };
+    (0..length).map(|_| if is_noise { noise() } else { 7 }).collect()
+}
+
+#[derive(Debug, Clone)]
+struct Step {
+    topic: usize,
+    length: usize,
+    is_noise: bool,
+    is_flushed: bool,
+}
+
+fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let step =
+        (0..3_usize, prop_oneof![0..200_usize, 0..60_000_usize], any::<bool>(), prop::bool::weighted(0.2));
+    let step =
+        step.prop_map(|(topic, length, is_noise, is_flushed)| Step { topic, length, is_noise, is_flushed });
+    prop::collection::vec(step, 1..80)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Whatever is written, the file is whole, no longer than its bound, holds the messages up to the first that
+    /// was left out, and had no room for that one.
+    #[test]
+    fn a_recording_is_whole_and_within_its_bound(steps in steps(), room in 2_000_u64..1_500_000) {
+        let bound = empty() + room;
+        let mut recording = BoundedRecording::new(Vec::new(), bound, &topics()).expect("room for no message");
+        let mut written = Vec::new();
+        let mut left_out = None;
+        for (k, step) in steps.iter().enumerate() {
+            let time = 1_000 * k as u64;
+            let bytes = data(step.length, step.is_noise, k as u64);
+            if !recording.write(step.topic, time, time + 1, &bytes).expect("in memory") {
+                left_out = Some(step.length as u64);
+                break;
+            }
+            written.push((format!("/topic_{}", step.topic), time, bytes));
+            if step.is_flushed {
+                recording.flush().expect("in memory");
+            }
+        }
+        let file = recording.finish().expect("in memory");
+        prop_assert!(file.len() as u64 <= bound, "{} of {bound}", file.len());
+        if let Some(length) = left_out {
+            // zstd may add a byte in 256.
+            let longest = file.len() as u64 + length + length / 256 + OVERHEAD;
+            prop_assert!(longest > bound, "{} of {bound}, {length} left out", file.len());
+        }
+        let summary = Summary::read(&file).expect("whole").expect("a summary");
+        prop_assert_eq!(summary.stats.expect("statistics").message_count, written.len() as u64);
+        prop_assert_eq!(summary.channels.len(), 3);
+        let found: Vec<_> = MessageStream::new(&file)
+            .expect("whole")
+            .map(|message| message.expect("whole"))
+            .map(|message| (message.channel.topic.clone(), message.log_time, message.data.into_owned()))
+            .collect();
+        prop_assert_eq!(found, written);
+    }
+}
+
+/// An output that others can look at, with so much room.
+#[derive(Clone)]
+struct Disk {
+    bytes: Arc<Mutex<Vec<u8>>>,
+    size: usize,
+}
+
+impl Write for Disk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut held = self.bytes.lock().expect("one thread");
+        let taken = bytes.len().min(self.size - held.len());
+        held.extend(&bytes[..taken]);
+        if taken == 0 && !bytes.is_empty() { Err(io::ErrorKind::StorageFull.into()) } else { Ok(taken) }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// The messages of a file that was not finished, and how reading ended.
+fn read(file: &[u8]) -> (usize, McapError) {
+    let mut reader = mcap::io::MessageReader::new(Cursor::new(file));
+    let mut count = 0;
+    loop {
+        match reader.next() {
+            Some(Ok(_)) => count += 1,
+            Some(Err(error)) => return (count, error),
+            None => panic!("the file was finished"),
+        }
+    }
+}
+
+#[test]
+fn what_has_been_flushed_can_be_read_though_nothing_follows() {
+    let disk = Disk { bytes: Arc::default(), size: usize::MAX };
+    let mut recording = BoundedRecording::new(disk.clone(), u64::MAX, &topics()).expect("in memory");
+    for k in 0..100 {
+        recording.write(k % 3, k as u64, k as u64, &data(200, true, k as u64)).expect("in memory");
+        if k == 69 {
+            recording.flush().expect("in memory");
+        }
+    }
+    let file = disk.bytes.lock().expect("one thread").clone();
+    assert_eq!(recording.whole(), file.len() as u64);
+    let (count, error) = read(&file);
+    assert_eq!(count, 70);
+    assert!(matches!(error, McapError::UnexpectedEof), "{error}");
+}
+
+#[test]
+fn a_full_disk_leaves_the_chunks_before_it_readable() {
+    let disk = Disk { bytes: Arc::default(), size: 60_000 };
+    let mut recording = BoundedRecording::new(disk.clone(), u64::MAX, &topics()).expect("room enough");
+    let mut flushed = 0;
+    let error = (0..100_usize)
+        .find_map(|k| {
+            let written = recording.write(0, k as u64, k as u64, &data(2_000, true, k as u64));
+            let written = written.and_then(|_| if k % 10 == 9 { recording.flush() } else { Ok(()) });
+            if k % 10 == 9 && written.is_ok() {
+                flushed = k + 1;
+            }
+            written.err()
+        })
+        .expect("it does not fit");
+    assert_eq!(error.kind(), io::ErrorKind::StorageFull);
+    let whole = recording.whole() as usize;
+    assert!(recording.finish().is_err());
+    let file = disk.bytes.lock().expect("one thread")[..whole].to_vec();
+    assert_eq!((flushed, read(&file).0), (20, 20));
+}
+
+#[test]
+fn a_bound_that_holds_no_recording_is_refused() {
+    let error = BoundedRecording::new(Vec::new(), 1_000, &topics()).expect_err("too small").to_string();
+    assert!(error.starts_with("1000 bytes are too few for a recording, it needs "), "{error}");
+}
