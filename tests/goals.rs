@@ -248,10 +248,11 @@ fn a_clock_that_jumps_ends_motions_and_brings_axes_to_rest() {
         setpoints(&mut bench, 50);
         bench.simulation.set_load(X, -500.0, 100 * SECOND_NS);
         let at = bench.simulation.next_instant();
+        let from = bench.simulation.time_of(at - 1);
         bench.simulation.jump_to(target);
         assert_eq!(bench.simulation.time_of(at), target);
         let ends: Vec<_> = bench.simulation.take_ends().map(|e| (e.id, e.outcome)).collect();
-        let aborted = Outcome::Aborted(Abort::ClockJump);
+        let aborted = Outcome::Aborted(Abort::ClockJump { from, to: target });
         assert_eq!(ends, [(A, aborted), (B, aborted)]);
         let psec = setpoints(&mut bench, 200);
         assert_controlled_stop(&psec);

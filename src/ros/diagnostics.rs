@@ -81,7 +81,7 @@ impl Diagnostics {
         let stands = periods == 0 && now.clock.source != ClockSource::Wall;
         let fine = if stands && now.clock.source == ClockSource::None {
             "waiting for /clock"
-        } else if stands && now.clock.held_back {
+        } else if stands && (now.clock.held_back || now.clock.source == ClockSource::Own) {
             "waiting for a slow subscriber"
         } else if stands {
             "paused"

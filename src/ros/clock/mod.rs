@@ -32,6 +32,8 @@ const LOOK_PERIOD: Duration = Duration::from_millis(50);
 /// Looks before a machine takes it that nobody else does: others are known 10 to 160 ms after the
 /// start, and give a clock every position period.
 const LOOKS: u32 = 6;
+/// Once it has listened, it looks only every so many times: a graph can be large.
+const LOOK_EVERY: u32 = 4;
 /// A topic that every machine of this package publishes, and nobody else.
 const MACHINE_TYPE: &str = "virtual_axes::msg::dds_::DriveStates_";
 
@@ -126,8 +128,11 @@ impl ClockInput {
             tokio::select! {
                 _ = timer.tick() => {
                     looks = looks.saturating_add(1);
-                    watcher.is_fresh = false;
-                    watcher.look(looks > LOOKS);
+                    let listened = looks > LOOKS;
+                    if !listened || looks.is_multiple_of(LOOK_EVERY) {
+                        watcher.is_fresh = false;
+                        watcher.look(listened);
+                    }
                 }
                 Some(received) = messages.next() => match received {
                     Ok((message, info)) => watcher.take(&message.clock, &info),

@@ -51,7 +51,7 @@ pub struct ClockHealth {
     pub source: ClockSource,
     /// How far the position instants are behind it, ns.
     pub behind: Nanoseconds,
-    /// Whether a slow subscriber is being waited for.
+    /// Whether a slow subscriber is being waited for, as of the last wait.
     pub held_back: bool,
     /// How often it has jumped since the start.
     pub jumps: u64,

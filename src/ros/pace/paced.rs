@@ -166,7 +166,6 @@ impl Paced {
         self.axes.tell_clock(|clock| {
             clock.source = source;
             clock.behind = behind;
-            clock.held_back = false;
         });
     }
 

@@ -15,7 +15,7 @@ const CATCH_UP: u32 = 10;
 pub fn origin(mode: TimeMode, period: Nanoseconds) -> Nanoseconds {
     match mode {
         TimeMode::Real | TimeMode::Fast => grid_origin(period),
-        TimeMode::SimTime => 0,
+        TimeMode::SimTime => period,
     }
 }
 

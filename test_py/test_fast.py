@@ -1,0 +1,221 @@
+"""`time: fast`: its /clock, the one of several machines, and subscribers that are slow."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from virtual_axes.msg import TrajectoryResult
+
+from drive import NANOSECONDS, TSP_NS, DomainId, Drive, Node, joint_trajectory, to_ns
+from motion import swing
+from sim_clock import SimClock
+
+DEEP = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
+LONG = 30.0
+"""Duration of a motion that real time would take long for, s."""
+
+
+def test_fast_outruns_the_wall_clock_on_an_unbroken_grid(start: Callable[..., Drive]):
+    """Half a minute of motion; the clock shows each position instant once, and so do the samples."""
+    drive = start("-p", "time:=fast")
+    ticks: list[int] = []
+    drive.node.create_subscription(Clock, "/clock", lambda message: ticks.append(to_ns(message.clock)), DEEP)
+    drive.wait_for(lambda: ticks, 10, "tick of the clock")
+    began = time.monotonic()
+    recording = drive.run(joint_trajectory(["x"], [0.0, LONG], [[0.0], [0.3]]), timeout=60)
+    elapsed = time.monotonic() - began
+    print(f"{LONG} s of motion, {LONG / elapsed:.1f} times real time")
+    assert set(np.diff(recording.joints.stamp)) == {TSP_NS}
+    assert len(recording.joints) == LONG * 1e9 / TSP_NS + 1
+    end = recording.joints.stamp[-1]
+    drive.wait_for(lambda: ticks[-1] >= end, 10, "tick at the end of the motion")
+    shown = np.array(ticks)
+    shown = shown[(shown >= recording.start) & (shown <= end)]
+    np.testing.assert_array_equal(shown, recording.joints.stamp)
+
+
+def test_an_idle_fast_node_floods_nobody(start: Callable[..., Drive]):
+    """With nothing to do the clock goes at real pace."""
+    drive = start("-p", "time:=fast")
+    before, began = drive.now(), time.monotonic()
+    time.sleep(1.0)
+    shown, passed = (drive.now() - before) / 1e9, time.monotonic() - began
+    # Slower on a busy machine, never faster.
+    assert 0 < shown < 1.5 * passed
+
+
+def machine(stack: ExitStack, name: str, domain: DomainId, *ros_args: str, connect: bool = True) -> Drive:
+    """A machine of a name of its own in a domain that others share."""
+    arguments = ["-r", f"__ns:=/{name}", *(ros_args or ("-p", "time:=fast"))]
+    process = stack.enter_context(Node(arguments, name=f"/{name}/virtual_axes", domain_id=domain.value))
+    return stack.enter_context(Drive(process=process, connect=connect))
+
+
+class Ticks:
+    """What /clock shows, in the order in which it comes."""
+
+    def __init__(self, drive: Drive):
+        """Listen through a Drive's node."""
+        self.shown: list[int] = []
+        self._drive = drive
+        drive.node.create_subscription(Clock, "/clock", lambda message: self.shown.append(to_ns(message.clock)), DEEP)
+        drive.wait_for(lambda: self.shown, 10, "tick of the clock")
+
+    def since(self, begin: int) -> np.ndarray:
+        """The ticks from the `begin`-th on, once there are some."""
+        self._drive.wait_for(lambda: len(self.shown) > begin + 10, 10, "ticks of the clock")
+        return np.array(self.shown[begin:])
+
+
+@pytest.fixture
+def shared() -> Iterator[tuple[ExitStack, DomainId]]:
+    """A domain for several machines; they end in the reverse order."""
+    domain = DomainId()
+    with ExitStack() as stack:
+        stack.callback(domain.release)
+        yield stack, domain
+
+
+def leads(drive: Drive) -> bool:
+    """Whether a machine gives the clock, by what it says about itself."""
+    said = [line for line in drive.process.output().splitlines() if "/clock:" in line]
+    return bool(said) and said[-1].endswith("publishing it")
+
+
+def assert_unbroken(drive: Drive, begin: int, end: int) -> None:
+    """Every position instant is there, from one time to another, ns."""
+    drive.wait_until(end // TSP_NS * TSP_NS, 30)
+    stamps = drive.record(begin, end).joints.stamp
+    assert np.array_equal(stamps, np.arange(-(-begin // TSP_NS) * TSP_NS, end + 1, TSP_NS))
+
+
+def test_the_second_machine_follows_the_first_and_takes_over(shared: tuple[ExitStack, DomainId]):
+    """One clock, that never goes back, for two machines and a third that only follows."""
+    stack, domain = shared
+    with ExitStack() as first_life:
+        first = machine(first_life, "first", domain)
+        second = machine(stack, "second", domain)
+        third = machine(stack, "third", domain, "-p", "use_sim_time:=true")
+        ticks = Ticks(third)
+        assert leads(first) and not leads(second)
+        begin = max(drive.now() for drive in (first, second, third))
+        # The first machine is asked, and goes as fast as it can; the others follow whatever they do.
+        slow = second.accept(joint_trajectory(["y"], [0.0, 1.0], [[0.0], [0.1]]))
+        recording = first.run(joint_trajectory(["x"], [0.0, 2.0], [[0.0], [0.3]]))
+        assert second.end(slow.sequence_number, 30).status == TrajectoryResult.COMPLETED
+        for drive in (first, second, third):
+            assert_unbroken(drive, begin, recording.joints.stamp[-1])
+        # While the first has nothing to do, a trajectory of the second goes at real pace.
+        began = time.monotonic()
+        second.run(joint_trajectory(["y"], [0.0, 0.6], [[0.1], [0.1]]))
+        assert time.monotonic() - began > 0.4
+        before = second.now()
+    count = len(ticks.shown)
+    second.wait_for(lambda: leads(second), 10, "second machine that takes over")
+    second.run(joint_trajectory(["y"], [0.0, 1.0], [[0.1], [0.0]]))
+    ticks.since(count)
+    shown = np.array(ticks.shown)
+    assert np.all(np.diff(shown) > 0), "the clock never goes back, and says nothing twice"
+    for drive in (second, third):
+        assert_unbroken(drive, before, second.now() - NANOSECONDS // 10)
+    assert not any("jumped" in drive.process.output() for drive in (second, third))
+
+
+def test_of_machines_that_start_together_one_leads(shared: tuple[ExitStack, DomainId]):
+    """Which one, their ids decide."""
+    stack, domain = shared
+    both = [machine(stack, name, domain, connect=False) for name in ("left", "right")]
+    for drive in both:
+        drive.connect()
+    both[0].wait_for(lambda: sum(map(leads, both)) == 1, 5, "one machine that gives the clock")
+    ticks = Ticks(both[0])
+    count = len(ticks.shown)
+    time.sleep(0.3)
+    assert np.all(np.diff(ticks.since(count)) > 0)
+    assert sum(map(leads, both)) == 1
+
+
+def test_the_clock_of_somebody_else_is_followed(start: Callable[..., Drive]):
+    """Whoever else publishes /clock wins; when it is gone, the machine goes on from where it was."""
+    drive = start("-p", "time:=fast")
+    ticks = Ticks(drive)
+    begin = -(-(drive.now() + 2 * NANOSECONDS) // TSP_NS) * TSP_NS
+    other = SimClock(drive, begin)
+    drive.wait_for(lambda: "holding back" in drive.process.output(), 10, "notice of the other clock")
+    other.reach(begin)
+    count = len(ticks.shown)
+    times, position = swing(0.6)
+    sent = drive.send(joint_trajectory(["x"], times, position))
+    drive.decision(sent)
+    time.sleep(0.2)
+    assert drive.now() == begin, "nobody else's clock has gone on"
+    other.advance(1.0, 0.05)
+    assert drive.end(sent, 5).status == TrajectoryResult.COMPLETED
+    own = set(range(begin, other.now + 1, TSP_NS)) - set(ticks.shown[:count])
+    said = len(ticks.shown) - count
+    assert said <= 21 < len(own), "only the other one speaks"
+    other.close()
+    drive.wait_for(lambda: drive.now() > other.now + NANOSECONDS // 10, 10, "clock of its own")
+    assert_unbroken(drive, begin, drive.now() - NANOSECONDS // 20)
+
+
+def stands(drive: Drive, timeout: float = 60.0) -> int:
+    """How many position periods there have been when a slow subscriber has stopped the clock for seconds."""
+    seen = len(drive.diagnostics())
+
+    def counts() -> list[str]:
+        said = [array.status[0] for array in drive.diagnostics()[seen:]][-2:]
+        counted = [v.value for status in said for v in status.values if v.key == "position_periods"]
+        is_held = all(status.message == "waiting for a slow subscriber" for status in said)
+        return counted if len(counted) == 2 and is_held and counted[0] == counted[1] else []
+
+    return int(drive.wait_for(counts, timeout, "clock that stands")[0])
+
+
+def test_a_slow_subscriber_misses_nothing(start: Callable[..., Drive]):
+    """One that keeps all and takes nothing for a while stops the clock, not the services."""
+    # What its middleware keeps (5000), what ours keeps for it (8192), and some more.
+    instants = 14_000
+    drive = start("-p", "time:=fast")
+    context = Context()
+    rclpy.init(context=context, domain_id=drive.process.domain_id)
+    try:
+        node = rclpy.create_node("slow", context=context, enable_rosout=False, start_parameter_services=False)
+        keep_all = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+        slow = node.create_subscription(JointState, "joint_states", lambda _: None, keep_all)
+
+        def take() -> int | None:
+            with slow.handle:
+                taken = slow.handle.take_message(JointState, False)
+            return taken and to_ns(taken[0].header.stamp)
+
+        stamps = [drive.wait_for(take, 10, "joint state")]
+        # A clock that runs freely to a motion in the future has little to compute.
+        end = drive.now() + instants * TSP_NS
+        sent = drive.send(joint_trajectory(["x"], *swing(0.3, amplitude=0.01), stamp=end))
+        drive.decision(sent)
+        stood_at = stands(drive)
+        assert drive.now() < end and len(drive.results(sent)) == 1, "it is under way"
+        assert drive.get_parameters(["time"]) == {"time": "fast"}
+        drive.set_parameters({"y.velocity_loop.gain": 4.4})
+        assert stands(drive) == stood_at
+        end += NANOSECONDS // 2
+        deadline = time.monotonic() + 60
+        while stamps[-1] < end and time.monotonic() < deadline:
+            stamp = take()
+            stamps += [stamp] if stamp else []
+            if stamp is None or len(stamps) % 20 == 0:
+                time.sleep(0.001)
+        assert np.array_equal(stamps, np.arange(stamps[0], stamps[-1] + 1, TSP_NS)) and stamps[-1] >= end
+        assert drive.end(sent, 20).status == TrajectoryResult.COMPLETED
+    finally:
+        rclpy.shutdown(context=context)
