@@ -21,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from graph import DAMPING, run_graph  # noqa: E402
+from four_processes import DAMPING, run_graph  # noqa: E402
 from motion import RATIO  # noqa: E402
 
 TORQUE_CONSTANT = 2.64

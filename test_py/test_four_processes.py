@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from graph import DAMPING, run_graph
+from four_processes import DAMPING, run_graph
 from motion import RATIO
 
 TORQUE_CONSTANT = 2.64

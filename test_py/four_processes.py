@@ -4,7 +4,7 @@ The process model answers the axes' velocity with a load in proportion to it and
 a cutting process does; the recorder keeps what the axes publish and how late it came. `tools/run_graph.py`
 runs it for a minute, a test for a few seconds. Each of the three is this file as a program:
 
-    python test_py/graph.py source|process-model|recorder SECONDS [FILE]
+    python test_py/four_processes.py source|process-model|recorder SECONDS [FILE]
 """
 
 from __future__ import annotations
