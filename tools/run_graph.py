@@ -21,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from graph import DAMPING, run_graph  # noqa: E402
+from four_processes import DAMPING, run_graph  # noqa: E402
 from motion import RATIO  # noqa: E402
 
 TORQUE_CONSTANT = 2.64
@@ -44,6 +44,7 @@ def main() -> int:
     slope, correlation, lag = figures.load_per_velocity()
     nominal = DAMPING * RATIO / TORQUE_CONSTANT
     print(f"  load over velocity: {slope:.3f} A s/m ({nominal:.3f}), correlation {correlation:.5f}, lag {lag:g} periods")
+    print(f"  loads that are a published velocity times that: {figures.answered(nominal) * 100:.2f} %")
     for key in ("position_periods", "missed_periods", "dropped_samples", "mean_lateness_ms", "max_lateness_ms"):
         print(f"  {key}: {figures.diagnostics[key]}")
     return int(bool(figures.faults()))

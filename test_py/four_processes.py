@@ -4,7 +4,7 @@ The process model answers the axes' velocity with a load in proportion to it and
 a cutting process does; the recorder keeps what the axes publish and how late it came. `tools/run_graph.py`
 runs it for a minute, a test for a few seconds. Each of the three is this file as a program:
 
-    python test_py/graph.py source|process-model|recorder SECONDS [FILE]
+    python test_py/four_processes.py source|process-model|recorder SECONDS [FILE]
 """
 
 from __future__ import annotations
@@ -15,13 +15,18 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import rclpy
+import rclpy.executors
+import rclpy.node
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from virtual_axes.msg import DriveStates, MotorCurrents
 
@@ -59,8 +64,7 @@ def source(seconds: float) -> None:
 
 def process_model(seconds: float) -> None:
     """A load for each joint state, -DAMPING times the velocity, until the end."""
-    with rclpy.init():
-        node = rclpy.create_node("process_model")
+    with joined("process_model") as node:
         publisher = node.create_publisher(JointState, "/load", 10)
 
         def react(state: JointState) -> None:
@@ -75,33 +79,54 @@ def process_model(seconds: float) -> None:
 
 def recorder(seconds: float, file: Path) -> None:
     """All samples with when they came, and the diagnostics; written to `file` at the end."""
-    with rclpy.init():
-        node = rclpy.create_node("recorder")
-        came: dict[str, list[tuple[int, int]]] = {topic: [] for topic in TOPICS}
-        rows: dict[str, list[list[float]]] = {"load": [], "velocity": []}
+    with joined("recorder") as node:
+        samples: dict[str, list[tuple[bytes, int]]] = {topic: [] for topic in TOPICS}
         statuses: list[dict[str, str]] = []
 
-        def keep(topic: str, message: JointState | MotorCurrents | DriveStates) -> None:
-            came[topic].append((to_ns(message.header.stamp), time.time_ns()))
-            for field in rows:
-                if topic != "joint_states" and hasattr(message, field):
-                    rows[field].append([getattr(message, field)[message.name.index(joint)] for joint in JOINTS])
+        def keep(topic: str, message: bytes) -> None:
+            samples[topic].append((message, time.time_ns()))
 
         for topic, kind in TOPICS.items():
             name = f"/{topic}" if topic == "joint_states" else f"/virtual_axes/{topic}"
-            node.create_subscription(kind, name, lambda message, topic=topic: keep(topic, message), DEEP_QOS)
+            # Raw: taking a sample must not cost more than the node needs to make one.
+            node.create_subscription(
+                kind, name, lambda message, topic=topic: keep(topic, message), DEEP_QOS, raw=True
+            )
         node.create_subscription(
             DiagnosticArray,
             "/diagnostics",
             lambda array: statuses.append({v.key: v.value for v in array.status[0].values}),
             QoSProfile(depth=10),
         )
-        wait_for_match(node, lambda: all(came.values()))
+        wait_for_match(node, lambda: all(samples.values()))
         spin(node, seconds)
+        came = {
+            topic: [(to_ns(deserialize_message(message, kind).header.stamp), at) for message, at in samples[topic]]
+            for topic, kind in TOPICS.items()
+        }
+        rows = {
+            field: [
+                [getattr(message, field)[message.name.index(joint)] for joint in JOINTS]
+                for message in (deserialize_message(raw, TOPICS[topic]) for raw, _ in samples[topic])
+            ]
+            for field, topic in (("load", "motor_currents"), ("velocity", "drive_states"))
+        }
         file.write_text(json.dumps({"came": came, **rows, "diagnostics": statuses}))
 
 
-def wait_for_match(node: rclpy.node.Node, is_matched) -> None:
+@contextmanager
+def joined(name: str) -> Iterator[rclpy.node.Node]:
+    """A node in the graph, for a while."""
+    rclpy.init()
+    node = rclpy.create_node(name)
+    try:
+        yield node
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def wait_for_match(node: rclpy.node.Node, is_matched: Callable[[], bool]) -> None:
     """Spin until it is so, 20 s at most."""
     deadline = time.monotonic() + 20
     while not is_matched():
@@ -116,8 +141,9 @@ def spin(node: rclpy.node.Node, seconds: float) -> None:
     executor = rclpy.executors.SingleThreadedExecutor()
     executor.add_node(node)
     deadline = time.monotonic() + seconds
-    while (left := deadline - time.monotonic()) > 0:
-        executor.spin_once(timeout_sec=left)
+    while time.monotonic() < deadline:
+        # Always the same: with another timeout rclpy begins again at the first subscription, and the last starves.
+        executor.spin_once(timeout_sec=0.1)
 
 
 # ------------------------------------------------------------------------------------- the graph
@@ -163,6 +189,21 @@ class Figures:
             return float(v @ i / (v @ v)), float(np.corrcoef(v, i)[0, 1]), float(lag)
 
         return max((fit(lag) for lag in range(21)), key=lambda found: found[1])
+
+
+    def answered(self, load_per_velocity: float) -> float:
+        """Share of the loads (A, where there is one) that are this times a velocity published before.
+
+        However late the answer was; `load_per_velocity` in A s/m.
+        """
+        answers = []
+        for joint in range(len(JOINTS)):
+            known = np.sort(self.velocity[:, joint] * load_per_velocity)
+            load = self.load[self.load[:, joint] != 0, joint]
+            place = np.clip(np.searchsorted(known, load), 1, len(known) - 1)
+            away = np.minimum(np.abs(known[place] - load), np.abs(known[place - 1] - load))
+            answers.append(away <= 1e-9 * np.abs(known).max())
+        return float(np.concatenate(answers).mean())
 
 
 class Process:
