@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 from collections.abc import Iterator
@@ -12,7 +13,6 @@ import pytest
 import yaml
 from drive import Drive
 from launch_graph import by_executable, nodes
-from rosidl_runtime_py.utilities import get_message
 from urdf_parser_py.urdf import URDF
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -23,16 +23,26 @@ FRAMES = {"machine", "workpiece", "tool"}
 
 @pytest.fixture(scope="module")
 def topics(real: Drive) -> dict[str, str]:
-    """Types of what the node publishes, by topic, and of the model that robot_state_publisher adds."""
-    listed = real.node.get_publisher_names_and_types_by_node("virtual_axes", "/")
-    return {name: types[0] for name, types in listed}
+    """Types of the node's topics."""
+
+    def listed() -> dict[str, str]:
+        return {name: types[0] for name, types in real.node.get_topic_names_and_types()}
+
+    real.wait_for(lambda: {"/virtual_axes/tool_path", "/virtual_axes/tool_path_setpoint"} <= listed().keys(), 10, "topics")
+    return listed()
+
+
+def fields_of(kind: str) -> dict[str, str]:
+    """Fields of a message type with their types."""
+    package, _, name = kind.split("/")
+    return getattr(importlib.import_module(f"{package}.msg"), name).get_fields_and_field_types()
 
 
 def type_at(kind: str, fields: list[str]) -> str:
     """Follow a path of fields through a message; returns the type at its end."""
     for field in fields:
         name, index = re.fullmatch(r"(\w+)(?:\[(\d+)\])?", field).groups()
-        kind = get_message(kind).get_fields_and_field_types()[name]
+        kind = fields_of(kind)[name]
         if index is not None:
             assert kind.startswith("sequence<"), field
             assert int(index) < JOINTS, field
