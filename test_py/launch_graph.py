@@ -6,9 +6,10 @@ import runpy
 from pathlib import Path
 
 import launch
-from drive import node_binary
 from launch_ros import substitutions
 from launch_ros.actions import Node as NodeAction
+
+from drive import node_binary
 
 ROOT = Path(__file__).resolve().parent.parent
 substitutions.PROGRAMS["virtual_axes", "virtual_axes"] = str(node_binary().with_name("virtual_axes"))

@@ -10,13 +10,14 @@ from pathlib import Path
 import launch
 import pytest
 import yaml
-from drive import Drive, Node, joint_trajectory, node_binary
 from geometry_msgs.msg import PoseStamped
 from launch.actions import DeclareLaunchArgument, LogInfo
-from launch_graph import ROOT, actions, by_executable, description, nodes
 from launch_ros import substitutions
 from launch_ros.actions import Node as NodeAction
 from urdf_parser_py.urdf import URDF
+
+from drive import Drive, Node, joint_trajectory, node_binary
+from launch_graph import ROOT, actions, by_executable, description, nodes
 
 ONE, TWO = "virtual_axes.launch.py", "two_machines.launch.py"
 
@@ -156,9 +157,7 @@ def test_two_machines_run_in_one_domain():
     assert len(found["rviz2"]) == 1
     with ExitStack() as stack:
         first = process(left, stack)
-        drives = [
-            stack.enter_context(Drive(process=one)) for one in (first, process(right, stack, first.domain_id))
-        ]
+        drives = [stack.enter_context(Drive(process=one)) for one in (first, process(right, stack, first.domain_id))]
         assert [set(drive.latest("controller").values()) for drive in drives] == [{"cascade"}, {"gpc"}]
         poses: list[PoseStamped] = []
         drives[1].node.create_subscription(PoseStamped, "/right/virtual_axes/tool_pose", poses.append, 10)
@@ -204,6 +203,7 @@ def test_what_launch_needs_is_installed():
 def test_the_command_says_where_the_tool_is():
     """A joint that the machine does not have is refused, with status 2 and no output."""
     program = node_binary().with_name("virtual_axes")
-    answer = subprocess.run([program, "pose", "--joints", "q=1"], capture_output=True, text=True, timeout=20, check=False)
+    command = [program, "pose", "--joints", "q=1"]
+    answer = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
     assert (answer.returncode, answer.stdout) == (2, "")
     assert "q" in answer.stderr and "x, y, z, a, c" in answer.stderr

@@ -11,9 +11,10 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
+from urdf_parser_py.urdf import URDF
+
 from drive import Drive
 from launch_graph import by_executable, nodes
-from urdf_parser_py.urdf import URDF
 
 ROOT = Path(__file__).resolve().parent.parent
 JOINTS = 5
@@ -28,7 +29,8 @@ def topics(real: Drive) -> dict[str, str]:
     def listed() -> dict[str, str]:
         return {name: types[0] for name, types in real.node.get_topic_names_and_types()}
 
-    real.wait_for(lambda: {"/virtual_axes/tool_path", "/virtual_axes/tool_path_setpoint"} <= listed().keys(), 10, "topics")
+    paths = {"/virtual_axes/tool_path", "/virtual_axes/tool_path_setpoint"}
+    real.wait_for(lambda: paths <= listed().keys(), 10, "topics of the paths")
     return listed()
 
 

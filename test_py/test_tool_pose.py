@@ -8,11 +8,14 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from drive import DEEP_QOS, TSP_NS, Drive, Node, ballbar, joint_trajectory, to_ns
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 
+from drive import DEEP_QOS, TSP_NS, Drive, Node, ballbar, joint_trajectory, to_ns
+
 JOINTS = ["x", "y", "z", "a", "c"]
+LENGTH = 850
+"""Poses of a path: more than 64 kB."""
 SPACING = 1e-4
 """From one pose of a path to the next at least, m."""
 # Every offset of the kinematics, each another, mm.
@@ -109,9 +112,10 @@ def matrix_of(q: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def tool() -> Iterator[Tool]:
-    """A machine with every offset, as fast as it goes."""
+    """A machine with every offset, as fast as it goes, whose paths have at most LENGTH poses."""
     offsets = [text for key, value in OFFSETS.items() for text in ("-p", f"kinematics.{key}_mm:={value}")]
     arguments = ["-p", "time:=fast", "-p", "tool_path_rate:=10.0", "-p", "workpiece_frame:=left/workpiece"]
+    arguments += ["-p", f"tool_path_length:={LENGTH}"]
     with Node([*arguments, *offsets]) as process, Drive(process=process) as drive:
         yield Tool(drive)
 
@@ -177,17 +181,15 @@ def test_the_paths_show_the_contour_error_of_the_ballbar(fast: Drive):
     assert np.linalg.norm(tips(actual) - tips(setpoint), axis=1).max() < 150e-6
 
 
-def test_a_long_path_keeps_its_newest_part_and_arrives_whole(start: Callable[..., Drive]):
-    """More than 64 kB: the reader gets every pose, no more than asked for, no closer than the spacing."""
-    drive = start("-p", "time:=fast", "-p", "tool_path_length:=850")
-    tool = Tool(drive)
+def test_a_long_path_keeps_its_newest_part_and_arrives_whole(tool: Tool):
+    """The reader gets every pose, no more than asked for, no closer than the spacing."""
     times = np.arange(0, 6.001, 0.006)
     x = 0.1 * np.sin(2 * np.pi * times / 2) * np.clip(np.minimum(times, 6 - times), 0, 1)
-    recording = drive.run(joint_trajectory(["x"], times, x[:, None]), settle=0.2)
+    recording = tool.drive.run(joint_trajectory(["x"], times, x[:, None]), settle=0.2)
     end = recording.start + 6_000_000_000
     actual, setpoint = tool.paths_with(lambda path: stamps(path)[-1] > end, "the end of the path")
     assert len(actual.poses) == len(setpoint.poses)
-    assert 840 <= len(actual.poses) <= 850
+    assert LENGTH - 1 <= len(actual.poses) <= LENGTH
     assert np.diff(stamps(actual)).min() > 0
     steps = [np.linalg.norm(np.diff(tips(path), axis=0), axis=1)[:-1] for path in (actual, setpoint)]
     assert np.maximum(*steps).min() >= SPACING * (1 - 1e-9)
