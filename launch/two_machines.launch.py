@@ -50,9 +50,7 @@ def start(context: LaunchContext) -> list[object]:
             **{key: argument[key] for key in ("time", "robot_state_publisher", "log_level")},
         }
         # In a group: the arguments of one must not reach the other.
-        include = IncludeLaunchDescription(
-            PythonLaunchDescriptionSource(source), launch_arguments=of_side.items()
-        )
+        include = IncludeLaunchDescription(PythonLaunchDescriptionSource(source), launch_arguments=of_side.items())
         actions.append(GroupAction([include]))
         if argument["robot_state_publisher"] == "true":
             x = float(argument["distance"]) * place
@@ -66,9 +64,7 @@ def start(context: LaunchContext) -> list[object]:
             )
     if argument["rviz"] == "true":
         config = SHARE / "rviz" / "two_machines.rviz"
-        actions.append(
-            Node(package="rviz2", executable="rviz2", arguments=["-d", str(config)], parameters=[clock])
-        )
+        actions.append(Node(package="rviz2", executable="rviz2", arguments=["-d", str(config)], parameters=[clock]))
     return actions
 
 

@@ -60,7 +60,6 @@ def machine_file(machine: str) -> Path:
 def joints_of(machine: Path) -> list[str]:
     """Names of a machine's joints."""
 
-
     def found(node: object) -> list[str]:
         if not isinstance(node, dict):
             return []

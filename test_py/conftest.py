@@ -7,8 +7,10 @@ target/release/virtual_axes_node, another with VIRTUAL_AXES_NODE.
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
 
@@ -16,6 +18,9 @@ import pytest
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
     os.environ.pop(variable, None)
+
+# launch is not on PyPI: what stands in for it is imported by the names of the real one.
+sys.path.insert(0, str(Path(__file__).parent / "launch_standin"))
 
 from drive import Drive, Node, node_binary  # noqa: E402
 

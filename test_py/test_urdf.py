@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from drive import node_binary
 from urdf_parser_py.urdf import URDF, Joint
+
+from drive import node_binary
 
 ROOT = Path(__file__).resolve().parent.parent
 MACHINES = ["mikron_ucp710", "linear_motor_center"]
