@@ -26,7 +26,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult
 
-from drive import DEEP_QOS, NANOSECONDS, RESULT_QOS, TSP_NS, Drive, Node, joint_trajectory, node_binary, to_ns
+from drive import DEEP_QOS, NANOSECONDS, RESULT_QOS, TSP_NS, Drive, Node, joint_trajectory, node_binary
 
 MEGABYTE = 1_000_000
 STATES, CURRENTS, DRIVES = "/joint_states", "/virtual_axes/motor_currents", "/virtual_axes/drive_states"
@@ -279,7 +279,11 @@ def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive
     )
     assert ended.level == DiagnosticStatus.WARN
     assert ended.message == "recording has ended: it has reached 1 MB"
-    drive.wait_for(lambda: int(values(recording_status(drive))["left_out"]) > int(values(ended)["left_out"]), 10, "more")
+
+    def left_out(status: DiagnosticStatus) -> int:
+        return int(values(status)["left_out"])
+
+    drive.wait_for(lambda: left_out(recording_status(drive)) > left_out(ended), 10, "more")
     assert 0.9 * MEGABYTE < path.stat().st_size <= MEGABYTE
     messages, _, types = read(path)
     assert types["/clock"] == "rosgraph_msgs/msg/Clock" and len(messages["/clock"]) > 100
@@ -299,7 +303,8 @@ def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
     with Node(ros_args, binary=binary) as process, Drive(process=process) as drive:
         noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (1500, 2))
         times = np.arange(1, len(noise) + 1) * (2 * TSP_NS / NANOSECONDS)
-        assert drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120).result.status == TrajectoryResult.COMPLETED
+        result = drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120).result
+        assert result.status == TrajectoryResult.COMPLETED
         ended = drive.wait_for(
             lambda: (status := recording_status(drive)) and values(status)["recording"] == "false" and status,
             20,
