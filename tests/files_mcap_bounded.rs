@@ -28,7 +28,7 @@ fn empty() -> u64 {
 
 /// A message of `length` bytes: noise that no compression makes shorter, or all the same.
 fn data(length: usize, is_noise: bool, seed: u64) -> Vec<u8> {
-    let mut state = seed | 1;
+    let mut state = 2 * seed + 1;
     let mut noise = || {
         state ^= state << 13;
         state ^= state >> 7;
@@ -165,6 +165,7 @@ fn a_full_disk_leaves_the_chunks_before_it_readable() {
     let whole = recording.whole() as usize;
     assert!(recording.finish().is_err());
     let file = disk.bytes.lock().expect("one thread")[..whole].to_vec();
+    // Thirty do not fit, and two chunks of ten do.
     assert_eq!((flushed, read(&file).0), (20, 20));
 }
 

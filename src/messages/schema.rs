@@ -93,6 +93,7 @@ trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_reference
 trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_feedback
 trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_error
 trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_output
+float64 speed_scaling_factor
 ";
 
 /// A type of message, with its definition.

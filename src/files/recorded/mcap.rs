@@ -48,7 +48,10 @@ pub(super) fn read(
     if ending == Ending::Unfinished {
         findings.push(Finding::warning(
             "unfinished",
-            format!("{name}: it has no end, its writer was killed: what it holds is read, the last second may be missing"),
+            format!(
+                "{name}: it has no end, its writer was killed: what it holds is read, the last second may be \
+                 missing"
+            ),
             "let the recorder finish",
         ));
     }
