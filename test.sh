@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Every test: Rust, the message build, rclpy against the real node. A line per stage.
-# Some stages run side by side; on two cores it takes some 17 minutes from nothing.
+# Every test: Rust, the message build, rclpy against the real node. A line per stage; some run side by side.
 #
 #     ./test.sh [arguments for pytest]
 set -euo pipefail
@@ -96,11 +95,11 @@ finish() {
   exit "$1"
 }
 
-# Two at a time, each file of tests (which may share a node) in one of them.
+# Two files at a time, since the tests of a file share nodes; in their order, which ends with short ones.
 python_tests() (
   # shellcheck source=/dev/null
   source "$root/.build/env.sh"
-  python -m pytest test_py -n 2 --dist loadscope "$@"
+  python -m pytest test_py -n 2 --dist loadscope --no-loadscope-reorder "$@"
 )
 
 # The set-up waits for the network while cargo works. The nodes in real time wait for their clocks most of

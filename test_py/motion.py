@@ -73,5 +73,11 @@ def start_swing(drive: Drive, joints: Sequence[str] = ("x",), duration: float = 
 def go_home(drive: Drive) -> None:
     """Rest at the start position, old samples dropped."""
     drive.reset()
+
+    def at_home() -> bool:
+        return not any(value for field in ("position", "psec") for value in drive.latest(field).values())
+
+    # On a busy machine samples from before the reset are still to come.
+    drive.wait_for(at_home, 5, "rest at home")
     drive.wait_until(drive.now() + 2 * TSP_NS, 5)
     drive.forget()

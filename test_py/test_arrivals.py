@@ -63,7 +63,7 @@ def test_stamp_in_the_future_waits_and_the_present_one_goes_on(home: Drive):
 def test_start_between_two_periods_is_the_later_one(home: Drive):
     """So points on the trajectory's own grid stay on it."""
     time, position = swing(0.6)
-    stamp = home.now() + 50 * TSP_NS + 1_234_567
+    stamp = home.now() + NANOSECONDS + 1_234_567
     accepted = home.accept(joint_trajectory(["x"], time, position, stamp=stamp))
     assert to_ns(accepted.start) == on_grid(home, stamp)
     assert_psec(home, to_ns(accepted.start), {"x": position})
@@ -138,7 +138,7 @@ def test_chunks_of_a_long_path_join_without_a_gap(home: Drive):
     """Each chunk's stamp is its absolute start; psec is the whole path."""
     time, position = swing(4.8)
     size = 200
-    origin = on_grid(home, home.now() + NANOSECONDS // 2)
+    origin = on_grid(home, home.now() + NANOSECONDS)
     accepted = []
     for begin in range(0, len(time), size):
         part = slice(begin, begin + size)
