@@ -16,11 +16,12 @@ from action_msgs.srv import CancelGoal
 from builtin_interfaces.msg import Duration, Time
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointTolerance
-from drive import NANOSECONDS, SETTLE_S, Drive
 from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from trajectory_msgs.msg import JointTrajectory
 from unique_identifier_msgs.msg import UUID
+
+from drive import NANOSECONDS, SETTLE_S, Drive
 
 Result = FollowJointTrajectory.Result
 STATUS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
