@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -18,6 +19,9 @@ for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
     os.environ.pop(variable, None)
 
 from drive import Drive, Node, node_binary  # noqa: E402
+
+if TYPE_CHECKING:
+    from action import Follow
 
 
 def pytest_sessionstart() -> None:
@@ -38,6 +42,25 @@ def fast() -> Iterator[Drive]:
     """Axes as fast as they can, shared by a module."""
     with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
         yield drive
+
+
+@pytest.fixture(scope="module")
+def following() -> Iterator[Follow]:
+    """Axes and a client of their action, with feedback at 50 Hz, shared by a module."""
+    # Needs control_msgs, which the other tests do without.
+    from action import Follow
+
+    args = ["-p", "time:=fast", "-p", "action_monitor_rate:=50.0"]
+    with Node(args) as process, Drive(process=process) as drive, Follow(drive) as follow:
+        yield follow
+
+
+@pytest.fixture
+def follow(following: Follow) -> Follow:
+    """The same, with the axes at rest at home."""
+    following.drive.reset()
+    following.drive.forget()
+    return following
 
 
 @pytest.fixture
