@@ -11,16 +11,19 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from action_msgs.msg import GoalInfo, GoalStatusArray
 from action_msgs.srv import CancelGoal
 from builtin_interfaces.msg import Duration, Time
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointTolerance
-from drive import NANOSECONDS, SETTLE_S, Drive
 from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from trajectory_msgs.msg import JointTrajectory
 from unique_identifier_msgs.msg import UUID
+from virtual_axes.msg import TrajectoryResult
+
+from drive import NANOSECONDS, SETTLE_S, Drive, joint_trajectory
 
 Result = FollowJointTrajectory.Result
 STATUS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -137,3 +140,34 @@ class Follow:
         """What the status topic said last about a goal."""
         listed = self.statuses[-1].status_list if self.statuses else []
         return next((entry.status for entry in listed if bytes(entry.goal_info.goal_id.uuid) == uuid), None)
+
+
+def line(names: list[str], to: list[float], duration: float) -> JointTrajectory:
+    """From home to `to` by a quintic, at rest at both ends."""
+    rest = [[0.0] * len(names)] * 2
+    return joint_trajectory(names, [0, duration], [[0.0] * len(names), to], rest, rest)
+
+
+def wave(duration: float = 600.0, joint: str = "x") -> JointTrajectory:
+    """A long motion there and back, at most 0.15 m/s and 0.225 m/s²."""
+    time = np.arange(0, duration + 0.05, 0.1)
+    # Rises over the first 2 s, so that it begins at rest.
+    phase = 1.5 * time
+    size = 0.1 * np.clip(time / 2, 0, 1) ** 2
+    rate = 0.1 * np.where(time < 2, time / 2, 0)
+    positions = size * np.sin(phase)
+    velocities = rate * np.sin(phase) + 1.5 * size * np.cos(phase)
+    velocities[-1] = 0.0
+    return joint_trajectory([joint], time, positions, velocities)
+
+
+def results_of(follow: Follow, sent: Sent) -> list[TrajectoryResult]:
+    """What `~/trajectory_result` said of a goal so far."""
+    return [result for result in follow.drive.results() if bytes(result.goal_id) == sent.id]
+
+
+def ending(follow: Follow, sent: Sent) -> TrajectoryResult:
+    """The last word on `~/trajectory_result`."""
+    return follow.drive.wait_for(
+        lambda: [r for r in results_of(follow, sent) if r.status != TrajectoryResult.ACCEPTED], 10, "its result"
+    )[0]

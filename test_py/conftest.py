@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -23,6 +24,9 @@ for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
 sys.path.insert(0, str(Path(__file__).parent / "launch_standin"))
 
 from drive import Drive, Node, node_binary  # noqa: E402
+
+if TYPE_CHECKING:
+    from action import Follow
 
 
 def pytest_sessionstart() -> None:
@@ -43,6 +47,25 @@ def fast() -> Iterator[Drive]:
     """Axes as fast as they can, shared by a module."""
     with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
         yield drive
+
+
+@pytest.fixture(scope="module")
+def following() -> Iterator[Follow]:
+    """Axes and a client of their action, with feedback at 50 Hz, shared by a module."""
+    # Needs control_msgs, which the other tests do without.
+    from action import Follow
+
+    args = ["-p", "time:=fast", "-p", "action_monitor_rate:=50.0"]
+    with Node(args) as process, Drive(process=process) as drive, Follow(drive) as follow:
+        yield follow
+
+
+@pytest.fixture
+def follow(following: Follow) -> Follow:
+    """The same, with the axes at rest at home."""
+    following.drive.reset()
+    following.drive.forget()
+    return following
 
 
 @pytest.fixture

@@ -10,15 +10,18 @@ use crate::units::{Nanoseconds, seconds};
 /// `(PSEC_floor(k − α/Tsp) − the one before) / Tsp`.
 #[derive(Debug, Default)]
 pub struct SetpointVelocities {
-    before: Option<Nanoseconds>,
+    /// Time and resets of the frame before.
+    before: Option<(Nanoseconds, u64)>,
     positions: Vec<f64>,
     velocities: Vec<f64>,
 }
 
 impl SetpointVelocities {
-    /// Takes the next frame in; m/s or rad/s per axis, 0 in the first.
+    /// Takes the next frame in; m/s or rad/s per axis, 0 in the first, after a reset and where the
+    /// clock went backwards.
     pub fn update(&mut self, frame: &Frame) -> &[f64] {
-        let elapsed = self.before.map(|before| seconds(frame.time - before)).filter(|&time| time > 0.0);
+        let before = self.before.filter(|&(_, resets)| resets == frame.resets);
+        let elapsed = before.map(|(time, _)| seconds(frame.time - time)).filter(|&time| time > 0.0);
         self.velocities.clear();
         self.velocities.extend(frame.samples.iter().enumerate().map(|(axis, sample)| {
             match (elapsed, self.positions.get(axis)) {
@@ -28,7 +31,7 @@ impl SetpointVelocities {
         }));
         self.positions.clear();
         self.positions.extend(frame.samples.iter().map(|sample| sample.delayed_psec));
-        self.before = Some(frame.time);
+        self.before = Some((frame.time, frame.resets));
         &self.velocities
     }
 }
@@ -92,7 +95,8 @@ mod tests {
     fn frame(instant: i64, setpoint: f64) -> Frame {
         let sample =
             AxisSample { delayed_psec: setpoint, position: 0.25, velocity: 1.0, ..Default::default() };
-        Frame { instant, time: instant * MILLISECOND_NS, samples: vec![AxisSample::default(), sample] }
+        let samples = vec![AxisSample::default(), sample];
+        Frame { instant, time: instant * MILLISECOND_NS, samples, resets: 0 }
     }
 
     #[test]
@@ -101,6 +105,16 @@ mod tests {
         assert_eq!(velocities.update(&frame(5, 0.5)), [0.0, 0.0]);
         assert_eq!(velocities.update(&frame(6, 0.5625)), [0.0, 62.5]);
         assert_eq!(velocities.update(&frame(8, 0.6875)), [0.0, 62.5]);
+    }
+
+    #[test]
+    fn a_reset_and_a_clock_that_goes_backwards_are_no_motion() {
+        let mut velocities = SetpointVelocities::default();
+        velocities.update(&frame(5, 0.5));
+        assert_eq!(velocities.update(&Frame { resets: 1, ..frame(6, 0.0) }), [0.0, 0.0]);
+        assert_eq!(velocities.update(&Frame { resets: 1, ..frame(4, 0.25) }), [0.0, 0.0]);
+        assert_eq!(velocities.update(&Frame { resets: 1, ..frame(5, 0.25) }), [0.0, 0.0]);
+        assert_eq!(velocities.update(&Frame { resets: 1, ..frame(6, 0.5) }), [0.0, 250.0]);
     }
 
     #[test]

@@ -140,7 +140,7 @@ impl ActionServer {
     pub async fn serve(self, work: Work) {
         let ActionServer { send_goal, cancel_goal, get_result } = &self;
         let mut requests = select_all([
-            stream(send_goal, Request::Goal),
+            stream(send_goal, |id, request| Request::Goal(id, Box::new(request))),
             stream(cancel_goal, Request::Cancel),
             stream(get_result, Request::Result),
         ]);
@@ -220,7 +220,7 @@ impl Ending {
 }
 
 enum Request {
-    Goal(RmwRequestId, SendGoalRequest),
+    Goal(RmwRequestId, Box<SendGoalRequest>),
     Cancel(RmwRequestId, CancelGoalRequest),
     Result(RmwRequestId, GetResultRequest),
     Unreadable(String),
@@ -240,7 +240,7 @@ struct Task<'a> {
 impl Task<'_> {
     async fn answer(&mut self, request: Request) {
         match request {
-            Request::Goal(request, message) => self.take_goal(request, message).await,
+            Request::Goal(request, message) => self.take_goal(request, *message).await,
             Request::Cancel(request, message) => self.cancel(request, &message).await,
             Request::Result(request, message) => {
                 if let Answer::Now(response) = self.goals.result(&message.goal_id.uuid, request) {
