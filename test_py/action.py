@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,8 @@ from virtual_axes.msg import TrajectoryResult
 from drive import NANOSECONDS, SETTLE_S, Drive, joint_trajectory
 
 Result = FollowJointTrajectory.Result
+FEEDBACK_QOS = QoSProfile(depth=1000)
+"""Deep enough for what a node in `fast` says while this process has other things to do."""
 STATUS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -49,6 +51,15 @@ def goal(
     )
 
 
+def in_executor(drive: Drive, call: Callable[[], Any]) -> Any:
+    """What `call()` gives in the thread that spins: from another one rclpy's ActionClient can meet a
+    response before it has noted the request, and drops it.
+    """
+    task = drive.node.executor.create_task(call)
+    drive.wait_for(task.done, 20.0, "turn of the executor")
+    return task.result()
+
+
 class Sent:
     """A goal that was sent, and what came back so far."""
 
@@ -57,8 +68,12 @@ class Sent:
         self._drive = drive
         self._client = client
         self.feedback: list[FollowJointTrajectory.Feedback] = []
-        self._accepting = client.send_goal_async(
-            message, feedback_callback=lambda received: self.feedback.append(received.feedback), goal_uuid=uuid
+
+        def keep(received: Any) -> None:
+            self.feedback.append(received.feedback)
+
+        self._accepting = in_executor(
+            drive, lambda: client.send_goal_async(message, feedback_callback=keep, goal_uuid=uuid)
         )
 
     @property
@@ -72,9 +87,14 @@ class Sent:
         """Its name."""
         return bytes(self.handle.goal_id.uuid)
 
+    def ask(self) -> Any:
+        """Ask for status and result; a future."""
+        handle = self.handle
+        return in_executor(self._drive, handle.get_result_async)
+
     def ended(self, timeout: float = 30.0) -> Any:
         """Status and result."""
-        future = self.handle.get_result_async()
+        future = self.ask()
         self._drive.wait_for(future.done, timeout, "result of a goal")
         return future.result()
 
@@ -93,7 +113,8 @@ class Sent:
 
     def cancel(self) -> CancelGoal.Response:
         """Ask for its end."""
-        future = self.handle.cancel_goal_async()
+        handle = self.handle
+        future = in_executor(self._drive, handle.cancel_goal_async)
         self._drive.wait_for(future.done, 20.0, "answer to a cancel request")
         return future.result()
 
@@ -106,7 +127,9 @@ class Follow:
         self.name = name or f"{drive.target}/follow_joint_trajectory"
         self.drive = drive
         self.statuses: list[GoalStatusArray] = []
-        self._client = ActionClient(drive.node, FollowJointTrajectory, self.name)
+        self._client = ActionClient(
+            drive.node, FollowJointTrajectory, self.name, feedback_sub_qos_profile=FEEDBACK_QOS
+        )
         self._cancelling = drive.node.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
         self._statuses = drive.node.create_subscription(
             GoalStatusArray, f"{self.name}/_action/status", self.statuses.append, STATUS_QOS

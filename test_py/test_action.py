@@ -288,7 +288,7 @@ def test_a_goal_under_way_is_aborted_when_the_node_ends(start: Callable[..., Dri
     with Follow(drive, name="/cell/move") as follow:
         sent = follow.send(goal(wave(60)))
         sent.wait_for_feedback(1)
-        waiting = sent.handle.get_result_async()
+        waiting = sent.ask()
         # The request has reached the node long before that.
         sent.wait_for_feedback(len(sent.feedback) + 10)
         assert follow.status_of(sent.id) == GoalStatus.STATUS_EXECUTING
