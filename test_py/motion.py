@@ -78,6 +78,6 @@ def go_home(drive: Drive) -> None:
         return not any(value for field in ("position", "psec") for value in drive.latest(field).values())
 
     # On a busy machine samples from before the reset are still to come.
-    drive.wait_for(at_home, 5, "rest at home")
+    drive.wait_for(at_home, 60, "rest at home")
     drive.wait_until(drive.now() + 2 * TSP_NS, 5)
     drive.forget()

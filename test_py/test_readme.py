@@ -200,7 +200,8 @@ def machine(seen: tuple[Run, Drive]) -> Machine:
     """Parameters of the node that was started, from the README and from the file that it read."""
     run, drive = seen
     file = yaml.safe_load((run.machine or DEFAULT_MACHINE).read_text(encoding="utf-8"))
-    given = {**flat(file["/**"]["ros__parameters"]), **run.settings}
+    settings = {key: yaml.safe_load(value) for key, value in run.settings.items()}
+    given = {**flat(file["/**"]["ros__parameters"]), **settings}
     joints = {joint: kinds_of(joint, given) for joint in given["joints"]}
     rows = [(name, row) for row in parameters() for name in row.names(joints)]
     assert len(dict(rows)) == len(rows), "a parameter has two rows"

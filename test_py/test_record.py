@@ -15,10 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from control_msgs.msg import JointTrajectoryControllerState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
+from nav_msgs.msg import Path as ToolPath
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message
@@ -38,6 +41,10 @@ KINDS = {
     RESULTS: TrajectoryResult,
     "/diagnostics": DiagnosticArray,
     "/rosout": Log,
+    "/virtual_axes/controller_state": JointTrajectoryControllerState,
+    "/virtual_axes/tool_pose": PoseStamped,
+    "/virtual_axes/tool_path": ToolPath,
+    "/virtual_axes/tool_path_setpoint": ToolPath,
 }
 """What is not sensor_msgs/JointState."""
 NOT_RECORDED = {"/parameter_events"}
@@ -127,10 +134,10 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
     path = tmp_path_factory.mktemp("record") / "session.mcap"
     with Node(["-p", f"record:={path}", "-p", "qos.drive_states.depth:=7"]) as process:
         drive = Drive(process=process)
-        heard: dict[str, list[bytes]] = {RESULTS: [], "/diagnostics": [], "/rosout": []}
-        profiles = {RESULTS: RESULT_QOS, "/diagnostics": DEEP_QOS, "/rosout": RESULT_QOS}
+        heard: dict[str, list[bytes]] = {topic: [] for topic in KINDS if topic not in ("/psec", CURRENTS, DRIVES)}
         for topic, store in heard.items():
-            drive.node.create_subscription(KINDS[topic], topic, drive._keep(store), profiles[topic], raw=True)
+            profile = RESULT_QOS if topic in (RESULTS, "/rosout") else DEEP_QOS
+            drive.node.create_subscription(KINDS[topic], topic, drive._keep(store), profile, raw=True)
         sent: dict[str, list[bytes]] = {"/psec": [], "/psec_stream": [], "/load": []}
         trajectory = joint_trajectory(["x", "c"], [0.0, 0.4], [[0.0, 0.0], [0.004, 0.1]])
         drive.run(trajectory, settle=0.1)
@@ -150,7 +157,8 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
             (drive.node.get_subscriber_names_and_types_by_node, drive.node.get_subscriptions_info_by_topic),
         ):
             for topic, (kind, *_) in of_node(name, namespace):
-                if topic in NOT_RECORDED:
+                # The action's topics are hidden: its result is on `~/trajectory_result`.
+                if topic in NOT_RECORDED or "/_action/" in topic:
                     continue
                 profiles_found = [info.qos_profile for info in infos(topic) if info.node_name == name]
                 ((reliability, durability),) = {(qos.reliability, qos.durability) for qos in profiles_found}

@@ -221,7 +221,7 @@ def test_a_trajectory_that_takes_joints_from_a_stream_is_told_to_it(real: Drive)
     hold = joint_trajectory(["x", "z"], [0.0, 0.1], [[0.001, 0.0], [0.002, 0.0]])
     told = told_when(real, lambda: real.run(hold))
     assert [(result.status, result.name) for result in told] == [(R.DISPLACED, ["x"])]
-    assert re.fullmatch(r"axes were taken over by trajectory \d+", told[0].text)
+    assert re.fullmatch(r"axes were taken over by trajectory \d+ of psec", told[0].text)
 
 
 def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):

@@ -174,7 +174,7 @@ impl Results {
             known.origin.clone()
         };
         if let Origin::Action { goal_id, .. } = origin {
-            self.tell(GoalEvent::Started(goal_id, accepted.start));
+            self.tell(GoalEvent::Started(goal_id));
         }
         let text = if accepted.joined_late {
             let late = seconds(time - accepted.start);

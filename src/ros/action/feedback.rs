@@ -9,17 +9,18 @@ use crate::messages::{FeedbackMessage, FollowJointTrajectoryFeedback, duration, 
 use crate::ros::outputs::Output;
 use crate::ros::pace::Frame;
 use crate::ros::setpoints::Comparison;
+use crate::trajectory::MotionId;
 use crate::units::{Nanoseconds, seconds};
 
-/// A goal that the axes follow.
+/// A goal that the axes follow or will follow.
 #[derive(Debug, Clone)]
 pub struct Running {
     /// Which one.
     pub id: GoalId,
+    /// Its motion.
+    pub motion: MotionId,
     /// Its joints, in its order, as places in the machine.
     pub places: Vec<usize>,
-    /// When its time 0 is, ns.
-    pub start: Nanoseconds,
 }
 
 /// Position instants from one feedback to the next at `rate` Hz; `period` is Tsp, ns.
@@ -46,15 +47,23 @@ impl Feedback {
             return;
         }
         let goals = Arc::clone(&self.goals.borrow());
-        for goal in goals.iter().filter(|goal| goal.start <= frame.time) {
-            self.output.send(message(goal, frame, velocities, &self.joints)).await;
+        for &(motion, start) in frame.motions.iter().filter(|(_, start)| *start <= frame.time) {
+            if let Some(goal) = goals.iter().find(|goal| goal.motion == motion) {
+                self.output.send(message(goal, start, frame, velocities, &self.joints)).await;
+            }
         }
     }
 }
 
-fn message(goal: &Running, frame: &Frame, velocities: &[f64], joints: &[String]) -> FeedbackMessage {
+fn message(
+    goal: &Running,
+    start: Nanoseconds,
+    frame: &Frame,
+    velocities: &[f64],
+    joints: &[String],
+) -> FeedbackMessage {
     let mut compared = Comparison::of(frame, velocities, goal.places.iter().copied());
-    let elapsed = duration(frame.time - goal.start);
+    let elapsed = duration(frame.time - start);
     for point in [&mut compared.desired, &mut compared.actual, &mut compared.error] {
         point.time_from_start = elapsed.clone();
     }

@@ -5,13 +5,12 @@ use super::goals::State;
 use crate::messages::{ErrorCode, FollowJointTrajectoryResult};
 use crate::simulation::Outcome;
 use crate::trajectory::{Code, Rejection};
-use crate::units::Nanoseconds;
 
 /// What became of a goal that was handed to the simulation.
 #[derive(Debug)]
 pub enum GoalEvent {
-    /// The axes follow it, from this time on, ns.
-    Started(GoalId, Nanoseconds),
+    /// The axes follow it.
+    Started(GoalId),
     /// The axes cannot follow it.
     Refused(GoalId, Rejection),
     /// It has ended; the text says how.

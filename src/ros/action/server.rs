@@ -277,12 +277,9 @@ impl Task<'_> {
                 let motion = next_id(&self.tell.ids);
                 let trajectory = Arc::new(trajectory);
                 self.goals.offered(&id, motion);
-                self.running.push(Running {
-                    id,
-                    places: trajectory.joints().to_vec(),
-                    // Not before it is known when it starts.
-                    start: i64::MAX,
-                });
+                // Before the simulation is asked, so that the first samples of it find the goal.
+                self.running.push(Running { id, motion, places: trajectory.joints().to_vec() });
+                self.show_running();
                 self.tell.results.expect(motion, origin, Arc::clone(&trajectory)).await;
                 let offer = Command::Offer { id: motion, trajectory, tolerances: Some(Box::new(tolerances)) };
                 // The simulation is gone only when the node shuts down.
@@ -313,13 +310,7 @@ impl Task<'_> {
     /// Follows what becomes of goals.
     async fn note(&mut self, event: GoalEvent) {
         match event {
-            GoalEvent::Started(id, start) => {
-                self.goals.started(&id);
-                if let Some(running) = self.running.iter_mut().find(|running| running.id == id) {
-                    running.start = start;
-                }
-                self.show_running();
-            }
+            GoalEvent::Started(id) => self.goals.started(&id),
             GoalEvent::Refused(id, rejection) => {
                 self.end(&id, State::Aborted, outcome::refused(&rejection));
             }

@@ -1,5 +1,6 @@
 //! The simulation, its commands and its reports, whatever it keeps step with.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::{mpsc, watch};
@@ -19,6 +20,8 @@ pub(super) struct Axes {
     stream: StreamLog,
     /// How often the axes have been reset.
     resets: u64,
+    /// The accepted motions that have not ended, with the times of their starts, ns.
+    motions: Arc<[(MotionId, Nanoseconds)]>,
 }
 
 impl Axes {
@@ -28,7 +31,7 @@ impl Axes {
         health: watch::Sender<Health>,
     ) -> Self {
         health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
-        Axes { simulation, reports, health, stream: StreamLog::default(), resets: 0 }
+        Axes { simulation, reports, health, stream: StreamLog::default(), resets: 0, motions: Arc::from([]) }
     }
 
     pub(super) fn simulation(&self) -> &Simulation {
@@ -46,7 +49,13 @@ impl Axes {
         self.simulation.step();
         self.stream.watch(&self.simulation);
         let samples = self.simulation.samples().to_vec();
-        Frame { instant, time: self.simulation.time_of(instant), samples, resets: self.resets }
+        Frame {
+            instant,
+            time: self.simulation.time_of(instant),
+            samples,
+            resets: self.resets,
+            motions: Arc::clone(&self.motions),
+        }
     }
 
     /// Tells what has become of the instant that was computed last.
@@ -66,6 +75,7 @@ impl Axes {
             let _ = self.reports.send(Report::StreamEnded(now, end, joints));
         }
         for end in self.simulation.take_ends() {
+            self.motions = self.motions.iter().copied().filter(|(id, _)| *id != end.id).collect();
             // The receiver lives as long as the node; when it is gone, so is whoever wants to know.
             let _ = self.reports.send(Report::Ended(end));
         }
@@ -96,7 +106,7 @@ impl Axes {
 
     /// Takes a command; the next step is the first to show it.
     pub(super) fn obey(&mut self, command: Command) {
-        let Axes { simulation, reports, stream, resets, .. } = self;
+        let Axes { simulation, reports, stream, resets, motions, .. } = self;
         // Between two instants, the time is that of the first.
         let now = simulation.time_of(simulation.next_instant() - 1);
         match command {
@@ -109,6 +119,9 @@ impl Axes {
                     start: simulation.time_of(admission.start_k),
                     joined_late: admission.joined_late,
                 });
+                if let Ok(accepted) = &decision {
+                    *motions = motions.iter().copied().chain([(id, accepted.start)]).collect();
+                }
                 let _ = reports.send(Report::Decided(id, now, decision));
             }
             Command::Cancel(id, done) => {

@@ -91,6 +91,8 @@ pub struct Frame {
     pub samples: Vec<AxisSample>,
     /// How often the axes have been reset before it.
     pub resets: u64,
+    /// The accepted motions that had not ended before it, with the times of their starts, ns.
+    pub motions: Arc<[(MotionId, Nanoseconds)]>,
 }
 
 /// The thread's ends of the channels.
