@@ -63,18 +63,18 @@ def in_executor(drive: Drive, call: Callable[[], Any]) -> Any:
 class Sent:
     """A goal that was sent, and what came back so far."""
 
-    def __init__(self, drive: Drive, client: ActionClient, message: FollowJointTrajectory.Goal, uuid: UUID | None):
+    def __init__(self, follow: Follow, message: FollowJointTrajectory.Goal, uuid: UUID | None):
         """Send it."""
+        drive = follow.drive
         self._drive = drive
-        self._client = client
-        self.feedback: list[FollowJointTrajectory.Feedback] = []
+        self._follow = follow
+        self._accepting = in_executor(drive, lambda: follow.client.send_goal_async(message, goal_uuid=uuid))
 
-        def keep(received: Any) -> None:
-            self.feedback.append(received.feedback)
-
-        self._accepting = in_executor(
-            drive, lambda: client.send_goal_async(message, feedback_callback=keep, goal_uuid=uuid)
-        )
+    @property
+    def feedback(self) -> list[FollowJointTrajectory.Feedback]:
+        """What the node has said on the way so far."""
+        id = self.id
+        return [said.feedback for said in list(self._follow.feedback) if bytes(said.goal_id.uuid) == id]
 
     @property
     def handle(self) -> Any:
@@ -127,14 +127,20 @@ class Follow:
         self.name = name or f"{drive.target}/follow_joint_trajectory"
         self.drive = drive
         self.statuses: list[GoalStatusArray] = []
-        self._client = ActionClient(
-            drive.node, FollowJointTrajectory, self.name, feedback_sub_qos_profile=FEEDBACK_QOS
+        self.client = ActionClient(drive.node, FollowJointTrajectory, self.name)
+        # Not the client's: it forgets a goal that is over, and what is still to come for it.
+        self.feedback: list[Any] = []
+        self._feedback = drive.node.create_subscription(
+            FollowJointTrajectory.Impl.FeedbackMessage,
+            f"{self.name}/_action/feedback",
+            self.feedback.append,
+            FEEDBACK_QOS,
         )
         self._cancelling = drive.node.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
         self._statuses = drive.node.create_subscription(
             GoalStatusArray, f"{self.name}/_action/status", self.statuses.append, STATUS_QOS
         )
-        drive.wait_for(self._client.server_is_ready, timeout, f"action {self.name}")
+        drive.wait_for(self.client.server_is_ready, timeout, f"action {self.name}")
         drive.wait_for(self._cancelling.service_is_ready, timeout, f"cancelling of {self.name}")
         time.sleep(SETTLE_S)
 
@@ -144,13 +150,14 @@ class Follow:
 
     def __exit__(self, *_: object) -> None:
         """Leave the action; the Drive stays."""
-        self._client.destroy()
+        self.client.destroy()
+        self.drive.node.destroy_subscription(self._feedback)
         self.drive.node.destroy_client(self._cancelling)
         self.drive.node.destroy_subscription(self._statuses)
 
     def send(self, message: FollowJointTrajectory.Goal, uuid: bytes | None = None) -> Sent:
         """Send a goal, under an id if it is to have a certain one."""
-        return Sent(self.drive, self._client, message, UUID(uuid=list(uuid)) if uuid else None)
+        return Sent(self, message, UUID(uuid=list(uuid)) if uuid else None)
 
     def cancel(self, uuid: bytes = bytes(16), stamp: Time | None = None) -> CancelGoal.Response:
         """Cancel by the rules of action_msgs/CancelGoal."""

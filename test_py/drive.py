@@ -69,6 +69,8 @@ DEEP_QOS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE, hist
 # Deeper than the node's own 50: a burst of trajectories has two results each.
 RESULT_QOS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
+SAMPLES_AT_ONCE = 200
+"""Few enough that other callbacks have their turn."""
 SETTLE_S = 0.2
 """A reliable sample written in the instant after matching can wait for the next heartbeat."""
 
@@ -343,7 +345,7 @@ class Drive:
         self._load = self.node.create_publisher(JointState, f"{namespace}/load", 10)
         # Raw: taking a sample must not cost more than the node needs to make one.
         self._subscriptions = [
-            self.node.create_subscription(kind, topic, self._keep_sample(key), DEEP_QOS, raw=True)
+            self._keep_samples(key, kind, topic)
             for key, kind, topic in (
                 ("joints", JointState, f"{namespace}/joint_states"),
                 ("currents", MotorCurrents, f"{self.target}/motor_currents"),
@@ -399,8 +401,24 @@ class Drive:
             if not self._closing:
                 raise
 
-    def _keep_sample(self, key: str) -> Callable[[bytes], None]:
-        return self._keep(self._samples[key])
+    def _keep_samples(self, key: str, kind: type, topic: str) -> Any:
+        """A subscription that takes what has come at one go: a turn of rclpy's executor costs ten times
+        as much as a sample, and axes in `fast` would run away from it.
+        """
+        store = self._samples[key]
+
+        def callback(first: bytes) -> None:
+            taken = [first]
+            handle = subscription.handle
+            with handle:
+                while len(taken) < SAMPLES_AT_ONCE and (more := handle.take_message(kind, True)) is not None:
+                    taken.append(more[0])
+            with self._changed:
+                store.extend(taken)
+                self._changed.notify_all()
+
+        subscription = self.node.create_subscription(kind, topic, callback, DEEP_QOS, raw=True)
+        return subscription
 
     def _keep(self, store: list[Any]) -> Callable[[Any], None]:
         def callback(message: Any) -> None:

@@ -30,7 +30,7 @@ pub fn feedback_period(rate: f64, period: Nanoseconds) -> i64 {
 
 /// Publishes the feedback of the goals that run.
 pub struct Feedback {
-    /// Those goals.
+    /// Those goals, and some that are over.
     pub goals: watch::Receiver<Arc<[Running]>>,
     /// `_action/feedback`.
     pub output: Output<FeedbackMessage>,

@@ -177,7 +177,7 @@ pub struct Work {
     pub tell: Tell,
     /// What becomes of goals.
     pub events: mpsc::UnboundedReceiver<GoalEvent>,
-    /// The goals that have feedback.
+    /// The goals that have feedback, some of them over already.
     pub running: watch::Sender<Arc<[Running]>>,
     /// `_action/status`.
     pub status: Output<GoalStatusArray>,
@@ -277,7 +277,10 @@ impl Task<'_> {
                 let motion = next_id(&self.tell.ids);
                 let trajectory = Arc::new(trajectory);
                 self.goals.offered(&id, motion);
-                // Before the simulation is asked, so that the first samples of it find the goal.
+                // Before the simulation is asked, and longer than the goal lasts: its first samples and its
+                // last ones find it here. Frames say themselves which motions they belong to.
+                let live = self.goals.live_ids();
+                self.running.retain(|running| live.contains(&running.id));
                 self.running.push(Running { id, motion, places: trajectory.joints().to_vec() });
                 self.show_running();
                 self.tell.results.expect(motion, origin, Arc::clone(&trajectory)).await;
@@ -324,8 +327,6 @@ impl Task<'_> {
 
     /// Ends a goal and answers those who wait for its result.
     fn end(&mut self, id: &GoalId, state: State, result: FollowJointTrajectoryResult) {
-        self.running.retain(|running| running.id != *id);
-        self.show_running();
         let (waiting, response) = self.goals.end(id, state, result, Instant::now());
         for request in waiting {
             self.responses.push(self.server.get_result.respond(request, response.clone()));
