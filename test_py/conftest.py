@@ -24,6 +24,7 @@ for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
 sys.path.insert(0, str(Path(__file__).parent / "launch_standin"))
 
 from drive import Drive, Node, node_binary  # noqa: E402
+from motion import go_home  # noqa: E402
 
 if TYPE_CHECKING:
     from action import Follow
@@ -63,8 +64,7 @@ def following() -> Iterator[Follow]:
 @pytest.fixture
 def follow(following: Follow) -> Follow:
     """The same, with the axes at rest at home."""
-    following.drive.reset()
-    following.drive.forget()
+    go_home(following.drive)
     return following
 
 

@@ -4,6 +4,13 @@
 //! and follows what it hears. Two that publish hear each other, and the one with the lower GUID goes
 //! on. When the one that is followed leaves, the lowest of those that are left goes on.
 
+/// Looks for which a stranger is waited for to turn out as a machine by one that has its clock: topics of a
+/// participant become known one by one.
+const STRANGE_LOOKS: u32 = 4;
+/// Looks after which whoever follows nobody leads, lowest or not: the lowest may follow one that has
+/// ceased to lead. Where two come to lead so, the lower goes on.
+const SILENT_LOOKS: u32 = 20;
+
 /// Prefix of a participant's GUIDs; they are ordered by it.
 pub type Prefix = [u8; 12];
 
@@ -33,12 +40,16 @@ pub struct Election {
     own: Prefix,
     rivals: Vec<Rival>,
     role: Role,
+    /// Looks in a row that found a stranger.
+    strange: u32,
+    /// Looks in a row at which nobody was there to be followed.
+    silent: u32,
 }
 
 impl Election {
     /// One that listens first.
     pub fn new(own: Prefix) -> Self {
-        Election { own, rivals: Vec::new(), role: Role::Listening }
+        Election { own, rivals: Vec::new(), role: Role::Listening, strange: 0, silent: 0 }
     }
 
     /// What this node does now.
@@ -62,11 +73,13 @@ impl Election {
     /// Takes those who have a publisher now; `listened` once this node has listened long enough.
     pub fn see(&mut self, rivals: Vec<Rival>, listened: bool) {
         self.rivals = rivals;
-        if self.has_stranger() {
-            self.role = match self.role {
-                Role::Following(Some(who)) if self.rival(who).is_some_and(|r| !r.machine) => self.role,
-                _ => Role::Following(None),
-            };
+        self.strange = if self.has_stranger() { self.strange.saturating_add(1) } else { 0 };
+        if self.strange > 0 {
+            let has_clock = matches!(self.role, Role::Leading | Role::Following(Some(_)));
+            let follows_it = matches!(self.role, Role::Following(Some(who)) if self.is_stranger(who));
+            if !follows_it && (!has_clock || self.strange >= STRANGE_LOOKS) {
+                self.role = Role::Following(None);
+            }
             return;
         }
         let leaderless = match self.role {
@@ -74,9 +87,15 @@ impl Election {
             Role::Leading => false,
             Role::Following(leader) => leader.is_none_or(|who| self.rival(who).is_none()),
         };
+        self.silent = if leaderless { self.silent.saturating_add(1) } else { 0 };
         if leaderless {
-            self.role = if self.is_lowest() { Role::Leading } else { Role::Following(None) };
+            let leads = self.is_lowest() || self.silent >= SILENT_LOOKS;
+            self.role = if leads { Role::Leading } else { Role::Following(None) };
         }
+    }
+
+    fn is_stranger(&self, prefix: Prefix) -> bool {
+        self.rival(prefix).is_some_and(|rival| !rival.machine)
     }
 
     /// Whether the clock that `from` gives counts here; `from` is one of those seen.
@@ -84,7 +103,7 @@ impl Election {
         let Some(rival) = self.rival(from) else { return false };
         let follows = if !rival.machine {
             true
-        } else if self.has_stranger() {
+        } else if self.strange >= STRANGE_LOOKS {
             false
         } else {
             match self.role {
@@ -95,6 +114,7 @@ impl Election {
         };
         if follows {
             self.role = Role::Following(Some(from));
+            self.silent = 0;
         }
         follows
     }
@@ -138,12 +158,34 @@ mod tests {
     fn a_stranger_wins_whatever_its_id_and_while_it_says_nothing() {
         let mut election = Election::new([1; 12]);
         election.see(Vec::new(), true);
+        for _ in 1..STRANGE_LOOKS {
+            election.see(vec![stranger(2), machine(3)], true);
+            assert_eq!(election.role(), Role::Leading, "it may turn out to be a machine");
+        }
         election.see(vec![stranger(2), machine(3)], true);
         assert_eq!(election.role(), Role::Following(None));
         assert!(!election.hear([3; 12]));
         assert!(election.hear([2; 12]));
         election.see(vec![machine(3)], true);
         assert_eq!(election.role(), Role::Leading);
+    }
+
+    /// The lower one follows the higher one, which took it for a stranger and yielded.
+    #[test]
+    fn two_that_wait_for_each_other_do_not_wait_for_ever() {
+        let (mut low, mut high) = (Election::new([1; 12]), Election::new([2; 12]));
+        high.see(Vec::new(), true);
+        low.see(vec![machine(2)], false);
+        assert!(low.hear([2; 12]));
+        for _ in 0..STRANGE_LOOKS {
+            high.see(vec![stranger(1)], true);
+        }
+        assert_eq!((low.role(), high.role()), (Role::Following(Some([2; 12])), Role::Following(None)));
+        for _ in 0..SILENT_LOOKS {
+            low.see(vec![machine(2)], true);
+            high.see(vec![machine(1)], true);
+        }
+        assert_eq!((low.role(), high.role()), (Role::Following(Some([2; 12])), Role::Leading));
     }
 
     #[test]
