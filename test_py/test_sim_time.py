@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from action_msgs.msg import GoalStatus
 from rclpy.qos import ReliabilityPolicy
 from virtual_axes.msg import TrajectoryResult
 
+from action import Follow, goal, line
 from drive import NANOSECONDS, TSP_NS, Drive, Node, _stamp_ns, joint_trajectory, to_ns
 from motion import assert_psec, swing
 from sim_clock import SimClock
@@ -89,6 +91,20 @@ def test_before_the_first_message_there_is_no_time(start: Callable[..., Drive]):
     clock.connect()
     clock.advance(0.1, 0.006)
     assert drive.end(soon, 5).status == TrajectoryResult.STOPPED
+
+
+def test_a_goal_cancelled_before_the_first_message_takes_no_other_with_it(start: Callable[..., Drive]):
+    """It ends at once; what waits beside it begins when there is a time."""
+    drive = start("-p", "use_sim_time:=true", connect=False)
+    with Follow(drive) as follow:
+        kept, gone = (follow.send(goal(line([joint], [0.01], 0.5))) for joint in ("y", "x"))
+        assert kept.handle.accepted and gone.handle.accepted
+        gone.cancel()
+        assert gone.status() == GoalStatus.STATUS_CANCELED
+        clock = SimClock(drive, BEGIN, ReliabilityPolicy.RELIABLE)
+        clock.connect()
+        clock.advance(1.0, 0.006)
+        assert kept.status() == GoalStatus.STATUS_SUCCEEDED
 
 
 @pytest.mark.parametrize("step", [0.1, 0.001, 0.0137, 2.0], ids=lambda step: f"{1e3 * step:g} ms")

@@ -231,7 +231,12 @@ impl Results {
             }
         };
         drop(known_list);
-        info!("{}: {status:?}{}{text}", known.origin, if text.is_empty() { "" } else { ", " });
+        let told = format!("{}: {status:?}{}{text}", known.origin, if text.is_empty() { "" } else { ", " });
+        if status == Status::Aborted {
+            warn!("{told}")
+        } else {
+            info!("{told}")
+        }
         if let Origin::Action { goal_id, .. } = known.origin {
             self.tell(GoalEvent::Ended(goal_id, end.outcome, text.clone()));
         }

@@ -6,7 +6,9 @@ use super::motion::{Abort, Cancel, Outcome};
 use super::tolerance::{Errors, Tolerances};
 use super::{Simulation, stream_delay};
 use crate::machine::{MachineError, MachineParameters};
-use crate::trajectory::{Admission, JointSet, MotionId, Rejection, StreamCounts, StreamEnd, Trajectory};
+use crate::trajectory::{
+    Admission, CallOff, JointSet, MotionId, Rejection, StreamCounts, StreamEnd, Trajectory,
+};
 use crate::units::Nanoseconds;
 
 impl Simulation {
@@ -51,8 +53,8 @@ impl Simulation {
             Cancel::Unknown => return false,
             Cancel::Known => {}
             Cancel::New => {
-                if !self.timeline.cancel(id) {
-                    // Its set-points are over already.
+                if self.timeline.cancel(id) != CallOff::Stopping {
+                    // Nothing is left of it to be waited for.
                     self.motions.end(id, Outcome::Cancelled, self.time_of(self.next - 1), &mut self.ends);
                 }
             }

@@ -103,7 +103,9 @@ impl Motion {
     fn into_end(self, outcome: Outcome, time: Nanoseconds) -> MotionEnd {
         let outcome = match outcome {
             // It was over for whoever asked for it before a successor or a stop came.
-            Outcome::Completed | Outcome::Displaced { .. } | Outcome::Stopped if self.cancelled => {
+            Outcome::Completed | Outcome::Displaced { .. } | Outcome::Stopped | Outcome::Aborted(_)
+                if self.cancelled =>
+            {
                 Outcome::Cancelled
             }
             outcome => outcome,

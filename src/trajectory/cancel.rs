@@ -7,15 +7,27 @@ use super::stream::StreamEnd;
 use super::timeline::Timeline;
 use crate::units::seconds;
 
+/// What calling a motion off does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CallOff {
+    /// Nothing: it commands no joint any more.
+    Over,
+    /// It had not begun, and will not.
+    Discarded,
+    /// Its joints come to rest.
+    Stopping,
+}
+
 impl Timeline {
     /// Calls a motion off: the joints that it commands come to rest by a controlled stop, which belongs
     /// to it, so that [`Event::Ended`](super::Event::Ended) tells when the last one is at rest. Joints
     /// for which it waits are left to what moves them now. What waits behind it for one of its joints
     /// is told to have been stopped by it: it was to begin where this one would have ended.
     ///
-    /// `false` if there is no such motion, or its last set-point has been commanded.
-    pub fn cancel(&mut self, id: MotionId) -> bool {
-        let Some(slot) = self.motions.find(id) else { return false };
+    /// It is over already if there is no such motion, or its last set-point has been commanded.
+    pub fn cancel(&mut self, id: MotionId) -> CallOff {
+        let Some(slot) = self.motions.find(id) else { return CallOff::Over };
+        let mut effect = CallOff::Discarded;
         for joint in 0..self.tracks.len() {
             let queue = &mut self.tracks[joint].queue;
             let Some(place) = queue.iter().position(|plan| plan.slot == Some(slot)) else { continue };
@@ -28,6 +40,7 @@ impl Timeline {
                 // Its slot goes on with the stop.
                 queue[0].slot = None;
                 self.brake(joint, Some(slot));
+                effect = CallOff::Stopping;
             } else {
                 queue.truncate(place);
                 self.motions.release(slot, joint, Release::Completed);
@@ -35,7 +48,7 @@ impl Timeline {
         }
         self.motions.settle(&mut self.pending);
         self.reserve_events();
-        true
+        effect
     }
 
     /// Brings every joint to rest by a controlled stop; all that moved or waited, the stream too, is

@@ -23,6 +23,7 @@ mod offer;
 mod plan;
 
 pub use arrivals::STREAM_JITTER;
+pub use cancel::CallOff;
 pub use event::{Event, JointSet, MotionId};
 pub use limits::JointLimits;
 pub use offer::Admission;

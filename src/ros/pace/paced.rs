@@ -130,8 +130,19 @@ impl Paced {
             Command::Offer { .. } => self.held.push_back(command),
             // They act at once or not at all.
             Command::Load { .. } | Command::Stream(_) => {}
-            // What they end has to have begun.
-            Command::Cancel(..) | Command::Reset(_) => {
+            Command::Cancel(id, _) => {
+                // What it ends has to have been taken; the others wait on.
+                let is_it = |held: &Command| matches!(held, Command::Offer { id: other, .. } if *other == id);
+                if let Some(offer) =
+                    self.held.iter().position(is_it).and_then(|place| self.held.remove(place))
+                {
+                    self.axes.obey(offer);
+                }
+                self.axes.obey(command);
+                self.axes.report_ends();
+            }
+            // All that waits ends with it.
+            Command::Reset(_) => {
                 self.release();
                 self.axes.obey(command);
                 self.axes.report_ends();
