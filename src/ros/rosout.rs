@@ -31,7 +31,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 ///
 /// # Errors
 /// [`EndpointError`] when the middleware refuses it.
-pub fn publisher(
+pub(super) fn publisher(
     node: &mut Node,
     args: &RosArgs,
     recorder: &mut Recorder,
@@ -57,7 +57,7 @@ pub fn publisher(
 }
 
 /// Publishes what comes until the log is closed.
-pub async fn publish(publisher: Publisher<Log>, mut records: mpsc::Receiver<LogRecord>) {
+pub(super) async fn publish(publisher: Publisher<Log>, mut records: mpsc::Receiver<LogRecord>) {
     while let Some(record) = records.recv().await {
         let message = message(record);
         publisher.tap.record(&message).await;

@@ -125,7 +125,7 @@ impl Simulation {
     }
 
     /// External force or torque on an axis (N or N·m, positive towards plus) from the next position
-    /// instant on, for `hold` ns; limited to ±[`MAX_LOAD`], and none if it is NaN.
+    /// instant on, for `hold` ns; limited to ±[`MAX_LOAD`](super::MAX_LOAD), and none if it is NaN.
     pub fn set_load(&mut self, axis: usize, load: f64, hold: Nanoseconds) {
         let until = self.next + hold.max(0).div_euclid(self.grid.period).max(1);
         self.loads.set(axis, load, until);
