@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 
-import pytest
 from sensor_msgs.msg import JointState
 
 from drive import Drive, Node
@@ -56,13 +55,12 @@ def test_comes_and_goes_within_two_seconds():
         process.__exit__()
 
 
-@pytest.mark.xfail(strict=True, reason="RustDDS does not send USER_DATA: docs/middleware.md, type hashes")
-def test_type_hash(fast: Drive):
-    """That of a publisher of rclpy, which has the same type."""
+def test_type_hash_is_not_sent(fast: Drive):
+    """A limit of RustDDS (docs/middleware.md). Should this fail, the hash has come: compare it with rclpy's then."""
     fast.node.create_publisher(JointState, "/joint_states", 10)
     hashes = fast.wait_for(
         lambda: {
-            info.node_name: str(info.topic_type_hash)
+            info.node_name: str(info.topic_type_hash).split("_")[0]
             for info in fast.node.get_publishers_info_by_topic("/joint_states")
         }
         if fast.node.count_publishers("/joint_states") == 2
@@ -70,4 +68,4 @@ def test_type_hash(fast: Drive):
         5,
         "both publishers",
     )
-    assert hashes["virtual_axes"] == hashes[fast.name]
+    assert hashes == {"virtual_axes": "INVALID", fast.name: "RIHS01"}
