@@ -68,8 +68,8 @@ fn every_live_key_takes_both_ends_of_its_range() {
             assert_eq!(parameters, start);
         }
     }
-    // 26 on each of five axes, and one of the node.
-    assert_eq!(live, 2 * (5 * 26 + 1));
+    // 28 on each of five axes, and two of the node.
+    assert_eq!(live, 2 * (5 * 28 + 2));
 }
 
 #[test]
