@@ -66,6 +66,11 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
     said = {(message.level, word) for message in found for word in words if word in message.msg}
     assert said == {(20, "holding"), (30, "no_such_joint"), (40, "not sent")}
     assert (Log.INFO, Log.WARN, Log.ERROR) == (20, 30, 40)
+    # The terminal has the same, in the same words.
+    shown = {match["text"]: (match["level"], match["logger"]) for match in lines(process)}
+    level_names = {20: "INFO", 30: "WARN", 40: "ERROR"}
+    assert shown == {message.msg: (level_names[message.level], message.name) for message in found}
+    # What rclpy calls the logger of such a node; the two are namesakes, which is said from here on.
     twin = rclpy.create_node("mill", namespace="/cell", context=drive.node.context, start_parameter_services=False)
     try:
         assert {message.name for message in found} == {twin.get_logger().name}
@@ -74,10 +79,6 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
     for message in found:
         stamp = message.stamp.sec + message.stamp.nanosec / 1e9
         assert began - 1 <= stamp <= time.time()
-    # The terminal has the same, in the same words.
-    shown = {match["text"]: (match["level"], match["logger"]) for match in lines(process)}
-    level_names = {20: "INFO", 30: "WARN", 40: "ERROR"}
-    assert shown == {message.msg: (level_names[message.level], message.name) for message in found}
 
 
 def test_level_of_one_logger(start: Callable[..., Drive]):
