@@ -4,7 +4,7 @@
 //! around [`simulation::Simulation`] in the room `ros` (cargo feature `ros`).
 //!
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
-//! [`units`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] → [`machine`] →
+//! [`units`], [`lanes`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] → [`machine`] →
 //! [`trajectory`], [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] →
 //! [`recording`] → [`identify`], [`tune`] → [`messages`], [`files`], [`report`], [`urdf`] → `ros`.
 
@@ -19,6 +19,7 @@ pub mod drive;
 pub mod files;
 pub mod identify;
 pub mod kinematics;
+pub mod lanes;
 pub mod machine;
 pub mod messages;
 pub mod path;

@@ -197,7 +197,7 @@ fn current_loop_step() {
     x[IS] = 5.0;
     let tick = plant_map() * current_map();
     for n in 0..2000 {
-        let voltage = pi.update(&mut memory, 5.0 - s.current, 0.0);
+        let voltage = pi.update(&mut memory, 5.0 - s.current);
         s = motor.step(&s, voltage, 0.0);
         x = tick * x;
         assert!((s.current - x[I]).abs() <= RELATIVE * 5.0, "tick {n}: i = {}, wanted {}", s.current, x[I]);

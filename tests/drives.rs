@@ -70,8 +70,8 @@ fn a_linear_motor_that_equals_a_screw_drive_moves_as_it_does() {
     let mut largest: f64 = 0.0;
     for k in 0..300 {
         let psec = [profile.at(f64::from(k) * 0.006)];
-        screw.advance(&psec);
-        linear.advance(&psec);
+        screw.advance(&psec, &[]);
+        linear.advance(&psec, &[]);
         let (s, l) = (screw.axis(0).sample(), linear.axis(0).sample());
         largest = largest.max(s.current.abs());
         assert!((s.position - l.position).abs() < 1e-10, "instant {k}: {} and {}", s.position, l.position);
@@ -106,12 +106,12 @@ fn a_load_that_saturates_the_current_is_recovered_from() {
     // 54 A hold 45 kN at X: more than that pushes it away.
     m.set_load(X, 60e3);
     for _ in 0..3 {
-        m.advance(&rest);
+        m.advance(&rest, &[]);
     }
     assert!(m.axis(X).sample().saturated && m.axis(X).sample().position > 1e-4);
     m.set_load(X, 0.0);
     for _ in 0..500 {
-        m.advance(&rest);
+        m.advance(&rest, &[]);
     }
     assert_near("position, m", m.axis(X).sample().position, 0.0, 2e-6);
 }
@@ -120,7 +120,7 @@ fn a_load_that_saturates_the_current_is_recovered_from() {
 fn an_axis_at_rest_stays_at_rest_under_its_weight() {
     let mut m = machine(&[]);
     for _ in 0..1000 {
-        m.advance(&[0.0; 5]);
+        m.advance(&[0.0; 5], &[]);
     }
     for axis in m.axes() {
         assert!(axis.sample().position.abs() < 1e-15, "{:?}", axis.sample());
@@ -133,13 +133,13 @@ fn an_axis_at_rest_stays_at_rest_under_its_weight() {
 fn gains_changed_at_rest_move_nothing() {
     let mut m = machine(&[]);
     for _ in 0..10 {
-        m.advance(&[0.0; 5]);
+        m.advance(&[0.0; 5], &[]);
     }
     let changes = [("z.velocity_loop.gain", 3.0), ("z.position_loop.gain", 1.0), ("z.delays.alpha_ms", 40.0)];
     let config = parameters(&changes).machine_config().expect("valid");
     m.adopt(Arc::new(MachineParameters::new(&config).expect("can be discretised"))).expect("same machine");
     for _ in 0..100 {
-        m.advance(&[0.0; 5]);
+        m.advance(&[0.0; 5], &[]);
     }
     assert!(m.axis(Z).sample().position.abs() < 1e-15);
 }

@@ -61,10 +61,7 @@ proptest! {
 #[test]
 fn friction_beyond_the_fitted_range_is_said() {
     let plant = plant(LAW);
-    let at = |metres_per_minute: f64| MotorState {
-        speed: metres_per_minute / 60.0 / RATIO,
-        ..MotorState::default()
-    };
-    assert!(!plant.friction_is_extrapolated(&at(19.99)));
-    assert!(plant.friction_is_extrapolated(&at(-20.01)));
+    let at = |metres_per_minute: f64| metres_per_minute / 60.0 / RATIO;
+    assert!(!plant.friction_is_extrapolated(at(19.99)));
+    assert!(plant.friction_is_extrapolated(at(-20.01)));
 }

@@ -4,8 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// As in ARCHITECTURE.md.
-const ORDER: [&str; 21] = [
+const ORDER: [&str; 22] = [
     "units",
+    "lanes",
     "config",
     "kinematics",
     "drive",

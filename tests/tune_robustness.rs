@@ -5,7 +5,7 @@ mod tune_common;
 use tune_common::{CIRCLE, course, machine};
 use virtual_axes::assess::AxisAssessor;
 use virtual_axes::config::{AxisConfig, Parameters, Source, Value};
-use virtual_axes::machine::{AxisSample, deviating_model, prediction_model};
+use virtual_axes::machine::{Activity, AxisSample, deviating_model, prediction_model};
 use virtual_axes::tune::{Cost, Deviation, Unwatched, robustness};
 
 fn with(parameters: &Parameters, changes: &[(&str, f64)]) -> Parameters {
@@ -87,14 +87,14 @@ fn each_deviation_is_a_run_of_its_own() {
 fn control_activity_is_the_rms_of_changes_at_position_instants() {
     let mut assessor = AxisAssessor::default();
     let sample = |current_setpoint: f64| AxisSample { current_setpoint, ..AxisSample::default() };
-    // The first value is no change; between position instants nothing is looked at.
-    for (instant, current) in [10.0, 13.0, 9.0, 9.0, 9.0].into_iter().enumerate() {
-        assessor.observe(&sample(current), true);
-        assessor.observe(&sample(100.0 * instant as f64), false);
+    // The first value is no change; what is between position instants is of no concern.
+    let activity = Activity { peak_current: 100.0, ..Activity::default() };
+    for current in [10.0, 13.0, 9.0, 9.0, 9.0] {
+        assessor.observe(&sample(current), &activity);
     }
     // √((3² + 4²) / 4)
     assert_eq!(assessor.report(1.0).control_activity, 2.5);
     let mut once = AxisAssessor::default();
-    once.observe(&sample(5.0), true);
+    once.observe(&sample(5.0), &activity);
     assert_eq!(once.report(1.0).control_activity, 0.0);
 }

@@ -1,6 +1,6 @@
 //! Tracking errors, currents and saturation of one axis, gathered while it runs.
 
-use crate::machine::AxisSample;
+use crate::machine::{Activity, AxisSample};
 
 /// Figures of one axis over a motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -22,7 +22,7 @@ pub struct AxisReport {
     pub control_activity: f64,
 }
 
-/// Gathers the figures of one axis, tick by tick.
+/// Gathers the figures of one axis, position period by position period.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct AxisAssessor {
     maxima: AxisReport,
@@ -36,25 +36,24 @@ pub struct AxisAssessor {
 }
 
 impl AxisAssessor {
-    /// Takes a tick into account; `position_instant` tells the first of a position period.
-    pub fn observe(&mut self, sample: &AxisSample, position_instant: bool) {
+    /// Takes a position period into account: the sample of its position instant, and what happened at its
+    /// ticks.
+    pub fn observe(&mut self, instant: &AxisSample, activity: &Activity) {
         let report = &mut self.maxima;
-        report.peak_current = report.peak_current.max(sample.current.abs());
-        self.saturated_ticks += u64::from(sample.saturated);
-        if position_instant {
-            let (tracking, synchronized) = (sample.tracking_error(), sample.synchronized_tracking_error());
-            report.max_tracking_error = report.max_tracking_error.max(tracking.abs());
-            report.max_synchronized_tracking_error =
-                report.max_synchronized_tracking_error.max(synchronized.abs());
-            self.square_tracking += tracking * tracking;
-            self.square_synchronized += synchronized * synchronized;
-            if self.instants > 0 {
-                let change = sample.current_setpoint - self.current_setpoint;
-                self.square_activity += change * change;
-            }
-            self.current_setpoint = sample.current_setpoint;
-            self.instants += 1;
+        report.peak_current = report.peak_current.max(activity.peak_current);
+        self.saturated_ticks += activity.saturated_ticks;
+        let (tracking, synchronized) = (instant.tracking_error(), instant.synchronized_tracking_error());
+        report.max_tracking_error = report.max_tracking_error.max(tracking.abs());
+        report.max_synchronized_tracking_error =
+            report.max_synchronized_tracking_error.max(synchronized.abs());
+        self.square_tracking += tracking * tracking;
+        self.square_synchronized += synchronized * synchronized;
+        if self.instants > 0 {
+            let change = instant.current_setpoint - self.current_setpoint;
+            self.square_activity += change * change;
         }
+        self.current_setpoint = instant.current_setpoint;
+        self.instants += 1;
     }
 
     /// The figures so far, for ticks of `tick` seconds.

@@ -66,21 +66,23 @@ impl MotionAssessor {
         }
     }
 
-    /// Takes a tick into account; `position_instant` tells the first of a position period.
-    pub fn observe(&mut self, machine: &Machine, position_instant: bool) {
-        let axes = machine.axes();
+    /// Takes the position period in that `machine` has computed last.
+    pub fn observe(&mut self, machine: &Machine) {
         for (place, assessor) in &mut self.axes {
-            assessor.observe(axes[*place].sample(), position_instant);
+            assessor.observe(machine.axis(*place).sample(), &machine.activity(*place));
         }
+        let ticks = machine.ticks_per_period();
         if !self.linear.is_empty() {
-            for (value, &p) in self.position.iter_mut().zip(&self.linear) {
-                *value = axes[p].sample().position;
+            for tick in 0..ticks {
+                for (value, &place) in self.position.iter_mut().zip(&self.linear) {
+                    *value = machine.position(place, tick);
+                }
+                let distance = self.contour.distance(&self.position);
+                self.max_contour = self.max_contour.max(distance);
+                self.square_contour += distance * distance;
             }
-            let distance = self.contour.distance(&self.position);
-            self.max_contour = self.max_contour.max(distance);
-            self.square_contour += distance * distance;
         }
-        self.ticks += 1;
+        self.ticks += ticks as u64;
     }
 
     /// The figures so far.

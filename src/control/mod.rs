@@ -10,9 +10,9 @@ mod rst;
 mod setpoint;
 mod transfer;
 
-pub use pi::{Pi, PiState};
+pub use pi::{Pi, PiLanes, PiState, PiStateLanes};
 pub use position::{Guard, PositionController, PositionState};
 pub(crate) use rst::INTEGRATOR_TOLERANCE;
 pub use rst::{MAX_COEFFICIENTS, MAX_PREVIEW, Rst, RstError};
-pub use setpoint::{Delays, Feedforward, Reach, SetpointHistory};
+pub use setpoint::{Delays, Feedforward, Reach, SetpointHistory, Shift};
 pub use transfer::{Transfer, TransferState};

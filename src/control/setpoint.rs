@@ -34,6 +34,39 @@ impl Delays {
     }
 }
 
+/// A delay on the grid of position periods: whole ones, and ticks of another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shift {
+    periods: i64,
+    ticks: u64,
+}
+
+impl Shift {
+    /// A delay of `ticks` where a position period has `ticks_per_setpoint`.
+    pub fn new(ticks: u64, ticks_per_setpoint: u64) -> Self {
+        Shift { periods: (ticks / ticks_per_setpoint) as i64, ticks: ticks % ticks_per_setpoint }
+    }
+
+    /// The tick of a position period at which the staircase behind the delay moves on.
+    #[inline]
+    pub fn step(self) -> u64 {
+        self.ticks
+    }
+
+    /// Index of the set-point that it shows in position period k from [`step`](Self::step) on; before, it
+    /// is the one before.
+    #[inline]
+    pub fn index(self, k: i64) -> i64 {
+        k - self.periods
+    }
+
+    /// Index of the set-point that it shows at the first tick of position period k.
+    #[inline]
+    pub fn index_at_instant(self, k: i64) -> i64 {
+        self.index(k) - i64::from(self.ticks > 0)
+    }
+}
+
 /// How far from the present one set-points are read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Reach {
@@ -50,94 +83,104 @@ pub struct Reach {
 /// Before the first set-point PSEC has its first value; what is not known of the future yet is its last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetpointHistory {
-    /// Ring: set-point k stands at k modulo its length.
+    /// Set-point k stands at k modulo half its length, and half its length behind that: set-points that
+    /// follow each other can be read as they stand, wherever they begin.
     ring: Box<[f64]>,
     ticks_per_setpoint: u64,
     /// How many set-points have been pushed.
     count: u64,
     /// Set-points that stand in the ring behind those.
     ahead: usize,
-    first: f64,
 }
 
 impl SetpointHistory {
     /// A history in which set-points within `reach` can be read, and two more for the second derivative.
     pub fn new(initial: f64, ticks_per_setpoint: u64, reach: Reach) -> Self {
         SetpointHistory {
-            ring: vec![initial; Self::length(ticks_per_setpoint, reach)].into_boxed_slice(),
+            ring: vec![initial; 2 * Self::length(ticks_per_setpoint, reach)].into_boxed_slice(),
             ticks_per_setpoint,
             count: 0,
             ahead: reach.ahead,
-            first: initial,
         }
     }
 
-    /// Set-points to hold: those that the delay spans, the present one, and two for the derivatives.
+    /// Set-points to hold: those that the delay spans, the present one, and two for the derivatives; a
+    /// power of two, so that no division finds a place.
     fn length(ticks_per_setpoint: u64, reach: Reach) -> usize {
-        reach.delay.div_ceil(ticks_per_setpoint) as usize + 3 + reach.lookback + reach.ahead
+        let needed = reach.delay.div_ceil(ticks_per_setpoint) as usize + 3 + reach.lookback + reach.ahead;
+        needed.next_power_of_two()
+    }
+
+    fn place(&self, k: i64) -> usize {
+        k as usize & (self.ring.len() / 2 - 1)
     }
 
     /// Makes room for another reach; set-points that are no longer known read as the oldest known one,
     /// those ahead are known from the next period on.
     pub fn adopt(&mut self, reach: Reach) {
-        let (length, old) = (Self::length(self.ticks_per_setpoint, reach), self.ring.len());
+        let (length, old) = (Self::length(self.ticks_per_setpoint, reach), self.ring.len() / 2);
         let ahead = std::mem::replace(&mut self.ahead, reach.ahead);
         if length == old && ahead == reach.ahead {
             return;
         }
         let count = self.count as i64;
-        let oldest = (count + ahead as i64 - old as i64).max(0);
-        let mut ring = vec![self.first; length].into_boxed_slice();
-        for k in (count + reach.ahead as i64 - length as i64).max(0)..count {
-            ring[(k as u64 % length as u64) as usize] = self.at(k.max(oldest));
+        // Before the first set-point stands its value.
+        let oldest = count + ahead as i64 - old as i64;
+        let mut grown = SetpointHistory {
+            ring: vec![0.0; 2 * length].into_boxed_slice(),
+            ticks_per_setpoint: self.ticks_per_setpoint,
+            count: self.count,
+            ahead: reach.ahead,
+        };
+        for k in count - length as i64..count {
+            grown.put(k, self.at(k.max(oldest)));
         }
-        self.ring = ring;
+        *self = grown;
     }
 
     /// Adds the set-point of the next position instant.
     #[inline]
     pub fn push(&mut self, psec: f64) {
         if self.count == 0 {
-            self.first = psec;
+            self.ring.fill(psec);
         }
-        self.put(self.count, psec);
+        self.put(self.count as i64, psec);
         self.count += 1;
     }
 
     /// The set-points behind the last one that was pushed, as they are known now.
     #[inline]
     pub fn foresee(&mut self, ahead: &[f64]) {
-        let mut last = self.at(self.count as i64 - 1);
+        let mut last = self.at(self.present());
         for j in 0..self.ahead {
             last = ahead.get(j).copied().unwrap_or(last);
-            self.put(self.count + j as u64, last);
+            self.put((self.count + j as u64) as i64, last);
         }
     }
 
     #[inline]
-    fn put(&mut self, k: u64, psec: f64) {
-        self.ring[(k % self.ring.len() as u64) as usize] = psec;
+    fn put(&mut self, k: i64, psec: f64) {
+        let place = self.place(k);
+        self.ring[place] = psec;
+        self.ring[place + self.ring.len() / 2] = psec;
+    }
+
+    /// Index of the set-point of this position period; -1 before the first.
+    #[inline]
+    pub fn present(&self) -> i64 {
+        self.count as i64 - 1
     }
 
     /// PSEC_k; the first value for k before the first set-point.
     #[inline]
     pub fn at(&self, k: i64) -> f64 {
-        if k < 0 {
-            return self.first;
-        }
-        self.ring[(k as u64 % self.ring.len() as u64) as usize]
+        self.ring[self.place(k)]
     }
 
-    /// Index of the set-point that the staircase shows at `tick` behind a delay of `delay` ticks.
+    /// `count` set-points from PSEC_k on, at most as many as the reach spans.
     #[inline]
-    pub fn index(&self, tick: u64, delay: u64) -> i64 {
-        (tick as i64 - delay as i64).div_euclid(self.ticks_per_setpoint as i64)
-    }
-
-    /// The staircase at `tick` behind a delay of `delay` ticks.
-    #[inline]
-    pub fn delayed(&self, tick: u64, delay: u64) -> f64 {
-        self.at(self.index(tick, delay))
+    pub fn from(&self, k: i64, count: usize) -> &[f64] {
+        &self.ring[self.place(k)..][..count]
     }
 }
 
@@ -182,14 +225,24 @@ mod tests {
 
     #[test]
     fn a_delay_of_one_and_a_half_periods_reads_two_set_points_back_at_position_instants() {
-        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 72, ..Reach::default() });
-        for k in 0..10 {
-            h.push(f64::from(k));
-        }
-        assert_eq!(h.delayed(9 * 48, 72), 7.0);
+        let shift = Shift::new(72, 48);
+        assert_eq!(shift.index_at_instant(9), 7);
         // In mid-period the staircase behind the delay moves on.
-        assert_eq!(h.delayed(9 * 48 + 23, 72), 7.0);
-        assert_eq!(h.delayed(9 * 48 + 24, 72), 8.0);
+        assert_eq!((shift.step(), shift.index(9)), (24, 8));
+        let whole = Shift::new(96, 48);
+        assert_eq!((whole.index_at_instant(9), whole.step(), whole.index(9)), (7, 0, 7));
+    }
+
+    #[test]
+    fn set_points_in_a_row_are_read_as_they_stand() {
+        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 96, lookback: 1, ahead: 3 });
+        for k in 0..40 {
+            h.push(f64::from(k));
+            h.foresee(&[1, 2, 3].map(|j| f64::from(k + j)));
+            let first = (k - 4).max(0);
+            let wanted: Vec<f64> = (first..=k + 3).map(f64::from).collect();
+            assert_eq!(h.from(i64::from(first), wanted.len()), wanted);
+        }
     }
 
     #[test]

@@ -1,21 +1,47 @@
 //! Friction as a function of velocity, and how it acts over one tick.
 
+use super::elementary::{MAX_EXPONENT, exponential, log2_rate};
 use crate::config::{AxisKind, FrictionConfig};
+use crate::lanes::lanes;
 use crate::units::{METRE_PER_MINUTE, RPM};
 
 /// Velocity up to which the law was fitted, m/min or rev/min (Prévost eq. 3).
 const FITTED_RANGE: f64 = 20.0;
 
-/// Double-exponential friction law of one axis, seen from its motor.
-///
-/// (Prévost eq. 3) `i_f(V) = a e^{bV} + c e^{dV}` for V > 0, odd in V; at standstill any value within
-/// ±i0. V is in m/min (linear axis) or rev/min (rotary axis). The torque is `Kt i_f`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Friction {
-    law: FrictionConfig,
-    torque_constant: f64,
-    /// V per ω of the motor, (m/min)/(rad/s) or (rev/min)/(rad/s).
-    velocity_per_speed: f64,
+lanes! {
+    /// Double-exponential friction law of one axis, seen from its motor.
+    ///
+    /// (Prévost eq. 3) `i_f(V) = a e^{bV} + c e^{dV}` for V > 0, odd in V; at standstill any value within
+    /// ±i0. V is in m/min (linear axis) or rev/min (rotary axis). The torque is `Kt i_f`.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Friction as FrictionLanes {
+        first: Term,
+        second: Term,
+        /// Kt i0, N·m.
+        breakaway: f64,
+        /// Speed from which on the law stays as it is, rad/s: its exponentials leave the range of numbers.
+        capped_from: f64,
+        /// Speed up to which the law was fitted, rad/s.
+        fitted_to: f64,
+    }
+}
+
+lanes! {
+    /// `torque · e^{rate |ω|}`.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub(super) struct Term as TermLanes {
+        /// N·m.
+        torque: f64,
+        /// s/rad.
+        rate: f64,
+        rate_log2: f64,
+    }
+}
+
+impl Term {
+    fn new(torque: f64, rate: f64) -> Self {
+        Term { torque, rate, rate_log2: log2_rate(rate) }
+    }
 }
 
 impl Friction {
@@ -26,38 +52,78 @@ impl Friction {
             AxisKind::Linear => METRE_PER_MINUTE,
             AxisKind::Rotary => RPM,
         };
-        Friction { law, torque_constant, velocity_per_speed: transmission_ratio / unit }
+        // V per ω of the motor.
+        let velocity = transmission_ratio / unit;
+        let first = Term::new(torque_constant * law.a, law.b * velocity);
+        let second = Term::new(torque_constant * law.c, law.d * velocity);
+        Friction {
+            first,
+            second,
+            breakaway: torque_constant * law.i0,
+            capped_from: (MAX_EXPONENT / first.rate.abs().max(second.rate.abs())).min(f64::MAX),
+            fitted_to: FITTED_RANGE / velocity,
+        }
     }
 
     /// Largest friction torque at motor speed ω (rad/s), N·m; never negative.
-    #[inline]
+    #[inline(always)]
     pub fn bound(&self, speed: f64) -> f64 {
-        let current = if speed == 0.0 {
-            self.law.i0
-        } else {
-            let v = speed.abs() * self.velocity_per_speed;
-            self.law.a * (self.law.b * v).exp() + self.law.c * (self.law.d * v).exp()
-        };
-        // `max` also turns the NaN of an extrapolated ∞ − ∞ into zero.
-        (self.torque_constant * current).max(0.0)
-    }
-
-    /// Friction torque over one tick, N·m, positive against motion towards plus.
-    ///
-    /// `free_speed` is the ω that the tick would end with if there were no friction, `speed` the ω
-    /// that it starts with, `speed_per_torque` the change of ω per torque. The result is the torque
-    /// that would end the tick at standstill, limited to the law's bound; the flag says whether it
-    /// does end at standstill.
-    #[inline]
-    pub fn over_tick(&self, speed: f64, free_speed: f64, speed_per_torque: f64) -> (f64, bool) {
-        let bound = self.bound(speed);
-        let stopping = free_speed / speed_per_torque;
-        if stopping.abs() <= bound { (stopping, true) } else { (bound.copysign(stopping), false) }
+        let size = speed.abs();
+        let size = if size < self.capped_from { size } else { self.capped_from };
+        let term = |t: &Term| exponential(size, t.rate, t.rate_log2);
+        let moving = self.first.torque.mul_add(term(&self.first), self.second.torque * term(&self.second));
+        let torque = if speed == 0.0 { self.breakaway } else { moving };
+        // Extrapolated, the law may change its sign.
+        if torque > 0.0 { torque } else { 0.0 }
     }
 
     /// Whether the law is extrapolated at motor speed ω (rad/s).
-    #[inline]
+    #[inline(always)]
     pub fn is_extrapolated(&self, speed: f64) -> bool {
-        speed.abs() * self.velocity_per_speed > FITTED_RANGE
+        speed.abs() > self.fitted_to
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Parameters;
+
+    /// The law as it is printed, with the exponential of the standard library, A.
+    fn printed(law: &FrictionConfig, v: f64) -> f64 {
+        law.a * (law.b * v).exp() + law.c * (law.d * v).exp()
+    }
+
+    #[test]
+    fn the_law_is_within_1e_12_a_of_what_is_printed() {
+        let config = Parameters::embedded_default()
+            .and_then(|p| p.machine_config())
+            .expect("the embedded machine is valid");
+        for axis in config.axes() {
+            // Kt = 1 and one m/min or rev/min per rad/s.
+            let unit = if axis.kind == AxisKind::Linear { METRE_PER_MINUTE } else { RPM };
+            let friction = Friction::new(axis.friction, axis.kind, unit, 1.0);
+            // Five times the range that the law was fitted for: as fast as any of the axes goes.
+            for k in 1..=1_000_000 {
+                let v = 5.0 * FITTED_RANGE * f64::from(k) * 1e-6;
+                let (found, exact) = (friction.bound(v), printed(&axis.friction, v));
+                assert!((found - exact).abs() <= 1e-12, "{}: {found} A at {v}, not {exact} A", axis.name);
+                assert_eq!(found.to_bits(), friction.bound(-v).to_bits());
+            }
+            assert_eq!(friction.bound(0.0), axis.friction.i0);
+        }
+    }
+
+    #[test]
+    fn a_law_that_leaves_the_range_of_numbers_is_finite_and_never_drives() {
+        let law = |a, c| FrictionConfig { a, b: 0.5, c, d: 0.7, i0: 1.0 };
+        for speed in [1.0, 1e3, 1e9, f64::MAX, f64::INFINITY] {
+            let strong = Friction::new(law(1.0, 1.0), AxisKind::Linear, 1.0, 1.0).bound(speed);
+            assert!(strong.is_finite() && strong > 0.0, "{strong} at {speed}");
+            let turned = Friction::new(law(1.0, -2.0), AxisKind::Linear, 1.0, 1.0).bound(speed);
+            assert_eq!(turned, 0.0, "at {speed}");
+        }
+        let constant = FrictionConfig { b: 0.0, d: 0.0, ..law(2.0, -0.5) };
+        assert_eq!(Friction::new(constant, AxisKind::Linear, 1.0, 1.0).bound(1e300), 1.5);
     }
 }

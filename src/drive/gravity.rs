@@ -1,33 +1,39 @@
 //! What weight asks of the motor.
 
+use super::elementary::sine;
 use crate::config::GravityConfig;
+use crate::lanes::lanes;
 
-/// `C_gravity = r (W + k sin(SP + φ))`, N·m at the motor, positive against motion towards plus.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Gravity {
-    weight: f64,
-    tilt: f64,
-    phase: f64,
-    ratio: f64,
+lanes! {
+    /// `C_gravity = r (W + k sin(SP + φ))`, N·m at the motor, positive against motion towards plus.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Gravity as GravityLanes {
+        /// r W, N·m.
+        weight: f64,
+        /// r k, N·m.
+        tilt: f64,
+        phase: f64,
+    }
 }
 
 impl Gravity {
     /// Gravity of an axis behind a transmission of ratio r (m or rad per rad of the motor).
     pub fn new(gravity: &GravityConfig, transmission_ratio: f64) -> Self {
         Gravity {
-            weight: gravity.weight,
-            tilt: gravity.tilt,
+            weight: transmission_ratio * gravity.weight,
+            tilt: transmission_ratio * gravity.tilt,
             phase: gravity.phase,
-            ratio: transmission_ratio,
         }
     }
 
+    /// Whether the torque depends on where the axis stands.
+    pub fn is_tilting(&self) -> bool {
+        self.tilt != 0.0
+    }
+
     /// Torque at the axis position `position` (m or rad), N·m at the motor.
-    #[inline]
+    #[inline(always)]
     pub fn torque(&self, position: f64) -> f64 {
-        if self.tilt == 0.0 {
-            return self.ratio * self.weight;
-        }
-        self.ratio * (self.weight + self.tilt * (position + self.phase).sin())
+        self.tilt.mul_add(sine(position + self.phase), self.weight)
     }
 }

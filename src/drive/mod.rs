@@ -8,15 +8,16 @@
 //!   dθ/dt = ω
 //! ```
 
+mod elementary;
 mod friction;
 mod gravity;
 mod motor;
 mod plant;
 
-pub use friction::Friction;
-pub use gravity::Gravity;
-pub use motor::{Motor, MotorState};
-pub use plant::{Plant, Torques};
+pub use friction::{Friction, FrictionLanes};
+pub use gravity::{Gravity, GravityLanes};
+pub use motor::{Motor, MotorLanes, MotorState, MotorStateLanes};
+pub use plant::{Plant, PlantLanes, Torques};
 
 /// Why a plant cannot be built from its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

@@ -4,48 +4,58 @@ use nalgebra::SMatrix;
 
 use super::DriveError;
 use crate::config::MotorConfig;
+use crate::lanes::lanes;
 
-/// State of a motor: what the differential equation integrates.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct MotorState {
-    /// i, A.
-    pub current: f64,
-    /// ω, rad/s (m/s for a linear motor).
-    pub speed: f64,
-    /// θ, rad (m for a linear motor).
-    pub angle: f64,
+lanes! {
+    /// State of a motor: what the differential equation integrates.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub struct MotorState as MotorStateLanes {
+        /// i, A.
+        pub current: f64,
+        /// ω, rad/s (m/s for a linear motor).
+        pub speed: f64,
+        /// θ, rad (m for a linear motor).
+        pub angle: f64,
+    }
 }
 
-/// Zero-order-hold discretisation of Prévost eq. 1 over one tick.
-///
-/// With voltage u and torque τ (everything but Kt·i) held,
-///
-/// ```text
-/// [i ω]ₙ₊₁ = Φ [i ω]ₙ + Γu u + Γτ τ
-///   θₙ₊₁   = θₙ + φ [i ω]ₙ + γu u + γτ τ
-/// ```
-///
-/// where Φ, Γ are blocks of the exponential of the augmented system matrix times the tick.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Motor {
-    current: Row,
-    speed: Row,
-    angle: Row,
+lanes! {
+    /// Zero-order-hold discretisation of Prévost eq. 1 over one tick.
+    ///
+    /// With voltage u and torque τ (everything but Kt·i) held,
+    ///
+    /// ```text
+    /// [i ω]ₙ₊₁ = Φ [i ω]ₙ + Γu u + Γτ τ
+    ///   θₙ₊₁   = θₙ + φ [i ω]ₙ + γu u + γτ τ
+    /// ```
+    ///
+    /// where Φ, Γ are blocks of the exponential of the augmented system matrix times the tick.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Motor as MotorLanes {
+        current: Row,
+        speed: Row,
+        angle: Row,
+        /// Torque per change of ω over one tick, (N·m)/(rad/s).
+        torque_per_speed: f64,
+    }
 }
 
-/// One row of the discretised system: the weights of i, ω, u and τ.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Row {
-    current: f64,
-    speed: f64,
-    voltage: f64,
-    torque: f64,
+lanes! {
+    /// One row of the discretised system: the weights of i, ω, u and τ.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub(super) struct Row as RowLanes {
+        current: f64,
+        speed: f64,
+        voltage: f64,
+        torque: f64,
+    }
 }
 
 impl Row {
-    #[inline]
+    #[inline(always)]
     fn apply(&self, s: &MotorState, voltage: f64, torque: f64) -> f64 {
-        self.current * s.current + self.speed * s.speed + self.voltage * voltage + self.torque * torque
+        let held = self.voltage.mul_add(voltage, self.torque * torque);
+        self.current.mul_add(s.current, self.speed.mul_add(s.speed, held))
     }
 }
 
@@ -68,34 +78,47 @@ impl Motor {
         let e = (a * period).exp();
         let row =
             |k: usize| Row { current: e[(k, 0)], speed: e[(k, 1)], voltage: e[(k, 3)], torque: e[(k, 4)] };
-        let discretised = Motor { current: row(0), speed: row(1), angle: row(2) };
-        let speed_per_torque = discretised.speed.torque;
-        let sound = e.iter().all(|v| v.is_finite()) && speed_per_torque > 0.0;
+        let speed = row(1);
+        let torque_per_speed = 1.0 / speed.torque;
+        let sound = e.iter().all(|v| v.is_finite()) && speed.torque > 0.0 && torque_per_speed.is_finite();
         if !sound {
-            return Err(DriveError::Discretisation { period_s: period, speed_per_torque });
+            return Err(DriveError::Discretisation { period_s: period, speed_per_torque: speed.torque });
         }
-        Ok(discretised)
+        Ok(Motor { current: row(0), speed, angle: row(2), torque_per_speed })
     }
 
-    /// ω at the end of the tick.
-    #[inline]
-    pub fn speed_after(&self, s: &MotorState, voltage: f64, torque: f64) -> f64 {
-        self.speed.apply(s, voltage, torque)
-    }
-
-    /// Change of ω over one tick per unit of held torque, (rad/s)/(N·m); positive.
-    #[inline]
-    pub fn speed_per_torque(&self) -> f64 {
-        self.speed.torque
-    }
-
-    /// State at the end of the tick.
-    #[inline]
+    /// State at the end of the tick under `voltage` and a held `torque`.
+    #[inline(always)]
     pub fn step(&self, s: &MotorState, voltage: f64, torque: f64) -> MotorState {
         MotorState {
             current: self.current.apply(s, voltage, torque),
             speed: self.speed.apply(s, voltage, torque),
             angle: s.angle + self.angle.apply(s, voltage, torque),
         }
+    }
+
+    /// State at the end of the tick, and the friction torque over it: the one that ends the tick at
+    /// standstill, limited to ±`bound` (N·m, not negative). Not limited, ω is 0.0 exactly.
+    ///
+    /// The comparison is made with the speed that `bound` takes away, so that rounding never turns ω round.
+    #[inline(always)]
+    pub(super) fn step_with_friction(
+        &self,
+        s: &MotorState,
+        voltage: f64,
+        external: f64,
+        bound: f64,
+    ) -> (MotorState, f64) {
+        let free = self.speed.apply(s, voltage, external);
+        let slowed = self.speed.torque * bound;
+        let stops = free.abs() <= slowed;
+        let friction = if stops { free * self.torque_per_speed } else { bound.copysign(free) };
+        let torque = external - friction;
+        let state = MotorState {
+            current: self.current.apply(s, voltage, torque),
+            speed: if stops { 0.0 } else { free - slowed.copysign(free) },
+            angle: s.angle + self.angle.apply(s, voltage, torque),
+        };
+        (state, friction)
     }
 }

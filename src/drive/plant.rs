@@ -2,6 +2,7 @@
 
 use super::{DriveError, Friction, Gravity, Motor, MotorState};
 use crate::config::{AxisConfig, MotorConfig};
+use crate::lanes::lanes;
 
 /// Torques that acted over a tick, N·m at the motor (N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -14,14 +15,16 @@ pub struct Torques {
     pub load: f64,
 }
 
-/// One axis without its controllers.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plant {
-    motor: Motor,
-    friction: Friction,
-    gravity: Gravity,
-    ratio: f64,
-    torque_constant: f64,
+lanes! {
+    /// One axis without its controllers.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Plant as PlantLanes {
+        pub(crate) motor: Motor,
+        pub(crate) friction: Friction,
+        pub(crate) gravity: Gravity,
+        ratio: f64,
+        torque_constant: f64,
+    }
 }
 
 impl Plant {
@@ -53,50 +56,60 @@ impl Plant {
     }
 
     /// Kt as it is, N·m/A.
-    #[inline]
+    #[inline(always)]
     pub fn torque_constant(&self) -> f64 {
         self.torque_constant
     }
 
-    /// Axis position of a motor state, m or rad.
-    #[inline]
-    pub fn position(&self, s: &MotorState) -> f64 {
-        s.angle * self.ratio
+    /// Axis position at a motor angle θ (rad), m or rad.
+    #[inline(always)]
+    pub fn position(&self, angle: f64) -> f64 {
+        angle * self.ratio
     }
 
-    /// Axis velocity of a motor state, m/s or rad/s.
-    #[inline]
-    pub fn velocity(&self, s: &MotorState) -> f64 {
-        s.speed * self.ratio
+    /// Axis velocity at a motor speed ω (rad/s), m/s or rad/s.
+    #[inline(always)]
+    pub fn velocity(&self, speed: f64) -> f64 {
+        speed * self.ratio
     }
 
-    /// Gravity torque where the axis stands, N·m at the motor.
-    #[inline]
-    pub fn gravity(&self, s: &MotorState) -> f64 {
-        self.gravity.torque(self.position(s))
+    /// Gravity torque at a motor angle θ (rad), N·m at the motor.
+    #[inline(always)]
+    pub fn gravity_at(&self, angle: f64) -> f64 {
+        self.gravity.torque(self.position(angle))
     }
 
-    /// Whether the friction law is extrapolated at this state.
+    /// What an external `load` (N or N·m at the axis) is at the motor, N·m.
+    #[inline(always)]
+    pub fn load_torque(&self, load: f64) -> f64 {
+        self.ratio * load
+    }
+
+    /// Whether the friction law is extrapolated at a motor speed ω (rad/s).
     #[inline]
-    pub fn friction_is_extrapolated(&self, s: &MotorState) -> bool {
-        self.friction.is_extrapolated(s.speed)
+    pub fn friction_is_extrapolated(&self, speed: f64) -> bool {
+        self.friction.is_extrapolated(speed)
     }
 
     /// Moves the plant by one tick under `voltage` (V) and an external `load` (N or N·m at the axis).
     ///
     /// Friction is the torque that ends the tick at standstill, limited to its bound: it stops the
     /// axis and never reverses it, `C_friction · ω_end ≥ 0`, and an axis that it stops has ω = 0.0.
-    #[inline]
+    #[inline(always)]
     pub fn step(&self, s: &mut MotorState, voltage: f64, load: f64) -> Torques {
-        let gravity = self.gravity(s);
-        let load = self.ratio * load;
-        let external = load - gravity;
-        let free_speed = self.motor.speed_after(s, voltage, external);
-        let (friction, stops) = self.friction.over_tick(s.speed, free_speed, self.motor.speed_per_torque());
-        *s = self.motor.step(s, voltage, external - friction);
-        if stops {
-            s.speed = 0.0;
-        }
+        let (gravity, load) = (self.gravity_at(s.angle), self.load_torque(load));
+        let bound = self.friction.bound(s.speed);
+        let (state, friction) = self.motor.step_with_friction(s, voltage, load - gravity, bound);
+        *s = state;
         Torques { friction, gravity, load }
+    }
+
+    /// The same with torques that are known already: gravity and load together, and the friction's bound
+    /// (all N·m at the motor). The friction torque comes back.
+    #[inline(always)]
+    pub(crate) fn step_under(&self, s: &mut MotorState, voltage: f64, external: f64, bound: f64) -> f64 {
+        let (state, friction) = self.motor.step_with_friction(s, voltage, external, bound);
+        *s = state;
+        friction
     }
 }

@@ -1,12 +1,13 @@
-//! One axis: a plant, its cascade, and the state of both.
+//! One axis: a plant, its cascade, and what of their state does not go on from tick to tick.
 
 use crate::config::{AxisConfig, Periods};
 use crate::control::{
-    Delays, Feedforward, Pi, PiState, PositionController, PositionState, Reach, SetpointHistory,
+    Delays, Feedforward, Pi, PiState, PositionController, PositionState, Reach, SetpointHistory, Shift,
 };
-use crate::drive::{MotorState, Plant, Torques};
+use crate::drive::{MotorState, Plant};
 use crate::units::seconds;
 
+use super::block::{Demand, Done, Loops, LoopsState, Stair};
 use super::compensation::FrictionCompensation;
 use super::controller::{feedforward, position_controller};
 use super::{AxisError, AxisSample};
@@ -14,14 +15,15 @@ use super::{AxisError, AxisSample};
 /// Everything immutable about one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisParameters {
-    plant: Plant,
+    pub(super) loops: Loops,
     position: PositionController,
     controller: &'static str,
-    velocity: Pi,
-    current: Pi,
     feedforward: Feedforward,
-    compensation: Option<FrictionCompensation>,
+    pub(super) compensation: Option<FrictionCompensation>,
     delays: Delays,
+    position_shift: Shift,
+    velocity_shift: Shift,
+    torque_shift: Shift,
     ratio: f64,
     /// Kt that the drive reckons with.
     torque_constant: f64,
@@ -59,98 +61,106 @@ impl AxisParameters {
     /// [`AxisError`].
     pub fn new(axis: &AxisConfig, periods: &Periods) -> Result<Self, AxisError> {
         let motor = &axis.motor;
-        let tick = seconds(periods.current);
+        let (tick, ticks) = (seconds(periods.current), periods.ticks_per_position());
         let (position, controller) = position_controller(axis, periods)?;
         let delays = Delays::new(&axis.delays, periods.current);
         let compensation = FrictionCompensation::new(axis, periods, delays.friction);
         // A shift of nothing delays nothing.
         let delays = Delays { friction: if compensation.is_some() { delays.friction } else { 0 }, ..delays };
+        let velocity_scale = 1.0 / motor.torque_constant;
         Ok(AxisParameters {
-            plant: Plant::new(axis, tick)?,
+            loops: Loops {
+                plant: Plant::new(axis, tick)?,
+                velocity: Pi::new(
+                    &axis.velocity_loop,
+                    seconds(periods.velocity),
+                    velocity_scale,
+                    motor.max_current,
+                ),
+                current: Pi::new(&axis.current_loop, tick, 1.0, motor.max_voltage),
+            },
             position,
             controller,
-            velocity: Pi::new(
-                &axis.velocity_loop,
-                seconds(periods.velocity),
-                motor.torque_constant,
-                motor.max_current,
-            ),
-            current: Pi::new(&axis.current_loop, tick, 1.0, motor.max_voltage),
             feedforward: Feedforward::new(
                 &feedforward(axis),
                 seconds(periods.position),
                 axis.transmission_ratio,
             ),
             compensation,
+            position_shift: Shift::new(delays.position, ticks),
+            velocity_shift: Shift::new(delays.velocity, ticks),
+            torque_shift: Shift::new(delays.torque, ticks),
             delays,
             ratio: axis.transmission_ratio,
             torque_constant: motor.torque_constant,
             max_current: motor.max_current,
             resistance: motor.resistance,
             max_speed: motor.max_speed,
-            ticks_per_position: periods.ticks_per_position(),
+            ticks_per_position: ticks,
             ticks_per_velocity: periods.ticks_per_velocity(),
         })
     }
+
+    /// A feedforward over a position period, from its values before and behind its step.
+    fn stair(&self, shift: Shift, before: f64, behind: f64) -> Stair {
+        Stair { before, behind, step: shift.step().div_ceil(self.ticks_per_velocity) as f64 }
+    }
 }
 
-/// State of one axis.
+/// State of one axis, but for what goes on from tick to tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    motor: MotorState,
-    torques: Torques,
+    /// N or N·m.
     load: f64,
     psec: SetpointHistory,
     position: PositionState,
-    velocity_pi: PiState,
-    current_pi: PiState,
-    speed_limited: bool,
-    /// Whether the current set-point was limited since the last position instant.
-    current_limited: bool,
+    /// What the axis was asked for in this position period.
+    demand: Demand,
+    /// Load torque over the tick before the position instant, N·m at the motor.
+    load_before: f64,
     sample: AxisSample,
 }
 
 impl Axis {
     /// At rest at `position` (m or rad), held against gravity.
-    pub fn at_rest(p: &AxisParameters, position: f64) -> Self {
-        let motor = MotorState { current: 0.0, speed: 0.0, angle: position / p.ratio };
-        let gravity = p.plant.gravity(&motor);
-        let current = gravity / p.plant.torque_constant();
+    pub(super) fn at_rest(p: &AxisParameters, position: f64) -> (Self, LoopsState) {
+        let angle = position / p.ratio;
+        let plant = &p.loops.plant;
+        let gravity = plant.gravity_at(angle);
+        let current = gravity / plant.torque_constant();
         // What the drive takes that current for.
-        let torque = gravity * (p.torque_constant / p.plant.torque_constant());
+        let torque = gravity * (p.torque_constant / plant.torque_constant());
         let voltage = p.resistance * current;
+        let state = LoopsState {
+            motor: MotorState { current, speed: 0.0, angle },
+            velocity: PiState { integral: torque, limited: false },
+            current: PiState { integral: voltage, limited: false },
+            current_setpoint: current,
+            gravity,
+            ..LoopsState::default()
+        };
         let mut axis = Axis {
-            motor: MotorState { current, ..motor },
-            torques: Torques { friction: 0.0, gravity, load: 0.0 },
             load: 0.0,
             psec: SetpointHistory::new(position, p.ticks_per_position, p.reach()),
-            position: PositionState::at_rest(motor.angle),
-            velocity_pi: PiState { integral: torque, limited: false },
-            current_pi: PiState { integral: voltage, limited: false },
-            speed_limited: false,
-            current_limited: false,
-            sample: AxisSample {
-                psec: position,
-                delayed_psec: position,
-                current_setpoint: current,
-                voltage,
-                ..AxisSample::default()
-            },
+            position: PositionState::at_rest(angle),
+            demand: Demand::default(),
+            load_before: 0.0,
+            sample: AxisSample { psec: position, delayed_psec: position, ..AxisSample::default() },
         };
-        axis.observe(p);
-        axis
+        let done = Done { current_setpoint: current, voltage, gravity, ..Done::default() };
+        axis.observe(p, 0, &state.motor, &done);
+        (axis, state)
     }
 
     /// Takes over changed parameters in the place of `old`; the state goes on.
     ///
     /// The velocity loop's integral takes over what TFFWS gives up.
-    pub(super) fn adopt(&mut self, old: &AxisParameters, p: &AxisParameters, tick: u64) {
-        let torque = |p: &AxisParameters| {
-            p.feedforward.torque(&self.psec, self.psec.index(tick.saturating_sub(1), p.delays.torque))
-        };
+    pub(super) fn adopt(&mut self, old: &AxisParameters, p: &AxisParameters, state: &mut LoopsState) {
+        // At the last tick of the period.
+        let torque =
+            |p: &AxisParameters| p.feedforward.torque(&self.psec, p.torque_shift.index(self.psec.present()));
         let limit = p.torque_constant * p.max_current;
-        let integral = self.velocity_pi.integral + (torque(old) - torque(p)).clamp(-limit, limit);
-        self.velocity_pi.integral = integral;
+        state.velocity.integral += (torque(old) - torque(p)).clamp(-limit, limit);
         self.psec.adopt(p.reach());
         if (&old.position, &old.feedforward) != (&p.position, &p.feedforward) {
             self.position.hand_over();
@@ -158,86 +168,89 @@ impl Axis {
         self.sample.controller = p.controller;
     }
 
-    /// The set-point of the position period that begins, and those behind it as far as they are known.
-    pub(super) fn begin_period(&mut self, psec: f64, ahead: &[f64]) {
-        self.psec.push(psec);
-        self.psec.foresee(ahead);
-        self.sample.psec = psec;
-    }
-
     pub(super) fn set_load(&mut self, load: f64) {
         self.load = load;
     }
 
-    /// The loops that are due at `tick`: position, then velocity, then current.
-    #[inline]
-    pub(super) fn control(&mut self, p: &AxisParameters, tick: u64, tick_in_period: u64) {
-        if tick_in_period == 0 {
-            self.control_position(p, tick);
+    /// The position instant: takes the set-point of the period that begins, and those behind it as far as
+    /// they are known, and says what is asked of the inner loops until the next one.
+    pub(super) fn control_position(
+        &mut self,
+        p: &AxisParameters,
+        state: &LoopsState,
+        psec: f64,
+        ahead: &[f64],
+    ) -> Demand {
+        self.psec.push(psec);
+        self.psec.foresee(ahead);
+        let present = self.psec.present();
+        let (history, motor) = (&self.psec, &state.motor);
+        let k = p.position_shift.index_at_instant(present);
+        self.sample.psec = psec;
+        self.sample.delayed_psec = history.at(k);
+        if state.was_limited {
+            self.position.correct(motor.speed);
         }
-        if tick_in_period.is_multiple_of(p.ticks_per_velocity) {
-            self.control_velocity(p, tick);
-        }
-        let error = self.sample.current_setpoint - self.motor.current;
-        self.sample.voltage = p.current.update(&mut self.current_pi, error, 0.0);
-        self.observe(p);
-    }
-
-    fn control_position(&mut self, p: &AxisParameters, tick: u64) {
-        let k = self.psec.index(tick, p.delays.position);
-        self.sample.delayed_psec = self.psec.at(k);
-        if std::mem::take(&mut self.current_limited) {
-            self.position.correct(self.motor.speed);
-        }
-        let psec = &self.psec;
-        let feedforward = p.feedforward.velocity(psec, psec.index(tick, p.delays.velocity));
-        let setpoint = |j| psec.at(k + j) / p.ratio;
-        let wanted = p.position.update(&mut self.position, setpoint, self.motor.angle, feedforward);
+        let staircase = |shift: Shift, value: &dyn Fn(i64) -> f64| {
+            let behind = shift.index(present);
+            p.stair(shift, value(behind - 1), value(behind))
+        };
+        let velocity = staircase(p.velocity_shift, &|k| p.feedforward.velocity(history, k));
+        let torque = staircase(p.torque_shift, &|k| p.feedforward.torque(history, k));
+        let feedforward = velocity.at(0.0);
+        let setpoint = |j| history.at(k + j) / p.ratio;
+        let wanted = p.position.update(&mut self.position, setpoint, motor.angle, feedforward);
         // Coefficients that are forced can make it overflow: an axis that is asked for nothing stops.
         let asked = if wanted.is_finite() { wanted } else { 0.0 };
-        self.sample.velocity_setpoint = asked.clamp(-p.max_speed, p.max_speed);
-        self.speed_limited = wanted != self.sample.velocity_setpoint;
-        self.position.record(self.sample.velocity_setpoint + feedforward);
+        let velocity_setpoint = asked.clamp(-p.max_speed, p.max_speed);
+        self.position.record(velocity_setpoint + feedforward);
+        self.load_before = self.demand.load;
+        self.demand = Demand {
+            velocity_setpoint,
+            speed_limited: wanted != velocity_setpoint,
+            velocity,
+            torque,
+            load: p.loops.plant.load_torque(self.load),
+        };
+        self.demand
     }
 
-    fn control_velocity(&mut self, p: &AxisParameters, tick: u64) {
-        let s = &mut self.sample;
-        let velocity_index = self.psec.index(tick, p.delays.velocity);
-        let torque_index = self.psec.index(tick, p.delays.torque);
-        s.velocity_feedforward = p.feedforward.velocity(&self.psec, velocity_index);
-        s.torque_feedforward = p.feedforward.torque(&self.psec, torque_index);
-        if let Some(compensation) = &p.compensation {
-            s.torque_feedforward += compensation.torque(&self.psec, tick);
-        }
-        let error = s.velocity_setpoint + s.velocity_feedforward - self.motor.speed;
-        s.current_setpoint = p.velocity.update(&mut self.velocity_pi, error, s.torque_feedforward);
-        self.current_limited |= self.velocity_pi.limited;
+    /// The torque with which friction is compensated at an instant of the velocity loop, N·m.
+    pub(super) fn compensation(&self, of: &FrictionCompensation, p: &AxisParameters, instant: usize) -> f64 {
+        // Before the first set-point there is nothing to compensate.
+        let Ok(period) = u64::try_from(self.psec.present()) else { return 0.0 };
+        of.torque(&self.psec, period * p.ticks_per_position + instant as u64 * p.ticks_per_velocity)
     }
 
-    /// Moves the plant by one tick.
-    #[inline]
-    pub(super) fn step(&mut self, p: &AxisParameters) {
-        self.torques = p.plant.step(&mut self.motor, self.sample.voltage, self.load);
+    /// Makes the sample of a tick of this position period.
+    pub(super) fn observe(&mut self, p: &AxisParameters, tick: usize, motor: &MotorState, done: &Done) {
+        let plant = &p.loops.plant;
+        let torque_constant = plant.torque_constant();
+        let instant = tick / p.ticks_per_velocity as usize;
+        let compensation = p.compensation.as_ref().map_or(0.0, |of| self.compensation(of, p, instant));
+        let load = if tick == 0 { self.load_before } else { self.demand.load };
+        self.sample = AxisSample {
+            position: plant.position(motor.angle),
+            velocity: plant.velocity(motor.speed),
+            current: motor.current,
+            current_setpoint: done.current_setpoint,
+            voltage: done.voltage,
+            velocity_setpoint: self.demand.velocity_setpoint,
+            velocity_feedforward: self.demand.velocity.at(instant as f64),
+            torque_feedforward: self.demand.torque.at(instant as f64) + compensation,
+            friction_current: done.friction / torque_constant,
+            gravity_current: done.gravity / torque_constant,
+            load_current: -load / torque_constant,
+            effort: torque_constant * motor.current / p.ratio,
+            controller: p.controller,
+            saturated: done.saturated,
+            friction_extrapolated: plant.friction_is_extrapolated(motor.speed),
+            ..self.sample
+        };
     }
 
-    /// Copies the plant's state into the sample.
-    #[inline]
-    fn observe(&mut self, p: &AxisParameters) {
-        let s = &mut self.sample;
-        s.position = p.plant.position(&self.motor);
-        s.velocity = p.plant.velocity(&self.motor);
-        s.current = self.motor.current;
-        let torque_constant = p.plant.torque_constant();
-        s.friction_current = self.torques.friction / torque_constant;
-        s.gravity_current = self.torques.gravity / torque_constant;
-        s.load_current = -self.torques.load / torque_constant;
-        s.effort = torque_constant * self.motor.current / p.ratio;
-        s.saturated = self.speed_limited || self.velocity_pi.limited || self.current_pi.limited;
-        s.controller = p.controller;
-        s.friction_extrapolated = p.plant.friction_is_extrapolated(&self.motor);
-    }
-
-    /// The signals of the tick that the controllers have last acted on.
+    /// The signals of the position instant of the period that was computed last, or of the tick that is
+    /// being shown.
     pub fn sample(&self) -> &AxisSample {
         &self.sample
     }

@@ -4,12 +4,15 @@
 //! integer count of ticks of the current loop; nothing here knows the wall clock.
 
 mod axis;
+mod bank;
+mod block;
 mod compensation;
 mod controller;
 mod prediction;
 mod sample;
 
 pub use axis::{Axis, AxisParameters};
+pub use bank::Width;
 pub use controller::designed;
 pub use prediction::{deviating_model, prediction_model};
 pub use sample::AxisSample;
@@ -20,6 +23,9 @@ use crate::config::{MachineConfig, Periods};
 use crate::design::DesignError;
 use crate::drive::DriveError;
 use crate::units::Nanoseconds;
+
+use bank::Bank;
+use block::{Loops, Timing};
 
 /// Why a machine cannot be built or changed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -76,6 +82,44 @@ impl MachineParameters {
     pub fn periods(&self) -> Periods {
         self.periods
     }
+
+    /// Several machines as one: their axes one behind the other. None if there is none, or their periods
+    /// differ.
+    pub fn together(machines: &[Arc<MachineParameters>]) -> Option<Self> {
+        let periods = machines.first()?.periods;
+        let same = machines.iter().all(|machine| machine.periods == periods);
+        let axes = machines.iter().flat_map(|machine| machine.axes.iter().cloned());
+        same.then(|| MachineParameters { periods, axes: axes.collect() })
+    }
+
+    /// The same with the axes at `places` only; places that there are not are left out.
+    pub fn with_axes(&self, places: &[usize]) -> Self {
+        let axes = places.iter().filter_map(|&place| self.axes.get(place)).cloned().collect();
+        MachineParameters { axes, ..*self }
+    }
+
+    fn timing(&self) -> Timing {
+        Timing {
+            ticks_per_position: self.periods.ticks_per_position() as usize,
+            ticks_per_velocity: self.periods.ticks_per_velocity() as usize,
+        }
+    }
+
+    fn bank(&self) -> Bank {
+        let loops: Vec<Loops> = self.axes.iter().map(|axis| axis.loops).collect();
+        Bank::new(&loops, self.timing())
+    }
+}
+
+/// What an axis did in a position period, over all of its ticks.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Activity {
+    /// Largest |i|, A.
+    pub peak_current: f64,
+    /// Ticks with speed, current or voltage set-point at its limit.
+    pub saturated_ticks: u64,
+    /// Whether the friction law was used beyond the range that it was fitted for.
+    pub friction_extrapolated: bool,
 }
 
 /// A machine: axes that move on one grid of ticks.
@@ -87,7 +131,7 @@ impl MachineParameters {
 /// let mut machine = Machine::new(MachineParameters::new(&config)?.into());
 /// // 1 mm in X, then a second of standstill: the axis arrives, but for what friction holds.
 /// for _ in 0..167 {
-///     machine.advance(&[0.001, 0.0, 0.0, 0.0, 0.0]);
+///     machine.advance(&[0.001, 0.0, 0.0, 0.0, 0.0], &[]);
 /// }
 /// let x = machine.axis(0).sample();
 /// assert!((x.position - 0.001).abs() < 1e-6);
@@ -97,22 +141,36 @@ impl MachineParameters {
 pub struct Machine {
     parameters: Arc<MachineParameters>,
     axes: Vec<Axis>,
+    bank: Bank,
     tick: u64,
 }
 
 impl Machine {
     /// A machine at rest at home (0 on every axis).
     pub fn new(parameters: Arc<MachineParameters>) -> Self {
-        let axes = parameters.axes.iter().map(|p| Axis::at_rest(p, 0.0)).collect();
-        Machine { parameters, axes, tick: 0 }
+        let (axes, states): (Vec<_>, Vec<_>) = parameters.axes.iter().map(|p| Axis::at_rest(p, 0.0)).unzip();
+        let mut bank = parameters.bank();
+        for (axis, state) in states.iter().enumerate() {
+            bank.set_state(axis, state);
+        }
+        Machine { axes, bank, parameters, tick: 0 }
     }
 
     /// Back to rest at `positions` (m or rad, one per axis), at tick 0.
     pub fn reset(&mut self, positions: &[f64]) {
-        for ((axis, p), &position) in self.axes.iter_mut().zip(&self.parameters.axes).zip(positions) {
-            *axis = Axis::at_rest(p, position);
+        for (place, ((axis, p), &position)) in
+            self.axes.iter_mut().zip(&self.parameters.axes).zip(positions).enumerate()
+        {
+            let (at_rest, state) = Axis::at_rest(p, position);
+            *axis = at_rest;
+            self.bank.set_state(place, &state);
         }
         self.tick = 0;
+    }
+
+    /// How wide the processor's vectors are used from now on; the results are the same.
+    pub fn set_width(&mut self, width: Width) {
+        self.bank.set_width(width);
     }
 
     /// Takes over changed gains, weights, delays or physics; states go on as they are.
@@ -127,8 +185,15 @@ impl Machine {
         if !same {
             return Err(MachineError::AnotherMachine);
         }
-        for ((axis, old), p) in self.axes.iter_mut().zip(&self.parameters.axes).zip(&parameters.axes) {
-            axis.adopt(old, p, self.tick);
+        let changed = self.parameters.axes.iter().zip(&parameters.axes);
+        for (place, (axis, (old, p))) in self.axes.iter_mut().zip(changed).enumerate() {
+            let mut state = self.bank.state(place);
+            axis.adopt(old, p, &mut state);
+            self.bank.set_state(place, &state);
+            self.bank.set_loops(place, p.loops);
+            if old.compensation.is_some() {
+                self.bank.set_compensation(place, |_| 0.0);
+            }
         }
         self.parameters = parameters;
         Ok(())
@@ -184,32 +249,85 @@ impl Machine {
         }
     }
 
-    /// One position period with the set-points `psec` (m or rad, one per axis), of whose future nothing
-    /// is known: controllers that read ahead find the present one.
-    pub fn advance(&mut self, psec: &[f64]) {
-        self.advance_with(psec, &[], |_| ());
+    /// One position period with the set-points `psec` (m or rad, one per axis).
+    ///
+    /// `ahead` holds the set-points of the next periods, as many for each axis, one axis behind the other;
+    /// beyond them, up to the [`horizon`](Self::horizon), the last one is taken. With none the future is
+    /// not known: controllers that read ahead find the present one.
+    ///
+    /// The samples of the axes are those of the position instant then; [`position`](Self::position) and
+    /// [`activity`](Self::activity) tell what happened at every tick.
+    pub fn advance(&mut self, psec: &[f64], ahead: &[f64]) {
+        self.begin_period(psec, ahead);
+        self.bank.run(false);
+        self.observe(0);
+        self.tick += self.parameters.periods.ticks_per_position();
     }
 
-    /// One position period, showing the machine to `observe` at every tick: after the controllers have
-    /// acted on the tick's state and before the plant moves. The first call is the position instant.
-    ///
-    /// `ahead` holds the set-points of the next periods, as many for each axis, one axis behind the
-    /// other; beyond them, up to the [`horizon`](Self::horizon), the last one is taken.
+    /// Likewise, showing the machine to `observe` at every tick: after the controllers have acted on the
+    /// tick's state and before the plant moves. The first call is the position instant. The samples of the
+    /// axes are those of the tick then, and those of the position instant in the end.
     pub fn advance_with(&mut self, psec: &[f64], ahead: &[f64], mut observe: impl FnMut(&Machine)) {
-        let parameters = Arc::clone(&self.parameters);
-        let known = ahead.len() / self.axes.len().max(1);
-        for (place, (axis, &setpoint)) in self.axes.iter_mut().zip(psec).enumerate() {
-            axis.begin_period(setpoint, &ahead[place * known..][..known]);
-        }
-        for tick_in_period in 0..parameters.periods.ticks_per_position() {
-            for (axis, p) in self.axes.iter_mut().zip(&parameters.axes) {
-                axis.control(p, self.tick, tick_in_period);
-            }
+        self.begin_period(psec, ahead);
+        self.bank.run(true);
+        for tick in 0..self.parameters.periods.ticks_per_position() {
+            self.observe(tick as usize);
             observe(self);
-            for (axis, p) in self.axes.iter_mut().zip(&parameters.axes) {
-                axis.step(p);
-            }
             self.tick += 1;
+        }
+        self.observe(0);
+    }
+
+    /// What the axes are asked for in the next position period.
+    fn begin_period(&mut self, psec: &[f64], ahead: &[f64]) {
+        let known = ahead.len() / self.axes.len().max(1);
+        let parameters = &*self.parameters;
+        for (place, ((axis, p), &setpoint)) in
+            self.axes.iter_mut().zip(&parameters.axes).zip(psec).enumerate()
+        {
+            let state = self.bank.state(place);
+            let demand = axis.control_position(p, &state, setpoint, &ahead[place * known..][..known]);
+            self.bank.set_demand(place, &demand);
+            if let Some(of) = &p.compensation {
+                self.bank.set_compensation(place, |instant| axis.compensation(of, p, instant));
+            }
+        }
+    }
+
+    /// Ticks of a position period.
+    pub fn ticks_per_period(&self) -> usize {
+        self.parameters.timing().ticks_per_position
+    }
+
+    /// Makes the samples of a tick of the position period.
+    fn observe(&mut self, tick: usize) {
+        for (place, (axis, p)) in self.axes.iter_mut().zip(&self.parameters.axes).enumerate() {
+            axis.observe(p, tick, &self.bank.motor(place, tick), &self.bank.done(place, tick));
+        }
+    }
+
+    /// Position of an axis at a tick of the position period that was computed last, m or rad.
+    ///
+    /// # Panics
+    /// If there is no such axis or tick.
+    #[inline]
+    pub fn position(&self, axis: usize, tick: usize) -> f64 {
+        self.parameters.axes[axis].loops.plant.position(self.bank.motor(axis, tick).angle)
+    }
+
+    /// What an axis did in the position period that was computed last.
+    ///
+    /// # Panics
+    /// If there is no such axis.
+    pub fn activity(&self, axis: usize) -> Activity {
+        let (peak_current, peak_speed) = self.bank.peaks(axis);
+        Activity {
+            peak_current,
+            saturated_ticks: self.bank.state(axis).saturated_ticks as u64,
+            friction_extrapolated: self.parameters.axes[axis]
+                .loops
+                .plant
+                .friction_is_extrapolated(peak_speed),
         }
     }
 }

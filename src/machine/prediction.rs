@@ -70,7 +70,12 @@ impl InnerLoops {
         let (unlimited, torque_constant) = (f64::INFINITY, axis.motor.torque_constant);
         Ok(InnerLoops {
             motor: Motor::new(motor, tick)?,
-            velocity: Pi::new(&axis.velocity_loop, seconds(periods.velocity), torque_constant, unlimited),
+            velocity: Pi::new(
+                &axis.velocity_loop,
+                seconds(periods.velocity),
+                1.0 / torque_constant,
+                unlimited,
+            ),
             current: Pi::new(&axis.current_loop, tick, 1.0, unlimited),
             ticks_per_position: periods.ticks_per_position(),
             ticks_per_velocity: periods.ticks_per_velocity(),
@@ -85,9 +90,9 @@ impl InnerLoops {
         let mut current_setpoint = 0.0;
         for tick in 0..self.ticks_per_position {
             if tick.is_multiple_of(self.ticks_per_velocity) {
-                current_setpoint = self.velocity.update(&mut velocity, setpoint - motor.speed, 0.0);
+                current_setpoint = self.velocity.update_with(&mut velocity, setpoint - motor.speed, 0.0);
             }
-            let voltage = self.current.update(&mut current, current_setpoint - motor.current, 0.0);
+            let voltage = self.current.update(&mut current, current_setpoint - motor.current);
             motor = self.motor.step(&motor, voltage, 0.0);
         }
         State::new(motor.current, motor.speed, velocity.integral, current.integral, motor.angle)

@@ -66,7 +66,7 @@ pub struct Simulation {
     /// The instant after which nothing is settling any more.
     settled_from: i64,
     samples: Vec<AxisSample>,
-    /// Whether an axis was at a limit at any tick since the last sample.
+    /// Whether an axis was at a limit at any tick behind the last sample.
     saturated: Vec<bool>,
     ends: Vec<MotionEnd>,
     /// Of each axis, at the last instants.
@@ -110,6 +110,12 @@ impl Simulation {
         })
     }
 
+    /// Whether motions that are accepted from now on are measured, as they are at first: the figures in
+    /// the [`MotionEnd`]s of others are 0. For those who measure themselves.
+    pub fn set_assessing(&mut self, assessing: bool) {
+        self.motions.set_assessing(assessing);
+    }
+
     /// Time of position instant k, ns.
     pub fn time_of(&self, k: i64) -> Nanoseconds {
         self.grid.time_of(k)
@@ -131,14 +137,26 @@ impl Simulation {
     }
 
     /// Computes the next position instant: its samples, and the ticks up to the one after.
-    pub fn step(&mut self) {
-        self.step_with(|_, _| ());
+    ///
+    /// Whether the machine has run: one that nothing has moved yet stands still without being computed.
+    pub fn step(&mut self) -> bool {
+        self.step_by(|machine, psec, ahead| machine.advance(psec, ahead))
     }
 
     /// Likewise, showing the machine to `observe` at every tick, as [`Machine::advance_with`] does;
     /// its second argument tells the first tick of the period. A machine that nothing has moved yet
     /// has no ticks to show.
-    pub fn step_with(&mut self, observe: impl FnMut(&Machine, bool)) {
+    pub fn step_with(&mut self, mut observe: impl FnMut(&Machine, bool)) -> bool {
+        self.step_by(|machine, psec, ahead| {
+            let mut position_instant = true;
+            machine.advance_with(psec, ahead, |machine| {
+                observe(machine, position_instant);
+                position_instant = false;
+            });
+        })
+    }
+
+    fn step_by(&mut self, advance: impl FnOnce(&mut Machine, &[f64], &[f64])) -> bool {
         let k = self.next;
         self.timeline.next();
         self.follow_timeline_events(k);
@@ -150,7 +168,8 @@ impl Simulation {
             self.motions.look_ahead(&self.timeline);
             self.loads.apply(&mut self.machine, k);
             self.look_ahead();
-            self.run_ticks(observe);
+            advance(&mut self.machine, self.timeline.psec(), &self.ahead);
+            self.take_period();
         }
         for (errors, sample) in self.errors.iter_mut().zip(&self.samples) {
             errors.note(sample);
@@ -164,13 +183,14 @@ impl Simulation {
             self.settled_from = k + 1 + SETTLING / self.grid.period;
         }
         self.next = k + 1;
+        self.awake
     }
 
     /// A position period at rest: of a machine that has moved nothing the first set-point counts as the
     /// one before it too, and a stream's first need not be where the machine stands.
     fn wake_at_rest(&mut self) {
         let rest: Vec<f64> = self.samples.iter().map(|sample| sample.psec).collect();
-        self.machine.advance(&rest);
+        self.machine.advance(&rest, &[]);
         self.awake = true;
     }
 
@@ -210,21 +230,16 @@ impl Simulation {
         }
     }
 
-    fn run_ticks(&mut self, mut observe: impl FnMut(&Machine, bool)) {
-        let Simulation { machine, timeline, ahead, motions, samples, saturated, .. } = self;
-        let mut position_instant = true;
-        machine.advance_with(timeline.psec(), ahead, |m: &Machine| {
-            for ((axis, sample), saturated) in m.axes().iter().zip(samples.iter_mut()).zip(&mut *saturated) {
-                *saturated |= axis.sample().saturated;
-                if position_instant {
-                    *sample = AxisSample { saturated: *saturated, ..*axis.sample() };
-                    *saturated = false;
-                }
-            }
-            motions.observe(m, position_instant);
-            observe(m, position_instant);
-            position_instant = false;
-        });
+    /// Takes the samples of the position instant, and the figures of the period behind it.
+    fn take_period(&mut self) {
+        let axes = self.machine.axes().iter().enumerate();
+        for (((place, axis), sample), saturated) in axes.zip(&mut self.samples).zip(&mut self.saturated) {
+            let instant = axis.sample();
+            let behind = self.machine.activity(place).saturated_ticks - u64::from(instant.saturated);
+            *sample = AxisSample { saturated: *saturated || instant.saturated, ..*instant };
+            *saturated = behind > 0;
+        }
+        self.motions.observe(&self.machine);
     }
 
     fn take_samples(&mut self) {

@@ -90,7 +90,8 @@ pub(super) enum Cancel {
 struct Motion {
     id: MotionId,
     places: Vec<usize>,
-    assessor: MotionAssessor,
+    /// Its figures; none where nobody reads them.
+    assessor: Option<MotionAssessor>,
     running: bool,
     /// The instant at which its last set-point has passed the delays.
     finishes: Option<i64>,
@@ -110,7 +111,8 @@ impl Motion {
             }
             outcome => outcome,
         };
-        MotionEnd { id: self.id, time, outcome, report: self.assessor.report(), places: self.places }
+        let report = self.assessor.map(|assessor| assessor.report()).unwrap_or_default();
+        MotionEnd { id: self.id, time, outcome, report, places: self.places }
     }
 }
 
@@ -120,19 +122,22 @@ pub(super) struct Motions {
     kinds: Vec<AxisKind>,
     tick: f64,
     horizon: u32,
+    assessing: bool,
     list: Vec<Motion>,
 }
 
 impl Motions {
     pub(super) fn new(kinds: Vec<AxisKind>, tick: f64, horizon: u32) -> Self {
-        Motions { kinds, tick, horizon, list: Vec::new() }
+        Motions { kinds, tick, horizon, assessing: true, list: Vec::new() }
     }
 
     pub(super) fn accept(&mut self, id: MotionId, places: &[usize], tolerances: Option<Tolerances>) {
         self.list.push(Motion {
             id,
             places: places.to_vec(),
-            assessor: MotionAssessor::new(places, &self.kinds, self.tick, self.horizon),
+            assessor: self
+                .assessing
+                .then(|| MotionAssessor::new(places, &self.kinds, self.tick, self.horizon)),
             running: false,
             finishes: None,
             tolerances,
@@ -238,16 +243,27 @@ impl Motions {
         ends.extend(self.list.drain(..).map(|m| m.into_end(Outcome::Aborted(why), time)));
     }
 
+    /// Assessors of the motions under way.
+    fn assessors(&mut self) -> impl Iterator<Item = &mut MotionAssessor> {
+        self.list.iter_mut().filter(|m| m.running).filter_map(|m| m.assessor.as_mut())
+    }
+
+    /// Whether motions that are accepted from now on have figures.
+    pub(super) fn set_assessing(&mut self, assessing: bool) {
+        self.assessing = assessing;
+    }
+
     /// Shows the motions under way what `timeline` commands next.
     pub(super) fn look_ahead(&mut self, timeline: &Timeline) {
-        for motion in self.list.iter_mut().filter(|m| m.running) {
-            motion.assessor.look_ahead(|place, periods| timeline.psec_ahead(place, periods).unwrap_or(0.0));
+        for assessor in self.assessors() {
+            assessor.look_ahead(|place, periods| timeline.psec_ahead(place, periods).unwrap_or(0.0));
         }
     }
 
-    pub(super) fn observe(&mut self, machine: &Machine, position_instant: bool) {
-        for motion in self.list.iter_mut().filter(|m| m.running) {
-            motion.assessor.observe(machine, position_instant);
+    /// Takes the position period in that `machine` has computed last.
+    pub(super) fn observe(&mut self, machine: &Machine) {
+        for assessor in self.assessors() {
+            assessor.observe(machine);
         }
     }
 }

@@ -89,7 +89,7 @@ pub enum TrialError {
     Watch(io::Error),
 }
 
-/// Runs `setpoints` until the axes have settled, and shows every tick to `watch`.
+/// Runs `setpoints` until the axes have settled, and shows every position instant to `watch`.
 ///
 /// The machine starts at rest at the first set-point; a trajectory whose first point is later than 0
 /// is approached from home.
@@ -101,14 +101,52 @@ pub fn run(
     setpoints: Setpoints<'_>,
     mut watch: impl FnMut(Tick<'_>) -> io::Result<()>,
 ) -> Result<Outcome, TrialError> {
+    run_by(trial, setpoints, |simulation| {
+        let time = simulation.time_of(simulation.next_instant());
+        let ran = simulation.step();
+        let machine = simulation.machine();
+        if ran { watch(Tick { time, position_instant: true, machine }).map(|()| ran) } else { Ok(ran) }
+    })
+}
+
+/// As [`run`], but shows every tick to `watch`.
+///
+/// # Errors
+/// [`TrialError`].
+pub fn trace(
+    trial: &Trial<'_>,
+    setpoints: Setpoints<'_>,
+    mut watch: impl FnMut(Tick<'_>) -> io::Result<()>,
+) -> Result<Outcome, TrialError> {
+    let tick = trial.machine.periods().current;
+    run_by(trial, setpoints, |simulation| {
+        let mut time = simulation.time_of(simulation.next_instant());
+        let mut watched = Ok(());
+        let ran = simulation.step_with(|machine, position_instant| {
+            if watched.is_ok() {
+                watched = watch(Tick { time, position_instant, machine });
+            }
+            time += tick;
+        });
+        watched.map(|()| ran)
+    })
+}
+
+/// Runs `setpoints`; `step` computes a position period and says whether the machine ran.
+fn run_by(
+    trial: &Trial<'_>,
+    setpoints: Setpoints<'_>,
+    mut step: impl FnMut(&mut Simulation) -> io::Result<bool>,
+) -> Result<Outcome, TrialError> {
     let limits = joints(trial.machine, "");
     let mut simulation = Simulation::new(trial.machine, limits.clone(), 0)?;
+    // The observer measures.
+    simulation.set_assessing(false);
     let mut supply = Supply::new(setpoints, &limits, trial)?;
     let home = vec![0.0; limits.len()];
     let start = supply.start().unwrap_or(&home).to_vec();
     simulation.reset_to(&start).map_err(|rejection| TrialError::Rejected { time: 0.0, rejection })?;
     let mut observer = Observer::new(trial, &start);
-    let tick = trial.machine.periods().current;
     loop {
         supply.offer_due(&mut simulation)?;
         if !simulation.is_busy() && supply.is_empty() {
@@ -116,18 +154,9 @@ pub fn run(
         }
         let moving = simulation.is_asked();
         observer.look_ahead(&simulation);
-        let mut time = simulation.time_of(simulation.next_instant());
-        let mut failed = None;
-        simulation.step_with(|machine, position_instant| {
-            let tick_now = Tick { time, position_instant, machine };
-            observer.observe(tick_now, moving);
-            if failed.is_none() {
-                failed = watch(tick_now).err();
-            }
-            time += tick;
-        });
-        if let Some(error) = failed {
-            return Err(TrialError::Watch(error));
+        let time = simulation.time_of(simulation.next_instant());
+        if step(&mut simulation).map_err(TrialError::Watch)? {
+            observer.observe(simulation.machine(), time, moving);
         }
     }
     Ok(observer.finish())

@@ -5,15 +5,16 @@ use std::sync::Arc;
 use crate::assess::{AxisAssessor, Nearest, PathTracker, SetpointTracker};
 use crate::config::{AxisKind, MachineConfig};
 use crate::kinematics::{Kinematics, ToolPose};
+use crate::machine::Machine;
 use crate::path::Frame;
 use crate::simulation::{Simulation, horizon};
-use crate::units::seconds;
+use crate::units::{Nanoseconds, seconds};
 
 use super::circle::Circles;
 use super::corner::Corners;
 use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, Reference};
 use super::recorder::Recorder;
-use super::{Outcome, Tick, Trial};
+use super::{Outcome, Trial};
 
 /// How far ahead of the set-point the nearest point of a path is sought, m or rad: an axis that
 /// overshoots a corner is nearest to what comes behind it.
@@ -102,19 +103,30 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// Takes a tick into account; `moving` tells whether set-points are under way.
-    pub(super) fn observe(&mut self, tick: Tick<'_>, moving: bool) {
-        let time = seconds(tick.time);
-        let axes = tick.machine.axes();
-        for (place, axis) in axes.iter().enumerate() {
-            let sample = axis.sample();
-            self.position[place] = sample.position;
+    /// Takes the position period in that `machine` has computed last, which began at `time` ns; `moving`
+    /// tells whether set-points are under way.
+    pub(super) fn observe(&mut self, machine: &Machine, time: Nanoseconds, moving: bool) {
+        for (place, axis) in machine.axes().iter().enumerate() {
+            let (sample, activity) = (axis.sample(), machine.activity(place));
             self.moves[place] |= sample.psec != self.start[place];
-            self.extrapolated[place] |= sample.friction_extrapolated;
+            self.extrapolated[place] |= activity.friction_extrapolated;
             if moving {
-                self.axes[place].observe(sample, tick.position_instant);
+                self.axes[place].observe(sample, &activity);
             }
         }
+        let mut time = time;
+        for tick in 0..machine.ticks_per_period() {
+            for (place, position) in self.position.iter_mut().enumerate() {
+                *position = machine.position(place, tick);
+            }
+            self.observe_tool(machine, tick == 0, seconds(time));
+            time += machine.periods().current;
+        }
+        self.end = seconds(time);
+    }
+
+    /// Takes a tick into account, at which the axes are at `position`.
+    fn observe_tool(&mut self, machine: &Machine, position_instant: bool, time: f64) {
         let pose = self.kinematics.forward(&self.position);
         let nearest = self.nearest(&pose, time);
         if let Some(nearest) = &nearest {
@@ -123,17 +135,14 @@ impl<'a> Observer<'a> {
             self.orientation.push(nearest.orientation);
             self.corners.observe(time, nearest);
         }
-        if tick.position_instant
-            && let Some(recorder) = &mut self.recorder
-        {
+        if position_instant && let Some(recorder) = &mut self.recorder {
             let tool = nearest.as_ref().map(|nearest| (nearest, pose.tip.into()));
-            recorder.push(time, axes.iter().map(|axis| axis.sample()), tool);
+            recorder.push(time, machine.axes().iter().map(|axis| axis.sample()), tool);
         }
         if self.trial.program.as_ref().is_some_and(|p| p.path().frame() == Frame::Workpiece) {
             self.kinematics.joints_to_tip(&mut self.position);
         }
         self.circles.observe(time, &self.position, self.recorder.is_some());
-        self.end = time + self.tick;
     }
 
     /// Learns, before a position instant, where the set-points go, if they are what the tool is

@@ -1,7 +1,5 @@
 //! A machine on a path, that tunings are tried on.
 
-use std::io;
-
 use rayon::prelude::*;
 
 use super::cost::Cost;
@@ -224,8 +222,7 @@ pub(super) fn run(
 ) -> Result<Outcome, TuneError> {
     let config = parameters.machine_config()?;
     let allow = parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
-    let look = |instant: bool| -> io::Result<()> { if instant { watch.go_on() } else { Ok(()) } };
-    Ok(course.run(&config, allow, record, |tick| look(tick.position_instant))?)
+    Ok(course.run(&config, allow, record, |_| watch.go_on())?)
 }
 
 fn candidate(

@@ -7,7 +7,6 @@ use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters}
 use virtual_axes::files::{self, FileKind};
 use virtual_axes::machine::MachineParameters;
 use virtual_axes::trial::Trial;
-use virtual_axes::units::seconds;
 
 use crate::input::Input;
 use crate::interrupt;
@@ -45,14 +44,11 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         allow_nonzero_end_velocity: false,
         record: false,
     };
-    let mut end = 0;
     // The surest check is to run it.
-    virtual_axes::trial::run(&trial, input.setpoints(&config, program.as_ref())?, |tick| {
-        end = tick.time;
-        interrupt::check()
-    })
-    .map_err(|error| crate::run::named(&input, error))?;
-    Ok(format!("{kind} for {}: {:.3} s\nvalid\n", config.name(), seconds(end)))
+    let setpoints = input.setpoints(&config, program.as_ref())?;
+    let outcome = virtual_axes::trial::run(&trial, setpoints, |_| interrupt::check())
+        .map_err(|error| crate::run::named(&input, error))?;
+    Ok(format!("{kind} for {}: {:.3} s\nvalid\n", config.name(), outcome.figures.duration))
 }
 
 fn machine(machine: &MachineConfig) -> String {

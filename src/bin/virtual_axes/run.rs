@@ -133,13 +133,19 @@ fn trial(
         Some(path) => Some(Trace::new(path, arguments.trace_period, config)?),
         None => None,
     };
-    let result = virtual_axes::trial::run(&trial, setpoints, |tick| {
+    let between_instants = trace.as_ref().is_some_and(|t| t.period % config.periods().position != 0);
+    let watch = |tick: Tick<'_>| {
         if tick.position_instant {
             interrupt::check()?;
             progress.reached(seconds(tick.time));
         }
         trace.as_mut().map_or(Ok(()), |trace| trace.observe(tick))
-    });
+    };
+    let result = if between_instants {
+        virtual_axes::trial::trace(&trial, setpoints, watch)
+    } else {
+        virtual_axes::trial::run(&trial, setpoints, watch)
+    };
     progress.finish();
     let outcome = result.map_err(|error| named(input, error))?;
     if let Some(trace) = trace {

@@ -1,0 +1,274 @@
+//! Axes side by side: their inner loops and plants, stepped through a position period.
+//!
+//! This is the only place where the recurrence of an axis is run. Each loop below goes over lanes, takes the
+//! values of one axis, and says what happens to it; vectors are the compiler's business.
+
+use crate::control::{Pi, PiState};
+use crate::drive::{Friction, MotorState, MotorStateLanes, Plant};
+use crate::lanes::{Lane, lanes};
+
+lanes! {
+    /// What an axis is, inside its position loop.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub(super) struct Loops as LoopsLanes {
+        pub plant: Plant,
+        pub velocity: Pi,
+        pub current: Pi,
+    }
+}
+
+lanes! {
+    /// What goes on from tick to tick.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct LoopsState as LoopsStateLanes {
+        pub motor: MotorState,
+        pub velocity: PiState,
+        pub current: PiState,
+        /// i*, A.
+        pub current_setpoint: f64,
+        /// Friction over the last tick, N·m.
+        pub friction: f64,
+        /// Gravity over the last tick, N·m.
+        pub gravity: f64,
+        /// Whether i* was limited at an instant of the velocity loop since the position instant.
+        pub was_limited: bool,
+        /// Ticks since the position instant with speed, current or voltage set-point at its limit.
+        pub saturated_ticks: f64,
+    }
+}
+
+lanes! {
+    /// What is asked of an axis for a position period.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct Demand as DemandLanes {
+        /// Ω* after its limit, rad/s.
+        pub velocity_setpoint: f64,
+        pub speed_limited: bool,
+        /// VFFWS, rad/s.
+        pub velocity: Stair,
+        /// TFFWS, N·m.
+        pub torque: Stair,
+        /// External load at the motor, N·m.
+        pub load: f64,
+    }
+}
+
+lanes! {
+    /// A value that changes once in a position period.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct Stair as StairLanes {
+        pub before: f64,
+        pub behind: f64,
+        /// Instant of the velocity loop from which on it is the second one.
+        pub step: f64,
+    }
+}
+
+impl Stair {
+    /// Its value at an instant of the velocity loop, counted from the position instant.
+    #[inline(always)]
+    pub fn at(&self, instant: f64) -> f64 {
+        if instant < self.step { self.before } else { self.behind }
+    }
+}
+
+lanes! {
+    /// What is kept of the position instant, and of every tick if it is asked for: what the controllers
+    /// make of it, and the torques of the tick before.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct Done as DoneLanes {
+        pub current_setpoint: f64,
+        pub voltage: f64,
+        pub friction: f64,
+        pub gravity: f64,
+        pub saturated: bool,
+    }
+}
+
+/// A row of lanes that begins where a vector can be fetched at once.
+#[derive(Debug, Clone, PartialEq)]
+#[repr(align(64))]
+pub(super) struct Row<T>(pub T);
+
+/// Ticks of the inner loops.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Timing {
+    pub ticks_per_position: usize,
+    pub ticks_per_velocity: usize,
+}
+
+impl Timing {
+    /// Instants of the velocity loop in a position period.
+    pub fn instants(self) -> usize {
+        self.ticks_per_position / self.ticks_per_velocity
+    }
+}
+
+/// `L` axes side by side.
+#[derive(Debug, Clone, PartialEq)]
+#[repr(align(64))]
+pub(super) struct Block<const L: usize> {
+    loops: LoopsLanes<L>,
+    pub state: LoopsStateLanes<L>,
+    pub demand: DemandLanes<L>,
+    /// Gravity over the tick at hand, N·m.
+    gravity: [f64; L],
+    /// Largest |i| and |ω| of any tick of the period.
+    pub peak_current: [f64; L],
+    pub peak_speed: [f64; L],
+    /// Whether gravity of any axis depends on where it stands.
+    tilting: bool,
+    /// Whether the torque feedforward of any axis changes at every instant of the velocity loop.
+    compensating: bool,
+    /// Torque feedforward on top, at each instant of the velocity loop, N·m.
+    compensation: Vec<Row<[f64; L]>>,
+    /// The motors as the controllers find them, one for each tick.
+    pub seen: Vec<Row<MotorStateLanes<L>>>,
+    /// One for the position instant, or one for each tick.
+    pub done: Vec<Row<DoneLanes<L>>>,
+}
+
+impl<const L: usize> Block<L> {
+    /// A block whose every lane is an axis of `loops`; the lanes that stand for none do as that one does.
+    pub fn new(loops: Loops, timing: Timing) -> Self {
+        Block {
+            loops: loops.fill(),
+            state: LoopsState::default().fill(),
+            demand: Demand::default().fill(),
+            gravity: [0.0; L],
+            peak_current: [0.0; L],
+            peak_speed: [0.0; L],
+            tilting: loops.plant.gravity.is_tilting(),
+            compensating: false,
+            compensation: vec![Row([0.0; L]); timing.instants()],
+            seen: vec![Row(MotorState::default().fill()); timing.ticks_per_position],
+            done: vec![Row(Done::default().fill())],
+        }
+    }
+
+    /// Puts the parameters of an axis into a lane.
+    pub fn set_loops(&mut self, lane: usize, loops: Loops) {
+        loops.set(&mut self.loops, lane);
+        self.tilting = (0..L).any(|lane| Loops::get(&self.loops, lane).plant.gravity.is_tilting());
+    }
+
+    /// Torque feedforward of one lane on top, N·m, by the instant of the velocity loop.
+    pub fn set_compensation(&mut self, lane: usize, torque: impl Fn(usize) -> f64) {
+        self.compensating = true;
+        for (instant, row) in self.compensation.iter_mut().enumerate() {
+            row.0[lane] = torque(instant);
+        }
+    }
+
+    /// To be called before the first tick of a position period.
+    #[inline(always)]
+    pub fn begin(&mut self) {
+        self.state.was_limited = [0; L];
+        self.state.saturated_ticks = [0.0; L];
+        if !self.tilting {
+            self.weigh();
+        }
+    }
+
+    /// The velocity loop: torque from the error of the speed, and i* from that.
+    #[inline(always)]
+    pub fn control_velocity(&mut self, instant: usize) {
+        let Block { loops, state, demand, compensation, compensating, .. } = self;
+        let since_instant = instant as f64;
+        let mut torque = [0.0; L];
+        for (lane, torque) in torque.iter_mut().enumerate() {
+            *torque = Stair::get(&demand.torque, lane).at(since_instant);
+        }
+        if *compensating {
+            for (torque, more) in torque.iter_mut().zip(&compensation[instant].0) {
+                *torque += more;
+            }
+        }
+        for lane in 0..L {
+            let pi = Pi::get(&loops.velocity, lane);
+            let mut memory = PiState::get(&state.velocity, lane);
+            let asked = demand.velocity_setpoint[lane] + Stair::get(&demand.velocity, lane).at(since_instant);
+            let error = asked - state.motor.speed[lane];
+            state.current_setpoint[lane] = pi.update_with(&mut memory, error, torque[lane]);
+            memory.set(&mut state.velocity, lane);
+            state.was_limited[lane] |= u64::from(memory.limited);
+        }
+    }
+
+    /// Gravity where the axes stand.
+    #[inline(always)]
+    fn weigh(&mut self) {
+        for lane in 0..L {
+            let plant = Plant::get(&self.loops.plant, lane);
+            self.gravity[lane] = plant.gravity_at(self.state.motor.angle[lane]);
+        }
+    }
+
+    /// The current loop and the plant.
+    ///
+    /// The bounds of friction come first, for all lanes: their exponentials are a long chain of arithmetic,
+    /// and those of the next lanes fill the time that one waits for itself.
+    #[inline(always)]
+    pub fn tick<const KEPT: bool>(&mut self, tick: usize) {
+        if self.tilting {
+            self.weigh();
+        }
+        let Block { loops, state, demand, gravity, seen, done, .. } = self;
+        let mut bounds = [0.0; L];
+        for (lane, bound) in bounds.iter_mut().enumerate() {
+            *bound = Friction::get(&loops.plant.friction, lane).bound(state.motor.speed[lane]);
+        }
+        let seen = &mut seen[tick].0;
+        let mut voltages = [0.0; L];
+        for lane in 0..L {
+            let mut s = LoopsState::get(state, lane);
+            s.motor.set(seen, lane);
+            let error = s.current_setpoint - s.motor.current;
+            let voltage = Pi::get(&loops.current, lane).update(&mut s.current, error);
+            voltages[lane] = voltage;
+            let limited =
+                demand.speed_limited[lane] | state.velocity.limited[lane] | u64::from(s.current.limited);
+            state.saturated_ticks[lane] += if limited != 0 { 1.0 } else { 0.0 };
+            s.current.set(&mut state.current, lane);
+        }
+        if KEPT {
+            let done = &mut done[tick].0;
+            done.current_setpoint = state.current_setpoint;
+            done.voltage = voltages;
+            done.friction = state.friction;
+            done.gravity = state.gravity;
+            for lane in 0..L {
+                done.saturated[lane] =
+                    demand.speed_limited[lane] | state.velocity.limited[lane] | state.current.limited[lane];
+            }
+        }
+        for lane in 0..L {
+            let plant = Plant::get(&loops.plant, lane);
+            let mut motor = MotorState::get(&state.motor, lane);
+            let external = demand.load[lane] - gravity[lane];
+            state.friction[lane] = plant.step_under(&mut motor, voltages[lane], external, bounds[lane]);
+            motor.set(&mut state.motor, lane);
+        }
+        state.gravity = *gravity;
+    }
+
+    /// The largest current and speed of any tick, at the end of the period.
+    #[inline(always)]
+    pub fn find_peaks(&mut self) {
+        let mut current = [0.0_f64; L];
+        let mut speed = [0.0_f64; L];
+        for row in &self.seen {
+            for lane in 0..L {
+                current[lane] = larger(current[lane], row.0.current[lane].abs());
+                speed[lane] = larger(speed[lane], row.0.speed[lane].abs());
+            }
+        }
+        (self.peak_current, self.peak_speed) = (current, speed);
+    }
+}
+
+/// One comparison, where `f64::max` also looks for what is not a number.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
+}
