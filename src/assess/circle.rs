@@ -115,7 +115,7 @@ impl CircleAssessor {
     /// Adds a point of the path, m; returns its radial deviation, m, positive outside.
     pub fn push(&mut self, x: f64, y: f64) -> f64 {
         let (x, y) = (x - self.centre[0], y - self.centre[1]);
-        let deviation = x.hypot(y) - self.radius;
+        let deviation = (x * x + y * y).sqrt() - self.radius;
         self.sums.add(x / self.radius, y / self.radius, deviation / self.radius);
         self.range = [self.range[0].min(deviation), self.range[1].max(deviation)];
         // A float becomes an index by truncation; the angle π has the last bin.

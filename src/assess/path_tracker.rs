@@ -244,13 +244,14 @@ impl PathTracker {
                 let (centre, plane, radius, turn) = (*centre, *plane, *radius, *turn);
                 let out = pose.tip - centre;
                 let [x, y, z] = plane.map(|vector| vector.dot(&out));
-                let off = x.hypot(y);
+                let off = (x * x + y * y).sqrt();
                 let angle = ((y.atan2(x) - start) * turn.signum()).rem_euclid(TAU);
                 let ahead = self.furthest - SLACK - self.path.start_of(block);
                 match passage(angle / turn.abs(), TAU / turn.abs(), low, high, ahead) {
                     Some(s) if off > 0.0 => {
                         let point = centre + (plane[0] * x + plane[1] * y) * (radius / off);
-                        self.candidate(block, s, point, (off - radius).hypot(z))
+                        let outside = off - radius;
+                        self.candidate(block, s, point, (outside * outside + z * z).sqrt())
                     }
                     _ => self.nearer_end(pose, block, low, high),
                 }
@@ -336,5 +337,6 @@ fn passage(s: f64, period: f64, low: f64, high: f64, ahead: f64) -> Option<f64> 
 
 /// Angle between two unit vectors, rad; exact for small ones.
 fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
-    a.cross(b).norm().atan2(a.dot(b))
+    // As it is on all paths along which the tables stand still.
+    if a == b { 0.0 } else { a.cross(b).norm().atan2(a.dot(b)) }
 }

@@ -139,7 +139,14 @@ impl Kinematics {
 
     /// Pose of the tool at these joints: one value for each joint of the machine, m or rad.
     pub fn forward(&self, joints: &[f64]) -> ToolPose {
-        let tables = self.tables_at(joints);
+        self.forward_from(&mut Turned::default(), joints)
+    }
+
+    /// As [`forward`](Self::forward), for poses that follow each other: `turned` is where the tables stood.
+    pub fn forward_from(&self, turned: &mut Turned, joints: &[f64]) -> ToolPose {
+        turned.turn_to([self.value(joints, Role::A), self.value(joints, Role::C)]);
+        let [a, c] = turned.sin_cos;
+        let tables = Tables { geometry: &self.geometry, a, c };
         let linear = Role::LINEAR.map(|role| self.value(joints, role));
         ToolPose { tip: tables.tip(Vector3::from(linear)), axis: tables.tool_axis() }
     }
@@ -180,7 +187,12 @@ impl Kinematics {
     /// machines that have all three, or no rotary axis.
     pub fn joints_to_tip(&self, joints: &mut [f64]) {
         let tip = self.forward(joints).tip;
-        self.put_linear(tip, joints);
+        self.put_tip(tip, joints);
+    }
+
+    /// Writes the coordinates of the tip (m, workpiece frame) in the place of x, y and z.
+    pub fn put_tip(&self, tip: Vector3<f64>, coordinates: &mut [f64]) {
+        self.put_linear(tip, coordinates);
     }
 
     /// Writes the coordinates of those linear roles that joints have.
@@ -205,6 +217,32 @@ impl Kinematics {
 /// From the tip to the point that X, Y and Z move, machine frame, m.
 fn tool_vector(geometry: &KinematicsConfig) -> Vector3<f64> {
     Vector3::new(0.0, 0.0, geometry.tool_length)
+}
+
+/// Where the tables stand, with what is reckoned from it: most paths turn one of them or none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turned {
+    /// a and c, rad.
+    angles: [f64; 2],
+    sin_cos: [(f64, f64); 2],
+}
+
+impl Default for Turned {
+    /// Both at 0.
+    fn default() -> Self {
+        Turned { angles: [0.0; 2], sin_cos: [(0.0, 1.0); 2] }
+    }
+}
+
+impl Turned {
+    fn turn_to(&mut self, angles: [f64; 2]) {
+        for ((angle, sin_cos), next) in self.angles.iter_mut().zip(&mut self.sin_cos).zip(angles) {
+            // −0 has another sine than 0.
+            if angle.to_bits() != next.to_bits() {
+                (*angle, *sin_cos) = (next, next.sin_cos());
+            }
+        }
+    }
 }
 
 /// Both tables at one pair of angles.

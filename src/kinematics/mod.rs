@@ -41,5 +41,5 @@ mod chain;
 mod error;
 mod inverse;
 
-pub use chain::{Kinematics, Role, ToolPose};
+pub use chain::{Kinematics, Role, ToolPose, Turned};
 pub use error::KinematicsError;

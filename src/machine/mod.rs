@@ -19,7 +19,7 @@ pub use sample::AxisSample;
 
 use std::sync::Arc;
 
-use crate::config::{MachineConfig, Periods};
+use crate::config::{AxisConfig, MachineConfig, Periods};
 use crate::design::DesignError;
 use crate::drive::DriveError;
 use crate::units::Nanoseconds;
@@ -67,15 +67,20 @@ impl MachineParameters {
     /// # Errors
     /// [`MachineError::Axis`] naming the axis that cannot be built.
     pub fn new(config: &MachineConfig) -> Result<Self, MachineError> {
-        let axes = config
-            .axes
-            .iter()
-            .map(|axis| {
-                AxisParameters::new(axis, &config.periods)
-                    .map_err(|source| MachineError::Axis { axis: axis.name.clone(), source })
-            })
-            .collect::<Result<_, _>>()?;
-        Ok(MachineParameters { periods: config.periods, axes })
+        Self::of_axes(config, &Vec::from_iter(0..config.axes.len()))
+    }
+
+    /// Discretises the axes of `config` at `places` only; places that there are not are left out.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of_axes(config: &MachineConfig, places: &[usize]) -> Result<Self, MachineError> {
+        let axis = |axis: &AxisConfig| {
+            AxisParameters::new(axis, &config.periods)
+                .map_err(|source| MachineError::Axis { axis: axis.name.clone(), source })
+        };
+        let axes = places.iter().filter_map(|&place| config.axes.get(place));
+        Ok(MachineParameters { periods: config.periods, axes: axes.map(axis).collect::<Result<_, _>>()? })
     }
 
     /// Sampling periods.
@@ -90,12 +95,6 @@ impl MachineParameters {
         let same = machines.iter().all(|machine| machine.periods == periods);
         let axes = machines.iter().flat_map(|machine| machine.axes.iter().cloned());
         same.then(|| MachineParameters { periods, axes: axes.collect() })
-    }
-
-    /// The same with the axes at `places` only; places that there are not are left out.
-    pub fn with_axes(&self, places: &[usize]) -> Self {
-        let axes = places.iter().filter_map(|&place| self.axes.get(place)).cloned().collect();
-        MachineParameters { axes, ..*self }
     }
 
     fn timing(&self) -> Timing {

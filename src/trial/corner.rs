@@ -50,7 +50,7 @@ impl Corners {
         }
     }
 
-    pub(super) fn finish(self) -> Vec<CornerFigures> {
-        self.list.into_iter().map(|(_, figures)| figures).collect()
+    pub(super) fn figures(&self) -> Vec<CornerFigures> {
+        self.list.iter().map(|(_, figures)| figures.clone()).collect()
     }
 }

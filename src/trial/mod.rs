@@ -10,6 +10,7 @@ mod observer;
 mod recorder;
 mod setpoints;
 mod supply;
+mod together;
 mod windows;
 
 use std::io;
@@ -28,6 +29,7 @@ pub use figures::{
     OrientationFigures, Reference,
 };
 pub use setpoints::{GridSource, ProgramSource, Requests, Setpoints, SourceError, UnreachableError};
+pub use together::run_together;
 
 use observer::Observer;
 use supply::Supply;
@@ -138,14 +140,7 @@ fn run_by(
     setpoints: Setpoints<'_>,
     mut step: impl FnMut(&mut Simulation) -> io::Result<bool>,
 ) -> Result<Outcome, TrialError> {
-    let limits = joints(trial.machine, "");
-    let mut simulation = Simulation::new(trial.machine, limits.clone(), 0)?;
-    // The observer measures.
-    simulation.set_assessing(false);
-    let mut supply = Supply::new(setpoints, &limits, trial)?;
-    let home = vec![0.0; limits.len()];
-    let start = supply.start().unwrap_or(&home).to_vec();
-    simulation.reset_to(&start).map_err(|rejection| TrialError::Rejected { time: 0.0, rejection })?;
+    let (mut simulation, mut supply, start) = begin(trial, setpoints)?;
     let mut observer = Observer::new(trial, &start);
     loop {
         supply.offer_due(&mut simulation)?;
@@ -156,8 +151,25 @@ fn run_by(
         observer.look_ahead(&simulation);
         let time = simulation.time_of(simulation.next_instant());
         if step(&mut simulation).map_err(TrialError::Watch)? {
-            observer.observe(simulation.machine(), time, moving);
+            let machine = simulation.machine();
+            observer.observe(|place| (machine, place), time, moving);
         }
     }
     Ok(observer.finish())
+}
+
+/// The trial's machine at rest where the set-points begin, those, and that place, m or rad.
+fn begin<'a>(
+    trial: &Trial<'_>,
+    setpoints: Setpoints<'a>,
+) -> Result<(Simulation, Supply<'a>, Vec<f64>), TrialError> {
+    let limits = joints(trial.machine, "");
+    let mut simulation = Simulation::new(trial.machine, limits.clone(), 0)?;
+    // The observer measures.
+    simulation.set_assessing(false);
+    let supply = Supply::new(setpoints, &limits, trial)?;
+    let home = vec![0.0; limits.len()];
+    let start = supply.start().unwrap_or(&home).to_vec();
+    simulation.reset_to(&start).map_err(|rejection| TrialError::Rejected { time: 0.0, rejection })?;
+    Ok((simulation, supply, start))
 }

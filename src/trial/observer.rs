@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::assess::{AxisAssessor, Nearest, PathTracker, SetpointTracker};
 use crate::config::{AxisKind, MachineConfig};
-use crate::kinematics::{Kinematics, ToolPose};
-use crate::machine::Machine;
+use crate::kinematics::{Kinematics, ToolPose, Turned};
+use crate::machine::{AxisSample, Machine};
 use crate::path::Frame;
 use crate::simulation::{Simulation, horizon};
 use crate::units::{Nanoseconds, seconds};
@@ -50,6 +50,7 @@ enum Tracker {
 pub(super) struct Observer<'a> {
     trial: &'a Trial<'a>,
     kinematics: Kinematics,
+    turned: Turned,
     tracker: Option<Tracker>,
     tick: f64,
     end: f64,
@@ -83,6 +84,7 @@ impl<'a> Observer<'a> {
         Observer {
             trial,
             tracker,
+            turned: Turned::default(),
             tick: seconds(machine.periods().current),
             end: 0.0,
             axes: vec![AxisAssessor::default(); count],
@@ -103,11 +105,18 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// Takes the position period in that `machine` has computed last, which began at `time` ns; `moving`
-    /// tells whether set-points are under way.
-    pub(super) fn observe(&mut self, machine: &Machine, time: Nanoseconds, moving: bool) {
-        for (place, axis) in machine.axes().iter().enumerate() {
-            let (sample, activity) = (axis.sample(), machine.activity(place));
+    /// Takes the position period in that was computed last, which began at `time` ns; `moving` tells
+    /// whether set-points are under way, and `axis` where each axis is: a machine, and the place in it.
+    pub(super) fn observe<'m>(
+        &mut self,
+        axis: impl Fn(usize) -> (&'m Machine, usize),
+        time: Nanoseconds,
+        moving: bool,
+    ) {
+        let periods = self.trial.machine.periods();
+        for place in 0..self.axes.len() {
+            let (machine, at) = axis(place);
+            let (sample, activity) = (machine.axis(at).sample(), machine.activity(at));
             self.moves[place] |= sample.psec != self.start[place];
             self.extrapolated[place] |= activity.friction_extrapolated;
             if moving {
@@ -115,19 +124,25 @@ impl<'a> Observer<'a> {
             }
         }
         let mut time = time;
-        for tick in 0..machine.ticks_per_period() {
+        for tick in 0..periods.ticks_per_position() as usize {
             for (place, position) in self.position.iter_mut().enumerate() {
-                *position = machine.position(place, tick);
+                let (machine, at) = axis(place);
+                *position = machine.position(at, tick);
             }
-            self.observe_tool(machine, tick == 0, seconds(time));
-            time += machine.periods().current;
+            let samples = (0..self.axes.len()).map(|place| {
+                let (machine, at) = axis(place);
+                machine.axis(at).sample()
+            });
+            self.observe_tool(seconds(time), (tick == 0).then_some(samples));
+            time += periods.current;
         }
         self.end = seconds(time);
     }
 
-    /// Takes a tick into account, at which the axes are at `position`.
-    fn observe_tool(&mut self, machine: &Machine, position_instant: bool, time: f64) {
-        let pose = self.kinematics.forward(&self.position);
+    /// Takes a tick at `time` s into account, at which the axes are at `position`; `samples` are those of a
+    /// position instant.
+    fn observe_tool<'m>(&mut self, time: f64, samples: Option<impl Iterator<Item = &'m AxisSample>>) {
+        let pose = self.kinematics.forward_from(&mut self.turned, &self.position);
         let nearest = self.nearest(&pose, time);
         if let Some(nearest) = &nearest {
             self.contour.push(nearest.distance);
@@ -135,14 +150,54 @@ impl<'a> Observer<'a> {
             self.orientation.push(nearest.orientation);
             self.corners.observe(time, nearest);
         }
-        if position_instant && let Some(recorder) = &mut self.recorder {
+        if let (Some(samples), Some(recorder)) = (samples, &mut self.recorder) {
             let tool = nearest.as_ref().map(|nearest| (nearest, pose.tip.into()));
-            recorder.push(time, machine.axes().iter().map(|axis| axis.sample()), tool);
+            recorder.push(time, samples, tool);
         }
         if self.trial.program.as_ref().is_some_and(|p| p.path().frame() == Frame::Workpiece) {
-            self.kinematics.joints_to_tip(&mut self.position);
+            self.kinematics.put_tip(pose.tip, &mut self.position);
         }
         self.circles.observe(time, &self.position, self.recorder.is_some());
+    }
+
+    /// What was measured so far, without a recording.
+    pub(super) fn figures(&self) -> Figures {
+        let machine = self.trial.machine;
+        let axes = machine.axes().iter().enumerate().map(|(place, axis)| AxisFigures {
+            name: axis.name().to_owned(),
+            kind: axis.kind(),
+            moves: self.moves[place],
+            report: self.axes[place].report(self.tick),
+            friction_extrapolated: self.extrapolated[place],
+        });
+        let reference = match self.tracker {
+            Some(Tracker::Path(_)) => Some(Reference::Path),
+            Some(Tracker::Setpoints(_)) => Some(Reference::Setpoints),
+            None => None,
+        };
+        let has_orientation = reference.is_some() && self.kinematics.has_rotary_axis();
+        Figures {
+            duration: self.end,
+            axes: axes.collect(),
+            contour: reference.map(|reference| ContourFigures {
+                reference,
+                max: self.contour.max,
+                rms: self.contour.rms(),
+                max_within_ends: self.within_ends.max,
+                rms_within_ends: self.within_ends.rms(),
+            }),
+            orientation: has_orientation
+                .then(|| OrientationFigures { max: self.orientation.max, rms: self.orientation.rms() }),
+            circles: self.circles.figures(),
+            bidirectional: self.circles.bidirectional(),
+            corners: self.corners.figures(),
+        }
+    }
+
+    /// Whether a rotary axis moves.
+    fn turns(&self) -> bool {
+        let axes = self.trial.machine.axes().iter();
+        axes.zip(&self.moves).any(|(axis, &moves)| moves && axis.kind() == AxisKind::Rotary)
     }
 
     /// Learns, before a position instant, where the set-points go, if they are what the tool is
@@ -171,39 +226,11 @@ impl<'a> Observer<'a> {
     }
 
     pub(super) fn finish(self) -> Outcome {
+        let figures = self.figures();
         let machine = self.trial.machine;
-        let axes = machine.axes().iter().enumerate().map(|(place, axis)| AxisFigures {
-            name: axis.name().to_owned(),
-            kind: axis.kind(),
-            moves: self.moves[place],
-            report: self.axes[place].report(self.tick),
-            friction_extrapolated: self.extrapolated[place],
-        });
-        let reference = match self.tracker {
-            Some(Tracker::Path(_)) => Some(Reference::Path),
-            Some(Tracker::Setpoints(_)) => Some(Reference::Setpoints),
-            None => None,
-        };
-        let rotary = machine.axes().iter().zip(&self.moves).any(|(a, &m)| m && a.kind() == AxisKind::Rotary);
-        let has_orientation = reference.is_some() && self.kinematics.has_rotary_axis();
-        let figures = Figures {
-            duration: self.end,
-            axes: axes.collect(),
-            contour: reference.map(|reference| ContourFigures {
-                reference,
-                max: self.contour.max,
-                rms: self.contour.rms(),
-                max_within_ends: self.within_ends.max,
-                rms_within_ends: self.within_ends.rms(),
-            }),
-            orientation: has_orientation
-                .then(|| OrientationFigures { max: self.orientation.max, rms: self.orientation.rms() }),
-            circles: self.circles.figures(),
-            bidirectional: self.circles.bidirectional(),
-            corners: self.corners.finish(),
-        };
+        let turns = figures.orientation.is_some() && self.turns();
         let recording = self.recorder.map(|recorder| {
-            let mut recording = recorder.finish(machine, &self.moves, has_orientation && rotary);
+            let mut recording = recorder.finish(machine, &self.moves, turns);
             recording.circles = self.circles.into_traces();
             recording
         });

@@ -14,6 +14,10 @@ use crate::machine::{MachineError, designed, prediction_model};
 use crate::trial::{Figures, Outcome};
 use crate::units::POSITION_GAIN;
 
+/// Tunings that are run side by side: enough to fill vectors and to share what they have in common, few
+/// enough for the caches.
+const TOGETHER: usize = 32;
+
 /// A tuning that was run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
@@ -173,8 +177,12 @@ impl<'a> Bench<'a> {
 
     /// Runs of `tunings` on a path, over all cores, in their order.
     pub(super) fn runs_on(&self, course: &Course, tunings: Vec<Tuning>) -> Result<Vec<Candidate>, TuneError> {
+        let with_margins = |tuning: Tuning| {
+            let margins = self.margins(&tuning);
+            (tuning, margins)
+        };
         self.watch.begin("both paths", tunings.len());
-        tunings.into_par_iter().map(|tuning| self.run_on(course, &tuning)).collect()
+        self.run_all(course, tunings.into_par_iter().map(with_margins).collect())
     }
 
     /// The margins of each of `tunings`, over all cores.
@@ -193,7 +201,36 @@ impl<'a> Bench<'a> {
         designs: Vec<(Tuning, Margins)>,
     ) -> Result<Vec<Candidate>, TuneError> {
         self.watch.begin(part, designs.len());
-        designs.into_par_iter().map(|(tuning, margins)| self.run(&tuning, Some(margins))).collect()
+        let with_margins = designs.into_iter().map(|(tuning, margins)| (tuning, Some(margins)));
+        self.run_all(self.course, with_margins.collect())
+    }
+
+    /// Runs of tunings that may have margins, over all cores, some of them side by side on each.
+    fn run_all(
+        &self,
+        course: &Course,
+        tunings: Vec<(Tuning, Option<Margins>)>,
+    ) -> Result<Vec<Candidate>, TuneError> {
+        let some = tunings.par_chunks(TOGETHER).map(|tunings| self.run_some(course, tunings));
+        Ok(some.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
+    }
+
+    fn run_some(
+        &self,
+        course: &Course,
+        tunings: &[(Tuning, Option<Margins>)],
+    ) -> Result<Vec<Candidate>, TuneError> {
+        let tuned =
+            |(tuning, _): &_| Ok(Tuning::apply(tuning, self.parameters, &self.joints)?.machine_config()?);
+        let variants = tunings.iter().map(tuned).collect::<Result<Vec<_>, TuneError>>()?;
+        let allow = self.parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
+        let go_on = || self.watch.go_on();
+        let figures = course.run_together(&self.config, &variants, &self.moving, allow, go_on)?;
+        let candidates = tunings.iter().zip(figures).map(|((tuning, margins), figures)| {
+            self.watch.done();
+            candidate(tuning.clone(), *margins, figures, self.cost, &self.config)
+        });
+        Ok(candidates.collect())
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::config::MachineConfig;
 use crate::path::Program;
 use crate::trajectory::Request;
-use crate::trial::{self, GridSource, Outcome, Setpoints, SourceError, Tick, Trial, TrialError};
+use crate::trial::{self, Figures, GridSource, Outcome, Setpoints, SourceError, Tick, Trial, TrialError};
 use crate::units::Nanoseconds;
 
 /// Set-points in memory, with the path behind them if it is known. They serve machines of the same joints,
@@ -69,14 +69,35 @@ impl Course {
         record: bool,
         watch: impl FnMut(Tick<'_>) -> io::Result<()>,
     ) -> Result<Outcome, TrialError> {
-        let setpoints = match &self.content {
+        let program = self.program.clone();
+        let trial = Trial { machine, program, allow_nonzero_end_velocity, record };
+        trial::run(&trial, self.setpoints(), watch)
+    }
+
+    /// Runs it on `variants` of `machine` that have axes at `own` of their own, as [`trial::run_together`].
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn run_together(
+        &self,
+        machine: &MachineConfig,
+        variants: &[MachineConfig],
+        own: &[usize],
+        allow_nonzero_end_velocity: bool,
+        watch: impl Fn() -> io::Result<()>,
+    ) -> Result<Vec<Figures>, TrialError> {
+        let program = self.program.clone();
+        let trial = Trial { machine, program, allow_nonzero_end_velocity, record: false };
+        trial::run_together(&trial, self.setpoints(), variants, own, watch)
+    }
+
+    fn setpoints(&self) -> Setpoints<'_> {
+        match &self.content {
             Content::Rows { joints, rows } => Setpoints::Grid(Box::new(Rows { joints, rows })),
             Content::Requests(requests) => {
                 Setpoints::Requests(Box::new(requests.iter().map(|request| Ok(request.clone()))))
             }
-        };
-        let program = self.program.clone();
-        trial::run(&Trial { machine, program, allow_nonzero_end_velocity, record }, setpoints, watch)
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::TuneError;
-use super::bench::{Bench, Search, keeping, ranked};
+use super::bench::{Bench, Candidate, Search, keeping, ranked};
 use super::loops::MarginLimits;
 use super::tuning::{Tuning, rounded};
 use crate::config::Value;
@@ -12,7 +12,7 @@ use crate::config::Value;
 pub const GRID_N2: usize = 24;
 /// Largest Nu of the grid.
 pub const GRID_NU: usize = 8;
-/// λ_rel of the grid.
+/// λ_rel of the grid, at least.
 pub const GRID_LAMBDA: [f64; 12] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1, 2e-1, 5e-1];
 
 /// Largest N2 that the search goes to.
@@ -32,11 +32,32 @@ const ROUNDS: usize = 16;
 /// Significant digits of λ_rel.
 const DIGITS: usize = 3;
 
+/// Tunings that are remembered, of more the cheapest.
+const REMEMBERED: usize = 10_000;
+
 /// The grid: N1 = 1, N2 up to [`GRID_N2`], Nu up to [`GRID_NU`] and N2, λ_rel of [`GRID_LAMBDA`].
 pub fn grid() -> Vec<Tuning> {
     let horizons = (1..=GRID_N2).flat_map(|n2| (1..=GRID_NU.min(n2)).map(move |nu| (n2, nu)));
     let of_horizon = |(n2, nu)| GRID_LAMBDA.map(|lambda_rel| Tuning::Gpc { n1: 1, n2, nu, lambda_rel });
     horizons.flat_map(of_horizon).collect()
+}
+
+/// The grid with so many λ_rel between its first and its last, evenly on a logarithmic scale, that it has at
+/// least `designs`.
+pub fn fine_grid(designs: usize) -> Vec<Tuning> {
+    let horizons = || (1..=GRID_N2).flat_map(|n2| (1..=GRID_NU.min(n2)).map(move |nu| (n2, nu)));
+    let count = designs.div_ceil(horizons().count()).max(2);
+    let (least, most) = (GRID_LAMBDA[0], GRID_LAMBDA[GRID_LAMBDA.len() - 1]);
+    let lambda = |i: usize| least * (most / least).powf(i as f64 / (count - 1) as f64);
+    let of_horizon = |(n2, nu)| (0..count).map(move |i| Tuning::Gpc { n1: 1, n2, nu, lambda_rel: lambda(i) });
+    horizons().flat_map(of_horizon).collect()
+}
+
+/// The cheapest of `candidates`, as many as are remembered.
+fn remembered(candidates: Vec<Candidate>) -> Vec<Candidate> {
+    let mut candidates = ranked(candidates);
+    candidates.truncate(REMEMBERED);
+    candidates
 }
 
 /// The predictive controller, alike on each axis that moves, that costs least on the bench's path.
@@ -47,8 +68,19 @@ pub fn grid() -> Vec<Tuning> {
 /// # Errors
 /// [`TuneError`], also if no tuning keeps the limits.
 pub fn tune_gpc(bench: &Bench<'_>, limits: &MarginLimits) -> Result<Search, TuneError> {
-    let mut first = grid();
-    first.extend(preset(bench));
+    tune_gpc_from(bench, limits, grid())
+}
+
+/// As [`tune_gpc`], with another grid `first`, such as a [`fine_grid`].
+///
+/// # Errors
+/// As [`tune_gpc`].
+pub fn tune_gpc_from(
+    bench: &Bench<'_>,
+    limits: &MarginLimits,
+    mut first: Vec<Tuning>,
+) -> Result<Search, TuneError> {
+    first.extend(preset(bench).filter(|preset| !first.contains(preset)));
     let mut seen: HashSet<Key> = first.iter().filter_map(key).collect();
     let mut designs = first.len();
     let all = bench.designs(first);
@@ -64,7 +96,7 @@ pub fn tune_gpc(bench: &Bench<'_>, limits: &MarginLimits) -> Result<Search, Tune
         });
     }
     let mut runs = kept.len();
-    let mut tried = ranked(bench.runs("grid", kept)?);
+    let mut tried = remembered(bench.runs("grid", kept)?);
     let mut factor = FIRST_FACTOR;
     for _ in 0..ROUNDS {
         let Some(best) = tried.first().map(|best| best.cost) else { break };
@@ -78,7 +110,7 @@ pub fn tune_gpc(bench: &Bench<'_>, limits: &MarginLimits) -> Result<Search, Tune
         let kept = keeping(bench.designs(around), limits);
         runs += kept.len();
         tried.extend(bench.runs("about the best", kept)?);
-        tried = ranked(tried);
+        tried = remembered(tried);
         let saved = tried.first().is_some_and(|now| now.cost < best * (1.0 - GAIN));
         if !saved {
             factor = factor.sqrt();
@@ -101,8 +133,7 @@ fn key(tuning: &Tuning) -> Option<Key> {
     }
 }
 
-/// The tuning that the machine file has for a predictive controller, if it is one for all axes and not in
-/// the grid.
+/// The tuning that the machine file has for a predictive controller, if it is one for all axes.
 pub(super) fn preset(bench: &Bench<'_>) -> Option<Tuning> {
     let parameters = bench.parameters();
     let own = |joint: &String| {
@@ -121,7 +152,7 @@ pub(super) fn preset(bench: &Bench<'_>) -> Option<Tuning> {
     let mut presets = bench.joints().iter().map(own);
     let first = presets.next()??;
     let alike = presets.all(|other| other.as_ref() == Some(&first));
-    (alike && !grid().contains(&first)).then_some(first)
+    alike.then_some(first)
 }
 
 /// What lies about a tuning.

@@ -28,7 +28,7 @@ pub use cascade::tune_cascade;
 pub use contrast::{Contrast, contrast};
 pub use cost::{Cost, CostError, Term};
 pub use course::Course;
-pub use gpc::{GRID_LAMBDA, GRID_N2, GRID_NU, grid, tune_gpc};
+pub use gpc::{GRID_LAMBDA, GRID_N2, GRID_NU, fine_grid, grid, tune_gpc, tune_gpc_from};
 pub use loops::MarginLimits;
 pub use pareto::front;
 pub use robustness::{Deviated, Deviation, Robustness, robustness};

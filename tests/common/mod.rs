@@ -11,7 +11,7 @@ use virtual_axes::machine::{Machine, MachineParameters};
 use virtual_axes::path::Program;
 use virtual_axes::scenario::Scenario;
 use virtual_axes::simulation::joints;
-use virtual_axes::trial::{Figures, ProgramSource, Setpoints, Tick, Trial, run as run_trial};
+use virtual_axes::trial::{Figures, ProgramSource, Setpoints, Tick, Trial, trace};
 
 /// Position period of the default machine, s.
 pub const TSP: f64 = 0.006;
@@ -79,7 +79,7 @@ pub fn watch_scenario(name: &str, machine: &MachineConfig, mut look: impl FnMut(
         allow_nonzero_end_velocity: false,
         record: false,
     };
-    let outcome = run_trial(&trial, setpoints(name, program, machine), |tick| {
+    let outcome = trace(&trial, setpoints(name, program, machine), |tick| {
         look(tick);
         Ok(())
     });

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use virtual_axes::config::Parameters;
 use virtual_axes::tune::{
-    Bench, Candidate, Contrast, Cost, Course, MarginLimits, Search, TuneError, Tuning, contrast,
-    tune_cascade, tune_gpc,
+    Bench, Candidate, Contrast, Cost, Course, MarginLimits, Search, TuneError, Tuning, contrast, fine_grid,
+    tune_cascade, tune_gpc, tune_gpc_from,
 };
 use virtual_axes::units::MILLISECOND;
 
@@ -25,6 +25,9 @@ pub enum Tunable {
     /// Kp and feedforward of the cascade.
     Cascade,
 }
+
+/// Most designs of a grid: an hour's work.
+const MOST_DESIGNS: u64 = 1_000_000;
 
 /// What to tune.
 #[derive(Debug, clap::Args)]
@@ -46,6 +49,9 @@ pub struct Arguments {
     /// Seed of the starts of the search of the cascade's gains.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
+    /// Designs of predictive controllers in the first grid, at least: more of λ between its first and its last.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_DESIGNS))]
+    designs: Option<u64>,
     /// One more path to run the tuning that was found on; can be given several times.
     #[arg(long, value_name = "SCENARIO|FILE")]
     also: Vec<String>,
@@ -110,6 +116,9 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let tunable = arguments.controller.map_or_else(|| tunable(&parameters), Ok)?;
     if arguments.contrast && tunable != Tunable::Gpc {
         return Err("--contrast: is for --controller gpc".into());
+    }
+    if arguments.designs.is_some() && (arguments.contrast || tunable != Tunable::Gpc) {
+        return Err("--designs: is for --controller gpc without --contrast".into());
     }
     if arguments.contrast && arguments.also.len() > 1 {
         return Err(format!("--contrast: takes one --also path, not {}", arguments.also.len()).into());
@@ -213,7 +222,10 @@ fn search(
         }));
     }
     let search = match tunable {
-        Tunable::Gpc => tune_gpc(bench, limits)?,
+        Tunable::Gpc => match arguments.designs.and_then(|designs| usize::try_from(designs).ok()) {
+            Some(designs) => tune_gpc_from(bench, limits, fine_grid(designs))?,
+            None => tune_gpc(bench, limits)?,
+        },
         Tunable::Cascade => tune_cascade(bench, limits, arguments.seed)?,
     };
     let elsewhere = paths.iter().map(|path| {
