@@ -1,4 +1,4 @@
-/* The model of docs/performance.md as a scalar C loop, with its figures: what the other contenders are compared with.
+/* The model of docs/performance.md as a scalar C loop, with its figures: what all others are compared with.
  *
  *     gcc -O3 -march=native -ffast-math -o scalar scalar.c -lm
  *     scalar TABLE SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--positions]
@@ -10,9 +10,9 @@
  *
  * Each line "run N" on standard input makes N runs; the answer is a line of JSON with seconds per run and figures.
  *
- * With -ffast-math gcc may contract, reorder and vectorise what it can. The axes stand side by side in the loop over
- * ticks, so that the processor overlaps their chains of dependent operations: one axis after the other, with the
- * state in registers, is slower.
+ * With -ffast-math gcc may contract, reorder and vectorise what it can. Several axes stand side by side in the loop
+ * over ticks, so that the processor overlaps their chains of dependent operations: for five axes that is a fifth
+ * faster than one axis after the other.
  */
 #include "machine.h"
 
@@ -65,7 +65,7 @@ static inline void assess_circle(struct circle *c, double x, double y) {
   c->count++;
 }
 
-/* One position period of one axis up to tick `t`: the loops that are due, the figures, the plant. */
+/* Tick `t` of position period `k` of an axis: the loops that are due, the figures, the plant. */
 static inline void step(const struct axis *p, struct state *s, struct figures *f, const double *psec, int k, int t) {
   if (t == 0) control_position(p, s, psec);
   if (t % TICKS_PER_VELOCITY == 0) control_velocity(p, s, t);
@@ -73,6 +73,24 @@ static inline void step(const struct axis *p, struct state *s, struct figures *f
   if (t == 0) assess_instant(f, p, s, psec, k);
   assess_tick(f, s);
   move(p, s);
+}
+
+/* A position period of a machine with one axis: its state may stay in registers. */
+static void period_of_one(const struct axis *p, struct state *state, struct figures *figures, const double *psec, int k) {
+  struct state s = *state;
+  struct figures f = *figures;
+  for (int t = 0; t < TICKS_PER_POSITION; t++) step(p, &s, &f, psec, k, t);
+  *state = s;
+  *figures = f;
+}
+
+static void period_of_all(struct machine *m, const struct setpoints *sp, int k) {
+  const int on_circle = m->circle.first <= k && k < m->circle.last;
+  for (int t = 0; t < TICKS_PER_POSITION; t++) {
+    if (on_circle)
+      assess_circle(&m->circle, position_of(&m->axis[0], &m->state[0]), position_of(&m->axis[1], &m->state[1]));
+    for (int a = 0; a < m->axes; a++) step(&m->axis[a], &m->state[a], &m->figures[a], sp->psec[a] + k, k, t);
+  }
 }
 
 static void run(struct machine *m, const struct setpoints *sp, FILE *positions) {
@@ -85,16 +103,11 @@ static void run(struct machine *m, const struct setpoints *sp, FILE *positions) 
   m->circle.min = HUGE_VAL;
   m->circle.max = -HUGE_VAL;
   for (int k = 0; k < sp->count; k++) {
-    const int on_circle = m->circle.first <= k && k < m->circle.last;
     if (positions)
       for (int a = 0; a < m->axes; a++)
         fprintf(positions, "%.17g%c", position_of(&m->axis[a], &m->state[a]), a + 1 < m->axes ? ' ' : '\n');
-    for (int t = 0; t < TICKS_PER_POSITION; t++) {
-      if (on_circle)
-        assess_circle(&m->circle, position_of(&m->axis[0], &m->state[0]), position_of(&m->axis[1], &m->state[1]));
-      for (int a = 0; a < m->axes; a++)
-        step(&m->axis[a], &m->state[a], &m->figures[a], sp->psec[a] + k, k, t);
-    }
+    if (m->axes == 1) period_of_one(&m->axis[0], &m->state[0], &m->figures[0], sp->psec[0] + k, k);
+    else period_of_all(m, sp, k);
   }
 }
 
