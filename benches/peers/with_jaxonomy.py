@@ -103,7 +103,7 @@ def main() -> None:
     ticks = len(psec) * TICKS_PER_POSITION
     # The update at the end of the last period is not wanted.
     end = (ticks - 0.5) * CURRENT_PERIOD
-    options = SimulatorOptions(precision="float64", max_major_steps=2 * ticks, save_time_series=False)
+    options = SimulatorOptions(precision="float64", save_time_series=False)
     context = system.create_context()
     simulator = jaxonomy.Simulator(system, options=options)
     advance = jax.jit(simulator.advance_to)

@@ -1,23 +1,25 @@
 /* The single-axis case in MuJoCo, in C against the library of its PyPI wheel: no Python in the loop.
  *
  *     gcc -O3 -march=native -ffast-math -I WHEEL/include -o with_mujoco with_mujoco.c -lm WHEEL/libmujoco.so.4.0.0
- *     with_mujoco TABLE SETPOINTS
+ *     with_mujoco TABLE SETPOINTS STEPS
  *
- * A hinge with a `dcmotor` actuator (voltage in, current as its activation), stepped by mj_step every 125 us, with
- * everything switched off that it does not need. MuJoCo's motor has one constant K = sqrt(Kt Ke); with s = sqrt(Kt/Ke)
+ * A hinge with a `dcmotor` actuator (voltage in, current as its activation), stepped by mj_step, STEPS times in each
+ * 125 us, with everything switched off that it does not need. MuJoCo's motor has one constant K = sqrt(Kt Ke); with s = sqrt(Kt/Ke)
  * its current is s i and its voltage s u, the rest is the same.
  *
  * What MuJoCo has not: the cascade with its rates, limits and delays, which are those of drive.h, called before each
  * step; the friction law, which is applied as an external torque, with the torque that would stop the axis in MuJoCo's
  * own step as its limit (its constraint solver would be slower). What it does otherwise: it integrates by
- * semi-implicit Euler, where the model has the exact step. Figures: the largest synchronised error and current only.
+ * semi-implicit Euler, where the model has the exact step, so that it needs more STEPS for the same error. Figures: the largest synchronised error and current only.
  */
 #include <mujoco/mujoco.h>
 
 #include "machine.h"
 
 int main(int argc, char **argv) {
-  if (argc != 3) fail("usage", "with_mujoco TABLE SETPOINTS");
+  const int steps = argc == 4 ? atoi(argv[3]) : 0;
+  if (steps < 1) fail("usage", "with_mujoco TABLE SETPOINTS STEPS");
+  const double timestep = CURRENT_PERIOD / steps;
   struct table table;
   struct setpoints setpoints;
   read_table(argv[1], &table);
@@ -32,12 +34,13 @@ int main(int argc, char **argv) {
   snprintf(xml, sizeof xml,
            "<mujoco><option timestep='%.9g' integrator='Euler'><flag constraint='disable' contact='disable' "
            "gravity='disable' spring='disable' damper='disable' sensor='disable' eulerdamp='disable' "
-           "autoreset='disable' warmstart='disable'/></option>"
+           "autoreset='disable' warmstart='disable' island='disable' equality='disable' frictionloss='disable' "
+           "limit='disable' refsafe='disable' filterparent='disable' midphase='disable' nativeccd='disable'/></option>"
            "<worldbody><body><joint name='motor' type='hinge' axis='0 0 1'/>"
            "<inertial pos='0 0 0' mass='1' diaginertia='%.17g %.17g %.17g'/></body></worldbody>"
            "<actuator><dcmotor joint='motor' motorconst='%.17g %.17g' resistance='%.17g' inductance='%.17g 0'/>"
            "</actuator></mujoco>",
-           CURRENT_PERIOD, inertia, inertia, inertia, kt, value(&table, "emf_constant_v_s_rad", column), p.resistance,
+           timestep, inertia, inertia, inertia, kt, value(&table, "emf_constant_v_s_rad", column), p.resistance,
            value(&table, "inductance_mh", column) * 1e-3);
   mjSpec *spec = mj_parseXMLString(xml, NULL, error, sizeof error);
   mjModel *model = spec ? mj_compile(spec, NULL) : NULL;
@@ -68,10 +71,13 @@ int main(int argc, char **argv) {
           if (t % TICKS_PER_VELOCITY == 0) control_velocity(&p, &s, t);
           control_current(&p, &s);
           peak = fmax(peak, fabs(s.i));
-          const double stopping = kt * s.i + inertia * s.omega / CURRENT_PERIOD;
           data->ctrl[0] = scale * s.voltage;
-          data->qfrc_applied[0] = -clamp(stopping, friction_bound(&p, s.omega));
-          mj_step(model, data);
+          for (int step = 0; step < steps; step++) {
+            const double omega = data->qvel[0];
+            const double stopping = kt * data->act[0] / scale + inertia * omega / timestep;
+            data->qfrc_applied[0] = -clamp(stopping, friction_bound(&p, omega));
+            mj_step(model, data);
+          }
         }
       }
     }
