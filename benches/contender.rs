@@ -21,7 +21,8 @@ use virtual_axes::config::{Assignment, Parameters, Source, Value as Setting};
 use virtual_axes::machine::{Machine, MachineParameters};
 use virtual_axes::units::seconds;
 
-const USAGE: &str = "contender SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT]   (see benches/peers/run.py)";
+const USAGE: &str =
+    "contender SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT]   (see benches/peers/run.py)";
 const MACHINE: &str = include_str!("../config/mikron_ucp710.yaml");
 const JOINTS: &str = r#"joints: ["x", "y", "z", "a", "c"]"#;
 /// Of Kp and Kv over the machines of a sweep, as in scalar.c.
@@ -93,7 +94,11 @@ fn run_case(case: &Case) -> Vec<Figures> {
 }
 
 /// The default machine with these joints only, its gains scaled.
-fn machine(joints: &[String], position: f64, velocity: f64) -> Result<Arc<MachineParameters>, Box<dyn Error>> {
+fn machine(
+    joints: &[String],
+    position: f64,
+    velocity: f64,
+) -> Result<Arc<MachineParameters>, Box<dyn Error>> {
     let quoted: Vec<String> = joints.iter().map(|joint| format!("\"{joint}\"")).collect();
     let text = MACHINE.replace(JOINTS, &format!("joints: [{}]", quoted.join(", ")));
     let text = without_sections(&text, joints);
@@ -104,7 +109,11 @@ fn machine(joints: &[String], position: f64, velocity: f64) -> Result<Arc<Machin
         for (key, factor) in [("position_loop.gain", position), ("velocity_loop.gain", velocity)] {
             let key = format!("{joint}.{key}");
             let Some(Setting::Double(gain)) = parameters.get(&key) else { return Err(key.into()) };
-            assignments.push(Assignment { key, value: Setting::Double(gain * factor), source: source.clone() });
+            assignments.push(Assignment {
+                key,
+                value: Setting::Double(gain * factor),
+                source: source.clone(),
+            });
         }
     }
     parameters.set_all(assignments)?;
@@ -115,7 +124,8 @@ fn machine(joints: &[String], position: f64, velocity: f64) -> Result<Arc<Machin
 fn without_sections(text: &str, joints: &[String]) -> String {
     let mut kept = true;
     let lines = text.lines().filter(|line| {
-        if let Some(section) = line.strip_prefix("    ").and_then(|rest| rest.strip_suffix(':')) {
+        let section = line.strip_prefix("    ").and_then(|rest| rest.strip_suffix(':'));
+        if let Some(section) = section.filter(|section| !section.starts_with(' ')) {
             let is_joint = JOINTS.contains(&format!("\"{section}\""));
             kept = !is_joint || joints.iter().any(|joint| joint == section);
         }
@@ -128,7 +138,8 @@ fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
     let (path, options) = arguments.split_first().ok_or(USAGE)?;
     let text = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
     let mut lines = text.lines();
-    let joints: Vec<String> = lines.next().ok_or("no first line")?.split_whitespace().map(str::to_owned).collect();
+    let joints: Vec<String> =
+        lines.next().ok_or("no first line")?.split_whitespace().map(str::to_owned).collect();
     let number = |word: &str| word.parse::<f64>();
     let rows: Vec<Vec<f64>> =
         lines.map(|line| line.split_whitespace().map(number).collect()).collect::<Result<_, _>>()?;
@@ -148,7 +159,8 @@ fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
             _ => return Err(format!("{word}: {USAGE}").into()),
         }
     }
-    let place = |index: i32| if count > 1 { 2.0 * f64::from(index) / f64::from(count - 1) - 1.0 } else { 0.0 };
+    let place =
+        |index: i32| if count > 1 { 2.0 * f64::from(index) / f64::from(count - 1) - 1.0 } else { 0.0 };
     let scaled = |index| {
         let x = place(index);
         machine(&joints, 1.0 + POSITION_SPREAD * x, 1.0 - VELOCITY_SPREAD * x)
