@@ -1,7 +1,7 @@
 //! This library as a contender of `benches/peers/run.py`, by the same protocol as the C loop.
 //!
 //! ```text
-//! cargo bench --bench contender -- SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT]
+//! cargo bench --bench contender -- SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--cores COUNT]
 //! ```
 //!
 //! SETPOINTS is text: names of the axes that take part, then a row of set-points (m, rad) for each position period.
@@ -15,14 +15,15 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::{Value, json};
 use virtual_axes::assess::{AxisAssessor, AxisReport};
 use virtual_axes::config::{Assignment, Parameters, Source, Value as Setting};
 use virtual_axes::machine::{Machine, MachineParameters};
 use virtual_axes::units::seconds;
 
-const USAGE: &str =
-    "contender SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT]   (see benches/peers/run.py)";
+const USAGE: &str = "contender SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--cores COUNT]   (see benches/peers/run.py)";
 const MACHINE: &str = include_str!("../config/mikron_ucp710.yaml");
 const JOINTS: &str = r#"joints: ["x", "y", "z", "a", "c"]"#;
 /// Of Kp and Kv over the machines of a sweep, as in scalar.c.
@@ -36,6 +37,8 @@ struct Case {
     rows: Vec<Vec<f64>>,
     circle: Option<Circle>,
     machines: Vec<Arc<MachineParameters>>,
+    /// One core is this thread's.
+    cores: usize,
 }
 
 /// Radial deviation about (−radius, 0) in a window of position periods.
@@ -88,9 +91,13 @@ fn run_machine(parameters: &Arc<MachineParameters>, case: &Case) -> Figures {
     }
 }
 
-/// Runs all machines of a case, one after the other.
-fn run_case(case: &Case) -> Vec<Figures> {
-    case.machines.iter().map(|parameters| run_machine(parameters, case)).collect()
+/// Runs all machines of a case, on as many cores as the pool has.
+fn run_case(case: &Case, pool: Option<&ThreadPool>) -> Vec<Figures> {
+    let run = |parameters| run_machine(parameters, case);
+    match pool {
+        Some(pool) => pool.install(|| case.machines.par_iter().map(run).collect()),
+        None => case.machines.iter().map(run).collect(),
+    }
 }
 
 /// The default machine with these joints only, its gains scaled.
@@ -146,7 +153,7 @@ fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
     if rows.is_empty() || rows.iter().any(|row| row.len() != joints.len()) {
         return Err(format!("{path}: a value per joint is wanted in each row").into());
     }
-    let (mut circle, mut count) = (None, 1);
+    let (mut circle, mut count, mut cores) = (None, 1, 1);
     let mut words = options.iter();
     while let Some(word) = words.next() {
         let mut next = || words.next().ok_or(USAGE);
@@ -156,6 +163,7 @@ fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
                 circle = Some(Circle { radius, window: first..last });
             }
             "--machines" => count = next()?.parse()?,
+            "--cores" => cores = next()?.parse()?,
             _ => return Err(format!("{word}: {USAGE}").into()),
         }
     }
@@ -166,7 +174,7 @@ fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
         machine(&joints, 1.0 + POSITION_SPREAD * x, 1.0 - VELOCITY_SPREAD * x)
     };
     let machines = (0..count).map(scaled).collect::<Result<_, _>>()?;
-    Ok(Case { joints, rows, circle, machines })
+    Ok(Case { joints, rows, circle, machines, cores })
 }
 
 fn as_json(figures: &Figures, joints: &[String]) -> Value {
@@ -194,13 +202,15 @@ fn as_json(figures: &Figures, joints: &[String]) -> Value {
 }
 
 fn serve(case: &Case) -> Result<(), Box<dyn Error>> {
+    let pool =
+        (case.cores > 1).then(|| ThreadPoolBuilder::new().num_threads(case.cores).build()).transpose()?;
     for line in io::stdin().lock().lines() {
         let line = line?;
         let runs: u32 = line.strip_prefix("run ").ok_or("`run N` is wanted")?.trim().parse()?;
         let began = Instant::now();
         let mut figures = Vec::new();
         for _ in 0..runs.max(1) {
-            figures = black_box(run_case(black_box(case)));
+            figures = black_box(run_case(black_box(case), pool.as_ref()));
         }
         let seconds = began.elapsed().as_secs_f64() / f64::from(runs.max(1));
         let machines: Vec<Value> = figures.iter().map(|figures| as_json(figures, &case.joints)).collect();
@@ -214,7 +224,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // `cargo bench` says --bench, `cargo test` says --test.
     let arguments: Vec<String> =
         std::env::args().skip(1).filter(|word| word != "--bench" && word != "--test").collect();
-    if arguments.is_empty() {
+    // What else begins so is meant for the other programs of `cargo bench`.
+    if arguments.first().is_none_or(|word| word.starts_with("--")) {
         println!("{USAGE}");
         return Ok(());
     }

@@ -167,7 +167,7 @@ def mujoco(folder: Path) -> str:
     return build("with_mujoco.c", folder, f"-I{package / 'include'}", str(shared), f"-Wl,-rpath,{package}")
 
 
-def contenders(case: Case, folder: Path, program: str | None) -> tuple[list[Contender], dict[str, str]]:
+def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tuple[list[Contender], dict[str, str]]:
     """Who takes part in a case; and who cannot, with the reason."""
     setpoints = [str(case.write(folder)), *case.arguments()]
     table_first = [str(TABLE), *setpoints]
@@ -185,6 +185,9 @@ def contenders(case: Case, folder: Path, program: str | None) -> tuple[list[Cont
         return found, missing
     add("C loop, -O2", lambda: [build("scalar.c", folder, "-O2"), *table_first])
     add("virtual_axes", lambda: [library(program), *setpoints])
+    # The time on a core is that of all cores together.
+    if case.machines > 1 and not cpu and (os.cpu_count() or 1) > 1:
+        add("virtual_axes, 2 cores", lambda: [library(program), *setpoints, "--cores", "2"])
     if case.name == "single-axis":
         for name, module, script in (
             ("numba", "numba", "with_numba.py"),
@@ -245,7 +248,7 @@ def measure(case: Case, rounds: int, cpu: bool, program: str | None) -> dict:
     """Runs a case; its results."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        everyone, missing = contenders(case, folder, program)
+        everyone, missing = contenders(case, folder, cpu, program)
         try:
             kept = check_all(everyone, missing)
             for turn in range(rounds):
