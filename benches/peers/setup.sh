@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what the simulation is compared with into .build/peers, from PyPI. Run again, it does nothing unless
-# requirements.txt changed. A package that cannot be had is named, and run.py says so again.
+# requirements.txt or constraints.txt changed. A package that cannot be had is named, and run.py says so again.
 #
 #     benches/peers/setup.sh
 set -euo pipefail
@@ -9,7 +9,7 @@ peers=benches/peers
 venv=$PWD/.build/peers
 stamp=$venv/setup.stamp
 
-wanted=$({ echo "$PWD"; cat "$peers/setup.sh" "$peers/requirements.txt"; } | sha256sum | cut -d' ' -f1)
+wanted=$({ echo "$PWD"; cat "$peers/setup.sh" "$peers/requirements.txt" "$peers/constraints.txt"; } | sha256sum | cut -d' ' -f1)
 if [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$wanted" ]; then exit 0; fi
 
 # The wheels are for Python 3.11 and 3.12.
@@ -28,7 +28,7 @@ pip=("$venv/bin/python" -m pip install --disable-pip-version-check --prefer-bina
 if ! "${pip[@]}" -r "$peers/requirements.txt"; then
   echo "setup: not all at once; one after the other" >&2
   grep -E '^[a-z]' "$peers/requirements.txt" | while read -r package; do
-    "${pip[@]}" -c "$peers/requirements.txt" "$package" || echo "setup: cannot be had: $package" >&2
+    "${pip[@]}" -c "$peers/constraints.txt" "$package" || echo "setup: cannot be had: $package" >&2
   done
   # Tried again at the next call.
   exit 0
