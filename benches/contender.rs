@@ -1,0 +1,233 @@
+//! This library as a contender of `benches/peers/run.py`, by the same protocol as the C loop.
+//!
+//! ```text
+//! cargo bench --bench contender -- SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--cores COUNT]
+//! ```
+//!
+//! SETPOINTS is text: names of the axes that take part, then a row of set-points (m, rad) for each position period.
+//! Each line `run N` on standard input makes N runs; the answer is a line of JSON with the seconds of a run and the
+//! figures. Without arguments it says so and ends.
+
+use std::error::Error;
+use std::hint::black_box;
+use std::io::{self, BufRead, Write};
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Instant;
+
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde_json::{Value, json};
+use virtual_axes::assess::{AxisAssessor, AxisReport};
+use virtual_axes::config::{Assignment, Parameters, Source, Value as Setting};
+use virtual_axes::machine::{Machine, MachineParameters};
+use virtual_axes::units::seconds;
+
+const USAGE: &str = "contender SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--cores COUNT]   (see benches/peers/run.py)";
+const MACHINE: &str = include_str!("../config/mikron_ucp710.yaml");
+const JOINTS: &str = r#"joints: ["x", "y", "z", "a", "c"]"#;
+/// Of Kp and Kv over the machines of a sweep, as in scalar.c.
+const POSITION_SPREAD: f64 = 0.2;
+const VELOCITY_SPREAD: f64 = 0.1;
+
+/// What is run.
+struct Case {
+    joints: Vec<String>,
+    /// One axis behind the other in each row.
+    rows: Vec<Vec<f64>>,
+    circle: Option<Circle>,
+    machines: Vec<Arc<MachineParameters>>,
+    /// One core is this thread's.
+    cores: usize,
+}
+
+/// Radial deviation about (−radius, 0) in a window of position periods.
+struct Circle {
+    radius: f64,
+    window: Range<usize>,
+}
+
+/// Figures of a machine.
+struct Figures {
+    axes: Vec<AxisReport>,
+    deviation: Option<Deviation>,
+}
+
+/// Mean, least and largest radial deviation, m.
+struct Deviation {
+    mean: f64,
+    min: f64,
+    max: f64,
+}
+
+/// Runs one machine with all its figures: the part that is measured.
+fn run_machine(parameters: &Arc<MachineParameters>, case: &Case) -> Figures {
+    let mut machine = Machine::new(Arc::clone(parameters));
+    machine.reset(&case.rows[0]);
+    let mut assessors = vec![AxisAssessor::default(); machine.axis_count()];
+    let (mut sum, mut min, mut max, mut count) = (0.0, f64::INFINITY, f64::NEG_INFINITY, 0u64);
+    for (k, psec) in case.rows.iter().enumerate() {
+        let circle = case.circle.as_ref().filter(|circle| circle.window.contains(&k));
+        let mut position_instant = true;
+        machine.advance_with(psec, &[], |machine| {
+            for (axis, assessor) in machine.axes().iter().zip(&mut assessors) {
+                assessor.observe(axis.sample(), position_instant);
+            }
+            position_instant = false;
+            if let Some(circle) = circle {
+                let [x, y] = [0, 1].map(|axis| machine.axis(axis).sample().position);
+                let deviation = ((x + circle.radius).powi(2) + y * y).sqrt() - circle.radius;
+                sum += deviation;
+                min = deviation.min(min);
+                max = deviation.max(max);
+                count += 1;
+            }
+        });
+    }
+    let tick = seconds(machine.periods().current);
+    Figures {
+        axes: assessors.iter().map(|assessor| assessor.report(tick)).collect(),
+        deviation: (count > 0).then(|| Deviation { mean: sum / count as f64, min, max }),
+    }
+}
+
+/// Runs all machines of a case, on as many cores as the pool has.
+fn run_case(case: &Case, pool: Option<&ThreadPool>) -> Vec<Figures> {
+    let run = |parameters| run_machine(parameters, case);
+    match pool {
+        Some(pool) => pool.install(|| case.machines.par_iter().map(run).collect()),
+        None => case.machines.iter().map(run).collect(),
+    }
+}
+
+/// The default machine with these joints only, its gains scaled.
+fn machine(
+    joints: &[String],
+    position: f64,
+    velocity: f64,
+) -> Result<Arc<MachineParameters>, Box<dyn Error>> {
+    let quoted: Vec<String> = joints.iter().map(|joint| format!("\"{joint}\"")).collect();
+    let text = MACHINE.replace(JOINTS, &format!("joints: [{}]", quoted.join(", ")));
+    let text = without_sections(&text, joints);
+    let mut parameters = Parameters::from_yaml(&text, "benches/contender.rs")?;
+    let source = Source::named("benches/contender.rs");
+    let mut assignments = Vec::new();
+    for joint in joints {
+        for (key, factor) in [("position_loop.gain", position), ("velocity_loop.gain", velocity)] {
+            let key = format!("{joint}.{key}");
+            let Some(Setting::Double(gain)) = parameters.get(&key) else { return Err(key.into()) };
+            assignments.push(Assignment {
+                key,
+                value: Setting::Double(gain * factor),
+                source: source.clone(),
+            });
+        }
+    }
+    parameters.set_all(assignments)?;
+    Ok(Arc::new(MachineParameters::new(&parameters.machine_config()?)?))
+}
+
+/// The text of a machine without the sections of other joints.
+fn without_sections(text: &str, joints: &[String]) -> String {
+    let mut kept = true;
+    let lines = text.lines().filter(|line| {
+        let section = line.strip_prefix("    ").and_then(|rest| rest.strip_suffix(':'));
+        if let Some(section) = section.filter(|section| !section.starts_with(' ')) {
+            let is_joint = JOINTS.contains(&format!("\"{section}\""));
+            kept = !is_joint || joints.iter().any(|joint| joint == section);
+        }
+        kept
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
+    let (path, options) = arguments.split_first().ok_or(USAGE)?;
+    let text = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
+    let mut lines = text.lines();
+    let joints: Vec<String> =
+        lines.next().ok_or("no first line")?.split_whitespace().map(str::to_owned).collect();
+    let number = |word: &str| word.parse::<f64>();
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split_whitespace().map(number).collect()).collect::<Result<_, _>>()?;
+    if rows.is_empty() || rows.iter().any(|row| row.len() != joints.len()) {
+        return Err(format!("{path}: a value per joint is wanted in each row").into());
+    }
+    let (mut circle, mut count, mut cores) = (None, 1, 1);
+    let mut words = options.iter();
+    while let Some(word) = words.next() {
+        let mut next = || words.next().ok_or(USAGE);
+        match word.as_str() {
+            "--circle" if joints.len() >= 2 => {
+                let (radius, first, last) = (next()?.parse()?, next()?.parse()?, next()?.parse()?);
+                circle = Some(Circle { radius, window: first..last });
+            }
+            "--machines" => count = next()?.parse()?,
+            "--cores" => cores = next()?.parse()?,
+            _ => return Err(format!("{word}: {USAGE}").into()),
+        }
+    }
+    let place =
+        |index: i32| if count > 1 { 2.0 * f64::from(index) / f64::from(count - 1) - 1.0 } else { 0.0 };
+    let scaled = |index| {
+        let x = place(index);
+        machine(&joints, 1.0 + POSITION_SPREAD * x, 1.0 - VELOCITY_SPREAD * x)
+    };
+    let machines = (0..count).map(scaled).collect::<Result<_, _>>()?;
+    Ok(Case { joints, rows, circle, machines, cores })
+}
+
+fn as_json(figures: &Figures, joints: &[String]) -> Value {
+    let axes: serde_json::Map<String, Value> = joints
+        .iter()
+        .zip(&figures.axes)
+        .map(|(joint, report)| {
+            let value = json!({
+                "max_tracking_error": report.max_tracking_error,
+                "rms_tracking_error": report.rms_tracking_error,
+                "max_synchronized_tracking_error": report.max_synchronized_tracking_error,
+                "rms_synchronized_tracking_error": report.rms_synchronized_tracking_error,
+                "peak_current": report.peak_current,
+                "saturation_time": report.saturation_time,
+                "control_activity": report.control_activity,
+            });
+            (joint.clone(), value)
+        })
+        .collect();
+    let mut value = json!({ "axes": axes });
+    if let Some(Deviation { mean, min, max }) = figures.deviation {
+        value["circle"] = json!({ "mean": mean, "min": min, "max": max });
+    }
+    value
+}
+
+fn serve(case: &Case) -> Result<(), Box<dyn Error>> {
+    let pool =
+        (case.cores > 1).then(|| ThreadPoolBuilder::new().num_threads(case.cores).build()).transpose()?;
+    for line in io::stdin().lock().lines() {
+        let line = line?;
+        let runs: u32 = line.strip_prefix("run ").ok_or("`run N` is wanted")?.trim().parse()?;
+        let began = Instant::now();
+        let mut figures = Vec::new();
+        for _ in 0..runs.max(1) {
+            figures = black_box(run_case(black_box(case), pool.as_ref()));
+        }
+        let seconds = began.elapsed().as_secs_f64() / f64::from(runs.max(1));
+        let machines: Vec<Value> = figures.iter().map(|figures| as_json(figures, &case.joints)).collect();
+        println!("{}", json!({ "seconds": seconds, "machines": machines }));
+        io::stdout().flush()?;
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // `cargo bench` says --bench, `cargo test` says --test.
+    let arguments: Vec<String> =
+        std::env::args().skip(1).filter(|word| word != "--bench" && word != "--test").collect();
+    // What else begins so is meant for the other programs of `cargo bench`.
+    if arguments.first().is_none_or(|word| word.starts_with("--")) {
+        println!("{USAGE}");
+        return Ok(());
+    }
+    serve(&read(&arguments)?)
+}

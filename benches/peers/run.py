@@ -1,0 +1,319 @@
+"""Runs this library and its peers against each other: same cases, same set-points, in turns.
+
+    benches/peers/setup.sh                 # once: the peers, into .build/peers
+    python3 benches/peers/run.py [--case NAME]... [--rounds 10] [--cpu] [--json FILE] [--contender PROGRAM]
+
+Every contender is a process that stays alive, has compiled and warmed up, and runs once for each line that it is
+given. First the figures of each are compared with those of the C loop, to a bound that is printed; only who keeps it
+is timed. Then all run in turns. Only ratios are printed: how much longer a contender takes than the C loop took in
+the same round for the same simulated time, as the median over the rounds. With --cpu the time is that of all threads
+of a contender on a core, as Linux counts it, for machines that have other work to do; without, it is the clock's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path.insert(0, str(HERE))
+sys.dont_write_bytecode = True
+
+from cases import CASES, TABLE, Case  # noqa: E402
+
+VENV = ROOT / ".build" / "peers"
+C_FLAGS = ("-std=gnu11", "-O3", "-march=native", "-ffast-math")
+"""Of the C loop."""
+REFERENCE = "C loop"
+ROUND_SECONDS = 0.2
+"""Time that a contender gets in a round, about; it runs at least once."""
+SAME = 1e-6
+"""Relative bound for those that step the model exactly: rounding, and the order of operations."""
+PATIENCE = 300.0
+"""Seconds after which a contender that does not answer is ended; compiling takes some."""
+
+
+class NotToBeHad(Exception):
+    """A contender that cannot be run here, and why."""
+
+
+@dataclass
+class Contender:
+    """One program that takes part."""
+
+    name: str
+    command: list[str]
+    bound: float = SAME
+    process: subprocess.Popen[str] | None = None
+    errors: IO[str] | None = None
+    runs: int = 1
+    seconds: list[float] = field(default_factory=list)
+    differs: float = 0.0
+
+    def start(self) -> None:
+        """Starts it."""
+        threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+        # Not a pipe: nobody reads it before the end.
+        self.errors = tempfile.TemporaryFile("w+")
+        self.process = subprocess.Popen(
+            self.command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self.errors,
+            text=True,
+            cwd=HERE,
+            env={**os.environ, **threads, "PYTHONDONTWRITEBYTECODE": "1", "JAX_PLATFORMS": "cpu"},
+        )
+
+    def on_core(self) -> float:
+        """Seconds that its threads have been on a core so far."""
+        assert self.process
+        tasks = Path(f"/proc/{self.process.pid}/task").iterdir()
+        return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) * 1e-9
+
+    def time(self, cpu: bool) -> float:
+        """Seconds of a run, by one clock or the other."""
+        before = self.on_core() if cpu else 0.0
+        seconds = self.run(self.runs)["seconds"]
+        return (self.on_core() - before) / self.runs if cpu else seconds
+
+    def run(self, runs: int) -> dict:
+        """Makes some runs; the answer."""
+        assert self.process and self.process.stdin and self.process.stdout and self.errors
+        watch = threading.Timer(PATIENCE, self.process.kill)
+        watch.start()
+        try:
+            self.process.stdin.write(f"run {runs}\n")
+            self.process.stdin.flush()
+            line = self.process.stdout.readline()
+        except BrokenPipeError:
+            line = ""
+        finally:
+            watch.cancel()
+        if not line:
+            status = self.process.wait()
+            self.errors.seek(0)
+            said = self.errors.read().strip().splitlines()
+            raise NotToBeHad(said[-1] if said else f"ended with status {status}")
+        return json.loads(line)
+
+    def end(self) -> None:
+        """Ends it, and waits for that."""
+        if self.process:
+            self.process.kill()
+            self.process.communicate()
+            self.process = None
+        if self.errors:
+            self.errors.close()
+            self.errors = None
+
+
+def build(source: str, folder: Path, *more: str) -> str:
+    """Builds a C program with the flags of the C loop, unless `more` has others."""
+    gcc = shutil.which("gcc")
+    if not gcc:
+        raise NotToBeHad("there is no gcc")
+    program = folder / Path(source).stem
+    program = program.with_name(program.name + str(len(list(folder.iterdir()))))
+    done = subprocess.run(
+        [gcc, *C_FLAGS, *more[:1], "-o", str(program), str(HERE / source), "-lm", *more[1:]],
+        capture_output=True,
+        text=True,
+    )
+    if done.returncode:
+        raise NotToBeHad(f"gcc: {done.stderr.strip().splitlines()[-1]}")
+    return str(program)
+
+
+def library(program: str | None) -> str:
+    """This library's program, built by cargo."""
+    if program:
+        return program
+    command = ["cargo", "bench", "--bench", "contender", "--no-run", "--locked", "--message-format=json"]
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    messages = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    found = [m["executable"] for m in messages if m.get("target", {}).get("name") == "contender" and "executable" in m]
+    if done.returncode or not found:
+        raise NotToBeHad("cargo did not build it")
+    return found[-1]
+
+
+def python_peer(module: str, script: str) -> list[str]:
+    """The command of a peer in Python, which has its package."""
+    python = VENV / "bin" / "python"
+    if not python.exists() or subprocess.run([python, "-c", f"import {module}"], capture_output=True).returncode:
+        raise NotToBeHad(f"there is no {module} in .build/peers: benches/peers/setup.sh")
+    return [str(python), str(HERE / script)]
+
+
+def mujoco(folder: Path) -> str:
+    """The program against the library in MuJoCo's wheel."""
+    package = next(VENV.glob("lib/python3*/site-packages/mujoco"), None)
+    shared = next(package.glob("libmujoco.so*"), None) if package else None
+    if not package or not shared:
+        raise NotToBeHad("there is no mujoco in .build/peers: benches/peers/setup.sh")
+    return build("with_mujoco.c", folder, f"-I{package / 'include'}", str(shared), f"-Wl,-rpath,{package}")
+
+
+def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tuple[list[Contender], dict[str, str]]:
+    """Who takes part in a case; and who cannot, with the reason."""
+    setpoints = [str(case.write(folder)), *case.arguments()]
+    table_first = [str(TABLE), *setpoints]
+    found: list[Contender] = []
+    missing: dict[str, str] = {}
+
+    def add(name: str, command, bound: float = SAME) -> None:
+        try:
+            found.append(Contender(name, command(), bound))
+        except NotToBeHad as reason:
+            missing[name] = str(reason)
+
+    add(REFERENCE, lambda: [build("scalar.c", folder), *table_first])
+    if not found:
+        return found, missing
+    add("C loop, -O2", lambda: [build("scalar.c", folder, "-O2"), *table_first])
+    add("virtual_axes", lambda: [library(program), *setpoints])
+    # The time on a core is that of all cores together.
+    if case.machines > 1 and not cpu and (os.cpu_count() or 1) > 1:
+        add("virtual_axes, 2 cores", lambda: [library(program), *setpoints, "--cores", "2"])
+    if case.name == "single-axis":
+        for name, module, script in (
+            ("numba", "numba", "with_numba.py"),
+            ("CasADi mapaccum", "casadi", "with_casadi.py"),
+            ("jaxonomy", "jaxonomy", "with_jaxonomy.py"),
+            ("Drake", "pydrake", "with_drake.py"),
+        ):
+            add(name, lambda module=module, script=script: [*python_peer(module, script), *table_first])
+        # It integrates with an error of the order of its step: as the model's tick, as the tolerance of the model's
+        # page, and for a tenth of that.
+        for steps, bound in ((1, 0.025), (3, 0.01), (25, 0.001)):
+            name = f"MuJoCo, 125 µs / {steps}"
+            add(name, lambda steps=steps: [mujoco(folder), *table_first, str(steps)], bound)
+    return found, missing
+
+
+def compared(reference: dict, answer: dict) -> float:
+    """The largest relative difference of a figure that both have."""
+    worst = 0.0
+
+    def compare(value: float, wanted: float, scale: float) -> None:
+        nonlocal worst
+        worst = max(worst, abs(value - wanted) / scale if scale else math.inf if value else 0.0)
+
+    for mine, other in zip(reference["machines"], answer["machines"], strict=True):
+        for joint, figures in mine["axes"].items():
+            for key in figures.keys() & other["axes"][joint].keys() - {"position"}:
+                compare(other["axes"][joint][key], figures[key], abs(figures[key]))
+        # A mean may be next to nothing: each is taken against the largest of the three.
+        circle = mine.get("circle", {})
+        for key, value in circle.items():
+            compare(other["circle"][key], value, max(map(abs, circle.values())))
+    return worst
+
+
+def check_all(all_of_them: list[Contender], missing: dict[str, str]) -> list[Contender]:
+    """Starts each, warms it up and compares its figures; those that keep their bound."""
+    kept: list[Contender] = []
+    reference: dict = {}
+    for contender in all_of_them:
+        try:
+            contender.start()
+            answer = contender.run(1)
+            reference = reference or answer
+            contender.differs = compared(reference, answer)
+            if not contender.differs <= contender.bound:
+                raise NotToBeHad(f"its figures differ by {contender.differs:.2g}, more than {contender.bound:.2g}")
+            again = contender.run(1)["seconds"]
+            contender.runs = max(1, math.ceil(ROUND_SECONDS / again))
+            kept.append(contender)
+        except NotToBeHad as reason:
+            missing[contender.name] = str(reason)
+            contender.end()
+    return kept
+
+
+def measure(case: Case, rounds: int, cpu: bool, program: str | None) -> dict:
+    """Runs a case; its results."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        everyone, missing = contenders(case, folder, cpu, program)
+        try:
+            kept = check_all(everyone, missing)
+            for turn in range(rounds):
+                # Who comes first changes from round to round.
+                shift = turn % max(len(kept), 1)
+                for contender in kept[shift:] + kept[:shift]:
+                    contender.seconds.append(contender.time(cpu))
+        finally:
+            for contender in everyone:
+                contender.end()
+    results = []
+    if kept and kept[0].name == REFERENCE:
+        for contender in kept:
+            ratios = [mine / his for mine, his in zip(contender.seconds, kept[0].seconds, strict=True)]
+            results.append(
+                {
+                    "contender": contender.name,
+                    "time_relative_to_c": statistics.median(ratios),
+                    "least_and_largest_of_a_round": [min(ratios), max(ratios)],
+                    "simulated_seconds_per_second": case.simulated_seconds() / statistics.median(contender.seconds),
+                    "differs_by": contender.differs,
+                    "bound": contender.bound,
+                }
+            )
+    clock = "time on a core" if cpu else "time"
+    return {"case": case.name, "clock": clock, "rounds": rounds, "results": results, "missing": missing}
+
+
+def table(measured: dict) -> str:
+    """A case as a table in Markdown."""
+    lines = [
+        f"### {measured['case']}: median of {measured['rounds']} rounds",
+        "",
+        f"| contender | {measured['clock']}, C loop = 1 | least … largest of a round | figures differ by at most |",
+        "|---|---|---|---|",
+    ]
+    for row in sorted(measured["results"], key=lambda row: row["time_relative_to_c"]):
+        least, largest = row["least_and_largest_of_a_round"]
+        lines.append(
+            f"| {row['contender']} | {row['time_relative_to_c']:.3g} | {least:.3g} … {largest:.3g} "
+            f"| {row['differs_by']:.1g} (bound {row['bound']:.1g}) |"
+        )
+    lines += [f"\nNot run: {name}: {reason}" for name, reason in measured["missing"].items()]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Runs what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--case", action="append", choices=list(CASES), help="one case; all of them without")
+    parser.add_argument("--rounds", type=int, default=10, help="rounds, ten at least for a figure that is told")
+    parser.add_argument("--cpu", action="store_true", help="time on a core in the place of the clock's")
+    parser.add_argument("--json", type=Path, help="writes the results to this file too")
+    parser.add_argument("--contender", help="this library's program; without, cargo builds it")
+    arguments = parser.parse_args()
+    if arguments.rounds < 1:
+        parser.error("--rounds: one at least")
+    measured = []
+    for name in arguments.case or list(CASES):
+        measured.append(measure(CASES[name], arguments.rounds, arguments.cpu, arguments.contender))
+        print(table(measured[-1]), flush=True)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(measured, indent=2) + "\n")
+    return 0 if all(case["results"] for case in measured) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

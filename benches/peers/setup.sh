@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# Installs what the simulation is compared with into .build/peers, from PyPI. Run again, it does nothing unless
+# requirements.txt or constraints.txt changed. A package that cannot be had is named, and run.py says so again.
+#
+#     benches/peers/setup.sh
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+peers=benches/peers
+venv=$PWD/.build/peers
+stamp=$venv/setup.stamp
+
+wanted=$({ echo "$PWD"; cat "$peers/setup.sh" "$peers/requirements.txt" "$peers/constraints.txt"; } | sha256sum | cut -d' ' -f1)
+if [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$wanted" ]; then exit 0; fi
+
+# The wheels are for Python 3.11 and 3.12.
+python=
+for candidate in ${PYTHON:-} python3.12 python3.11 python3; do
+  if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null; then
+    python=$candidate
+    break
+  fi
+done
+[ -n "$python" ] || { echo "setup: needs Python 3.11 or 3.12; name one with PYTHON=/path/to/python3.12" >&2; exit 1; }
+
+rm -rf "$venv"
+"$python" -m venv "$venv"
+pip=("$venv/bin/python" -m pip install --disable-pip-version-check --prefer-binary --quiet)
+if ! "${pip[@]}" -r "$peers/requirements.txt"; then
+  echo "setup: not all at once; one after the other" >&2
+  grep -E '^[a-z]' "$peers/requirements.txt" | while read -r package; do
+    "${pip[@]}" -c "$peers/constraints.txt" "$package" || echo "setup: cannot be had: $package" >&2
+  done
+  # Tried again at the next call.
+  exit 0
+fi
+echo "$wanted" >"$stamp"

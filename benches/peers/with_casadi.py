@@ -1,0 +1,121 @@
+"""The single-axis case in CasADi: `mapaccum` over the position periods, as C code compiled by gcc.
+
+A position period is one SX function (its 48 ticks written out), `mapaccum` carries the state through all of them,
+and CasADi's code generator makes it C, compiled with the flags of the C loop and called through `external`: the
+fastest way that CasADi documents. Branches of the model are `if_else`, of which CasADi works out both sides.
+Figures: the largest synchronised error and current only. Generating and compiling are not in the time.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+from axis import TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis, padded, read_axis
+from cases import read_setpoints
+from protocol import Figures, figures, serve
+
+FLAGS = ("-O3", "-march=native", "-ffast-math", "-fPIC", "-shared")
+
+
+def clamp(value: ca.SX, limit: ca.SX | float) -> ca.SX:
+    """Within ±limit."""
+    return ca.fmax(ca.fmin(value, limit), -limit)
+
+
+def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
+    """A PI controller at an instant: output and integral."""
+    new = integral + integral_gain * error
+    wanted = (gain * error + new + feedforward) * scale
+    output = clamp(wanted, limit)
+    return output, ca.if_else(error * (wanted - output) > 0, integral, new)
+
+
+def position_period(p: Axis) -> ca.Function:
+    """State and set-points (the delayed one, then those of both feedforwards) to the state a period later."""
+    state = ca.SX.sym("state", 7)
+    psec = ca.SX.sym("psec", 4)
+    i, omega, theta, velocity_integral, current_integral, synchronized, peak = ca.vertsplit(state)
+    # Newest first: one after the delayed set-point, that itself, and two before it.
+    after, delayed, before, oldest = ca.vertsplit(psec)
+    synchronized = ca.fmax(synchronized, ca.fabs(delayed - theta * p.ratio))
+    velocity_setpoint = clamp(p.position_gain * (delayed / p.ratio - theta), p.max_speed)
+    differences = ((delayed - before, before - oldest), (after - delayed, delayed - before))
+    current_setpoint = ca.SX(0)
+    for t in range(TICKS_PER_POSITION):
+        if t % TICKS_PER_VELOCITY == 0:
+            first, second = differences[t >= p.delay_step]
+            error = velocity_setpoint + p.velocity_feedforward * first - omega
+            current_setpoint, velocity_integral = pi(
+                p.velocity_gain, p.velocity_integral_gain, 1 / p.torque_constant, p.max_current,
+                velocity_integral, error, p.torque_feedforward * (first - second),
+            )  # fmt: skip
+        voltage, current_integral = pi(
+            p.current_gain, p.current_integral_gain, 1, p.max_voltage, current_integral, current_setpoint - i, 0
+        )
+        peak = ca.fmax(peak, ca.fabs(i))
+        v = ca.fabs(omega) * p.velocity_per_speed
+        law = p.friction_a * ca.exp(p.friction_b * v) + p.friction_c * ca.exp(p.friction_d * v)
+        bound = ca.if_else(omega == 0, p.friction_i0, ca.fmax(law, 0))
+
+        def row(r, torque, now=(i, omega, voltage)):
+            return r[0] * now[0] + r[1] * now[1] + r[2] * now[2] + r[3] * torque
+
+        stopping = row(p.speed, 0) / p.speed[3]
+        friction = clamp(stopping, bound)
+        theta = theta + row(p.angle, -friction)
+        i = row(p.current, -friction)
+        omega = ca.if_else(friction == stopping, 0, row(p.speed, -friction))
+    end = ca.vertcat(i, omega, theta, velocity_integral, current_integral, synchronized, peak)
+    return ca.Function("period", [state, psec], [end])
+
+
+def compiled(function: ca.Function) -> ca.Function:
+    """The function as C code, compiled."""
+    with tempfile.TemporaryDirectory() as folder:
+        here = os.getcwd()
+        os.chdir(folder)
+        try:
+            function.generate("generated.c")
+            subprocess.run(["gcc", *FLAGS, "-o", "generated.so", "generated.c", "-lm"], check=True)
+            return ca.external(function.name(), str(Path(folder) / "generated.so"))
+        finally:
+            os.chdir(here)
+
+
+def main() -> None:
+    """Runs what standard input asks for."""
+    table, setpoints = map(Path, sys.argv[1:3])
+    (joint,), (psec,) = read_setpoints(setpoints)
+    axis = read_axis(table, joint)
+    values, start = padded(psec, axis)
+    array = np.array(values)
+    count = len(values) - start
+    at = np.arange(start, len(values)) - axis.delay_periods
+    # Before its step the staircase behind the delay shows the delayed set-point, then the one after it.
+    shifted = ca.DM(np.vstack([array[at + 1], array[at], array[at - 1], array[at - 2]]))
+    function = compiled(position_period(axis).mapaccum("run", count, {"base": count}))
+    initial = ca.DM([0, 0, psec[0] / axis.ratio, 0, 0, 0, 0])
+    # The buffers of the call are made once: CasADi's way to call without conversions.
+    buffer, call = function.buffer()
+    arguments = [np.array(initial).ravel(order="F"), np.array(shifted).ravel(order="F")]
+    result = np.zeros(function.nnz_out(0))
+    for place, argument in enumerate(arguments):
+        buffer.set_arg(place, memoryview(argument))
+    buffer.set_res(0, memoryview(result))
+
+    def run() -> Figures:
+        call()
+        end = result[-7:]
+        return figures(end[5], end[6], position=end[2] * axis.ratio)
+
+    serve(run, joint)
+
+
+if __name__ == "__main__":
+    main()

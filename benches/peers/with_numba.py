@@ -1,0 +1,127 @@
+"""The single-axis case in numba: one compiled loop, all figures of the C loop.
+
+fastmath is on, as -ffast-math is for the C loop. Compiling is not in the time.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis, padded, read_axis
+from cases import read_setpoints
+from numba import njit
+from protocol import Figures, figures, serve
+
+
+@njit(fastmath=True)
+def clamp(value: float, limit: float) -> float:
+    """Within ±limit."""
+    return limit if value > limit else -limit if value < -limit else value
+
+
+@njit(fastmath=True)
+def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
+    """A PI controller at an instant: output, integral, whether it is limited."""
+    new = integral + integral_gain * error
+    wanted = (gain * error + new + feedforward) * scale
+    output = clamp(wanted, limit)
+    limited = wanted != output
+    return output, integral if limited and error * (wanted - output) > 0.0 else new, limited
+
+
+@njit(fastmath=True)
+def row(r, i, omega, voltage, torque):
+    """A row of the discretised motor."""
+    return r[0] * i + r[1] * omega + r[2] * voltage + r[3] * torque
+
+
+@njit(fastmath=True)
+def simulate(p: Axis, psec: np.ndarray, start: int):
+    """The whole run from rest at home; the figures."""
+    i = omega = velocity_integral = current_integral = 0.0
+    theta = psec[0] / p.ratio
+    current_setpoint = 0.0
+    max_tracking = max_synchronized = square_tracking = square_synchronized = 0.0
+    peak = square_activity = last = 0.0
+    saturated = 0
+    current_limited = False
+    inverse_kt, inverse_speed_per_torque = 1.0 / p.torque_constant, 1.0 / p.speed[3]
+    for k in range(start, len(psec)):
+        delayed = psec[k - p.delay_periods]
+        wanted = p.position_gain * (delayed / p.ratio - theta)
+        velocity_setpoint = clamp(wanted, p.max_speed)
+        speed_limited = wanted != velocity_setpoint
+        tracking, synchronized = psec[k] - theta * p.ratio, delayed - theta * p.ratio
+        max_tracking = max(max_tracking, abs(tracking))
+        max_synchronized = max(max_synchronized, abs(synchronized))
+        square_tracking += tracking * tracking
+        square_synchronized += synchronized * synchronized
+        for t in range(TICKS_PER_POSITION):
+            if t % TICKS_PER_VELOCITY == 0:
+                at = k - p.delay_periods + (1 if t >= p.delay_step else 0)
+                first, second = psec[at] - psec[at - 1], psec[at - 1] - psec[at - 2]
+                error = velocity_setpoint + p.velocity_feedforward * first - omega
+                feedforward = p.torque_feedforward * (first - second)
+                current_setpoint, velocity_integral, current_limited = pi(
+                    p.velocity_gain, p.velocity_integral_gain, inverse_kt, p.max_current,
+                    velocity_integral, error, feedforward,
+                )  # fmt: skip
+            if t == 0:
+                if k > start:
+                    square_activity += (current_setpoint - last) ** 2
+                last = current_setpoint
+            voltage, current_integral, voltage_limited = pi(
+                p.current_gain, p.current_integral_gain, 1.0, p.max_voltage,
+                current_integral, current_setpoint - i, 0.0,
+            )  # fmt: skip
+            peak = max(peak, abs(i))
+            saturated += speed_limited | current_limited | voltage_limited
+            if omega == 0.0:
+                bound = p.friction_i0
+            else:
+                v = abs(omega) * p.velocity_per_speed
+                bound = p.friction_a * math.exp(p.friction_b * v) + p.friction_c * math.exp(p.friction_d * v)
+                bound = max(bound, 0.0)
+            stopping = row(p.speed, i, omega, voltage, 0.0) * inverse_speed_per_torque
+            friction = clamp(stopping, bound)
+            theta += row(p.angle, i, omega, voltage, -friction)
+            i_next = row(p.current, i, omega, voltage, -friction)
+            omega = 0.0 if friction == stopping else row(p.speed, i, omega, voltage, -friction)
+            i = i_next
+    n = len(psec) - start
+    return (
+        max_tracking, math.sqrt(square_tracking / n), max_synchronized, math.sqrt(square_synchronized / n),
+        peak, saturated * CURRENT_PERIOD, math.sqrt(square_activity / (n - 1)), theta * p.ratio,
+    )  # fmt: skip
+
+
+def main() -> None:
+    """Runs what standard input asks for."""
+    table, setpoints = map(Path, sys.argv[1:3])
+    (joint,), (psec,) = read_setpoints(setpoints)
+    axis = read_axis(table, joint)
+    values, start = padded(psec, axis)
+    array = np.array(values)
+
+    def run() -> Figures:
+        found = simulate(axis, array, start)
+        tracking, rms_tracking, synchronized, rms_synchronized, peak, saturation, activity, position = found
+        return figures(
+            synchronized,
+            peak,
+            max_tracking_error=tracking,
+            rms_tracking_error=rms_tracking,
+            rms_synchronized_tracking_error=rms_synchronized,
+            saturation_time=saturation,
+            control_activity=activity,
+            position=position,
+        )
+
+    serve(run, joint)
+
+
+if __name__ == "__main__":
+    main()
