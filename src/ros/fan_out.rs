@@ -46,7 +46,7 @@ pub struct FanOut {
 
 impl FanOut {
     /// Publishes frames until the simulation ends.
-    pub async fn run(self, mut frames: mpsc::Receiver<Frame>) {
+    pub async fn run(self, mut frames: mpsc::Receiver<Arc<Frame>>) {
         let mut setpoints = SetpointVelocities::default();
         while let Some(frame) = frames.recv().await {
             let velocities = setpoints.update(&frame);

@@ -26,6 +26,7 @@ pub mod parameter_services;
 pub mod participant;
 mod recorder;
 mod results;
+mod reused;
 pub mod rosout;
 mod rtps;
 mod service;
