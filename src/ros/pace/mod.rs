@@ -9,6 +9,8 @@ mod axes;
 mod health;
 mod paced;
 mod real;
+#[cfg(test)]
+mod tests;
 mod wall;
 
 pub use health::{AxisHealth, ClockHealth, ClockSource, Health};
