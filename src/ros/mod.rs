@@ -13,6 +13,7 @@ mod endpoints;
 pub mod environment;
 mod fan_out;
 mod goodbye;
+mod heard;
 mod inputs;
 mod large_response;
 pub mod log;
