@@ -40,7 +40,17 @@ from virtual_axes.msg import DriveStates, MotorCurrents
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from drive import DEEP_QOS, PSEC_QOS, SETTLE_S, STREAM_QOS, TSP_NS, Node, _stamp_ns, ballbar, joint_trajectory  # noqa: E402
+from drive import (  # noqa: E402
+    DEEP_QOS,
+    PSEC_QOS,
+    SETTLE_S,
+    STREAM_QOS,
+    TSP_NS,
+    Node,
+    _stamp_ns,
+    ballbar,
+    joint_trajectory,
+)
 
 JOINTS = {"/joint_states": JointState}
 ALL = JOINTS | {
@@ -68,7 +78,9 @@ class Guest:
         self.stamps: list[int] = []
         self._context = Context()
         rclpy.init(context=self._context, domain_id=process.domain_id, signal_handler_options=SignalHandlerOptions.NO)
-        self.node = rclpy.create_node("guest", context=self._context, enable_rosout=False, start_parameter_services=False)
+        self.node = rclpy.create_node(
+            "guest", context=self._context, enable_rosout=False, start_parameter_services=False
+        )
         for topic, kind in topics.items():
             keep = self._keep if topic == "/joint_states" else lambda _: None
             self.node.create_subscription(kind, topic, keep, DEEP_QOS, raw=True)
@@ -195,7 +207,8 @@ def memory(process: Node, guest: Guest, minutes: float) -> None:
             check(process, guest.stamps[first:], LOOK_S)
     passed, resident, files = np.array(looks).T
     print(f"memory over {minutes:g} minutes of motion, {len(looks)} looks:")
-    print(f"  resident: {resident[0]:.0f} kB at first, {resident.min():.0f} to {resident.max():.0f}, {resident[-1]:.0f} at last")
+    span = f"{resident.min():.0f} to {resident.max():.0f}"
+    print(f"  resident: {resident[0]:.0f} kB at first, {span}, {resident[-1]:.0f} at last")
     half = passed > minutes * 30
     if half.sum() > 2:
         slope = np.polyfit(passed[half] / 60, resident[half], 1)[0]

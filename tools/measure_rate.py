@@ -70,7 +70,9 @@ class Subscriber:
         self._stamps: list[int] = []
         self._context = Context()
         rclpy.init(context=self._context, domain_id=process.domain_id, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node("counter", context=self._context, enable_rosout=False, start_parameter_services=False)
+        self._node = rclpy.create_node(
+            "counter", context=self._context, enable_rosout=False, start_parameter_services=False
+        )
         self._node.create_subscription(JointState, "/joint_states", self._keep, QoSProfile(depth=DEPTH))
         self._psec = self._node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
         self._executor = SingleThreadedExecutor(context=self._context)
@@ -175,7 +177,8 @@ def fast(seconds: float) -> None:
                 sender.close()
             if process.poll() is not None:
                 raise SystemExit(f"the node ended; its output:\n{process.output()}")
-        print(f"fast, to {name}: {found.rate:.0f} samples a second, {found.lost} lost, {found.rate / default:.1f} times real time")
+        times = f"{found.rate / default:.1f} times real time"
+        print(f"fast, to {name}: {found.rate:.0f} samples a second, {found.lost} lost, {times}")
 
 
 def main() -> int:
