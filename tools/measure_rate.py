@@ -7,9 +7,9 @@
 In real time, with shorter and shorter position periods, to a subscriber in Rust
 (examples/count_joint_states.rs) and to one in rclpy, each alone with the node: samples a second, how
 many of them are missing on the grid of their stamps, and the share of a core that the node takes. Both
-subscribers are reliable, keep the last 100 samples, and look at every message. Then in `fast`, in
-motion, where the simulation waits for whoever listens: samples a second. Rates are multiples of the
-default one, all of one run.
+subscribers are reliable and look at every message; the one in Rust keeps all until it is taken, the one
+in rclpy the last 100. Then in `fast`, in motion, where the simulation waits for whoever listens and
+rclpy keeps all too: samples a second. Rates are multiples of the default one, all of one run.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import numpy as np
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.qos import QoSProfile
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
@@ -41,8 +41,9 @@ from measure_node import STARTED_S, cpu_seconds  # noqa: E402
 
 PERIODS_MS = (6, 3, 2, 1, 0.5, 0.25)
 """Down to the period of the velocity loop."""
-DEPTH = 100
-"""Samples that a reader keeps: late by more, it loses some."""
+LAST = QoSProfile(depth=100)
+"""Late by more, the reader loses some."""
+ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 COUNTER = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "examples" / "count_joint_states"
 # Longer than any span of `fast`: half an hour of the machine's time.
 LONG_S = 1800
@@ -64,7 +65,7 @@ class Count(NamedTuple):
 class Subscriber:
     """rclpy, with messages and callbacks as everybody has them."""
 
-    def __init__(self, process: Node):
+    def __init__(self, process: Node, qos: QoSProfile):
         """Join the node's graph."""
         self._process = process
         self._stamps: list[int] = []
@@ -73,7 +74,7 @@ class Subscriber:
         self._node = rclpy.create_node(
             "counter", context=self._context, enable_rosout=False, start_parameter_services=False
         )
-        self._node.create_subscription(JointState, "/joint_states", self._keep, QoSProfile(depth=DEPTH))
+        self._node.create_subscription(JointState, "/joint_states", self._keep, qos)
         self._psec = self._node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -122,7 +123,7 @@ def count_in_rust(process: Node, seconds: float, period_ns: int) -> Count:
 
 def count_in_rclpy(process: Node, seconds: float, period_ns: int) -> Count:
     """What rclpy counts."""
-    subscriber = Subscriber(process)
+    subscriber = Subscriber(process, LAST)
     try:
         return subscriber.count(seconds, period_ns)
     finally:
@@ -163,7 +164,7 @@ def fast(seconds: float) -> None:
     for name in ("Rust", "rclpy"):
         with Node(["-p", "time:=fast"]) as process:
             time.sleep(STARTED_S)
-            sender = Subscriber(process)
+            sender = Subscriber(process, ALL)
             # To and fro in x, a point a second.
             points = np.arange(LONG_S + 1)
             sender.send(joint_trajectory(["x"], points, 0.05 * (points % 2)[:, None]))
