@@ -10,7 +10,8 @@ Every span is checked: the node lives at its end, it says itself that no period 
 whoever listens has got every sample.
 
 Memory: resident set and open files while a trajectory follows the other and a subscriber listens to
-joint_states, over --minutes (0: not at all).
+joint_states, over --minutes (0: not at all). First as many trajectories are sent as psec keeps, so that
+what is bounded has grown to its bound: the middleware keeps the last 64.
 """
 
 from __future__ import annotations
@@ -66,6 +67,8 @@ STARTED_S = 2.0
 """The node is up and has been discovered long before."""
 LOOK_S = 5.0
 """From one look at the memory to the next."""
+KEPT = 64
+"""Trajectories that the middleware keeps: depth of psec."""
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -157,6 +160,14 @@ class Motion:
                 self.guest.psec_stream.publish(JointState(name=["x", "y"], position=position))
                 self._end.wait(TSP_NS / 1e9)
 
+    def fill(self) -> None:
+        """Send as many trajectories as are kept, and stop."""
+        for _ in range(2 * KEPT):
+            self.guest.psec.publish(self._circle)
+            time.sleep(0.1)
+        self.guest.psec.publish(JointTrajectory())
+        time.sleep(1.0)
+
     def __enter__(self) -> Motion:
         """Begin."""
         if self.kind != "rest":
@@ -198,8 +209,10 @@ def share(process: Node, guest: Guest | None, seconds: float) -> float:
 def memory(process: Node, guest: Guest, minutes: float) -> None:
     """Print how memory and open files go while the axes move."""
     looks: list[tuple[float, int, int]] = []
+    motion = Motion(guest, "trajectory")
+    motion.fill()
     start = time.monotonic()
-    with Motion(guest, "trajectory"):
+    with motion:
         while (passed := time.monotonic() - start) < minutes * 60:
             looks.append((passed, resident_kb(process.pid), open_files(process.pid)))
             first = len(guest.stamps)
