@@ -20,6 +20,8 @@ use virtual_axes::ros::participant::Participant;
 
 /// How long the first sample is waited for.
 const FIRST: Duration = Duration::from_secs(10);
+/// Samples that are kept until they are taken. RustDDS keeps fewer of "all".
+const DEPTH: usize = 100_000;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = env::args().skip(1);
@@ -58,8 +60,8 @@ async fn count(participant: &Participant, topic: &str, span: Duration) -> Result
     let context = participant.context()?;
     let options = NodeOptions::new().start_parameter_services(false).enable_rosout(false);
     let mut node = context.new_node(NodeName::new("/", "count_joint_states")?, options)?;
-    // A publisher's profile is reliable and fits both ends. What has come is kept until it is taken.
-    let qos = QosProfile::publisher_default().history(History::KeepAll);
+    // A publisher's profile is reliable, and fits both ends.
+    let qos = QosProfile::publisher_default().history(History::KeepLast { depth: DEPTH });
     let topic =
         node.create_topic(&Name::parse(topic)?, MessageTypeName::new("sensor_msgs", "JointState"), &qos)?;
     let subscription = node.create_subscription::<JointState>(&topic, None)?;
