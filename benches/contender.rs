@@ -60,43 +60,77 @@ struct Deviation {
     max: f64,
 }
 
-/// Runs one machine with all its figures: the part that is measured.
-fn run_machine(parameters: &Arc<MachineParameters>, case: &Case) -> Figures {
-    let mut machine = Machine::new(Arc::clone(parameters));
-    machine.reset(&case.rows[0]);
+/// Machines that are run side by side on a core.
+const TOGETHER: usize = 32;
+
+/// Runs some machines side by side with all their figures: the part that is measured.
+fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures> {
+    let Some(together) = MachineParameters::together(machines) else { return Vec::new() };
+    let axes = case.joints.len();
+    let mut machine = Machine::new(Arc::new(together));
+    machine.reset(&case.rows[0].repeat(machines.len()));
     let mut assessors = vec![AxisAssessor::default(); machine.axis_count()];
-    let (mut sum, mut min, mut max, mut count) = (0.0, f64::INFINITY, f64::NEG_INFINITY, 0u64);
-    for (k, psec) in case.rows.iter().enumerate() {
-        let circle = case.circle.as_ref().filter(|circle| circle.window.contains(&k));
-        let mut position_instant = true;
-        machine.advance_with(psec, &[], |machine| {
-            for (axis, assessor) in machine.axes().iter().zip(&mut assessors) {
-                assessor.observe(axis.sample(), position_instant);
+    let mut circles = vec![Radial::default(); machines.len()];
+    let mut psec = Vec::with_capacity(machine.axis_count());
+    for (k, row) in case.rows.iter().enumerate() {
+        psec.clear();
+        (0..machines.len()).for_each(|_| psec.extend_from_slice(row));
+        machine.advance(&psec, &[]);
+        for (place, assessor) in assessors.iter_mut().enumerate() {
+            assessor.observe(machine.axis(place).sample(), &machine.activity(place));
+        }
+        if let Some(circle) = case.circle.as_ref().filter(|circle| circle.window.contains(&k)) {
+            for (place, radial) in circles.iter_mut().enumerate() {
+                let [x, y] = [0, 1].map(|axis| machine.positions(place * axes + axis));
+                x.zip(y).for_each(|(x, y)| radial.push(circle.radius, x, y));
             }
-            position_instant = false;
-            if let Some(circle) = circle {
-                let [x, y] = [0, 1].map(|axis| machine.axis(axis).sample().position);
-                let deviation = ((x + circle.radius).powi(2) + y * y).sqrt() - circle.radius;
-                sum += deviation;
-                min = deviation.min(min);
-                max = deviation.max(max);
-                count += 1;
-            }
-        });
+        }
     }
     let tick = seconds(machine.periods().current);
-    Figures {
+    let figures = |(assessors, radial): (&[AxisAssessor], &Radial)| Figures {
         axes: assessors.iter().map(|assessor| assessor.report(tick)).collect(),
-        deviation: (count > 0).then(|| Deviation { mean: sum / count as f64, min, max }),
+        deviation: radial.deviation(),
+    };
+    assessors.chunks(axes).zip(&circles).map(figures).collect()
+}
+
+/// Radial deviation about (−radius, 0), tick by tick.
+#[derive(Clone)]
+struct Radial {
+    sum: f64,
+    min: f64,
+    max: f64,
+    count: u64,
+}
+
+impl Default for Radial {
+    fn default() -> Self {
+        Radial { sum: 0.0, min: f64::INFINITY, max: f64::NEG_INFINITY, count: 0 }
+    }
+}
+
+impl Radial {
+    #[inline]
+    fn push(&mut self, radius: f64, x: f64, y: f64) {
+        let deviation = ((x + radius) * (x + radius) + y * y).sqrt() - radius;
+        self.sum += deviation;
+        self.min = if deviation < self.min { deviation } else { self.min };
+        self.max = if deviation > self.max { deviation } else { self.max };
+        self.count += 1;
+    }
+
+    fn deviation(&self) -> Option<Deviation> {
+        let mean = self.sum / self.count as f64;
+        (self.count > 0).then_some(Deviation { mean, min: self.min, max: self.max })
     }
 }
 
 /// Runs all machines of a case, on as many cores as the pool has.
 fn run_case(case: &Case, pool: Option<&ThreadPool>) -> Vec<Figures> {
-    let run = |parameters| run_machine(parameters, case);
+    let run = |machines| run_machines(machines, case);
     match pool {
-        Some(pool) => pool.install(|| case.machines.par_iter().map(run).collect()),
-        None => case.machines.iter().map(run).collect(),
+        Some(pool) => pool.install(|| case.machines.par_chunks(TOGETHER).flat_map(run).collect()),
+        None => case.machines.chunks(TOGETHER).flat_map(run).collect(),
     }
 }
 

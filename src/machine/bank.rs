@@ -98,6 +98,13 @@ impl Bank {
         MotorState::get(&block.seen[tick].0, lane)
     }
 
+    /// Motor angles of an axis at the ticks of the last position period, rad.
+    #[inline]
+    pub fn angles(&self, axis: usize) -> impl ExactSizeIterator<Item = f64> + '_ {
+        let (block, lane) = self.of(axis);
+        block.seen.iter().map(move |row| row.0.angle[lane])
+    }
+
     /// What the controllers of an axis made of it.
     pub fn done(&self, axis: usize, tick: usize) -> Done {
         let (block, lane) = self.of(axis);

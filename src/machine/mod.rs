@@ -314,6 +314,16 @@ impl Machine {
         self.parameters.axes[axis].loops.plant.position(self.bank.motor(axis, tick).angle)
     }
 
+    /// Positions of an axis at the ticks of the position period that was computed last, m or rad.
+    ///
+    /// # Panics
+    /// If there is no such axis.
+    #[inline]
+    pub fn positions(&self, axis: usize) -> impl ExactSizeIterator<Item = f64> + '_ {
+        let plant = &self.parameters.axes[axis].loops.plant;
+        self.bank.angles(axis).map(|angle| plant.position(angle))
+    }
+
     /// What an axis did in the position period that was computed last.
     ///
     /// # Panics

@@ -26,8 +26,7 @@ use std::{
     net::{Ipv4Addr, SocketAddr, UdpSocket},
 };
 
-use futures::StreamExt;
-use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, StatusEvented};
+use rustdds::{DomainParticipant, GUID};
 use tracing::debug;
 
 use super::rtps::{Guid, Message, entity};
@@ -37,29 +36,31 @@ const VENDOR_FAST_DDS: [u8; 2] = [0x01, 0x0f];
 /// Of an entity kind: 0 for those that an application makes.
 const BUILT_IN: u8 = 0xf0;
 
-/// Asks every publisher that is matched from now on, until the task is ended.
-pub(super) async fn run(participant: DomainParticipant) {
-    let socket = match open() {
-        Ok(socket) => socket,
-        Err(error) => {
-            debug!("what publishers send before they are known is not asked for: {error}");
+/// Asks publishers that are matched.
+pub(super) struct Asker(UdpSocket);
+
+impl Asker {
+    /// Ready to ask; none where there is no socket to be had.
+    pub(super) fn open() -> Option<Self> {
+        match socket() {
+            Ok(socket) => Some(Asker(socket)),
+            Err(error) => {
+                debug!("what publishers send before they are known is not asked for: {error}");
+                None
+            }
+        }
+    }
+
+    /// Asks a publisher that has just been matched with a reader of `participant`.
+    pub(super) fn matched(&self, participant: &DomainParticipant, reader: GUID, writer: GUID) {
+        let (own, other) = (reader.to_bytes(), writer.to_bytes());
+        if !is_asked(&own, &other) {
             return;
         }
-    };
-    let listener = participant.status_listener();
-    let mut events = listener.as_async_status_stream();
-    while let Some(event) = events.next().await {
-        let DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer } = event else {
-            continue;
-        };
-        let (reader, writer) = (local_reader.to_bytes(), remote_writer.to_bytes());
-        if !is_asked(&reader, &writer) {
-            continue;
-        }
-        let datagram = datagram(&reader, &writer);
-        for to in addresses(&participant, remote_writer) {
+        let datagram = datagram(&own, &other);
+        for to in addresses(participant, writer) {
             // The publisher may be gone already: then there is nothing to be had.
-            let _ = socket.send_to(&datagram, to);
+            let _ = self.0.send_to(&datagram, to);
         }
     }
 }
@@ -70,7 +71,7 @@ fn is_asked(reader: &Guid, writer: &Guid) -> bool {
     writer[..2] == VENDOR_FAST_DDS && (reader[15] | writer[15]) & BUILT_IN == 0
 }
 
-fn open() -> io::Result<UdpSocket> {
+fn socket() -> io::Result<UdpSocket> {
     let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
     socket.set_nonblocking(true)?;
     Ok(socket)

@@ -17,12 +17,14 @@ pub struct Publisher<M: Serialize> {
     pub network: ros2_client::Publisher<M>,
     /// To the recording.
     pub tap: Tap<M>,
+    /// Its name in DDS, unless readers that come later want what was sent before.
+    pub volatile: Option<String>,
 }
 
 impl<M: Serialize> Publisher<M> {
     /// One whose messages are not recorded.
     pub fn unrecorded(network: ros2_client::Publisher<M>) -> Self {
-        Publisher { network, tap: Tap::none() }
+        Publisher { network, tap: Tap::none(), volatile: None }
     }
 }
 
@@ -122,7 +124,8 @@ impl Endpoints<'_> {
             .create_publisher(&topic, None)
             .map_err(|e| EndpointError { name: name.to_owned(), reason: e.to_string() })?;
         let tap = self.recorder.tap(&resolved, qos, Direction::Out);
-        Ok((Publisher { network, tap }, resolved))
+        let volatile = (!qos.transient_local).then(|| format!("rt{resolved}"));
+        Ok((Publisher { network, tap, volatile }, resolved))
     }
 
     /// A subscription, and the name that it listens to.

@@ -46,7 +46,7 @@ pub struct FanOut {
 
 impl FanOut {
     /// Publishes frames until the simulation ends.
-    pub async fn run(self, mut frames: mpsc::Receiver<Frame>) {
+    pub async fn run(self, mut frames: mpsc::Receiver<Arc<Frame>>) {
         let mut setpoints = SetpointVelocities::default();
         while let Some(frame) = frames.recv().await {
             let velocities = setpoints.update(&frame);
@@ -58,10 +58,18 @@ impl FanOut {
                 tool.take(&frame, publish).await;
             }
             if publish {
-                self.joint_states.send(convert::joint_state(&frame, &self.joints)).await;
-                self.motor_currents.send(convert::motor_currents(&frame, &self.joints)).await;
-                self.drive_states.send(convert::drive_states(&frame, &self.joints)).await;
-                self.controller_state.send(controller_state(&frame, velocities, &self.joints)).await;
+                if self.joint_states.is_heard() {
+                    self.joint_states.send(convert::joint_state(&frame, &self.joints)).await;
+                }
+                if self.motor_currents.is_heard() {
+                    self.motor_currents.send(convert::motor_currents(&frame, &self.joints)).await;
+                }
+                if self.drive_states.is_heard() {
+                    self.drive_states.send(convert::drive_states(&frame, &self.joints)).await;
+                }
+                if self.controller_state.is_heard() {
+                    self.controller_state.send(controller_state(&frame, velocities, &self.joints)).await;
+                }
             }
             self.feedback.frame(&frame, velocities).await;
         }

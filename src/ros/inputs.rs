@@ -16,6 +16,7 @@ use super::endpoints::Subscription;
 use super::pace::{Command, Health};
 use super::parameter_host::LiveNodeParameters;
 use super::results::{Origin, Results};
+use super::reused::Reused;
 use super::stream::{Order, Setpoints};
 use super::throttle::Throttle;
 use crate::trajectory::{Context, JointLimits, MotionId, Rejection, Trajectory};
@@ -108,13 +109,13 @@ pub async fn take_stream(
     commands: mpsc::Sender<Command>,
 ) {
     let mut messages = std::pin::pin!(subscription.async_stream());
-    let mut order = Order::default();
+    let (mut order, mut sent) = (Order::default(), Reused::default());
     while let Some(received) = messages.next().await {
         match received {
             Ok((message, info)) => {
                 let publisher = info.publisher_gid().to_bytes16();
                 let setpoints = Setpoints::in_order(&message, &joints, publisher, &mut order);
-                let _ = commands.send(Command::Stream(setpoints)).await;
+                let _ = commands.send(Command::Stream(sent.next(|last| *last = setpoints))).await;
             }
             Err(error) => warn!("a message on psec_stream could not be read: {error:?}"),
         }
@@ -130,9 +131,11 @@ pub async fn take_loads(
 ) {
     let mut messages = std::pin::pin!(subscription.async_stream());
     let (mut told, started) = (Throttle::default(), Instant::now());
+    let mut sent = Reused::default();
     while let Some(received) = messages.next().await {
         match received.map_err(|e| format!("{e:?}")).and_then(|(m, _)| convert::loads(&m, &joints)) {
             Ok(loads) => {
+                let loads = sent.next(|last| *last = loads);
                 let _ = commands.send(Command::Load { loads, hold }).await;
             }
             Err(reason) => {

@@ -14,13 +14,13 @@ use tracing::{info, warn};
 
 use super::action::{ActionServer, Ending, Feedback, GoalChecks, Tell, Work, feedback_period};
 use super::args::RosArgs;
-use super::ask_again;
 use super::clock::{ClockInput, ClockOutput, ClockState};
 use super::convert;
 use super::diagnostics::Diagnostics;
 use super::endpoints::{EndpointError, Publisher};
 use super::environment::Environment;
 use super::fan_out::{FanOut, publish_diagnostics};
+use super::heard::{self, Listeners};
 use super::inputs::{Checks, PsecInput, next_id, take_loads, take_stream};
 use super::log::LogRecord;
 use super::namesake;
@@ -157,7 +157,8 @@ async fn serve(
     let ids = Arc::new(AtomicU64::new(1));
 
     // What goes out.
-    let mut publishing = Publishing { dropped: &dropped, tasks: &mut tasks };
+    let mut listeners = Listeners::default();
+    let mut publishing = Publishing { dropped: &dropped, listeners: &mut listeners, tasks: &mut tasks };
     let (goal_events, events) = mpsc::unbounded_channel();
     let results_output = publishing.start(topics.results, WhenFull::Wait);
     let results = Arc::new(Results::new(results_output, joint_limits.clone(), goal_events));
@@ -192,7 +193,7 @@ async fn serve(
     let recording = recorder.start()?;
 
     // What comes in.
-    tasks.spawn(ask_again::run(dds.clone()));
+    tasks.spawn(heard::run(dds.clone(), listeners));
     if let Some((subscription, name)) = topics.clock_input {
         let (participant, health) = (dds.clone(), health.clone());
         let input = ClockInput { subscription, name, participant, period, health, state: clock_out };
@@ -252,7 +253,9 @@ async fn serve(
             results.report(report).await;
         }
     });
-    tasks.spawn(outputs.run(frames));
+    // On a thread of its own: each position instant wakes it and nobody else.
+    let runtime = Handle::current();
+    tasks.spawn_blocking(move || runtime.block_on(outputs.run(frames)));
 
     topics.names.print(args, config.name(), mode);
     let (ended, has_ended) = oneshot::channel();

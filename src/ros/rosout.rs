@@ -53,7 +53,7 @@ pub(super) fn publisher(
     let network = node.create_publisher(&topic, None).map_err(|e| failed(e.to_string()))?;
     let qos = QosConfig { reliable: true, transient_local: true, depth: DEPTH };
     let tap = recorder.tap(&resolved, qos, Direction::Out);
-    Ok(Some(Publisher { network, tap }))
+    Ok(Some(Publisher { network, tap, volatile: None }))
 }
 
 /// Publishes what comes until the log is closed.

@@ -186,6 +186,18 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         }
     }
 
+    /// Likewise, each made one of the requests that several services share.
+    pub fn requests_as<'a, R: 'a>(
+        &'a self,
+        wrap: impl Fn(RmwRequestId, Q) -> R + Send + 'a,
+    ) -> BoxStream<'a, Result<R, String>>
+    where
+        Q: Send + Sync,
+        A: Send + Sync,
+    {
+        self.requests().map(move |received| received.map(|(id, request)| wrap(id, request))).boxed()
+    }
+
     /// Sends the response to a request, once its client is known.
     pub fn respond<'a>(&'a self, id: RmwRequestId, response: A) -> BoxFuture<'a, ()>
     where

@@ -96,7 +96,7 @@ mod tests {
         let sample =
             AxisSample { delayed_psec: setpoint, position: 0.25, velocity: 1.0, ..Default::default() };
         let samples = vec![AxisSample::default(), sample];
-        Frame { instant, time: instant * MILLISECOND_NS, samples, resets: 0, motions: Vec::new().into() }
+        Frame { instant, time: instant * MILLISECOND_NS, samples, resets: 0, motions: Vec::new() }
     }
 
     #[test]

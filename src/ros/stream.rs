@@ -139,13 +139,13 @@ impl Setpoints {
 
 impl StreamLog {
     /// Gives `setpoints` to the axes for the next position instant.
-    pub fn take(&mut self, simulation: &mut Simulation, setpoints: Setpoints) {
+    pub fn take(&mut self, simulation: &mut Simulation, setpoints: &Setpoints) {
         let now = simulation.time_of(simulation.next_instant());
         self.overtaken += u64::from(setpoints.overtaken);
         for rejection in &setpoints.refused {
             self.refuse(rejection, now);
         }
-        for (place, position) in setpoints.positions {
+        for &(place, position) in &setpoints.positions {
             match simulation.stream_sent(place, position, setpoints.sent) {
                 Ok(true) => {}
                 Ok(false) => self.ignored += 1,

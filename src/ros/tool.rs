@@ -92,7 +92,7 @@ impl ToolOutput {
         let actual = self.place(frame, |sample| sample.position);
         let setpoint = self.place(frame, |sample| sample.delayed_psec);
         lock(&self.trace).take(frame.resets, Moment { time: frame.time, actual, setpoint });
-        if publish {
+        if publish && self.pose.is_heard() {
             self.pose.send(actual.message(frame.time, &self.frame)).await;
         }
     }
@@ -194,6 +194,9 @@ impl Paths {
         let mut last: Option<Instant> = None;
         loop {
             let now = timer.tick().await;
+            if !self.outputs.iter().any(Output::is_heard) {
+                continue;
+            }
             let is_due = last.is_none_or(|last| now - last >= REPEAT);
             let moments = {
                 let mut trace = lock(&self.trace);

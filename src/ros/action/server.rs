@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use futures::StreamExt;
 use futures::future::BoxFuture;
-use futures::stream::{BoxStream, FuturesUnordered, select_all};
+use futures::stream::{FuturesUnordered, select_all};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use ros2_client::service::RmwRequestId;
 use ros2_client::{Context, Message, MessageTypeName, Name, Node, Publisher, ServiceTypeName};
@@ -140,9 +140,9 @@ impl ActionServer {
     pub async fn serve(self, work: Work) {
         let ActionServer { send_goal, cancel_goal, get_result } = &self;
         let mut requests = select_all([
-            stream(send_goal, |id, request| Request::Goal(id, Box::new(request))),
-            stream(cancel_goal, Request::Cancel),
-            stream(get_result, Request::Result),
+            send_goal.requests_as(|id, request| Request::Goal(id, Box::new(request))),
+            cancel_goal.requests_as(Request::Cancel),
+            get_result.requests_as(Request::Result),
         ]);
         let Work { mut events, end, .. } = work;
         let mut task = Task {
@@ -162,7 +162,10 @@ impl ActionServer {
                 _ = &mut asked => break,
                 Some(()) = task.responses.next(), if !task.responses.is_empty() => {}
                 Some(event) = events.recv() => task.note(event).await,
-                Some(request) = requests.next() => task.answer(request).await,
+                Some(request) = requests.next() => match request {
+                    Ok(request) => task.answer(request).await,
+                    Err(reason) => warn!("{reason}"),
+                },
                 else => break,
             }
         }
@@ -223,7 +226,6 @@ enum Request {
     Goal(RmwRequestId, Box<SendGoalRequest>),
     Cancel(RmwRequestId, CancelGoalRequest),
     Result(RmwRequestId, GetResultRequest),
-    Unreadable(String),
 }
 
 struct Task<'a> {
@@ -247,7 +249,6 @@ impl Task<'_> {
                     self.responses.push(self.server.get_result.respond(request, response));
                 }
             }
-            Request::Unreadable(reason) => warn!("{reason}"),
         }
     }
 
@@ -358,22 +359,4 @@ impl Task<'_> {
         // Large responses are given again for seconds, which is not waited for.
         let _ = tokio::time::timeout(LAST_RESPONSES, last).await;
     }
-}
-
-/// Requests of one service among those of the others.
-fn stream<'a, Q, A>(
-    service: &'a Service<Q, A>,
-    wrap: impl Fn(RmwRequestId, Q) -> Request + Send + 'a,
-) -> BoxStream<'a, Request>
-where
-    Q: Message + Send + Sync + 'static,
-    A: Message + Send + Sync + 'static,
-{
-    service
-        .requests()
-        .map(move |received| match received {
-            Ok((id, request)) => wrap(id, request),
-            Err(reason) => Request::Unreadable(reason),
-        })
-        .boxed()
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tracing::{info, warn};
 
+use super::super::reused::Reused;
 use super::super::stream::StreamLog;
 use super::{Accepted, AxisHealth, COMMAND_QUEUE, ClockHealth, Command, Frame, Health, Report};
 use crate::simulation::Simulation;
@@ -21,7 +22,8 @@ pub(super) struct Axes {
     /// How often the axes have been reset.
     resets: u64,
     /// The accepted motions that have not ended, with the times of their starts, ns.
-    motions: Arc<[(MotionId, Nanoseconds)]>,
+    motions: Vec<(MotionId, Nanoseconds)>,
+    frames: Reused<Frame>,
 }
 
 impl Axes {
@@ -31,7 +33,8 @@ impl Axes {
         health: watch::Sender<Health>,
     ) -> Self {
         health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
-        Axes { simulation, reports, health, stream: StreamLog::default(), resets: 0, motions: Arc::from([]) }
+        let (stream, frames) = (StreamLog::default(), Reused::default());
+        Axes { simulation, reports, health, stream, resets: 0, motions: Vec::new(), frames }
     }
 
     pub(super) fn simulation(&self) -> &Simulation {
@@ -44,18 +47,19 @@ impl Axes {
     }
 
     /// Computes the next position instant.
-    pub(super) fn step(&mut self) -> Frame {
-        let instant = self.simulation.next_instant();
-        self.simulation.step();
-        self.stream.watch(&self.simulation);
-        let samples = self.simulation.samples().to_vec();
-        Frame {
-            instant,
-            time: self.simulation.time_of(instant),
-            samples,
-            resets: self.resets,
-            motions: Arc::clone(&self.motions),
-        }
+    pub(super) fn step(&mut self) -> Arc<Frame> {
+        let Axes { simulation, stream, resets, motions, frames, .. } = self;
+        let instant = simulation.next_instant();
+        simulation.step();
+        stream.watch(simulation);
+        frames.next(|frame| {
+            frame.instant = instant;
+            frame.time = simulation.time_of(instant);
+            frame.samples.clear();
+            frame.samples.extend_from_slice(simulation.samples());
+            frame.resets = *resets;
+            frame.motions.clone_from(motions);
+        })
     }
 
     /// Tells what has become of the instant that was computed last.
@@ -75,7 +79,7 @@ impl Axes {
             let _ = self.reports.send(Report::StreamEnded(now, end, joints));
         }
         for end in self.simulation.take_ends() {
-            self.motions = self.motions.iter().copied().filter(|(id, _)| *id != end.id).collect();
+            self.motions.retain(|(id, _)| *id != end.id);
             // The receiver lives as long as the node; when it is gone, so is whoever wants to know.
             let _ = self.reports.send(Report::Ended(end));
         }
@@ -120,7 +124,7 @@ impl Axes {
                     joined_late: admission.joined_late,
                 });
                 if let Ok(accepted) = &decision {
-                    *motions = motions.iter().copied().chain([(id, accepted.start)]).collect();
+                    motions.push((id, accepted.start));
                 }
                 let _ = reports.send(Report::Decided(id, now, decision));
             }
@@ -128,11 +132,11 @@ impl Axes {
                 let _ = done.send(simulation.cancel(id));
             }
             Command::Load { loads, hold } => {
-                for (axis, load) in loads {
+                for &(axis, load) in loads.iter() {
                     simulation.set_load(axis, load, hold);
                 }
             }
-            Command::Stream(setpoints) => stream.take(simulation, setpoints),
+            Command::Stream(setpoints) => stream.take(simulation, &setpoints),
             Command::Adopt(parameters) => {
                 if let Err(error) = simulation.adopt(parameters) {
                     warn!("changed parameters could not be taken over: {error}");

@@ -9,6 +9,8 @@ mod axes;
 mod health;
 mod paced;
 mod real;
+#[cfg(test)]
+mod tests;
 mod wall;
 
 pub use health::{AxisHealth, ClockHealth, ClockSource, Health};
@@ -46,12 +48,12 @@ pub enum Command {
     /// Put loads (N or N·m) on axes for a while.
     Load {
         /// Place of the axis, and load.
-        loads: Vec<(usize, f64)>,
+        loads: Arc<Vec<(usize, f64)>>,
         /// How long, ns.
         hold: Nanoseconds,
     },
     /// Take the set-points of a stream over, where no trajectory moves.
-    Stream(Setpoints),
+    Stream(Arc<Setpoints>),
     /// Take changed parameters over.
     Adopt(Arc<MachineParameters>),
     /// Back to rest at home.
@@ -81,7 +83,7 @@ pub enum Report {
 }
 
 /// The samples of one position instant.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Frame {
     /// Position instant.
     pub instant: i64,
@@ -92,7 +94,7 @@ pub struct Frame {
     /// How often the axes have been reset before it.
     pub resets: u64,
     /// The accepted motions that had not ended before it, with the times of their starts, ns.
-    pub motions: Arc<[(MotionId, Nanoseconds)]>,
+    pub motions: Vec<(MotionId, Nanoseconds)>,
 }
 
 /// The thread's ends of the channels.
@@ -100,7 +102,7 @@ pub struct Channels {
     /// Commands in.
     pub commands: mpsc::Receiver<Command>,
     /// Frames out; bounded.
-    pub frames: mpsc::Sender<Frame>,
+    pub frames: mpsc::Sender<Arc<Frame>>,
     /// Reports out: at most two for each accepted command.
     pub reports: mpsc::UnboundedSender<Report>,
     /// Health out.

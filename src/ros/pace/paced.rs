@@ -5,6 +5,7 @@
 //! time at all, trajectories are kept until it comes.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::{mpsc, watch};
@@ -41,7 +42,7 @@ fn leave(state: &ClockState, next: Nanoseconds, busy: bool) -> Leave {
 pub(super) async fn run(
     axes: Axes,
     mut commands: mpsc::Receiver<Command>,
-    frames: &mpsc::Sender<Frame>,
+    frames: &mpsc::Sender<Arc<Frame>>,
     mut clock: watch::Receiver<ClockState>,
 ) {
     let period = axes.simulation().period();

@@ -1,5 +1,9 @@
 //! In step with the wall clock.
 
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Duration;
+
 use tokio::sync::mpsc;
 
 use super::axes::Axes;
@@ -7,19 +11,37 @@ use super::wall::PaceClock;
 use super::{ClockSource, Command, Frame};
 
 /// Runs until told to shut down; a frame that nobody takes in time is dropped and counted.
-pub(super) fn run(mut axes: Axes, mut commands: mpsc::Receiver<Command>, frames: &mpsc::Sender<Frame>) {
+pub(super) fn run(mut axes: Axes, mut commands: mpsc::Receiver<Command>, frames: &mpsc::Sender<Arc<Frame>>) {
     let clock = PaceClock::new(axes.simulation());
     axes.tell_clock(|clock| clock.source = ClockSource::Wall);
     loop {
         let lateness = clock.wait_for(axes.simulation().next_instant());
-        loop {
-            match commands.try_recv() {
-                Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => return,
-                Ok(command) => axes.obey(command),
-                Err(mpsc::error::TryRecvError::Empty) => break,
-            }
+        if period(&mut axes, &mut commands, frames, lateness, lateness > clock.period).is_break() {
+            return;
         }
-        let taken = frames.try_send(axes.step()).is_ok();
-        axes.released(lateness, lateness > clock.period, !taken);
     }
+}
+
+/// One position period that has become due `lateness` ago; breaks when told to shut down.
+///
+/// It allocates and frees nothing but when a trajectory or another seldom command comes or a motion ends.
+pub(super) fn period(
+    axes: &mut Axes,
+    commands: &mut mpsc::Receiver<Command>,
+    frames: &mpsc::Sender<Arc<Frame>>,
+    lateness: Duration,
+    missed: bool,
+) -> ControlFlow<()> {
+    loop {
+        match commands.try_recv() {
+            Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => {
+                return ControlFlow::Break(());
+            }
+            Ok(command) => axes.obey(command),
+            Err(mpsc::error::TryRecvError::Empty) => break,
+        }
+    }
+    let taken = frames.try_send(axes.step()).is_ok();
+    axes.released(lateness, missed, !taken);
+    ControlFlow::Continue(())
 }

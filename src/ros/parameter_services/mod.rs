@@ -14,7 +14,7 @@ use std::future::Future;
 use futures::{
     StreamExt,
     future::BoxFuture,
-    stream::{BoxStream, FuturesUnordered, select_all},
+    stream::{FuturesUnordered, select_all},
 };
 use ros2_client::{
     Context, Message, MessageTypeName, Name, Node, Publisher, ServiceTypeName, service::RmwRequestId,
@@ -46,7 +46,6 @@ enum Request {
     SetAtomically(RmwRequestId, SetParametersAtomicallyRequest),
     List(RmwRequestId, ListParametersRequest),
     Describe(RmwRequestId, DescribeParametersRequest),
-    Unreadable(String),
 }
 
 /// The services of one node, ready to [`Self::serve`].
@@ -89,12 +88,12 @@ impl ParameterServices {
         stop: impl Future<Output = ()> + Send,
     ) {
         let mut requests = select_all([
-            stream(&self.get, Request::Get),
-            stream(&self.types, Request::Types),
-            stream(&self.set, Request::Set),
-            stream(&self.set_atomically, Request::SetAtomically),
-            stream(&self.list, Request::List),
-            stream(&self.describe, Request::Describe),
+            self.get.requests_as(Request::Get),
+            self.types.requests_as(Request::Types),
+            self.set.requests_as(Request::Set),
+            self.set_atomically.requests_as(Request::SetAtomically),
+            self.list.requests_as(Request::List),
+            self.describe.requests_as(Request::Describe),
         ]);
         // Responses are sent side by side: one client that is slow to be discovered holds up no other.
         let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
@@ -104,10 +103,13 @@ impl ParameterServices {
                 biased;
                 () = &mut stop => break,
                 Some(()) = responses.next(), if !responses.is_empty() => {}
-                Some(request) = requests.next() => {
-                    let response = self.answer(&mut host, &now, request).await;
-                    responses.extend(response);
-                }
+                Some(request) = requests.next() => match request {
+                    Ok(request) => {
+                        let response = self.answer(&mut host, &now, request).await;
+                        responses.push(response);
+                    }
+                    Err(reason) => tracing::warn!("{reason}"),
+                },
                 else => break,
             }
         }
@@ -119,8 +121,8 @@ impl ParameterServices {
         host: &mut H,
         now: &(impl Fn() -> Time + Send),
         request: Request,
-    ) -> Option<BoxFuture<'a, ()>> {
-        Some(match request {
+    ) -> BoxFuture<'a, ()> {
+        match request {
             Request::Get(id, request) => {
                 let values = request.names.iter().map(|name| host.get(name));
                 let values = values.map(wire::value_to_wire).collect();
@@ -159,11 +161,7 @@ impl ParameterServices {
                 let descriptors = descriptors.collect();
                 self.describe.respond(id, DescribeParametersResponse { descriptors })
             }
-            Request::Unreadable(reason) => {
-                tracing::warn!("{reason}");
-                return None;
-            }
-        })
+        }
     }
 
     /// Sets all of `parameters` or none, and publishes the event.
@@ -194,24 +192,6 @@ impl ParameterServices {
         }
         Ok(())
     }
-}
-
-/// Requests of one service among those of the others.
-fn stream<'a, Q, A>(
-    service: &'a Service<Q, A>,
-    wrap: impl Fn(RmwRequestId, Q) -> Request + Send + 'a,
-) -> BoxStream<'a, Request>
-where
-    Q: Message + Send + Sync + 'static,
-    A: Message + Send + Sync + 'static,
-{
-    service
-        .requests()
-        .map(move |received| match received {
-            Ok((id, request)) => wrap(id, request),
-            Err(reason) => Request::Unreadable(reason),
-        })
-        .boxed()
 }
 
 /// Creates the services under the node's name, reliable and with rmw's depth.

@@ -64,6 +64,11 @@ impl<M> Tap<M> {
         Tap(None)
     }
 
+    /// Whether there is a recording.
+    pub fn records(&self) -> bool {
+        self.0.is_some()
+    }
+
     pub(super) fn new(shared: Arc<Shared>, topic: usize, direction: Direction) -> Self
     where
         M: Recorded,

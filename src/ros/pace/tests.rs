@@ -1,0 +1,132 @@
+//! The period of the thread, without clock and network.
+
+use std::time::Duration;
+
+use allocation_counter::{AllocationInfo, measure};
+
+use super::super::reused::Reused;
+use super::*;
+use crate::config::Parameters;
+use crate::messages::sensor_msgs::msg::JointState;
+use crate::simulation::joints;
+use crate::trajectory::{Context, Request, Row, Start};
+use crate::units::seconds;
+
+/// Periods in which queues and buffers grow to their size.
+const WARM_UP: i64 = 256;
+/// Periods that are looked at.
+const LOOKED_AT: i64 = 256;
+/// Periods that whoever takes the frames falls behind by, again and again.
+const BEHIND: i64 = 7;
+
+/// The thread's part of the node, and what stands at the other ends of its channels.
+struct Thread {
+    axes: axes::Axes,
+    names: Vec<String>,
+    commands: (mpsc::Sender<Command>, mpsc::Receiver<Command>),
+    frames: (mpsc::Sender<Arc<Frame>>, mpsc::Receiver<Arc<Frame>>),
+    reports: mpsc::UnboundedReceiver<Report>,
+    health: watch::Receiver<Health>,
+}
+
+impl Thread {
+    fn new() -> Self {
+        let parameters = Parameters::embedded_default().expect("the embedded machine is valid");
+        let config = parameters.machine_config().expect("valid");
+        let limits = joints(&config, "");
+        let names = limits.iter().map(|joint| joint.name.clone()).collect();
+        let simulation = Simulation::new(&config, limits, 0).expect("can be simulated");
+        let (reports_out, reports) = mpsc::unbounded_channel();
+        let (health_out, health) = watch::channel(Health::default());
+        let axes = axes::Axes::new(simulation, reports_out, health_out);
+        Thread {
+            axes,
+            names,
+            commands: mpsc::channel(COMMAND_QUEUE),
+            frames: mpsc::channel(64),
+            reports,
+            health,
+        }
+    }
+
+    fn command(&self, command: Command) {
+        self.commands.0.try_send(command).expect("there is room");
+    }
+
+    /// Y to and fro until after what is looked at.
+    fn offer(&self) {
+        let parameters = Parameters::embedded_default().expect("the embedded machine is valid");
+        let limits = joints(&parameters.machine_config().expect("valid"), "");
+        let period = self.axes.simulation().period();
+        let mut request = Request::new(Start::Now, vec!["y".to_owned()]);
+        for k in 0..2 * (WARM_UP + LOOKED_AT) {
+            let position = [0.01 * (1.0 - (2.0 * seconds(k * period)).cos())];
+            request.push(k * period, Row { positions: &position, ..Row::default() }).expect("well formed");
+        }
+        let context =
+            Context { joints: &limits, period, max_points: 10_000, allow_nonzero_end_velocity: true };
+        let trajectory = Arc::new(Trajectory::new(request, &context).expect("within limits"));
+        self.command(Command::Offer { id: MotionId(1), trajectory, tolerances: None });
+    }
+
+    /// One period as in real time, counted.
+    fn period(&mut self) -> AllocationInfo {
+        measure(|| {
+            let late = Duration::from_micros(50);
+            let goes_on =
+                real::period(&mut self.axes, &mut self.commands.1, &self.frames.0, late, false).is_continue();
+            assert!(goes_on);
+        })
+    }
+}
+
+#[test]
+fn a_period_of_the_thread_allocates_and_frees_nothing() {
+    let mut thread = Thread::new();
+    let (mut streamed, mut loads) = (Reused::default(), Reused::default());
+    thread.offer();
+    for k in 0..WARM_UP + LOOKED_AT {
+        let position = vec![0.005 * (2.0 * seconds(k * thread.axes.simulation().period())).sin()];
+        let message = JointState { name: vec!["x".to_owned()], position, ..JointState::default() };
+        let setpoints = Setpoints::of(&message, &thread.names);
+        thread.command(Command::Stream(streamed.next(|last| *last = setpoints)));
+        thread.command(Command::Load { loads: loads.next(|last| *last = vec![(2, 50.0)]), hold: 60_000_000 });
+        let found = thread.period();
+        assert!(
+            k < WARM_UP || found == AllocationInfo::default(),
+            "period {k}: {} allocations, {:+} left",
+            found.count_total,
+            found.count_current
+        );
+        if k % BEHIND == 0 {
+            while thread.frames.1.try_recv().is_ok() {}
+        }
+    }
+    // It did what it was asked to do.
+    let health = thread.health.borrow();
+    assert_eq!((health.periods, health.dropped), ((WARM_UP + LOOKED_AT).unsigned_abs(), 0));
+    assert!(health.moving && health.stream.drives, "{health:?}");
+    assert!(matches!(thread.reports.try_recv(), Ok(Report::Decided(MotionId(1), _, Ok(_)))));
+}
+
+#[test]
+fn a_frame_stays_as_it_was_while_somebody_has_it() {
+    let mut thread = Thread::new();
+    thread.period();
+    let kept = thread.frames.1.try_recv().expect("a frame");
+    for _ in 0..10 {
+        thread.period();
+        let _ = thread.frames.1.try_recv();
+    }
+    assert_eq!((kept.instant, kept.time, kept.samples.len()), (0, 0, 5));
+}
+
+#[test]
+fn frames_that_nobody_takes_are_dropped_and_counted() {
+    let mut thread = Thread::new();
+    for _ in 0..70 {
+        thread.period();
+    }
+    assert_eq!(thread.health.borrow().dropped, 6);
+    assert_eq!(thread.frames.1.try_recv().expect("a frame").instant, 0);
+}

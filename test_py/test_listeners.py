@@ -1,0 +1,33 @@
+"""A topic that nobody listens to is not made; whoever comes gets it at once, also after others have left."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from control_msgs.msg import JointTrajectoryControllerState
+
+from drive import TSP_NS, Drive, to_ns
+
+TOPIC = "/virtual_axes/controller_state"
+LOOKED_S = 2.5
+"""The node looks once a second whether its listeners have gone."""
+SAMPLES = 50
+
+
+def test_each_listener_gets_an_unbroken_grid_of_samples_whoever_left_before(real: Drive):
+    """The node's own idea of who listens must not cost anybody a sample."""
+    for _ in range(2):
+        stamps: list[int] = []
+        came = threading.Event()
+
+        def keep(message: JointTrajectoryControllerState, stamps: list[int] = stamps, came=came) -> None:
+            stamps.append(to_ns(message.header.stamp))
+            if len(stamps) == SAMPLES:
+                came.set()
+
+        subscription = real.node.create_subscription(JointTrajectoryControllerState, TOPIC, keep, 100)
+        assert came.wait(5), f"{len(stamps)} samples"
+        assert {b - a for a, b in zip(stamps[:SAMPLES], stamps[1:SAMPLES])} == {TSP_NS}
+        real.node.destroy_subscription(subscription)
+        time.sleep(LOOKED_S)

@@ -1,0 +1,260 @@
+#!/usr/bin/env python3
+"""What the node costs in real time: its share of a core, its memory and its open files.
+
+    cargo build --release && source .build/env.sh
+    tools/measure_node.py --seconds 20 --minutes 10
+
+The share is what the kernel counts for the process, user and system time of all its threads, over
+wall-clock time, of one core: at rest and in motion, alone and with subscribers (rclpy, reliable, raw).
+Every span is checked: the node lives at its end, it says itself that no period was missed, and
+whoever listens has got every sample.
+
+Memory: resident set and open files while a trajectory follows the other and a subscriber listens to
+joint_states, over --minutes (0: not at all). First as many trajectories are sent as psec keeps, so that
+what is bounded has grown to its bound: the middleware keeps the last 64.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from control_msgs.msg import JointTrajectoryControllerState
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Path as PathMessage
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+from virtual_axes.msg import DriveStates, MotorCurrents
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+from drive import (  # noqa: E402
+    DEEP_QOS,
+    PSEC_QOS,
+    SETTLE_S,
+    STREAM_QOS,
+    TSP_NS,
+    Node,
+    _stamp_ns,
+    ballbar,
+    joint_trajectory,
+)
+
+JOINTS = {"/joint_states": JointState}
+ALL = JOINTS | {
+    "/virtual_axes/motor_currents": MotorCurrents,
+    "/virtual_axes/drive_states": DriveStates,
+    "/virtual_axes/controller_state": JointTrajectoryControllerState,
+    "/virtual_axes/tool_pose": PoseStamped,
+    "/virtual_axes/tool_path": PathMessage,
+    "/virtual_axes/tool_path_setpoint": PathMessage,
+    "/diagnostics": DiagnosticArray,
+}
+STARTED_S = 2.0
+"""The node is up and has been discovered long before."""
+LOOK_S = 5.0
+"""From one look at the memory to the next."""
+KEPT = 64
+"""Trajectories that the middleware keeps: depth of psec."""
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+class Guest:
+    """Somebody in the node's graph who subscribes and may send set-points."""
+
+    def __init__(self, process: Node, topics: dict[str, Any]):
+        """Subscribe to `topics`."""
+        self.process = process
+        self.stamps: list[int] = []
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=process.domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        self.node = rclpy.create_node(
+            "guest", context=self._context, enable_rosout=False, start_parameter_services=False
+        )
+        for topic, kind in topics.items():
+            keep = self._keep if topic == "/joint_states" else lambda _: None
+            self.node.create_subscription(kind, topic, keep, DEEP_QOS, raw=True)
+        self.psec = self.node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
+        self.psec_stream = self.node.create_publisher(JointState, "/psec_stream", STREAM_QOS)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+        self._wait_for(lambda: self.stamps and self.psec.get_subscription_count(), "joint_states")
+        time.sleep(SETTLE_S)
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            pass
+
+    def _keep(self, message: bytes) -> None:
+        self.stamps.append(_stamp_ns(message))
+
+    def _wait_for(self, condition: Callable[[], Any], what: str) -> None:
+        deadline = time.monotonic() + 20
+        while not condition():
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                raise SystemExit(f"no {what}; the node's output:\n{self.process.output()}")
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown(timeout_sec=2.0)
+        self._thread.join(timeout=2.0)
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+
+def cpu_seconds(pid: int) -> float:
+    """User and system time of a process so far, s."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS
+
+
+def resident_kb(pid: int) -> int:
+    """Resident set of a process, kB."""
+    return next(int(line.split()[1]) for line in Path(f"/proc/{pid}/status").open() if line.startswith("VmRSS"))
+
+
+def open_files(pid: int) -> int:
+    """Number of a process's file descriptors."""
+    return len(os.listdir(f"/proc/{pid}/fd"))
+
+
+class Motion:
+    """What a guest asks of the axes again and again."""
+
+    def __init__(self, guest: Guest, kind: str):
+        """Ask for `kind`: rest, trajectory or stream."""
+        self.guest, self.kind = guest, kind
+        circle = ballbar()
+        self._circle = joint_trajectory(["x", "y"], circle.time, np.column_stack([circle.x, circle.y]))
+        self._duration = circle.time[-1]
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def _run(self) -> None:
+        start = time.monotonic()
+        while not self._end.is_set():
+            if self.kind == "trajectory":
+                self.guest.psec.publish(self._circle)
+                self._end.wait(self._duration + 0.1)
+            else:
+                phase = 2 * np.pi * 0.5 * (time.monotonic() - start)
+                position = [0.01 * np.sin(phase), 0.01 * (1 - np.cos(phase))]
+                self.guest.psec_stream.publish(JointState(name=["x", "y"], position=position))
+                self._end.wait(TSP_NS / 1e9)
+
+    def fill(self) -> None:
+        """Send as many trajectories as are kept, and stop."""
+        for _ in range(2 * KEPT):
+            self.guest.psec.publish(self._circle)
+            time.sleep(0.1)
+        self.guest.psec.publish(JointTrajectory())
+        time.sleep(1.0)
+
+    def __enter__(self) -> Motion:
+        """Begin."""
+        if self.kind != "rest":
+            self._thread.start()
+            time.sleep(1.0)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End, and wait until the axes stand."""
+        self._end.set()
+        if self.kind != "rest":
+            self._thread.join(timeout=5.0)
+            self.guest.psec.publish(JointTrajectory())
+            time.sleep(1.0)
+
+
+def check(process: Node, stamps: Iterable[int] | None, seconds: float) -> None:
+    """End the program unless the node lives and every sample of the span has come."""
+    if process.poll() is not None:
+        raise SystemExit(f"the node ended; its output:\n{process.output()}")
+    if stamps is None:
+        return
+    grid = np.diff(np.array(list(stamps)))
+    lost = int(np.sum(grid // TSP_NS - 1))
+    if len(grid) < 0.98 * seconds * 1e9 / TSP_NS or lost:
+        raise SystemExit(f"{len(grid) + 1} samples came in {seconds:.1f} s, {lost} were lost")
+
+
+def share(process: Node, guest: Guest | None, seconds: float) -> float:
+    """Share of a core over a span."""
+    first = len(guest.stamps) if guest else 0
+    before, start = cpu_seconds(process.pid), time.monotonic()
+    time.sleep(seconds)
+    used, took = cpu_seconds(process.pid) - before, time.monotonic() - start
+    check(process, guest.stamps[first:] if guest else None, took)
+    return used / took
+
+
+def memory(process: Node, guest: Guest, minutes: float) -> None:
+    """Print how memory and open files go while the axes move."""
+    looks: list[tuple[float, int, int]] = []
+    motion = Motion(guest, "trajectory")
+    motion.fill()
+    start = time.monotonic()
+    with motion:
+        while (passed := time.monotonic() - start) < minutes * 60:
+            looks.append((passed, resident_kb(process.pid), open_files(process.pid)))
+            first = len(guest.stamps)
+            time.sleep(LOOK_S)
+            check(process, guest.stamps[first:], LOOK_S)
+    passed, resident, files = np.array(looks).T
+    print(f"memory over {minutes:g} minutes of motion, {len(looks)} looks:")
+    span = f"{resident.min():.0f} to {resident.max():.0f}"
+    print(f"  resident: {resident[0]:.0f} kB at first, {span}, {resident[-1]:.0f} at last")
+    half = passed > minutes * 30
+    if half.sum() > 2:
+        slope = np.polyfit(passed[half] / 60, resident[half], 1)[0]
+        print(f"  growth over the second half: {slope:+.1f} kB a minute")
+    print(f"  open files: {files[0]:.0f} at first, at most {files.max():.0f}, {files[-1]:.0f} at last")
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=20, help="of each span of which the share is taken (20)")
+    parser.add_argument("--minutes", type=float, default=10, help="of motion while memory is looked at (10)")
+    args = parser.parse_args()
+    with Node(["-p", "time:=real"]) as process:
+        time.sleep(STARTED_S)
+        print(f"share of one core in real time, position period {TSP_NS / 1e6:g} ms, spans of {args.seconds:g} s:")
+        print(f"  {'at rest, nobody listens':<44}{share(process, None, args.seconds):6.2%}", flush=True)
+        for topics, who in ((JOINTS, "joint_states"), (ALL, f"{len(ALL)} topics")):
+            guest = Guest(process, topics)
+            for kind in ("rest", "trajectory", "stream"):
+                with Motion(guest, kind):
+                    found = share(process, guest, args.seconds)
+                print(f"  {f'{kind}, a subscriber of {who}':<44}{found:6.2%}", flush=True)
+            guest.close()
+        if args.minutes > 0:
+            guest = Guest(process, JOINTS)
+            memory(process, guest, args.minutes)
+            guest.close()
+        check(process, None, 0)
+        if process.stop() != 0:
+            raise SystemExit(f"the node ended with status {process.poll()}; its output:\n{process.output()}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

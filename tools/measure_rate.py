@@ -1,0 +1,196 @@
+#!/usr/bin/env python3
+"""The highest rate at which the node's joint_states reach a subscriber whole.
+
+    cargo build --release --bins --examples && source .build/env.sh
+    tools/measure_rate.py --seconds 5
+
+In real time, with shorter and shorter position periods, to a subscriber in Rust
+(examples/count_joint_states.rs) and to one in rclpy, each alone with the node: samples a second, how
+many of them are missing on the grid of their stamps, and the share of a core that the node takes. Both
+subscribers are reliable and look at every message; the one in Rust keeps the last 100 000 samples, the
+one in rclpy the last 100. Then in `fast`, in motion, where the simulation waits for whoever listens and
+rclpy keeps all too: samples a second. Rates are multiples of the default one, all of one run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "test_py"))
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+from drive import PSEC_QOS, TSP_NS, Node, joint_trajectory, to_ns  # noqa: E402
+from measure_node import STARTED_S, cpu_seconds  # noqa: E402
+
+PERIODS_MS = (6, 3, 2, 1, 0.5, 0.25)
+"""Down to the period of the velocity loop."""
+LAST = QoSProfile(depth=100)
+"""Late by more, the reader loses some."""
+ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+COUNTER = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "examples" / "count_joint_states"
+# Longer than any span of `fast`: half an hour of the machine's time.
+LONG_S = 1800
+
+
+class Count(NamedTuple):
+    """What a subscriber got."""
+
+    samples: int
+    seconds: float
+    lost: int
+
+    @property
+    def rate(self) -> float:
+        """Samples a second."""
+        return (self.samples - 1) / self.seconds
+
+
+class Subscriber:
+    """rclpy, with messages and callbacks as everybody has them."""
+
+    def __init__(self, process: Node, qos: QoSProfile):
+        """Join the node's graph."""
+        self._process = process
+        self._stamps: list[int] = []
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=process.domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node(
+            "counter", context=self._context, enable_rosout=False, start_parameter_services=False
+        )
+        self._node.create_subscription(JointState, "/joint_states", self._keep, qos)
+        self._psec = self._node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+
+    def _keep(self, message: JointState) -> None:
+        self._stamps.append(to_ns(message.header.stamp))
+
+    def count(self, seconds: float, period_ns: int) -> Count:
+        """Samples that come within `seconds` of the first one."""
+        deadline = time.monotonic() + 10
+        while not self._stamps:
+            if time.monotonic() > deadline or self._process.poll() is not None:
+                raise SystemExit(f"nothing is published; the node's output:\n{self._process.output()}")
+            self._executor.spin_once(timeout_sec=0.1)
+        self._stamps.clear()
+        start = time.monotonic()
+        while time.monotonic() - start < seconds:
+            self._executor.spin_once(timeout_sec=0.1)
+        stamps = np.array(self._stamps)
+        return Count(len(stamps), time.monotonic() - start, int(np.sum(np.rint(np.diff(stamps) / period_ns) - 1)))
+
+    def send(self, trajectory: JointTrajectory) -> None:
+        """Publish set-points once the node listens."""
+        while not self._psec.get_subscription_count():
+            self._executor.spin_once(timeout_sec=0.1)
+        time.sleep(0.2)
+        self._psec.publish(trajectory)
+
+    def close(self) -> None:
+        """Leave."""
+        self._executor.shutdown(timeout_sec=2.0)
+        self._node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+
+def count_in_rust(process: Node, seconds: float, period_ns: int) -> Count:
+    """What examples/count_joint_states.rs counts."""
+    env = os.environ | {"ROS_DOMAIN_ID": str(process.domain_id)}
+    command = [str(COUNTER), str(seconds), str(period_ns / 1e6)]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=seconds + 20, check=False)
+    found = re.search(r"(\d+) samples in ([\d.]+) s: [\d.]+ a second, (-?\d+) lost", done.stdout)
+    if done.returncode or found is None:
+        raise SystemExit(f"{COUNTER.name}: {done.stdout}{done.stderr}")
+    return Count(int(found[1]), float(found[2]), int(found[3]))
+
+
+def count_in_rclpy(process: Node, seconds: float, period_ns: int) -> Count:
+    """What rclpy counts."""
+    subscriber = Subscriber(process, LAST)
+    try:
+        return subscriber.count(seconds, period_ns)
+    finally:
+        subscriber.close()
+
+
+def real_time(seconds: float) -> None:
+    """Print rates, losses and shares of a core, and the highest rate without loss."""
+    print(f"{'multiple':>10}{'period, ms':>12}{'subscriber':>12}{'a second':>10}{'lost':>8}{'node, of a core':>17}")
+    best: dict[str, float] = {}
+    for period_ms in PERIODS_MS:
+        period_ns = round(period_ms * 1e6)
+        for name, count in (("Rust", count_in_rust), ("rclpy", count_in_rclpy)):
+            with Node(["-p", f"periods.position_ms:={period_ms}"]) as process:
+                time.sleep(STARTED_S)
+                before, start = cpu_seconds(process.pid), time.monotonic()
+                found = count(process, seconds, period_ns)
+                used = (cpu_seconds(process.pid) - before) / (time.monotonic() - start)
+                if process.stop() != 0:
+                    raise SystemExit(f"the node failed; its output:\n{process.output()}")
+            multiple = TSP_NS / period_ns
+            # At the grid's own rate: what is late at the end of the span is not lost.
+            is_whole = found.lost == 0 and found.rate > 0.97e9 / period_ns
+            if is_whole:
+                best[name] = max(best.get(name, 0), multiple)
+            print(
+                f"{multiple:>10g}{period_ms:>12g}{name:>12}{found.rate:>10.0f}{found.lost:>8}{used:>17.1%}",
+                "" if is_whole else "  not whole",
+                flush=True,
+            )
+    for name, multiple in best.items():
+        print(f"highest rate without loss to {name}: {multiple:g} times the default rate")
+
+
+def fast(seconds: float) -> None:
+    """Print samples a second while the simulation waits for its subscribers."""
+    default = 1e9 / TSP_NS
+    for name in ("Rust", "rclpy"):
+        with Node(["-p", "time:=fast"]) as process:
+            time.sleep(STARTED_S)
+            sender = Subscriber(process, ALL)
+            # To and fro in x, a point a second.
+            points = np.arange(LONG_S + 1)
+            sender.send(joint_trajectory(["x"], points, 0.05 * (points % 2)[:, None]))
+            if name == "rclpy":
+                found = sender.count(seconds, TSP_NS)
+            else:
+                # Otherwise the simulation would wait for it.
+                sender.close()
+                found = count_in_rust(process, seconds, TSP_NS)
+            if name == "rclpy":
+                sender.close()
+            if process.poll() is not None:
+                raise SystemExit(f"the node ended; its output:\n{process.output()}")
+        times = f"{found.rate / default:.1f} times real time"
+        print(f"fast, to {name}: {found.rate:.0f} samples a second, {found.lost} lost, {times}")
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=5, help="of each span (5)")
+    args = parser.parse_args()
+    real_time(args.seconds)
+    fast(args.seconds)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
