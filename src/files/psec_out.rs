@@ -3,10 +3,10 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::OutputFile;
 use super::mcap_out::{Recording, Topic, USUAL_QOS};
 use super::psec_csv::TIME;
 use super::trace::extension;
+use super::{OutputFile, number};
 use crate::messages::trajectory_msgs::msg::JointTrajectory;
 use crate::messages::{self, Schema};
 use crate::trajectory::Row;
@@ -47,6 +47,8 @@ pub fn psec_writer(path: &Path, joints: &[String]) -> io::Result<Box<dyn PsecWri
 #[derive(Debug)]
 pub struct PsecCsvOut<W> {
     output: W,
+    /// A row as text.
+    row: Vec<u8>,
 }
 
 impl<W: Write> PsecCsvOut<W> {
@@ -56,7 +58,7 @@ impl<W: Write> PsecCsvOut<W> {
     /// Those of the output.
     pub fn new(mut output: W, joints: &[String]) -> io::Result<Self> {
         writeln!(output, "{TIME},{}", joints.join(","))?;
-        Ok(PsecCsvOut { output })
+        Ok(PsecCsvOut { output, row: Vec::new() })
     }
 
     /// Adds the set-points (m or rad) of an instant, ns from the start.
@@ -64,11 +66,14 @@ impl<W: Write> PsecCsvOut<W> {
     /// # Errors
     /// Those of the output.
     pub fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
-        write!(self.output, "{}", seconds(time))?;
-        for position in positions {
-            write!(self.output, ",{position}")?;
+        self.row.clear();
+        number::push(&mut self.row, seconds(time));
+        for &position in positions {
+            self.row.push(b',');
+            number::push(&mut self.row, position);
         }
-        self.output.write_all(b"\n")
+        self.row.push(b'\n');
+        self.output.write_all(&self.row)
     }
 
     /// Hands everything over and gives the output back.
@@ -87,6 +92,8 @@ impl<W: Write> PsecCsvOut<W> {
 pub struct PsecYamlOut<W> {
     output: W,
     empty: bool,
+    /// A point as text.
+    row: Vec<u8>,
 }
 
 impl<W: Write> PsecYamlOut<W> {
@@ -98,7 +105,7 @@ impl<W: Write> PsecYamlOut<W> {
         // A list of texts in JSON is one in YAML, whatever the names are.
         let names = serde_json::to_string(joints).map_err(io::Error::other)?;
         write!(output, "joint_names: {names}\npoints:")?;
-        Ok(PsecYamlOut { output, empty: true })
+        Ok(PsecYamlOut { output, empty: true, row: Vec::new() })
     }
 
     /// Adds the set-points (m or rad) of an instant, ns from the start.
@@ -107,16 +114,18 @@ impl<W: Write> PsecYamlOut<W> {
     /// Those of the output; a time beyond the 32-bit seconds of a message.
     pub fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
         let (sec, nanosec) = message_time(time)?;
-        self.output.write_all(b"\n- {positions: [")?;
+        self.row.clear();
+        self.row.extend_from_slice(b"\n- {positions: [");
         self.empty = false;
-        for (column, position) in positions.iter().enumerate() {
-            let comma = if column > 0 { ", " } else { "" };
+        for (column, &position) in positions.iter().enumerate() {
+            self.row.extend_from_slice(if column > 0 { b", " } else { b"" });
             // Without an exponent, which YAML 1.1 wants in a form of its own, and with a point, so that
             // it is no integer.
-            let point = if position.fract() == 0.0 { ".0" } else { "" };
-            write!(self.output, "{comma}{position}{point}")?;
+            number::push(&mut self.row, position);
+            self.row.extend_from_slice(if position.fract() == 0.0 { b".0" } else { b"" });
         }
-        write!(self.output, "], time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}")
+        write!(self.row, "], time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}")?;
+        self.output.write_all(&self.row)
     }
 
     /// Hands everything over and gives the output back.
