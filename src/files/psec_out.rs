@@ -3,13 +3,15 @@
 use std::io::{self, Write};
 use std::path::Path;
 
+use serde::ser::{Serialize, Serializer};
+
 use super::mcap_out::{Recording, Topic, USUAL_QOS};
 use super::psec_csv::TIME;
 use super::trace::extension;
 use super::{OutputFile, number};
-use crate::messages::trajectory_msgs::msg::JointTrajectory;
+use crate::messages::builtin_interfaces::msg::Duration;
+use crate::messages::std_msgs::msg::Header;
 use crate::messages::{self, Schema};
-use crate::trajectory::Row;
 use crate::units::{Nanoseconds, seconds};
 
 /// Topic of the trajectory in a recording.
@@ -145,7 +147,7 @@ impl<W: Write> PsecYamlOut<W> {
 pub struct PsecMcapOut<W: Write> {
     recording: Recording<W>,
     topic: Topic,
-    message: JointTrajectory,
+    message: Trajectory,
 }
 
 impl<W: Write> PsecMcapOut<W> {
@@ -156,7 +158,7 @@ impl<W: Write> PsecMcapOut<W> {
     pub fn new(output: W, joints: &[String]) -> io::Result<Self> {
         let mut recording = Recording::new(output)?;
         let topic = recording.topic(TOPIC, &Schema::joint_trajectory(), USUAL_QOS)?;
-        let message = JointTrajectory { joint_names: joints.to_vec(), ..JointTrajectory::default() };
+        let message = Trajectory { joint_names: joints.to_vec(), ..Trajectory::default() };
         Ok(PsecMcapOut { recording, topic, message })
     }
 
@@ -166,7 +168,10 @@ impl<W: Write> PsecMcapOut<W> {
     /// A time beyond the 32-bit seconds of a message.
     pub fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
         message_time(time)?;
-        self.message.points.push(messages::point(time, Row { positions, ..Row::default() }));
+        let Points { times, positions: all, begins } = &mut self.message.points;
+        times.push(time);
+        begins.push(all.len());
+        all.extend_from_slice(positions);
         Ok(())
     }
 
@@ -179,6 +184,50 @@ impl<W: Write> PsecMcapOut<W> {
         let mut output = self.recording.finish()?;
         output.flush()?;
         Ok(output)
+    }
+}
+
+/// `trajectory_msgs/JointTrajectory` with positions only, field by field, without a list for each point.
+#[derive(Debug, Default, serde::Serialize)]
+struct Trajectory {
+    header: Header,
+    joint_names: Vec<String>,
+    points: Points,
+}
+
+/// The points of a trajectory, one after the other.
+#[derive(Debug, Default)]
+struct Points {
+    /// ns from the start.
+    times: Vec<Nanoseconds>,
+    /// m or rad.
+    positions: Vec<f64>,
+    /// Where the positions of each point begin.
+    begins: Vec<usize>,
+}
+
+/// `trajectory_msgs/JointTrajectoryPoint`, field by field.
+#[derive(serde::Serialize)]
+struct Point<'a> {
+    positions: &'a [f64],
+    velocities: &'a [f64],
+    accelerations: &'a [f64],
+    effort: &'a [f64],
+    time_from_start: Duration,
+}
+
+impl Serialize for Points {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let ends = self.begins.iter().skip(1).copied().chain([self.positions.len()]);
+        let ranges = self.begins.iter().zip(ends).map(|(&begin, end)| &self.positions[begin..end]);
+        let points = self.times.iter().zip(ranges).map(|(&time, positions)| Point {
+            positions,
+            velocities: &[],
+            accelerations: &[],
+            effort: &[],
+            time_from_start: messages::duration(time),
+        });
+        serializer.collect_seq(points)
     }
 }
 
