@@ -75,7 +75,7 @@ impl Topic {
 impl<W: Write> Recording<W> {
     /// Begins a recording; `output` need not be able to seek.
     ///
-    /// It is compressed by LZ4, three times as fast as zstd for a file that is a sixth longer (traces at each tick):
+    /// It is compressed by LZ4, three times as fast as zstd for a file that is a seventh longer (traces at each tick):
     /// who computes a trace waits for it.
     pub fn new(output: W) -> io::Result<Self> {
         Self::with_chunks(output, Some(WriteOptions::DEFAULT_CHUNK_SIZE), Compression::Lz4)
