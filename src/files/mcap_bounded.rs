@@ -10,6 +10,8 @@ use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use mcap::Compression;
+
 use super::mcap_out::{ENCODING, QOS_KEY, Recording, SCHEMAS, Topic, qos_text};
 use crate::config::QosConfig;
 use crate::messages::Schema;
@@ -117,7 +119,7 @@ impl<W: Write> BoundedRecording<W> {
     pub fn new(output: W, bound: u64, topics: &[RecordedTopic]) -> io::Result<Self> {
         let count = Arc::new(AtomicU64::new(0));
         let counting = Counting { output, count: Arc::clone(&count) };
-        let mut recording = Recording::with_chunks(counting, None)?;
+        let mut recording = Recording::with_chunks(counting, None, Compression::Zstd)?;
         let mut open = 0;
         let mut handles = Vec::with_capacity(topics.len());
         for topic in topics {

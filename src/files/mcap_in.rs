@@ -16,6 +16,8 @@ const ENCODING: &str = "cdr";
 const LONGEST_RECORD: usize = 256 << 20;
 /// Opcode and length before a record.
 const RECORD_HEAD: usize = 1 + 8;
+/// Bytes that are asked of a file at once.
+const BLOCK: usize = 1 << 18;
 /// What a file begins with, bytes.
 const MAGIC: usize = 8;
 
@@ -76,7 +78,7 @@ pub(super) fn start<R: Read + Seek>(
     name: &str,
 ) -> Result<MessageReader<BufReader<R>>, McapFault> {
     input.rewind().map_err(|error| unreadable(name, &error))?;
-    Ok(MessageReader::new_with_options(BufReader::new(input), options()))
+    Ok(MessageReader::new_with_options(BufReader::with_capacity(BLOCK, input), options()))
 }
 
 /// Checks that the records of each chunk that is not compressed fill it, which the reader relies upon, and says
@@ -89,7 +91,7 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
         },
         _ => unreadable(name, &error),
     })?;
-    let mut input = BufReader::new(input);
+    let mut input = BufReader::with_capacity(BLOCK, input);
     let mut reader = LinearReader::new_with_options(options().with_emit_chunks(true));
     let (mut found, mut whole) = (0, MAGIC);
     while let Some(event) = reader.next_event() {

@@ -12,6 +12,7 @@ mod lines;
 mod mcap_bounded;
 mod mcap_in;
 mod mcap_out;
+mod number;
 mod output;
 mod psec_csv;
 mod psec_error;

@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 const STDOUT: &str = "/dev/stdout";
 /// Most links that are followed from one to the next; as many as Linux follows.
 const MOST_LINKS: usize = 40;
+/// Bytes that are gathered before they are handed over: few calls, within a processor's cache.
+const GATHERED: usize = 1 << 18;
 /// Most names that are tried for a partial file: earlier runs that were killed can have left some.
 const MOST_NAMES: usize = 100;
 
@@ -63,7 +65,7 @@ impl OutputFile {
             create_beside(&target).map(|(file, partial)| (Sink::File(file), Some(partial)))
         };
         let (sink, partial) = opened.map_err(|error| named(&name, &error))?;
-        Ok(OutputFile { name, target, partial, sink: BufWriter::new(sink) })
+        Ok(OutputFile { name, target, partial, sink: BufWriter::with_capacity(GATHERED, sink) })
     }
 
     /// The file's name as it was given.

@@ -185,6 +185,10 @@ impl<R: Read> PsecCsv<R> {
             row.copy_from_slice(&self.after.positions);
             return;
         }
+        if time == self.before.time {
+            row.copy_from_slice(&self.before.positions);
+            return;
+        }
         let duration = self.after.time - self.before.time;
         for (value, (&from, &to)) in
             row.iter_mut().zip(self.before.positions.iter().zip(&self.after.positions))
@@ -259,20 +263,26 @@ impl<R: Read> PsecCsv<R> {
         })?;
         let Some((line, text)) = found else { return Ok(false) };
         let at = || format!("{name}:{line}");
-        let number = |column: &str, text: &str| {
-            text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| PsecError::Number {
-                at: at(),
-                column: column.to_owned(),
-                found: super::shortened(text),
-            })
-        };
         let wanted = columns.len() + 1;
-        let found = fields(text).count();
+        let mut values = fields(text).map(number);
+        let time = values.next().unwrap_or(f64::NAN);
+        after.positions.clear();
+        after.positions.extend(values.by_ref().take(columns.len()));
+        let found = 1 + after.positions.len() + values.count();
         if found != wanted {
             return Err(PsecError::Columns { at: at(), found, wanted });
         }
-        let mut values = fields(text);
-        let time = number(TIME, values.next().unwrap_or_default())?;
+        let no_number = |column: usize| {
+            let name = column.checked_sub(1).and_then(|column| columns.get(column));
+            PsecError::Number {
+                at: at(),
+                column: name.map_or(TIME, String::as_str).to_owned(),
+                found: super::shortened(fields(text).nth(column).unwrap_or_default()),
+            }
+        };
+        if !time.is_finite() {
+            return Err(no_number(0));
+        }
         if !(0.0..=LONGEST).contains(&time) {
             return Err(PsecError::Time { at: at(), found: time });
         }
@@ -283,16 +293,21 @@ impl<R: Read> PsecCsv<R> {
         if !first && after.time <= before.time {
             return Err(PsecError::NotIncreasing { at: at(), found: time, before: seconds(before.time) });
         }
-        after.positions.clear();
-        for ((column, joint), text) in columns.iter().zip(limits.iter()).zip(values) {
-            let position = number(column, text)?;
+        for (column, (joint, &position)) in limits.iter().zip(&after.positions).enumerate() {
+            if !position.is_finite() {
+                return Err(no_number(column + 1));
+            }
             joint
                 .check_stroke(after.index, position)
                 .map_err(|rejection| PsecError::Point { at: at(), rejection })?;
-            after.positions.push(position);
         }
         Ok(true)
     }
+}
+
+/// A number, or NaN.
+fn number(text: &str) -> f64 {
+    text.parse().unwrap_or(f64::NAN)
 }
 
 /// A time in s as ns.

@@ -3,13 +3,15 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::OutputFile;
+use serde::ser::{Serialize, Serializer};
+
 use super::mcap_out::{Recording, Topic, USUAL_QOS};
 use super::psec_csv::TIME;
 use super::trace::extension;
-use crate::messages::trajectory_msgs::msg::JointTrajectory;
+use super::{OutputFile, number};
+use crate::messages::builtin_interfaces::msg::Duration;
+use crate::messages::std_msgs::msg::Header;
 use crate::messages::{self, Schema};
-use crate::trajectory::Row;
 use crate::units::{Nanoseconds, seconds};
 
 /// Topic of the trajectory in a recording.
@@ -47,6 +49,8 @@ pub fn psec_writer(path: &Path, joints: &[String]) -> io::Result<Box<dyn PsecWri
 #[derive(Debug)]
 pub struct PsecCsvOut<W> {
     output: W,
+    /// A row as text.
+    row: Vec<u8>,
 }
 
 impl<W: Write> PsecCsvOut<W> {
@@ -56,7 +60,7 @@ impl<W: Write> PsecCsvOut<W> {
     /// Those of the output.
     pub fn new(mut output: W, joints: &[String]) -> io::Result<Self> {
         writeln!(output, "{TIME},{}", joints.join(","))?;
-        Ok(PsecCsvOut { output })
+        Ok(PsecCsvOut { output, row: Vec::new() })
     }
 
     /// Adds the set-points (m or rad) of an instant, ns from the start.
@@ -64,11 +68,14 @@ impl<W: Write> PsecCsvOut<W> {
     /// # Errors
     /// Those of the output.
     pub fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
-        write!(self.output, "{}", seconds(time))?;
-        for position in positions {
-            write!(self.output, ",{position}")?;
+        self.row.clear();
+        number::push(&mut self.row, seconds(time));
+        for &position in positions {
+            self.row.push(b',');
+            number::push(&mut self.row, position);
         }
-        self.output.write_all(b"\n")
+        self.row.push(b'\n');
+        self.output.write_all(&self.row)
     }
 
     /// Hands everything over and gives the output back.
@@ -87,6 +94,8 @@ impl<W: Write> PsecCsvOut<W> {
 pub struct PsecYamlOut<W> {
     output: W,
     empty: bool,
+    /// A point as text.
+    row: Vec<u8>,
 }
 
 impl<W: Write> PsecYamlOut<W> {
@@ -98,7 +107,7 @@ impl<W: Write> PsecYamlOut<W> {
         // A list of texts in JSON is one in YAML, whatever the names are.
         let names = serde_json::to_string(joints).map_err(io::Error::other)?;
         write!(output, "joint_names: {names}\npoints:")?;
-        Ok(PsecYamlOut { output, empty: true })
+        Ok(PsecYamlOut { output, empty: true, row: Vec::new() })
     }
 
     /// Adds the set-points (m or rad) of an instant, ns from the start.
@@ -107,16 +116,18 @@ impl<W: Write> PsecYamlOut<W> {
     /// Those of the output; a time beyond the 32-bit seconds of a message.
     pub fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
         let (sec, nanosec) = message_time(time)?;
-        self.output.write_all(b"\n- {positions: [")?;
+        self.row.clear();
+        self.row.extend_from_slice(b"\n- {positions: [");
         self.empty = false;
-        for (column, position) in positions.iter().enumerate() {
-            let comma = if column > 0 { ", " } else { "" };
+        for (column, &position) in positions.iter().enumerate() {
+            self.row.extend_from_slice(if column > 0 { b", " } else { b"" });
             // Without an exponent, which YAML 1.1 wants in a form of its own, and with a point, so that
             // it is no integer.
-            let point = if position.fract() == 0.0 { ".0" } else { "" };
-            write!(self.output, "{comma}{position}{point}")?;
+            number::push(&mut self.row, position);
+            self.row.extend_from_slice(if position.fract() == 0.0 { b".0" } else { b"" });
         }
-        write!(self.output, "], time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}")
+        write!(self.row, "], time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}")?;
+        self.output.write_all(&self.row)
     }
 
     /// Hands everything over and gives the output back.
@@ -136,7 +147,7 @@ impl<W: Write> PsecYamlOut<W> {
 pub struct PsecMcapOut<W: Write> {
     recording: Recording<W>,
     topic: Topic,
-    message: JointTrajectory,
+    message: Trajectory,
 }
 
 impl<W: Write> PsecMcapOut<W> {
@@ -147,7 +158,7 @@ impl<W: Write> PsecMcapOut<W> {
     pub fn new(output: W, joints: &[String]) -> io::Result<Self> {
         let mut recording = Recording::new(output)?;
         let topic = recording.topic(TOPIC, &Schema::joint_trajectory(), USUAL_QOS)?;
-        let message = JointTrajectory { joint_names: joints.to_vec(), ..JointTrajectory::default() };
+        let message = Trajectory { joint_names: joints.to_vec(), ..Trajectory::default() };
         Ok(PsecMcapOut { recording, topic, message })
     }
 
@@ -157,7 +168,10 @@ impl<W: Write> PsecMcapOut<W> {
     /// A time beyond the 32-bit seconds of a message.
     pub fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
         message_time(time)?;
-        self.message.points.push(messages::point(time, Row { positions, ..Row::default() }));
+        let Points { times, positions: all, begins } = &mut self.message.points;
+        times.push(time);
+        begins.push(all.len());
+        all.extend_from_slice(positions);
         Ok(())
     }
 
@@ -170,6 +184,50 @@ impl<W: Write> PsecMcapOut<W> {
         let mut output = self.recording.finish()?;
         output.flush()?;
         Ok(output)
+    }
+}
+
+/// `trajectory_msgs/JointTrajectory` with positions only, field by field, without a list for each point.
+#[derive(Debug, Default, serde::Serialize)]
+struct Trajectory {
+    header: Header,
+    joint_names: Vec<String>,
+    points: Points,
+}
+
+/// The points of a trajectory, one after the other.
+#[derive(Debug, Default)]
+struct Points {
+    /// ns from the start.
+    times: Vec<Nanoseconds>,
+    /// m or rad.
+    positions: Vec<f64>,
+    /// Where the positions of each point begin.
+    begins: Vec<usize>,
+}
+
+/// `trajectory_msgs/JointTrajectoryPoint`, field by field.
+#[derive(serde::Serialize)]
+struct Point<'a> {
+    positions: &'a [f64],
+    velocities: &'a [f64],
+    accelerations: &'a [f64],
+    effort: &'a [f64],
+    time_from_start: Duration,
+}
+
+impl Serialize for Points {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let ends = self.begins.iter().skip(1).copied().chain([self.positions.len()]);
+        let ranges = self.begins.iter().zip(ends).map(|(&begin, end)| &self.positions[begin..end]);
+        let points = self.times.iter().zip(ranges).map(|(&time, positions)| Point {
+            positions,
+            velocities: &[],
+            accelerations: &[],
+            effort: &[],
+            time_from_start: messages::duration(time),
+        });
+        serializer.collect_seq(points)
     }
 }
 

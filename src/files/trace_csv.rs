@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use super::number;
 use crate::machine::AxisSample;
 use crate::units::{Nanoseconds, seconds};
 
@@ -23,6 +24,8 @@ const SIGNALS: [Signal; 7] = [
 #[derive(Debug)]
 pub struct TraceCsv<W> {
     output: W,
+    /// A row as text.
+    row: Vec<u8>,
 }
 
 impl<W: Write> TraceCsv<W> {
@@ -38,7 +41,7 @@ impl<W: Write> TraceCsv<W> {
             }
         }
         output.write_all(b"\n")?;
-        Ok(TraceCsv { output })
+        Ok(TraceCsv { output, row: Vec::new() })
     }
 
     /// Adds a row at `time` ns: s, m, m/s, A, V (rad and rad/s on rotary axes).
@@ -46,13 +49,16 @@ impl<W: Write> TraceCsv<W> {
     /// # Errors
     /// Those of the output.
     pub fn row(&mut self, time: Nanoseconds, samples: &[AxisSample]) -> io::Result<()> {
-        write!(self.output, "{}", seconds(time))?;
+        self.row.clear();
+        number::push(&mut self.row, seconds(time));
         for sample in samples {
             for (_, value) in SIGNALS {
-                write!(self.output, ",{}", value(sample))?;
+                self.row.push(b',');
+                number::push(&mut self.row, value(sample));
             }
         }
-        self.output.write_all(b"\n")
+        self.row.push(b'\n');
+        self.output.write_all(&self.row)
     }
 
     /// Hands everything over and gives the output back.

@@ -1,5 +1,7 @@
 //! Trajectory messages: to requests and back.
 
+use std::fmt;
+
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::{Duration, Time};
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
 
@@ -14,7 +16,7 @@ use crate::units::{Nanoseconds, SECOND_NS};
 /// malformed times, more than `max_points` points.
 pub fn request(message: &JointTrajectory, max_points: usize) -> Result<Request, Rejection> {
     let Time { sec, nanosec } = message.header.stamp;
-    let start = match nanoseconds(sec, nanosec, "header.stamp", None)? {
+    let start = match nanoseconds(sec, nanosec, format_args!("header.stamp"), None)? {
         0 => Start::Now,
         at => Start::At(at),
     };
@@ -27,7 +29,8 @@ pub fn request(message: &JointTrajectory, max_points: usize) -> Result<Request, 
     request.reserve(points.len());
     for (index, point) in points.iter().enumerate() {
         let Duration { sec, nanosec } = point.time_from_start;
-        let time = nanoseconds(sec, nanosec, &format!("point {index}, time_from_start"), Some(index))?;
+        let what = format_args!("point {index}, time_from_start");
+        let time = nanoseconds(sec, nanosec, what, Some(index))?;
         request.push(
             time,
             Row {
@@ -74,7 +77,12 @@ pub fn point(time: Nanoseconds, row: Row<'_>) -> JointTrajectoryPoint {
 ///
 /// # Errors
 /// [`Code::InvalidTime`] if `nanosec` is a second or more; `what` and `index` say where it stands.
-fn nanoseconds(sec: i32, nanosec: u32, what: &str, index: Option<usize>) -> Result<Nanoseconds, Rejection> {
+fn nanoseconds(
+    sec: i32,
+    nanosec: u32,
+    what: fmt::Arguments<'_>,
+    index: Option<usize>,
+) -> Result<Nanoseconds, Rejection> {
     if i64::from(nanosec) >= SECOND_NS {
         let text = format!("{what}: nanosec is {nanosec}, must be below {SECOND_NS}");
         let rejection =

@@ -35,9 +35,14 @@ impl Signal {
             (self.high, self.low_first) = (value, true);
         }
         if count + 1 == bucket {
-            let (first, second) = if self.low_first { (self.low, self.high) } else { (self.high, self.low) };
-            self.values.extend([first, second]);
+            self.close();
         }
+    }
+
+    /// Makes two values of the bucket.
+    fn close(&mut self) {
+        let (first, second) = if self.low_first { (self.low, self.high) } else { (self.high, self.low) };
+        self.values.extend([first, second]);
     }
 
     /// Makes two values of each four, the extremes in their order.
@@ -53,6 +58,15 @@ impl Signal {
         }
         self.values = kept;
     }
+}
+
+/// Reference and position of the tool tip, m.
+type Pair = [[f64; 3]; 2];
+
+/// The pair whose points are farther apart, the first if they are alike.
+fn farther(one: Pair, other: Pair) -> Pair {
+    let apart = |[a, b]: Pair| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    if apart(other) > apart(one) { other } else { one }
 }
 
 /// Signals of an axis, in the order of [`AxisTrace`].
@@ -81,10 +95,13 @@ pub(super) struct Recorder {
     contour: Signal,
     orientation: Signal,
     /// Reference and position of the tool tip, one pair per value of the signals.
-    tool: Vec<[[f64; 3]; 2]>,
+    tool: Vec<Pair>,
     /// Samples in a bucket: 1, then 4, 8, …
     bucket: usize,
+    /// Samples in the bucket that was begun.
     count: usize,
+    /// Time of the last sample, s.
+    last: f64,
 }
 
 impl Recorder {
@@ -97,6 +114,7 @@ impl Recorder {
             tool: Vec::new(),
             bucket: 1,
             count: 0,
+            last: 0.0,
         }
     }
 
@@ -108,6 +126,7 @@ impl Recorder {
         tool: Option<(&Nearest, [f64; 3])>,
     ) {
         let (count, bucket) = (self.count, self.bucket);
+        self.last = time;
         for (signals, sample) in self.axes.iter_mut().zip(samples) {
             for (signal, value) in signals.iter_mut().zip(axis_values(sample)) {
                 signal.push(value, count, bucket);
@@ -121,8 +140,11 @@ impl Recorder {
         if let Some((nearest, position)) = tool {
             self.contour.push(nearest.distance, count, bucket);
             self.orientation.push(nearest.orientation, count, bucket);
-            if told {
-                self.tool.push([nearest.point.into(), position]);
+            let pair = [nearest.point.into(), position];
+            match self.tool.last_mut() {
+                // Of each half of a bucket, where the tool is farthest from the path.
+                Some(last) if !told => *last = farther(*last, pair),
+                _ => self.tool.push(pair),
             }
         }
         self.count = (count + 1) % bucket;
@@ -143,20 +165,30 @@ impl Recorder {
             place % 2 == 1
         };
         self.time.retain(|_| every_second());
-        let mut place = 0;
-        self.tool.retain(|_| {
-            place += 1;
-            place % 2 == 1
-        });
+        let halves = self.tool.chunks(2);
+        self.tool = halves.filter_map(|pairs| pairs.iter().copied().reduce(farther)).collect();
         self.bucket = if self.bucket == 1 { 4 } else { 2 * self.bucket };
+    }
+
+    /// Ends the bucket that was begun, so that all lists are of one length.
+    fn close(&mut self) {
+        if self.count == 0 {
+            return;
+        }
+        let has_tool = !self.tool.is_empty();
+        let of_tool = [&mut self.contour, &mut self.orientation].into_iter().filter(|_| has_tool);
+        self.axes.iter_mut().flatten().chain(of_tool).for_each(Signal::close);
+        if self.count <= self.bucket / 2 {
+            // Its middle was not reached.
+            self.time.push(self.last);
+            self.tool.extend(self.tool.last().copied());
+        }
+        self.count = 0;
     }
 
     /// The recording; `moves` tells which axes move.
     pub(super) fn finish(mut self, machine: &MachineConfig, moves: &[bool], orientation: bool) -> Recording {
-        // A bucket that was begun is left out, so that all lists are of one length.
-        let rows = self.axes.first().map_or(0, |signals| signals[0].values.len());
-        self.time.truncate(rows);
-        self.tool.truncate(rows);
+        self.close();
         let axes = machine.axes().iter().zip(self.axes).zip(moves).map(|((axis, signals), &moves)| {
             let [
                 psec,
@@ -199,6 +231,7 @@ impl Recorder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     #[test]
     fn a_thinned_signal_keeps_a_spike_of_one_sample() {
@@ -217,6 +250,63 @@ mod tests {
         let at = values.iter().position(|&v| v == 1.0).expect("the spike is there");
         let distance = (recorder.time[at] - (length / 2 + 1) as f64).abs();
         assert!(distance <= recorder.bucket as f64, "the spike is {distance} instants off");
+    }
+
+    /// An hour at 6 ms; each signal has its one peak elsewhere, the last at the very end.
+    #[test]
+    fn an_hour_keeps_the_one_peak_of_every_signal_and_of_the_path() {
+        const HOUR: usize = 600_001;
+        let peaks = [1, 33_000, 100_003, 300_001, 555_555, HOUR - 2, HOUR - 1];
+        let mut recorder = Recorder::new(1);
+        for k in 0..HOUR {
+            let at = |place: usize| if k == peaks[place] { 1.0 } else { 0.0 };
+            let sample = AxisSample {
+                psec: 5.0 + at(0),
+                position: 3.0 - at(1),
+                velocity: at(2),
+                current: at(3),
+                current_setpoint: -at(4),
+                friction_current: at(5),
+                gravity_current: at(6),
+                ..AxisSample::default()
+            };
+            let nearest = Nearest {
+                progress: 0.0,
+                point: Vector3::zeros(),
+                axis: Vector3::z(),
+                distance: 0.1 + at(5),
+                within_ends: 0.0,
+                orientation: at(6),
+            };
+            recorder.push(k as f64, [&sample].into_iter(), Some((&nearest, [0.1 + at(5), 0.0, 0.0])));
+        }
+        let machine = crate::config::Parameters::embedded_default()
+            .and_then(|p| p.machine_config())
+            .expect("the embedded machine is valid");
+        let within = recorder.bucket as f64;
+        let recording = recorder.finish(&machine, &[true], true);
+        let (x, tool) = (&recording.axes[0], recording.tool.as_ref().expect("a tool"));
+        let far: Vec<f64> = tool.position.iter().map(|position| position[0]).collect();
+        let found: [(&[f64], f64, usize); 9] = [
+            (&x.psec, 6.0, 0),
+            (&x.position, 2.0, 1),
+            (&x.velocity, 1.0, 2),
+            (&x.current, 1.0, 3),
+            (&x.current_setpoint, -1.0, 4),
+            (&x.friction_current, 1.0, 5),
+            (&x.gravity_current, 1.0, 6),
+            (&far, 1.1, 5),
+            (&tool.orientation_error, 1.0, 6),
+        ];
+        assert!(recording.time.len() <= CAPACITY && recording.time.is_sorted());
+        for (values, peak, place) in found {
+            assert_eq!(values.len(), recording.time.len());
+            let at: Vec<usize> = (0..values.len()).filter(|&i| values[i] == peak).collect();
+            // A bucket of one sample has it twice.
+            assert!((1..=2).contains(&at.len()), "peak {place} is there {} times", at.len());
+            let near = |&i: &usize| (recording.time[i] - peaks[place] as f64).abs() <= within;
+            assert!(at.iter().all(near), "peak {place}");
+        }
     }
 
     #[test]
