@@ -72,6 +72,7 @@ fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures
     let mut assessors = vec![AxisAssessor::default(); machine.axis_count()];
     let mut circles = vec![Radial::default(); machines.len()];
     let mut psec = Vec::with_capacity(machine.axis_count());
+    let (mut x, mut y) = (Vec::new(), Vec::new());
     for (k, row) in case.rows.iter().enumerate() {
         psec.clear();
         (0..machines.len()).for_each(|_| psec.extend_from_slice(row));
@@ -81,8 +82,9 @@ fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures
         }
         if let Some(circle) = case.circle.as_ref().filter(|circle| circle.window.contains(&k)) {
             for (place, radial) in circles.iter_mut().enumerate() {
-                let [x, y] = [0, 1].map(|axis| machine.positions(place * axes + axis));
-                x.zip(y).for_each(|(x, y)| radial.push(circle.radius, x, y));
+                machine.positions(place * axes, &mut x);
+                machine.positions(place * axes + 1, &mut y);
+                x.iter().zip(&y).for_each(|(x, y)| radial.push(circle.radius, *x, *y));
             }
         }
     }

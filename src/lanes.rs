@@ -40,6 +40,25 @@ impl Lane for f64 {
     }
 }
 
+impl Lane for u64 {
+    type Lanes<const L: usize> = [u64; L];
+
+    #[inline(always)]
+    fn fill<const L: usize>(self) -> [u64; L] {
+        [self; L]
+    }
+
+    #[inline(always)]
+    fn get<const L: usize>(lanes: &[u64; L], lane: usize) -> u64 {
+        lanes[lane]
+    }
+
+    #[inline(always)]
+    fn set<const L: usize>(self, lanes: &mut [u64; L], lane: usize) {
+        lanes[lane] = self;
+    }
+}
+
 /// As wide as a number, so that both fill the same vectors.
 impl Lane for bool {
     type Lanes<const L: usize> = [u64; L];
@@ -58,6 +77,21 @@ impl Lane for bool {
     fn set<const L: usize>(self, lanes: &mut [u64; L], lane: usize) {
         lanes[lane] = u64::from(self);
     }
+}
+
+/// `value` within ±`limit`, in a form that is two instructions on many lanes; NaN stays what it is.
+#[inline(always)]
+pub fn limited(value: f64, limit: f64) -> f64 {
+    let below = if value > limit { limit } else { value };
+    if below < -limit { -limit } else { below }
+}
+
+/// `a` where `condition` holds, else `b`, both of which are read: where they stand in memory, a plain `if`
+/// becomes a choice of the place to read, which is none that a vector has.
+#[inline(always)]
+pub fn select(condition: bool, a: f64, b: f64) -> f64 {
+    let mask = u64::from(condition).wrapping_neg();
+    f64::from_bits((a.to_bits() & mask) | (b.to_bits() & !mask))
 }
 
 /// Defines a structure of lane values, and its twin as the second name.

@@ -28,7 +28,9 @@ const FREQUENCY: f64 = std::f64::consts::TAU / 3.0;
 fn assert_nothing_allocated(what: &str, simulation: &mut Simulation, mut ask: impl FnMut(&mut Simulation)) {
     for period in 0..WARM_UP + LOOKED_AT {
         ask(simulation);
-        let found = measure(|| simulation.step());
+        let found = measure(|| {
+            simulation.step();
+        });
         assert!(
             period < WARM_UP || found == AllocationInfo::default(),
             "{what}, period {period}: {} allocations, {:+} left",

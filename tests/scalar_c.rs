@@ -141,15 +141,11 @@ fn library(setpoints: &Setpoints) -> (Vec<Vec<f64>>, Vec<AxisReport>) {
     let mut assessors = [AxisAssessor::default(); AXES];
     let mut positions = Vec::new();
     for psec in &setpoints.rows {
-        let mut position_instant = true;
-        machine.advance_with(psec, &[], |machine| {
-            for (axis, assessor) in machine.axes().iter().zip(&mut assessors) {
-                assessor.observe(axis.sample(), position_instant);
-            }
-            if std::mem::take(&mut position_instant) {
-                positions.push(machine.axes().iter().map(|axis| axis.sample().position).collect());
-            }
-        });
+        machine.advance(psec, &[]);
+        for (place, assessor) in assessors.iter_mut().enumerate() {
+            assessor.observe(machine.axis(place).sample(), &machine.activity(place));
+        }
+        positions.push(machine.axes().iter().map(|axis| axis.sample().position).collect());
     }
     let tick = seconds(machine.periods().current);
     (positions, assessors.map(|assessor| assessor.report(tick)).to_vec())

@@ -1,7 +1,7 @@
 //! PI controller with feedforward, output limit and anti-windup.
 
 use crate::config::PiConfig;
-use crate::lanes::lanes;
+use crate::lanes::{lanes, limited};
 
 lanes! {
     /// A sampled PI controller whose integral is in units of its output.
@@ -44,21 +44,20 @@ impl Pi {
     /// One instant: error in, limited output back. The output is not scaled.
     #[inline(always)]
     pub fn update(&self, s: &mut PiState, error: f64) -> f64 {
-        self.limited(s, error, |wanted| wanted)
+        self.output(s, error, |wanted| wanted)
     }
 
     /// One instant: error and feedforward in, scaled and limited output back.
     #[inline(always)]
     pub fn update_with(&self, s: &mut PiState, error: f64, feedforward: f64) -> f64 {
-        self.limited(s, error, |wanted| (wanted + feedforward) * self.scale)
+        self.output(s, error, |wanted| (wanted + feedforward) * self.scale)
     }
 
     #[inline(always)]
-    fn limited(&self, s: &mut PiState, error: f64, output: impl Fn(f64) -> f64) -> f64 {
+    fn output(&self, s: &mut PiState, error: f64, scaled: impl Fn(f64) -> f64) -> f64 {
         let step = self.integral_gain * error;
-        let wanted = output(self.gain.mul_add(error, s.integral + step));
-        let below = if wanted > self.limit { self.limit } else { wanted };
-        let y = if below < -self.limit { -self.limit } else { below };
+        let wanted = scaled(self.gain.mul_add(error, s.integral + step));
+        let y = limited(wanted, self.limit);
         let excess = wanted - y;
         s.limited = excess != 0.0;
         // Adding nothing, rather than not adding, keeps the loop over lanes free of conditional stores.

@@ -4,7 +4,7 @@ use nalgebra::SMatrix;
 
 use super::DriveError;
 use crate::config::MotorConfig;
-use crate::lanes::lanes;
+use crate::lanes::{lanes, limited};
 
 lanes! {
     /// State of a motor: what the differential equation integrates.
@@ -112,7 +112,7 @@ impl Motor {
         let free = self.speed.apply(s, voltage, external);
         let slowed = self.speed.torque * bound;
         let stops = free.abs() <= slowed;
-        let friction = if stops { free * self.torque_per_speed } else { bound.copysign(free) };
+        let friction = limited(free * self.torque_per_speed, bound);
         let torque = external - friction;
         let state = MotorState {
             current: self.current.apply(s, voltage, torque),

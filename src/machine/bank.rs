@@ -6,10 +6,10 @@ use super::block::{Block, Demand, Done, Loops, LoopsState, Row, Timing};
 use crate::drive::MotorState;
 use crate::lanes::Lane;
 
-/// Lanes of a block: one vector of most processors.
-const LANES: usize = 4;
-/// Blocks that go through the ticks together: while one waits for itself, the other is worked on.
-const TOGETHER: usize = 2;
+/// Lanes of a block of few axes: one vector of most processors.
+const FEW: usize = 4;
+/// Lanes of a block of many: while one vector waits for itself, the other is worked on.
+const MANY: usize = 8;
 
 /// How wide the processor's vectors are used. The results are the same bits whatever the width.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -25,23 +25,63 @@ pub enum Width {
 /// Inner loops and plants of any number of axes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bank {
-    blocks: Vec<Block<LANES>>,
+    blocks: Blocks,
     timing: Timing,
     width: Width,
+}
+
+/// Blocks of one size, in the order of the axes.
+#[derive(Debug, Clone, PartialEq)]
+enum Blocks {
+    Few(Vec<Block<FEW>>),
+    Many(Vec<Block<MANY>>),
+}
+
+/// `$act` on the block and the lane of an axis, whatever the size of the blocks.
+macro_rules! at {
+    ($blocks:expr, $axis:expr, $iter:ident, |$block:ident, $lane:ident| $act:expr) => {
+        match $blocks {
+            Blocks::Few(blocks) => {
+                let ($block, $lane) = $iter(blocks, $axis);
+                $act
+            }
+            Blocks::Many(blocks) => {
+                let ($block, $lane) = $iter(blocks, $axis);
+                $act
+            }
+        }
+    };
+}
+
+fn of<const L: usize>(blocks: &[Block<L>], axis: usize) -> (&Block<L>, usize) {
+    (&blocks[axis / L], axis % L)
+}
+
+fn of_mut<const L: usize>(blocks: &mut [Block<L>], axis: usize) -> (&mut Block<L>, usize) {
+    (&mut blocks[axis / L], axis % L)
+}
+
+/// Blocks of the axes `loops`; lanes that stand for no axis do as the first one of their block does.
+fn filled<const L: usize>(loops: &[Loops], timing: Timing) -> Vec<Block<L>> {
+    let block = |axes: &[Loops]| {
+        let mut block = Block::new(axes[0], timing);
+        for (lane, loops) in axes.iter().enumerate() {
+            block.set_loops(lane, *loops);
+        }
+        block
+    };
+    loops.chunks(L).map(block).collect()
 }
 
 impl Bank {
     /// A bank of the axes `loops`.
     pub fn new(loops: &[Loops], timing: Timing) -> Self {
-        let block = |axes: &[Loops]| {
-            // Lanes that stand for no axis do as the first one does.
-            let mut block = Block::new(axes[0], timing);
-            for (lane, loops) in axes.iter().enumerate() {
-                block.set_loops(lane, *loops);
-            }
-            block
+        let blocks = if loops.len() <= FEW {
+            Blocks::Few(filled(loops, timing))
+        } else {
+            Blocks::Many(filled(loops, timing))
         };
-        Bank { blocks: loops.chunks(LANES).map(block).collect(), timing, width: Width::default() }
+        Bank { blocks, timing, width: Width::default() }
     }
 
     /// How wide vectors are used from now on.
@@ -49,135 +89,95 @@ impl Bank {
         self.width = width;
     }
 
-    /// The block and the lane of an axis.
-    #[inline]
-    fn of(&self, axis: usize) -> (&Block<LANES>, usize) {
-        (&self.blocks[axis / LANES], axis % LANES)
-    }
-
-    /// Likewise, to change it.
-    #[inline]
-    fn of_mut(&mut self, axis: usize) -> (&mut Block<LANES>, usize) {
-        (&mut self.blocks[axis / LANES], axis % LANES)
-    }
-
     /// Gives an axis other parameters.
     pub fn set_loops(&mut self, axis: usize, loops: Loops) {
-        let (block, lane) = self.of_mut(axis);
-        block.set_loops(lane, loops);
+        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_loops(lane, loops));
     }
 
     /// Where an axis is.
     pub fn state(&self, axis: usize) -> LoopsState {
-        let (block, lane) = self.of(axis);
-        LoopsState::get(&block.state, lane)
+        at!(&self.blocks, axis, of, |block, lane| block.state(lane))
     }
 
     /// Puts an axis there.
     pub fn set_state(&mut self, axis: usize, state: &LoopsState) {
-        let (block, lane) = self.of_mut(axis);
-        state.set(&mut block.state, lane);
+        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_state(lane, state));
     }
 
-    /// What is asked of an axis in the next position period; its friction is not compensated.
+    /// What is asked of an axis in the next position period.
     pub fn set_demand(&mut self, axis: usize, demand: &Demand) {
-        let (block, lane) = self.of_mut(axis);
-        demand.set(&mut block.demand, lane);
+        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_demand(lane, demand));
     }
 
     /// The torque with which friction of an axis is compensated, N·m, by the instant of the velocity loop.
     pub fn set_compensation(&mut self, axis: usize, torque: impl Fn(usize) -> f64) {
-        let (block, lane) = self.of_mut(axis);
-        block.set_compensation(lane, torque);
+        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_compensation(lane, torque));
     }
 
     /// The motor of an axis at a tick of the last position period.
     #[inline]
     pub fn motor(&self, axis: usize, tick: usize) -> MotorState {
-        let (block, lane) = self.of(axis);
-        MotorState::get(&block.seen[tick].0, lane)
+        at!(&self.blocks, axis, of, |block, lane| MotorState::get(&block.seen[tick].0, lane))
     }
 
-    /// Motor angles of an axis at the ticks of the last position period, rad.
+    /// Calls `with` on the motor angle of an axis, rad, at each tick of the last position period.
     #[inline]
-    pub fn angles(&self, axis: usize) -> impl ExactSizeIterator<Item = f64> + '_ {
-        let (block, lane) = self.of(axis);
-        block.seen.iter().map(move |row| row.0.angle[lane])
+    pub fn for_each_angle(&self, axis: usize, mut with: impl FnMut(f64)) {
+        at!(&self.blocks, axis, of, |block, lane| {
+            block.seen.iter().for_each(|row| with(row.0.angle[lane]));
+        });
     }
 
     /// What the controllers of an axis made of it.
     pub fn done(&self, axis: usize, tick: usize) -> Done {
-        let (block, lane) = self.of(axis);
-        Done::get(&block.done[tick].0, lane)
+        at!(&self.blocks, axis, of, |block, lane| Done::get(&block.done[tick].0, lane))
     }
 
     /// Largest |i| (A) and |ω| (rad/s) of an axis in the last position period.
     pub fn peaks(&self, axis: usize) -> (f64, f64) {
-        let (block, lane) = self.of(axis);
-        (block.peak_current[lane], block.peak_speed[lane])
+        at!(&self.blocks, axis, of, |block, lane| (block.peak_current[lane], block.peak_speed[lane]))
     }
 
     /// Runs a position period; `traced` keeps what the controllers did at every tick, not only at the first.
     pub fn run(&mut self, traced: bool) {
-        let Bank { blocks, timing, width } = self;
-        if traced {
-            for block in blocks.iter_mut() {
-                block.done.resize(timing.ticks_per_position, Row(Done::default().fill()));
-            }
-        }
-        let period = Period { blocks, timing: *timing, traced };
-        match width {
-            Width::Widest => Arch::new().dispatch(period),
-            Width::Baseline => Scalar::new().vectorize(period),
+        let timing = self.timing;
+        match &mut self.blocks {
+            Blocks::Few(blocks) => run_all(self.width, Period { blocks, timing, traced }),
+            Blocks::Many(blocks) => run_all(self.width, Period { blocks, timing, traced }),
         }
     }
 }
 
+fn run_all<const L: usize>(width: Width, period: Period<'_, L>) {
+    if period.traced {
+        let row = || Row(Done::default().fill());
+        period.blocks.iter_mut().for_each(|b| b.done.resize_with(period.timing.ticks_per_position, row));
+    }
+    match width {
+        Width::Widest => Arch::new().dispatch(period),
+        Width::Baseline => Scalar::new().vectorize(period),
+    }
+}
+
 /// A position period to be run.
-struct Period<'a> {
-    blocks: &'a mut [Block<LANES>],
+struct Period<'a, const L: usize> {
+    blocks: &'a mut [Block<L>],
     timing: Timing,
     traced: bool,
 }
 
-impl WithSimd for Period<'_> {
+impl<const L: usize> WithSimd for Period<'_, L> {
     type Output = ();
 
     /// Compiled once for each width: what is inlined here is made of the vectors that it has.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        for blocks in self.blocks.chunks_mut(TOGETHER) {
+        for block in self.blocks {
             if self.traced {
-                run::<true>(blocks, self.timing);
+                block.run::<true>(self.timing);
             } else {
-                run::<false>(blocks, self.timing);
+                block.run::<false>(self.timing);
             }
         }
-    }
-}
-
-/// Runs some blocks through a position period, tick by tick.
-#[inline(always)]
-fn run<const TRACED: bool>(blocks: &mut [Block<LANES>], timing: Timing) {
-    for block in &mut *blocks {
-        block.begin();
-    }
-    for instant in 0..timing.instants() {
-        for block in &mut *blocks {
-            block.control_velocity(instant);
-        }
-        let first = instant * timing.ticks_per_velocity;
-        for tick in first..first + timing.ticks_per_velocity {
-            for block in &mut *blocks {
-                if TRACED || tick == 0 {
-                    block.tick::<true>(tick);
-                } else {
-                    block.tick::<false>(tick);
-                }
-            }
-        }
-    }
-    for block in blocks {
-        block.find_peaks();
     }
 }

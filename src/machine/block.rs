@@ -5,7 +5,7 @@
 
 use crate::control::{Pi, PiState};
 use crate::drive::{Friction, MotorState, MotorStateLanes, Plant};
-use crate::lanes::{Lane, lanes};
+use crate::lanes::{Lane, lanes, select};
 
 lanes! {
     /// What an axis is, inside its position loop.
@@ -33,7 +33,7 @@ lanes! {
         /// Whether i* was limited at an instant of the velocity loop since the position instant.
         pub was_limited: bool,
         /// Ticks since the position instant with speed, current or voltage set-point at its limit.
-        pub saturated_ticks: f64,
+        pub saturated_ticks: u64,
     }
 }
 
@@ -68,7 +68,7 @@ impl Stair {
     /// Its value at an instant of the velocity loop, counted from the position instant.
     #[inline(always)]
     pub fn at(&self, instant: f64) -> f64 {
-        if instant < self.step { self.before } else { self.behind }
+        select(instant < self.step, self.before, self.behind)
     }
 }
 
@@ -99,7 +99,7 @@ pub(super) struct Timing {
 
 impl Timing {
     /// Instants of the velocity loop in a position period.
-    pub fn instants(self) -> usize {
+    fn instants(self) -> usize {
         self.ticks_per_position / self.ticks_per_velocity
     }
 }
@@ -108,11 +108,11 @@ impl Timing {
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
 pub(super) struct Block<const L: usize> {
-    loops: LoopsLanes<L>,
-    pub state: LoopsStateLanes<L>,
-    pub demand: DemandLanes<L>,
+    loops: Row<LoopsLanes<L>>,
+    state: Row<LoopsStateLanes<L>>,
+    demand: Row<DemandLanes<L>>,
     /// Gravity over the tick at hand, N·m.
-    gravity: [f64; L],
+    gravity: Row<[f64; L]>,
     /// Largest |i| and |ω| of any tick of the period.
     pub peak_current: [f64; L],
     pub peak_speed: [f64; L],
@@ -132,10 +132,10 @@ impl<const L: usize> Block<L> {
     /// A block whose every lane is an axis of `loops`; the lanes that stand for none do as that one does.
     pub fn new(loops: Loops, timing: Timing) -> Self {
         Block {
-            loops: loops.fill(),
-            state: LoopsState::default().fill(),
-            demand: Demand::default().fill(),
-            gravity: [0.0; L],
+            loops: Row(loops.fill()),
+            state: Row(LoopsState::default().fill()),
+            demand: Row(Demand::default().fill()),
+            gravity: Row([0.0; L]),
             peak_current: [0.0; L],
             peak_speed: [0.0; L],
             tilting: loops.plant.gravity.is_tilting(),
@@ -146,10 +146,25 @@ impl<const L: usize> Block<L> {
         }
     }
 
+    /// Where an axis is.
+    pub fn state(&self, lane: usize) -> LoopsState {
+        LoopsState::get(&self.state.0, lane)
+    }
+
+    /// Puts an axis there.
+    pub fn set_state(&mut self, lane: usize, state: &LoopsState) {
+        state.set(&mut self.state.0, lane);
+    }
+
+    /// What is asked of an axis in the next position period.
+    pub fn set_demand(&mut self, lane: usize, demand: &Demand) {
+        demand.set(&mut self.demand.0, lane);
+    }
+
     /// Puts the parameters of an axis into a lane.
     pub fn set_loops(&mut self, lane: usize, loops: Loops) {
-        loops.set(&mut self.loops, lane);
-        self.tilting = (0..L).any(|lane| Loops::get(&self.loops, lane).plant.gravity.is_tilting());
+        loops.set(&mut self.loops.0, lane);
+        self.tilting = (0..L).any(|lane| Loops::get(&self.loops.0, lane).plant.gravity.is_tilting());
     }
 
     /// Torque feedforward of one lane on top, N·m, by the instant of the velocity loop.
@@ -160,101 +175,110 @@ impl<const L: usize> Block<L> {
         }
     }
 
-    /// To be called before the first tick of a position period.
+    /// Runs a position period, and keeps every tick where `TRACED`.
     #[inline(always)]
-    pub fn begin(&mut self) {
-        self.state.was_limited = [0; L];
-        self.state.saturated_ticks = [0.0; L];
-        if !self.tilting {
-            self.weigh();
+    pub fn run<const TRACED: bool>(&mut self, timing: Timing) {
+        self.begin();
+        for instant in 0..timing.instants() {
+            self.control_velocity(instant);
+            let first = instant * timing.ticks_per_velocity;
+            for tick in first..first + timing.ticks_per_velocity {
+                if TRACED || tick == 0 {
+                    self.tick::<true>(tick);
+                } else {
+                    self.tick::<false>(tick);
+                }
+            }
+        }
+        self.find_peaks();
+    }
+
+    #[inline(always)]
+    fn begin(&mut self) {
+        self.state.0.was_limited = [0; L];
+        self.state.0.saturated_ticks = [0; L];
+        for lane in 0..L {
+            let plant = Plant::get(&self.loops.0.plant, lane);
+            self.gravity.0[lane] = plant.gravity_at(self.state.0.motor.angle[lane]);
         }
     }
 
     /// The velocity loop: torque from the error of the speed, and i* from that.
     #[inline(always)]
-    pub fn control_velocity(&mut self, instant: usize) {
-        let Block { loops, state, demand, compensation, compensating, .. } = self;
+    fn control_velocity(&mut self, instant: usize) {
+        let Block { loops: Row(loops), state: Row(state), demand: Row(demand), .. } = self;
+        let (compensation, compensating) = (&self.compensation, self.compensating);
         let since_instant = instant as f64;
-        let mut torque = [0.0; L];
-        for (lane, torque) in torque.iter_mut().enumerate() {
-            *torque = Stair::get(&demand.torque, lane).at(since_instant);
-        }
-        if *compensating {
-            for (torque, more) in torque.iter_mut().zip(&compensation[instant].0) {
-                *torque += more;
-            }
-        }
+        let more = if compensating { compensation[instant].0 } else { [0.0; L] };
         for lane in 0..L {
-            let pi = Pi::get(&loops.velocity, lane);
-            let mut memory = PiState::get(&state.velocity, lane);
-            let asked = demand.velocity_setpoint[lane] + Stair::get(&demand.velocity, lane).at(since_instant);
+            let demand = Demand::get(demand, lane);
+            let asked = demand.velocity_setpoint + demand.velocity.at(since_instant);
+            let torque = demand.torque.at(since_instant) + more[lane];
             let error = asked - state.motor.speed[lane];
-            state.current_setpoint[lane] = pi.update_with(&mut memory, error, torque[lane]);
+            let mut memory = PiState::get(&state.velocity, lane);
+            let pi = Pi::get(&loops.velocity, lane);
+            state.current_setpoint[lane] = pi.update_with(&mut memory, error, torque);
             memory.set(&mut state.velocity, lane);
             state.was_limited[lane] |= u64::from(memory.limited);
         }
     }
 
-    /// Gravity where the axes stand.
+    /// The current loop and the plant.
     #[inline(always)]
-    fn weigh(&mut self) {
-        for lane in 0..L {
-            let plant = Plant::get(&self.loops.plant, lane);
-            self.gravity[lane] = plant.gravity_at(self.state.motor.angle[lane]);
+    fn tick<const KEPT: bool>(&mut self, tick: usize) {
+        self.seen[tick].0.clone_from(&self.state.0.motor);
+        let (friction, gravity) = (self.state.0.friction, self.state.0.gravity);
+        let voltages = if self.tilting { self.step::<true>() } else { self.step::<false>() };
+        if KEPT || self.tilting {
+            self.state.0.gravity = self.gravity.0;
+        }
+        if KEPT {
+            let Block { state: Row(state), demand: Row(demand), done, .. } = self;
+            let done = &mut done[tick].0;
+            done.current_setpoint = state.current_setpoint;
+            (done.voltage, done.friction, done.gravity) = (voltages, friction, gravity);
+            for lane in 0..L {
+                let limited = demand.speed_limited[lane] | state.velocity.limited[lane];
+                done.saturated[lane] = limited | state.current.limited[lane];
+            }
         }
     }
 
-    /// The current loop and the plant.
+    /// Moves the axes by one tick; the voltages come back.
     ///
     /// The bounds of friction come first, for all lanes: their exponentials are a long chain of arithmetic,
     /// and those of the next lanes fill the time that one waits for itself.
     #[inline(always)]
-    pub fn tick<const KEPT: bool>(&mut self, tick: usize) {
-        if self.tilting {
-            self.weigh();
-        }
-        let Block { loops, state, demand, gravity, seen, done, .. } = self;
-        let mut bounds = [0.0; L];
-        for (lane, bound) in bounds.iter_mut().enumerate() {
-            *bound = Friction::get(&loops.plant.friction, lane).bound(state.motor.speed[lane]);
-        }
-        let seen = &mut seen[tick].0;
-        let mut voltages = [0.0; L];
+    fn step<const TILTING: bool>(&mut self) -> [f64; L] {
+        let Block {
+            loops: Row(loops), state: Row(state), demand: Row(demand), gravity: Row(gravity), ..
+        } = self;
+        let (mut bounds, mut voltages) = (Row([0.0; L]), Row([0.0; L]));
         for lane in 0..L {
-            let mut s = LoopsState::get(state, lane);
-            s.motor.set(seen, lane);
-            let error = s.current_setpoint - s.motor.current;
-            let voltage = Pi::get(&loops.current, lane).update(&mut s.current, error);
-            voltages[lane] = voltage;
-            let limited =
-                demand.speed_limited[lane] | state.velocity.limited[lane] | u64::from(s.current.limited);
-            state.saturated_ticks[lane] += if limited != 0 { 1.0 } else { 0.0 };
-            s.current.set(&mut state.current, lane);
-        }
-        if KEPT {
-            let done = &mut done[tick].0;
-            done.current_setpoint = state.current_setpoint;
-            done.voltage = voltages;
-            done.friction = state.friction;
-            done.gravity = state.gravity;
-            for lane in 0..L {
-                done.saturated[lane] =
-                    demand.speed_limited[lane] | state.velocity.limited[lane] | state.current.limited[lane];
+            bounds.0[lane] = Friction::get(&loops.plant.friction, lane).bound(state.motor.speed[lane]);
+            if TILTING {
+                gravity[lane] = Plant::get(&loops.plant, lane).gravity_at(state.motor.angle[lane]);
             }
         }
         for lane in 0..L {
-            let plant = Plant::get(&loops.plant, lane);
+            let Loops { plant, current, .. } = Loops::get(loops, lane);
             let mut motor = MotorState::get(&state.motor, lane);
+            let mut memory = PiState::get(&state.current, lane);
+            let voltage = current.update(&mut memory, state.current_setpoint[lane] - motor.current);
             let external = demand.load[lane] - gravity[lane];
-            state.friction[lane] = plant.step_under(&mut motor, voltages[lane], external, bounds[lane]);
+            state.friction[lane] = plant.step_under(&mut motor, voltage, external, bounds.0[lane]);
+            voltages.0[lane] = voltage;
             motor.set(&mut state.motor, lane);
+            memory.set(&mut state.current, lane);
+            state.saturated_ticks[lane] +=
+                demand.speed_limited[lane] | state.velocity.limited[lane] | u64::from(memory.limited);
         }
-        state.gravity = *gravity;
+        voltages.0
     }
 
-    /// The largest current and speed of any tick, at the end of the period.
+    /// The largest current and speed of any tick.
     #[inline(always)]
-    pub fn find_peaks(&mut self) {
+    fn find_peaks(&mut self) {
         let mut current = [0.0_f64; L];
         let mut speed = [0.0_f64; L];
         for row in &self.seen {

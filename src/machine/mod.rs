@@ -314,14 +314,16 @@ impl Machine {
         self.parameters.axes[axis].loops.plant.position(self.bank.motor(axis, tick).angle)
     }
 
-    /// Positions of an axis at the ticks of the position period that was computed last, m or rad.
+    /// Puts the positions of an axis at the ticks of the position period that was computed last, m or rad,
+    /// in the place of what is in `positions`.
     ///
     /// # Panics
     /// If there is no such axis.
     #[inline]
-    pub fn positions(&self, axis: usize) -> impl ExactSizeIterator<Item = f64> + '_ {
+    pub fn positions(&self, axis: usize, positions: &mut Vec<f64>) {
         let plant = &self.parameters.axes[axis].loops.plant;
-        self.bank.angles(axis).map(|angle| plant.position(angle))
+        positions.clear();
+        self.bank.for_each_angle(axis, |angle| positions.push(plant.position(angle)));
     }
 
     /// What an axis did in the position period that was computed last.
@@ -332,7 +334,7 @@ impl Machine {
         let (peak_current, peak_speed) = self.bank.peaks(axis);
         Activity {
             peak_current,
-            saturated_ticks: self.bank.state(axis).saturated_ticks as u64,
+            saturated_ticks: self.bank.state(axis).saturated_ticks,
             friction_extrapolated: self.parameters.axes[axis]
                 .loops
                 .plant
