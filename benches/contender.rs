@@ -84,7 +84,7 @@ fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures
             for (place, radial) in circles.iter_mut().enumerate() {
                 machine.positions(place * axes, &mut x);
                 machine.positions(place * axes + 1, &mut y);
-                x.iter().zip(&y).for_each(|(x, y)| radial.push(circle.radius, *x, *y));
+                radial.push(circle.radius, &x, &y);
             }
         }
     }
@@ -96,34 +96,52 @@ fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures
     assessors.chunks(axes).zip(&circles).map(figures).collect()
 }
 
+/// Ticks whose radial deviations are reckoned side by side.
+const SIDE_BY_SIDE: usize = 8;
+
 /// Radial deviation about (−radius, 0), tick by tick.
 #[derive(Clone)]
 struct Radial {
-    sum: f64,
-    min: f64,
-    max: f64,
-    count: u64,
+    sum: [f64; SIDE_BY_SIDE],
+    min: [f64; SIDE_BY_SIDE],
+    max: [f64; SIDE_BY_SIDE],
+    count: usize,
 }
 
 impl Default for Radial {
     fn default() -> Self {
-        Radial { sum: 0.0, min: f64::INFINITY, max: f64::NEG_INFINITY, count: 0 }
+        Radial {
+            sum: [0.0; SIDE_BY_SIDE],
+            min: [f64::INFINITY; SIDE_BY_SIDE],
+            max: [f64::NEG_INFINITY; SIDE_BY_SIDE],
+            count: 0,
+        }
     }
 }
 
 impl Radial {
-    #[inline]
-    fn push(&mut self, radius: f64, x: f64, y: f64) {
-        let deviation = ((x + radius) * (x + radius) + y * y).sqrt() - radius;
-        self.sum += deviation;
-        self.min = if deviation < self.min { deviation } else { self.min };
-        self.max = if deviation > self.max { deviation } else { self.max };
-        self.count += 1;
+    /// Takes ticks in, a multiple of [`SIDE_BY_SIDE`].
+    #[inline(always)]
+    fn push(&mut self, radius: f64, x: &[f64], y: &[f64]) {
+        let (x, _) = x.as_chunks::<SIDE_BY_SIDE>();
+        let (y, _) = y.as_chunks::<SIDE_BY_SIDE>();
+        for (x, y) in x.iter().zip(y) {
+            for i in 0..SIDE_BY_SIDE {
+                let (u, v) = (x[i] + radius, y[i]);
+                let deviation = (u * u + v * v).sqrt() - radius;
+                self.sum[i] += deviation;
+                self.min[i] = if deviation < self.min[i] { deviation } else { self.min[i] };
+                self.max[i] = if deviation > self.max[i] { deviation } else { self.max[i] };
+            }
+        }
+        self.count += SIDE_BY_SIDE * x.len();
     }
 
     fn deviation(&self) -> Option<Deviation> {
-        let mean = self.sum / self.count as f64;
-        (self.count > 0).then_some(Deviation { mean, min: self.min, max: self.max })
+        let mean = self.sum.iter().sum::<f64>() / self.count as f64;
+        let min = self.min.into_iter().fold(f64::INFINITY, f64::min);
+        let max = self.max.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        (self.count > 0).then_some(Deviation { mean, min, max })
     }
 }
 

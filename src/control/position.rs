@@ -53,9 +53,9 @@ pub struct Guard {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionState {
     /// θ(k), θ(k − 1), …
-    angles: [f64; MAX_COEFFICIENTS],
+    angles: Past,
     /// Ω*(k − 1), Ω*(k − 2), …: as limited, with the velocity feedforward.
-    commands: [f64; MAX_COEFFICIENTS],
+    commands: Past,
     /// Position instants since which the set-point has stood still over the whole horizon of this controller.
     still: u32,
     /// Position instants since the motor's current was at its limit.
@@ -67,8 +67,8 @@ impl PositionState {
     /// At rest at `angle`, rad.
     pub fn at_rest(angle: f64) -> Self {
         PositionState {
-            angles: [angle; MAX_COEFFICIENTS],
-            commands: [0.0; MAX_COEFFICIENTS],
+            angles: Past::of(angle),
+            commands: Past::of(0.0),
             still: u32::MAX,
             unlimited: u32::MAX,
             transfer: TransferState::default(),
@@ -82,14 +82,14 @@ impl PositionState {
     /// controller diverges.
     #[inline]
     pub fn record(&mut self, command: f64) {
-        shift_in(&mut self.commands, command);
+        self.commands.push(command);
     }
 
     /// Takes down that the axis reached `speed` instead, rad/s: the motor's current was at its limit, and
     /// a recursion that went on from what was asked for would wind up.
     #[inline]
     pub fn correct(&mut self, speed: f64) {
-        self.commands[0] = speed;
+        self.commands.correct(speed);
         self.unlimited = 0;
     }
 
@@ -100,9 +100,36 @@ impl PositionState {
     }
 }
 
-fn shift_in(values: &mut [f64; MAX_COEFFICIENTS], newest: f64) {
-    values.copy_within(..MAX_COEFFICIENTS - 1, 1);
-    values[0] = newest;
+/// The last values of a signal, as many as any controller reads.
+#[derive(Debug, Clone, PartialEq)]
+struct Past {
+    ring: [f64; MAX_COEFFICIENTS],
+    newest: usize,
+}
+
+impl Past {
+    /// A signal that always was `value`.
+    fn of(value: f64) -> Self {
+        Past { ring: [value; MAX_COEFFICIENTS], newest: 0 }
+    }
+
+    #[inline]
+    fn push(&mut self, value: f64) {
+        self.newest = (self.newest + 1) % MAX_COEFFICIENTS;
+        self.correct(value);
+    }
+
+    /// Puts another value in the place of the newest.
+    #[inline]
+    fn correct(&mut self, value: f64) {
+        self.ring[self.newest] = value;
+    }
+
+    /// The value `back` instants before the newest.
+    #[inline]
+    fn before(&self, back: usize) -> f64 {
+        self.ring[(self.newest + MAX_COEFFICIENTS - back) % MAX_COEFFICIENTS]
+    }
 }
 
 impl PositionController {
@@ -145,14 +172,14 @@ impl PositionController {
         angle: f64,
         feedforward: f64,
     ) -> f64 {
-        shift_in(&mut s.angles, angle);
+        s.angles.push(angle);
         s.unlimited = s.unlimited.saturating_add(1);
         if self.guard.is_some() {
             let is_still = (-self.lookback()..=self.preview()).all(|j| setpoint(j) == setpoint(0));
             s.still = if is_still { s.still.saturating_add(1) } else { 0 };
         }
         if s.transfer.pending {
-            let excess = self.output(s, &setpoint, angle) + feedforward - s.commands[0];
+            let excess = self.output(s, &setpoint, angle) + feedforward - s.commands.before(0);
             let excess = excess - excess.clamp(-self.transfer.step, self.transfer.step);
             match &self.guard {
                 _ if excess == 0.0 => s.transfer.end(),
@@ -171,7 +198,7 @@ impl PositionController {
             (Law::Rst(_), Some(guard)) if self.is_guarded(s, guard) => {
                 let error = setpoint(0) - angle;
                 let asked = setpoint(1) - setpoint(0);
-                let crept = (angle - s.angles[1]).abs();
+                let crept = (angle - s.angles.before(1)).abs();
                 if asked == 0.0 && error.abs() <= guard.rest_error && crept <= STOPPED * guard.rest_error {
                     return 0.0;
                 }
@@ -179,8 +206,8 @@ impl PositionController {
             }
             (Law::Rst(rst), _) => {
                 let asked = weighted(rst.t(), |i| setpoint(rst.t_first() + i as i64));
-                let seen = weighted(rst.r(), |i| s.angles[i]);
-                let done = weighted(&rst.s()[1..], |i| s.commands[i]);
+                let seen = weighted(rst.r(), |i| s.angles.before(i));
+                let done = weighted(&rst.s()[1..], |i| s.commands.before(i));
                 asked - seen - done
             }
         }

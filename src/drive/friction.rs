@@ -46,7 +46,7 @@ impl Term {
 
 impl Friction {
     /// Friction of an axis of `kind` behind a transmission of ratio r (m or rad per rad of the motor),
-    /// whose motor has `torque_constant` Kt in N·m/A.
+    /// whose motor has `torque_constant` Kt in N·m/A. (With another constant the bound is in its unit.)
     pub fn new(law: FrictionConfig, kind: AxisKind, transmission_ratio: f64, torque_constant: f64) -> Self {
         let unit = match kind {
             AxisKind::Linear => METRE_PER_MINUTE,

@@ -98,27 +98,31 @@ impl Motor {
     }
 
     /// State at the end of the tick, and the friction torque over it: the one that ends the tick at
-    /// standstill, limited to ±`bound` (N·m, not negative). Not limited, ω is 0.0 exactly.
-    ///
-    /// The comparison is made with the speed that `bound` takes away, so that rounding never turns ω round.
+    /// standstill, limited to what changes ω by `slowing` (rad/s, not negative) over a tick. Where it is not
+    /// limited ω is 0.0 exactly, and rounding never turns ω round: what friction takes away is never more
+    /// than there is.
     #[inline(always)]
     pub(super) fn step_with_friction(
         &self,
         s: &MotorState,
         voltage: f64,
         external: f64,
-        bound: f64,
+        slowing: f64,
     ) -> (MotorState, f64) {
         let free = self.speed.apply(s, voltage, external);
-        let slowed = self.speed.torque * bound;
-        let stops = free.abs() <= slowed;
-        let friction = limited(free * self.torque_per_speed, bound);
+        let taken = limited(free, slowing);
+        let friction = taken * self.torque_per_speed;
         let torque = external - friction;
         let state = MotorState {
             current: self.current.apply(s, voltage, torque),
-            speed: if stops { 0.0 } else { free - slowed.copysign(free) },
+            speed: free - taken,
             angle: s.angle + self.angle.apply(s, voltage, torque),
         };
         (state, friction)
+    }
+
+    /// Change of ω over a tick per torque that acts over it, (rad/s)/(N·m).
+    pub(super) fn speed_per_torque(&self) -> f64 {
+        self.speed.torque
     }
 }

@@ -20,7 +20,8 @@ lanes! {
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct Plant as PlantLanes {
         pub(crate) motor: Motor,
-        pub(crate) friction: Friction,
+        /// Friction in the change of ω that it makes over a tick, rad/s.
+        pub(crate) slowing: Friction,
         pub(crate) gravity: Gravity,
         ratio: f64,
         torque_constant: f64,
@@ -37,12 +38,14 @@ impl Plant {
         let motor = Self::motor(axis);
         // The law gives amperes of the motor as it is reckoned with: its torque does not follow Kt.
         let friction_constant = axis.motor.torque_constant * deviation.friction;
+        let stepped = Motor::new(&motor, period)?;
+        let slowing = friction_constant * stepped.speed_per_torque();
         Ok(Plant {
-            friction: Friction::new(axis.friction, axis.kind, r, friction_constant),
+            slowing: Friction::new(axis.friction, axis.kind, r, slowing),
             gravity: Gravity::new(&axis.gravity, r),
             ratio: r,
             torque_constant: motor.torque_constant,
-            motor: Motor::new(&motor, period)?,
+            motor: stepped,
         })
     }
 
@@ -88,7 +91,7 @@ impl Plant {
     /// Whether the friction law is extrapolated at a motor speed ω (rad/s).
     #[inline]
     pub fn friction_is_extrapolated(&self, speed: f64) -> bool {
-        self.friction.is_extrapolated(speed)
+        self.slowing.is_extrapolated(speed)
     }
 
     /// Moves the plant by one tick under `voltage` (V) and an external `load` (N or N·m at the axis).
@@ -98,17 +101,17 @@ impl Plant {
     #[inline(always)]
     pub fn step(&self, s: &mut MotorState, voltage: f64, load: f64) -> Torques {
         let (gravity, load) = (self.gravity_at(s.angle), self.load_torque(load));
-        let bound = self.friction.bound(s.speed);
-        let (state, friction) = self.motor.step_with_friction(s, voltage, load - gravity, bound);
+        let slowing = self.slowing.bound(s.speed);
+        let (state, friction) = self.motor.step_with_friction(s, voltage, load - gravity, slowing);
         *s = state;
         Torques { friction, gravity, load }
     }
 
-    /// The same with torques that are known already: gravity and load together, and the friction's bound
-    /// (all N·m at the motor). The friction torque comes back.
+    /// The same with what is known already: gravity and load together as `external` torque (N·m at the
+    /// motor), and the bound of `slowing`. The friction torque comes back.
     #[inline(always)]
-    pub(crate) fn step_under(&self, s: &mut MotorState, voltage: f64, external: f64, bound: f64) -> f64 {
-        let (state, friction) = self.motor.step_with_friction(s, voltage, external, bound);
+    pub(crate) fn step_under(&self, s: &mut MotorState, voltage: f64, external: f64, slowing: f64) -> f64 {
+        let (state, friction) = self.motor.step_with_friction(s, voltage, external, slowing);
         *s = state;
         friction
     }

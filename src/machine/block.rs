@@ -253,9 +253,9 @@ impl<const L: usize> Block<L> {
         let Block {
             loops: Row(loops), state: Row(state), demand: Row(demand), gravity: Row(gravity), ..
         } = self;
-        let (mut bounds, mut voltages) = (Row([0.0; L]), Row([0.0; L]));
+        let (mut slowing, mut voltages) = (Row([0.0; L]), Row([0.0; L]));
         for lane in 0..L {
-            bounds.0[lane] = Friction::get(&loops.plant.friction, lane).bound(state.motor.speed[lane]);
+            slowing.0[lane] = Friction::get(&loops.plant.slowing, lane).bound(state.motor.speed[lane]);
             if TILTING {
                 gravity[lane] = Plant::get(&loops.plant, lane).gravity_at(state.motor.angle[lane]);
             }
@@ -266,7 +266,7 @@ impl<const L: usize> Block<L> {
             let mut memory = PiState::get(&state.current, lane);
             let voltage = current.update(&mut memory, state.current_setpoint[lane] - motor.current);
             let external = demand.load[lane] - gravity[lane];
-            state.friction[lane] = plant.step_under(&mut motor, voltage, external, bounds.0[lane]);
+            state.friction[lane] = plant.step_under(&mut motor, voltage, external, slowing.0[lane]);
             voltages.0[lane] = voltage;
             motor.set(&mut state.motor, lane);
             memory.set(&mut state.current, lane);
