@@ -1,5 +1,7 @@
 //! Distance from a geometric path.
 
+mod follow;
+
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -8,6 +10,9 @@ use nalgebra::Vector3;
 use super::path_shape::{Room, Shape, pose};
 use crate::kinematics::ToolPose;
 use crate::path::Path;
+
+pub use follow::{Deviations, Followed};
+use follow::{from_axis, from_circle, from_line};
 
 /// How far behind the furthest nearest point the next one may lie, m or rad: an axis that swings back.
 const BACK: f64 = 5e-3;
@@ -74,7 +79,8 @@ struct Candidate {
 #[derive(Debug, Clone)]
 pub struct PathTracker {
     path: Arc<Path>,
-    shapes: Vec<Shape>,
+    /// Shared by clones.
+    shapes: Arc<[Shape]>,
     /// Directions of the path at both ends, where the tip moves there.
     ends: [Option<Vector3<f64>>; 2],
     /// Largest progress of a nearest point so far.
@@ -89,7 +95,7 @@ impl PathTracker {
     /// A tracker at the start of `path`.
     pub fn new(path: Arc<Path>) -> Self {
         let mut room = Room::new(path.joint_count());
-        let shapes: Vec<Shape> =
+        let shapes: Arc<[Shape]> =
             (0..path.blocks().len()).map(|block| Shape::new(&path, block, &mut room)).collect();
         let last = shapes.len() - 1;
         let end = path.blocks()[last].length();
@@ -232,7 +238,7 @@ impl PathTracker {
         match &self.shapes[block] {
             Shape::Segment { from, slope, .. } => {
                 let (from, slope) = (*from, *slope);
-                let s = (slope.dot(&(pose.tip - from)) / slope.norm_squared()).clamp(low, high);
+                let s = from_line(pose.tip, from, slope).clamp(low, high);
                 let length = self.path.blocks()[block].length();
                 if s <= 0.0 || s >= length {
                     return self.still(pose, block, s);
@@ -242,16 +248,13 @@ impl PathTracker {
             }
             Shape::Circle { centre, plane, radius, start, turn, .. } => {
                 let (centre, plane, radius, turn) = (*centre, *plane, *radius, *turn);
-                let out = pose.tip - centre;
-                let [x, y, z] = plane.map(|vector| vector.dot(&out));
-                let off = (x * x + y * y).sqrt();
+                let ([x, y, z], off) = from_axis(pose.tip, centre, &plane);
                 let angle = ((y.atan2(x) - start) * turn.signum()).rem_euclid(TAU);
                 let ahead = self.furthest - SLACK - self.path.start_of(block);
                 match passage(angle / turn.abs(), TAU / turn.abs(), low, high, ahead) {
                     Some(s) if off > 0.0 => {
                         let point = centre + (plane[0] * x + plane[1] * y) * (radius / off);
-                        let outside = off - radius;
-                        self.candidate(block, s, point, (outside * outside + z * z).sqrt())
+                        self.candidate(block, s, point, from_circle(off, z, radius))
                     }
                     _ => self.nearer_end(pose, block, low, high),
                 }

@@ -98,6 +98,12 @@ impl Bank {
         MotorState::get(&block.seen[tick].0, lane)
     }
 
+    /// Motor angles of an axis at all ticks of the last position period, rad.
+    pub fn angles(&self, axis: usize) -> impl Iterator<Item = f64> {
+        let (block, lane) = self.of(axis);
+        block.seen.iter().map(move |row| row.0.angle[lane])
+    }
+
     /// What the controllers of an axis made of it.
     pub fn done(&self, axis: usize, tick: usize) -> Done {
         let (block, lane) = self.of(axis);

@@ -314,6 +314,15 @@ impl Machine {
         self.parameters.axes[axis].loops.plant.position(self.bank.motor(axis, tick).angle)
     }
 
+    /// Positions of an axis at all ticks of the position period that was computed last, m or rad.
+    ///
+    /// # Panics
+    /// If there is no such axis.
+    pub fn positions(&self, axis: usize) -> impl Iterator<Item = f64> {
+        let plant = self.parameters.axes[axis].loops.plant;
+        self.bank.angles(axis).map(move |angle| plant.position(angle))
+    }
+
     /// What an axis did in the position period that was computed last.
     ///
     /// # Panics
