@@ -88,7 +88,28 @@ pub struct PathTracker {
     /// The last nearest one.
     block: usize,
     s: f64,
+    /// The last call, if it found the tracker as it left it: the same one would find the same.
+    last: Option<Call>,
+    /// Room for where the feet of poses are.
+    feet: [Vec<f64>; 2],
     room: Room,
+}
+
+/// What was asked for, and what was found.
+#[derive(Debug, Clone, Copy)]
+struct Call {
+    pose: ToolPose,
+    until: f64,
+    nearest: Nearest,
+}
+
+impl Call {
+    fn is_for(&self, pose: &ToolPose, until: f64) -> bool {
+        let bits = |vector: &Vector3<f64>| [vector.x, vector.y, vector.z].map(f64::to_bits);
+        self.until == until
+            && bits(&self.pose.tip) == bits(&pose.tip)
+            && bits(&self.pose.axis) == bits(&pose.axis)
+    }
 }
 
 impl PathTracker {
@@ -101,7 +122,17 @@ impl PathTracker {
         let end = path.blocks()[last].length();
         let ends =
             [(0, 0.0), (last, end)].map(|(block, s)| shapes[block].direction(&path, block, s, &mut room));
-        Self { path, shapes, ends, furthest: 0.0, block: 0, s: 0.0, room }
+        Self {
+            path,
+            shapes,
+            ends,
+            furthest: 0.0,
+            block: 0,
+            s: 0.0,
+            last: None,
+            feet: [Vec::new(), Vec::new()],
+            room,
+        }
     }
 
     /// The path.
@@ -113,6 +144,10 @@ impl PathTracker {
     /// nearest one.
     pub fn nearest(&mut self, pose: &ToolPose, until: f64) -> Nearest {
         let until = until.clamp(0.0, self.path.length()).max(self.furthest);
+        if let Some(last) = self.last.filter(|last| last.is_for(pose, until)) {
+            return last.nearest;
+        }
+        let before = (self.furthest, self.block, self.s);
         let from = (self.furthest - BACK).max(0.0);
         let window = (self.path.locate(from), self.path.locate(until));
         let best = self.search(pose, window);
@@ -121,14 +156,17 @@ impl PathTracker {
             (self.block, self.s) = (best.block, best.s);
         }
         let axis = self.shapes[best.block].axis(&self.path, best.block, best.s, &mut self.room);
-        Nearest {
+        let nearest = Nearest {
             progress: best.progress,
             point: best.point,
             axis,
             distance: best.distance,
             within_ends: self.within_ends(&best, pose),
             orientation: angle(&axis, &pose.axis),
-        }
+        };
+        let stays = before == (self.furthest, self.block, self.s);
+        self.last = stays.then_some(Call { pose: *pose, until, nearest });
+        nearest
     }
 
     /// See [`Nearest::within_ends`].

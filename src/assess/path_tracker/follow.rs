@@ -4,6 +4,8 @@
 //! of all of them lie in the block, inside of what would be searched, the distance follows from the pose alone.
 //! What is computed then is what the search computes, so that the distances are the same bits.
 
+use std::f64::consts::TAU;
+
 use nalgebra::Vector3;
 
 use super::{BACK, Nearest, PathTracker};
@@ -88,6 +90,12 @@ pub(super) fn from_circle(off: f64, z: f64, radius: f64) -> f64 {
     (outside * outside + z * z).sqrt()
 }
 
+/// The tips, one after the other.
+fn tips(poses: &Poses) -> impl Iterator<Item = Vector3<f64>> {
+    let [xs, ys, zs] = poses.tips();
+    xs.iter().zip(ys).zip(zs).map(|((x, y), z)| Vector3::new(*x, *y, *z))
+}
+
 impl PathTracker {
     /// As [`nearest`](Self::nearest) for each of `poses`, one after the other: what they deviate by goes to
     /// `found`, in the place of what was there. `until` tells by the place of a pose what has been commanded by
@@ -106,18 +114,16 @@ impl PathTracker {
         found.push(&first);
         let reach = if last > 1 { self.reach(before, [begin, until(last)]) } else { None };
         let closed_form = poses.only_axis().and(reach).is_some_and(|reach| {
-            let inside = self.follow_line(poses, reach, found) || self.follow_circle(poses, reach, found);
-            if !inside {
-                found.distance.truncate(1);
-            }
-            inside
+            self.follow_line(poses, reach, &mut found.distance)
+                || self.follow_circle(poses, reach, &mut found.distance)
         });
         if closed_form {
-            // The tool axis stands still, and so does that of the path.
-            found.orientation.resize(last, first.orientation);
+            self.nearest(&poses.get(last), until(last));
             found.within_ends.extend_from_slice(&found.distance[1..]);
-            found.push(&self.nearest(&poses.get(last), until(last)));
+            // The tool axis stands still, and so does that of the path.
+            found.orientation.resize(poses.len(), first.orientation);
         } else {
+            found.distance.truncate(1);
             for place in 1..=last {
                 let nearest = self.nearest(&poses.get(place), until(place));
                 found.push(&nearest);
@@ -143,88 +149,76 @@ impl PathTracker {
         })
     }
 
-    /// Distances of all poses but the first and the last from a line, as long as all feet, those of the two
-    /// included, lie inside of what is searched.
-    fn follow_line(&mut self, poses: &Poses, reach: Reach, found: &mut Deviations) -> bool {
+    /// Distances of all poses from a line, as long as all feet lie inside of what is searched. The feet of all
+    /// but the last are taken into account.
+    fn follow_line(&mut self, poses: &Poses, reach: Reach, distances: &mut Vec<f64>) -> bool {
         let Shape::Segment { from, slope, .. } = &self.shapes[reach.block] else { return false };
         let (from, slope) = (*from, *slope);
-        let last = poses.len() - 1;
-        let [xs, ys, zs] = poses.tips();
-        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-        let mut before_last = f64::NEG_INFINITY;
-        // Written so that what is no number is not inside.
-        let mut inside = true;
-        let mut see = |place: usize| {
-            let tip = Vector3::new(xs[place], ys[place], zs[place]);
+        let [feet, _] = &mut self.feet;
+        feet.resize(poses.len(), 0.0);
+        distances.resize(poses.len(), 0.0);
+        for ((foot, distance), tip) in feet.iter_mut().zip(&mut *distances).zip(tips(poses)) {
             let s = from_line(tip, from, slope);
-            inside &= s > CLEAR && s < reach.high[0] - CLEAR;
-            least = if s < least { s } else { least };
-            most = if s > most { s } else { most };
-            let point = from + slope * s;
-            (tip - point).norm()
-        };
-        see(0);
-        for place in 1..last {
-            let distance = see(place);
-            found.distance.push(distance);
+            *foot = s;
+            *distance = (tip - (from + slope * s)).norm();
         }
-        see(last);
-        for place in 1..last {
-            let s = from_line(poses.tip(place), from, slope);
-            before_last = if s > before_last { s } else { before_last };
-        }
-        let furthest = self.furthest.max(self.path.start_of(reach.block) + most);
-        let low = (furthest - BACK - reach.start).max(reach.low);
-        let inside = inside && least > low + CLEAR && self.is_within_ends(reach, least, most);
+        // Written so that what is no number is not inside.
+        let inside = feet.iter().fold(true, |inside, s| inside & (*s > CLEAR && *s < reach.high[0] - CLEAR));
+        let least = feet.iter().fold(f64::INFINITY, |least, s| if *s < least { *s } else { least });
+        let most = |feet: &[f64]| feet.iter().fold(0.0, |most, s| if *s > most { *s } else { most });
+        let (furthest, before) = (most(feet), most(&feet[..poses.len() - 1]));
+        let low = (self.furthest.max(reach.start + furthest) - BACK - reach.start).max(reach.low);
+        let inside = inside && least > low + CLEAR && self.is_within_ends(reach, least, furthest);
         if inside {
-            let progress = (reach.start + before_last).min(self.path.start_of(reach.block + 1));
+            let progress = (reach.start + before).min(self.path.start_of(reach.block + 1));
             self.furthest = self.furthest.max(progress);
+            self.last = None;
         }
         inside
     }
 
-    /// Distances of all poses but the first and the last from a circle, as long as each foot lies clearly ahead
-    /// of the one before, and all inside of what is searched.
+    /// Distances of all poses from a circle, as long as each foot lies clearly ahead of the one before, and all
+    /// inside of what is searched.
     ///
-    /// The first one has been found between both ends. What is searched ends further ahead at each pose, and
-    /// begins behind the furthest foot so far: those that lie ahead of each other lie behind that begin never, and
-    /// before that end if the last one lies before the end that the first one had. There is one passage only
-    /// to choose for each if less than a turn is searched.
-    fn follow_circle(&mut self, poses: &Poses, reach: Reach, found: &mut Deviations) -> bool {
+    /// The first one has been found between both ends. What is searched begins some way behind the furthest foot
+    /// so far, and ends further ahead at each pose: feet that lie ahead of each other are never before its begin,
+    /// and none is behind its end if the last one is not behind the end that the first one had. As less than a
+    /// turn is searched there is one passage only for each.
+    fn follow_circle(&mut self, poses: &Poses, reach: Reach, distances: &mut Vec<f64>) -> bool {
         let Shape::Circle { centre, plane, radius, turn, .. } = &self.shapes[reach.block] else {
             return false;
         };
         let (centre, plane, radius, turn) = (*centre, *plane, *radius, *turn);
         let first = self.s;
-        let turn_length = std::f64::consts::TAU / turn.abs();
-        let one_turn = reach.high[1] - first.min(reach.low) < turn_length - CLEAR;
+        let one_turn = reach.high[1] - reach.low < TAU / turn.abs() - CLEAR;
         if !(one_turn && first > reach.low + CLEAR && first < reach.high[0] - CLEAR) {
             return false;
         }
-        let last = poses.len() - 1;
-        let [xs, ys, zs] = poses.tips();
-        let least = FORWARDS * radius * radius;
-        let at = |place: usize| from_axis(Vector3::new(xs[place], ys[place], zs[place]), centre, &plane);
-        let ([x0, y0, _], _) = at(0);
-        let direction = turn.signum();
-        let (mut x_before, mut y_before) = (x0, y0);
-        // Written so that what is no number is not ahead.
-        let mut ahead = true;
-        let mut see = |place: usize| {
-            let ([x, y, z], off) = at(place);
-            ahead &= (x_before * y - y_before * x) * direction > least && x0 * x + y0 * y > 0.0;
-            (x_before, y_before) = (x, y);
-            from_circle(off, z, radius)
-        };
-        for place in 1..last {
-            let distance = see(place);
-            found.distance.push(distance);
+        let [xs, ys] = &mut self.feet;
+        xs.resize(poses.len(), 0.0);
+        ys.resize(poses.len(), 0.0);
+        distances.resize(poses.len(), 0.0);
+        let places = xs.iter_mut().zip(ys.iter_mut()).zip(&mut *distances);
+        for (((x_out, y_out), distance), tip) in places.zip(tips(poses)) {
+            let ([x, y, z], off) = from_axis(tip, centre, &plane);
+            (*x_out, *y_out) = (x, y);
+            *distance = from_circle(off, z, radius);
         }
-        see(last);
-        let (x, y) = (x_before, y_before);
+        let (least, direction) = (FORWARDS * radius * radius, turn.signum());
+        let (x0, y0) = (xs[0], ys[0]);
+        let steps = xs.iter().zip(ys.iter()).zip(xs[1..].iter().zip(&ys[1..]));
+        // Written so that what is no number is not ahead.
+        let ahead = steps.fold(true, |ahead, ((x_before, y_before), (x, y))| {
+            let forwards = (x_before * y - y_before * x) * direction > least;
+            ahead & forwards & (x0 * x + y0 * y > 0.0)
+        });
+        if !ahead {
+            return false;
+        }
+        let (x, y) = (xs[poses.len() - 1], ys[poses.len() - 1]);
         let swept = ((x0 * y - y0 * x) * direction).atan2(x0 * x + y0 * y);
         let end = first + swept / turn.abs();
-        ahead && end < reach.high[0] - CLEAR && self.is_within_ends(reach, first, end)
+        end < reach.high[0] - CLEAR && self.is_within_ends(reach, first, end)
     }
 
     /// Whether what lies between two lengths in a block lies between the ends of the block and of the path.
