@@ -13,6 +13,11 @@ pub struct Poses {
     axes: Vec<Vector3<f64>>,
 }
 
+/// Whether all values are the same, bit for bit.
+fn stand(values: &[f64]) -> bool {
+    values.iter().all(|value| value.to_bits() == values[0].to_bits())
+}
+
 impl Poses {
     /// How many there are.
     pub fn len(&self) -> usize {
@@ -50,6 +55,11 @@ impl Poses {
     pub fn only_axis(&self) -> Option<Vector3<f64>> {
         if let [axis] = self.axes[..] { Some(axis) } else { None }
     }
+
+    /// Whether all of them are the same, bit for bit.
+    pub fn stand_still(&self) -> bool {
+        self.axes.len() <= 1 && self.tips().into_iter().all(stand)
+    }
 }
 
 impl Kinematics {
@@ -71,10 +81,9 @@ impl Kinematics {
         poses.axes.clear();
         let tables = [of(Role::A), of(Role::C)];
         let angles = |instant: usize| tables.map(|values| values.map_or(0.0, |values| values[instant]));
-        let stands = |values: &[f64]| values.iter().all(|value| value.to_bits() == values[0].to_bits());
         let [xs, ys, zs] = &mut poses.tips;
         let linear = xs.iter_mut().zip(ys.iter_mut()).zip(zs.iter_mut());
-        if instants > 0 && tables.into_iter().flatten().all(stands) {
+        if instants > 0 && tables.into_iter().flatten().all(stand) {
             let tables = self.turned(turned, angles(0));
             poses.axes.push(tables.tool_axis());
             for ((x, y), z) in linear {

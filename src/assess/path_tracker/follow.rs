@@ -112,6 +112,11 @@ impl PathTracker {
         let begin = until(0);
         let first = self.nearest(&poses.get(0), begin);
         found.push(&first);
+        // The call before found the tracker as it left it, and so would all of these.
+        if self.last.is_some() && poses.stand_still() && until(last) == begin {
+            (0..last).for_each(|_| found.push(&first));
+            return Some(Followed { first, closed_form: false });
+        }
         let reach = if last > 1 { self.reach(before, [begin, until(last)]) } else { None };
         let closed_form = poses.only_axis().and(reach).is_some_and(|reach| {
             self.follow_line(poses, reach, &mut found.distance)
@@ -123,7 +128,8 @@ impl PathTracker {
             // The tool axis stands still, and so does that of the path.
             found.orientation.resize(poses.len(), first.orientation);
         } else {
-            found.distance.truncate(1);
+            found.clear();
+            found.push(&first);
             for place in 1..=last {
                 let nearest = self.nearest(&poses.get(place), until(place));
                 found.push(&nearest);
