@@ -72,7 +72,8 @@ fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures
     let mut assessors = vec![AxisAssessor::default(); machine.axis_count()];
     let mut circles = vec![Radial::default(); machines.len()];
     let mut psec = Vec::with_capacity(machine.axis_count());
-    let (mut x, mut y) = (Vec::new(), Vec::new());
+    let mut x = vec![0.0; machine.ticks_per_period()];
+    let mut y = x.clone();
     for (k, row) in case.rows.iter().enumerate() {
         psec.clear();
         (0..machines.len()).for_each(|_| psec.extend_from_slice(row));

@@ -73,6 +73,27 @@ fn the_machine_that_is_written_runs_at_the_printed_cost() {
 }
 
 #[test]
+fn the_first_grid_is_as_fine_as_it_is_asked_for() {
+    let folder = Folder::new("tune_designs");
+    // Far enough for a whole turn at steady feed.
+    let circle = folder.file("circle.yaml", &CIRCLE.replace("turns: 1", "turns: 3"));
+    let circle = &*circle.to_string_lossy();
+    let mut arguments = vec!["tune", circle, "--controller", "gpc", "--json"];
+    arguments.extend(FEW);
+    let coarse = json(&arguments);
+    // More than the 1968 designs of the grid that is taken otherwise, and than the rounds add.
+    const DESIGNS: u64 = 4000;
+    let designs = DESIGNS.to_string();
+    arguments.extend(["--designs", &*designs]);
+    let fine = json(&arguments);
+    assert!(coarse["designs"].as_u64() < Some(DESIGNS), "{}", coarse["designs"]);
+    assert!(fine["designs"].as_u64() >= Some(DESIGNS), "{}", fine["designs"]);
+    assert!(fine["runs"].as_u64() > coarse["runs"].as_u64());
+    // What is told of the best is told as of a run of its own.
+    assert_eq!(fine["best"]["figures"]["circles"].as_array().map(Vec::len), Some(1));
+}
+
+#[test]
 fn the_text_says_what_it_was_and_what_it_becomes() {
     let folder = Folder::new("tune_text");
     let (corner, circle) = (folder.file("corner.yaml", CORNER), folder.file("circle.yaml", CIRCLE));
@@ -162,6 +183,12 @@ fn options_that_cannot_be_are_refused_by_name() {
         (vec!["--seed", "-1"], vec!["--seed"]),
         (vec!["--contrast"], vec!["--also"]),
         (vec!["--contrast", "--also", "corner-90", "--controller", "cascade"], vec!["--contrast", "gpc"]),
+        (vec!["--designs", "10", "--controller", "cascade"], vec!["--designs", "gpc"]),
+        (
+            vec!["--designs", "10", "--controller", "gpc", "--contrast", "--also", "corner-90"],
+            vec!["--designs", "--contrast"],
+        ),
+        (vec!["--designs", "0"], vec!["--designs", "'0'"]),
         (vec!["--also", "no-such"], vec!["no-such"]),
         (vec!["--out", corner], vec!["corner.yaml", "would replace what is read"]),
         (vec!["--out", &page], vec![".html", "YAML"]),
@@ -186,7 +213,8 @@ fn an_interrupted_search_leaves_nothing_behind() {
     let folder = Folder::new("tune_interrupted");
     let out = folder.0.join("out.yaml");
     let mut child = Command::new(env!("CARGO_BIN_EXE_virtual_axes"))
-        .args(["tune", "ballbar", "--controller", "gpc", "--out", &out.to_string_lossy()])
+        .args(["tune", "ballbar", "--controller", "gpc", "--designs", "1000000"])
+        .args(["--out", &out.to_string_lossy()])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()

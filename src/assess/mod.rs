@@ -14,6 +14,6 @@ pub use axis::{AxisAssessor, AxisReport};
 pub use circle::{BidirectionalReport, CircleAssessor, CircleReport, FullCircle, bidirectional};
 pub use contour::ContourTracker;
 pub use motion::{MotionAssessor, MotionReport};
-pub use path_tracker::{Nearest, PathTracker};
+pub use path_tracker::{Deviations, Followed, Nearest, PathTracker};
 pub use recording::{AxisTrace, CircleTrace, Recording, ToolTrace};
 pub use setpoint_tracker::SetpointTracker;

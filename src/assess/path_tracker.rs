@@ -1,5 +1,7 @@
 //! Distance from a geometric path.
 
+mod follow;
+
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -8,6 +10,9 @@ use nalgebra::Vector3;
 use super::path_shape::{Room, Shape, pose};
 use crate::kinematics::ToolPose;
 use crate::path::Path;
+
+pub use follow::{Deviations, Followed};
+use follow::{from_axis, from_circle, from_line};
 
 /// How far behind the furthest nearest point the next one may lie, m or rad: an axis that swings back.
 const BACK: f64 = 5e-3;
@@ -74,7 +79,8 @@ struct Candidate {
 #[derive(Debug, Clone)]
 pub struct PathTracker {
     path: Arc<Path>,
-    shapes: Vec<Shape>,
+    /// Shared by clones.
+    shapes: Arc<[Shape]>,
     /// Directions of the path at both ends, where the tip moves there.
     ends: [Option<Vector3<f64>>; 2],
     /// Largest progress of a nearest point so far.
@@ -82,20 +88,51 @@ pub struct PathTracker {
     /// The last nearest one.
     block: usize,
     s: f64,
+    /// The last call, if it found the tracker as it left it: the same one would find the same.
+    last: Option<Call>,
+    /// Room for where the feet of poses are.
+    feet: [Vec<f64>; 2],
     room: Room,
+}
+
+/// What was asked for, and what was found.
+#[derive(Debug, Clone, Copy)]
+struct Call {
+    pose: ToolPose,
+    until: f64,
+    nearest: Nearest,
+}
+
+impl Call {
+    fn is_for(&self, pose: &ToolPose, until: f64) -> bool {
+        let bits = |vector: &Vector3<f64>| [vector.x, vector.y, vector.z].map(f64::to_bits);
+        self.until == until
+            && bits(&self.pose.tip) == bits(&pose.tip)
+            && bits(&self.pose.axis) == bits(&pose.axis)
+    }
 }
 
 impl PathTracker {
     /// A tracker at the start of `path`.
     pub fn new(path: Arc<Path>) -> Self {
         let mut room = Room::new(path.joint_count());
-        let shapes: Vec<Shape> =
+        let shapes: Arc<[Shape]> =
             (0..path.blocks().len()).map(|block| Shape::new(&path, block, &mut room)).collect();
         let last = shapes.len() - 1;
         let end = path.blocks()[last].length();
         let ends =
             [(0, 0.0), (last, end)].map(|(block, s)| shapes[block].direction(&path, block, s, &mut room));
-        Self { path, shapes, ends, furthest: 0.0, block: 0, s: 0.0, room }
+        Self {
+            path,
+            shapes,
+            ends,
+            furthest: 0.0,
+            block: 0,
+            s: 0.0,
+            last: None,
+            feet: [Vec::new(), Vec::new()],
+            room,
+        }
     }
 
     /// The path.
@@ -107,6 +144,10 @@ impl PathTracker {
     /// nearest one.
     pub fn nearest(&mut self, pose: &ToolPose, until: f64) -> Nearest {
         let until = until.clamp(0.0, self.path.length()).max(self.furthest);
+        if let Some(last) = self.last.filter(|last| last.is_for(pose, until)) {
+            return last.nearest;
+        }
+        let before = (self.furthest, self.block, self.s);
         let from = (self.furthest - BACK).max(0.0);
         let window = (self.path.locate(from), self.path.locate(until));
         let best = self.search(pose, window);
@@ -115,14 +156,17 @@ impl PathTracker {
             (self.block, self.s) = (best.block, best.s);
         }
         let axis = self.shapes[best.block].axis(&self.path, best.block, best.s, &mut self.room);
-        Nearest {
+        let nearest = Nearest {
             progress: best.progress,
             point: best.point,
             axis,
             distance: best.distance,
             within_ends: self.within_ends(&best, pose),
             orientation: angle(&axis, &pose.axis),
-        }
+        };
+        let stays = before == (self.furthest, self.block, self.s);
+        self.last = stays.then_some(Call { pose: *pose, until, nearest });
+        nearest
     }
 
     /// See [`Nearest::within_ends`].
@@ -232,7 +276,7 @@ impl PathTracker {
         match &self.shapes[block] {
             Shape::Segment { from, slope, .. } => {
                 let (from, slope) = (*from, *slope);
-                let s = (slope.dot(&(pose.tip - from)) / slope.norm_squared()).clamp(low, high);
+                let s = from_line(pose.tip, from, slope).clamp(low, high);
                 let length = self.path.blocks()[block].length();
                 if s <= 0.0 || s >= length {
                     return self.still(pose, block, s);
@@ -242,16 +286,13 @@ impl PathTracker {
             }
             Shape::Circle { centre, plane, radius, start, turn, .. } => {
                 let (centre, plane, radius, turn) = (*centre, *plane, *radius, *turn);
-                let out = pose.tip - centre;
-                let [x, y, z] = plane.map(|vector| vector.dot(&out));
-                let off = (x * x + y * y).sqrt();
+                let ([x, y, z], off) = from_axis(pose.tip, centre, &plane);
                 let angle = ((y.atan2(x) - start) * turn.signum()).rem_euclid(TAU);
                 let ahead = self.furthest - SLACK - self.path.start_of(block);
                 match passage(angle / turn.abs(), TAU / turn.abs(), low, high, ahead) {
                     Some(s) if off > 0.0 => {
                         let point = centre + (plane[0] * x + plane[1] * y) * (radius / off);
-                        let outside = off - radius;
-                        self.candidate(block, s, point, (outside * outside + z * z).sqrt())
+                        self.candidate(block, s, point, from_circle(off, z, radius))
                     }
                     _ => self.nearer_end(pose, block, low, high),
                 }

@@ -144,11 +144,17 @@ impl Kinematics {
 
     /// As [`forward`](Self::forward), for poses that follow each other: `turned` is where the tables stood.
     pub fn forward_from(&self, turned: &mut Turned, joints: &[f64]) -> ToolPose {
-        turned.turn_to([self.value(joints, Role::A), self.value(joints, Role::C)]);
-        let [a, c] = turned.sin_cos;
-        let tables = Tables { geometry: &self.geometry, a, c };
+        let tables = self.turned(turned, [self.value(joints, Role::A), self.value(joints, Role::C)]);
         let linear = Role::LINEAR.map(|role| self.value(joints, role));
         ToolPose { tip: tables.tip(Vector3::from(linear)), axis: tables.tool_axis() }
+    }
+
+    /// The tables at `angles`, rad.
+    #[inline]
+    pub(super) fn turned(&self, turned: &mut Turned, angles: [f64; 2]) -> Tables<'_> {
+        turned.turn_to(angles);
+        let [a, c] = turned.sin_cos;
+        Tables { geometry: &self.geometry, a, c }
     }
 
     /// Orientation of the tool frame in the workpiece frame, `Rz(c) Rx(a)`; its Z axis is the tool axis.
@@ -256,13 +262,15 @@ pub(super) struct Tables<'a> {
 
 impl Tables<'_> {
     /// u = (sin a sin c, −sin a cos c, cos a); each component with its own relative accuracy.
-    fn tool_axis(&self) -> Vector3<f64> {
+    #[inline]
+    pub(super) fn tool_axis(&self) -> Vector3<f64> {
         let ((sin_a, cos_a), (sin_c, cos_c)) = (self.a, self.c);
         Vector3::new(sin_a * sin_c, -sin_a * cos_c, cos_a)
     }
 
     /// Tip in the workpiece frame with X, Y and Z at `linear`, m.
-    fn tip(&self, linear: Vector3<f64>) -> Vector3<f64> {
+    #[inline]
+    pub(super) fn tip(&self, linear: Vector3<f64>) -> Vector3<f64> {
         let ([pivot_a, pivot_c, workpiece], (sin_a, cos_a), (sin_c, cos_c)) = (self.points(), self.a, self.c);
         let p = linear - tool_vector(self.geometry) - pivot_a;
         let p = Vector3::new(p.x, cos_a * p.y - sin_a * p.z, sin_a * p.y + cos_a * p.z) + pivot_a - pivot_c;

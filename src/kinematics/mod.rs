@@ -40,6 +40,8 @@
 mod chain;
 mod error;
 mod inverse;
+mod poses;
 
 pub use chain::{Kinematics, Role, ToolPose, Turned};
 pub use error::KinematicsError;
+pub use poses::Poses;

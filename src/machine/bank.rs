@@ -120,11 +120,11 @@ impl Bank {
         at!(&self.blocks, axis, of, |block, lane| MotorState::get(&block.seen[tick].0, lane))
     }
 
-    /// Calls `with` on the motor angle of an axis, rad, at each tick of the last position period.
+    /// Motor angles of an axis at the ticks of the last position period, rad.
     #[inline]
-    pub fn for_each_angle(&self, axis: usize, mut with: impl FnMut(f64)) {
+    pub fn angles(&self, axis: usize, angles: &mut [f64]) {
         at!(&self.blocks, axis, of, |block, lane| {
-            block.seen.iter().for_each(|row| with(row.0.angle[lane]));
+            angles.iter_mut().zip(&block.seen).for_each(|(angle, row)| *angle = row.0.angle[lane]);
         });
     }
 

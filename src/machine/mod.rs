@@ -315,15 +315,15 @@ impl Machine {
     }
 
     /// Puts the positions of an axis at the ticks of the position period that was computed last, m or rad,
-    /// in the place of what is in `positions`.
+    /// into `positions`, as far as it goes.
     ///
     /// # Panics
     /// If there is no such axis.
     #[inline]
-    pub fn positions(&self, axis: usize, positions: &mut Vec<f64>) {
+    pub fn positions(&self, axis: usize, positions: &mut [f64]) {
         let plant = &self.parameters.axes[axis].loops.plant;
-        positions.clear();
-        self.bank.for_each_angle(axis, |angle| positions.push(plant.position(angle)));
+        self.bank.angles(axis, positions);
+        positions.iter_mut().for_each(|value| *value = plant.position(*value));
     }
 
     /// What an axis did in the position period that was computed last.

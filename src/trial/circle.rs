@@ -62,25 +62,25 @@ impl Circles {
         Circles { list: circles.take(MOST).collect(), next: 0 }
     }
 
-    /// Takes the programmed coordinates of where the axes are at `time`, s, into account.
-    pub(super) fn observe(&mut self, time: f64, coordinates: &[f64], record: bool) {
-        while self.list.get(self.next).is_some_and(|steady| time >= steady.window.end) {
-            self.next += 1;
-        }
-        let Some(steady) = self.list.get_mut(self.next).filter(|s| s.window.contains(&time)) else {
-            return;
-        };
-        let [u, v] = steady.circle.plane.map(|place| coordinates[place]);
-        let deviation = steady.assessor.push(u, v);
-        if record && self.next < TRACED && steady.trace.angle.len() < TRACE {
-            let [cu, cv] = steady.circle.centre;
-            let angle = (v - cv).atan2(u - cu);
-            let angle = match steady.trace.angle.last() {
-                Some(last) => last + (angle - last + PI).rem_euclid(2.0 * PI) - PI,
-                None => angle,
+    /// Takes where the axes are at `times`, s, into account: `coordinates` has the programmed ones of an axis.
+    pub(super) fn observe<'m>(
+        &mut self,
+        times: &[f64],
+        coordinates: impl Fn(usize) -> &'m [f64],
+        record: bool,
+    ) {
+        let Some(last) = times.last() else { return };
+        for (tick, time) in times.iter().enumerate() {
+            while self.list.get(self.next).is_some_and(|steady| *time >= steady.window.end) {
+                self.next += 1;
+            }
+            let Some(steady) = self.list.get_mut(self.next).filter(|s| *last >= s.window.start) else {
+                return;
             };
-            steady.trace.angle.push(angle);
-            steady.trace.deviation.push(deviation);
+            if steady.window.contains(time) {
+                let [u, v] = steady.circle.plane.map(|place| coordinates(place)[tick]);
+                steady.push(u, v, record && self.next < TRACED);
+            }
         }
     }
 
@@ -124,6 +124,21 @@ impl Circles {
 }
 
 impl Steady {
+    /// Adds a point; `record` keeps it for the plot.
+    fn push(&mut self, u: f64, v: f64, record: bool) {
+        let deviation = self.assessor.push(u, v);
+        if record && self.trace.angle.len() < TRACE {
+            let [cu, cv] = self.circle.centre;
+            let angle = (v - cv).atan2(u - cu);
+            let angle = match self.trace.angle.last() {
+                Some(last) => last + (angle - last + PI).rem_euclid(2.0 * PI) - PI,
+                None => angle,
+            };
+            self.trace.angle.push(angle);
+            self.trace.deviation.push(deviation);
+        }
+    }
+
     fn is_reverse_of(&self, other: &Steady) -> bool {
         let (a, b) = (&self.circle, &other.circle);
         a.plane == b.plane

@@ -1,6 +1,5 @@
 //! Contour error around the corners of a path.
 
-use crate::assess::Nearest;
 use crate::config::MachineConfig;
 use crate::path::Program;
 use crate::units::seconds;
@@ -40,13 +39,20 @@ impl Corners {
         Corners { list: corners.take(MOST).collect(), next: 0 }
     }
 
-    pub(super) fn observe(&mut self, time: f64, nearest: &Nearest) {
-        while self.list.get(self.next).is_some_and(|(corner, _)| time > corner + WINDOW) {
-            self.next += 1;
-        }
-        let open = self.list.iter_mut().skip(self.next).take_while(|(corner, _)| time >= corner - WINDOW);
-        for (_, figures) in open {
-            figures.max_contour_error = figures.max_contour_error.max(nearest.within_ends);
+    /// Takes distances from the path, less what overshoots its ends, m, at `times`, s, into account.
+    pub(super) fn observe(&mut self, times: &[f64], within_ends: &[f64]) {
+        let Some(last) = times.last() else { return };
+        for (&time, &distance) in times.iter().zip(within_ends) {
+            while self.list.get(self.next).is_some_and(|(corner, _)| time > corner + WINDOW) {
+                self.next += 1;
+            }
+            if self.list.get(self.next).is_none_or(|(corner, _)| *last < corner - WINDOW) {
+                return;
+            }
+            let open = self.list.iter_mut().skip(self.next).take_while(|(corner, _)| time >= corner - WINDOW);
+            for (_, figures) in open {
+                figures.max_contour_error = figures.max_contour_error.max(distance);
+            }
         }
     }
 

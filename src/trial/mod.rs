@@ -7,6 +7,7 @@ mod circle;
 mod corner;
 mod figures;
 mod observer;
+mod period;
 mod recorder;
 mod setpoints;
 mod supply;
@@ -31,7 +32,8 @@ pub use figures::{
 pub use setpoints::{GridSource, ProgramSource, Requests, Setpoints, SourceError, UnreachableError};
 pub use together::run_together;
 
-use observer::Observer;
+use observer::{Measures, Observer};
+use period::Period;
 use supply::Supply;
 
 /// What is to be run, besides the set-points.
@@ -141,7 +143,8 @@ fn run_by(
     mut step: impl FnMut(&mut Simulation) -> io::Result<bool>,
 ) -> Result<Outcome, TrialError> {
     let (mut simulation, mut supply, start) = begin(trial, setpoints)?;
-    let mut observer = Observer::new(trial, &start);
+    let mut observer = Observer::new(trial, &start, Measures::All);
+    let mut period = Period::new(trial.machine.periods(), start.len());
     loop {
         supply.offer_due(&mut simulation)?;
         if !simulation.is_busy() && supply.is_empty() {
@@ -152,7 +155,9 @@ fn run_by(
         let time = simulation.time_of(simulation.next_instant());
         if step(&mut simulation).map_err(TrialError::Watch)? {
             let machine = simulation.machine();
-            observer.observe(|place| (machine, place), time, moving);
+            period.begin(time, moving);
+            (0..start.len()).for_each(|place| period.put(place, machine, place));
+            observer.observe(|place| (machine, place), &mut period);
         }
     }
     Ok(observer.finish())

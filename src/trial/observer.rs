@@ -2,23 +2,20 @@
 
 use std::sync::Arc;
 
-use crate::assess::{AxisAssessor, Nearest, PathTracker, SetpointTracker};
+use crate::assess::{AxisAssessor, Deviations, Nearest, PathTracker, SetpointTracker};
 use crate::config::{AxisKind, MachineConfig};
-use crate::kinematics::{Kinematics, ToolPose, Turned};
-use crate::machine::{AxisSample, Machine};
+use crate::kinematics::{Kinematics, Poses, Role, Turned};
+use crate::machine::Machine;
 use crate::path::Frame;
 use crate::simulation::{Simulation, horizon};
-use crate::units::{Nanoseconds, seconds};
+use crate::units::seconds;
 
 use super::circle::Circles;
 use super::corner::Corners;
 use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, Reference};
+use super::period::Period;
 use super::recorder::Recorder;
 use super::{Outcome, Trial};
-
-/// How far ahead of the set-point the nearest point of a path is sought, m or rad: an axis that
-/// overshoots a corner is nearest to what comes behind it.
-const AHEAD: f64 = 5e-3;
 
 /// Largest and mean square of an error.
 #[derive(Debug, Clone, Copy, Default)]
@@ -40,13 +37,23 @@ impl Extent {
     }
 }
 
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Measures {
+    All,
+    /// Not the circles, each of which takes longer and more memory than all of the rest.
+    WithoutCircles,
+}
+
 /// What the tool is followed along.
+#[derive(Clone)]
 enum Tracker {
     Path(Box<PathTracker>),
     Setpoints(Box<SetpointTracker>),
 }
 
 /// Gathers figures and recording.
+#[derive(Clone)]
 pub(super) struct Observer<'a> {
     trial: &'a Trial<'a>,
     kinematics: Kinematics,
@@ -61,7 +68,9 @@ pub(super) struct Observer<'a> {
     /// Room for set-points to come.
     ahead: Vec<f64>,
     looked_ahead: bool,
-    position: Vec<f64>,
+    /// Where the tool was in the position period, and by how much it was off.
+    poses: Poses,
+    found: Deviations,
     contour: Extent,
     within_ends: Extent,
     orientation: Extent,
@@ -71,7 +80,7 @@ pub(super) struct Observer<'a> {
 }
 
 impl<'a> Observer<'a> {
-    pub(super) fn new(trial: &'a Trial<'a>, start: &[f64]) -> Self {
+    pub(super) fn new(trial: &'a Trial<'a>, start: &[f64], measures: Measures) -> Self {
         let machine: &MachineConfig = trial.machine;
         let count = machine.axes().len();
         let kinematics = Kinematics::new(machine);
@@ -81,6 +90,7 @@ impl<'a> Observer<'a> {
             None => Tracker::Setpoints(Box::new(SetpointTracker::new(kinematics.forward(start)))),
         });
         let program = trial.program.as_deref();
+        let circles = program.filter(|_| measures == Measures::All);
         Observer {
             trial,
             tracker,
@@ -93,11 +103,12 @@ impl<'a> Observer<'a> {
             start: start.to_vec(),
             ahead: start.to_vec(),
             looked_ahead: false,
-            position: start.to_vec(),
+            poses: Poses::default(),
+            found: Deviations::default(),
             contour: Extent::default(),
             within_ends: Extent::default(),
             orientation: Extent::default(),
-            circles: program.map(|p| Circles::of(p, machine)).unwrap_or_default(),
+            circles: circles.map(|p| Circles::of(p, machine)).unwrap_or_default(),
             // Without a tool there is no contour error to tell at a corner.
             corners: program.filter(|_| has_tool).map(|p| Corners::of(p, machine)).unwrap_or_default(),
             recorder: trial.record.then(|| Recorder::new(count)),
@@ -105,59 +116,70 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// Takes the position period in that was computed last, which began at `time` ns; `moving` tells
-    /// whether set-points are under way, and `axis` where each axis is: a machine, and the place in it.
-    pub(super) fn observe<'m>(
-        &mut self,
-        axis: impl Fn(usize) -> (&'m Machine, usize),
-        time: Nanoseconds,
-        moving: bool,
-    ) {
-        let periods = self.trial.machine.periods();
+    /// Takes a position period in; `axis` tells where each axis is: a machine, and the place in it.
+    pub(super) fn observe<'m>(&mut self, axis: impl Fn(usize) -> (&'m Machine, usize), period: &mut Period) {
         for place in 0..self.axes.len() {
             let (machine, at) = axis(place);
             let (sample, activity) = (machine.axis(at).sample(), machine.activity(at));
             self.moves[place] |= sample.psec != self.start[place];
             self.extrapolated[place] |= activity.friction_extrapolated;
-            if moving {
+            if period.moving {
                 self.axes[place].observe(sample, &activity);
             }
         }
-        let mut time = time;
-        for tick in 0..periods.ticks_per_position() as usize {
-            for (place, position) in self.position.iter_mut().enumerate() {
-                let (machine, at) = axis(place);
-                *position = machine.position(at, tick);
-            }
-            let samples = (0..self.axes.len()).map(|place| {
-                let (machine, at) = axis(place);
-                machine.axis(at).sample()
-            });
-            self.observe_tool(seconds(time), (tick == 0).then_some(samples));
-            time += periods.current;
+        self.kinematics.forward_all(&mut self.turned, &period.positions, period.ticks(), &mut self.poses);
+        let first = self.follow(period);
+        let samples = (0..self.axes.len()).map(|place| {
+            let (machine, at) = axis(place);
+            machine.axis(at).sample()
+        });
+        if let Some(recorder) = &mut self.recorder {
+            let tool = first.as_ref().map(|nearest| (nearest, self.poses.tip(0).into()));
+            recorder.push(period.times[0], samples, tool);
         }
-        self.end = seconds(time);
+        self.observe_circles(period);
+        self.end = period.end;
     }
 
-    /// Takes a tick at `time` s into account, at which the axes are at `position`; `samples` are those of a
-    /// position instant.
-    fn observe_tool<'m>(&mut self, time: f64, samples: Option<impl Iterator<Item = &'m AxisSample>>) {
-        let pose = self.kinematics.forward_from(&mut self.turned, &self.position);
-        let nearest = self.nearest(&pose, time);
-        if let Some(nearest) = &nearest {
-            self.contour.push(nearest.distance);
-            self.within_ends.push(nearest.within_ends);
-            self.orientation.push(nearest.orientation);
-            self.corners.observe(time, nearest);
+    /// Takes the tool into account: what is nearest to it at the first tick.
+    fn follow(&mut self, period: &mut Period) -> Option<Nearest> {
+        let (poses, found) = (&self.poses, &mut self.found);
+        let first = match (self.tracker.as_mut()?, &self.trial.program) {
+            (Tracker::Path(tracker), Some(program)) => {
+                tracker.follow(poses, |tick| period.until(program, tick), found)?.first
+            }
+            (Tracker::Setpoints(tracker), _) => {
+                found.clear();
+                let mut at = |tick| {
+                    let nearest = tracker.nearest(&poses.get(tick));
+                    found.push(&nearest);
+                    nearest
+                };
+                let first = at(0);
+                (1..poses.len()).for_each(|tick| _ = at(tick));
+                first
+            }
+            (Tracker::Path(_), None) => return None,
+        };
+        let each = found.distance.iter().zip(&found.within_ends).zip(&found.orientation);
+        for ((&distance, &within_ends), &orientation) in each {
+            self.contour.push(distance);
+            self.within_ends.push(within_ends);
+            self.orientation.push(orientation);
         }
-        if let (Some(samples), Some(recorder)) = (samples, &mut self.recorder) {
-            let tool = nearest.as_ref().map(|nearest| (nearest, pose.tip.into()));
-            recorder.push(time, samples, tool);
-        }
-        if self.trial.program.as_ref().is_some_and(|p| p.path().frame() == Frame::Workpiece) {
-            self.kinematics.put_tip(pose.tip, &mut self.position);
-        }
-        self.circles.observe(time, &self.position, self.recorder.is_some());
+        self.corners.observe(&period.times, &found.within_ends);
+        Some(first)
+    }
+
+    fn observe_circles(&mut self, period: &Period) {
+        let workpiece = self.trial.program.as_ref().is_some_and(|p| p.path().frame() == Frame::Workpiece);
+        let (kinematics, poses, ticks) = (&self.kinematics, &self.poses, period.ticks());
+        let tips = Role::LINEAR.map(|role| kinematics.role(role)).into_iter().zip(poses.tips());
+        let coordinates = |place: usize| {
+            let tip = tips.clone().find(|(joint, _)| workpiece && *joint == Some(place));
+            tip.map_or(&period.positions[place * ticks..][..ticks], |(_, values)| values)
+        };
+        self.circles.observe(&period.times, coordinates, self.recorder.is_some());
     }
 
     /// What was measured so far, without a recording.
@@ -212,16 +234,6 @@ impl<'a> Observer<'a> {
                 *value = simulation.psec_ahead(joint, periods).unwrap_or(*value);
             }
             tracker.push(self.kinematics.forward(&self.ahead));
-        }
-    }
-
-    fn nearest(&mut self, pose: &ToolPose, time: f64) -> Option<Nearest> {
-        match (self.tracker.as_mut()?, &self.trial.program) {
-            (Tracker::Path(tracker), Some(program)) => {
-                Some(tracker.nearest(pose, program.progress(time) + AHEAD))
-            }
-            (Tracker::Setpoints(tracker), _) => Some(tracker.nearest(pose)),
-            (Tracker::Path(_), None) => None,
         }
     }
 

@@ -88,7 +88,7 @@ fn axis_values(s: &AxisSample) -> [f64; AXIS_SIGNALS] {
 }
 
 /// Gathers a [`Recording`], one row per position instant as long as there is room.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Recorder {
     time: Vec<f64>,
     axes: Vec<[Signal; AXIS_SIGNALS]>,

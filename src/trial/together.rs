@@ -8,7 +8,8 @@ use crate::machine::{Machine, MachineParameters};
 use crate::simulation::{Simulation, SimulationError};
 
 use super::figures::Figures;
-use super::observer::Observer;
+use super::observer::{Measures, Observer};
+use super::period::Period;
 use super::setpoints::Setpoints;
 use super::{Trial, TrialError, begin};
 
@@ -64,7 +65,8 @@ impl<'a> Together<'a> {
 }
 
 /// Runs `setpoints` on each of `variants`: machines that differ from the trial's own in axes at `own` only,
-/// and neither in periods nor in delays. The figures of each are those that [`run`](super::run) finds for it.
+/// and neither in periods nor in delays. The figures of each are those that [`run`](super::run) finds for it, but
+/// without circles, each of which would cost more than all of the rest.
 /// `watch` is asked at every position period.
 ///
 /// # Errors
@@ -78,7 +80,8 @@ pub fn run_together(
 ) -> Result<Vec<Figures>, TrialError> {
     let (mut pilot, mut supply, start) = begin(trial, setpoints)?;
     let Some(mut together) = Together::new(trial, variants, own, &start)? else { return Ok(Vec::new()) };
-    let mut observers: Vec<Observer<'_>> = variants.iter().map(|_| Observer::new(trial, &start)).collect();
+    let mut observers = vec![Observer::new(trial, &start, Measures::WithoutCircles); variants.len()];
+    let mut period = Period::new(trial.machine.periods(), start.len());
     loop {
         supply.offer_due(&mut pilot)?;
         if !pilot.is_busy() && supply.is_empty() {
@@ -93,8 +96,15 @@ pub fn run_together(
         watch().map_err(TrialError::Watch)?;
         if pilot.step() {
             together.advance(variants.len());
+            period.begin(time, moving);
+            (0..start.len()).for_each(|axis| period.put(axis, pilot.machine(), axis));
             for (variant, observer) in observers.iter_mut().enumerate() {
-                observer.observe(|axis| together.find(&pilot, variant, axis), time, moving);
+                let find = |axis| together.find(&pilot, variant, axis);
+                for &axis in own {
+                    let (machine, at) = find(axis);
+                    period.put(axis, machine, at);
+                }
+                observer.observe(find, &mut period);
             }
         }
     }

@@ -31,10 +31,11 @@ pub(super) fn steady_circle(program: &Program, index: usize) -> Option<Range<f64
         let (before, behind) = ((t - HALF_STEP).max(span.start), (t + HALF_STEP).min(span.end));
         (program.progress(behind) - program.progress(before)) / (behind - before)
     };
-    let times = || (0..=LOOKS).map(|i| span.start + step * i as f64);
-    let top = times().map(feed).fold(0.0, f64::max);
-    let steady = |t: &f64| feed(*t) >= top * (1.0 - STEADY);
-    let (first, last) = (times().find(steady)?, times().rev().find(steady)?);
+    let time = |i: usize| span.start + step * i as f64;
+    let feeds: Vec<f64> = (0..=LOOKS).map(|i| feed(time(i))).collect();
+    let top = feeds.iter().copied().fold(0.0, f64::max);
+    let steady = |feed: &f64| *feed >= top * (1.0 - STEADY);
+    let (first, last) = (time(feeds.iter().position(steady)?), time(feeds.iter().rposition(steady)?));
     let turn = TAU * circle.radius / top;
     let spare = last - first - turn;
     if spare < -TURN_TOLERANCE * turn {

@@ -29,7 +29,7 @@ pub struct Candidate {
     pub cost: f64,
     /// Whether speed, current or voltage of an axis reached its limit.
     pub saturated: bool,
-    /// Everything that was measured.
+    /// What was measured: of one that was run side by side with others, all but the circles.
     pub figures: Figures,
 }
 
@@ -156,6 +156,13 @@ impl<'a> Bench<'a> {
         Ok(candidate(tuning.clone(), margins, figures, self.cost, &self.config))
     }
 
+    /// `candidate` of a run side by side with others, with everything that is measured on `course`.
+    pub(super) fn completed(&self, course: &Course, candidate: &Candidate) -> Result<Candidate, TuneError> {
+        let tuned = candidate.tuning.apply(self.parameters, &self.joints)?;
+        let figures = run(&tuned, course, self.watch, false)?.figures;
+        Ok(Candidate { figures, ..candidate.clone() })
+    }
+
     /// Runs `tuning` on a path with a recording.
     ///
     /// # Errors
@@ -251,7 +258,7 @@ pub(super) fn ranked(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
 }
 
 /// Runs a machine on a path.
-pub(super) fn run(
+fn run(
     parameters: &Parameters,
     course: &Course,
     watch: &dyn Watch,

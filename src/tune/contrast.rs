@@ -18,7 +18,7 @@ pub struct Contrast {
 
 /// Predictive controllers of the grid that keep `limits`, cost less than the machine as it is on the bench's
 /// path and more than it on `other`, with what the machine as it is costs there; those that cost most on
-/// `other` first.
+/// `other` first. The figures of the first one are complete; those of the others have no circles.
 ///
 /// # Errors
 /// [`TuneError`].
@@ -50,5 +50,9 @@ pub fn contrast(
     let pairs = better.into_iter().zip(worse).map(|(better, worse)| Contrast { better, worse });
     let mut contrasts: Vec<Contrast> = pairs.filter(|c| is_better(&c.better) && is_worse(&c.worse)).collect();
     contrasts.sort_by(|a, b| b.worse.cost.total_cmp(&a.worse.cost));
+    if let Some(worst) = contrasts.first_mut() {
+        worst.better = bench.completed(bench.course(), &worst.better)?;
+        worst.worse = bench.completed(other, &worst.worse)?;
+    }
     Ok((present, contrasts))
 }

@@ -119,7 +119,9 @@ pub fn tune_gpc_from(
             }
         }
     }
-    let best = tried.first().cloned().ok_or(TuneError::Saturated { runs })?;
+    let best = tried.first_mut().ok_or(TuneError::Saturated { runs })?;
+    *best = bench.completed(bench.course(), best)?;
+    let best = best.clone();
     Ok(Search { best, tried, designs, runs })
 }
 

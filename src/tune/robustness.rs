@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::bench::run;
 use super::cost::Cost;
 use super::course::Course;
 use super::loops::worst;
@@ -61,7 +60,7 @@ pub struct Deviated {
     pub margins: Option<Margins>,
     /// What it costs.
     pub cost: f64,
-    /// Everything that was measured.
+    /// What was measured, all but the circles.
     pub figures: Figures,
 }
 
@@ -92,8 +91,24 @@ pub fn robustness(
     let (single, combined) = (Deviation::single(by), Deviation::combined(by));
     let all: Vec<Deviation> = [Deviation::NONE].into_iter().chain(single).chain(combined).collect();
     watch.begin("deviating plants", all.len());
-    let run = |deviation: Deviation| deviated(parameters, course, cost, deviation, watch);
-    let mut runs = all.into_par_iter().map(run).collect::<Result<Vec<_>, TuneError>>()?;
+    let plants =
+        all.iter().map(|deviation| deviating(parameters, deviation)).collect::<Result<Vec<_>, _>>()?;
+    let machine = parameters.machine_config()?;
+    let axes: Vec<usize> = (0..machine.axes().len()).collect();
+    let allow = parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
+    let side_by_side = |plants: &[MachineConfig]| {
+        let figures = course.run_together(&machine, plants, &axes, allow, || watch.go_on())?;
+        figures.iter().for_each(|_| watch.done());
+        Ok(figures)
+    };
+    let share = plants.len().div_ceil(rayon::current_num_threads().max(1));
+    let figures = plants.par_chunks(share).map(side_by_side).collect::<Result<Vec<_>, TuneError>>()?;
+    let run = |((deviation, config), figures): ((Deviation, &MachineConfig), Figures)| {
+        let margins = margins(config, &figures)?;
+        Ok(Deviated { deviation, margins, cost: cost.of(&figures, config), figures })
+    };
+    let runs = all.into_iter().zip(&plants).zip(figures.into_iter().flatten()).map(run);
+    let mut runs = runs.collect::<Result<Vec<_>, TuneError>>()?;
     let combined = runs.split_off(1 + single.len());
     let nominal = runs.remove(0);
     let key = |run: &Deviated| (run.margins.is_none(), run.cost);
@@ -104,13 +119,8 @@ pub fn robustness(
     Ok(Robustness { worst: worst.unwrap_or_else(|| nominal.clone()), nominal, single: runs })
 }
 
-fn deviated(
-    parameters: &Parameters,
-    course: &Course,
-    cost: &Cost,
-    deviation: Deviation,
-    watch: &dyn Watch,
-) -> Result<Deviated, TuneError> {
+/// The machine with plants that deviate.
+fn deviating(parameters: &Parameters, deviation: &Deviation) -> Result<MachineConfig, TuneError> {
     let source = Source::named("deviation");
     let mut changed = parameters.clone();
     let factors = [
@@ -132,11 +142,7 @@ fn deviated(
         })
     };
     changed.set_all(joints.iter().flat_map(of_joint).collect())?;
-    let config = changed.machine_config()?;
-    let figures = run(&changed, course, watch, false)?.figures;
-    watch.done();
-    let margins = margins(&config, &figures)?;
-    Ok(Deviated { deviation, margins, cost: cost.of(&figures, &config), figures })
+    Ok(changed.machine_config()?)
 }
 
 /// Of the worst axis that moves: the controller for the nominal plant on the plant as it is.

@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+"""How many tunings are screened in which time, and what a second core is worth.
+
+    cargo build --release --no-default-features --bin virtual_axes
+    tools/measure_screening.py                          # 100 000 designs on the ballbar
+    tools/measure_screening.py --designs 5000 --scenario corner-90
+
+Each design of a predictive controller that is stable is run on the scenario; the best are refined. A machine-second is
+a second of one machine on the path, all of its axes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+PROGRAM = Path(__file__).resolve().parent.parent / "target" / "release" / "virtual_axes"
+
+
+def screen(arguments: argparse.Namespace, designs: int, threads: int) -> float:
+    """Screens, prints what it took, and returns the machine-seconds per second."""
+    command = [
+        str(arguments.program), "tune", arguments.scenario, "--controller", "gpc", "--designs", str(designs),
+        "--modulus-margin", "0", "--delay-margin-ms", "0", "--json",
+    ]  # fmt: skip
+    environment = {**os.environ, "RAYON_NUM_THREADS": str(threads)}
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    seconds = time.monotonic() - start
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(command)}: ended with {done.returncode}")
+    found = json.loads(done.stdout)
+    runs, duration = found["runs"], found["best"]["figures"]["duration_s"]
+    core = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    rate = runs * duration / seconds
+    print(f"{threads} threads: {found['designs']} designs, {runs} tunings run in {seconds:.1f} s")
+    print(f"  {rate:.0f} machine-seconds per second; {core:.1f} s on the cores, ", end="")
+    print(f"{runs * duration / core:.0f} machine-seconds per second on one", flush=True)
+    return rate
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", type=Path, default=PROGRAM)
+    parser.add_argument("--scenario", default="ballbar")
+    parser.add_argument("--designs", type=int, default=100_000)
+    parser.add_argument("--part", type=int, default=10, help="one core screens the designs divided by this")
+    arguments = parser.parse_args()
+    two = screen(arguments, arguments.designs, 2)
+    one = screen(arguments, max(arguments.designs // arguments.part, 1), 1)
+    print(f"two cores are worth {two / one:.2f} of one")
+
+
+if __name__ == "__main__":
+    main()
