@@ -1,6 +1,6 @@
 //! Friction as a function of velocity, and how it acts over one tick.
 
-use super::elementary::{MAX_EXPONENT, exponential, log2_rate};
+use super::elementary::{Exponential, MAX_EXPONENT};
 use crate::config::{AxisKind, FrictionConfig};
 use crate::lanes::lanes;
 use crate::units::{METRE_PER_MINUTE, RPM};
@@ -15,32 +15,14 @@ lanes! {
     /// ±i0. V is in m/min (linear axis) or rev/min (rotary axis). The torque is `Kt i_f`.
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct Friction as FrictionLanes {
-        first: Term,
-        second: Term,
+        first: Exponential,
+        second: Exponential,
         /// Kt i0, N·m.
         breakaway: f64,
         /// Speed from which on the law stays as it is, rad/s: its exponentials leave the range of numbers.
         capped_from: f64,
         /// Speed up to which the law was fitted, rad/s.
         fitted_to: f64,
-    }
-}
-
-lanes! {
-    /// `torque · e^{rate |ω|}`.
-    #[derive(Debug, Clone, Copy, PartialEq)]
-    pub(super) struct Term as TermLanes {
-        /// N·m.
-        torque: f64,
-        /// s/rad.
-        rate: f64,
-        rate_log2: f64,
-    }
-}
-
-impl Term {
-    fn new(torque: f64, rate: f64) -> Self {
-        Term { torque, rate, rate_log2: log2_rate(rate) }
     }
 }
 
@@ -54,8 +36,8 @@ impl Friction {
         };
         // V per ω of the motor.
         let velocity = transmission_ratio / unit;
-        let first = Term::new(torque_constant * law.a, law.b * velocity);
-        let second = Term::new(torque_constant * law.c, law.d * velocity);
+        let first = Exponential::new(torque_constant * law.a, law.b * velocity);
+        let second = Exponential::new(torque_constant * law.c, law.d * velocity);
         Friction {
             first,
             second,
@@ -70,8 +52,7 @@ impl Friction {
     pub fn bound(&self, speed: f64) -> f64 {
         let size = speed.abs();
         let size = if size < self.capped_from { size } else { self.capped_from };
-        let term = |t: &Term| exponential(size, t.rate, t.rate_log2);
-        let moving = self.first.torque.mul_add(term(&self.first), self.second.torque * term(&self.second));
+        let moving = self.first.at(size) + self.second.at(size);
         let torque = if speed == 0.0 { self.breakaway } else { moving };
         // Extrapolated, the law may change its sign.
         if torque > 0.0 { torque } else { 0.0 }

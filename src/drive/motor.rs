@@ -37,6 +37,9 @@ lanes! {
         angle: Row,
         /// Torque per change of ω over one tick, (N·m)/(rad/s).
         torque_per_speed: f64,
+        /// What a torque that changes ω by 1 rad/s over one tick changes i and θ by, A and rad.
+        current_per_speed: f64,
+        angle_per_speed: f64,
     }
 }
 
@@ -54,8 +57,9 @@ lanes! {
 impl Row {
     #[inline(always)]
     fn apply(&self, s: &MotorState, voltage: f64, torque: f64) -> f64 {
-        let held = self.voltage.mul_add(voltage, self.torque * torque);
-        self.current.mul_add(s.current, self.speed.mul_add(s.speed, held))
+        // The voltage is known last.
+        let rest = self.current.mul_add(s.current, self.speed.mul_add(s.speed, self.torque * torque));
+        self.voltage.mul_add(voltage, rest)
     }
 }
 
@@ -84,7 +88,15 @@ impl Motor {
         if !sound {
             return Err(DriveError::Discretisation { period_s: period, speed_per_torque: speed.torque });
         }
-        Ok(Motor { current: row(0), speed, angle: row(2), torque_per_speed })
+        let (current, angle) = (row(0), row(2));
+        Ok(Motor {
+            current,
+            speed,
+            angle,
+            torque_per_speed,
+            current_per_speed: current.torque * torque_per_speed,
+            angle_per_speed: angle.torque * torque_per_speed,
+        })
     }
 
     /// State at the end of the tick under `voltage` and a held `torque`.
@@ -109,16 +121,14 @@ impl Motor {
         external: f64,
         slowing: f64,
     ) -> (MotorState, f64) {
-        let free = self.speed.apply(s, voltage, external);
-        let taken = limited(free, slowing);
-        let friction = taken * self.torque_per_speed;
-        let torque = external - friction;
+        let free = self.step(s, voltage, external);
+        let taken = limited(free.speed, slowing);
         let state = MotorState {
-            current: self.current.apply(s, voltage, torque),
-            speed: free - taken,
-            angle: s.angle + self.angle.apply(s, voltage, torque),
+            current: taken.mul_add(-self.current_per_speed, free.current),
+            speed: free.speed - taken,
+            angle: taken.mul_add(-self.angle_per_speed, free.angle),
         };
-        (state, friction)
+        (state, taken * self.torque_per_speed)
     }
 
     /// Change of ω over a tick per torque that acts over it, (rad/s)/(N·m).
