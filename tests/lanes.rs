@@ -182,7 +182,7 @@ fn a_period_of_poses_is_as_far_from_the_path_as_each_of_them() {
     // Share of the periods that go by a closed form: all but those at rest or about a corner on lines and
     // circles, none on splines.
     for (scenario, closed) in [
-        ("ballbar", 0.75..1.0),
+        ("ballbar", 0.8..1.0),
         ("ballbar-both", 0.75..1.0),
         ("corner-90", 0.2..1.0),
         ("contour-a", 0.2..1.0),

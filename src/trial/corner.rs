@@ -57,6 +57,6 @@ impl Corners {
     }
 
     pub(super) fn figures(&self) -> Vec<CornerFigures> {
-        self.list.iter().map(|(_, figures)| figures.clone()).collect()
+        self.list.iter().map(|(_, figures)| *figures).collect()
     }
 }

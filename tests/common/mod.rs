@@ -214,7 +214,7 @@ impl Ballbar {
 
     /// Distance of a point from the circle, positive outside.
     pub fn radial_deviation(&self, x: f64, y: f64) -> f64 {
-        (x + self.radius).hypot(y) - self.radius
+        ((x + self.radius).powi(2) + y * y).sqrt() - self.radius
     }
 }
 

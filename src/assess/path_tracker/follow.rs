@@ -8,9 +8,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::{BACK, Nearest, PathTracker};
+use super::{BACK, Candidate, Nearest, PathTracker};
 use crate::assess::path_shape::Shape;
-use crate::kinematics::Poses;
+use crate::kinematics::{Poses, ToolPose};
 
 /// How far from the ends of what is searched all feet must lie, m: more than rounding moves them.
 const CLEAR: f64 = 1e-9;
@@ -117,6 +117,12 @@ impl PathTracker {
             (0..last).for_each(|_| found.push(&first));
             return Some(Followed { first, closed_form: false });
         }
+        if poses.only_axis().is_some() && begin >= self.path.length() && self.all_beyond(poses, &first) {
+            for place in 1..=last {
+                found.push(&self.at_end(&poses.get(place), &first));
+            }
+            return Some(Followed { first, closed_form: true });
+        }
         let reach = if last > 1 { self.reach(before, [begin, until(last)]) } else { None };
         let closed_form = poses.only_axis().and(reach).is_some_and(|reach| {
             self.follow_line(poses, reach, &mut found.distance)
@@ -136,6 +142,47 @@ impl PathTracker {
             }
         }
         Some(Followed { first, closed_form })
+    }
+
+    /// Whether all of `poses` lie beyond the path's last point, to which the first of them is nearest, and all of
+    /// the path has been commanded.
+    fn all_beyond(&self, poses: &Poses, first: &Nearest) -> bool {
+        let (block, length) = (self.block, self.path.blocks()[self.block].length());
+        let is_last = block + 1 == self.path.blocks().len();
+        let at_end = is_last && first.progress >= self.path.length() && self.s >= length;
+        let low = self.furthest - BACK;
+        if !at_end || self.path.locate(low.max(0.0)).0 != block || self.furthest < self.path.length() {
+            return false;
+        }
+        // Written so that what is no number is not beyond.
+        match &self.shapes[block] {
+            Shape::Segment { from, slope, .. } => {
+                tips(poses).all(|tip| from_line(tip, *from, *slope) > length + CLEAR)
+            }
+            // The begin of what is searched is further off than the end, less than a quarter of a turn before.
+            Shape::Circle { centre, plane, radius, turn, .. } if BACK * turn.abs() < 1.0 && length > BACK => {
+                let (least, direction) = (FORWARDS * radius * radius, turn.signum());
+                let ([x0, y0, _], _) = from_axis(first.point, *centre, plane);
+                tips(poses).all(|tip| {
+                    let ([x, y, _], _) = from_axis(tip, *centre, plane);
+                    (x0 * y - y0 * x) * direction > least && x0 * x + y0 * y > 0.0
+                })
+            }
+            _ => false,
+        }
+    }
+
+    /// What is nearest to a pose beyond the path's last point, which `first` is nearest to.
+    fn at_end(&self, pose: &ToolPose, first: &Nearest) -> Nearest {
+        let distance = (pose.tip - first.point).norm();
+        let end = Candidate {
+            block: self.block,
+            s: self.s,
+            progress: first.progress,
+            point: first.point,
+            distance,
+        };
+        Nearest { distance, within_ends: self.within_ends(&end, pose), ..*first }
     }
 
     /// What is searched for poses, the first of which has been sought already, if it lies in one block.
