@@ -3,6 +3,8 @@
 //! This is the only place where the recurrence of an axis is run. Each loop below goes over lanes, takes the
 //! values of one axis, and says what happens to it; vectors are the compiler's business.
 
+#![allow(clippy::needless_range_loop, reason = "a lane is an index into several arrays")]
+
 use crate::control::{Pi, PiState};
 use crate::drive::{Friction, MotorState, MotorStateLanes, Plant};
 use crate::lanes::{Lane, lanes, select};
