@@ -76,7 +76,7 @@ fn the_machine_that_is_written_runs_at_the_printed_cost() {
 fn the_first_grid_is_as_fine_as_it_is_asked_for() {
     let folder = Folder::new("tune_designs");
     // Far enough for a whole turn at steady feed.
-    let circle = folder.file("circle.yaml", &CIRCLE.replace("turns: 1", "turns: 3"));
+    let circle = folder.file("circle.yaml", CIRCLE.replace("turns: 1", "turns: 3"));
     let circle = &*circle.to_string_lossy();
     let mut arguments = vec!["tune", circle, "--controller", "gpc", "--json"];
     arguments.extend(FEW);
