@@ -181,17 +181,21 @@ impl<const L: usize> Block<L> {
     #[inline(always)]
     pub fn run<const TRACED: bool>(&mut self, timing: Timing) {
         self.begin();
+        // A copy that nothing else points to: it need not be in memory at every tick.
+        let mut held = self.state.clone();
+        let now = &mut held.0;
         for instant in 0..timing.instants() {
-            self.control_velocity(instant);
+            self.control_velocity(now, instant);
             let first = instant * timing.ticks_per_velocity;
             for tick in first..first + timing.ticks_per_velocity {
                 if TRACED || tick == 0 {
-                    self.tick::<true>(tick);
+                    self.tick::<true>(now, tick);
                 } else {
-                    self.tick::<false>(tick);
+                    self.tick::<false>(now, tick);
                 }
             }
         }
+        self.state = held;
         self.find_peaks();
     }
 
@@ -207,8 +211,8 @@ impl<const L: usize> Block<L> {
 
     /// The velocity loop: torque from the error of the speed, and i* from that.
     #[inline(always)]
-    fn control_velocity(&mut self, instant: usize) {
-        let Block { loops: Row(loops), state: Row(state), demand: Row(demand), .. } = self;
+    fn control_velocity(&self, state: &mut LoopsStateLanes<L>, instant: usize) {
+        let Block { loops: Row(loops), demand: Row(demand), .. } = self;
         let (compensation, compensating) = (&self.compensation, self.compensating);
         let since_instant = instant as f64;
         let more = if compensating { compensation[instant].0 } else { [0.0; L] };
@@ -227,15 +231,15 @@ impl<const L: usize> Block<L> {
 
     /// The current loop and the plant.
     #[inline(always)]
-    fn tick<const KEPT: bool>(&mut self, tick: usize) {
-        self.seen[tick].0.clone_from(&self.state.0.motor);
-        let (friction, gravity) = (self.state.0.friction, self.state.0.gravity);
-        let voltages = if self.tilting { self.step::<true>() } else { self.step::<false>() };
+    fn tick<const KEPT: bool>(&mut self, state: &mut LoopsStateLanes<L>, tick: usize) {
+        self.seen[tick].0.clone_from(&state.motor);
+        let (friction, gravity) = (state.friction, state.gravity);
+        let voltages = if self.tilting { self.step::<true>(state) } else { self.step::<false>(state) };
         if KEPT || self.tilting {
-            self.state.0.gravity = self.gravity.0;
+            state.gravity = self.gravity.0;
         }
         if KEPT {
-            let Block { state: Row(state), demand: Row(demand), done, .. } = self;
+            let Block { demand: Row(demand), done, .. } = self;
             let done = &mut done[tick].0;
             done.current_setpoint = state.current_setpoint;
             (done.voltage, done.friction, done.gravity) = (voltages, friction, gravity);
@@ -251,10 +255,8 @@ impl<const L: usize> Block<L> {
     /// The bounds of friction come first, for all lanes: their exponentials are a long chain of arithmetic,
     /// and those of the next lanes fill the time that one waits for itself.
     #[inline(always)]
-    fn step<const TILTING: bool>(&mut self) -> [f64; L] {
-        let Block {
-            loops: Row(loops), state: Row(state), demand: Row(demand), gravity: Row(gravity), ..
-        } = self;
+    fn step<const TILTING: bool>(&mut self, state: &mut LoopsStateLanes<L>) -> [f64; L] {
+        let Block { loops: Row(loops), demand: Row(demand), gravity: Row(gravity), .. } = self;
         let (mut slowing, mut voltages) = (Row([0.0; L]), Row([0.0; L]));
         for lane in 0..L {
             slowing.0[lane] = Friction::get(&loops.plant.slowing, lane).bound(state.motor.speed[lane]);
