@@ -18,7 +18,7 @@ pub enum Width {
     #[default]
     Widest,
     /// As every processor of its kind has them. Where multiplication and addition are not fused by the
-    /// hardware this is some ten times slower.
+    /// hardware this is far slower.
     Baseline,
 }
 
