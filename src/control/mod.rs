@@ -10,7 +10,7 @@ mod rst;
 mod setpoint;
 mod transfer;
 
-pub use pi::{Pi, PiLanes, PiState, PiStateLanes};
+pub use pi::{Pi, PiState};
 pub use position::{Guard, PositionController, PositionState};
 pub(crate) use rst::INTEGRATOR_TOLERANCE;
 pub use rst::{MAX_COEFFICIENTS, MAX_PREVIEW, Rst, RstError};

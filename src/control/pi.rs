@@ -1,9 +1,9 @@
 //! PI controller with feedforward, output limit and anti-windup.
 
 use crate::config::PiConfig;
-use crate::lanes::{lanes, limited};
+use crate::lanes::{Number, limited, numbers};
 
-lanes! {
+numbers! {
     /// A sampled PI controller whose integral is in units of its output.
     ///
     /// ```text
@@ -16,52 +16,55 @@ lanes! {
     /// The output may be given in another unit: `w` is multiplied by `scale` then, and `y` limited in that
     /// unit (the velocity loop computes a torque and is limited in current, scale 1/Kt).
     #[derive(Debug, Clone, Copy, PartialEq)]
-    pub struct Pi as PiLanes {
-        gain: f64,
-        integral_gain: f64,
-        scale: f64,
-        limit: f64,
+    pub struct Pi {
+        integral_gain: N,
+        /// What an error makes of the scaled output at once: (K + K T/Ti) scale.
+        gain: N,
+        scale: N,
+        limit: N,
     }
 }
 
-lanes! {
+numbers! {
     /// Memory of a [`Pi`].
     #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct PiState as PiStateLanes {
+    pub struct PiState {
         /// I, in units of the unscaled output.
-        pub integral: f64,
-        /// Whether the last output was limited.
-        pub limited: bool,
+        pub integral: N,
+        /// By how much the last output was over its limit, in its unit; 0 where it was not.
+        pub excess: N,
     }
 }
 
 impl Pi {
     /// Controller with sampling period `period` (s), output multiplied by `scale` and limited to ±`limit`.
     pub fn new(config: &PiConfig, period: f64, scale: f64, limit: f64) -> Self {
-        Pi { gain: config.gain, integral_gain: config.gain * period / config.integral_time, scale, limit }
+        let integral_gain = config.gain * period / config.integral_time;
+        Pi { integral_gain, gain: (config.gain + integral_gain) * scale, scale, limit }
     }
+}
 
+impl<N: Number> Pi<N> {
     /// One instant: error in, limited output back. The output is not scaled.
     #[inline(always)]
-    pub fn update(&self, s: &mut PiState, error: f64) -> f64 {
-        self.output(s, error, |wanted| wanted)
+    pub fn update(&self, s: &mut PiState<N>, error: N) -> N {
+        self.output(s, error, s.integral)
     }
 
     /// One instant: error and feedforward in, scaled and limited output back.
     #[inline(always)]
-    pub fn update_with(&self, s: &mut PiState, error: f64, feedforward: f64) -> f64 {
-        self.output(s, error, |wanted| (wanted + feedforward) * self.scale)
+    pub fn update_with(&self, s: &mut PiState<N>, error: N, feedforward: N) -> N {
+        self.output(s, error, (s.integral + feedforward) * self.scale)
     }
 
     #[inline(always)]
-    fn output(&self, s: &mut PiState, error: f64, scaled: impl Fn(f64) -> f64) -> f64 {
+    fn output(&self, s: &mut PiState<N>, error: N, rest: N) -> N {
         let step = self.integral_gain * error;
-        let wanted = scaled(self.gain.mul_add(error, s.integral + step));
+        let wanted = self.gain.mul_add(error, rest);
         let y = limited(wanted, self.limit);
-        let excess = wanted - y;
-        s.limited = excess != 0.0;
-        // Adding nothing, rather than not adding, keeps the loop over lanes free of conditional stores.
-        s.integral += if error * excess > 0.0 { 0.0 } else { step };
+        s.excess = wanted - y;
+        let nothing = error.constant(0.0);
+        s.integral = s.integral + nothing.select(nothing.less(error * s.excess), step);
         y
     }
 }
@@ -89,12 +92,12 @@ mod tests {
             assert_eq!(pi().update(&mut s, 8.0), 10.0);
         }
         assert_eq!(s.integral, 0.0);
-        assert!(s.limited);
+        assert_eq!(s.excess, 8.0);
     }
 
     #[test]
     fn error_against_the_excess_still_unwinds() {
-        let mut s = PiState { integral: 30.0, limited: false };
+        let mut s = PiState { integral: 30.0, excess: 0.0 };
         assert_eq!(pi().update(&mut s, -4.0), 10.0);
         assert_eq!(s.integral, 29.0);
     }

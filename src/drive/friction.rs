@@ -1,28 +1,28 @@
 //! Friction as a function of velocity, and how it acts over one tick.
 
 use super::elementary::{Exponential, MAX_EXPONENT};
+use super::expansion::{Expansion, Pair};
 use crate::config::{AxisKind, FrictionConfig};
-use crate::lanes::lanes;
+use crate::lanes::{Number, numbers};
 use crate::units::{METRE_PER_MINUTE, RPM};
 
 /// Velocity up to which the law was fitted, m/min or rev/min (Prévost eq. 3).
 const FITTED_RANGE: f64 = 20.0;
 
-lanes! {
+numbers! {
     /// Double-exponential friction law of one axis, seen from its motor.
     ///
     /// (Prévost eq. 3) `i_f(V) = a e^{bV} + c e^{dV}` for V > 0, odd in V; at standstill any value within
     /// ±i0. V is in m/min (linear axis) or rev/min (rotary axis). The torque is `Kt i_f`.
     #[derive(Debug, Clone, Copy, PartialEq)]
-    pub struct Friction as FrictionLanes {
-        first: Exponential,
-        second: Exponential,
+    pub struct Friction {
+        moving: Pair<N>,
         /// Kt i0, N·m.
-        breakaway: f64,
+        breakaway: N,
         /// Speed from which on the law stays as it is, rad/s: its exponentials leave the range of numbers.
-        capped_from: f64,
+        capped_from: N,
         /// Speed up to which the law was fitted, rad/s.
-        fitted_to: f64,
+        fitted_to: N,
     }
 }
 
@@ -36,32 +36,66 @@ impl Friction {
         };
         // V per ω of the motor.
         let velocity = transmission_ratio / unit;
-        let first = Exponential::new(torque_constant * law.a, law.b * velocity);
-        let second = Exponential::new(torque_constant * law.c, law.d * velocity);
+        let exponential = |size: f64, rate: f64| Exponential::new(torque_constant * size, rate * velocity);
+        let moving = Pair::new(exponential(law.a, law.b), exponential(law.c, law.d));
         Friction {
-            first,
-            second,
+            moving,
             breakaway: torque_constant * law.i0,
-            capped_from: (MAX_EXPONENT / first.rate.abs().max(second.rate.abs())).min(f64::MAX),
+            capped_from: f64::min(MAX_EXPONENT / moving.scale(), f64::MAX),
             fitted_to: FITTED_RANGE / velocity,
         }
     }
 
     /// Largest friction torque at motor speed ω (rad/s), N·m; never negative.
-    #[inline(always)]
     pub fn bound(&self, speed: f64) -> f64 {
-        let size = speed.abs();
-        let size = if size < self.capped_from { size } else { self.capped_from };
-        let moving = self.first.at(size) + self.second.at(size);
-        let torque = if speed == 0.0 { self.breakaway } else { moving };
-        // Extrapolated, the law may change its sign.
-        if torque > 0.0 { torque } else { 0.0 }
+        self.resisting(speed, self.moving.at(self.size(speed)))
+    }
+
+    /// The law near motor speed ω, rad/s.
+    pub(crate) fn near(&self, speed: f64) -> Expansion {
+        self.moving.near(self.size(speed))
     }
 
     /// Whether the law is extrapolated at motor speed ω (rad/s).
     #[inline(always)]
     pub fn is_extrapolated(&self, speed: f64) -> bool {
         speed.abs() > self.fitted_to
+    }
+}
+
+impl<N: Number> Friction<N> {
+    /// How far motor speed ω (rad/s) is from the middle of an expansion.
+    #[inline(always)]
+    pub(crate) fn distance(&self, near: &Expansion<N>, speed: N) -> N {
+        self.moving.distance(near, self.size(speed))
+    }
+
+    /// The expansions to go on with at motor speed ω (rad/s), some of which it has left: each is replaced that
+    /// does not hold at its `distance`, and no other.
+    #[inline(always)]
+    pub(crate) fn renewed(&self, near: &Expansion<N>, speed: N, distance: N) -> Expansion<N> {
+        let next = self.moving.near(self.moving.ahead(self.size(speed), distance));
+        near.or(&next, distance)
+    }
+
+    /// Largest friction torque at motor speed ω (rad/s), at a `distance` that the expansion reaches, N·m.
+    #[inline(always)]
+    pub(crate) fn bound_near(&self, near: &Expansion<N>, speed: N, distance: N) -> N {
+        self.resisting(speed, near.at(distance))
+    }
+
+    /// |ω|, as far as the law goes.
+    #[inline(always)]
+    fn size(&self, speed: N) -> N {
+        self.capped_from.min(speed.abs())
+    }
+
+    #[inline(always)]
+    fn resisting(&self, speed: N, moving: N) -> N {
+        let nothing = speed.constant(0.0);
+        let torque = moving.select(nothing.less(speed.abs()), self.breakaway);
+        // Extrapolated, the law may change its sign.
+        torque.max(nothing)
     }
 }
 
@@ -95,12 +129,51 @@ mod tests {
         }
     }
 
+    /// The bound at each of `speeds`, one after the other, as an axis finds it on its way.
+    fn on_the_way(
+        friction: &Friction,
+        speeds: impl Iterator<Item = f64>,
+    ) -> impl Iterator<Item = (f64, f64)> {
+        let mut near = friction.near(0.0);
+        speeds.map(move |speed| {
+            let distance = friction.distance(&near, speed);
+            if Expansion::is_left(distance) {
+                near = friction.renewed(&near, speed, distance);
+            }
+            let distance = friction.distance(&near, speed);
+            assert!(!Expansion::is_left(distance), "{speed} rad/s");
+            (speed, friction.bound_near(&near, speed, distance))
+        })
+    }
+
+    #[test]
+    fn the_law_is_as_near_to_what_is_printed_where_it_is_expanded() {
+        let config = Parameters::embedded_default()
+            .and_then(|p| p.machine_config())
+            .expect("the embedded machine is valid");
+        for axis in config.axes() {
+            let unit = if axis.kind == AxisKind::Linear { METRE_PER_MINUTE } else { RPM };
+            let friction = Friction::new(axis.friction, axis.kind, unit, 1.0);
+            let fastest = 5.0 * FITTED_RANGE;
+            // To and fro with steps of every size: many within an expansion, some over several of them.
+            let slow = (0..2_000_000).map(|k| fastest * (1e-5 * f64::from(k)).sin());
+            let jumping = (0..100_000).map(|k| fastest * (0.37 * f64::from(k)).sin());
+            for (v, found) in on_the_way(&friction, slow.chain(jumping)) {
+                let exact = if v == 0.0 { axis.friction.i0 } else { printed(&axis.friction, v.abs()) };
+                assert!((found - exact).abs() <= 1e-12, "{}: {found} A at {v}, not {exact} A", axis.name);
+            }
+        }
+    }
+
     #[test]
     fn a_law_that_leaves_the_range_of_numbers_is_finite_and_never_drives() {
         let law = |a, c| FrictionConfig { a, b: 0.5, c, d: 0.7, i0: 1.0 };
         for speed in [1.0, 1e3, 1e9, f64::MAX, f64::INFINITY] {
             let strong = Friction::new(law(1.0, 1.0), AxisKind::Linear, 1.0, 1.0).bound(speed);
             assert!(strong.is_finite() && strong > 0.0, "{strong} at {speed}");
+            let friction = Friction::new(law(1.0, 1.0), AxisKind::Linear, 1.0, 1.0);
+            let (_, expanded) = on_the_way(&friction, [speed].into_iter()).next().expect("there is one");
+            assert!((expanded / strong - 1.0).abs() <= 1e-12, "{expanded}, not {strong} at {speed}");
             let turned = Friction::new(law(1.0, -2.0), AxisKind::Linear, 1.0, 1.0).bound(speed);
             assert_eq!(turned, 0.0, "at {speed}");
         }

@@ -2,17 +2,17 @@
 
 use super::elementary::sine;
 use crate::config::GravityConfig;
-use crate::lanes::lanes;
+use crate::lanes::{Number, numbers};
 
-lanes! {
+numbers! {
     /// `C_gravity = r (W + k sin(SP + φ))`, N·m at the motor, positive against motion towards plus.
     #[derive(Debug, Clone, Copy, PartialEq)]
-    pub struct Gravity as GravityLanes {
+    pub struct Gravity {
         /// r W, N·m.
-        weight: f64,
+        weight: N,
         /// r k, N·m.
-        tilt: f64,
-        phase: f64,
+        tilt: N,
+        phase: N,
     }
 }
 
@@ -30,10 +30,18 @@ impl Gravity {
     pub fn is_tilting(&self) -> bool {
         self.tilt != 0.0
     }
+}
+
+impl<N: Number> Gravity<N> {
+    /// Torque of an axis that does not tilt, N·m at the motor.
+    #[inline(always)]
+    pub(super) fn weight(&self) -> N {
+        self.weight
+    }
 
     /// Torque at the axis position `position` (m or rad), N·m at the motor.
     #[inline(always)]
-    pub fn torque(&self, position: f64) -> f64 {
+    pub fn torque(&self, position: N) -> N {
         self.tilt.mul_add(sine(position + self.phase), self.weight)
     }
 }

@@ -9,15 +9,17 @@
 //! ```
 
 mod elementary;
+mod expansion;
 mod friction;
 mod gravity;
 mod motor;
 mod plant;
 
-pub use friction::{Friction, FrictionLanes};
-pub use gravity::{Gravity, GravityLanes};
-pub use motor::{Motor, MotorLanes, MotorState, MotorStateLanes};
-pub use plant::{Plant, PlantLanes, Torques};
+pub(crate) use expansion::Expansion;
+pub use friction::Friction;
+pub use gravity::Gravity;
+pub use motor::{Motor, MotorState};
+pub use plant::{Plant, Torques};
 
 /// Why a plant cannot be built from its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

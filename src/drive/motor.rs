@@ -4,22 +4,22 @@ use nalgebra::SMatrix;
 
 use super::DriveError;
 use crate::config::MotorConfig;
-use crate::lanes::{lanes, limited};
+use crate::lanes::{Number, limited, numbers};
 
-lanes! {
+numbers! {
     /// State of a motor: what the differential equation integrates.
     #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct MotorState as MotorStateLanes {
+    pub struct MotorState {
         /// i, A.
-        pub current: f64,
+        pub current: N,
         /// ω, rad/s (m/s for a linear motor).
-        pub speed: f64,
+        pub speed: N,
         /// θ, rad (m for a linear motor).
-        pub angle: f64,
+        pub angle: N,
     }
 }
 
-lanes! {
+numbers! {
     /// Zero-order-hold discretisation of Prévost eq. 1 over one tick.
     ///
     /// With voltage u and torque τ (everything but Kt·i) held,
@@ -31,32 +31,32 @@ lanes! {
     ///
     /// where Φ, Γ are blocks of the exponential of the augmented system matrix times the tick.
     #[derive(Debug, Clone, Copy, PartialEq)]
-    pub struct Motor as MotorLanes {
-        current: Row,
-        speed: Row,
-        angle: Row,
+    pub struct Motor {
+        current: Row<N>,
+        speed: Row<N>,
+        angle: Row<N>,
         /// Torque per change of ω over one tick, (N·m)/(rad/s).
-        torque_per_speed: f64,
+        torque_per_speed: N,
         /// What a torque that changes ω by 1 rad/s over one tick changes i and θ by, A and rad.
-        current_per_speed: f64,
-        angle_per_speed: f64,
+        current_per_speed: N,
+        angle_per_speed: N,
     }
 }
 
-lanes! {
+numbers! {
     /// One row of the discretised system: the weights of i, ω, u and τ.
     #[derive(Debug, Clone, Copy, PartialEq)]
-    pub(super) struct Row as RowLanes {
-        current: f64,
-        speed: f64,
-        voltage: f64,
-        torque: f64,
+    pub(super) struct Row {
+        current: N,
+        speed: N,
+        voltage: N,
+        torque: N,
     }
 }
 
-impl Row {
+impl<N: Number> Row<N> {
     #[inline(always)]
-    fn apply(&self, s: &MotorState, voltage: f64, torque: f64) -> f64 {
+    fn apply(&self, s: &MotorState<N>, voltage: N, torque: N) -> N {
         // The voltage is known last.
         let rest = self.current.mul_add(s.current, self.speed.mul_add(s.speed, self.torque * torque));
         self.voltage.mul_add(voltage, rest)
@@ -99,9 +99,16 @@ impl Motor {
         })
     }
 
+    /// Change of ω over a tick per torque that acts over it, (rad/s)/(N·m).
+    pub(super) fn speed_per_torque(&self) -> f64 {
+        self.speed.torque
+    }
+}
+
+impl<N: Number> Motor<N> {
     /// State at the end of the tick under `voltage` and a held `torque`.
     #[inline(always)]
-    pub fn step(&self, s: &MotorState, voltage: f64, torque: f64) -> MotorState {
+    pub fn step(&self, s: &MotorState<N>, voltage: N, torque: N) -> MotorState<N> {
         MotorState {
             current: self.current.apply(s, voltage, torque),
             speed: self.speed.apply(s, voltage, torque),
@@ -109,18 +116,17 @@ impl Motor {
         }
     }
 
-    /// State at the end of the tick, and the friction torque over it: the one that ends the tick at
-    /// standstill, limited to what changes ω by `slowing` (rad/s, not negative) over a tick. Where it is not
-    /// limited ω is 0.0 exactly, and rounding never turns ω round: what friction takes away is never more
-    /// than there is.
+    /// State at the end of the tick, and what friction takes from ω over it (rad/s): what ends the tick at
+    /// standstill, limited to `slowing` (rad/s, not negative). Where it is not limited ω is 0.0 exactly, and
+    /// rounding never turns ω round: what friction takes away is never more than there is.
     #[inline(always)]
     pub(super) fn step_with_friction(
         &self,
-        s: &MotorState,
-        voltage: f64,
-        external: f64,
-        slowing: f64,
-    ) -> (MotorState, f64) {
+        s: &MotorState<N>,
+        voltage: N,
+        external: N,
+        slowing: N,
+    ) -> (MotorState<N>, N) {
         let free = self.step(s, voltage, external);
         let taken = limited(free.speed, slowing);
         let state = MotorState {
@@ -128,11 +134,12 @@ impl Motor {
             speed: free.speed - taken,
             angle: taken.mul_add(-self.angle_per_speed, free.angle),
         };
-        (state, taken * self.torque_per_speed)
+        (state, taken)
     }
 
-    /// Change of ω over a tick per torque that acts over it, (rad/s)/(N·m).
-    pub(super) fn speed_per_torque(&self) -> f64 {
-        self.speed.torque
+    /// The friction torque that takes `taken` from ω over a tick (rad/s), N·m.
+    #[inline(always)]
+    pub(super) fn torque_taking(&self, taken: N) -> N {
+        taken * self.torque_per_speed
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{DriveError, Friction, Gravity, Motor, MotorState};
 use crate::config::{AxisConfig, MotorConfig};
-use crate::lanes::lanes;
+use crate::lanes::{Number, numbers};
 
 /// Torques that acted over a tick, N·m at the motor (N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -15,16 +15,16 @@ pub struct Torques {
     pub load: f64,
 }
 
-lanes! {
+numbers! {
     /// One axis without its controllers.
     #[derive(Debug, Clone, Copy, PartialEq)]
-    pub struct Plant as PlantLanes {
-        pub(crate) motor: Motor,
+    pub struct Plant {
+        pub(crate) motor: Motor<N>,
         /// Friction in the change of ω that it makes over a tick, rad/s.
-        pub(crate) slowing: Friction,
-        pub(crate) gravity: Gravity,
-        ratio: f64,
-        torque_constant: f64,
+        pub(crate) slowing: Friction<N>,
+        pub(crate) gravity: Gravity<N>,
+        ratio: N,
+        torque_constant: N,
     }
 }
 
@@ -58,36 +58,6 @@ impl Plant {
         }
     }
 
-    /// Kt as it is, N·m/A.
-    #[inline(always)]
-    pub fn torque_constant(&self) -> f64 {
-        self.torque_constant
-    }
-
-    /// Axis position at a motor angle θ (rad), m or rad.
-    #[inline(always)]
-    pub fn position(&self, angle: f64) -> f64 {
-        angle * self.ratio
-    }
-
-    /// Axis velocity at a motor speed ω (rad/s), m/s or rad/s.
-    #[inline(always)]
-    pub fn velocity(&self, speed: f64) -> f64 {
-        speed * self.ratio
-    }
-
-    /// Gravity torque at a motor angle θ (rad), N·m at the motor.
-    #[inline(always)]
-    pub fn gravity_at(&self, angle: f64) -> f64 {
-        self.gravity.torque(self.position(angle))
-    }
-
-    /// What an external `load` (N or N·m at the axis) is at the motor, N·m.
-    #[inline(always)]
-    pub fn load_torque(&self, load: f64) -> f64 {
-        self.ratio * load
-    }
-
     /// Whether the friction law is extrapolated at a motor speed ω (rad/s).
     #[inline]
     pub fn friction_is_extrapolated(&self, speed: f64) -> bool {
@@ -98,21 +68,63 @@ impl Plant {
     ///
     /// Friction is the torque that ends the tick at standstill, limited to its bound: it stops the
     /// axis and never reverses it, `C_friction · ω_end ≥ 0`, and an axis that it stops has ω = 0.0.
-    #[inline(always)]
     pub fn step(&self, s: &mut MotorState, voltage: f64, load: f64) -> Torques {
         let (gravity, load) = (self.gravity_at(s.angle), self.load_torque(load));
-        let slowing = self.slowing.bound(s.speed);
-        let (state, friction) = self.motor.step_with_friction(s, voltage, load - gravity, slowing);
-        *s = state;
+        let taken = self.step_under(s, voltage, load - gravity, self.slowing.bound(s.speed));
+        let friction = self.friction_taking(taken);
         Torques { friction, gravity, load }
     }
+}
 
-    /// The same with what is known already: gravity and load together as `external` torque (N·m at the
-    /// motor), and the bound of `slowing`. The friction torque comes back.
+impl<N: Number> Plant<N> {
+    /// Kt as it is, N·m/A.
     #[inline(always)]
-    pub(crate) fn step_under(&self, s: &mut MotorState, voltage: f64, external: f64, slowing: f64) -> f64 {
-        let (state, friction) = self.motor.step_with_friction(s, voltage, external, slowing);
+    pub fn torque_constant(&self) -> N {
+        self.torque_constant
+    }
+
+    /// Axis position at a motor angle θ (rad), m or rad.
+    #[inline(always)]
+    pub fn position(&self, angle: N) -> N {
+        angle * self.ratio
+    }
+
+    /// Axis velocity at a motor speed ω (rad/s), m/s or rad/s.
+    #[inline(always)]
+    pub fn velocity(&self, speed: N) -> N {
+        speed * self.ratio
+    }
+
+    /// Gravity torque at a motor angle θ (rad), N·m at the motor.
+    #[inline(always)]
+    pub fn gravity_at(&self, angle: N) -> N {
+        self.gravity.torque(self.position(angle))
+    }
+
+    /// Gravity torque where it does not depend on the position, N·m at the motor.
+    #[inline(always)]
+    pub(crate) fn weight(&self) -> N {
+        self.gravity.weight()
+    }
+
+    /// What an external `load` (N or N·m at the axis) is at the motor, N·m.
+    #[inline(always)]
+    pub fn load_torque(&self, load: N) -> N {
+        self.ratio * load
+    }
+
+    /// Moves the plant by one tick with what is known already: gravity and load together as `external` torque
+    /// (N·m at the motor), and the bound of `slowing`. What friction takes from ω comes back, rad/s.
+    #[inline(always)]
+    pub(crate) fn step_under(&self, s: &mut MotorState<N>, voltage: N, external: N, slowing: N) -> N {
+        let (state, taken) = self.motor.step_with_friction(s, voltage, external, slowing);
         *s = state;
-        friction
+        taken
+    }
+
+    /// The friction torque that takes `taken` from ω over a tick (rad/s), N·m.
+    #[inline(always)]
+    pub(crate) fn friction_taking(&self, taken: N) -> N {
+        self.motor.torque_taking(taken)
     }
 }

@@ -25,6 +25,7 @@ pub struct AxisParameters {
     velocity_shift: Shift,
     torque_shift: Shift,
     ratio: f64,
+    inverse_ratio: f64,
     /// Kt that the drive reckons with.
     torque_constant: f64,
     max_current: f64,
@@ -92,6 +93,7 @@ impl AxisParameters {
             torque_shift: Shift::new(delays.torque, ticks),
             delays,
             ratio: axis.transmission_ratio,
+            inverse_ratio: 1.0 / axis.transmission_ratio,
             torque_constant: motor.torque_constant,
             max_current: motor.max_current,
             resistance: motor.resistance,
@@ -133,8 +135,8 @@ impl Axis {
         let voltage = p.resistance * current;
         let state = LoopsState {
             motor: MotorState { current, speed: 0.0, angle },
-            velocity: PiState { integral: torque, limited: false },
-            current: PiState { integral: voltage, limited: false },
+            velocity: PiState { integral: torque, excess: 0.0 },
+            current: PiState { integral: voltage, excess: 0.0 },
             current_setpoint: current,
             gravity,
             ..LoopsState::default()
@@ -188,7 +190,7 @@ impl Axis {
         let k = p.position_shift.index_at_instant(present);
         self.sample.psec = psec;
         self.sample.delayed_psec = history.at(k);
-        if state.was_limited {
+        if state.current_excess > 0.0 {
             self.position.correct(motor.speed);
         }
         let staircase = |shift: Shift, value: &dyn Fn(i64) -> f64| {
@@ -198,7 +200,7 @@ impl Axis {
         let velocity = staircase(p.velocity_shift, &|k| p.feedforward.velocity(history, k));
         let torque = staircase(p.torque_shift, &|k| p.feedforward.torque(history, k));
         let feedforward = velocity.at(0.0);
-        let setpoint = |j| history.at(k + j) / p.ratio;
+        let setpoint = |j| history.at(k + j) * p.inverse_ratio;
         let wanted = p.position.update(&mut self.position, setpoint, motor.angle, feedforward);
         // Coefficients that are forced can make it overflow: an axis that is asked for nothing stops.
         let asked = if wanted.is_finite() { wanted } else { 0.0 };
@@ -207,7 +209,7 @@ impl Axis {
         self.load_before = self.demand.load;
         self.demand = Demand {
             velocity_setpoint,
-            speed_limited: wanted != velocity_setpoint,
+            velocity_excess: if wanted.is_finite() { wanted - velocity_setpoint } else { f64::INFINITY },
             velocity,
             torque,
             load: p.loops.plant.load_torque(self.load),
@@ -241,9 +243,9 @@ impl Axis {
             friction_current: done.friction / torque_constant,
             gravity_current: done.gravity / torque_constant,
             load_current: -load / torque_constant,
-            effort: torque_constant * motor.current / p.ratio,
+            effort: torque_constant * motor.current * p.inverse_ratio,
             controller: p.controller,
-            saturated: done.saturated,
+            saturated: done.saturated > 0.0,
             friction_extrapolated: plant.friction_is_extrapolated(motor.speed),
             ..self.sample
         };

@@ -2,9 +2,8 @@
 
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
-use super::block::{Block, Demand, Done, Loops, LoopsState, Row, Timing};
+use super::block::{Block, Demand, Done, Loops, LoopsState, Row, Tally, Timing};
 use crate::drive::MotorState;
-use crate::lanes::Lane;
 
 /// Lanes of a block of few axes: one vector of most processors.
 const FEW: usize = 4;
@@ -64,9 +63,9 @@ fn of_mut<const L: usize>(blocks: &mut [Block<L>], axis: usize) -> (&mut Block<L
 /// Blocks of the axes `loops`; lanes that stand for no axis do as the first one of their block does.
 fn filled<const L: usize>(loops: &[Loops], timing: Timing) -> Vec<Block<L>> {
     let block = |axes: &[Loops]| {
-        let mut block = Block::new(axes[0], timing);
+        let mut block = Block::new(&axes[0], timing);
         for (lane, loops) in axes.iter().enumerate() {
-            block.set_loops(lane, *loops);
+            block.set_loops(lane, loops);
         }
         block
     };
@@ -90,7 +89,7 @@ impl Bank {
     }
 
     /// Gives an axis other parameters.
-    pub fn set_loops(&mut self, axis: usize, loops: Loops) {
+    pub fn set_loops(&mut self, axis: usize, loops: &Loops) {
         at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_loops(lane, loops));
     }
 
@@ -111,13 +110,14 @@ impl Bank {
 
     /// The torque with which friction of an axis is compensated, N·m, by the instant of the velocity loop.
     pub fn set_compensation(&mut self, axis: usize, torque: impl Fn(usize) -> f64) {
-        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_compensation(lane, torque));
+        let timing = self.timing;
+        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_compensation(lane, timing, torque));
     }
 
     /// The motor of an axis at a tick of the last position period.
     #[inline]
     pub fn motor(&self, axis: usize, tick: usize) -> MotorState {
-        at!(&self.blocks, axis, of, |block, lane| MotorState::get(&block.seen[tick].0, lane))
+        at!(&self.blocks, axis, of, |block, lane| block.seen[tick].0.lane(lane))
     }
 
     /// Motor angles of an axis at the ticks of the last position period, rad.
@@ -130,12 +130,13 @@ impl Bank {
 
     /// What the controllers of an axis made of it.
     pub fn done(&self, axis: usize, tick: usize) -> Done {
-        at!(&self.blocks, axis, of, |block, lane| Done::get(&block.done[tick].0, lane))
+        at!(&self.blocks, axis, of, |block, lane| block.done[tick].0.lane(lane))
     }
 
-    /// Largest |i| (A) and |ω| (rad/s) of an axis in the last position period.
-    pub fn peaks(&self, axis: usize) -> (f64, f64) {
-        at!(&self.blocks, axis, of, |block, lane| (block.peak_current[lane], block.peak_speed[lane]))
+    /// What the ticks of the last position period come to for an axis.
+    #[inline]
+    pub fn tally(&self, axis: usize) -> Tally {
+        at!(&self.blocks, axis, of, |block, lane| block.tally.0.lane(lane))
     }
 
     /// Runs a position period; `traced` keeps what the controllers did at every tick, not only at the first.
@@ -171,13 +172,9 @@ impl<const L: usize> WithSimd for Period<'_, L> {
 
     /// Compiled once for each width: what is inlined here is made of the vectors that it has.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         for block in self.blocks {
-            if self.traced {
-                block.run::<true>(self.timing);
-            } else {
-                block.run::<false>(self.timing);
-            }
+            block.run(simd, self.timing, self.traced);
         }
     }
 }

@@ -1,89 +1,102 @@
 //! Axes side by side: their inner loops and plants, stepped through a position period.
 //!
-//! This is the only place where the recurrence of an axis is run. Each loop below goes over lanes, takes the
-//! values of one axis, and says what happens to it; vectors are the compiler's business.
+//! This is the only place where the recurrence of an axis is run. What happens to an axis is said once, over
+//! vectors of as many axes as the processor reckons with at a time.
 
-#![allow(clippy::needless_range_loop, reason = "a lane is an index into several arrays")]
+use pulp::Simd;
 
 use crate::control::{Pi, PiState};
-use crate::drive::{Friction, MotorState, MotorStateLanes, Plant};
-use crate::lanes::{Lane, lanes, select};
+use crate::drive::{Expansion, MotorState, Plant};
+use crate::lanes::{Fetch, Number, Twice, Vector, numbers};
 
-lanes! {
+numbers! {
     /// What an axis is, inside its position loop.
     #[derive(Debug, Clone, Copy, PartialEq)]
-    pub(super) struct Loops as LoopsLanes {
-        pub plant: Plant,
-        pub velocity: Pi,
-        pub current: Pi,
+    pub(super) struct Loops {
+        pub plant: Plant<N>,
+        pub velocity: Pi<N>,
+        pub current: Pi<N>,
     }
 }
 
-lanes! {
+numbers! {
     /// What goes on from tick to tick.
     #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub(super) struct LoopsState as LoopsStateLanes {
-        pub motor: MotorState,
-        pub velocity: PiState,
-        pub current: PiState,
+    pub(super) struct LoopsState {
+        pub motor: MotorState<N>,
+        pub velocity: PiState<N>,
+        pub current: PiState<N>,
         /// i*, A.
-        pub current_setpoint: f64,
+        pub current_setpoint: N,
         /// Friction over the last tick, N·m.
-        pub friction: f64,
+        pub friction: N,
         /// Gravity over the last tick, N·m.
-        pub gravity: f64,
-        /// Whether i* was limited at an instant of the velocity loop since the position instant.
-        pub was_limited: bool,
-        /// Ticks since the position instant with speed, current or voltage set-point at its limit.
-        pub saturated_ticks: u64,
+        pub gravity: N,
+        /// By how much i* was over its limit at most since the position instant, A.
+        pub current_excess: N,
     }
 }
 
-lanes! {
+numbers! {
     /// What is asked of an axis for a position period.
     #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub(super) struct Demand as DemandLanes {
+    pub(super) struct Demand {
         /// Ω* after its limit, rad/s.
-        pub velocity_setpoint: f64,
-        pub speed_limited: bool,
+        pub velocity_setpoint: N,
+        /// By how much it was over that, rad/s.
+        pub velocity_excess: N,
         /// VFFWS, rad/s.
-        pub velocity: Stair,
+        pub velocity: Stair<N>,
         /// TFFWS, N·m.
-        pub torque: Stair,
+        pub torque: Stair<N>,
         /// External load at the motor, N·m.
-        pub load: f64,
+        pub load: N,
     }
 }
 
-lanes! {
+numbers! {
     /// A value that changes once in a position period.
     #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub(super) struct Stair as StairLanes {
-        pub before: f64,
-        pub behind: f64,
+    pub(super) struct Stair {
+        pub before: N,
+        pub behind: N,
         /// Instant of the velocity loop from which on it is the second one.
-        pub step: f64,
+        pub step: N,
     }
 }
 
-impl Stair {
+impl<N: Number> Stair<N> {
     /// Its value at an instant of the velocity loop, counted from the position instant.
     #[inline(always)]
-    pub fn at(&self, instant: f64) -> f64 {
-        select(instant < self.step, self.before, self.behind)
+    pub fn at(&self, instant: f64) -> N {
+        self.before.select(self.step.constant(instant).less(self.step), self.behind)
     }
 }
 
-lanes! {
+numbers! {
     /// What is kept of the position instant, and of every tick if it is asked for: what the controllers
     /// make of it, and the torques of the tick before.
     #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub(super) struct Done as DoneLanes {
-        pub current_setpoint: f64,
-        pub voltage: f64,
-        pub friction: f64,
-        pub gravity: f64,
-        pub saturated: bool,
+    pub(super) struct Done {
+        pub current_setpoint: N,
+        pub voltage: N,
+        pub friction: N,
+        pub gravity: N,
+        /// 1 where a set-point was at its limit, else 0.
+        pub saturated: N,
+    }
+}
+
+numbers! {
+    /// What the ticks of a period come to.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct Tally {
+        /// Largest |i|, A.
+        pub peak_current: N,
+        /// Largest |ω|, rad/s.
+        pub peak_speed: N,
+        /// Ticks with speed, current or voltage set-point at its limit.
+        pub saturated_ticks: N,
     }
 }
 
@@ -110,39 +123,33 @@ impl Timing {
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
 pub(super) struct Block<const L: usize> {
-    loops: Row<LoopsLanes<L>>,
-    state: Row<LoopsStateLanes<L>>,
-    demand: Row<DemandLanes<L>>,
-    /// Gravity over the tick at hand, N·m.
-    gravity: Row<[f64; L]>,
-    /// Largest |i| and |ω| of any tick of the period.
-    pub peak_current: [f64; L],
-    pub peak_speed: [f64; L],
+    loops: Row<Loops<[f64; L]>>,
+    state: Row<LoopsState<[f64; L]>>,
+    demand: Row<Demand<[f64; L]>>,
+    /// The friction laws near the speeds at hand.
+    near: Row<Expansion<[f64; L]>>,
+    pub tally: Row<Tally<[f64; L]>>,
     /// Whether gravity of any axis depends on where it stands.
     tilting: bool,
-    /// Whether the torque feedforward of any axis changes at every instant of the velocity loop.
-    compensating: bool,
-    /// Torque feedforward on top, at each instant of the velocity loop, N·m.
+    /// Torque feedforward on top, at each instant of the velocity loop, N·m; none if it is nothing.
     compensation: Vec<Row<[f64; L]>>,
     /// The motors as the controllers find them, one for each tick.
-    pub seen: Vec<Row<MotorStateLanes<L>>>,
+    pub seen: Vec<Row<MotorState<[f64; L]>>>,
     /// One for the position instant, or one for each tick.
-    pub done: Vec<Row<DoneLanes<L>>>,
+    pub done: Vec<Row<Done<[f64; L]>>>,
 }
 
 impl<const L: usize> Block<L> {
     /// A block whose every lane is an axis of `loops`; the lanes that stand for none do as that one does.
-    pub fn new(loops: Loops, timing: Timing) -> Self {
+    pub fn new(loops: &Loops, timing: Timing) -> Self {
         Block {
             loops: Row(loops.fill()),
             state: Row(LoopsState::default().fill()),
             demand: Row(Demand::default().fill()),
-            gravity: Row([0.0; L]),
-            peak_current: [0.0; L],
-            peak_speed: [0.0; L],
+            near: Row(loops.plant.slowing.near(0.0).fill()),
+            tally: Row(Tally::default().fill()),
             tilting: loops.plant.gravity.is_tilting(),
-            compensating: false,
-            compensation: vec![Row([0.0; L]); timing.instants()],
+            compensation: Vec::new(),
             seen: vec![Row(MotorState::default().fill()); timing.ticks_per_position],
             done: vec![Row(Done::default().fill())],
         }
@@ -150,153 +157,155 @@ impl<const L: usize> Block<L> {
 
     /// Where an axis is.
     pub fn state(&self, lane: usize) -> LoopsState {
-        LoopsState::get(&self.state.0, lane)
+        self.state.0.lane(lane)
     }
 
     /// Puts an axis there.
     pub fn set_state(&mut self, lane: usize, state: &LoopsState) {
-        state.set(&mut self.state.0, lane);
+        self.state.0.set_lane(lane, state);
+        self.expand(lane);
     }
 
     /// What is asked of an axis in the next position period.
     pub fn set_demand(&mut self, lane: usize, demand: &Demand) {
-        demand.set(&mut self.demand.0, lane);
+        self.demand.0.set_lane(lane, demand);
     }
 
     /// Puts the parameters of an axis into a lane.
-    pub fn set_loops(&mut self, lane: usize, loops: Loops) {
-        loops.set(&mut self.loops.0, lane);
-        self.tilting = (0..L).any(|lane| Loops::get(&self.loops.0, lane).plant.gravity.is_tilting());
+    pub fn set_loops(&mut self, lane: usize, loops: &Loops) {
+        self.loops.0.set_lane(lane, loops);
+        self.expand(lane);
+        self.tilting = (0..L).any(|lane| self.loops.0.lane(lane).plant.gravity.is_tilting());
+    }
+
+    /// Expands the friction law of an axis at the speed that it has.
+    fn expand(&mut self, lane: usize) {
+        let (friction, speed) = (self.loops.0.plant.slowing.lane(lane), self.state.0.motor.speed[lane]);
+        self.near.0.set_lane(lane, &friction.near(speed));
     }
 
     /// Torque feedforward of one lane on top, N·m, by the instant of the velocity loop.
-    pub fn set_compensation(&mut self, lane: usize, torque: impl Fn(usize) -> f64) {
-        self.compensating = true;
+    pub fn set_compensation(&mut self, lane: usize, timing: Timing, torque: impl Fn(usize) -> f64) {
+        self.compensation.resize_with(timing.instants(), || Row([0.0; L]));
         for (instant, row) in self.compensation.iter_mut().enumerate() {
             row.0[lane] = torque(instant);
         }
     }
 
-    /// Runs a position period, and keeps every tick where `TRACED`.
+    /// Runs a position period, and keeps every tick if it is `traced`.
     #[inline(always)]
-    pub fn run<const TRACED: bool>(&mut self, timing: Timing) {
-        self.begin();
-        // A copy that nothing else points to: it need not be in memory at every tick.
-        let mut held = self.state.clone();
-        let now = &mut held.0;
+    pub fn run<S: Simd>(&mut self, simd: S, timing: Timing, traced: bool) {
+        if L.is_multiple_of(Twice::<Vector<S>>::LANES) {
+            self.run_by::<S, Twice<Vector<S>>>(simd, timing, traced);
+        } else {
+            self.run_by::<S, Vector<S>>(simd, timing, traced);
+        }
+    }
+
+    #[inline(always)]
+    fn run_by<S: Simd, N: Fetch<S>>(&mut self, simd: S, timing: Timing, traced: bool) {
+        for place in 0..L / N::LANES {
+            if self.tilting {
+                self.run_lanes::<S, N, true>(simd, place, timing, traced);
+            } else {
+                self.run_lanes::<S, N, false>(simd, place, timing, traced);
+            }
+        }
+    }
+
+    /// Runs a position period of the lanes at `place`, counted in as many as `N` are.
+    #[inline(always)]
+    fn run_lanes<S: Simd, N: Fetch<S>, const TILTING: bool>(
+        &mut self,
+        simd: S,
+        place: usize,
+        timing: Timing,
+        traced: bool,
+    ) {
+        let loops: Loops<N> = self.loops.0.fetch(simd, place);
+        let demand: Demand<N> = self.demand.0.fetch(simd, place);
+        let mut near: Expansion<N> = self.near.0.fetch(simd, place);
+        let mut state: LoopsState<N> = self.state.0.fetch(simd, place);
+        let nothing = state.friction.constant(0.0);
+        state.current_excess = nothing;
+        let mut saturated_ticks = nothing;
+        let mut gravity =
+            if TILTING { loops.plant.gravity_at(state.motor.angle) } else { loops.plant.weight() };
+        let mut external = demand.load - gravity;
+        // From the speed by friction, in the tick before.
+        let mut taken = nothing;
         for instant in 0..timing.instants() {
-            self.control_velocity(now, instant);
-            let first = instant * timing.ticks_per_velocity;
-            for tick in first..first + timing.ticks_per_velocity {
-                if TRACED || tick == 0 {
-                    self.tick::<true>(now, tick);
-                } else {
-                    self.tick::<false>(now, tick);
+            let compensation = match self.compensation.get(instant) {
+                Some(row) => N::fetch(simd, &row.0, place),
+                None => nothing,
+            };
+            let excess = loops.control_velocity(&demand, &mut state, instant as f64, compensation);
+            let ticks = instant * timing.ticks_per_velocity;
+            for tick in ticks..ticks + timing.ticks_per_velocity {
+                let friction = &loops.plant.slowing;
+                let mut distance = friction.distance(&near, state.motor.speed);
+                if Expansion::is_left(distance) {
+                    near = friction.renewed(&near, state.motor.speed, distance);
+                    distance = friction.distance(&near, state.motor.speed);
+                }
+                let slowing = friction.bound_near(&near, state.motor.speed, distance);
+                self.seen[tick].0.put(place, &state.motor);
+                if tick > 0 && (traced || TILTING) {
+                    state.friction = loops.plant.friction_taking(taken);
+                    state.gravity = gravity;
+                    if TILTING {
+                        gravity = loops.plant.gravity_at(state.motor.angle);
+                        external = demand.load - gravity;
+                    }
+                }
+                let (voltage, saturated) = loops.control_current(&mut state, excess);
+                saturated_ticks = saturated_ticks + saturated;
+                taken = loops.plant.step_under(&mut state.motor, voltage, external, slowing);
+                if traced || tick == 0 {
+                    let LoopsState { current_setpoint, friction, gravity, .. } = state;
+                    let done = Done { current_setpoint, voltage, friction, gravity, saturated };
+                    self.done[tick].0.put(place, &done);
                 }
             }
         }
-        self.state = held;
-        self.find_peaks();
-    }
-
-    #[inline(always)]
-    fn begin(&mut self) {
-        self.state.0.was_limited = [0; L];
-        self.state.0.saturated_ticks = [0; L];
-        for lane in 0..L {
-            let plant = Plant::get(&self.loops.0.plant, lane);
-            self.gravity.0[lane] = plant.gravity_at(self.state.0.motor.angle[lane]);
-        }
-    }
-
-    /// The velocity loop: torque from the error of the speed, and i* from that.
-    #[inline(always)]
-    fn control_velocity(&self, state: &mut LoopsStateLanes<L>, instant: usize) {
-        let Block { loops: Row(loops), demand: Row(demand), .. } = self;
-        let (compensation, compensating) = (&self.compensation, self.compensating);
-        let since_instant = instant as f64;
-        let more = if compensating { compensation[instant].0 } else { [0.0; L] };
-        for lane in 0..L {
-            let demand = Demand::get(demand, lane);
-            let asked = demand.velocity_setpoint + demand.velocity.at(since_instant);
-            let torque = demand.torque.at(since_instant) + more[lane];
-            let error = asked - state.motor.speed[lane];
-            let mut memory = PiState::get(&state.velocity, lane);
-            let pi = Pi::get(&loops.velocity, lane);
-            state.current_setpoint[lane] = pi.update_with(&mut memory, error, torque);
-            memory.set(&mut state.velocity, lane);
-            state.was_limited[lane] |= u64::from(memory.limited);
-        }
-    }
-
-    /// The current loop and the plant.
-    #[inline(always)]
-    fn tick<const KEPT: bool>(&mut self, state: &mut LoopsStateLanes<L>, tick: usize) {
-        self.seen[tick].0.clone_from(&state.motor);
-        let (friction, gravity) = (state.friction, state.gravity);
-        let voltages = if self.tilting { self.step::<true>(state) } else { self.step::<false>(state) };
-        if KEPT || self.tilting {
-            state.gravity = self.gravity.0;
-        }
-        if KEPT {
-            let Block { demand: Row(demand), done, .. } = self;
-            let done = &mut done[tick].0;
-            done.current_setpoint = state.current_setpoint;
-            (done.voltage, done.friction, done.gravity) = (voltages, friction, gravity);
-            for lane in 0..L {
-                let limited = demand.speed_limited[lane] | state.velocity.limited[lane];
-                done.saturated[lane] = limited | state.current.limited[lane];
-            }
-        }
-    }
-
-    /// Moves the axes by one tick; the voltages come back.
-    ///
-    /// The bounds of friction come first, for all lanes: their exponentials are a long chain of arithmetic,
-    /// and those of the next lanes fill the time that one waits for itself.
-    #[inline(always)]
-    fn step<const TILTING: bool>(&mut self, state: &mut LoopsStateLanes<L>) -> [f64; L] {
-        let Block { loops: Row(loops), demand: Row(demand), gravity: Row(gravity), .. } = self;
-        let (mut slowing, mut voltages) = (Row([0.0; L]), Row([0.0; L]));
-        for lane in 0..L {
-            slowing.0[lane] = Friction::get(&loops.plant.slowing, lane).bound(state.motor.speed[lane]);
-            if TILTING {
-                gravity[lane] = Plant::get(&loops.plant, lane).gravity_at(state.motor.angle[lane]);
-            }
-        }
-        for lane in 0..L {
-            let Loops { plant, current, .. } = Loops::get(loops, lane);
-            let mut motor = MotorState::get(&state.motor, lane);
-            let mut memory = PiState::get(&state.current, lane);
-            let voltage = current.update(&mut memory, state.current_setpoint[lane] - motor.current);
-            let external = demand.load[lane] - gravity[lane];
-            state.friction[lane] = plant.step_under(&mut motor, voltage, external, slowing.0[lane]);
-            voltages.0[lane] = voltage;
-            motor.set(&mut state.motor, lane);
-            memory.set(&mut state.current, lane);
-            state.saturated_ticks[lane] +=
-                demand.speed_limited[lane] | state.velocity.limited[lane] | u64::from(memory.limited);
-        }
-        voltages.0
-    }
-
-    /// The largest current and speed of any tick.
-    #[inline(always)]
-    fn find_peaks(&mut self) {
-        let mut current = [0.0_f64; L];
-        let mut speed = [0.0_f64; L];
+        state.friction = loops.plant.friction_taking(taken);
+        state.gravity = gravity;
+        self.near.0.put(place, &near);
+        self.state.0.put(place, &state);
+        // In a loop of its own: the one above has no register left for it.
+        let mut tally = Tally { peak_current: nothing, peak_speed: nothing, saturated_ticks };
         for row in &self.seen {
-            for lane in 0..L {
-                current[lane] = larger(current[lane], row.0.current[lane].abs());
-                speed[lane] = larger(speed[lane], row.0.speed[lane].abs());
-            }
+            let motor: MotorState<N> = row.0.fetch(simd, place);
+            tally.peak_current = motor.current.abs().max(tally.peak_current);
+            tally.peak_speed = motor.speed.abs().max(tally.peak_speed);
         }
-        (self.peak_current, self.peak_speed) = (current, speed);
+        self.tally.0.put(place, &tally);
     }
 }
 
-/// One comparison, where `f64::max` also looks for what is not a number.
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if b > a { b } else { a }
+impl<N: Number> Loops<N> {
+    /// The velocity loop: torque from the error of the speed, and i* from that. By how much the set-points
+    /// of speed and current were over their limits comes back.
+    #[inline(always)]
+    fn control_velocity(&self, demand: &Demand<N>, state: &mut LoopsState<N>, instant: f64, more: N) -> N {
+        let asked = demand.velocity_setpoint + demand.velocity.at(instant);
+        let torque = demand.torque.at(instant) + more;
+        let error = asked - state.motor.speed;
+        state.current_setpoint = self.velocity.update_with(&mut state.velocity, error, torque);
+        let excess = state.velocity.excess.abs();
+        state.current_excess = excess.max(state.current_excess);
+        excess + demand.velocity_excess.abs()
+    }
+
+    /// The current loop: the voltage comes back, and 1 where a set-point was at its limit, else 0. `excess` is
+    /// that of the outer loops.
+    #[inline(always)]
+    fn control_current(&self, state: &mut LoopsState<N>, excess: N) -> (N, N) {
+        let error = state.current_setpoint - state.motor.current;
+        let voltage = self.current.update(&mut state.current, error);
+        let nothing = excess.constant(0.0);
+        let beyond = nothing.less(excess + state.current.excess.abs());
+        let saturated = excess.constant(1.0).select(beyond, nothing);
+        (voltage, saturated)
+    }
 }

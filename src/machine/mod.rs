@@ -189,7 +189,7 @@ impl Machine {
             let mut state = self.bank.state(place);
             axis.adopt(old, p, &mut state);
             self.bank.set_state(place, &state);
-            self.bank.set_loops(place, p.loops);
+            self.bank.set_loops(place, &p.loops);
             if old.compensation.is_some() {
                 self.bank.set_compensation(place, |_| 0.0);
             }
@@ -331,14 +331,12 @@ impl Machine {
     /// # Panics
     /// If there is no such axis.
     pub fn activity(&self, axis: usize) -> Activity {
-        let (peak_current, peak_speed) = self.bank.peaks(axis);
+        let tally = self.bank.tally(axis);
+        let plant = &self.parameters.axes[axis].loops.plant;
         Activity {
-            peak_current,
-            saturated_ticks: self.bank.state(axis).saturated_ticks,
-            friction_extrapolated: self.parameters.axes[axis]
-                .loops
-                .plant
-                .friction_is_extrapolated(peak_speed),
+            peak_current: tally.peak_current,
+            saturated_ticks: tally.saturated_ticks as u64,
+            friction_extrapolated: plant.friction_is_extrapolated(tally.peak_speed),
         }
     }
 }

@@ -85,8 +85,8 @@ impl InnerLoops {
     /// The state after one position period under `setpoint` (Ω*, rad/s).
     fn after_one_period(&self, state: &State, setpoint: f64) -> State {
         let mut motor = MotorState { current: state[0], speed: state[1], angle: state[4] };
-        let mut velocity = PiState { integral: state[2], limited: false };
-        let mut current = PiState { integral: state[3], limited: false };
+        let mut velocity = PiState { integral: state[2], excess: 0.0 };
+        let mut current = PiState { integral: state[3], excess: 0.0 };
         let mut current_setpoint = 0.0;
         for tick in 0..self.ticks_per_position {
             if tick.is_multiple_of(self.ticks_per_velocity) {
