@@ -6,6 +6,8 @@
 
 The share is what the kernel counts for the process, user and system time of all its threads, over
 wall-clock time, of one core: at rest and in motion, alone and with subscribers (rclpy, reliable, raw).
+Beside it stands how often a thread of the process is woken in a position period, which depends less on
+the machine and its load than the share does.
 Every span is checked: the node lives at its end, it says itself that no period was missed, and
 whoever listens has got every sample.
 
@@ -126,6 +128,13 @@ def cpu_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
+def wakeups(pid: int) -> int:
+    """How often the threads of a process have gone to sleep so far."""
+    label = "voluntary_ctxt_switches:"
+    lines = (line for status in Path(f"/proc/{pid}/task").glob("*/status") for line in status.open())
+    return sum(int(line.removeprefix(label)) for line in lines if line.startswith(label))
+
+
 def resident_kb(pid: int) -> int:
     """Resident set of a process, kB."""
     return next(int(line.split()[1]) for line in Path(f"/proc/{pid}/status").open() if line.startswith("VmRSS"))
@@ -196,14 +205,15 @@ def check(process: Node, stamps: Iterable[int] | None, seconds: float) -> None:
         raise SystemExit(f"{len(grid) + 1} samples came in {seconds:.1f} s, {lost} were lost")
 
 
-def share(process: Node, guest: Guest | None, seconds: float) -> float:
-    """Share of a core over a span."""
+def share(process: Node, guest: Guest | None, seconds: float) -> str:
+    """Share of a core over a span, and wake-ups in a position period."""
     first = len(guest.stamps) if guest else 0
-    before, start = cpu_seconds(process.pid), time.monotonic()
+    before, slept, start = cpu_seconds(process.pid), wakeups(process.pid), time.monotonic()
     time.sleep(seconds)
     used, took = cpu_seconds(process.pid) - before, time.monotonic() - start
+    slept = wakeups(process.pid) - slept
     check(process, guest.stamps[first:] if guest else None, took)
-    return used / took
+    return f"{used / took:6.2%}{slept * TSP_NS / 1e9 / took:6.1f} wake-ups a period"
 
 
 def memory(process: Node, guest: Guest, minutes: float) -> None:
@@ -238,13 +248,13 @@ def main() -> int:
     with Node(["-p", "time:=real"]) as process:
         time.sleep(STARTED_S)
         print(f"share of one core in real time, position period {TSP_NS / 1e6:g} ms, spans of {args.seconds:g} s:")
-        print(f"  {'at rest, nobody listens':<44}{share(process, None, args.seconds):6.2%}", flush=True)
+        print(f"  {'at rest, nobody listens':<44}{share(process, None, args.seconds)}", flush=True)
         for topics, who in ((JOINTS, "joint_states"), (ALL, f"{len(ALL)} topics")):
             guest = Guest(process, topics)
             for kind in ("rest", "trajectory", "stream"):
                 with Motion(guest, kind):
                     found = share(process, guest, args.seconds)
-                print(f"  {f'{kind}, a subscriber of {who}':<44}{found:6.2%}", flush=True)
+                print(f"  {f'{kind}, a subscriber of {who}':<44}{found}", flush=True)
             guest.close()
         if args.minutes > 0:
             guest = Guest(process, JOINTS)

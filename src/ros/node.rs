@@ -5,6 +5,8 @@ use std::sync::atomic::AtomicU64;
 use std::thread;
 use std::time::Duration;
 
+use futures::stream::FuturesUnordered;
+use futures::{FutureExt, StreamExt};
 use ros2_client::{NodeName, NodeOptions};
 use tokio::runtime::Handle;
 use tokio::signal::unix::{Signal, SignalKind, signal};
@@ -94,8 +96,9 @@ pub fn run(
     parameters: Parameters,
     log: mpsc::Receiver<LogRecord>,
 ) -> Result<(), NodeError> {
+    // A second worker would be woken with the first each time, and find nothing to do.
     let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
+        .worker_threads(1)
         .enable_all()
         .build()
         .map_err(|source| NodeError::System { what: "start the runtime", source })?;
@@ -223,8 +226,8 @@ async fn serve(
         ids: Arc::clone(&ids),
     };
     tasks.spawn(psec_input.run(topics.psec));
-    tasks.spawn(take_stream(topics.psec_stream, joints.clone(), commands.clone()));
-    tasks.spawn(take_loads(topics.load, joints.clone(), node_config.load_timeout, commands.clone()));
+    let streamed = take_stream(topics.psec_stream, joints.clone(), commands.clone());
+    let loads = take_loads(topics.load, joints.clone(), node_config.load_timeout, commands.clone());
     let clock_health = health.clone();
     let now = move || convert::stamp(clock_health.borrow().time);
     let host = Host::new(parameters, commands.clone(), live);
@@ -253,16 +256,28 @@ async fn serve(
             results.report(report).await;
         }
     });
-    // On a thread of its own: each position instant wakes it and nobody else.
+    let published = outputs.run(frames).boxed();
+    // On a thread of its own, each woken alone: a message wakes it and nobody else.
+    let inputs = FuturesUnordered::from_iter([streamed.boxed(), loads.boxed()]);
+    let pace = match mode {
+        TimeMode::Real => {
+            let commands = commands.clone();
+            inputs.push(async move { commands.closed().await }.boxed());
+            Pace::Real { published }
+        }
+        // It may wait for subscribers, and ends after the last frame.
+        TimeMode::Fast | TimeMode::SimTime => {
+            inputs.push(published);
+            Pace::Clock { state: clock, runtime: Handle::current() }
+        }
+    };
     let runtime = Handle::current();
-    tasks.spawn_blocking(move || runtime.block_on(outputs.run(frames)));
+    tasks.spawn_blocking(move || {
+        let _ = runtime.block_on(inputs.into_future());
+    });
 
     topics.names.print(args, config.name(), mode);
     let (ended, has_ended) = oneshot::channel();
-    let pace = match mode {
-        TimeMode::Real => Pace::Real,
-        TimeMode::Fast | TimeMode::SimTime => Pace::Clock { state: clock, runtime: Handle::current() },
-    };
     thread::Builder::new()
         .name("axes".into())
         .spawn(move || {

@@ -80,8 +80,11 @@ impl ParameterHost for Host {
         }
         let mut changed = self.parameters.clone();
         changed.set_all(assignments).map_err(|error| error.to_string())?;
-        let config = changed.machine_config().map_err(|error| error.to_string())?;
-        let machine = MachineParameters::new(&config).map_err(|error| error.to_string())?;
+        // A predictive controller takes a while to design; other tasks go on meanwhile.
+        let machine = tokio::task::block_in_place(|| {
+            let config = changed.machine_config().map_err(|error| error.to_string())?;
+            MachineParameters::new(&config).map_err(|error| error.to_string())
+        })?;
         self.commands
             .try_send(Command::Adopt(Arc::new(machine)))
             .map_err(|_| "too many commands wait for the next position period; try again".to_owned())?;

@@ -18,6 +18,7 @@ pub use wall::origin;
 
 use std::sync::Arc;
 
+use futures::future::BoxFuture;
 use tokio::runtime::Handle;
 use tokio::sync::{mpsc, oneshot, watch};
 
@@ -112,7 +113,10 @@ pub struct Channels {
 /// What the thread keeps step with.
 pub enum Pace {
     /// The wall clock.
-    Real,
+    Real {
+        /// What takes the frames; it has its turn after each instant, and must not wait.
+        published: BoxFuture<'static, ()>,
+    },
     /// A ROS clock, as the task that watches it tells.
     Clock {
         /// What it tells.
@@ -127,7 +131,7 @@ pub fn run(simulation: Simulation, pace: Pace, channels: Channels) {
     let Channels { commands, frames, reports, health } = channels;
     let axes = axes::Axes::new(simulation, reports, health);
     match pace {
-        Pace::Real => real::run(axes, commands, &frames),
+        Pace::Real { published } => real::run(axes, commands, &frames, published),
         Pace::Clock { state, runtime } => runtime.block_on(paced::run(axes, commands, &frames, state)),
     }
 }

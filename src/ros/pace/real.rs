@@ -2,8 +2,10 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::task::{Context, Waker};
 use std::time::Duration;
 
+use futures::future::BoxFuture;
 use tokio::sync::mpsc;
 
 use super::axes::Axes;
@@ -11,7 +13,15 @@ use super::wall::PaceClock;
 use super::{ClockSource, Command, Frame};
 
 /// Runs until told to shut down; a frame that nobody takes in time is dropped and counted.
-pub(super) fn run(mut axes: Axes, mut commands: mpsc::Receiver<Command>, frames: &mpsc::Sender<Arc<Frame>>) {
+///
+/// `published` takes the frames, and has its turn after each instant: a thread of its own would have to be
+/// woken each time, which takes longer than what it does.
+pub(super) fn run(
+    mut axes: Axes,
+    mut commands: mpsc::Receiver<Command>,
+    frames: &mpsc::Sender<Arc<Frame>>,
+    mut published: BoxFuture<'static, ()>,
+) {
     let clock = PaceClock::new(axes.simulation());
     axes.tell_clock(|clock| clock.source = ClockSource::Wall);
     loop {
@@ -19,6 +29,8 @@ pub(super) fn run(mut axes: Axes, mut commands: mpsc::Receiver<Command>, frames:
         if period(&mut axes, &mut commands, frames, lateness, lateness > clock.period).is_break() {
             return;
         }
+        // It is asked again in the next period, whether or not it has been woken.
+        let _ = published.as_mut().poll(&mut Context::from_waker(Waker::noop()));
     }
 }
 

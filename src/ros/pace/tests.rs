@@ -130,3 +130,24 @@ fn frames_that_nobody_takes_are_dropped_and_counted() {
     assert_eq!(thread.health.borrow().dropped, 6);
     assert_eq!(thread.frames.1.try_recv().expect("a frame").instant, 0);
 }
+
+#[test]
+fn what_publishes_gets_each_frame_in_the_period_that_made_it() {
+    const FRAMES: i64 = 5;
+    let Thread { axes, commands: (commands_out, commands), frames: (frames, mut taken), .. } = Thread::new();
+    let (found_out, found) = std::sync::mpsc::channel();
+    let published = async move {
+        while let Some(frame) = taken.recv().await {
+            let _ = found_out.send((frame.instant, taken.len()));
+            if frame.instant == FRAMES - 1 {
+                let _ = commands_out.try_send(Command::Shutdown);
+            }
+        }
+    };
+    let thread = std::thread::spawn(move || real::run(axes, commands, &frames, Box::pin(published)));
+    for instant in 0..FRAMES {
+        let found = found.recv_timeout(Duration::from_secs(20)).expect("a frame");
+        assert_eq!(found, (instant, 0), "none may wait");
+    }
+    thread.join().expect("it ends when it is told to");
+}
