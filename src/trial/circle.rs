@@ -1,6 +1,6 @@
 //! Circularity of the circles of a program.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use crate::assess::{CircleAssessor, CircleTrace, bidirectional};
@@ -36,18 +36,20 @@ pub(super) struct Circles {
     list: Vec<Steady>,
     /// The first whose window is not over.
     next: usize,
+    /// Whole circles behind those of the list.
+    more: usize,
 }
 
 impl Circles {
     pub(super) fn of(program: &Program, machine: &MachineConfig) -> Self {
         let axes = machine.axes();
+        let is_linear = |place: &usize| axes[*place].kind() == AxisKind::Linear;
         let blocks = program.path().blocks().iter().enumerate();
-        let circles = blocks.filter_map(|(index, block)| {
-            let circle = block.circle()?;
+        let mut circles = blocks.filter_map(|(index, block)| {
+            Some((index, block.circle().filter(|circle| circle.plane.iter().all(is_linear))?))
+        });
+        let steady = |(index, circle): (usize, Circle)| {
             let plane = circle.plane;
-            if plane.iter().any(|&place| axes[place].kind() != AxisKind::Linear) {
-                return None;
-            }
             let window = steady_circle(program, index)?;
             let trace = CircleTrace {
                 plane: plane.map(|place| axes[place].name().to_owned()),
@@ -58,8 +60,10 @@ impl Circles {
             };
             let assessor = CircleAssessor::new(circle.centre, circle.radius);
             Some(Steady { index, window, circle, assessor, trace })
-        });
-        Circles { list: circles.take(MOST).collect(), next: 0 }
+        };
+        let list = circles.by_ref().filter_map(steady).take(MOST).collect();
+        let more = circles.filter(|(_, circle)| circle.sweep.abs() >= TAU).count();
+        Circles { list, next: 0, more }
     }
 
     /// Takes where the axes are at `times`, s, into account: `coordinates` has the programmed ones of an axis.
@@ -99,6 +103,11 @@ impl Circles {
             })
         });
         figures.collect()
+    }
+
+    /// Whole circles of which nothing is measured.
+    pub(super) fn more(&self) -> usize {
+        self.more
     }
 
     /// Each circle that was run in both directions.

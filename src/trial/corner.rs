@@ -19,6 +19,8 @@ pub(super) struct Corners {
     list: Vec<(f64, CornerFigures)>,
     /// The first whose window is not over.
     next: usize,
+    /// Corners behind those of the list.
+    more: usize,
 }
 
 impl Corners {
@@ -26,7 +28,7 @@ impl Corners {
         let kinds: Vec<_> = machine.axes().iter().map(|axis| axis.kind()).collect();
         let delay = machine.axes().iter().map(|axis| axis.alpha()).max().unwrap_or(0);
         let blocks = program.path().blocks();
-        let corners = blocks.windows(2).enumerate().filter_map(|(index, pair)| {
+        let mut corners = blocks.windows(2).enumerate().filter_map(|(index, pair)| {
             let turn = turn(&pair[0], &pair[1], &kinds)?;
             let (end, next) = (program.span(index).end, program.span(index + 1).start);
             // Behind a dwell the axes start anew: that is no corner.
@@ -36,7 +38,8 @@ impl Corners {
             let time = end + seconds(delay);
             Some((time, CornerFigures { index: index + 1, turn, max_contour_error: 0.0 }))
         });
-        Corners { list: corners.take(MOST).collect(), next: 0 }
+        let list = corners.by_ref().take(MOST).collect();
+        Corners { list, next: 0, more: corners.count() }
     }
 
     /// Takes distances from the path, less what overshoots its ends, m, at `times`, s, into account.
@@ -54,6 +57,11 @@ impl Corners {
                 figures.max_contour_error = figures.max_contour_error.max(distance);
             }
         }
+    }
+
+    /// Corners of which nothing is measured.
+    pub(super) fn more(&self) -> usize {
+        self.more
     }
 
     pub(super) fn figures(&self) -> Vec<CornerFigures> {
