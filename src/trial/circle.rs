@@ -156,3 +156,30 @@ impl Steady {
             && (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1]) < SAME
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Parameters;
+    use crate::kinematics::Kinematics;
+    use crate::path::{Block, Frame, Law, Move};
+    use crate::simulation::joints;
+
+    #[test]
+    fn circles_that_are_not_measured_are_counted() {
+        let machine = Parameters::embedded_default().and_then(|p| p.machine_config()).expect("valid");
+        let kinds: Vec<AxisKind> = machine.axes().iter().map(|axis| axis.kind()).collect();
+        let (from, turns) = ([0.0; 5], 2.0);
+        let block = Block::arc(&from, [0, 1], [-0.01, 0.0], turns * 2.0 * PI, &from, &kinds).expect("an arc");
+        let circle = Move { law: Law::Cosine { ramp: 0.1 }, ..Move::new(block, 0.05) };
+        let period = machine.periods().position;
+        for (count, measured, more) in [(MOST, MOST, 0), (MOST + 3, MOST, 3)] {
+            let moves = vec![circle.clone(); count];
+            let kinematics = Kinematics::new(&machine);
+            let program = Program::plan(kinematics, Frame::Joints, &joints(&machine, ""), period, 0.0, moves)
+                .expect("the machine can do it");
+            let circles = Circles::of(&program, &machine);
+            assert_eq!((circles.list.len(), circles.more()), (measured, more), "{count} circles");
+        }
+    }
+}

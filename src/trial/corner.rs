@@ -68,3 +68,40 @@ impl Corners {
         self.list.iter().map(|(_, figures)| *figures).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{AxisKind, Parameters};
+    use crate::kinematics::Kinematics;
+    use crate::path::{Block, Frame, Move};
+    use crate::simulation::joints;
+
+    /// Steps in X and Y by turns: each but the last ends in a corner.
+    fn stairs(steps: usize) -> (Program, MachineConfig) {
+        let machine = Parameters::embedded_default().and_then(|p| p.machine_config()).expect("valid");
+        let kinds: Vec<AxisKind> = machine.axes().iter().map(|axis| axis.kind()).collect();
+        let at = |step: usize| [1e-4 * step.div_ceil(2) as f64, 1e-4 * (step / 2) as f64, 0.0, 0.0, 0.0];
+        let line = |step| Move::new(Block::line(&at(step), &at(step + 1), &kinds).expect("a line"), 0.01);
+        let moves = (0..steps).map(line).collect();
+        let period = machine.periods().position;
+        let program = Program::plan(
+            Kinematics::new(&machine),
+            Frame::Joints,
+            &joints(&machine, ""),
+            period,
+            0.0,
+            moves,
+        );
+        (program.expect("the machine can do it"), machine)
+    }
+
+    #[test]
+    fn corners_that_are_not_measured_are_counted() {
+        for (steps, measured, more) in [(MOST, MOST - 1, 0), (MOST + 1, MOST, 0), (MOST + 4, MOST, 3)] {
+            let (program, machine) = stairs(steps);
+            let corners = Corners::of(&program, &machine);
+            assert_eq!((corners.figures().len(), corners.more()), (measured, more), "{steps} steps");
+        }
+    }
+}
