@@ -1,7 +1,7 @@
 //! Files against the raw bytes: each reader and writer beside a plain read or write of the same file.
 //!
 //!     cargo bench --no-default-features --bench io
-//!     cargo bench --no-default-features --bench io -- "set-points from"
+//!     cargo bench --no-default-features --bench io -- MCAP
 //!
 //! A round runs every case once, so that what the machine does besides falls on all of them; the first table
 //! gives medians over the rounds as a ratio to the raw bytes. Criterion's own figures follow.
