@@ -207,7 +207,7 @@ mod tests {
             |message| message.points[1].time_from_start.nanosec = 1_000_000_000,
             |message| message.points[2].accelerations = vec![0.0; 3],
             |message| message.points[3].positions.clear(),
-            |message| message.points[1].effort[1] = f64::NAN,
+            |message| message.points[1].effort[1] = f64::INFINITY,
             |message| message.joint_names.clear(),
         ];
         for change in changes {
