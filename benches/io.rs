@@ -1,6 +1,7 @@
 //! Files against the raw bytes: each reader and writer beside a plain read or write of the same file.
 //!
 //!     cargo bench --no-default-features --bench io
+//!     cargo bench --no-default-features --bench io -- MCAP
 //!
 //! A round runs every case once, so that what the machine does besides falls on all of them; the first table
 //! gives medians over the rounds as a ratio to the raw bytes. Criterion's own figures follow.
@@ -285,6 +286,10 @@ fn main() {
         Parameters::embedded_default().and_then(|p| p.machine_config()).expect("the shipped machine"),
     ));
     let mut cases = cases(machine, &folder.0);
+    // `cargo bench` says --bench.
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| name.contains(word.as_str()));
+    cases.retain(|case| case.against.is_none() || is_wanted(case.name));
     ratios(&mut cases);
     let mut criterion = Criterion::default().sample_size(10).configure_from_args();
     let mut group = criterion.benchmark_group("files");

@@ -11,6 +11,7 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 
+from documented import OFFSETS, tool_pose
 from drive import DEEP_QOS, TSP_NS, Drive, Node, ballbar, joint_trajectory, to_ns
 
 JOINTS = ["x", "y", "z", "a", "c"]
@@ -18,17 +19,6 @@ LENGTH = 850
 """Poses of a path: more than 64 kB."""
 SPACING = 1e-4
 """From one pose of a path to the next at least, m."""
-# Every offset of the kinematics, each another, mm.
-OFFSETS = {
-    "tool_length": 123.0,
-    "pivot_a_y": 11.0,
-    "pivot_a_z": -37.0,
-    "pivot_c_x": 5.0,
-    "pivot_c_y": -7.0,
-    "workpiece_x": 60.0,
-    "workpiece_y": 17.0,
-    "workpiece_z": -29.0,
-}
 
 
 class Tool:
@@ -84,25 +74,6 @@ def quaternion(pose: PoseStamped) -> np.ndarray:
     return np.array([q.x, q.y, q.z, q.w])
 
 
-def turn(axis: int, angle: float) -> np.ndarray:
-    """Right-handed rotation about X (0) or Z (2)."""
-    i, j = {0: (1, 2), 2: (0, 1)}[axis]
-    matrix = np.eye(3)
-    matrix[i, i] = matrix[j, j] = math.cos(angle)
-    matrix[i, j], matrix[j, i] = -math.sin(angle), math.sin(angle)
-    return matrix
-
-
-def kinematics(x: float, y: float, z: float, a: float, c: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tip (m) and orientation of the tool in the workpiece frame, by the documented equations."""
-    p = {key: value * 1e-3 for key, value in OFFSETS.items()}
-    pivot_a = np.array([0.0, p["pivot_a_y"], p["pivot_a_z"]])
-    pivot_c = np.array([p["pivot_c_x"], p["pivot_c_y"], 0.0])
-    workpiece = np.array([p["workpiece_x"], p["workpiece_y"], p["workpiece_z"]])
-    tip = turn(0, a) @ (np.array([x, y, z - p["tool_length"]]) - pivot_a) + pivot_a - pivot_c
-    return turn(2, c) @ tip + pivot_c - workpiece, turn(2, c) @ turn(0, a)
-
-
 def matrix_of(q: np.ndarray) -> np.ndarray:
     """Rotation matrix of a unit quaternion x, y, z, w."""
     v, w = q[:3], q[3]
@@ -132,7 +103,7 @@ def test_the_pose_is_the_kinematics_of_the_joint_states(tool: Tool):
     largest = 0.0
     for row, stamp in enumerate(recording.joints.stamp.tolist()):
         pose = tool.poses[stamp]
-        tip, orientation = kinematics(*(recording.joints["position", joint][row] for joint in JOINTS))
+        tip, orientation = tool_pose(*(recording.joints["position", joint][row] for joint in JOINTS))
         point = pose.pose.position
         q = quaternion(pose)
         largest = max(largest, np.abs(tip - [point.x, point.y, point.z]).max())

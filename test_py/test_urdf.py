@@ -15,21 +15,11 @@ import pytest
 import yaml
 from urdf_parser_py.urdf import URDF, Joint
 
+from documented import OFFSETS, tool_pose
 from drive import node_binary
 
 ROOT = Path(__file__).resolve().parent.parent
 MACHINES = ["mikron_ucp710", "linear_motor_center"]
-# Every offset, each another, so that none can stand for another.
-OFFSETS = {
-    "tool_length": 123.0,
-    "pivot_a_y": 11.0,
-    "pivot_a_z": -37.0,
-    "pivot_c_x": 5.0,
-    "pivot_c_y": -7.0,
-    "workpiece_x": 60.0,
-    "workpiece_y": 17.0,
-    "workpiece_z": -29.0,
-}
 
 
 def command(*arguments: str) -> str:
@@ -73,17 +63,6 @@ def frame(robot: URDF, link: str, joints: dict[str, float]) -> np.ndarray:
     return matrix
 
 
-def formula(p: dict[str, float], x: float, y: float, z: float, a: float, c: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tip and tool axis in the workpiece frame: the equations of the documentation, solved for p."""
-    turn_a, turn_c = rotation(np.eye(3)[0], a), rotation(np.eye(3)[2], c)
-    pivot_a = np.array([0.0, p["pivot_a_y"], p["pivot_a_z"]])
-    pivot_c = np.array([p["pivot_c_x"], p["pivot_c_y"], 0.0])
-    workpiece = np.array([p["workpiece_x"], p["workpiece_y"], p["workpiece_z"]])
-    tip = np.array([x, y, z - p["tool_length"]])
-    tip = turn_c @ (turn_a @ (tip - pivot_a) + pivot_a - pivot_c) + pivot_c - workpiece
-    return tip, np.array([math.sin(a) * math.sin(c), -math.sin(a) * math.cos(c), math.cos(a)])
-
-
 @pytest.mark.parametrize("machine", MACHINES)
 def test_limits_are_the_machine_files(machine: str):
     """Names and kinds as in joint_states; stroke, velocity and effort in SI."""
@@ -124,17 +103,16 @@ def test_the_tool_in_the_workpiece_is_the_kinematics(machine: str):
     trials = random.uniform([-0.3, -0.2, -0.2, -math.pi, -20.0], [0.3, 0.2, 0.2, math.pi, 20.0], (60, 5))
     asked = [f"--joints={','.join(f'{n}={v!r}' for n, v in zip(names, row))}" for row in trials.tolist()]
     poses = json.loads(command("pose", "--machine", machine, "--json", *settings, *asked))
-    metres = {key: value * 1e-3 for key, value in OFFSETS.items()}
     largest = 0.0
     for row, pose in zip(trials.tolist(), poses, strict=True):
         joints = dict(zip(names, row))
         seen = np.linalg.inv(frame(robot, "workpiece", joints)) @ frame(robot, "tool", joints)
-        tip, axis = formula(metres, **joints)
+        tip, orientation = tool_pose(**joints)
         x, y, z, w = pose["orientation"]
         sine = math.sqrt(x * x + y * y + z * z)
         turned = rotation(np.array([x, y, z]) / sine, 2 * math.atan2(sine, w))
         errors = [seen[:3, 3] - pose["tip"], seen[:3, 2] - pose["axis"], seen[:3, :3] - turned]
-        errors += [tip - pose["tip"], axis - pose["axis"]]
+        errors += [tip - pose["tip"], orientation[:, 2] - pose["axis"]]
         largest = max(largest, *(np.abs(error).max() for error in errors))
     print(f"{machine}: largest difference {largest:.1e}")
     assert largest < 1e-9

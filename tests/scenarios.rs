@@ -238,3 +238,55 @@ fn overshoot_of_the_ends_is_told_apart() {
     assert!(contour.max > 10.0 * MICROMETRE, "{contour:?}");
     assert!(contour.max_within_ends < 1e-15, "{contour:?}");
 }
+
+#[test]
+fn what_is_plotted_is_as_large_as_the_figures() {
+    for name in ["corner-90", "five-axis"] {
+        let config = config(&[]);
+        let program = program(name, &config);
+        let trial = Trial {
+            machine: &config,
+            program: Some(Arc::clone(&program)),
+            allow_nonzero_end_velocity: false,
+            record: true,
+        };
+        let outcome = run_trial(&trial, setpoints(name, program, &config), |_| Ok(())).expect("a run");
+        let (figures, recording) = (outcome.figures, outcome.recording.expect("it was asked for"));
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        let tool = recording.tool.expect("there is a tool");
+        assert_eq!(largest(&tool.contour_error), figures.contour.expect("there is a tool").max, "{name}");
+        if !tool.orientation_error.is_empty() {
+            let orientation = figures.orientation.expect("there are tables");
+            assert_eq!(largest(&tool.orientation_error), orientation.max, "{name}");
+        }
+        for (axis, shown) in figures.axes.iter().zip(&recording.axes).filter(|(axis, _)| axis.moves) {
+            let at = format!("{name}, {}", axis.name);
+            assert_eq!(largest(&shown.current), axis.report.peak_current, "{at}");
+            assert_eq!(largest(&shown.tracking_error), axis.report.max_tracking_error, "{at}");
+        }
+    }
+}
+
+/// Between two position instants the current of a reversal is larger than at either.
+#[test]
+fn a_peak_between_two_position_instants_is_plotted() {
+    let config = config(&[]);
+    let mut at_instants = 0.0_f64;
+    let figures = watch_scenario("x-there-and-back", &config, |tick| {
+        if tick.position_instant {
+            at_instants = at_instants.max(tick.machine.axis(X).sample().current.abs());
+        }
+    });
+    let program = program("x-there-and-back", &config);
+    let trial = Trial {
+        machine: &config,
+        program: Some(Arc::clone(&program)),
+        allow_nonzero_end_velocity: false,
+        record: true,
+    };
+    let outcome = run_trial(&trial, setpoints("x-there-and-back", program, &config), |_| Ok(()));
+    let recording = outcome.expect("a run").recording.expect("it was asked for");
+    let plotted = recording.axes[X].current.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    assert!(plotted > at_instants, "{plotted} A, at the instants {at_instants} A");
+    assert_eq!(plotted, figures.axes[X].report.peak_current);
+}

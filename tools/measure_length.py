@@ -7,8 +7,9 @@
     tools/measure_length.py --write 36000 psec.csv # only the set-points, five axes every 6 ms
 
 A row per length: seconds of the processor (and of the clock, which a busy machine makes longer), times real time,
-time per simulated second relative to the first length, largest resident memory, and the length of what was written. `--report` and `--trace` have a page and a trace (at position
-instants) written too.
+time per simulated second relative to the first length, largest resident memory, and the length of what was read and
+written. `--report` and `--trace` have a page and a trace (at position instants) written too. Of several `--rounds`,
+which take the lengths in turns, the medians are told.
 """
 
 from __future__ import annotations
@@ -16,11 +17,13 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 COMMAND = Path(__file__).resolve().parent.parent / "target" / "release" / "virtual_axes"
 LENGTHS = [60, 600, 3600, 36000]
@@ -31,6 +34,8 @@ CYCLE = 10_000
 # Amplitude (m, rad) and turns a cycle of the axes: each begins and ends a cycle at rest.
 AXES = {"x": (0.1, 6), "y": (0.08, 7), "z": (0.05, 5), "a": (0.3, 3), "c": (0.6, 4)}
 MEBIBYTE = 1 << 20
+# How often the memory of a run is looked at, s.
+LOOK_EVERY = 0.005
 
 
 def write_psec(path: Path, seconds: int) -> None:
@@ -47,51 +52,103 @@ def write_psec(path: Path, seconds: int) -> None:
             file.write("".join(f"{(first + i) * PERIOD_MS / 1000!r}{rows[i]}" for i in range(count)))
 
 
-def run(command: list[str]) -> tuple[float, float, int]:
-    """Seconds that it takes, of the processor and of the clock, and the most memory that it holds, bytes."""
+class Run(NamedTuple):
+    """What a run took and left."""
+
+    processor: float  # s
+    clock: float  # s
+    memory: int  # largest resident, bytes
+    written: list[int]  # bytes of each output
+
+
+def resident(pid: int) -> int:
+    """The most memory that a process has held since it began, bytes; 0 where it is no more."""
+    # Not ru_maxrss: that begins with what this interpreter holds.
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:")), 0)
+
+
+def run(command: list[str], outputs: list[Path]) -> Run:
     began = time.monotonic()
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(child.pid, 0)
-    took = time.monotonic() - began
+    memory = 0
+    try:
+        while True:
+            ended, status, usage = os.wait4(child.pid, os.WNOHANG)
+            if ended:
+                break
+            memory = max(memory, resident(child.pid))
+            time.sleep(LOOK_EVERY)
+    except BaseException:
+        child.kill()
+        raise
+    clock = time.monotonic() - began
     child.returncode = os.waitstatus_to_exitcode(status)
     if child.returncode != 0:
         sys.exit(f"measure_length: {' '.join(command)} ended with {child.returncode}")
-    return usage.ru_utime + usage.ru_stime, took, usage.ru_maxrss * 1024
+    written = [output.stat().st_size for output in outputs]
+    return Run(usage.ru_utime + usage.ru_stime, clock, memory, written)
 
 
 def measure(arguments: argparse.Namespace, folder: Path) -> None:
-    first = None
-    heads = ["length, s", "processor, s", "clock, s", "× real time", "per s", "memory, MiB", "read, MB", "written, MB"]
-    print(" ".join(f"{head:>12}" for head in heads))
-    for seconds in arguments.seconds:
-        psec = folder / "psec.csv"
-        write_psec(psec, seconds)
-        command = [str(arguments.command), "run", str(psec)]
-        outputs = [folder / "page.html"] * arguments.report + [folder / "trace.csv"] * arguments.trace
-        for option, output in zip(["--report"] * arguments.report + ["--trace"] * arguments.trace, outputs):
-            command += [option, str(output)]
-        took, clock, memory = run(command)
-        first = first or took / seconds
-        written = ", ".join(f"{output.stat().st_size / 1e6:.2f}" for output in outputs)
-        print(
-            f"{seconds:12} {took:12.2f} {clock:12.2f} {seconds / took:12.0f} {took / seconds / first:12.2f} "
-            f"{memory / MEBIBYTE:12.1f} {psec.stat().st_size / 1e6:12.1f} {written:>12}",
-            flush=True,
-        )
+    wanted = [("--report", folder / "page.html")] * arguments.report + [("--trace", folder / "trace.csv")] * arguments.trace
+    outputs = [output for _, output in wanted]
+    options = [word for option, output in wanted for word in (option, str(output))]
+    runs: dict[int, list[Run]] = {seconds: [] for seconds in arguments.seconds}
+    read: dict[int, int] = {}
+    for _ in range(arguments.rounds):
+        for seconds, done in runs.items():
+            psec = folder / "psec.csv"
+            write_psec(psec, seconds)
+            read[seconds] = psec.stat().st_size
+            done.append(run([str(arguments.command), "run", str(psec), *options], outputs))
+            if len(done) == arguments.rounds:
+                row(seconds, done, read[seconds], next(iter(runs.items())))
+
+
+def row(seconds: int, runs: list[Run], read: int, first: tuple[int, list[Run]]) -> None:
+    """Prints the medians of a length's runs; the heads before the first."""
+    if seconds == first[0]:
+        heads = ["length, s", "processor, s", "clock, s", "× real time", "per s", "memory, MiB", "read, MB", "written, MB"]
+        print(" ".join(f"{head:>12}" for head in heads))
+    processor = statistics.median(run.processor for run in runs)
+    clock = statistics.median(run.clock for run in runs)
+    memory = max(run.memory for run in runs)
+    ratio = processor / seconds / (statistics.median(run.processor for run in first[1]) / first[0])
+    written = ", ".join(f"{size / 1e6:.2f}" for size in runs[-1].written)
+    print(
+        f"{seconds:12} {processor:12.2f} {clock:12.2f} {seconds / processor:12.0f} {ratio:12.2f} "
+        f"{memory / MEBIBYTE:12.1f} {read / 1e6:12.1f} {written:>12}",
+        flush=True,
+    )
+
+
+def length(text: str) -> int:
+    seconds = int(text)
+    if seconds <= 0:
+        raise argparse.ArgumentTypeError(f"{text} s is no length")
+    return seconds
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--command", type=Path, default=COMMAND, help="the program virtual_axes")
-    parser.add_argument("--seconds", type=int, nargs="+", default=LENGTHS, metavar="S", help="lengths of the set-points")
+    parser.add_argument("--seconds", type=length, nargs="+", default=LENGTHS, metavar="S", help="lengths of the set-points")
     parser.add_argument("--report", action="store_true", help="write a page, too")
     parser.add_argument("--trace", action="store_true", help="write a trace, too")
+    parser.add_argument("--rounds", type=length, default=1, metavar="N", help="how often each length is run")
+    parser.add_argument("--folder", type=Path, help="where set-points and outputs are for a while")
     parser.add_argument("--write", nargs=2, metavar=("S", "FILE"), help="write set-points and run nothing")
     arguments = parser.parse_args()
     if arguments.write:
         write_psec(Path(arguments.write[1]), int(arguments.write[0]))
         return
-    with tempfile.TemporaryDirectory() as folder:
+    if not arguments.command.is_file():
+        parser.error(f"there is no {arguments.command}: cargo build --release --bin virtual_axes")
+    with tempfile.TemporaryDirectory(dir=arguments.folder) as folder:
         measure(arguments, Path(folder))
 
 

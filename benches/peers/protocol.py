@@ -6,9 +6,35 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from axis import Axis, padded, read_axis
+from cases import read_setpoints
 
 Figures = dict[str, float]
 """Figures of the one axis, by the names of the C loop."""
+
+
+class Asked(NamedTuple):
+    """The one axis that is to be run."""
+
+    joint: str
+    axis: Axis
+    psec: list[float]
+    """Set-points, one a position period."""
+    values: list[float]
+    """The same with what the delay reaches behind the first."""
+    start: int
+    """Where the first stands in `values`."""
+
+
+def asked() -> Asked:
+    """What the command line names: the table of the machine and the set-points."""
+    table, setpoints = map(Path, sys.argv[1:3])
+    (joint,), (psec,) = read_setpoints(setpoints)
+    axis = read_axis(table, joint)
+    return Asked(joint, axis, psec, *padded(psec, axis))
 
 
 def figures(max_synchronized: float, peak_current: float, **more: float) -> Figures:

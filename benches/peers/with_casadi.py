@@ -10,15 +10,13 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from axis import TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis, padded, read_axis
-from cases import read_setpoints
-from protocol import Figures, figures, serve
+from axis import TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
+from protocol import Figures, asked, figures, serve
 
 FLAGS = ("-O3", "-march=native", "-ffast-math", "-fPIC", "-shared")
 
@@ -90,10 +88,7 @@ def compiled(function: ca.Function) -> ca.Function:
 
 def main() -> None:
     """Runs what standard input asks for."""
-    table, setpoints = map(Path, sys.argv[1:3])
-    (joint,), (psec,) = read_setpoints(setpoints)
-    axis = read_axis(table, joint)
-    values, start = padded(psec, axis)
+    joint, axis, psec, values, start = asked()
     array = np.array(values)
     count = len(values) - start
     at = np.arange(start, len(values)) - axis.delay_periods

@@ -9,12 +9,9 @@ the largest synchronised error and current only. Building the diagram is not in 
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
-from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis, padded, read_axis
-from cases import read_setpoints
-from protocol import Figures, figures, serve
+from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
+from protocol import Figures, asked, figures, serve
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
@@ -89,10 +86,7 @@ class Drive(LeafSystem):
 
 def main() -> None:
     """Runs what standard input asks for."""
-    table, setpoints = map(Path, sys.argv[1:3])
-    (joint,), (psec,) = read_setpoints(setpoints)
-    axis = read_axis(table, joint)
-    values, start = padded(psec, axis)
+    joint, axis, psec, values, start = asked()
     simulator = Simulator(Drive(axis, values, start))
     context = simulator.get_mutable_context()
     initial = [0.0, 0.0, psec[0] / axis.ratio] + [0.0] * (Drive.STATE - 3)

@@ -8,18 +8,14 @@ and compiling are not in the time.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import jax
-from cases import read_setpoints
-from protocol import Figures, figures, serve
+from protocol import Figures, asked, figures, serve
 
 jax.config.update("jax_enable_x64", True)
 
 import jax.numpy as jnp  # noqa: E402  (after the choice of float64)
 import jaxonomy  # noqa: E402
-from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis, padded, read_axis  # noqa: E402
+from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis  # noqa: E402
 from jaxonomy.simulation import SimulatorOptions  # noqa: E402
 
 
@@ -95,10 +91,7 @@ class Drive(jaxonomy.LeafSystem):
 
 def main() -> None:
     """Runs what standard input asks for."""
-    table, setpoints = map(Path, sys.argv[1:3])
-    (joint,), (psec,) = read_setpoints(setpoints)
-    axis = read_axis(table, joint)
-    values, start = padded(psec, axis)
+    joint, axis, psec, values, start = asked()
     system = Drive(axis, values, start)
     ticks = len(psec) * TICKS_PER_POSITION
     # The update at the end of the last period is not wanted.

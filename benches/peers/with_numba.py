@@ -6,14 +6,11 @@ fastmath is on, as -ffast-math is for the C loop. Compiling is not in the time.
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
-from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis, padded, read_axis
-from cases import read_setpoints
+from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
 from numba import njit
-from protocol import Figures, figures, serve
+from protocol import Figures, asked, figures, serve
 
 
 @njit(fastmath=True)
@@ -100,10 +97,7 @@ def simulate(p: Axis, psec: np.ndarray, start: int):
 
 def main() -> None:
     """Runs what standard input asks for."""
-    table, setpoints = map(Path, sys.argv[1:3])
-    (joint,), (psec,) = read_setpoints(setpoints)
-    axis = read_axis(table, joint)
-    values, start = padded(psec, axis)
+    joint, axis, _, values, start = asked()
     array = np.array(values)
 
     def run() -> Figures:

@@ -2,7 +2,10 @@
 
 use crate::config::AxisKind;
 
-/// Signals of one run, sampled at the same times; every list of a run is as long as [`Self::time`].
+/// Signals of one run at the same position instants; every list of a run is as long as [`Self::time`].
+///
+/// What figures measure at every tick is taken where it is largest in the position period that begins there, so
+/// that a plot shows the figure.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Recording {
     /// s from the start.
@@ -34,7 +37,7 @@ pub struct AxisTrace {
     pub synchronized_tracking_error: Vec<f64>,
     /// SV, m/s or rad/s.
     pub velocity: Vec<f64>,
-    /// SMC, A.
+    /// SMC, A, where it is largest in the position period.
     pub current: Vec<f64>,
     /// Set-point of the current loop, A.
     pub current_setpoint: Vec<f64>,
@@ -53,10 +56,10 @@ pub struct ToolTrace {
     pub reference: Vec<[f64; 3]>,
     /// Where the tip is, m.
     pub position: Vec<[f64; 3]>,
-    /// Distance of the two, m.
+    /// Distance of the tip from the path, m, the largest of the position period.
     pub contour_error: Vec<f64>,
-    /// Angle between the tool axis and that of the path at its nearest point, rad; empty for a
-    /// machine without rotary axes.
+    /// Angle between the tool axis and that of the path at its nearest point, rad, the largest of the position
+    /// period; empty for a machine without rotary axes.
     pub orientation_error: Vec<f64>,
 }
 

@@ -1,12 +1,13 @@
 //! MCAP recordings (rosbag2, profile `ros2`) as files: reading them whole, and what can be wrong with them.
 
 use std::io::{self, BufReader, Read, Seek};
+use std::marker::PhantomData;
 
 use mcap::io::MessageReader;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, Message};
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, DeserializeSeed};
 
 use super::{cdr, shortened};
 
@@ -61,11 +62,22 @@ pub(super) fn type_of<'a>(message: &'a Message<'_>) -> Option<&'a str> {
 /// # Errors
 /// A sentence that says what is wrong.
 pub(super) fn decode<T: DeserializeOwned>(message: &Message<'_>) -> Result<T, String> {
+    decode_with(PhantomData::<T>, message)
+}
+
+/// What `seed` makes of a message.
+///
+/// # Errors
+/// A sentence that says what is wrong.
+pub(super) fn decode_with<'a, S: DeserializeSeed<'a>>(
+    seed: S,
+    message: &'a Message<'_>,
+) -> Result<S::Value, String> {
     let encoding = &message.channel.message_encoding;
     if encoding != ENCODING {
         return Err(format!("its encoding is \"{encoding}\", must be \"{ENCODING}\""));
     }
-    cdr::decode(&message.data)
+    cdr::decode(seed, &message.data)
 }
 
 fn options() -> LinearReaderOptions {

@@ -10,11 +10,10 @@ use mcap::Message;
 use mcap::io::MessageReader;
 
 use super::mcap_in::{
-    Ending, McapFault, check_chunks, damaged, decode, start, type_of, unfinished, unreadable,
+    Ending, McapFault, check_chunks, damaged, decode_with, start, type_of, unfinished, unreadable,
 };
 use super::{nearest, nearest_name};
-use crate::messages;
-use crate::messages::trajectory_msgs::msg::JointTrajectory;
+use crate::messages::RequestSeed;
 use crate::trajectory::{Rejection, Request};
 use crate::units::{Nanoseconds, seconds};
 
@@ -211,9 +210,8 @@ impl<R: Read + Seek> Trajectories<R> {
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
         let at =
             || format!("{}: {}, message {number}, log time {} s", self.name, self.topic, seconds(log_time));
-        let trajectory: JointTrajectory =
-            decode(message).map_err(|reason| RecordingError::Message { at: at(), reason })?;
-        let request = messages::request(&trajectory, usize::MAX)
+        let request = decode_with(RequestSeed, message)
+            .map_err(|reason| RecordingError::Message { at: at(), reason })?
             .map_err(|rejection| RecordingError::Rejected { at: at(), rejection })?;
         Ok((log_time, request))
     }

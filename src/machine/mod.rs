@@ -326,6 +326,17 @@ impl Machine {
         positions.iter_mut().for_each(|value| *value = plant.position(*value));
     }
 
+    /// Current of an axis at that tick of the position period that was computed last where it is largest in
+    /// size, A.
+    ///
+    /// # Panics
+    /// If there is no such axis.
+    pub fn largest_current(&self, axis: usize) -> f64 {
+        let currents = (0..self.ticks_per_period()).map(|tick| self.bank.motor(axis, tick).current);
+        currents
+            .fold(0.0, |largest: f64, current| if current.abs() > largest.abs() { current } else { largest })
+    }
+
     /// What an axis did in the position period that was computed last.
     ///
     /// # Panics

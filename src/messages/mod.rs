@@ -5,6 +5,7 @@ mod control;
 mod own;
 mod pose;
 mod recorded;
+mod request_seed;
 mod schema;
 mod state;
 mod time;
@@ -18,6 +19,7 @@ pub use control::{
 pub use own::{DriveStates, MotorCurrents, PACKAGE, Source, Status, TrajectoryResult};
 pub use pose::{path, pose_stamped};
 pub use recorded::Recorded;
+pub use request_seed::RequestSeed;
 pub use ros2_interfaces_jazzy_serde::{
     action_msgs, builtin_interfaces, diagnostic_msgs, geometry_msgs, nav_msgs, rcl_interfaces, rosgraph_msgs,
     sensor_msgs, std_msgs, std_srvs, trajectory_msgs, unique_identifier_msgs,

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::{Duration, Time};
+use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
 
 use super::time::{duration, header};
@@ -15,11 +16,7 @@ use crate::units::{Nanoseconds, SECOND_NS};
 /// [`Rejection`] for what no machine could run: wrong array sizes, values that are not finite,
 /// malformed times, more than `max_points` points.
 pub fn request(message: &JointTrajectory, max_points: usize) -> Result<Request, Rejection> {
-    let Time { sec, nanosec } = message.header.stamp;
-    let start = match nanoseconds(sec, nanosec, format_args!("header.stamp"), None)? {
-        0 => Start::Now,
-        at => Start::At(at),
-    };
+    let start = start(&message.header)?;
     let points = &message.points;
     if points.len() > max_points {
         let text = format!("{} points are more than max_points, {max_points}", points.len());
@@ -28,11 +25,8 @@ pub fn request(message: &JointTrajectory, max_points: usize) -> Result<Request, 
     let mut request = Request::new(start, message.joint_names.clone());
     request.reserve(points.len());
     for (index, point) in points.iter().enumerate() {
-        let Duration { sec, nanosec } = point.time_from_start;
-        let what = format_args!("point {index}, time_from_start");
-        let time = nanoseconds(sec, nanosec, what, Some(index))?;
         request.push(
-            time,
+            point_time(&point.time_from_start, index)?,
             Row {
                 positions: &point.positions,
                 velocities: &point.velocities,
@@ -42,6 +36,21 @@ pub fn request(message: &JointTrajectory, max_points: usize) -> Result<Request, 
         )?;
     }
     Ok(request)
+}
+
+/// When a trajectory starts by its header.
+pub(super) fn start(header: &Header) -> Result<Start, Rejection> {
+    let Time { sec, nanosec } = header.stamp;
+    Ok(match nanoseconds(sec, nanosec, format_args!("header.stamp"), None)? {
+        0 => Start::Now,
+        at => Start::At(at),
+    })
+}
+
+/// The time of point `index`, ns from the start.
+pub(super) fn point_time(time: &Duration, index: usize) -> Result<Nanoseconds, Rejection> {
+    let Duration { sec, nanosec } = *time;
+    nanoseconds(sec, nanosec, format_args!("point {index}, time_from_start"), Some(index))
 }
 
 /// A request as a message, stamp 0 for [`Start::Now`]; the inverse of [`request`] but for efforts,

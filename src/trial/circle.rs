@@ -1,6 +1,6 @@
 //! Circularity of the circles of a program.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use crate::assess::{CircleAssessor, CircleTrace, bidirectional};
@@ -36,18 +36,20 @@ pub(super) struct Circles {
     list: Vec<Steady>,
     /// The first whose window is not over.
     next: usize,
+    /// Whole circles behind those of the list.
+    more: usize,
 }
 
 impl Circles {
     pub(super) fn of(program: &Program, machine: &MachineConfig) -> Self {
         let axes = machine.axes();
+        let is_linear = |place: &usize| axes[*place].kind() == AxisKind::Linear;
         let blocks = program.path().blocks().iter().enumerate();
-        let circles = blocks.filter_map(|(index, block)| {
-            let circle = block.circle()?;
+        let mut circles = blocks.filter_map(|(index, block)| {
+            Some((index, block.circle().filter(|circle| circle.plane.iter().all(is_linear))?))
+        });
+        let steady = |(index, circle): (usize, Circle)| {
             let plane = circle.plane;
-            if plane.iter().any(|&place| axes[place].kind() != AxisKind::Linear) {
-                return None;
-            }
             let window = steady_circle(program, index)?;
             let trace = CircleTrace {
                 plane: plane.map(|place| axes[place].name().to_owned()),
@@ -58,8 +60,10 @@ impl Circles {
             };
             let assessor = CircleAssessor::new(circle.centre, circle.radius);
             Some(Steady { index, window, circle, assessor, trace })
-        });
-        Circles { list: circles.take(MOST).collect(), next: 0 }
+        };
+        let list = circles.by_ref().filter_map(steady).take(MOST).collect();
+        let more = circles.filter(|(_, circle)| circle.sweep.abs() >= TAU).count();
+        Circles { list, next: 0, more }
     }
 
     /// Takes where the axes are at `times`, s, into account: `coordinates` has the programmed ones of an axis.
@@ -99,6 +103,11 @@ impl Circles {
             })
         });
         figures.collect()
+    }
+
+    /// Whole circles of which nothing is measured.
+    pub(super) fn more(&self) -> usize {
+        self.more
     }
 
     /// Each circle that was run in both directions.
@@ -145,5 +154,32 @@ impl Steady {
             && (a.sweep > 0.0) != (b.sweep > 0.0)
             && (a.radius - b.radius).abs() < SAME
             && (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1]) < SAME
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Parameters;
+    use crate::kinematics::Kinematics;
+    use crate::path::{Block, Frame, Law, Move};
+    use crate::simulation::joints;
+
+    #[test]
+    fn circles_that_are_not_measured_are_counted() {
+        let machine = Parameters::embedded_default().and_then(|p| p.machine_config()).expect("valid");
+        let kinds: Vec<AxisKind> = machine.axes().iter().map(|axis| axis.kind()).collect();
+        let (from, turns) = ([0.0; 5], 2.0);
+        let block = Block::arc(&from, [0, 1], [-0.01, 0.0], turns * 2.0 * PI, &from, &kinds).expect("an arc");
+        let circle = Move { law: Law::Cosine { ramp: 0.1 }, ..Move::new(block, 0.05) };
+        let period = machine.periods().position;
+        for (count, measured, more) in [(MOST, MOST, 0), (MOST + 3, MOST, 3)] {
+            let moves = vec![circle.clone(); count];
+            let kinematics = Kinematics::new(&machine);
+            let program = Program::plan(kinematics, Frame::Joints, &joints(&machine, ""), period, 0.0, moves)
+                .expect("the machine can do it");
+            let circles = Circles::of(&program, &machine);
+            assert_eq!((circles.list.len(), circles.more()), (measured, more), "{count} circles");
+        }
     }
 }

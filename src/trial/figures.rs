@@ -16,10 +16,14 @@ pub struct Figures {
     pub orientation: Option<OrientationFigures>,
     /// Circles of a whole turn or more, in their order.
     pub circles: Vec<CircleFigures>,
+    /// Circles beyond these, of which nothing is measured.
+    pub more_circles: usize,
     /// The same circle in both directions.
     pub bidirectional: Vec<BidirectionalFigures>,
     /// Where the direction turns, in their order.
     pub corners: Vec<CornerFigures>,
+    /// Corners beyond these, of which nothing is measured on their own.
+    pub more_corners: usize,
 }
 
 /// Figures of one axis, from the first set-point until the last one has passed the delays.

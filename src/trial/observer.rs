@@ -14,7 +14,7 @@ use super::circle::Circles;
 use super::corner::Corners;
 use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, Reference};
 use super::period::Period;
-use super::recorder::Recorder;
+use super::recorder::{Recorder, Tool};
 use super::{Outcome, Trial};
 
 /// Largest and mean square of an error.
@@ -129,13 +129,19 @@ impl<'a> Observer<'a> {
         }
         self.kinematics.forward_all(&mut self.turned, &period.positions, period.ticks(), &mut self.poses);
         let first = self.follow(period);
-        let samples = (0..self.axes.len()).map(|place| {
-            let (machine, at) = axis(place);
-            machine.axis(at).sample()
-        });
         if let Some(recorder) = &mut self.recorder {
-            let tool = first.as_ref().map(|nearest| (nearest, self.poses.tip(0).into()));
-            recorder.push(period.times[0], samples, tool);
+            let axes = (0..self.axes.len()).map(|place| {
+                let (machine, at) = axis(place);
+                (machine.axis(at).sample(), machine.largest_current(at))
+            });
+            let largest = |errors: &[f64]| errors.iter().copied().fold(0.0, f64::max);
+            let tool = first.map(|nearest| Tool {
+                reference: nearest.point.into(),
+                position: self.poses.tip(0).into(),
+                contour_error: largest(&self.found.distance),
+                orientation_error: largest(&self.found.orientation),
+            });
+            recorder.push(period.times[0], axes, tool);
         }
         self.observe_circles(period);
         self.end = period.end;
@@ -211,8 +217,10 @@ impl<'a> Observer<'a> {
             orientation: has_orientation
                 .then(|| OrientationFigures { max: self.orientation.max, rms: self.orientation.rms() }),
             circles: self.circles.figures(),
+            more_circles: self.circles.more(),
             bidirectional: self.circles.bidirectional(),
             corners: self.corners.figures(),
+            more_corners: self.corners.more(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Keeps the signals of a trial in bounded memory.
 
-use crate::assess::{AxisTrace, Nearest, Recording, ToolTrace};
+use crate::assess::{AxisTrace, Recording, ToolTrace};
 use crate::config::MachineConfig;
 use crate::machine::AxisSample;
 
@@ -72,19 +72,32 @@ fn farther(one: Pair, other: Pair) -> Pair {
 /// Signals of an axis, in the order of [`AxisTrace`].
 const AXIS_SIGNALS: usize = 10;
 
-fn axis_values(s: &AxisSample) -> [f64; AXIS_SIGNALS] {
+fn axis_values(s: &AxisSample, current: f64) -> [f64; AXIS_SIGNALS] {
     [
         s.psec,
         s.position,
         s.tracking_error(),
         s.synchronized_tracking_error(),
         s.velocity,
-        s.current,
+        current,
         s.current_setpoint,
         s.friction_current,
         s.gravity_current,
         s.load_current,
     ]
+}
+
+/// The tool in a position period.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tool {
+    /// Nearest point of the path to the tip at the position instant, m.
+    pub reference: [f64; 3],
+    /// The tip then, m.
+    pub position: [f64; 3],
+    /// Largest distance from the path at any tick, m.
+    pub contour_error: f64,
+    /// Largest angle between the tool axes at any tick, rad.
+    pub orientation_error: f64,
 }
 
 /// Gathers a [`Recording`], one row per position instant as long as there is room.
@@ -118,17 +131,18 @@ impl Recorder {
         }
     }
 
-    /// Adds a position instant, s from the start.
+    /// Adds the position period that begins at `time`, s from the start: of each axis the sample of that instant
+    /// and the largest current of all ticks, A.
     pub(super) fn push<'a>(
         &mut self,
         time: f64,
-        samples: impl Iterator<Item = &'a AxisSample>,
-        tool: Option<(&Nearest, [f64; 3])>,
+        axes: impl Iterator<Item = (&'a AxisSample, f64)>,
+        tool: Option<Tool>,
     ) {
         let (count, bucket) = (self.count, self.bucket);
         self.last = time;
-        for (signals, sample) in self.axes.iter_mut().zip(samples) {
-            for (signal, value) in signals.iter_mut().zip(axis_values(sample)) {
+        for (signals, (sample, current)) in self.axes.iter_mut().zip(axes) {
+            for (signal, value) in signals.iter_mut().zip(axis_values(sample, current)) {
                 signal.push(value, count, bucket);
             }
         }
@@ -137,10 +151,10 @@ impl Recorder {
         if told {
             self.time.push(time);
         }
-        if let Some((nearest, position)) = tool {
-            self.contour.push(nearest.distance, count, bucket);
-            self.orientation.push(nearest.orientation, count, bucket);
-            let pair = [nearest.point.into(), position];
+        if let Some(tool) = tool {
+            self.contour.push(tool.contour_error, count, bucket);
+            self.orientation.push(tool.orientation_error, count, bucket);
+            let pair = [tool.reference, tool.position];
             match self.tool.last_mut() {
                 // Of each half of a bucket, where the tool is farthest from the path.
                 Some(last) if !told => *last = farther(*last, pair),
@@ -231,7 +245,6 @@ impl Recorder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
 
     #[test]
     fn a_thinned_signal_keeps_a_spike_of_one_sample() {
@@ -241,7 +254,7 @@ mod tests {
         for k in 0..length {
             let position = if k == length / 2 + 1 { 1.0 } else { 0.0 };
             let sample = AxisSample { position, ..AxisSample::default() };
-            recorder.push(k as f64, [&sample].into_iter(), None);
+            recorder.push(k as f64, [(&sample, 0.0)].into_iter(), None);
             signal.push(position, 0, 1);
         }
         let values = &recorder.axes[0][1].values;
@@ -264,21 +277,18 @@ mod tests {
                 psec: 5.0 + at(0),
                 position: 3.0 - at(1),
                 velocity: at(2),
-                current: at(3),
                 current_setpoint: -at(4),
                 friction_current: at(5),
                 gravity_current: at(6),
                 ..AxisSample::default()
             };
-            let nearest = Nearest {
-                progress: 0.0,
-                point: Vector3::zeros(),
-                axis: Vector3::z(),
-                distance: 0.1 + at(5),
-                within_ends: 0.0,
-                orientation: at(6),
+            let tool = Tool {
+                reference: [0.0; 3],
+                position: [0.1 + at(5), 0.0, 0.0],
+                contour_error: 0.1 + at(5),
+                orientation_error: at(6),
             };
-            recorder.push(k as f64, [&sample].into_iter(), Some((&nearest, [0.1 + at(5), 0.0, 0.0])));
+            recorder.push(k as f64, [(&sample, at(3))].into_iter(), Some(tool));
         }
         let machine = crate::config::Parameters::embedded_default()
             .and_then(|p| p.machine_config())
@@ -314,7 +324,7 @@ mod tests {
         for length in [1, CAPACITY - 1, CAPACITY, CAPACITY + 3, 2 * CAPACITY + 5] {
             let mut recorder = Recorder::new(1);
             for k in 0..length {
-                recorder.push(k as f64, [&AxisSample::default()].into_iter(), None);
+                recorder.push(k as f64, [(&AxisSample::default(), 0.0)].into_iter(), None);
             }
             let config = crate::config::Parameters::embedded_default()
                 .and_then(|p| p.machine_config())

@@ -39,8 +39,10 @@ pub fn figures(figures: &Figures) -> Map<String, Value> {
     object.insert("contour_error_um".to_owned(), contour(figures));
     object.insert("orientation_error_mdeg".to_owned(), orientation(figures));
     object.insert("circles".to_owned(), figures.circles.iter().map(circle).collect());
+    object.insert("more_circles".to_owned(), json!(figures.more_circles));
     object.insert("bidirectional".to_owned(), figures.bidirectional.iter().map(bidirectional).collect());
     object.insert("corners".to_owned(), figures.corners.iter().map(corner).collect());
+    object.insert("more_corners".to_owned(), json!(figures.more_corners));
     object
 }
 

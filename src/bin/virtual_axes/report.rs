@@ -44,6 +44,7 @@ pub fn write(
         if figures.contour.is_none() {
             facts.push(("contour error".to_owned(), table::NO_CONTOUR.to_owned()));
         }
+        facts.extend(table::more(figures).map(|line| ("not shown".to_owned(), line)));
         facts.extend(run.changes.iter().map(|change| ("set".to_owned(), change.clone())));
         ReportRun {
             title,

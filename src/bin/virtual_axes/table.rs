@@ -104,7 +104,17 @@ pub fn remarks(figures: &Figures) -> Vec<String> {
     let extrapolated = names(|axis| axis.friction_extrapolated)
         .map(|names| format!("friction law used beyond the velocities that it was fitted for: {names}"));
     let no_contour = figures.contour.is_none().then(|| format!("no contour error: {NO_CONTOUR}"));
-    still.into_iter().chain(extrapolated).chain(no_contour).collect()
+    still.into_iter().chain(extrapolated).chain(no_contour).chain(more(figures)).collect()
+}
+
+/// What of the path has no figures of its own, a line each.
+pub fn more(figures: &Figures) -> impl Iterator<Item = String> {
+    let line = |count: usize, told: usize, what: &str| {
+        (count > 0).then(|| format!("{count} more {what}: only the first {told} are measured one by one"))
+    };
+    let circles = line(figures.more_circles, figures.circles.len(), "circles");
+    let corners = line(figures.more_corners, figures.corners.len(), "corners");
+    circles.into_iter().chain(corners)
 }
 
 /// Whether the largest and the RMS contour error differ, in print, without what overshoots the path's

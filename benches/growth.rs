@@ -1,0 +1,230 @@
+//! How the cost of a simulation grows: with the length of the set-points, with axes, machines and cores.
+//!
+//!     cargo bench --no-default-features --bench growth
+//!     cargo bench --no-default-features --bench growth -- axes cores
+//!
+//! The rows of a table are run in turns, so that what the computer does besides falls on all of them; medians over
+//! the rounds, and their ratio to the first row per simulated second of a machine.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use std::f64::consts::TAU;
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use common::{AXES, parameters, program, setpoints};
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
+use virtual_axes::assess::AxisAssessor;
+use virtual_axes::config::MachineConfig;
+use virtual_axes::machine::{Machine, MachineParameters};
+use virtual_axes::trial::{self, Figures, GridSource, Setpoints, SourceError, Trial};
+use virtual_axes::units::seconds;
+
+/// Rounds of a table, an odd number.
+const ROUNDS: usize = 11;
+/// A row that would take longer than that in all its rounds has as many as fit, at least one.
+const LONGEST: Duration = Duration::from_secs(20);
+/// Machines that are run side by side on a core, as a search does.
+const TOGETHER: usize = 32;
+/// Machines of which more than one core has its share.
+const SWEEP: usize = 256;
+/// Simulated time of the table of axes, s.
+const AXES_TIME: f64 = 120.0;
+/// Instants after which the motion begins anew: a minute.
+const CYCLE: usize = 10_000;
+/// Amplitude (m, rad) and turns a cycle of the axes: each begins and ends a cycle at rest.
+const MOTION: [(f64, f64); AXES] = [(0.1, 6.0), (0.08, 7.0), (0.05, 5.0), (0.3, 3.0), (0.6, 4.0)];
+
+/// A row of a table.
+struct Row<'a> {
+    name: String,
+    /// Simulated seconds, of all machines together.
+    simulated: f64,
+    run: Box<dyn FnMut() + 'a>,
+}
+
+impl<'a> Row<'a> {
+    fn new(name: impl ToString, simulated: f64, run: impl FnMut() + 'a) -> Self {
+        Row { name: name.to_string(), simulated, run: Box::new(run) }
+    }
+}
+
+fn seconds_of(run: &mut dyn FnMut()) -> f64 {
+    let began = Instant::now();
+    run();
+    began.elapsed().as_secs_f64()
+}
+
+/// Runs the rows in turns and prints them.
+fn table(title: &str, column: &str, mut rows: Vec<Row>) {
+    let mut times: Vec<Vec<f64>> = vec![Vec::new(); rows.len()];
+    for _ in 0..ROUNDS {
+        for (row, times) in rows.iter_mut().zip(&mut times) {
+            let before: f64 = times.iter().sum();
+            let next = before / times.len().max(1) as f64;
+            if before + next <= LONGEST.as_secs_f64() {
+                times.push(seconds_of(&mut row.run));
+            }
+        }
+    }
+    println!("\n{title}");
+    println!(
+        "{column:>10} {:>8} {:>12} {:>18} {:>13} {:>14}",
+        "rounds", "median, s", "machine-seconds/s", "min … max", "per machine-s"
+    );
+    let mut first = None;
+    for (row, times) in rows.iter().zip(&mut times) {
+        times.sort_unstable_by(f64::total_cmp);
+        let (rounds, median) = (times.len(), times[times.len() / 2]);
+        let cost = median / row.simulated;
+        let spread = format!("{:.2} … {:.2}", times[0] / median, times[rounds - 1] / median);
+        let ratio = cost / *first.get_or_insert(cost);
+        println!("{:>10} {rounds:8} {median:12.4} {:18.0} {spread:>13} {ratio:14.3}", row.name, 1.0 / cost);
+    }
+}
+
+/// The motion of `MOTION`, again and again, for some instants; nothing of it is held.
+struct Cycle {
+    joints: [usize; AXES],
+    rows: Arc<Vec<[f64; AXES]>>,
+    next: usize,
+    count: usize,
+}
+
+impl GridSource for Cycle {
+    fn joints(&self) -> &[usize] {
+        &self.joints
+    }
+
+    fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
+        let is_more = self.next < self.count;
+        row.copy_from_slice(&self.rows[self.next % CYCLE]);
+        self.next += 1;
+        Ok(is_more)
+    }
+}
+
+fn cycle() -> Arc<Vec<[f64; AXES]>> {
+    let at =
+        |k: usize| MOTION.map(|(size, turns)| size * (1.0 - (TAU * turns * k as f64 / CYCLE as f64).cos()));
+    Arc::new((0..CYCLE).map(at).collect())
+}
+
+/// Set-points that are computed as they are needed, figures of tool and axes, no trace.
+fn length(config: &MachineConfig) {
+    let rows = cycle();
+    let trial = Trial { machine: config, program: None, allow_nonzero_end_velocity: false, record: false };
+    let run = |count: usize| {
+        let source = Cycle { joints: [0, 1, 2, 3, 4], rows: Arc::clone(&rows), next: 0, count: count + 1 };
+        black_box(trial::run(&trial, Setpoints::Grid(Box::new(source)), |_| Ok(())).expect("a run"));
+    };
+    let period = seconds(config.periods().position);
+    let lengths = [1, 10, 100, 1000];
+    let row = |minutes: usize| {
+        let count = minutes * CYCLE;
+        Row::new(minutes, count as f64 * period, move || run(count))
+    };
+    table("length: one machine of five axes, figures, no trace", "minutes", lengths.map(row).into());
+    println!("{:>10} {:>20}", "minutes", "largest memory, KiB");
+    for minutes in &lengths[..3] {
+        let held = allocation_counter::measure(|| run(minutes * CYCLE)).bytes_max;
+        println!("{minutes:>10} {:20.1}", held as f64 / 1024.0);
+    }
+}
+
+/// One machine with more and more axes, with their figures.
+fn axes(config: &MachineConfig) {
+    let cycle = cycle();
+    let instants = (AXES_TIME / seconds(config.periods().position)) as usize;
+    let row = |count: usize| {
+        let places: Vec<usize> = (0..count).map(|axis| axis % AXES).collect();
+        let made = MachineParameters::of_axes(config, &places).expect("it can be discretised");
+        let mut machine = Machine::new(Arc::new(made));
+        let cycle = Arc::clone(&cycle);
+        let mut psec = vec![0.0; count];
+        Row::new(count, AXES_TIME, move || {
+            let mut assessors = vec![AxisAssessor::default(); count];
+            machine.reset(&vec![0.0; count]);
+            for row in cycle.iter().cycle().take(instants) {
+                psec.iter_mut().zip(&places).for_each(|(psec, &place)| *psec = row[place]);
+                machine.advance(&psec, &[]);
+                for (axis, assessor) in assessors.iter_mut().enumerate() {
+                    assessor.observe(machine.axis(axis).sample(), &machine.activity(axis));
+                }
+            }
+            black_box(assessors);
+        })
+    };
+    table("axes: one machine, figures of the axes", "axes", [1, 2, 4, 5, 8, 16, 32].map(row).into());
+}
+
+/// Machines of different gains.
+fn variants(count: usize) -> Vec<MachineConfig> {
+    let variant = |i: usize| {
+        let gain = 1.0 + 0.5 * i as f64 / count as f64;
+        parameters(&[("x.position_loop.gain", gain), ("y.position_loop.gain", gain)])
+            .machine_config()
+            .expect("a machine")
+    };
+    (0..count).map(variant).collect()
+}
+
+/// Machines on the ballbar as a search runs them: some side by side, over the cores of the pool.
+fn sweep(trial: &Trial<'_>, variants: &[MachineConfig], own: &[usize]) -> Vec<Figures> {
+    let run = |some: &[MachineConfig]| {
+        let program = trial.program.clone().expect("planned");
+        trial::run_together(trial, setpoints("ballbar", program, trial.machine), some, own, || Ok(()))
+            .expect("a run")
+    };
+    variants.par_chunks(TOGETHER).flat_map(run).collect()
+}
+
+/// More and more machines on one core, and the same machines on more cores.
+fn machines(config: &MachineConfig, counts: &[usize], cores: &[usize]) {
+    let program = program("ballbar", config);
+    let (duration, own) = (program.duration(), [0, 1]);
+    let trial =
+        Trial { machine: config, program: Some(program), allow_nonzero_end_velocity: false, record: false };
+    let most = counts.iter().copied().max().unwrap_or(0);
+    let all = variants(most);
+    let rows = |cores: usize| {
+        let (trial, all, own) = (&trial, &all, &own);
+        let pool = Arc::new(ThreadPoolBuilder::new().num_threads(cores).build().expect("threads"));
+        counts.iter().map(move |&count| {
+            let (variants, pool) = (&all[..count], Arc::clone(&pool));
+            let name = if counts.len() > 1 { count } else { cores };
+            Row::new(name, duration * count as f64, move || {
+                black_box(pool.install(|| sweep(trial, variants, own)));
+            })
+        })
+    };
+    let rows = cores.iter().flat_map(|&cores| rows(cores)).collect();
+    match counts {
+        [count] => {
+            table(&format!("cores: {count} machines on the ballbar, all figures but circles"), "cores", rows)
+        }
+        _ => table("machines: on the ballbar, one core, all figures but circles", "machines", rows),
+    }
+}
+
+fn main() {
+    // `cargo bench` says --bench.
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
+    let config = parameters::<&str>(&[]).machine_config().expect("the shipped machine");
+    if is_wanted("length") {
+        length(&config);
+    }
+    if is_wanted("axes") {
+        axes(&config);
+    }
+    if is_wanted("machines") {
+        machines(&config, &[1, 8, 32, 64, 256, 1024], &[1]);
+    }
+    if is_wanted("cores") {
+        machines(&config, &[SWEEP], &[1, 2]);
+    }
+}

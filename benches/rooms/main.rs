@@ -1,0 +1,56 @@
+//! What each room of the library costs.
+//!
+//!     cargo bench --no-default-features --bench rooms
+//!     cargo bench --no-default-features --bench rooms -- machine
+//!
+//! The name of a group says what its rate counts. Rooms that read and write files are in `io.rs`, growth with length,
+//! axes, machines and cores in `growth.rs`.
+
+#[path = "../../tests/common/mod.rs"]
+mod common;
+
+mod doors;
+mod loops;
+mod motion;
+mod studies;
+
+use std::time::Duration;
+
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, Criterion, Throughput};
+use virtual_axes::config::{MachineConfig, Parameters};
+
+type Group<'a> = BenchmarkGroup<'a, WallTime>;
+
+/// Samples, and the time that they take at least: a whole run within minutes.
+const SAMPLES: usize = 20;
+const WARM_UP: Duration = Duration::from_millis(300);
+const MEASUREMENT: Duration = Duration::from_secs(1);
+
+/// The shipped machine.
+fn shipped() -> MachineConfig {
+    Parameters::embedded_default().and_then(|p| p.machine_config()).expect("the shipped machine")
+}
+
+/// A position (m, rad) that an axis swings through, at position instant `k`.
+fn swing(axis: usize, k: usize) -> f64 {
+    let turn = (axis + 3) as f64 * 6e-3 * k as f64;
+    0.05 * (1.0 - turn.cos())
+}
+
+/// A bench whose work counts `elements`.
+fn bench<T>(group: &mut Group, name: &str, elements: usize, mut work: impl FnMut() -> T) {
+    group.throughput(Throughput::Elements(elements as u64));
+    group.bench_function(name, |bencher| bencher.iter(&mut work));
+}
+
+fn main() {
+    let criterion =
+        Criterion::default().sample_size(SAMPLES).warm_up_time(WARM_UP).measurement_time(MEASUREMENT);
+    let mut criterion = criterion.configure_from_args();
+    loops::all(&mut criterion);
+    motion::all(&mut criterion);
+    studies::all(&mut criterion);
+    doors::all(&mut criterion);
+    criterion.final_summary();
+}

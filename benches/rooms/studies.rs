@@ -1,0 +1,130 @@
+//! Trial, tune, identify: whole runs.
+
+use std::cell::LazyCell;
+use std::hint::black_box;
+use std::sync::Arc;
+
+use criterion::Criterion;
+use virtual_axes::config::{MachineConfig, Parameters};
+use virtual_axes::identify::campaign::{Campaign, Options as CampaignOptions};
+use virtual_axes::identify::{FeedforwardMode, Input, Options, Refine, identify};
+use virtual_axes::recording::{Conditioning, RawRecording, Signals, condition};
+use virtual_axes::trial::{self, Trial};
+use virtual_axes::tune::{Bench, Cost, Course, MarginLimits, Tuning, Unwatched, fine_grid, tune_gpc_from};
+use virtual_axes::units::seconds;
+
+use crate::common::recordings::{Disturbance, ignorant, record_campaign, truth};
+use crate::common::{program, setpoints};
+use crate::{bench, shipped};
+
+/// Machines that are run side by side, as a search does.
+const TOGETHER: usize = 32;
+/// Designs that are screened, and how many of them one iteration judges.
+const DESIGNS: usize = 5000;
+const SCREENED: usize = 64;
+/// Samples of what takes long.
+const FEW: usize = 10;
+
+pub fn all(criterion: &mut Criterion) {
+    trial(criterion);
+    tune(criterion);
+    identify_one(criterion);
+}
+
+fn trial_of<'a>(name: &str, machine: &'a MachineConfig, record: bool) -> Trial<'a> {
+    Trial { machine, program: Some(program(name, machine)), allow_nonzero_end_velocity: false, record }
+}
+
+fn trial(criterion: &mut Criterion) {
+    let config = shipped();
+    let ticks = |seconds_of_all: f64| (seconds_of_all / seconds(config.periods().current)) as usize;
+    let mut group = criterion.benchmark_group("trial, ticks of a machine");
+    group.sample_size(FEW);
+    for name in ["ballbar", "corner-90", "five-axis"] {
+        let of = |record| trial_of(name, &config, record);
+        let (bare, recorded) = (of(false), of(true));
+        let points = |trial: &Trial| setpoints(name, trial.program.clone().expect("planned"), &config);
+        let run = |trial: &Trial| trial::run(trial, points(trial), |_| Ok(())).expect("a run");
+        let count = ticks(run(&bare).figures.duration);
+        bench(&mut group, &format!("{name}, figures"), count, || run(&bare));
+        bench(&mut group, &format!("{name}, figures and recording"), count, || run(&recorded));
+        bench(&mut group, &format!("{name}, every tick shown"), count, || {
+            trial::trace(&bare, points(&bare), |tick| {
+                black_box(tick.machine.axes());
+                Ok(())
+            })
+        });
+        if name != "ballbar" {
+            continue;
+        }
+        let variants = vec![config.clone(); TOGETHER];
+        let own: Vec<usize> = (0..config.axes().len()).collect();
+        bench(&mut group, &format!("{name}, 32 machines together"), count * TOGETHER, || {
+            trial::run_together(&bare, points(&bare), &variants, &own, || Ok(()))
+        });
+    }
+    group.finish();
+}
+
+fn tune(criterion: &mut Criterion) {
+    let config = shipped();
+    let parameters = Parameters::embedded_default().expect("the shipped machine");
+    let program = program("ballbar", &config);
+    let course = Course::read(
+        "ballbar",
+        Some(Arc::clone(&program)),
+        setpoints("ballbar", program, &config),
+        || Ok(()),
+    )
+    .expect("set-points");
+    let cost = Cost::default();
+    let bench_of = LazyCell::new(|| Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench"));
+    let designs: Vec<Tuning> = fine_grid(DESIGNS).into_iter().step_by(DESIGNS / SCREENED).collect();
+    let mut group = criterion.benchmark_group("tune, designs");
+    bench(&mut group, "margins of the worst axis", designs.len(), || {
+        designs.iter().filter(|design| bench_of.margins(design).is_some()).count()
+    });
+    group.sample_size(FEW);
+    bench(&mut group, "screened on the ballbar, the best refined, all cores", designs.len(), || {
+        tune_gpc_from(&bench_of, &MarginLimits::STABLE, designs.clone()).expect("a tuning")
+    });
+    group.finish();
+}
+
+fn identify_one(criterion: &mut Criterion) {
+    const AXIS: &str = "x";
+    let start = ignorant(AXIS);
+    let machine = start.machine_config().expect("a machine");
+    let axis = &machine.axes()[0];
+    let raw: LazyCell<Vec<RawRecording>, _> = LazyCell::new(|| {
+        let disturbance = Disturbance::usual(axis.kind(), 1);
+        let parts =
+            record_campaign(&truth(), AXIS, &FeedforwardMode::ALL, &CampaignOptions::default(), &disturbance);
+        parts.into_iter().map(|(_, recording)| recording).collect()
+    });
+    let conditioned = |raw: &RawRecording| -> Signals {
+        condition(raw, axis, &machine.periods(), &Conditioning::default()).expect("a recording").0
+    };
+    let signals: LazyCell<Vec<Signals>, _> = LazyCell::new(|| raw.iter().map(conditioned).collect());
+    // A campaign is planned for the machine that is to be identified.
+    let config = shipped();
+    let planned = Campaign::plan(&config, 0, &FeedforwardMode::ALL, &CampaignOptions::default());
+    let samples = planned.expect("planned").psec().len();
+    let mut group = criterion.benchmark_group("identify, position periods recorded");
+    group.sample_size(FEW);
+    bench(&mut group, "a campaign planned", samples, || {
+        Campaign::plan(&config, 0, &FeedforwardMode::ALL, &CampaignOptions::default())
+    });
+    bench(&mut group, "recordings checked and filtered", samples, || {
+        raw.iter().map(conditioned).collect::<Vec<_>>()
+    });
+    let refined = |refine: Refine| {
+        let modes = FeedforwardMode::ALL.into_iter().map(Some);
+        let inputs: Vec<Input> =
+            signals.iter().zip(modes).map(|(signals, feedforward)| Input { signals, feedforward }).collect();
+        identify(&inputs, axis, &machine.periods(), &Options { refine, ..Options::default() })
+    };
+    bench(&mut group, "one axis by the steps of the paper", samples, || refined(Refine::NONE));
+    bench(&mut group, "one axis, refined on the closed loop", samples, || refined(Refine::ALL));
+    group.finish();
+}
