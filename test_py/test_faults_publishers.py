@@ -16,7 +16,6 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import TrajectoryResult as R
 
 from drive import TSP_NS, Drive, Node, _parameters, joint_trajectory, to_ns
@@ -106,12 +105,24 @@ def test_a_trajectory_of_500_000_points_does_not_disturb_the_motion_under_way(no
     node.wait_for(lambda: resident_mb(pid_of(node)) < memory + 4 * MESSAGE_MB, 30, f"memory near {memory} MB")
 
 
-def flood(drive: Drive, publisher: Any, message: Any) -> float:
+def flood(publisher: Any, message: Any) -> float:
     """Publish 10 000 messages, 10 000 a second and more where the machine can; returns how long it took, s."""
     raw, begin = serialize_message(message), time.monotonic()
     for _ in range(FLOOD):
         publisher.publish(raw)
     return time.monotonic() - begin
+
+
+def forget_results(drive: Drive) -> None:
+    """Drop the results of a flood when no more come: to look through thousands of them takes long."""
+    silent_since, known = time.monotonic(), -1
+    deadline = silent_since + 30
+    while time.monotonic() < min(deadline, silent_since + 0.5):
+        if len(drive.results()) != known:
+            silent_since, known = time.monotonic(), len(drive.results())
+        time.sleep(0.05)
+    with drive._changed:
+        drive._results.clear()
 
 
 def move_through(drive: Drive, act: Callable[[], None]) -> str:
@@ -152,7 +163,7 @@ def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
     memory = resident_mb(pid_of(node))
 
     def act() -> None:
-        seconds = flood(node, getattr(node, publisher), message)
+        seconds = flood(getattr(node, publisher), message)
         if publisher == "_psec":
             node._sent += FLOOD
         print(f"\n{what}: {FLOOD / seconds:.0f} a second, ", end="")
@@ -163,6 +174,7 @@ def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
     assert grown < GROWTH_MB
     if publisher == "_psec":
         assert "lines of this kind" in log, "nothing was left out"
+        forget_results(node)
     if what == "set-points that are refused":
         assert int(numbers(node)["stream_setpoints_refused"]) > refused
         assert log.count("set-point of the stream refused") <= 10
@@ -205,9 +217,9 @@ def test_parameters_can_be_set_while_a_stream_floods_the_node(node: Drive):
 
     def stream() -> None:
         while not ended.is_set():
-            for _ in range(50):
+            for _ in range(20):
                 node._stream.publish(raw)
-            time.sleep(0.001)
+            time.sleep(0.002)
 
     thread = threading.Thread(target=stream)
     thread.start()
@@ -266,13 +278,3 @@ def test_of_two_streams_that_contend_no_message_is_mixed(node: Drive):
     assert commanded <= sent
     assert len({x > 0 for x, _ in commanded - {(0.0, 0.0)}}) == 2, "only one of them was heard"
     assert len(commanded) > 30
-
-
-def test_an_empty_flood_is_stopped_by_its_end(node: Drive):
-    """10 000 stops in a row: the last trajectory after them is taken."""
-    go_home(node)
-    flood(node, node._psec, JointTrajectory())
-    node._sent += FLOOD
-    time_s, position = swing(0.6, amplitude=0.01)
-    accepted = node.accept(joint_trajectory(["y"], time_s, position), timeout=60)
-    assert_psec(node, to_ns(accepted.start), {"y": position})
