@@ -23,10 +23,12 @@ from guest import Guest, long_trajectory, resident_mb
 from motion import TSP, assert_psec, go_home, start_swing, swing
 
 POINTS = 500_000
-MESSAGE_MB = 28
+MESSAGE_MB = 20
 """A trajectory of two joints and so many points as it is sent."""
 ATTEMPTS = 4
 FLOOD = 10_000
+FLOOD_OF_TRAJECTORIES = 4_000
+"""At the same rate, but each has two results, which this process has to read."""
 LINES_A_SECOND = 55
 """Of one kind in the log: 50, and what says that the rest is left out."""
 GROWTH_MB = 30.0
@@ -96,19 +98,23 @@ def test_a_trajectory_of_500_000_points_does_not_disturb_the_motion_under_way(no
     go_home(node)
     memory = resident_mb(pid_of(node))
     accepted, start, plan = start_swing(node, duration=4.8)
-    long = node.accept(long_trajectory(POINTS), timeout=60)
+    with node._changed:
+        node._sent += 1
+        long = node._sent
+        node._psec.publish(long_trajectory(POINTS))
+    assert node.decision(long, 60).status == R.ACCEPTED
     assert_psec(node, start, plan)
     assert node.end(accepted.sequence_number, 10).status == R.COMPLETED
     node.stop()
-    assert node.end(long.sequence_number, 10).status == R.STOPPED
+    assert node.end(long, 10).status == R.STOPPED
     # The middleware keeps the message, as it keeps the last 64.
     node.wait_for(lambda: resident_mb(pid_of(node)) < memory + 4 * MESSAGE_MB, 30, f"memory near {memory} MB")
 
 
-def flood(publisher: Any, message: Any) -> float:
-    """Publish 10 000 messages, 10 000 a second and more where the machine can; returns how long it took, s."""
+def flood(publisher: Any, message: Any, number: int) -> float:
+    """Publish `number` messages, 10 000 a second and more where the machine can; returns how long it took, s."""
     raw, begin = serialize_message(message), time.monotonic()
-    for _ in range(FLOOD):
+    for _ in range(number):
         publisher.publish(raw)
     return time.monotonic() - begin
 
@@ -130,7 +136,7 @@ def move_through(drive: Drive, act: Callable[[], None]) -> str:
     go_home(drive)
     said = len(drive.process.output())
     begin = time.monotonic()
-    accepted, start, plan = start_swing(drive, ["z"], duration=2.4, amplitude=0.02)
+    accepted, start, plan = start_swing(drive, ["z"], duration=1.8, amplitude=0.02)
     act()
     assert_psec(drive, start, plan)
     assert drive.end(accepted.sequence_number, 30).status == R.COMPLETED
@@ -163,10 +169,11 @@ def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
     memory = resident_mb(pid_of(node))
 
     def act() -> None:
-        seconds = flood(getattr(node, publisher), message)
+        number = FLOOD_OF_TRAJECTORIES if publisher == "_psec" else FLOOD
+        seconds = flood(getattr(node, publisher), message, number)
         if publisher == "_psec":
-            node._sent += FLOOD
-        print(f"\n{what}: {FLOOD / seconds:.0f} a second, ", end="")
+            node._sent += number
+        print(f"\n{what}: {number / seconds:.0f} a second, ", end="")
 
     log = move_through(node, act)
     grown = resident_mb(pid_of(node)) - memory
@@ -217,18 +224,20 @@ def test_parameters_can_be_set_while_a_stream_floods_the_node(node: Drive):
 
     def stream() -> None:
         while not ended.is_set():
-            for _ in range(20):
+            for _ in range(100):
                 node._stream.publish(raw)
-            time.sleep(0.002)
+            time.sleep(0.001)
 
     thread = threading.Thread(target=stream)
     thread.start()
     try:
-        for k in range(20):
+        for k in range(40):
             node.set_parameters({"x.velocity_loop.gain": 4.5 + 0.01 * k})
     finally:
         ended.set()
         thread.join()
+    # What is on its way still.
+    time.sleep(0.5)
     node.set_parameters({"x.velocity_loop.gain": 5.0})
 
 
