@@ -18,6 +18,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from virtual_axes.msg import TrajectoryResult as R
 
+from action import in_executor
 from drive import TSP_NS, Drive, Node, _parameters, joint_trajectory, to_ns
 from guest import Guest, long_trajectory, resident_mb
 from motion import TSP, assert_psec, go_home, start_swing, swing
@@ -210,7 +211,7 @@ def test_a_flood_of_service_calls(node: Drive):
     print(f"\n{len(calls) / (time.monotonic() - begin):.0f} a second")
     node.wait_for(lambda: sum(call.done() for call in calls) > len(calls) // 10, 60, "answers")
     for client in (setter, stopper):
-        node.node.destroy_client(client)
+        in_executor(node, lambda client=client: node.node.destroy_client(client))
     # Who calls now waits for what is before it, and no more.
     assert node.reset(timeout=60)
     assert resident_mb(pid_of(node)) - memory < GROWTH_MB

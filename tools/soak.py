@@ -40,7 +40,7 @@ from virtual_axes.msg import DriveStates, MotorCurrents
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from action import Follow, goal  # noqa: E402
+from action import Follow, goal, in_executor  # noqa: E402
 from drive import NANOSECONDS, Drive, Node, ParameterRefused, joint_trajectory, to_time  # noqa: E402
 from guest import Guest  # noqa: E402
 
@@ -51,6 +51,10 @@ TICK_S = 0.003
 """Wall time between two messages of the clock."""
 FILL = 12_000
 """More than the 8192 samples that the middleware keeps of a topic."""
+KEPT = 64
+"""Trajectories that the middleware keeps: depth of psec."""
+LONG = 5_000
+"""Points of the longest trajectories."""
 LOOKS = 60
 CALLS = 9
 """Whose median is the latency of a look."""
@@ -164,9 +168,8 @@ class Traffic:
         self._send(message)
 
     def long_trajectory(self) -> None:
-        """20 000 points, most of which nobody waits for."""
-        times = 1 + np.arange(20_000) / 500
-        self._send(joint_trajectory(["c"], times, 0.2 * np.sin(times - 1)))
+        """Many points, most of which nobody waits for."""
+        self._send(long_trajectory())
 
     def halt(self) -> None:
         """A controlled stop, by the topic or the service."""
@@ -225,9 +228,15 @@ class Traffic:
              (DriveStates, "/virtual_axes/drive_states")]
         )  # fmt: skip
         profile = QoSProfile(depth=self.chance.choice([1, 10, 1000]))
-        self._listening.append(self.drive.node.create_subscription(kind, topic, lambda _: None, profile, raw=True))
-        if len(self._listening) > 5:
-            self.drive.node.destroy_subscription(self._listening.pop(0))
+        node = self.drive.node
+
+        def change() -> None:
+            self._listening.append(node.create_subscription(kind, topic, lambda _: None, profile, raw=True))
+            if len(self._listening) > 5:
+                node.destroy_subscription(self._listening.pop(0))
+
+        # In the thread that spins: rclpy's executor does not bear that what it waits for goes.
+        in_executor(self.drive, change)
 
     def visitor(self) -> None:
         """A participant comes and leaves."""
@@ -255,6 +264,12 @@ class Traffic:
             guest.kill()
 
 
+def long_trajectory() -> JointTrajectory:
+    """Ten seconds and more of C at 2 ms, after a second to get there."""
+    times = 1 + np.arange(LONG) / 500
+    return joint_trajectory(["c"], times, 0.2 * np.sin(times - 1))
+
+
 def fill(drive: Drive) -> None:
     """Bring histories and queues to their bounds."""
     raw = serialize_message(joint_trajectory(["q"], [0.0], [[0.0]]))
@@ -264,6 +279,9 @@ def fill(drive: Drive) -> None:
             drive._psec.publish(raw)
             drive._sent += 1
         time.sleep(0.02)
+    for _ in range(KEPT + 16):
+        drive.send(long_trajectory())
+        time.sleep(0.05)
     time.sleep(7)  # The middleware looks through its histories every 6 s.
 
 
