@@ -41,6 +41,7 @@ def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
         JointState, "/joint_states", lambda message: stamps.append(to_ns(message.header.stamp)), SHALLOW
     )
     real.wait_for(lambda: stamps, 10, "samples")
+    real.wait_for(real.diagnostics, 10, "diagnostics")
     before = diagnostics(real)[-1]
     accepted, start, plan = start_swing(real, duration=PAUSE_S + 4.0)
     real.wait_until(start + NANOSECONDS // 2, 10)
