@@ -303,7 +303,10 @@ def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive
 
 
 def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
-    """The system takes no more than 200 KiB in a file: what was written before stays readable."""
+    """The system takes no more than 200 KiB in a file, as a full disk: what was written before stays readable.
+
+    It is said once, and the next recording is whole.
+    """
     path, binary = tmp_path / "full.mcap", tmp_path / "limited.sh"
     binary.write_text(f'#!/bin/bash\ntrap "" XFSZ\nulimit -f 200\nexec {node_binary()} "$@"\n')
     binary.chmod(binary.stat().st_mode | stat.S_IXUSR)
@@ -319,10 +322,18 @@ def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
             "end of the recording",
         )
         assert "too large" in ended.message and ended.level == DiagnosticStatus.WARN
+        last = drive.now()
+        drive.wait_until(last + 10 * TSP_NS, 10)
         assert process.stop(signal.SIGTERM) == 0
+        assert process.output().count("the axes go on") == 1
     assert path.stat().st_size <= 200 * 1024
     messages, _, _ = read(path, whole=False)
     assert len(messages[DRIVES]) > 0 and set(np.diff(stamps(messages[DRIVES]))) <= {TSP_NS}
+    again = tmp_path / "again.mcap"
+    with Node(["-p", f"record:={again}", "-p", "time:=fast"], binary=binary) as process, Drive(process=process) as drive:
+        drive.wait_until(drive.now() + 100 * TSP_NS, 20)
+        assert process.stop(signal.SIGTERM) == 0
+    assert len(read(again)[0][DRIVES]) > 100
 
 
 def refusal(record: object) -> str:

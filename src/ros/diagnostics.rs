@@ -60,6 +60,9 @@ impl Diagnostics {
         if missed > 0 {
             problems.push("position periods were released late");
         }
+        if now.unpublished > before.unpublished {
+            problems.push("the node stood still: position instants were computed and not published");
+        }
         if dropped > 0 {
             problems.push("samples were dropped: a subscriber is slow");
         }
@@ -103,6 +106,7 @@ impl Diagnostics {
             value("position_periods", now.periods),
             value("missed_periods", now.missed),
             value("missed_periods_last_second", missed),
+            value("unpublished_periods", now.unpublished),
             value("dropped_samples", now.dropped + new),
             value("mean_lateness_ms", format!("{:.3}", mean * 1e3)),
             value("max_lateness_ms", format!("{:.3}", now.max_lateness * 1e3)),

@@ -29,6 +29,8 @@ impl LiveNodeParameters {
 pub struct Host {
     parameters: Parameters,
     commands: mpsc::Sender<Command>,
+    /// Room among the commands for the next change.
+    room: Option<mpsc::OwnedPermit<Command>>,
     live: Arc<LiveNodeParameters>,
 }
 
@@ -39,7 +41,7 @@ impl Host {
         commands: mpsc::Sender<Command>,
         live: Arc<LiveNodeParameters>,
     ) -> Self {
-        let host = Host { parameters, commands, live };
+        let host = Host { parameters, commands, room: None, live };
         host.update_live();
         host
     }
@@ -65,6 +67,13 @@ impl ParameterHost for Host {
         self.parameters.definition(name).map(descriptor)
     }
 
+    async fn ready(&mut self) {
+        if self.room.is_none() {
+            // None only when the node shuts down.
+            self.room = self.commands.clone().reserve_owned().await.ok();
+        }
+    }
+
     fn set(&mut self, changes: Vec<(String, ParameterValue)>) -> Result<(), String> {
         let source = Source::named("parameter");
         let mut assignments = Vec::with_capacity(changes.len());
@@ -85,9 +94,8 @@ impl ParameterHost for Host {
             let config = changed.machine_config().map_err(|error| error.to_string())?;
             MachineParameters::new(&config).map_err(|error| error.to_string())
         })?;
-        self.commands
-            .try_send(Command::Adopt(Arc::new(machine)))
-            .map_err(|_| "too many commands wait for the next position period; try again".to_owned())?;
+        let room = self.room.take().ok_or("the node is shutting down")?;
+        room.send(Command::Adopt(Arc::new(machine)));
         self.parameters = changed;
         self.update_live();
         Ok(())

@@ -7,13 +7,16 @@
 //! The program logs with `tracing`; the DDS crates log with `log`, which arrives here too. They
 //! report much as errors that is none (a participant's own shutdown, gaps in sequence numbers), so
 //! from them only errors are shown, less the known noise. `--log-level rustdds:=debug` shows all.
+//!
+//! Of the lines of one kind 50 a second are shown, but of debugging.
 
 mod filter;
+mod limit;
 
 use std::{
     fmt::{self, Write as _},
     io::Write as _,
-    time::{Duration, SystemTime, UNIX_EPOCH},
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
 use tokio::sync::mpsc;
@@ -28,6 +31,7 @@ use tracing_subscriber::{
 };
 
 use self::filter::LoggerLevels;
+use self::limit::{Limiter, Verdict};
 use super::args::{LogLevel, RosArgs};
 
 /// One message of this program, for `/rosout`.
@@ -61,7 +65,8 @@ pub fn init(args: &RosArgs, rosout: Option<mpsc::Sender<LogRecord>>) -> Result<(
     let logger = logger_name(&args.node().to_string());
     let levels = LoggerLevels::new(&logger, args.log_level(), args.logger_levels());
     let sinks = args.log_sinks();
-    let layer = RosLayer { logger, terminal: sinks.stdout, rosout: rosout.filter(|_| sinks.rosout) };
+    let rosout = rosout.filter(|_| sinks.rosout);
+    let layer = RosLayer { logger, terminal: sinks.stdout, rosout, limiter: Limiter::default() };
     tracing_subscriber::registry()
         .with(layer.with_filter(levels))
         .try_init()
@@ -77,17 +82,36 @@ struct RosLayer {
     logger: String,
     terminal: bool,
     rosout: Option<mpsc::Sender<LogRecord>>,
+    limiter: Limiter,
+}
+
+impl RosLayer {
+    /// What is shown of an event; nothing when there are too many of its kind.
+    fn limited(&self, event: &Event<'_>, text: EventText) -> Option<String> {
+        if *event.metadata().level() > Level::INFO {
+            return Some(text.message);
+        }
+        let kind = (event.metadata().callsite(), text.log_target.unwrap_or_default());
+        match self.limiter.judge(kind, Instant::now()) {
+            Verdict::Shown => Some(text.message),
+            Verdict::ShownAfter(left_out) => Some(limit::ends(left_out, &text.message)),
+            Verdict::FirstLeftOut => Some(limit::begins(&text.message)),
+            Verdict::LeftOut => None,
+        }
+    }
 }
 
 impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for RosLayer {
     fn on_event(&self, event: &Event<'_>, _context: Context<'_, S>) {
         let text = EventText::of(event);
         let own = filter::is_own(text.target(event));
+        let logger = if own { self.logger.clone() } else { text.target(event).replace("::", ".") };
+        let Some(message) = self.limited(event, text) else { return };
         let record = LogRecord {
             stamp: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default(),
             level: severity(*event.metadata().level()),
-            logger: if own { self.logger.clone() } else { text.target(event).replace("::", ".") },
-            message: text.message,
+            logger,
+            message,
             file: event.metadata().file(),
             line: event.metadata().line(),
         };
@@ -183,7 +207,8 @@ mod tests {
         log: impl FnOnce(),
     ) -> Vec<LogRecord> {
         let (sender, mut receiver) = mpsc::channel(16);
-        let layer = RosLayer { logger: "cell.mill".to_owned(), terminal: false, rosout: Some(sender) };
+        let (logger, limiter) = ("cell.mill".to_owned(), Limiter::default());
+        let layer = RosLayer { logger, terminal: false, rosout: Some(sender), limiter };
         let levels = LoggerLevels::new("cell.mill", level, loggers);
         let subscriber = tracing_subscriber::registry().with(layer.with_filter(levels));
         tracing::subscriber::with_default(subscriber, log);

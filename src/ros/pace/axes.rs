@@ -72,6 +72,12 @@ impl Axes {
         });
     }
 
+    /// Likewise of an instant that came too late to be published.
+    pub(super) fn kept(&mut self, lateness: Duration) {
+        self.released(lateness, true, false);
+        self.health.send_modify(|h| h.unpublished += 1);
+    }
+
     /// Tells of motions and streams that have ended, whether or not time goes on.
     pub(super) fn report_ends(&mut self) {
         if let Some((end, joints)) = self.simulation.take_stream_end() {

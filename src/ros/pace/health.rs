@@ -19,6 +19,8 @@ pub struct Health {
     pub periods: u64,
     /// Periods that were released later than the next one was due.
     pub missed: u64,
+    /// Of those, the ones that came too late to be published.
+    pub unpublished: u64,
     /// Frames that the ROS side did not take in time.
     pub dropped: u64,
     /// Largest lateness of a release since the start, s.

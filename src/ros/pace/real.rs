@@ -7,10 +7,15 @@ use std::time::Duration;
 
 use futures::future::BoxFuture;
 use tokio::sync::mpsc;
+use tracing::warn;
 
 use super::axes::Axes;
 use super::wall::PaceClock;
 use super::{ClockSource, Command, Frame};
+
+/// Instants that come later than this are computed and not published: a burst of them would push out of
+/// subscribers' queues what they have not read, and tell nothing of now.
+pub(super) const LONGEST_BURST: Duration = Duration::from_secs(1);
 
 /// Runs until told to shut down; a frame that nobody takes in time is dropped and counted.
 ///
@@ -25,13 +30,38 @@ pub(super) fn run(
     let clock = PaceClock::new(axes.simulation());
     axes.tell_clock(|clock| clock.source = ClockSource::Wall);
     loop {
-        let lateness = clock.wait_for(axes.simulation().next_instant());
+        let mut lateness = clock.wait_for(axes.simulation().next_instant());
+        if lateness > LONGEST_BURST {
+            stood_still(&mut axes, lateness, clock.newest_due(), |k| clock.lateness_of(k));
+            lateness = clock.wait_for(axes.simulation().next_instant());
+        }
         if period(&mut axes, &mut commands, frames, lateness, lateness > clock.period).is_break() {
             return;
         }
         // It is asked again in the next period, whether or not it has been woken.
         let _ = published.as_mut().poll(&mut Context::from_waker(Waker::noop()));
     }
+}
+
+/// Computes the instants before `newest`, of which the first is due since `lateness`, and keeps them to itself.
+///
+/// Commands wait for the instant of now. What the axes do in between is what they would have done in time.
+pub(super) fn stood_still(
+    axes: &mut Axes,
+    lateness: Duration,
+    newest: i64,
+    lateness_of: impl Fn(i64) -> Duration,
+) {
+    let first = axes.simulation().next_instant();
+    for instant in first..newest {
+        drop(axes.step());
+        axes.kept(lateness_of(instant));
+    }
+    warn!(
+        "the node stood still for {:.3} s: {} position periods were missed; they are computed, and not published",
+        lateness.as_secs_f64(),
+        (newest - first).max(0)
+    );
 }
 
 /// One position period that has become due `lateness` ago; breaks when told to shut down.

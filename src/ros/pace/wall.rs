@@ -42,15 +42,30 @@ impl PaceClock {
         PaceClock { start, period }
     }
 
+    fn due(&self, k: i64) -> Instant {
+        let nanoseconds = self.period.as_nanos() * u128::try_from(k).unwrap_or(0);
+        self.start + Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
+    }
+
     /// Sleeps until instant `k` is due, and says how late it has become.
     pub(super) fn wait_for(&self, k: i64) -> Duration {
-        let nanoseconds = self.period.as_nanos() * u128::try_from(k).unwrap_or(0);
-        let due = self.start + Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX));
+        let due = self.due(k);
         let now = Instant::now();
         if now < due {
             thread::sleep(due - now);
         }
-        Instant::now().saturating_duration_since(due)
+        self.lateness_of(k)
+    }
+
+    /// How late instant `k` is now.
+    pub(super) fn lateness_of(&self, k: i64) -> Duration {
+        Instant::now().saturating_duration_since(self.due(k))
+    }
+
+    /// The last instant that is due.
+    pub(super) fn newest_due(&self) -> i64 {
+        let passed = Instant::now().saturating_duration_since(self.start).as_nanos();
+        i64::try_from(passed / self.period.as_nanos().max(1)).unwrap_or(i64::MAX)
     }
 }
 

@@ -176,6 +176,7 @@ impl ParameterServices {
             return Ok(());
         }
         let names: Vec<String> = changes.iter().map(|(name, _)| name.clone()).collect();
+        host.ready().await;
         host.set(changes)?;
         // What the host made of a value is what counts: it may have turned 4 into 4.0.
         let changed_parameters = names

@@ -118,7 +118,10 @@ pub trait ParameterHost: Send + 'static {
     /// A parameter's description, or `None` when there is no such parameter.
     fn describe(&self, name: &str) -> Option<Descriptor>;
 
-    /// Makes all of the changes, or none of them.
+    /// Waits until changes can be taken, whoever else keeps the host busy.
+    fn ready(&mut self) -> impl Future<Output = ()> + Send;
+
+    /// Makes all of the changes, or none of them; call [`Self::ready`] first.
     ///
     /// # Errors
     /// Why they cannot be made, in a sentence for whoever asked: name, value, what is allowed.

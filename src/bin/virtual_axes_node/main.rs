@@ -1,5 +1,8 @@
 //! The ROS 2 node: virtual machine-tool axes.
 
+#[cfg(target_os = "linux")]
+mod interrupted;
+
 use std::io::Write;
 use std::process::ExitCode;
 

@@ -1,0 +1,187 @@
+"""Others in the node's graph, each a process of its own that can be stopped and killed: this file as a program.
+
+    python test_py/guest.py listen TOPIC DEPTH    reliable; tells the stamps that it got when it is asked
+    python test_py/guest.py send POINTS           one trajectory of so many points on psec
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from builtin_interfaces.msg import Duration
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from drive import DEEP_QOS, NANOSECONDS, PSEC_QOS, SETTLE_S, _die_with_parent, _stamp_ns
+
+READY = "ready"
+PATIENCE_S = 30
+"""How long a guest's word is waited for."""
+LEASE = """<?xml version="1.0" encoding="UTF-8"?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <participant profile_name="lease" is_default_profile="true"><rtps><builtin><discovery_config>
+    <leaseDuration><sec>{seconds}</sec></leaseDuration>
+    <leaseAnnouncement><sec>0</sec><nanosec>300000000</nanosec></leaseAnnouncement>
+  </discovery_config></builtin></rtps></participant>
+</profiles>
+"""
+
+
+class Guest:
+    """A process that runs this file, ended by its id."""
+
+    def __init__(self, domain_id: int, *words: object, lease: int | None = None, folder: Path | None = None):
+        """Begin; `lease` is how long it may be silent before it counts as gone, s, by a profile in `folder`."""
+        env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
+        if lease is not None:
+            assert folder is not None
+            profile = folder / f"lease_{lease}.xml"
+            profile.write_text(LEASE.format(seconds=lease))
+            env["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profile)
+        self._process = subprocess.Popen(
+            [sys.executable, __file__, *map(str, words)],
+            env=env,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            preexec_fn=_die_with_parent,
+        )
+
+    def __enter__(self) -> Guest:
+        """Itself, once it is ready."""
+        assert self.says() == READY
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Kill it."""
+        self.kill()
+
+    def says(self) -> str:
+        """Its next line."""
+        out = self._process.stdout
+        assert out is not None
+        if not select.select([out], [], [], PATIENCE_S)[0]:
+            raise TimeoutError("a guest says nothing")
+        return out.readline().rstrip("\n")
+
+    def stamps(self) -> np.ndarray:
+        """What a listener has got so far, ns."""
+        assert self._process.stdin is not None
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+        return np.array(json.loads(self.says()), dtype=np.int64)
+
+    def go_on(self) -> None:
+        """Let a sender send."""
+        assert self._process.stdin is not None
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+
+    def stop(self) -> None:
+        """SIGSTOP."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """SIGCONT."""
+        self._process.send_signal(signal.SIGCONT)
+
+    def kill(self) -> None:
+        """SIGKILL; harmless when called twice."""
+        self._process.kill()
+        self._process.wait(PATIENCE_S)
+        for end in (self._process.stdin, self._process.stdout):
+            if end is not None and not end.closed:
+                try:
+                    end.close()
+                except BrokenPipeError:
+                    pass
+
+
+def resident_mb(pid: int) -> float:
+    """Resident set of a process, MB."""
+    return next(int(line.split()[1]) for line in Path(f"/proc/{pid}/status").open() if line.startswith("VmRSS")) / 1e3
+
+
+def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:
+    """A gentle swing of two joints at a point per millisecond, as it is sent: to make half a million objects takes long."""
+    values, stamp = (0.25, 0.75), (7, 13)
+    known = [*(struct.pack("<d", value) for value in values), struct.pack("<iI", *stamp)]
+    point = JointTrajectoryPoint(positions=values, time_from_start=Duration(sec=stamp[0], nanosec=stamp[1]))
+    two = serialize_message(JointTrajectory(joint_names=joints, points=[point, point]))
+    # Number of points, then of the first one's positions, which are aligned to 8 octets.
+    count_at = two[: two.index(known[0])].rindex(struct.pack("<II", 2, len(values)))
+    second = two.index(known[-1]) + len(known[-1])
+    template = two[second : two.index(known[-1], second) + len(known[-1])]
+    first = bytearray(two[:second])
+    first[count_at : count_at + 4] = struct.pack("<I", points)
+    rows = np.tile(np.frombuffer(template, dtype=np.uint8), (points - 1, 1))
+    milliseconds = np.arange(1, points, dtype=np.int64)
+    seconds = milliseconds / 1000
+    position = 0.02 * np.sin(seconds / 5) * np.minimum(1, seconds / 5)
+    stamps = np.column_stack([milliseconds // 1000, milliseconds % 1000 * 1_000_000]).astype(np.int32)
+    for wanted, column in zip(known, (position, position, stamps)):
+        place = template.index(wanted)
+        rows[:, place : place + 8] = column.view(np.uint8).reshape(points - 1, 8)
+        first = first.replace(wanted, bytes(8))
+    return bytes(first) + rows.tobytes()
+
+
+# ------------------------------------------------------------------------------------ the programs
+
+
+def listen(node: Any, topic: str, depth: int) -> None:
+    """Keep stamps, and tell them all for each line that comes in."""
+    stamps: list[int] = []
+    qos = QoSProfile(depth=depth, reliability=DEEP_QOS.reliability)
+    node.create_subscription(JointState, topic, lambda raw: stamps.append(_stamp_ns(raw)), qos, raw=True)
+    threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+    while not stamps:
+        time.sleep(0.01)
+    print(READY, flush=True)
+    for _ in sys.stdin:
+        print(json.dumps(stamps), flush=True)
+
+
+def send(node: Any, points: int) -> None:
+    """Publish one long trajectory when a line comes in, already serialised, so that all the time goes into sending."""
+    psec = node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
+    message = long_trajectory(points)
+    while psec.get_subscription_count() == 0:
+        time.sleep(0.01)
+    time.sleep(SETTLE_S)
+    print(READY, flush=True)
+    sys.stdin.readline()
+    psec.publish(message)
+    print("sent", flush=True)
+    sys.stdin.readline()
+
+
+def main() -> None:
+    """What the command line says."""
+    rclpy.init()
+    node = rclpy.create_node(f"guest_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
+    match sys.argv[1:]:
+        case ["listen", topic, depth]:
+            listen(node, topic, int(depth))
+        case ["send", points]:
+            send(node, int(points))
+        case _:
+            sys.exit(__doc__)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""Clocks that nobody can follow: two that contend, an hour apart, and one that gives what is no time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from rclpy.qos import ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from virtual_axes.msg import TrajectoryResult as R
+
+from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, to_ns
+from motion import assert_psec, swing
+from sim_clock import SimClock
+
+BEGIN = 1_000 * NANOSECONDS
+APART = 3_600 * NANOSECONDS
+MESSAGES = 300
+LINES_A_SECOND = 55
+"""Of one kind in the log: 50, and what says that the rest is left out."""
+
+
+@pytest.fixture(scope="module")
+def clock() -> Iterator[SimClock]:
+    """Axes that follow a clock turned by hand, shared by the module."""
+    with Node(["-p", "use_sim_time:=true"]) as process, Drive(process=process, connect=False) as drive:
+        clock = SimClock(drive, BEGIN, ReliabilityPolicy.RELIABLE)
+        clock.connect()
+        yield clock
+
+
+def jumps(drive: Drive) -> int:
+    """Jumps that the node has counted, by diagnostics to come."""
+    seen = len(drive.diagnostics())
+    array = drive.wait_for(lambda: drive.diagnostics()[seen + 1 :], 8, "diagnostics")[0]
+    return next(int(value.value) for value in array.status[0].values if value.key == "clock_jumps")
+
+
+def runs_as_before(clock: SimClock) -> None:
+    """A trajectory by the clock is followed bit for bit, on an unbroken grid."""
+    drive = clock.drive
+    drive.reset()
+    clock.advance(0.06, 0.006)
+    time_s, position = swing(0.6)
+    begin = -(-(clock.now + NANOSECONDS) // TSP_NS) * TSP_NS
+    accepted = drive.accept(joint_trajectory(["x"], time_s, position, stamp=begin))
+    clock.advance(2.0, 0.05)
+    assert_psec(drive, to_ns(accepted.start), {"x": position})
+
+
+def test_two_clocks_that_contend_are_jumps_counted_and_not_a_flood(clock: SimClock):
+    """Each change from one to the other ends what moves; when one has left, the other is followed as ever."""
+    drive = clock.drive
+    time_s, position = swing(6.0)
+    moving = drive.accept(joint_trajectory(["y"], time_s, position))
+    clock.advance(0.3, 0.006)
+    before, said = jumps(drive), len(drive.process.output())
+    other = SimClock(drive, clock.now + APART, ReliabilityPolicy.RELIABLE)
+    drive.wait_for(lambda: other._publisher.get_subscription_count() > 0, 10, "match of another clock")
+    begin = time.monotonic()
+    for _ in range(MESSAGES):
+        clock.set(clock.now + TSP_NS)
+        other.set(other.now + TSP_NS)
+        time.sleep(0.001)
+    assert drive.end(moving.sequence_number, 10).status == R.ABORTED
+    counted = jumps(drive) - before
+    lines = drive.process.output()[said:].count("the clock jumped")
+    seconds = time.monotonic() - begin
+    # A clock is best effort: what is not taken in time is overtaken.
+    assert 2 <= counted <= 2 * MESSAGES
+    assert 1 <= lines <= LINES_A_SECOND * (seconds + 1)
+    other.close()
+    clock.advance(0.3, 0.006)
+    runs_as_before(clock)
+
+
+def test_what_is_no_time_is_left_out_and_said_once(clock: SimClock):
+    """Before the epoch, or with more nanoseconds than a second has; the newest that there can be is a jump."""
+    drive = clock.drive
+    clock.advance(0.06, 0.006)
+    stood_at = drive.now()
+    said = len(drive.process.output())
+    for _ in range(100):
+        clock._publisher.publish(Clock(clock=Time(sec=-1, nanosec=0)))
+        clock._publisher.publish(Clock(clock=Time(sec=1, nanosec=4_000_000_000)))
+    drive.wait_for(lambda: "is no time" in drive.process.output()[said:], 10, "word of what is no time")
+    time.sleep(0.2)
+    assert drive.now() == stood_at
+    assert drive.process.output()[said:].count("is no time") == 1
+    back, last = clock.now, (2**31 - 1) * NANOSECONDS // TSP_NS * TSP_NS
+    for _ in range(3):
+        clock.reach(last)
+        clock.set(back)
+        drive.wait_for(lambda: drive.now() <= back + TSP_NS, 10, "jump back")
+    assert np.isfinite(list(drive.latest("position").values())).all()
+    runs_as_before(clock)

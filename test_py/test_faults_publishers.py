@@ -1,0 +1,290 @@
+"""Publishers that are killed, send far too much, or contend; the axes move meanwhile as they were asked to."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rcl_interfaces.srv import SetParameters
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from virtual_axes.msg import TrajectoryResult as R
+
+from action import in_executor
+from drive import TSP_NS, Drive, Node, _parameters, joint_trajectory, to_ns
+from guest import Guest, long_trajectory, resident_mb
+from motion import TSP, assert_psec, go_home, start_swing, swing
+
+POINTS = 500_000
+MESSAGE_MB = 20
+"""A trajectory of two joints and so many points as it is sent."""
+ATTEMPTS = 4
+FLOOD = 10_000
+FLOOD_OF_TRAJECTORIES = 4_000
+"""At the same rate, but each has two results, which this process has to read."""
+LINES_A_SECOND = 55
+"""Of one kind in the log: 50, and what says that the rest is left out."""
+GROWTH_MB = 30.0
+"""What queues and histories take once they are full: 8192 results and log lines of the middleware's, above all."""
+
+
+@pytest.fixture(scope="module")
+def node() -> Iterator[Drive]:
+    """Axes in real time that take trajectories of any length, shared by the module."""
+    with Node() as process, Drive(process=process) as drive:
+        yield drive
+
+
+def pid_of(drive: Drive) -> int:
+    """Process id of the node."""
+    assert drive.process is not None
+    return drive.process.pid
+
+
+def numbers(drive: Drive) -> dict[str, str]:
+    """Values of the node's diagnostics that are younger than now."""
+    now, seen = drive.now(), len(drive.diagnostics())
+
+    def young() -> list[dict[str, str]]:
+        arrays = [a for a in drive.diagnostics()[seen:] if to_ns(a.header.stamp) > now + 2 * TSP_NS]
+        return [{value.key: value.value for value in array.status[0].values} for array in arrays]
+
+    return drive.wait_for(young, 10, "diagnostics")[-1]
+
+
+def kill_while_sending(drive: Drive, folder: Path) -> bool:
+    """Kill a publisher when the node has begun to put its message together; whether it came to that."""
+    pid, decided = pid_of(drive), len(drive.results())
+    with Guest(drive.process.domain_id, "send", POINTS, lease=2, folder=folder) as sender:
+        before = resident_mb(pid)
+        sender.go_on()
+        deadline = time.monotonic() + 5
+        # Room for the whole message is made with its first fragment.
+        while resident_mb(pid) < before + 0.8 * MESSAGE_MB and time.monotonic() < deadline:
+            time.sleep(0.0005)
+        begun = time.monotonic() < deadline
+        sender.kill()
+    time.sleep(0.5)
+    return len(drive.results()) == decided and begun
+
+
+def test_a_publisher_killed_in_the_middle_of_a_message_harms_nobody(node: Drive, tmp_path: Path):
+    """The next publisher's trajectory runs to the same bits as before; what has come of the message is all that is kept."""
+    time_s, position = swing(1.2)
+    motion = joint_trajectory(["x", "c"], time_s, np.column_stack([position, 3 * position]))
+    go_home(node)
+    before = node.run(motion)
+    memory, attempts = resident_mb(pid_of(node)), 1
+    while not kill_while_sending(node, tmp_path):
+        assert attempts < ATTEMPTS, "each message was whole before its sender died"
+        attempts += 1
+    go_home(node)
+    after = node.run(motion)
+    for kind, field in (("states", "psec"), ("joints", "position"), ("currents", "current")):
+        np.testing.assert_array_equal(getattr(after, kind)[field], getattr(before, kind)[field], err_msg=field)
+    # A message that was whole is there twice, as it came and as a trajectory.
+    assert resident_mb(pid_of(node)) < memory + 3 * MESSAGE_MB * attempts
+
+
+def test_a_trajectory_of_500_000_points_does_not_disturb_the_motion_under_way(node: Drive):
+    """It is taken, and what moves goes on bit for bit; afterwards its memory is given back."""
+    go_home(node)
+    memory = resident_mb(pid_of(node))
+    accepted, start, plan = start_swing(node, duration=4.8)
+    with node._changed:
+        node._sent += 1
+        long = node._sent
+        node._psec.publish(long_trajectory(POINTS))
+    assert node.decision(long, 60).status == R.ACCEPTED
+    assert_psec(node, start, plan)
+    assert node.end(accepted.sequence_number, 10).status == R.COMPLETED
+    node.stop()
+    assert node.end(long, 10).status == R.STOPPED
+    # The middleware keeps the message, as it keeps the last 64.
+    node.wait_for(lambda: resident_mb(pid_of(node)) < memory + 4 * MESSAGE_MB, 30, f"memory near {memory} MB")
+
+
+def flood(publisher: Any, message: Any, number: int) -> float:
+    """Publish `number` messages, 10 000 a second and more where the machine can; returns how long it took, s."""
+    raw, begin = serialize_message(message), time.monotonic()
+    for _ in range(number):
+        publisher.publish(raw)
+    return time.monotonic() - begin
+
+
+def forget_results(drive: Drive) -> None:
+    """Drop the results of a flood when no more come: to look through thousands of them takes long."""
+    silent_since, known = time.monotonic(), -1
+    deadline = silent_since + 30
+    while time.monotonic() < min(deadline, silent_since + 0.5):
+        if len(drive.results()) != known:
+            silent_since, known = time.monotonic(), len(drive.results())
+        time.sleep(0.05)
+    with drive._changed:
+        drive._results.clear()
+
+
+def move_through(drive: Drive, act: Callable[[], None]) -> str:
+    """A swing of Z while `act` acts, followed bit for bit; returns what the node's log said, checked for its length."""
+    go_home(drive)
+    said = len(drive.process.output())
+    begin = time.monotonic()
+    accepted, start, plan = start_swing(drive, ["z"], duration=1.8, amplitude=0.02)
+    act()
+    assert_psec(drive, start, plan)
+    assert drive.end(accepted.sequence_number, 30).status == R.COMPLETED
+    # What is told by diagnostics is told by now, and the last of the log is out.
+    numbers(drive)
+    log, seconds = drive.process.output()[said:], time.monotonic() - begin
+    kinds: dict[str, int] = {}
+    for line in log.splitlines():
+        kind = re.sub(r"\d+", "", line.split("]: ", 1)[-1].removeprefix("more than"))
+        kinds[kind] = kinds.get(kind, 0) + 1
+    assert all(count < LINES_A_SECOND * (seconds + 2) for count in kinds.values()), kinds
+    return log
+
+
+FLOODS = {
+    "trajectories that are taken": ("_psec", joint_trajectory(["x"], [0.0, 0.06], [[0.0]] * 2)),
+    "trajectories that are refused": ("_psec", joint_trajectory(["q"], [0.0], [[0.0]])),
+    "set-points that are taken": ("_stream", JointState(name=["x"], position=[1e-4])),
+    "set-points that are refused": ("_stream", JointState(name=["x"], position=[0.4])),
+    "loads": ("_load", JointState(name=["x"], effort=[1.0])),
+    "loads that are refused": ("_load", JointState(name=["q"], effort=[1.0])),
+}
+
+
+@pytest.mark.parametrize("what", FLOODS)
+def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
+    """What moves is not disturbed, memory and log are bounded, and commands are taken as before."""
+    publisher, message = FLOODS[what]
+    refused = int(numbers(node)["stream_setpoints_refused"])
+    memory = resident_mb(pid_of(node))
+
+    def act() -> None:
+        number = FLOOD_OF_TRAJECTORIES if publisher == "_psec" else FLOOD
+        seconds = flood(getattr(node, publisher), message, number)
+        if publisher == "_psec":
+            node._sent += number
+        print(f"\n{what}: {number / seconds:.0f} a second, ", end="")
+
+    log = move_through(node, act)
+    grown = resident_mb(pid_of(node)) - memory
+    print(f"{grown:.1f} MB more, {log.count(chr(10))} lines")
+    assert grown < GROWTH_MB
+    if publisher == "_psec":
+        assert "lines of this kind" in log, "nothing was left out"
+        forget_results(node)
+    if what == "set-points that are refused":
+        assert int(numbers(node)["stream_setpoints_refused"]) > refused
+        assert log.count("set-point of the stream refused") <= 10
+    if what == "loads that are refused":
+        assert 1 <= log.count("a message on load is left out") <= 10
+    node.set_parameters({"x.velocity_loop.gain": 5.0})
+    time_s, position = swing(0.6, amplitude=0.01)
+    recording = node.run(joint_trajectory(["y"], time_s, position))
+    assert_psec(node, recording.start, {"y": position})
+
+
+def test_a_flood_of_service_calls(node: Drive):
+    """Thousands at once of two services: those of the last call are answered, and nothing grows."""
+    memory = resident_mb(pid_of(node))
+    deep = QoSProfile(depth=FLOOD)
+    setter = node.node.create_client(SetParameters, f"{node.target}/set_parameters", qos_profile=deep)
+    stopper = node.node.create_client(Trigger, f"{node.target}/stop", qos_profile=deep)
+    for client in (setter, stopper):
+        node.wait_for(client.service_is_ready, 10, "service")
+    time.sleep(0.2)
+    go_home(node)
+    begin = time.monotonic()
+    request = SetParameters.Request(parameters=_parameters({"x.velocity_loop.gain": 5.0}))
+    calls = [setter.call_async(request) for _ in range(FLOOD // 10)]
+    calls += [stopper.call_async(Trigger.Request()) for _ in range(FLOOD // 10)]
+    print(f"\n{len(calls) / (time.monotonic() - begin):.0f} a second")
+    node.wait_for(lambda: sum(call.done() for call in calls) > len(calls) // 10, 60, "answers")
+    for client in (setter, stopper):
+        in_executor(node, lambda client=client: node.node.destroy_client(client))
+    # Who calls now waits for what is before it, and no more.
+    assert node.reset(timeout=60)
+    assert resident_mb(pid_of(node)) - memory < GROWTH_MB
+
+
+def test_parameters_can_be_set_while_a_stream_floods_the_node(node: Drive):
+    """None is refused for want of room among the commands."""
+    go_home(node)
+    ended = threading.Event()
+    raw = serialize_message(JointState(name=["x"], position=[1e-4]))
+
+    def stream() -> None:
+        while not ended.is_set():
+            for _ in range(100):
+                node._stream.publish(raw)
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=stream)
+    thread.start()
+    try:
+        for k in range(40):
+            node.set_parameters({"x.velocity_loop.gain": 4.5 + 0.01 * k})
+    finally:
+        ended.set()
+        thread.join()
+    # What is on its way still.
+    time.sleep(0.5)
+    node.set_parameters({"x.velocity_loop.gain": 5.0})
+
+
+def test_of_two_publishers_that_contend_the_newest_has_the_joint(node: Drive):
+    """Every instant belongs to one trajectory, whole from its start until the next one's; each is told."""
+    go_home(node)
+    with Drive(process=node.process) as other:
+        plans: dict[int, tuple[str, np.ndarray]] = {}
+        begin = node.now()
+        results = []
+        for k in range(12):
+            drive = (node, other)[k % 2]
+            # Distinct by their values, and within reach of each other.
+            position = 1e-4 * (k + 1) + np.arange(300) * 1e-7
+            trajectory = joint_trajectory(["x", "y"], np.arange(300) * TSP, np.column_stack([position, -position]))
+            accepted = drive.accept(trajectory)
+            results.append((drive, accepted.sequence_number))
+            plans[to_ns(accepted.start)] = ("", position)
+            node.wait_until(to_ns(accepted.start) + 5 * TSP_NS, 10)
+        ends = [drive.end(number, 10).status for drive, number in results]
+        assert ends == [R.DISPLACED] * 11 + [R.COMPLETED]
+        states = node.record(begin, max(plans) + 299 * TSP_NS).states
+    starts = np.array(sorted(plans))
+    assert set(np.diff(states.stamp)) == {TSP_NS}
+    for stamp, x, y in zip(states.stamp, states["psec", "x"], states["psec", "y"]):
+        if stamp >= starts[0]:
+            start = starts[np.searchsorted(starts, stamp, side="right") - 1]
+            assert x == plans[start][1][(stamp - start) // TSP_NS]
+        assert x == -y
+
+
+def test_of_two_streams_that_contend_no_message_is_mixed(node: Drive):
+    """The joints of one message are commanded together: of those of a period the last message counts."""
+    go_home(node)
+    with Drive(process=node.process) as other:
+        begin = node.now()
+        sent: set[tuple[float, float]] = {(0.0, 0.0)}
+        for k in range(300):
+            for drive, sign in ((node, 1), (other, -1)):
+                pair = (sign * 1e-6 * (k + 1), sign * 2e-6 * (k + 1))
+                sent.add(pair)
+                drive.stream(["x", "y"], pair)
+            time.sleep(0.002)
+        node.wait_until(node.now() + 10 * TSP_NS, 10)
+        states = node.record(begin, node.now()).states
+    commanded = set(zip(states["psec", "x"].tolist(), states["psec", "y"].tolist()))
+    assert commanded <= sent
+    assert len({x > 0 for x, _ in commanded - {(0.0, 0.0)}}) == 2, "only one of them was heard"
+    assert len(commanded) > 30

@@ -1,0 +1,64 @@
+"""Subscribers that are killed or stopped, while the axes move and others listen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from drive import NANOSECONDS, TSP_NS, Drive
+from guest import Guest, resident_mb
+from motion import assert_psec, go_home, start_swing
+
+STOPPED_S = 20
+LEASE_S = 60
+"""Of who is stopped: with Fast DDS's own of 20 s it would be given up."""
+SHALLOW, DEEP = 10, 20_000
+GROWTH_MB = 24.0
+"""What 20 s of unread samples of a topic may take, and whoever comes and goes."""
+
+
+def test_subscribers_that_are_killed_or_stopped_for_20_s_harm_nobody(real: Drive, tmp_path: Path):
+    """The axes move in real time, others lose nothing, memory is bounded; afterwards each gets what its depth holds."""
+    go_home(real)
+    assert real.process is not None
+    pid, domain = real.process.pid, real.process.domain_id
+    topic = "/joint_states"
+    with (
+        Guest(domain, "listen", topic, 100) as killed,
+        Guest(domain, "listen", topic, SHALLOW, lease=LEASE_S, folder=tmp_path) as shallow,
+        Guest(domain, "listen", topic, DEEP, lease=LEASE_S, folder=tmp_path) as deep,
+    ):
+        before = resident_mb(pid)
+        accepted, start, plan = start_swing(real, duration=STOPPED_S + 1.0)
+        killed.kill()
+        for guest in (shallow, deep):
+            guest.stop()
+        stopped = real.now()
+        real.wait_until(stopped + STOPPED_S * NANOSECONDS, STOPPED_S + 30)
+        resumed = real.now()
+        grown = resident_mb(pid) - before
+        for guest in (shallow, deep):
+            guest.resume()
+        # Others: every sample, and the motion as planned.
+        assert_psec(real, start, plan)
+        recording = real.record(stopped, resumed)
+        for series in (recording.joints, recording.currents, recording.states):
+            assert set(np.diff(series.stamp)) == {TSP_NS}
+        assert grown < GROWTH_MB, f"{grown:.1f} MB more"
+        dropped = [v.value for v in real.diagnostics()[-1].status[0].values if v.key == "dropped_samples"]
+        assert dropped == ["0"]
+        # Those who were stopped: what has come since, and of before what their depth holds.
+        real.wait_until(resumed + 2 * NANOSECONDS, 30)
+        until = real.now()
+        stamps = {}
+        for name, guest in (("shallow", shallow), ("deep", deep)):
+
+            def caught_up(guest: Guest = guest, name: str = name) -> bool:
+                stamps[name] = guest.stamps()
+                return bool(stamps[name][-1] >= until)
+
+            real.wait_for(caught_up, 20, f"samples of the {name} one that goes on")
+        assert set(np.diff(stamps["deep"])) == {TSP_NS}, "it has room for all of them"
+        assert np.all(np.diff(stamps["shallow"]) > 0)
+        assert real.end(accepted.sequence_number, 10).status == 2

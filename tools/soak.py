@@ -1,0 +1,377 @@
+#!/usr/bin/env python3
+"""Random traffic for a long time: whether the node's memory, open files, threads and latency stay as they are.
+
+    cargo build --release && source .build/env.sh
+    tools/soak.py --minutes 1                  # does the tool work
+    tools/soak.py --minutes 10                 # ten minutes in real time
+    tools/soak.py --minutes 60 --speed 10      # an hour, in which the axes live ten
+
+Valid and invalid trajectories, streams, loads, services, parameters, goals that are cancelled or not, subscribers
+that come and go, nodes that come, leave and are killed; the same --seed gives the same sequence. With --speed the node
+follows a /clock of this tool's. At first what is bounded is filled to its bound, by a flood.
+
+The exit status is 1 if over the second half something grew by more than it may, or if the node died.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import math
+import os
+import random
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+from virtual_axes.msg import DriveStates, MotorCurrents
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+from action import Follow, goal, in_executor  # noqa: E402
+from drive import NANOSECONDS, Drive, Node, ParameterRefused, joint_trajectory, to_time  # noqa: E402
+from guest import Guest  # noqa: E402
+
+JOINTS = {"x": 0.05, "y": 0.05, "z": 0.05, "a": 0.2, "c": 1.0}
+"""How far trajectories go from home, m or rad."""
+GAIN = "x.velocity_loop.gain"
+TICK_S = 0.003
+"""Wall time between two messages of the clock."""
+FILL = 12_000
+"""More than the 8192 samples that the middleware keeps of a topic."""
+KEPT = 64
+"""Trajectories that the middleware keeps: depth of psec."""
+LONG = 5_000
+"""Points of the longest trajectories."""
+LOOKS = 60
+CALLS = 9
+"""Whose median is the latency of a look."""
+
+
+@dataclass
+class Look:
+    """What was seen at one time."""
+
+    minutes: float
+    resident_mb: float
+    files: float
+    threads: float
+    latency_ms: float
+
+
+MAY_GROW = {"resident_mb": (3.0, 0.02), "files": (2.5, 0.0), "threads": (1.5, 0.0), "latency_ms": (2.0, 0.5)}
+"""Over the second half: so much, and this share of its median there."""
+
+
+class SoakClock:
+    """`/clock` at a multiple of real time."""
+
+    def __init__(self, drive: Drive, speed: float):
+        """Begin to tick."""
+        self._publisher = drive.node.create_publisher(Clock, "/clock", 10)
+        self._speed, self._end = speed, threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        begin = time.monotonic()
+        while not self._end.wait(TICK_S):
+            now = NANOSECONDS + int((time.monotonic() - begin) * self._speed * NANOSECONDS)
+            self._publisher.publish(Clock(clock=to_time(now)))
+
+    def close(self) -> None:
+        """Stand still."""
+        self._end.set()
+        self._thread.join(timeout=5)
+
+
+class Traffic:
+    """What is asked of the node, one thing after the other, by chance."""
+
+    def __init__(self, drive: Drive, follow: Follow, seed: int):
+        """Nothing is sent yet."""
+        self.drive, self.follow = drive, follow
+        self.chance = random.Random(seed)
+        self.count: Counter[str] = Counter()
+        self._guests: list[Guest] = []
+        self._listening: list[Any] = []
+        self._kinds: list[tuple[float, Callable[[], None]]] = [
+            (20, self.trajectory),
+            (10, self.invalid),
+            (1, self.long_trajectory),
+            (3, self.halt),
+            (8, self.stream),
+            (5, self.load),
+            (8, self.parameters),
+            (4, self.wrong_parameter),
+            (2, self.descriptions),
+            (1, self.reset),
+            (8, self.goal),
+            (8, self.listener),
+            (1, self.visitor),
+            (0.5, self.killed),
+        ]
+
+    def step(self) -> None:
+        """One of them."""
+        weights, acts = zip(*self._kinds)
+        [act] = self.chance.choices(acts, weights)
+        try:
+            act()
+            self.count[act.__name__] += 1
+        except TimeoutError:
+            self.count["timeouts"] += 1
+        time.sleep(self.chance.expovariate(20))
+
+    def _way(self) -> tuple[list[str], list[float], float]:
+        names = self.chance.sample(list(JOINTS), self.chance.randint(1, len(JOINTS)))
+        return names, [self.chance.uniform(-1, 1) * JOINTS[name] for name in names], self.chance.uniform(1.5, 4)
+
+    def _send(self, trajectory: JointTrajectory) -> None:
+        self.drive.send(trajectory)
+
+    def trajectory(self) -> None:
+        """From where it is to somewhere, in a while."""
+        names, to, duration = self._way()
+        self._send(joint_trajectory(names, [duration], [to], [[0.0] * len(names)]))
+
+    def invalid(self) -> None:
+        """Refused for one reason or another."""
+        names, to, duration = self._way()
+        bad = self.chance.choice(["joint", "nan", "size", "times", "stroke", "past"])
+        rows, times, stamp = [to, to], [duration, duration + 1], None
+        if bad == "joint":
+            names = [f"q{self.chance.randrange(1000)}", *names[1:]]
+        elif bad == "nan":
+            rows = [to, [math.nan] * len(to)]
+        elif bad == "times":
+            times = [2.0, 1.0]
+        elif bad == "stroke":
+            names, rows = ["x"], [[9.0], [9.0]]
+        elif bad == "past":
+            stamp = 1
+        message = joint_trajectory(names, times, rows, stamp=stamp)
+        if bad == "size":
+            message.points[1].positions = [0.0] * (len(names) + 1)
+        self._send(message)
+
+    def long_trajectory(self) -> None:
+        """Many points, most of which nobody waits for."""
+        self._send(long_trajectory())
+
+    def halt(self) -> None:
+        """A controlled stop, by the topic or the service."""
+        if self.chance.random() < 0.5:
+            self._send(JointTrajectory())
+        else:
+            self.drive.stop()
+
+    def stream(self) -> None:
+        """A burst of set-points, within reach or not."""
+        at = self.drive.latest("psec")["y"]
+        for k in range(50):
+            far = 1.0 if self.chance.random() < 0.05 else 0.0
+            self.drive.stream(["y"], [at + 1e-5 * k + far])
+            time.sleep(0.004)
+
+    def load(self) -> None:
+        """A burst of forces."""
+        for _ in range(10):
+            self.drive.load({"x": self.chance.uniform(-300, 300), "q" if self.chance.random() < 0.1 else "y": 1.0})
+
+    def parameters(self) -> None:
+        """One that is taken."""
+        self.drive.set_parameters({GAIN: self.chance.uniform(4.5, 5.0)})
+
+    def wrong_parameter(self) -> None:
+        """One that is not."""
+        wrong: Any = self.chance.choice([(GAIN, -1.0), ("no.such", 1), ("time", "fast"), (GAIN, "text")])
+        try:
+            self.drive.set_parameters(dict([wrong]))
+        except ParameterRefused:
+            return
+        raise SystemExit(f"{wrong} was taken")
+
+    def descriptions(self) -> None:
+        """Long answers."""
+        self.drive.describe(self.drive.list_parameters()[:60])
+
+    def reset(self) -> None:
+        """Home."""
+        self.drive.reset()
+
+    def goal(self) -> None:
+        """A goal, cancelled now and then."""
+        names, to, duration = self._way()
+        sent = self.follow.send(goal(joint_trajectory(names, [duration], [to], [[0.0] * len(names)])))
+        if sent.handle.accepted and self.chance.random() < 0.5:
+            sent.cancel()
+        self.follow.feedback.clear()
+        self.follow.statuses.clear()
+
+    def listener(self) -> None:
+        """A subscription comes; the oldest of some goes."""
+        kind, topic = self.chance.choice(
+            [(JointState, "/joint_states"), (MotorCurrents, "/virtual_axes/motor_currents"),
+             (DriveStates, "/virtual_axes/drive_states")]
+        )  # fmt: skip
+        profile = QoSProfile(depth=self.chance.choice([1, 10, 1000]))
+        node = self.drive.node
+
+        def change() -> None:
+            self._listening.append(node.create_subscription(kind, topic, lambda _: None, profile, raw=True))
+            if len(self._listening) > 5:
+                node.destroy_subscription(self._listening.pop(0))
+
+        # In the thread that spins: rclpy's executor does not bear that what it waits for goes.
+        in_executor(self.drive, change)
+
+    def visitor(self) -> None:
+        """A participant comes and leaves."""
+        with Drive(process=self.drive.process) as other:
+            other.send(JointTrajectory(joint_names=["q"]))
+
+    def killed(self) -> None:
+        """A process listens; one of those that do is killed."""
+        assert self.drive.process is not None
+        self._guests.append(Guest(self.drive.process.domain_id, "listen", "/joint_states", 10).__enter__())
+        if len(self._guests) > 2:
+            self._guests.pop(0).kill()
+
+    def forget(self) -> None:
+        """Drop what this process has kept."""
+        self.drive.forget()
+        with self.drive._changed:
+            self.drive._results.clear()
+            self.drive._diagnostics.clear()
+        gc.collect()
+
+    def close(self) -> None:
+        """End the guests."""
+        for guest in self._guests:
+            guest.kill()
+
+
+def long_trajectory() -> JointTrajectory:
+    """Ten seconds and more of C at 2 ms, after a second to get there."""
+    times = 1 + np.arange(LONG) / 500
+    return joint_trajectory(["c"], times, 0.2 * np.sin(times - 1))
+
+
+def fill(drive: Drive) -> None:
+    """Bring histories and queues to their bounds."""
+    raw = serialize_message(joint_trajectory(["q"], [0.0], [[0.0]]))
+    deadline = time.monotonic() + 60
+    while len(drive.results()) < FILL and time.monotonic() < deadline:
+        for _ in range(50):
+            drive._psec.publish(raw)
+            drive._sent += 1
+        time.sleep(0.02)
+    for _ in range(KEPT + 16):
+        drive.send(long_trajectory())
+        time.sleep(0.05)
+    time.sleep(7)  # The middleware looks through its histories every 6 s.
+
+
+def look(drive: Drive, began: float) -> Look:
+    """The process as it is now."""
+    assert drive.process is not None
+    pid = drive.process.pid
+    status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
+    took = []
+    for _ in range(CALLS):
+        begin = time.perf_counter()
+        drive.get_parameters([GAIN])
+        took.append((time.perf_counter() - begin) * 1e3)
+    return Look(
+        minutes=(time.monotonic() - began) / 60,
+        resident_mb=int(status["VmRSS"].split()[0]) / 1e3,
+        files=len(os.listdir(f"/proc/{pid}/fd")),
+        threads=int(status["Threads"]),
+        latency_ms=float(np.median(took)),
+    )
+
+
+def slope(minutes: np.ndarray, values: np.ndarray) -> float:
+    """Theil and Sen's: the median of the slopes of all pairs, per minute."""
+    first, second = np.triu_indices(len(minutes), 1)
+    return float(np.median((values[second] - values[first]) / (minutes[second] - minutes[first])))
+
+
+def verdict(looks: list[Look]) -> bool:
+    """Print how each figure went, and whether one grew."""
+    half = looks[len(looks) // 2 :]
+    minutes = np.array([found.minutes for found in half])
+    grew = False
+    print(f"\n{len(looks)} looks in {looks[-1].minutes:.1f} minutes; over the second half:")
+    for name, (at_least, share) in MAY_GROW.items():
+        values = np.array([getattr(found, name) for found in half])
+        rate = slope(minutes, values)
+        growth, most = rate * (minutes[-1] - minutes[0]), at_least + share * float(np.median(values))
+        bad = growth > most
+        grew |= bad
+        print(
+            f"  {name:<12}{values.min():9.2f} to {values.max():9.2f}, {rate:+9.4f} a minute, "
+            f"{growth:+7.2f} in all, at most {most:.2f}: {'GROWS' if bad else 'flat'}"
+        )
+    return grew
+
+
+def main() -> int:
+    """Run and judge."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=1, help="of the wall clock (1)")
+    parser.add_argument("--speed", type=float, default=1, help="of the node's clock against the wall's (1)")
+    parser.add_argument("--seed", type=int, default=1, help="of the traffic (1)")
+    args = parser.parse_args()
+    real = args.speed == 1
+    mode = ["-p", "time:=real"] if real else ["-p", "use_sim_time:=true"]
+    with Node([*mode, "-p", "max_points:=20000"]) as process, Drive(process=process, connect=False) as drive:
+        clock = None if real else SoakClock(drive, args.speed)
+        drive.connect(30)
+        fill(drive)
+        with Follow(drive) as follow:
+            traffic = Traffic(drive, follow, args.seed)
+            looks: list[Look] = []
+            try:
+                began = time.monotonic()
+                while (passed := time.monotonic() - began) < args.minutes * 60:
+                    traffic.step()
+                    if process.poll() is not None:
+                        break
+                    if passed >= len(looks) * args.minutes * 60 / LOOKS:
+                        traffic.forget()
+                        looks.append(look(drive, began))
+                        if len(looks) % (LOOKS // 10) == 0:
+                            print(looks[-1], flush=True)
+            finally:
+                traffic.close()
+        time.sleep(1.5)
+        values = {value.key: value.value for value in drive.diagnostics()[-1].status[0].values}
+        if clock is not None:
+            clock.close()
+        grew = verdict(looks)
+        print("  asked:", ", ".join(f"{name} {number}" for name, number in sorted(traffic.count.items())))
+        keys = ("position_periods", "missed_periods", "unpublished_periods", "dropped_samples", "max_lateness_ms")
+        print("  told:", ", ".join(f"{key} {values[key]}" for key in keys))
+        drive.process = None
+        died = process.poll() is not None or process.stop() != 0 or "panicked" in process.output()
+        if died:
+            print(f"the node died; its output ends:\n{process.output()[-3000:]}")
+    return int(grew or died)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
