@@ -5,10 +5,6 @@
 //! `NodeOptions::new().start_parameter_services(false)`, its spinner stays unused, and the services
 //! are these.
 
-mod list;
-mod types;
-mod wire;
-
 use std::future::Future;
 
 use futures::{
@@ -32,8 +28,8 @@ use ros2_interfaces_jazzy_serde::{
     },
 };
 
-pub use self::types::{Descriptor, ParameterHost, ParameterType, ParameterValue, Range};
 use super::args::RosArgs;
+use crate::door::parameters::{self as wire, ParameterHost, list};
 use super::service::{Service, ServiceError, profile};
 
 /// rmw's profile for parameter services and events keeps this many, so that a client may send that
@@ -150,7 +146,7 @@ impl ParameterServices {
                 self.set_atomically.respond(id, SetParametersAtomicallyResponse { result })
             }
             Request::List(id, request) => {
-                let result = list::list(&host.names(), &request.prefixes, request.depth);
+                let result = list(&host.names(), &request.prefixes, request.depth);
                 self.list.respond(id, ListParametersResponse { result })
             }
             Request::Describe(id, request) => {
