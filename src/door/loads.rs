@@ -1,5 +1,6 @@
 //! Loads at the axes from messages.
 
+use crate::config::shortened;
 use crate::messages::sensor_msgs::msg::JointState;
 use crate::simulation::MAX_LOAD;
 
@@ -21,7 +22,7 @@ pub fn loads(message: &JointState, joints: &[String]) -> Result<Vec<(usize, f64)
         .zip(&message.effort)
         .map(|(name, &load)| {
             let Some(place) = joints.iter().position(|j| j == name) else {
-                return Err(format!("unknown joint {name}; there are {}", joints.join(", ")));
+                return Err(format!("unknown joint {}; there are {}", shortened(name), joints.join(", ")));
             };
             if message.name.iter().filter(|n| *n == name).count() > 1 {
                 return Err(format!("joint {name} is named twice"));
@@ -48,5 +49,13 @@ mod tests {
         let joints = ["x".to_owned(), "y".to_owned()];
         let error = loads(&message, &joints).expect_err("must be refused");
         assert!(error.contains('y') && error.contains("NaN"), "{error}");
+    }
+
+    #[test]
+    fn a_name_without_end_does_not_come_back_in_the_refusal() {
+        let message =
+            JointState { name: vec!["q\n".repeat(100_000)], effort: vec![1.0], ..JointState::default() };
+        let error = loads(&message, &["x".to_owned()]).expect_err("must be refused");
+        assert!(error.len() < 600 && !error.contains('\n'), "{} bytes", error.len());
     }
 }

@@ -10,6 +10,9 @@ use crate::units::{Nanoseconds, SECOND_NS};
 /// A message whose stamp is older than the one before by more than this comes from a clock that was
 /// set back; by less, it was overtaken on its way.
 const CLOCK_SET_BACK: Nanoseconds = SECOND_NS;
+/// Refusals of one message that are kept; a message can name more joints than there are, and more than there
+/// is memory for.
+const MOST_REFUSED: usize = 16;
 /// Publishers whose last stamp is remembered.
 const MOST_PUBLISHERS: usize = 64;
 
@@ -20,6 +23,8 @@ pub struct Setpoints {
     pub positions: Vec<(usize, f64)>,
     /// What is refused without asking the axes.
     pub refused: Vec<Rejection>,
+    /// How many more were refused.
+    pub refused_beside: u64,
     /// When it was sent by the sender's clock, ns; none if it does not say.
     pub sent: Option<Nanoseconds>,
     /// Whether a younger message of its publisher came before it.
@@ -73,11 +78,17 @@ impl Setpoints {
                 continue;
             }
             let Some(place) = joints.iter().position(|joint| joint == name) else {
+                if setpoints.is_full() {
+                    continue;
+                }
                 let text = format!("unknown joint {name}; there are {}", joints.join(", "));
                 setpoints.refused.push(Rejection::new(Code::UnknownJoint, text).joint(name));
                 continue;
             };
             if setpoints.positions.iter().any(|&(taken, _)| taken == place) {
+                if setpoints.is_full() {
+                    continue;
+                }
                 let text = format!("joint {name} is named twice; the first counts");
                 setpoints.refused.push(Rejection::new(Code::DuplicateJoint, text).joint(name));
                 continue;
@@ -85,6 +96,13 @@ impl Setpoints {
             setpoints.positions.push((place, position));
         }
         setpoints
+    }
+
+    /// Whether no more refusals are kept; the one that asks is counted then.
+    fn is_full(&mut self) -> bool {
+        let is_full = self.refused.len() == MOST_REFUSED;
+        self.refused_beside += u64::from(is_full);
+        is_full
     }
 
     /// Likewise, of a message of `publisher`; one that was overtaken has none.
@@ -121,6 +139,15 @@ mod tests {
         assert_eq!(found.positions, [(0, 0.2), (1, f64::INFINITY)]);
         let codes: Vec<_> = found.refused.iter().map(|r| r.code).collect();
         assert_eq!(codes, [Code::UnknownJoint, Code::DuplicateJoint]);
+    }
+
+    #[test]
+    fn a_message_of_many_unknown_joints_takes_no_memory_for_each() {
+        let found = setpoints(&["q"; 10_000], &[0.1; 10_000]);
+        assert_eq!((found.refused.len(), found.refused_beside), (MOST_REFUSED, 10_000 - 16));
+        let found = setpoints(&["x"; 10_000], &[0.1; 10_000]);
+        assert_eq!((found.positions.len(), found.refused.len()), (1, MOST_REFUSED));
+        assert_eq!(found.refused_beside, 10_000 - 1 - 16);
     }
 
     #[test]

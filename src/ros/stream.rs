@@ -49,6 +49,7 @@ impl StreamLog {
     pub fn take(&mut self, simulation: &mut Simulation, setpoints: &Setpoints) {
         let now = simulation.time_of(simulation.next_instant());
         self.overtaken += u64::from(setpoints.overtaken);
+        self.refused += setpoints.refused_beside;
         for rejection in &setpoints.refused {
             self.refuse(rejection, now);
         }

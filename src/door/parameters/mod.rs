@@ -6,6 +6,6 @@ mod types;
 mod wire;
 
 pub use list::list;
-pub use settings::{LiveNodeParameters, Settings};
+pub use settings::{LiveNodeParameters, Settings, check_count};
 pub use types::{Descriptor, ParameterHost, ParameterType, ParameterValue, Range};
 pub use wire::{descriptor_to_wire, parameter_from_wire, result_to_wire, type_number, value_to_wire};

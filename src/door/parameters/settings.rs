@@ -4,8 +4,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::types::{Descriptor, ParameterType, ParameterValue, Range};
-use crate::config::{Assignment, Definition, GoalDefaults, Kind, Parameters, Source, Value};
+use crate::config::{Assignment, Definition, GoalDefaults, Kind, Parameters, Source, Value, shortened};
 use crate::machine::MachineParameters;
+
+/// Most parameters of one request to set; a machine has a few hundred, and each set alone is checked with
+/// the whole machine.
+const MOST_CHANGES: usize = 1000;
+
+/// Refuses a request to set more parameters than there can be.
+///
+/// # Errors
+/// A sentence with the number found and what is allowed.
+pub fn check_count(found: usize) -> Result<(), String> {
+    if found <= MOST_CHANGES {
+        return Ok(());
+    }
+    Err(format!("{found} parameters in one request; {MOST_CHANGES} are allowed"))
+}
 
 /// Node parameters that other tasks read while they can be set.
 #[derive(Debug, Default)]
@@ -81,7 +96,7 @@ impl Settings {
                 ));
             }
             let value = from_ros(value)
-                .ok_or_else(|| format!("{key}: empty lists and byte arrays are not parameters here"))?;
+                .ok_or_else(|| format!("{}: empty lists and byte arrays are not parameters here", shortened(&key)))?;
             assignments.push(Assignment { key, value, source: source.clone() });
         }
         let mut changed = self.parameters.clone();
@@ -154,5 +169,30 @@ fn descriptor(definition: &Definition) -> Descriptor {
         read_only: !definition.live,
         dynamic_typing: false,
         range,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings() -> Settings {
+        Settings::new(Parameters::embedded_default().expect("shipped"), Arc::default())
+    }
+
+    #[test]
+    fn a_name_without_end_does_not_come_back_in_the_refusal() {
+        for value in [ParameterValue::ByteArray(vec![1]), ParameterValue::Integer(1)] {
+            let reason = settings().check(vec![("k\n".repeat(100_000), value)]).map(|_| ()).unwrap_err();
+            assert!(reason.len() < 1000 && !reason.contains('\n'), "{} bytes", reason.len());
+        }
+    }
+
+    /// Each of them would be checked with the whole machine, and nobody else be answered meanwhile.
+    #[test]
+    fn more_parameters_in_a_request_than_there_can_be_are_refused_before_they_are_checked() {
+        assert!(settings().names().len() < MOST_CHANGES);
+        assert_eq!(check_count(MOST_CHANGES), Ok(()));
+        assert!(check_count(MOST_CHANGES + 1).unwrap_err().contains("1001"));
     }
 }

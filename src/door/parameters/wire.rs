@@ -2,6 +2,7 @@
 
 use crate::messages::rcl_interfaces::msg;
 
+use crate::config::shortened;
 use super::types::{Descriptor, ParameterType, ParameterValue, Range};
 
 /// The type number of a parameter that does not exist.
@@ -46,10 +47,12 @@ pub fn parameter_from_wire(wire: msg::Parameter) -> Result<(String, ParameterVal
         9 => ParameterValue::StringArray(value.string_array_value),
         NOT_SET => {
             return Err(format!(
-                "parameter '{name}' is to be removed; the parameters of this node cannot be"
+                "parameter '{}' is to be removed; the parameters of this node cannot be",
+                shortened(&name)
             ));
         }
         other => {
+            let name = shortened(&name);
             return Err(format!("parameter '{name}' comes with type number {other}; allowed is 1 to 9"));
         }
     };
@@ -123,6 +126,15 @@ mod tests {
                 value: msg::ParameterValue { type_, ..Default::default() },
             };
             assert!(parameter_from_wire(wire).unwrap_err().contains("'x.gain'"));
+        }
+    }
+
+    #[test]
+    fn a_name_without_end_does_not_come_back_in_the_refusal() {
+        for type_ in [0, 77] {
+            let value = msg::ParameterValue { type_, ..Default::default() };
+            let reason = parameter_from_wire(msg::Parameter { name: "k\n".repeat(100_000), value }).unwrap_err();
+            assert!(reason.len() < 600 && !reason.contains('\n'), "{} bytes", reason.len());
         }
     }
 }

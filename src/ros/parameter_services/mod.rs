@@ -133,6 +133,10 @@ impl ParameterServices {
                 self.types.respond(id, GetParameterTypesResponse { types })
             }
             Request::Set(id, request) => {
+                if let Err(reason) = wire::check_count(request.parameters.len()) {
+                    let results = vec![wire::result_to_wire(Err(reason))];
+                    return self.set.respond(id, SetParametersResponse { results });
+                }
                 let mut results = Vec::with_capacity(request.parameters.len());
                 for parameter in request.parameters {
                     let result = self.set(host, now, vec![parameter]).await;
@@ -167,6 +171,7 @@ impl ParameterServices {
         now: &(impl Fn() -> Time + Send),
         parameters: Vec<msg::Parameter>,
     ) -> Result<(), String> {
+        wire::check_count(parameters.len())?;
         let changes = parameters.into_iter().map(wire::parameter_from_wire).collect::<Result<Vec<_>, _>>()?;
         if changes.is_empty() {
             return Ok(());

@@ -1,0 +1,56 @@
+//! Damaged scenarios: refused with file and reason, or a path within the limits of the axes.
+
+mod common;
+
+use common::AXES;
+use proptest::prelude::*;
+use virtual_axes::config::Parameters;
+use virtual_axes::scenario::Scenario;
+
+/// Instants at which a path is looked at.
+const LOOKS: u32 = 50;
+/// Rounding of a position, m or rad.
+const ROUNDING: f64 = 1e-6;
+
+fn names() -> impl Strategy<Value = &'static str> {
+    // Those with few moves: planning is what takes time.
+    prop::sample::select(vec!["x-constant", "c-two-speeds", "corner-45", "ballbar", "bspline-3d"])
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_damaged_scenario_is_refused_or_stays_within_the_strokes(
+        name in names(),
+        place: prop::sample::Index,
+        length in 0..12usize,
+        patch in prop_oneof![
+            "[-0-9.e]{1,6}", "[-:\\[\\]{}, \n#&*a-z_0-9]{0,10}",
+            prop::sample::select(vec!["1e300", "1e-300", "-0.0", ".nan", ".inf", "turns: 1e9", "ramp_s: 0.1", "dwell_s: 1", "corner_m_min: 1"]).prop_map(str::to_owned),
+        ],
+    ) {
+        let mut bytes = Scenario::builtin_text(name).expect("shipped").as_bytes().to_vec();
+        let at = place.index(bytes.len());
+        bytes.splice(at..(at + length).min(bytes.len()), patch.into_bytes());
+        let text = String::from_utf8_lossy(&bytes);
+        let machine = Parameters::embedded_default().expect("shipped").machine_config().expect("shipped");
+        match Scenario::from_yaml(&text, "my.yaml").and_then(|scenario| scenario.program(&machine, None)) {
+            Ok(program) => {
+                let mut psec = [0.0; AXES];
+                for look in 0..=LOOKS {
+                    program.psec(program.duration() * f64::from(look) / f64::from(LOOKS), &mut psec);
+                    for (position, axis) in psec.iter().zip(machine.axes()) {
+                        let limits = axis.limits();
+                        let stroke = limits.stroke_min - ROUNDING..=limits.stroke_max + ROUNDING;
+                        prop_assert!(stroke.contains(position), "{} at {}", axis.name(), position);
+                    }
+                }
+            }
+            Err(error) => {
+                let text = error.to_string();
+                prop_assert!(text.starts_with("my.yaml") && !text.contains('\n') && text.len() < 2000, "{}", text);
+            }
+        }
+    }
+}
