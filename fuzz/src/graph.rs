@@ -141,7 +141,7 @@ pub fn cdr_parameters(data: &[u8]) {
     let settings = || Settings::new(PARAMETERS.clone(), Arc::default());
     bounded(data.len(), || match data.get(HEADER - 1).copied().unwrap_or_default() % 6 {
         0 | 1 => {
-            let parameters = match data[HEADER - 1] % 6 {
+            let parameters = match data.get(HEADER - 1).copied().unwrap_or_default() % 6 {
                 0 => decode::<SetParametersRequest>(data).map(|request| request.parameters),
                 _ => decode::<SetParametersAtomicallyRequest>(data).map(|request| request.parameters),
             };

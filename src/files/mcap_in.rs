@@ -2,12 +2,12 @@
 
 use std::io::{self, BufReader, Read, Seek};
 
-use mcap::io::MessageReader;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, Message};
 use serde::de::DeserializeOwned;
 
+use super::mcap_messages::{Messages, is_whole};
 use super::{cdr, shortened};
 
 /// The encoding of messages that is read.
@@ -76,13 +76,13 @@ fn options() -> LinearReaderOptions {
 pub(super) fn start<R: Read + Seek>(
     mut input: R,
     name: &str,
-) -> Result<MessageReader<BufReader<R>>, McapFault> {
+) -> Result<Messages<BufReader<R>>, McapFault> {
     input.rewind().map_err(|error| unreadable(name, &error))?;
-    Ok(MessageReader::new_with_options(BufReader::with_capacity(BLOCK, input), options()))
+    Ok(Messages::new(BufReader::with_capacity(BLOCK, input), options()))
 }
 
-/// Checks that the records of each chunk that is not compressed fill it, which the reader relies upon, and says
-/// how the file ends.
+/// Checks that each chunk is as long as it says, and that its records fill it if it is not compressed, which the
+/// reader relies upon; says how the file ends.
 pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<Ending, McapFault> {
     input.rewind().map_err(|error| match error.kind() {
         io::ErrorKind::NotSeekable => McapFault::Unreadable {
@@ -117,6 +117,9 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
                 reader.notify_read(read);
             }
             LinearReadEvent::Record { opcode: op::CHUNK, data } => {
+                if !is_whole(op::CHUNK, data) {
+                    return Err(damaged(name, &McapError::UnexpectedEoc));
+                }
                 let record = mcap::parse_record(op::CHUNK, data).map_err(|error| damaged(name, &error))?;
                 if let Record::Chunk { header, data } = record
                     && header.compression.is_empty()

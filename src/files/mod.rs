@@ -11,6 +11,7 @@ mod input;
 mod lines;
 mod mcap_bounded;
 mod mcap_in;
+mod mcap_messages;
 mod mcap_out;
 mod number;
 mod output;
@@ -52,7 +53,7 @@ const NEAR_ENOUGH: f64 = 0.7;
 fn nearest<'a>(found: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
     let similar = known.map(|name| (strsim::jaro_winkler(found, name), name));
     let (similarity, name) = similar.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (similarity >= NEAR_ENOUGH).then(|| name.to_owned())
+    (similarity >= NEAR_ENOUGH).then(|| shortened(name))
 }
 
 /// The end of a message about an unknown name.

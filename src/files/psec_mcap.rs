@@ -7,11 +7,11 @@ use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use mcap::Message;
-use mcap::io::MessageReader;
 
 use super::mcap_in::{
     Ending, McapFault, check_chunks, damaged, decode, start, type_of, unfinished, unreadable,
 };
+use super::mcap_messages::Messages;
 use super::{nearest, nearest_name};
 use crate::messages;
 use crate::messages::trajectory_msgs::msg::JointTrajectory;
@@ -86,7 +86,7 @@ fn topics_text(topics: &[String]) -> String {
 /// The file is read three times and never held: chunks are checked, then the log times are taken down, then
 /// messages are handed out as they come. Only those are held that come before an earlier one.
 pub struct Trajectories<R> {
-    messages: MessageReader<BufReader<R>>,
+    messages: Messages<BufReader<R>>,
     name: String,
     topic: String,
     /// Numbers of the messages in the file, in the order of log times.
