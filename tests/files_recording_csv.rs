@@ -77,6 +77,12 @@ fn value(axis: &AxisConfig, channel: &str, number: &str, unit: &str) -> Result<f
 }
 
 #[test]
+fn a_refusal_names_a_column_in_one_line() {
+    let text = error("{time: p1\u{c}osition: \"#2\"}\n0 0\n", &[]);
+    assert!(!text.contains(char::is_control) && text.contains("the nearest is"), "{text:?}");
+}
+
+#[test]
 fn each_unit_is_worth_what_it_is() {
     let (mill, linear) = (mill(), linear());
     let (x, a, lx) = (axis(mill, "x"), axis(mill, "a"), axis(&linear, "x"));
