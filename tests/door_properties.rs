@@ -38,7 +38,10 @@ fn at_rest() -> Simulation {
 fn is_finite(simulation: &mut Simulation) -> bool {
     (0..10).all(|_| {
         simulation.step();
-        simulation.samples().iter().all(|s| s.psec.is_finite() && s.position.is_finite() && s.current.is_finite())
+        simulation
+            .samples()
+            .iter()
+            .all(|s| s.psec.is_finite() && s.position.is_finite() && s.current.is_finite())
     })
 }
 
@@ -92,8 +95,12 @@ fn trajectory() -> impl Strategy<Value = JointTrajectory> {
 }
 
 fn tolerances() -> impl Strategy<Value = Vec<JointTolerance>> {
-    let tolerance = (joint(), number(), number())
-        .prop_map(|(name, position, velocity)| JointTolerance { name, position, velocity, acceleration: -1.0 });
+    let tolerance = (joint(), number(), number()).prop_map(|(name, position, velocity)| JointTolerance {
+        name,
+        position,
+        velocity,
+        acceleration: -1.0,
+    });
     prop::collection::vec(tolerance, 0..3)
 }
 
@@ -187,7 +194,7 @@ proptest! {
                 // Of the right kind and within its range, every other time.
                 let value = match (definition.kind, fit) {
                     (Kind::Number { min, max }, true) => ParameterValue::Double(1.0f64.clamp(min, max)),
-                    (Kind::Integer { min, max }, true) => ParameterValue::Integer(2.clamp(min, max)),
+                    (Kind::Integer { min, max }, true) => ParameterValue::Integer(2_i64.clamp(min, max)),
                     (Kind::Flag, true) => ParameterValue::Bool(true),
                     _ => value,
                 };

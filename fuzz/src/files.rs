@@ -10,8 +10,10 @@ use virtual_axes::messages;
 use virtual_axes::recording::{Conditioning, Finding, RawRecording, condition};
 use virtual_axes::trajectory::{Context, Trajectory};
 
-use crate::{JOINTS, MACHINE, bounded, names, refused};
+use crate::{JOINTS, MACHINE, bounded, bounded_beside, names, refused};
 
+/// A record in a compressed chunk is believed to be as long as it says, up to the longest, bytes.
+const COMPRESSED_RECORD: u64 = 256 << 20;
 /// Most instants of a file that are read: a long time in two rows is as long a motion.
 const MOST_INSTANTS: usize = 2000;
 /// Most points of a trajectory that is checked.
@@ -98,7 +100,7 @@ pub fn psec_yaml(data: &[u8]) {
 
 /// Set-points as MCAP.
 pub fn psec_mcap(data: &[u8]) {
-    bounded(data.len(), || {
+    bounded_beside(COMPRESSED_RECORD, data.len(), || {
         let trajectories = match Trajectories::new(Cursor::new(data), "my.mcap", None) {
             Ok(trajectories) => trajectories,
             Err(error) => return refused(&error.to_string()),
@@ -157,17 +159,15 @@ pub fn recording_csv(data: &[u8]) {
         }
         body = rest.as_bytes();
     }
-    bounded(data.len(), || {
-        match read_recording_csv(body, "my.csv", &MACHINE.axes()[0], &options) {
-            Ok(read) => conditioned(read),
-            Err(error) => refused(&error.to_string()),
-        }
+    bounded(data.len(), || match read_recording_csv(body, "my.csv", &MACHINE.axes()[0], &options) {
+        Ok(read) => conditioned(read),
+        Err(error) => refused(&error.to_string()),
     });
 }
 
 /// A recording as MCAP.
 pub fn recording_mcap(data: &[u8]) {
-    bounded(data.len(), || {
+    bounded_beside(COMPRESSED_RECORD, data.len(), || {
         let options = RecordingOptions::default();
         match read_recording_mcap(Cursor::new(data), "my.mcap", &MACHINE.axes()[0], &options) {
             Ok(read) => conditioned(read),

@@ -7,8 +7,8 @@ use byteorder::{BigEndian, LittleEndian};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use virtual_axes::door::parameters::{
-    LiveNodeParameters, Settings, check_count, descriptor_to_wire, list, parameter_from_wire, result_to_wire, type_number,
-    value_to_wire,
+    LiveNodeParameters, Settings, check_count, descriptor_to_wire, list, parameter_from_wire, result_to_wire,
+    type_number, value_to_wire,
 };
 use virtual_axes::door::{Candidate, Checks, GoalChecks, Order, Setpoints, loads, select};
 use virtual_axes::messages::action_msgs::srv::CancelGoalRequest;
@@ -124,8 +124,7 @@ pub fn cdr_goal(data: &[u8]) {
                 let columns = trajectory.joints().len();
                 assert_eq!((tolerances.path.len(), tolerances.goal.len()), (columns, columns));
                 let mut simulation = machine_at_rest();
-                if let Err(rejection) =
-                    simulation.offer_within(MotionId(1), Arc::new(trajectory), tolerances)
+                if let Err(rejection) = simulation.offer_within(MotionId(1), Arc::new(trajectory), tolerances)
                 {
                     refused(&rejection.to_string());
                 }
@@ -177,7 +176,10 @@ pub fn cdr_parameters(data: &[u8]) {
             let settings = settings();
             for name in &request.names {
                 let wire = value_to_wire(settings.get(name));
-                assert_eq!(wire.type_ != 0, settings.parameters().definition(name).is_some() && wire.type_ != 0);
+                assert_eq!(
+                    wire.type_ != 0,
+                    settings.parameters().definition(name).is_some() && wire.type_ != 0
+                );
             }
         }
         3 => {

@@ -55,15 +55,25 @@ fn step(simulation: &mut Simulation, periods: usize) {
 /// A refusal is one short line that says something.
 fn refused(text: &str) {
     assert!(!text.trim().is_empty(), "a refusal without a word");
-    assert!(text.len() <= LONGEST_REFUSAL, "{} bytes: {}…", text.len(), &text[..text.floor_char_boundary(200)]);
+    assert!(
+        text.len() <= LONGEST_REFUSAL,
+        "{} bytes: {}…",
+        text.len(),
+        &text[..text.floor_char_boundary(200)]
+    );
     assert!(!text.contains(char::is_control), "more than a line: {text:?}");
 }
 
 /// Runs `body`, which may take memory in proportion to `input`, a length in bytes.
 fn bounded(input: usize, body: impl FnOnce()) {
+    bounded_beside(0, input, body);
+}
+
+/// Likewise, and `beside` bytes whatever the input is.
+fn bounded_beside(beside: u64, input: usize, body: impl FnOnce()) {
     // What is made once counts for nobody.
     LazyLock::force(&JOINTS);
     let used = allocation_counter::measure(body).bytes_max;
-    let allowed = FREE_MEMORY + MEMORY_PER_BYTE * input as u64;
+    let allowed = beside + FREE_MEMORY + MEMORY_PER_BYTE * input as u64;
     assert!(used <= allowed, "{used} bytes for an input of {input}");
 }

@@ -49,7 +49,8 @@ fn request(input: &mut Unstructured<'_>, now: Nanoseconds, commanded: &[f64]) ->
             time += pause;
             for (at, &place) in at.iter_mut().zip(&places) {
                 // Within its reach, more or less.
-                *at += value(input, 1.2 * JOINTS[place].limits.velocity * seconds(pause.clamp(0, SECOND_NS)))?;
+                *at +=
+                    value(input, 1.2 * JOINTS[place].limits.velocity * seconds(pause.clamp(0, SECOND_NS)))?;
             }
         }
         let row = |scale: f64, input: &mut Unstructured<'_>| -> Result<Vec<f64>> {
@@ -74,8 +75,9 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
         let now = simulation.time_of(simulation.next_instant());
         match input.int_in_range(0..=9u8)? {
             0..=3 => {
-                let commanded: Vec<f64> =
-                    (0..JOINTS.len()).map(|joint| simulation.psec_ahead(joint, 0).unwrap_or_default()).collect();
+                let commanded: Vec<f64> = (0..JOINTS.len())
+                    .map(|joint| simulation.psec_ahead(joint, 0).unwrap_or_default())
+                    .collect();
                 let Some(request) = request(input, now, &commanded)? else { continue };
                 let context = Context {
                     joints: &JOINTS,

@@ -12,12 +12,13 @@ use super::{cdr, shortened};
 
 /// The encoding of messages that is read.
 const ENCODING: &str = "cdr";
-/// Longest record, bytes: hours of set-points in one message. A damaged length asks for no more memory.
+/// Longest record, bytes: hours of set-points in one message. In a compressed chunk a damaged length asks for
+/// no more memory.
 const LONGEST_RECORD: usize = 256 << 20;
 /// Opcode and length before a record.
 const RECORD_HEAD: usize = 1 + 8;
-/// Bytes that are asked of a file at once.
-const BLOCK: usize = 1 << 18;
+/// Bytes that are asked of a file at once: room is made for what is there, not for what a length says.
+pub(super) const BLOCK: usize = 1 << 18;
 /// What a file begins with, bytes.
 const MAGIC: usize = 8;
 
@@ -73,10 +74,7 @@ fn options() -> LinearReaderOptions {
 }
 
 /// From the beginning.
-pub(super) fn start<R: Read + Seek>(
-    mut input: R,
-    name: &str,
-) -> Result<Messages<BufReader<R>>, McapFault> {
+pub(super) fn start<R: Read + Seek>(mut input: R, name: &str) -> Result<Messages<BufReader<R>>, McapFault> {
     input.rewind().map_err(|error| unreadable(name, &error))?;
     Ok(Messages::new(BufReader::with_capacity(BLOCK, input), options()))
 }
@@ -108,7 +106,7 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
         match event {
             LinearReadEvent::ReadRequest(wanted) => {
                 let read = loop {
-                    match input.read(reader.insert(wanted)) {
+                    match input.read(reader.insert(wanted.min(BLOCK))) {
                         Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                         read => break read.map_err(|error| unreadable(name, &error))?,
                     }

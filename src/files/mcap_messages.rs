@@ -12,6 +12,8 @@ use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult, Message};
 
+use super::mcap_in::BLOCK;
+
 /// Number of a schema, in its record before the texts.
 const SCHEMA_HEAD: usize = 2;
 /// Numbers of a channel and its schema, likewise.
@@ -44,7 +46,7 @@ impl<R: Read> Messages<R> {
             match event? {
                 LinearReadEvent::ReadRequest(wanted) => {
                     let read = loop {
-                        match self.source.read(self.reader.insert(wanted)) {
+                        match self.source.read(self.reader.insert(wanted.min(BLOCK))) {
                             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                             read => break read?,
                         }
@@ -110,14 +112,16 @@ fn take(
 pub(super) fn is_whole(opcode: u8, record: &[u8]) -> bool {
     let texts = match opcode {
         op::SCHEMA => record.get(SCHEMA_HEAD..).and_then(behind_text).and_then(behind_text),
-        op::CHANNEL => record.get(CHANNEL_HEAD..).and_then(behind_text).and_then(behind_text).and_then(|map| {
-            let rest = behind_text(map)?;
-            let mut entries = map.get(size_of::<u32>()..map.len() - rest.len())?;
-            while !entries.is_empty() {
-                entries = behind_text(entries)?;
-            }
-            Some(rest)
-        }),
+        op::CHANNEL => {
+            record.get(CHANNEL_HEAD..).and_then(behind_text).and_then(behind_text).and_then(|map| {
+                let rest = behind_text(map)?;
+                let mut entries = map.get(size_of::<u32>()..map.len() - rest.len())?;
+                while !entries.is_empty() {
+                    entries = behind_text(entries)?;
+                }
+                Some(rest)
+            })
+        }
         op::CHUNK => record.get(CHUNK_HEAD..).and_then(behind_text),
         _ => Some(record),
     };

@@ -4,8 +4,8 @@
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 
 use super::pace::Frame;
-use crate::messages::{DriveStates, MotorCurrents, Sampled};
 pub use crate::door::loads;
+use crate::messages::{DriveStates, MotorCurrents, Sampled};
 pub use crate::messages::{header, stamp};
 
 /// `joint_states` of a frame.

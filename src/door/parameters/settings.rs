@@ -95,8 +95,9 @@ impl Settings {
                     "{key} cannot be set while the node runs; set it at the start, with -p or --params-file"
                 ));
             }
-            let value = from_ros(value)
-                .ok_or_else(|| format!("{}: empty lists and byte arrays are not parameters here", shortened(&key)))?;
+            let value = from_ros(value).ok_or_else(|| {
+                format!("{}: empty lists and byte arrays are not parameters here", shortened(&key))
+            })?;
             assignments.push(Assignment { key, value, source: source.clone() });
         }
         let mut changed = self.parameters.clone();

@@ -2,8 +2,8 @@
 
 use crate::messages::rcl_interfaces::msg;
 
-use crate::config::shortened;
 use super::types::{Descriptor, ParameterType, ParameterValue, Range};
+use crate::config::shortened;
 
 /// The type number of a parameter that does not exist.
 const NOT_SET: u8 = 0;
@@ -133,7 +133,8 @@ mod tests {
     fn a_name_without_end_does_not_come_back_in_the_refusal() {
         for type_ in [0, 77] {
             let value = msg::ParameterValue { type_, ..Default::default() };
-            let reason = parameter_from_wire(msg::Parameter { name: "k\n".repeat(100_000), value }).unwrap_err();
+            let reason =
+                parameter_from_wire(msg::Parameter { name: "k\n".repeat(100_000), value }).unwrap_err();
             assert!(reason.len() < 600 && !reason.contains('\n'), "{} bytes", reason.len());
         }
     }

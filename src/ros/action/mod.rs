@@ -10,8 +10,8 @@ mod goals;
 mod outcome;
 mod server;
 
-pub use feedback::{Feedback, feedback_period};
 pub use crate::door::{GoalChecks, GoalId};
+pub use feedback::{Feedback, feedback_period};
 pub use outcome::GoalEvent;
 pub use server::{ActionServer, Ending, Tell, Work};
 

@@ -29,8 +29,8 @@ use ros2_interfaces_jazzy_serde::{
 };
 
 use super::args::RosArgs;
-use crate::door::parameters::{self as wire, ParameterHost, list};
 use super::service::{Service, ServiceError, profile};
+use crate::door::parameters::{self as wire, ParameterHost, list};
 
 /// rmw's profile for parameter services and events keeps this many, so that a client may send that
 /// many requests at once.
