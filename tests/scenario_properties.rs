@@ -17,6 +17,23 @@ fn names() -> impl Strategy<Value = &'static str> {
     prop::sample::select(vec!["x-constant", "c-two-speeds", "corner-45", "ballbar", "bspline-3d"])
 }
 
+#[test]
+fn a_refusal_names_a_key_in_one_line() {
+    let long = "k".repeat(1 << 20);
+    let machine = Parameters::embedded_default().expect("shipped").machine_config().expect("shipped");
+    for key in ["\"a\\nb\"", &format!("? {long}\n  ")] {
+        for (limits, line) in [(key, "x_mm"), ("jerk_m_s3", key)] {
+            let text = format!(
+                "description: a\nfeed_m_min: 1\nlimits:\n  {limits}: 5\nmoves:\n- line:\n    {}: 1\n",
+                line.replace("\n  ", "\n    ")
+            );
+            let refused = Scenario::from_yaml(&text, "my.yaml").and_then(|s| s.program(&machine, None));
+            let refused = refused.expect_err("must be refused").to_string();
+            assert!(!refused.contains(char::is_control) && refused.len() < 2000, "{} bytes", refused.len());
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 

@@ -49,6 +49,14 @@ use crate::config::shortened;
 /// Least similarity (Jaro-Winkler) of a name that is offered in place of an unknown one.
 const NEAR_ENOUGH: f64 = 0.7;
 
+/// Most names that a message lists.
+const MOST_LISTED: usize = 10;
+
+/// Names for a message: the first of them, none longer than is worth reading.
+fn listed<'a>(names: impl IntoIterator<Item = &'a String>) -> Vec<String> {
+    names.into_iter().take(MOST_LISTED).map(|name| shortened(name)).collect()
+}
+
 /// The name that looks most like `found`, if one does.
 fn nearest<'a>(found: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
     let similar = known.map(|name| (strsim::jaro_winkler(found, name), name));

@@ -12,7 +12,7 @@ use super::mcap_in::{
     Ending, McapFault, check_chunks, damaged, decode, start, type_of, unfinished, unreadable,
 };
 use super::mcap_messages::Messages;
-use super::{nearest, nearest_name};
+use super::{listed, nearest, nearest_name, shortened};
 use crate::messages;
 use crate::messages::trajectory_msgs::msg::JointTrajectory;
 use crate::trajectory::{Rejection, Request};
@@ -149,15 +149,20 @@ impl<R: Read + Seek> Trajectories<R> {
         let topic = match (topic, topics.as_slice()) {
             (_, []) => {
                 others.sort();
-                return Err(RecordingError::NoTrajectory { at, topics: others });
+                return Err(RecordingError::NoTrajectory { at, topics: listed(&others) });
             }
             (None, [topic]) => topic.clone(),
-            (None, _) => return Err(RecordingError::SeveralTopics { at, topics }),
+            (None, _) => return Err(RecordingError::SeveralTopics { at, topics: listed(&topics) }),
             (Some(topic), _) => topic.to_owned(),
         };
         let Some(times) = found.remove(&topic) else {
             let nearest = nearest(&topic, topics.iter().map(String::as_str));
-            return Err(RecordingError::UnknownTopic { at, topic, topics, nearest });
+            return Err(RecordingError::UnknownTopic {
+                at,
+                topic: shortened(&topic),
+                topics: listed(&topics),
+                nearest,
+            });
         };
         let mut order: Vec<usize> = (0..times.len()).collect();
         // Stable: messages of one time stay in the order of the file.
@@ -209,8 +214,14 @@ impl<R: Read + Seek> Trajectories<R> {
         message: &Message<'_>,
     ) -> Result<(Nanoseconds, Request), RecordingError> {
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
-        let at =
-            || format!("{}: {}, message {number}, log time {} s", self.name, self.topic, seconds(log_time));
+        let at = || {
+            format!(
+                "{}: {}, message {number}, log time {} s",
+                self.name,
+                shortened(&self.topic),
+                seconds(log_time)
+            )
+        };
         let trajectory: JointTrajectory =
             decode(message).map_err(|reason| RecordingError::Message { at: at(), reason })?;
         let request = messages::request(&trajectory, usize::MAX)
