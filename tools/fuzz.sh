@@ -27,7 +27,7 @@ build() {
   for flag in level=4 inline-8bit-counters pc-table trace-compares; do
     coverage+=" -Cllvm-args=-sanitizer-coverage-$flag"
   done
-  RUSTFLAGS="$coverage --cfg fuzzing" cargo build --manifest-path fuzz/Cargo.toml --release --target "$host" --bins
+  RUSTFLAGS="$coverage --cfg fuzzing" cargo build --manifest-path fuzz/Cargo.toml --release --locked --target "$host" --bins
 }
 
 fuzz_one() { # target, log, options of libFuzzer

@@ -64,7 +64,8 @@ pub(super) fn type_of<'a>(message: &'a Message<'_>) -> Option<&'a str> {
 pub(super) fn decode<T: DeserializeOwned>(message: &Message<'_>) -> Result<T, String> {
     let encoding = &message.channel.message_encoding;
     if encoding != ENCODING {
-        return Err(format!("its encoding is \"{encoding}\", must be \"{ENCODING}\""));
+        let found = shortened(encoding);
+        return Err(format!("its encoding is \"{found}\", must be \"{ENCODING}\""));
     }
     cdr::decode(&message.data)
 }
