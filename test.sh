@@ -105,7 +105,7 @@ python_tests() (
 # The set-up waits for the network while cargo works. The nodes in real time wait for their clocks most of
 # the time; cargo test has what they leave.
 background "set-up and message build" tools/setup.sh --browser
-stage "cargo fmt --check" cargo fmt --check
+stage "cargo fmt --check" bash -c "cargo fmt --check && cargo fmt --check --manifest-path fuzz/Cargo.toml"
 stage "cargo clippy" cargo clippy --release --all-targets --locked -- -D warnings
 stage "library without ROS" cargo clippy --release --lib --no-default-features --locked -- -D warnings
 stage "cargo doc" env RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --locked
@@ -114,4 +114,5 @@ finish_background
 background "cargo test" nice -n 15 cargo test --release --locked
 stage "rclpy against the node" python_tests "$@"
 finish_background
+stage "bad input: short runs of the fuzz targets" tools/fuzz.sh short
 finish 0

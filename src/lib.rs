@@ -6,7 +6,7 @@
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
 //! [`units`], [`lanes`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] → [`machine`] →
 //! [`trajectory`], [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] →
-//! [`recording`] → [`identify`], [`tune`] → [`messages`], [`files`], [`report`], [`urdf`] → `ros`.
+//! [`recording`] → [`identify`], [`tune`] → [`messages`], [`files`], [`report`], [`urdf`] → [`door`] → `ros`.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -15,6 +15,7 @@ pub mod assess;
 pub mod config;
 pub mod control;
 pub mod design;
+pub mod door;
 pub mod drive;
 pub mod files;
 pub mod identify;

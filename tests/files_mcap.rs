@@ -212,6 +212,60 @@ fn a_file_that_is_cut_off_or_no_recording_is_said() {
     assert!(message.starts_with("no/such.mcap: "), "{message}");
 }
 
+/// `bytes` with a record put in behind the magic and the header record.
+fn with_record(bytes: &[u8], opcode: u8, body: &[u8]) -> Vec<u8> {
+    const MAGIC: usize = 8;
+    let length = u64::from_le_bytes(bytes[MAGIC + 1..MAGIC + 9].try_into().expect("eight bytes"));
+    let (before, behind) = bytes.split_at(MAGIC + 9 + length as usize);
+    [before, &[opcode], &(body.len() as u64).to_le_bytes(), body, behind].concat()
+}
+
+/// The reader of the `mcap` crate slices it from byte 32 to 28.
+#[test]
+fn an_attachment_that_is_too_short_is_passed_over() {
+    let good = record(
+        &[("/psec", TYPE, 1, trajectory(0.5, false))],
+        options(None).calculate_data_section_crc(false),
+    );
+    // Two times, two empty texts, a length; the checksum is missing.
+    let bytes = with_record(&good, 9, &[0; 8 + 8 + 4 + 4 + 8]);
+    let found: Vec<_> = open(&bytes, None).expect("a recording").map(|found| found.is_ok()).collect();
+    assert_eq!(found, [true]);
+}
+
+/// The reader of the `mcap` crate makes room for as much before it looks.
+#[test]
+fn a_text_that_says_it_is_gibibytes_long_takes_no_memory() {
+    let good = record(
+        &[("/psec", TYPE, 1, trajectory(0.5, false))],
+        options(None).calculate_data_section_crc(false),
+    );
+    let length = u32::MAX.to_le_bytes();
+    let schema = [&[9, 0][..], &length, b"name"].concat();
+    let channel = [&[9, 0, 0, 0, 2, 0, 0, 0][..], b"/a", &[0; 4], &length].concat();
+    for (opcode, body) in [(3, schema), (4, channel), (6, [&[0; 28][..], &length, b"zstd"].concat())] {
+        let bytes = with_record(&good, opcode, &body);
+        let used = allocation_counter::measure(|| {
+            let text = error(&bytes, None);
+            assert!(text.starts_with("r.mcap: not a whole MCAP recording: "), "{text}");
+        });
+        // Buffers of readers.
+        assert!(used.bytes_max < 10 << 20, "{} bytes for opcode {opcode}", used.bytes_max);
+    }
+}
+
+/// The reader of the `mcap` crate made room for all of it at once.
+#[test]
+fn a_record_that_says_it_is_long_takes_no_memory_before_it_is_there() {
+    let good = record(&[("/psec", TYPE, 1, trajectory(0.5, false))], options(None));
+    let bytes = [&good[..8], &[3], &(200_u64 << 20).to_le_bytes(), &[0; 1000]].concat();
+    let used = allocation_counter::measure(|| {
+        let text = error(&bytes, None);
+        assert!(text.contains("it ends in the middle of a record"), "{text}");
+    });
+    assert!(used.bytes_max < 10 << 20, "{} bytes", used.bytes_max);
+}
+
 /// A damaged recording gives what it gives, or one error; it never panics nor takes memory without bound.
 fn read_damaged(bytes: &[u8]) {
     if let Ok(trajectories) = open(bytes, None) {

@@ -77,6 +77,20 @@ fn value(axis: &AxisConfig, channel: &str, number: &str, unit: &str) -> Result<f
 }
 
 #[test]
+fn a_refusal_names_a_unit_in_one_line() {
+    for text in ["position=act [m\0m]", "position=act [1\0 mm]"] {
+        let text = Columns::default().set(text, "--column").expect_err("must be refused").to_string();
+        assert!(!text.contains(char::is_control), "{text:?}");
+    }
+}
+
+#[test]
+fn a_refusal_names_a_column_in_one_line() {
+    let text = error("{time: p1\u{c}osition: \"#2\"}\n0 0\n", &[]);
+    assert!(!text.contains(char::is_control) && text.contains("the nearest is"), "{text:?}");
+}
+
+#[test]
 fn each_unit_is_worth_what_it_is() {
     let (mill, linear) = (mill(), linear());
     let (x, a, lx) = (axis(mill, "x"), axis(mill, "a"), axis(&linear, "x"));

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// As in ARCHITECTURE.md.
-const ORDER: [&str; 22] = [
+const ORDER: [&str; 23] = [
     "units",
     "lanes",
     "config",
@@ -26,13 +26,18 @@ const ORDER: [&str; 22] = [
     "files",
     "report",
     "urdf",
+    "door",
     "ros",
 ];
 
 /// Rooms before a room that it still must not know.
-const APART: [(&str, &str); 12] = [
+const APART: [(&str, &str); 16] = [
     ("control", "drive"),
     ("design", "drive"),
+    ("door", "files"),
+    ("door", "report"),
+    ("door", "trial"),
+    ("door", "urdf"),
     ("report", "files"),
     ("report", "messages"),
     ("ros", "report"),

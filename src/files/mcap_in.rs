@@ -3,22 +3,23 @@
 use std::io::{self, BufReader, Read, Seek};
 use std::marker::PhantomData;
 
-use mcap::io::MessageReader;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, Message};
 use serde::de::{DeserializeOwned, DeserializeSeed};
 
+use super::mcap_messages::{Messages, is_whole};
 use super::{cdr, shortened};
 
 /// The encoding of messages that is read.
 const ENCODING: &str = "cdr";
-/// Longest record, bytes: hours of set-points in one message. A damaged length asks for no more memory.
+/// Longest record, bytes: hours of set-points in one message. In a compressed chunk a damaged length asks for
+/// no more memory.
 const LONGEST_RECORD: usize = 256 << 20;
 /// Opcode and length before a record.
 const RECORD_HEAD: usize = 1 + 8;
-/// Bytes that are asked of a file at once.
-const BLOCK: usize = 1 << 18;
+/// Bytes that are asked of a file at once: room is made for what is there, not for what a length says.
+pub(super) const BLOCK: usize = 1 << 18;
 /// What a file begins with, bytes.
 const MAGIC: usize = 8;
 
@@ -75,7 +76,8 @@ pub(super) fn decode_with<'a, S: DeserializeSeed<'a>>(
 ) -> Result<S::Value, String> {
     let encoding = &message.channel.message_encoding;
     if encoding != ENCODING {
-        return Err(format!("its encoding is \"{encoding}\", must be \"{ENCODING}\""));
+        let found = shortened(encoding);
+        return Err(format!("its encoding is \"{found}\", must be \"{ENCODING}\""));
     }
     cdr::decode(seed, &message.data)
 }
@@ -85,16 +87,13 @@ fn options() -> LinearReaderOptions {
 }
 
 /// From the beginning.
-pub(super) fn start<R: Read + Seek>(
-    mut input: R,
-    name: &str,
-) -> Result<MessageReader<BufReader<R>>, McapFault> {
+pub(super) fn start<R: Read + Seek>(mut input: R, name: &str) -> Result<Messages<BufReader<R>>, McapFault> {
     input.rewind().map_err(|error| unreadable(name, &error))?;
-    Ok(MessageReader::new_with_options(BufReader::with_capacity(BLOCK, input), options()))
+    Ok(Messages::new(BufReader::with_capacity(BLOCK, input), options()))
 }
 
-/// Checks that the records of each chunk that is not compressed fill it, which the reader relies upon, and says
-/// how the file ends.
+/// Checks that each chunk is as long as it says, and that its records fill it if it is not compressed, which the
+/// reader relies upon; says how the file ends.
 pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<Ending, McapFault> {
     input.rewind().map_err(|error| match error.kind() {
         io::ErrorKind::NotSeekable => McapFault::Unreadable {
@@ -120,7 +119,7 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
         match event {
             LinearReadEvent::ReadRequest(wanted) => {
                 let read = loop {
-                    match input.read(reader.insert(wanted)) {
+                    match input.read(reader.insert(wanted.min(BLOCK))) {
                         Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                         read => break read.map_err(|error| unreadable(name, &error))?,
                     }
@@ -129,6 +128,9 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
                 reader.notify_read(read);
             }
             LinearReadEvent::Record { opcode: op::CHUNK, data } => {
+                if !is_whole(op::CHUNK, data) {
+                    return Err(damaged(name, &McapError::UnexpectedEoc));
+                }
                 let record = mcap::parse_record(op::CHUNK, data).map_err(|error| damaged(name, &error))?;
                 if let Record::Chunk { header, data } = record
                     && header.compression.is_empty()

@@ -11,6 +11,7 @@ mod input;
 mod lines;
 mod mcap_bounded;
 mod mcap_in;
+mod mcap_messages;
 mod mcap_out;
 mod number;
 mod output;
@@ -48,11 +49,19 @@ use crate::config::shortened;
 /// Least similarity (Jaro-Winkler) of a name that is offered in place of an unknown one.
 const NEAR_ENOUGH: f64 = 0.7;
 
+/// Most names that a message lists.
+const MOST_LISTED: usize = 10;
+
+/// Names for a message: the first of them, none longer than is worth reading.
+fn listed<'a>(names: impl IntoIterator<Item = &'a String>) -> Vec<String> {
+    names.into_iter().take(MOST_LISTED).map(|name| shortened(name)).collect()
+}
+
 /// The name that looks most like `found`, if one does.
 fn nearest<'a>(found: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
     let similar = known.map(|name| (strsim::jaro_winkler(found, name), name));
     let (similarity, name) = similar.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (similarity >= NEAR_ENOUGH).then(|| name.to_owned())
+    (similarity >= NEAR_ENOUGH).then(|| shortened(name))
 }
 
 /// The end of a message about an unknown name.

@@ -7,12 +7,12 @@ use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use mcap::Message;
-use mcap::io::MessageReader;
 
 use super::mcap_in::{
     Ending, McapFault, check_chunks, damaged, decode_with, start, type_of, unfinished, unreadable,
 };
-use super::{nearest, nearest_name};
+use super::mcap_messages::Messages;
+use super::{listed, nearest, nearest_name, shortened};
 use crate::messages::RequestSeed;
 use crate::trajectory::{Rejection, Request};
 use crate::units::{Nanoseconds, seconds};
@@ -85,7 +85,7 @@ fn topics_text(topics: &[String]) -> String {
 /// The file is read three times and never held: chunks are checked, then the log times are taken down, then
 /// messages are handed out as they come. Only those are held that come before an earlier one.
 pub struct Trajectories<R> {
-    messages: MessageReader<BufReader<R>>,
+    messages: Messages<BufReader<R>>,
     name: String,
     topic: String,
     /// Numbers of the messages in the file, in the order of log times.
@@ -148,15 +148,20 @@ impl<R: Read + Seek> Trajectories<R> {
         let topic = match (topic, topics.as_slice()) {
             (_, []) => {
                 others.sort();
-                return Err(RecordingError::NoTrajectory { at, topics: others });
+                return Err(RecordingError::NoTrajectory { at, topics: listed(&others) });
             }
             (None, [topic]) => topic.clone(),
-            (None, _) => return Err(RecordingError::SeveralTopics { at, topics }),
+            (None, _) => return Err(RecordingError::SeveralTopics { at, topics: listed(&topics) }),
             (Some(topic), _) => topic.to_owned(),
         };
         let Some(times) = found.remove(&topic) else {
             let nearest = nearest(&topic, topics.iter().map(String::as_str));
-            return Err(RecordingError::UnknownTopic { at, topic, topics, nearest });
+            return Err(RecordingError::UnknownTopic {
+                at,
+                topic: shortened(&topic),
+                topics: listed(&topics),
+                nearest,
+            });
         };
         let mut order: Vec<usize> = (0..times.len()).collect();
         // Stable: messages of one time stay in the order of the file.
@@ -208,8 +213,14 @@ impl<R: Read + Seek> Trajectories<R> {
         message: &Message<'_>,
     ) -> Result<(Nanoseconds, Request), RecordingError> {
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
-        let at =
-            || format!("{}: {}, message {number}, log time {} s", self.name, self.topic, seconds(log_time));
+        let at = || {
+            format!(
+                "{}: {}, message {number}, log time {} s",
+                self.name,
+                shortened(&self.topic),
+                seconds(log_time)
+            )
+        };
         let request = decode_with(RequestSeed, message)
             .map_err(|reason| RecordingError::Message { at: at(), reason })?
             .map_err(|rejection| RecordingError::Rejected { at: at(), rejection })?;

@@ -26,5 +26,5 @@ pub use ros2_interfaces_jazzy_serde::{
 };
 pub use schema::Schema;
 pub use state::Sampled;
-pub use time::{duration, header, parts, stamp};
+pub use time::{duration, header, nanoseconds, parts, stamp};
 pub use trajectory::{joint_trajectory, point, request};

@@ -28,7 +28,7 @@ pub fn parts(time: Nanoseconds) -> (i32, u32) {
     (sec as i32, time.rem_euclid(SECOND_NS) as u32)
 }
 
-/// A ROS time in ns since the Unix epoch.
+/// A ROS time in ns since the Unix epoch, as it came: `nanosec` may be more than a second.
 pub fn nanoseconds(time: &Time) -> Nanoseconds {
     Nanoseconds::from(time.sec) * SECOND_NS + Nanoseconds::from(time.nanosec)
 }

@@ -1,50 +1,12 @@
-//! The door: ROS messages to typed values and back, by the conversions of [`crate::messages`] and those
-//! that only the node needs.
+//! ROS messages to typed values and back, by the conversions of [`crate::messages`], [`crate::door`] and
+//! those that only the node needs.
 
-use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 
 use super::pace::Frame;
+pub use crate::door::loads;
 use crate::messages::{DriveStates, MotorCurrents, Sampled};
-pub use crate::messages::{header, request, stamp};
-use crate::simulation::MAX_LOAD;
-use crate::units::{Nanoseconds, SECOND_NS};
-
-/// A stamp as it came, ns.
-pub fn nanoseconds(stamp: &Time) -> Nanoseconds {
-    Nanoseconds::from(stamp.sec) * SECOND_NS + Nanoseconds::from(stamp.nanosec)
-}
-
-/// The loads of a message: place of the axis in `joints` and load, N or N·m.
-///
-/// # Errors
-/// A sentence that names the first thing that is wrong; no load of the message is taken then.
-pub fn loads(message: &JointState, joints: &[String]) -> Result<Vec<(usize, f64)>, String> {
-    if message.name.len() != message.effort.len() {
-        return Err(format!(
-            "{} efforts for {} joints; effort needs one value for each name",
-            message.effort.len(),
-            message.name.len()
-        ));
-    }
-    message
-        .name
-        .iter()
-        .zip(&message.effort)
-        .map(|(name, &load)| {
-            let Some(place) = joints.iter().position(|j| j == name) else {
-                return Err(format!("unknown joint {name}; there are {}", joints.join(", ")));
-            };
-            if message.name.iter().filter(|n| *n == name).count() > 1 {
-                return Err(format!("joint {name} is named twice"));
-            }
-            if load.is_nan() || load.abs() > MAX_LOAD {
-                return Err(format!("joint {name}: effort is {load}, must lie in ±{MAX_LOAD}"));
-            }
-            Ok((place, load))
-        })
-        .collect()
-}
+pub use crate::messages::{header, stamp};
 
 /// `joint_states` of a frame.
 pub fn joint_state(frame: &Frame, joints: &[String]) -> JointState {
@@ -59,21 +21,4 @@ pub fn motor_currents(frame: &Frame, joints: &[String]) -> MotorCurrents {
 /// `~/drive_states` of a frame.
 pub fn drive_states(frame: &Frame, joints: &[String]) -> DriveStates {
     DriveStates::of(frame.time, &frame.samples, joints)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_load_of_nan_takes_the_whole_message_down() {
-        let message = JointState {
-            name: vec!["x".into(), "y".into()],
-            effort: vec![1.0, f64::NAN],
-            ..JointState::default()
-        };
-        let joints = ["x".to_owned(), "y".to_owned()];
-        let error = loads(&message, &joints).expect_err("must be refused");
-        assert!(error.contains('y') && error.contains("NaN"), "{error}");
-    }
 }

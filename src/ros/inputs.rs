@@ -14,42 +14,13 @@ use tracing::warn;
 use super::convert;
 use super::endpoints::Subscription;
 use super::pace::{Command, Health};
-use super::parameter_host::LiveNodeParameters;
 use super::results::{Origin, Results};
 use super::reused::Reused;
 use super::stream::{Order, Setpoints};
 use super::throttle::Throttle;
-use crate::trajectory::{Context, JointLimits, MotionId, Rejection, Trajectory};
+pub use crate::door::Checks;
+use crate::trajectory::MotionId;
 use crate::units::Nanoseconds;
-
-/// The checks of a trajectory that need no state of the axes.
-pub struct Checks {
-    /// Joints that trajectories may name, with their limits.
-    pub joints: Vec<JointLimits>,
-    /// Tsp, ns.
-    pub period: Nanoseconds,
-    /// Largest number of points.
-    pub max_points: usize,
-    /// Parameters of the node that can be set.
-    pub live: Arc<LiveNodeParameters>,
-}
-
-impl Checks {
-    /// A message as a trajectory that can be offered to the axes.
-    ///
-    /// # Errors
-    /// The first fault found.
-    pub fn check(&self, message: &JointTrajectory) -> Result<Trajectory, Rejection> {
-        let request = convert::request(message, self.max_points)?;
-        let context = Context {
-            joints: &self.joints,
-            period: self.period,
-            max_points: self.max_points,
-            allow_nonzero_end_velocity: self.live.allow_nonzero_end_velocity.load(Ordering::Relaxed),
-        };
-        Trajectory::new(request, &context)
-    }
-}
 
 /// Takes trajectories in, makes the checks that need no state, and hands them to the simulation.
 pub struct PsecInput {

@@ -4,7 +4,6 @@
 //! runs on tokio and talks to it through bounded channels.
 
 mod action;
-pub mod args;
 mod ask_again;
 mod clock;
 mod convert;
@@ -17,7 +16,6 @@ mod heard;
 mod inputs;
 mod large_response;
 pub mod log;
-pub mod names;
 mod namesake;
 pub mod node;
 mod outputs;
@@ -37,3 +35,5 @@ mod throttle;
 mod tool;
 mod topics;
 mod trigger;
+
+use crate::door::{args, names};

@@ -1,37 +1,20 @@
-//! The schema's parameters as the parameter services see them.
+//! The node's parameters: what is set goes to the simulation as a command.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use tokio::sync::mpsc;
 
 use super::pace::Command;
-use super::parameter_services::{Descriptor, ParameterHost, ParameterType, ParameterValue, Range};
-use crate::config::{Assignment, Definition, GoalDefaults, Kind, Parameters, Source, Value};
-use crate::machine::MachineParameters;
-
-/// Node parameters that other tasks read while they can be set.
-#[derive(Debug, Default)]
-pub struct LiveNodeParameters {
-    /// `allow_nonzero_velocity_at_trajectory_end`.
-    pub allow_nonzero_end_velocity: AtomicBool,
-    goal_defaults: Mutex<Arc<GoalDefaults>>,
-}
-
-impl LiveNodeParameters {
-    /// Tolerances of action goals that name none themselves.
-    pub fn goal_defaults(&self) -> Arc<GoalDefaults> {
-        Arc::clone(&self.goal_defaults.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-}
+use crate::config::Parameters;
+pub use crate::door::parameters::LiveNodeParameters;
+use crate::door::parameters::{Descriptor, ParameterHost, ParameterValue, Settings};
 
 /// Checks what is set against the schema, and hands it to the simulation as a command.
 pub struct Host {
-    parameters: Parameters,
+    settings: Settings,
     commands: mpsc::Sender<Command>,
     /// Room among the commands for the next change.
     room: Option<mpsc::OwnedPermit<Command>>,
-    live: Arc<LiveNodeParameters>,
 }
 
 impl Host {
@@ -41,30 +24,21 @@ impl Host {
         commands: mpsc::Sender<Command>,
         live: Arc<LiveNodeParameters>,
     ) -> Self {
-        let host = Host { parameters, commands, room: None, live };
-        host.update_live();
-        host
-    }
-
-    fn update_live(&self) {
-        let allow = self.parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
-        self.live.allow_nonzero_end_velocity.store(allow, Ordering::Relaxed);
-        let defaults = Arc::new(self.parameters.goal_defaults());
-        *self.live.goal_defaults.lock().unwrap_or_else(PoisonError::into_inner) = defaults;
+        Host { settings: Settings::new(parameters, live), commands, room: None }
     }
 }
 
 impl ParameterHost for Host {
     fn names(&self) -> Vec<String> {
-        self.parameters.definitions().map(|(name, _)| name).collect()
+        self.settings.names()
     }
 
     fn get(&self, name: &str) -> Option<ParameterValue> {
-        self.parameters.get(name).map(to_ros)
+        self.settings.get(name)
     }
 
     fn describe(&self, name: &str) -> Option<Descriptor> {
-        self.parameters.definition(name).map(descriptor)
+        self.settings.describe(name)
     }
 
     async fn ready(&mut self) {
@@ -75,88 +49,11 @@ impl ParameterHost for Host {
     }
 
     fn set(&mut self, changes: Vec<(String, ParameterValue)>) -> Result<(), String> {
-        let source = Source::named("parameter");
-        let mut assignments = Vec::with_capacity(changes.len());
-        for (key, value) in changes {
-            if self.parameters.definition(&key).is_some_and(|d| !d.live) {
-                return Err(format!(
-                    "{key} cannot be set while the node runs; set it at the start, with -p or --params-file"
-                ));
-            }
-            let value = from_ros(value)
-                .ok_or_else(|| format!("{key}: empty lists and byte arrays are not parameters here"))?;
-            assignments.push(Assignment { key, value, source: source.clone() });
-        }
-        let mut changed = self.parameters.clone();
-        changed.set_all(assignments).map_err(|error| error.to_string())?;
         // A predictive controller takes a while to design; other tasks go on meanwhile.
-        let machine = tokio::task::block_in_place(|| {
-            let config = changed.machine_config().map_err(|error| error.to_string())?;
-            MachineParameters::new(&config).map_err(|error| error.to_string())
-        })?;
+        let (changed, machine) = tokio::task::block_in_place(|| self.settings.check(changes))?;
         let room = self.room.take().ok_or("the node is shutting down")?;
         room.send(Command::Adopt(Arc::new(machine)));
-        self.parameters = changed;
-        self.update_live();
+        self.settings.adopt(changed);
         Ok(())
-    }
-}
-
-fn to_ros(value: Value) -> ParameterValue {
-    match value {
-        Value::Bool(v) => ParameterValue::Bool(v),
-        Value::Integer(v) => ParameterValue::Integer(v),
-        Value::Double(v) => ParameterValue::Double(v),
-        Value::Text(v) => ParameterValue::String(v),
-        Value::BoolList(v) => ParameterValue::BoolArray(v),
-        Value::IntegerList(v) => ParameterValue::IntegerArray(v),
-        Value::DoubleList(v) => ParameterValue::DoubleArray(v),
-        Value::TextList(v) => ParameterValue::StringArray(v),
-    }
-}
-
-fn from_ros(value: ParameterValue) -> Option<Value> {
-    Some(match value {
-        ParameterValue::Bool(v) => Value::Bool(v),
-        ParameterValue::Integer(v) => Value::Integer(v),
-        ParameterValue::Double(v) => Value::Double(v),
-        ParameterValue::String(v) => Value::Text(v),
-        ParameterValue::BoolArray(v) => Value::BoolList(v),
-        ParameterValue::IntegerArray(v) => Value::IntegerList(v),
-        ParameterValue::DoubleArray(v) => Value::DoubleList(v),
-        ParameterValue::StringArray(v) => Value::TextList(v),
-        ParameterValue::ByteArray(_) => return None,
-    })
-}
-
-fn descriptor(definition: &Definition) -> Descriptor {
-    let (kind, range) = match definition.kind {
-        Kind::Number { min, max } => {
-            (ParameterType::Double, Some(Range::Double { from: min, to: max, step: 0.0 }))
-        }
-        Kind::Integer { min, max } => {
-            (ParameterType::Integer, Some(Range::Integer { from: min, to: max, step: 0 }))
-        }
-        Kind::Flag => (ParameterType::Bool, None),
-        Kind::Text | Kind::Choice(_) => (ParameterType::String, None),
-        Kind::TextList => (ParameterType::StringArray, None),
-        Kind::NumberList { .. } => (ParameterType::DoubleArray, None),
-    };
-    let description = if definition.unit.is_empty() {
-        definition.description.to_owned()
-    } else {
-        format!("{} Unit: {}.", definition.description, definition.unit)
-    };
-    let constraints = match definition.kind {
-        Kind::Choice(_) | Kind::NumberList { .. } => format!("must {}", definition.allowed()),
-        _ => String::new(),
-    };
-    Descriptor {
-        kind,
-        description,
-        additional_constraints: constraints,
-        read_only: !definition.live,
-        dynamic_typing: false,
-        range,
     }
 }

@@ -1,41 +1,12 @@
 //! `psec_stream`: set-points one at a time, and what becomes of them.
 
-use std::collections::VecDeque;
-
-use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use tracing::warn;
 
-use super::convert::nanoseconds;
 use super::throttle::Throttle;
+pub use crate::door::{Order, Setpoints};
 use crate::simulation::Simulation;
 use crate::trajectory::{Code, Rejection, StreamCounts};
-use crate::units::{Nanoseconds, SECOND_NS};
-
-/// A message whose stamp is older than the one before by more than this comes from a clock that was
-/// set back; by less, it was overtaken on its way.
-const CLOCK_SET_BACK: Nanoseconds = SECOND_NS;
-/// Publishers whose last stamp is remembered.
-const MOST_PUBLISHERS: usize = 64;
-
-/// The set-points of one message.
-#[derive(Debug, Default)]
-pub struct Setpoints {
-    /// Place of the axis in `joints`, and position, m or rad.
-    positions: Vec<(usize, f64)>,
-    /// What is refused without asking the axes.
-    refused: Vec<Rejection>,
-    /// When it was sent by the sender's clock, ns; none if it does not say.
-    sent: Option<Nanoseconds>,
-    /// Whether a younger message of its publisher came before it.
-    overtaken: bool,
-}
-
-/// The youngest stamp of each publisher.
-#[derive(Debug, Default)]
-pub struct Order {
-    /// The publisher's id, and its youngest stamp, ns.
-    youngest: VecDeque<([u8; 16], Nanoseconds)>,
-}
+use crate::units::Nanoseconds;
 
 /// What the diagnostics say about the stream.
 #[derive(Debug, Clone, Copy, Default)]
@@ -73,75 +44,12 @@ enum Told {
     Gap,
 }
 
-impl Order {
-    /// Whether a message of `publisher` that was sent at `sent` comes after a younger one.
-    pub fn is_overtaken(&mut self, publisher: [u8; 16], sent: Option<Nanoseconds>) -> bool {
-        let Some(sent) = sent else { return false };
-        let Some((_, youngest)) = self.youngest.iter_mut().find(|(known, _)| *known == publisher) else {
-            if self.youngest.len() == MOST_PUBLISHERS {
-                self.youngest.pop_front();
-            }
-            self.youngest.push_back((publisher, sent));
-            return false;
-        };
-        let is_overtaken = sent < *youngest && *youngest - sent <= CLOCK_SET_BACK;
-        if !is_overtaken {
-            *youngest = sent;
-        }
-        is_overtaken
-    }
-}
-
-impl Setpoints {
-    /// The set-points of a message, joint by joint: what is wrong with one leaves the others.
-    ///
-    /// As ros2_control's topic-based hardware means it: NaN and a `position` shorter than `name` leave
-    /// the joint alone.
-    pub fn of(message: &JointState, joints: &[String]) -> Self {
-        let sent = Some(nanoseconds(&message.header.stamp)).filter(|&stamp| stamp != 0);
-        let mut setpoints = Self { sent, ..Self::default() };
-        let (names, positions) = (&message.name, &message.position);
-        if positions.len() > names.len() {
-            let (found, wanted) = (positions.len(), names.len());
-            let text = format!("{found} positions for {wanted} joints; position has no more than name");
-            let rejection = Rejection::new(Code::WrongSize, text).numbers(found as f64, wanted as f64);
-            setpoints.refused.push(rejection);
-            return setpoints;
-        }
-        for (name, &position) in names.iter().zip(positions) {
-            if position.is_nan() {
-                continue;
-            }
-            let Some(place) = joints.iter().position(|joint| joint == name) else {
-                let text = format!("unknown joint {name}; there are {}", joints.join(", "));
-                setpoints.refused.push(Rejection::new(Code::UnknownJoint, text).joint(name));
-                continue;
-            };
-            if setpoints.positions.iter().any(|&(taken, _)| taken == place) {
-                let text = format!("joint {name} is named twice; the first counts");
-                setpoints.refused.push(Rejection::new(Code::DuplicateJoint, text).joint(name));
-                continue;
-            }
-            setpoints.positions.push((place, position));
-        }
-        setpoints
-    }
-
-    /// Likewise, of a message of `publisher`; one that was overtaken has none.
-    pub fn in_order(message: &JointState, joints: &[String], publisher: [u8; 16], order: &mut Order) -> Self {
-        let setpoints = Self::of(message, joints);
-        if order.is_overtaken(publisher, setpoints.sent) {
-            return Self { overtaken: true, ..Self::default() };
-        }
-        setpoints
-    }
-}
-
 impl StreamLog {
     /// Gives `setpoints` to the axes for the next position instant.
     pub fn take(&mut self, simulation: &mut Simulation, setpoints: &Setpoints) {
         let now = simulation.time_of(simulation.next_instant());
         self.overtaken += u64::from(setpoints.overtaken);
+        self.refused += setpoints.refused_beside;
         for rejection in &setpoints.refused {
             self.refuse(rejection, now);
         }
@@ -181,53 +89,5 @@ impl StreamLog {
             overtaken: self.overtaken,
             counts: simulation.stream_counts(),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn setpoints(name: &[&str], position: &[f64]) -> Setpoints {
-        let joints = ["x", "y", "z"].map(str::to_owned);
-        let name = name.iter().map(|&n| n.to_owned()).collect();
-        Setpoints::of(&JointState { name, position: position.to_vec(), ..JointState::default() }, &joints)
-    }
-
-    #[test]
-    fn nan_and_missing_positions_leave_a_joint_alone() {
-        let found = setpoints(&["z", "x", "y"], &[f64::NAN, 0.1]);
-        assert_eq!(found.positions, [(0, 0.1)]);
-        assert!(found.refused.is_empty());
-        assert!(setpoints(&["x"], &[]).positions.is_empty());
-    }
-
-    #[test]
-    fn what_is_wrong_with_one_joint_leaves_the_others() {
-        let found = setpoints(&["q", "x", "x", "y"], &[0.1, 0.2, 0.3, f64::INFINITY]);
-        assert_eq!(found.positions, [(0, 0.2), (1, f64::INFINITY)]);
-        let codes: Vec<_> = found.refused.iter().map(|r| r.code).collect();
-        assert_eq!(codes, [Code::UnknownJoint, Code::DuplicateJoint]);
-    }
-
-    #[test]
-    fn more_positions_than_names_belong_to_nobody_knows_which() {
-        let found = setpoints(&["x"], &[0.1, 0.2]);
-        assert!(found.positions.is_empty());
-        assert_eq!(found.refused[0].code, Code::WrongSize);
-    }
-
-    #[test]
-    fn of_each_publisher_what_was_overtaken_is_left_out() {
-        let mut order = Order::default();
-        let (one, other) = ([1; 16], [2; 16]);
-        let mut is_overtaken = |publisher, sent| order.is_overtaken(publisher, sent);
-        assert!(!is_overtaken(one, Some(10 * SECOND_NS)));
-        assert!(!is_overtaken(one, Some(10 * SECOND_NS)), "twice the same");
-        assert!(is_overtaken(one, Some(10 * SECOND_NS - 1)));
-        assert!(!is_overtaken(one, None), "no stamp");
-        assert!(!is_overtaken(other, Some(9 * SECOND_NS)));
-        assert!(!is_overtaken(one, Some(8 * SECOND_NS)), "its clock was set back");
-        assert!(!is_overtaken(one, Some(8 * SECOND_NS + 1)));
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde_saphyr::Spanned;
 
-use crate::config::{AxisKind, MachineConfig};
+use crate::config::{AxisKind, MachineConfig, shortened};
 use crate::kinematics::Kinematics;
 use crate::path::{Block, Frame, Law, Move, PathError, PathLimits, Program};
 use crate::trajectory::JointLimits;
@@ -229,7 +229,7 @@ impl Builder<'_> {
             if place == first || place == second {
                 return Err(ScenarioError::Key {
                     at: at.to_owned(),
-                    key: key.clone(),
+                    key: shortened(key),
                     reason: "lies in the plane of the arc, whose end follows from its angle".to_owned(),
                 });
             }
@@ -270,7 +270,7 @@ fn path_error(at: &str, error: PathError) -> ScenarioError {
 }
 
 fn value_error(at: &str, key: &str, value: f64, allowed: &str) -> ScenarioError {
-    ScenarioError::Value { at: at.to_owned(), key: key.to_owned(), value, allowed: allowed.to_owned() }
+    ScenarioError::Value { at: at.to_owned(), key: shortened(key), value, allowed: allowed.to_owned() }
 }
 
 fn finite(at: &str, key: &str, value: f64) -> Result<f64, ScenarioError> {
@@ -305,7 +305,7 @@ fn path_limits(values: &Values, at: &str) -> Result<PathLimits, ScenarioError> {
             _ => {
                 return Err(ScenarioError::Key {
                     at: at.to_owned(),
-                    key: key.clone(),
+                    key: shortened(key),
                     reason: "unknown; limits are acceleration_m_s2 and jerk_m_s3 along the path, or \
                              acceleration_rev_s2 and jerk_rev_s3"
                         .to_owned(),

@@ -1,6 +1,6 @@
 //! Coordinates by joint name and unit, as in `x_mm` and `c_deg`.
 
-use crate::config::AxisKind;
+use crate::config::{AxisKind, shortened};
 use crate::trajectory::JointLimits;
 use crate::units::{DEGREE, MILLIMETRE};
 
@@ -32,14 +32,16 @@ pub(super) fn coordinate(
 ) -> Result<(usize, f64), ScenarioError> {
     let Some(place) = joints.iter().position(|joint| key_of(joint) == key) else {
         let known: Vec<String> = joints.iter().map(key_of).collect();
+        // A key of any length is compared in memory of as many cells.
+        let key = shortened(key);
         let nearest = known
             .iter()
-            .min_by_key(|known| strsim::damerau_levenshtein(key, known))
-            .filter(|known| strsim::jaro_winkler(key, known) >= NEAR_ENOUGH);
+            .min_by_key(|known| strsim::damerau_levenshtein(&key, known))
+            .filter(|known| strsim::jaro_winkler(&key, known) >= NEAR_ENOUGH);
         let hint = nearest.map(|nearest| format!("; the nearest is {nearest}")).unwrap_or_default();
         return Err(ScenarioError::Key {
             at: at.to_owned(),
-            key: key.to_owned(),
+            key,
             reason: format!("no coordinate of this machine, which has {}{hint}", known.join(", ")),
         });
     };

@@ -48,6 +48,8 @@ const BUILTIN: &[(&str, &str)] = &[
     ("five-axis", include_str!("../../config/scenarios/five-axis.yaml")),
     ("bspline-5x", include_str!("../../config/scenarios/bspline-5x.yaml")),
 ];
+/// Longest part of what the YAML reader says, characters: it quotes keys of any length.
+const LONGEST_MESSAGE: usize = 500;
 /// Largest scenario file that is read.
 const MAX_FILE_BYTES: u64 = 16 << 20;
 
@@ -115,7 +117,11 @@ impl Scenario {
             let message = text.rsplit_once(" at line ").map_or(text.as_str(), |(message, _)| message);
             ScenarioError::Syntax {
                 at: format!("{name}{}", line.unwrap_or_default()),
-                message: message.replace('\n', " "),
+                message: message
+                    .chars()
+                    .take(LONGEST_MESSAGE)
+                    .collect::<String>()
+                    .replace(char::is_control, " "),
             }
         })?;
         Ok(Scenario { name: name.to_owned(), file })

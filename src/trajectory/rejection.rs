@@ -2,6 +2,11 @@
 
 use std::fmt;
 
+use crate::config::shortened;
+
+/// Longest sentence, characters: what it quotes comes from whoever sent the trajectory, in any length.
+const LONGEST_TEXT: usize = 500;
+
 /// Reason of a refusal; the numbers are those of the message `TrajectoryResult` and never change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
@@ -87,15 +92,24 @@ pub struct Rejection {
 }
 
 impl Rejection {
-    /// A refusal with `code` and the sentence `text`; the rest is filled in by the methods below.
+    /// A refusal with `code` and the sentence `text`, which becomes one line that is not long; the rest is
+    /// filled in by the methods below.
     pub fn new(code: Code, text: impl Into<String>) -> Self {
-        Self { code, joint: None, index: None, value: 0.0, limit: 0.0, text: text.into() }
+        let mut text = text.into();
+        if let Some((end, _)) = text.char_indices().nth(LONGEST_TEXT) {
+            text.truncate(end);
+            text.push('…');
+        }
+        if text.contains(char::is_control) {
+            text = text.replace(char::is_control, " ");
+        }
+        Self { code, joint: None, index: None, value: 0.0, limit: 0.0, text }
     }
 
-    /// Names the joint.
+    /// Names the joint; a name that is too long for one is cut.
     #[must_use]
     pub fn joint(mut self, name: &str) -> Self {
-        self.joint = Some(name.to_owned());
+        self.joint = Some(shortened(name));
         self
     }
 
@@ -122,3 +136,19 @@ impl fmt::Display for Rejection {
 }
 
 impl std::error::Error for Rejection {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A joint's name in a message can be as long as the message, and hold line ends.
+    #[test]
+    fn a_name_without_end_does_not_come_back_in_the_refusal() {
+        let name = "x\n[INFO] forged ".repeat(100_000);
+        let rejection = Rejection::new(Code::UnknownJoint, format!("unknown joint {name}")).joint(&name);
+        let joint = rejection.joint.as_deref().unwrap_or_default();
+        assert!(rejection.text.len() < 600 && joint.len() < 600, "{} {}", rejection.text.len(), joint.len());
+        assert!(!rejection.text.contains('\n') && !joint.contains('\n'), "{rejection}");
+        assert!(rejection.text.starts_with("unknown joint x [INFO] forged"), "{rejection}");
+    }
+}

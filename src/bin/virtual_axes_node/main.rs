@@ -7,7 +7,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use virtual_axes::config::{Parameters, Source, parse_assignment};
-use virtual_axes::ros::args::{Command, ParameterSource, RosArgs};
+use virtual_axes::door::args::{Command, ParameterSource, RosArgs};
 use virtual_axes::ros::environment::Environment;
 use virtual_axes::ros::node::{self, NodeError};
 use virtual_axes::ros::{log, rosout};

@@ -10,7 +10,7 @@ use super::join::{Clock, Times, put};
 use super::series::{Kind, Row, Series};
 use crate::config::AxisConfig;
 use crate::files::mcap_in::{Ending, check_chunks, damaged, start, type_of};
-use crate::files::nearest;
+use crate::files::{listed, nearest};
 use crate::recording::{Finding, RawRecording};
 use crate::units::{Nanoseconds, seconds};
 
@@ -105,7 +105,7 @@ impl Contents {
                 topics => Err(AxisRecordingError::SeveralTopics {
                     at: at(),
                     kind: kind.name(),
-                    topics: topics.iter().map(|topic| (*topic).clone()).collect(),
+                    topics: listed(topics.iter().copied()),
                 }),
             }
         };
@@ -121,6 +121,7 @@ impl Contents {
         if chosen.is_empty() {
             let found: Vec<String> =
                 self.all.iter().map(|(topic, kind)| format!("{topic} ({kind})")).collect();
+            let found = listed(&found);
             return Err(AxisRecordingError::NoMessages {
                 at: at(),
                 wanted: format!("{} or {}", Kind::DriveStates.name(), Kind::JointState.name()),
@@ -143,7 +144,7 @@ impl Contents {
                 return Err(AxisRecordingError::UnknownTopic {
                     at: name.to_owned(),
                     topic: topic.clone(),
-                    topics: all().cloned().collect(),
+                    topics: listed(all()),
                     nearest: nearest(topic, all().map(String::as_str)),
                 });
             }

@@ -129,7 +129,11 @@ impl Series {
         self.messages += 1;
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
         self.take(message, log_time, joint, is_whole).map_err(|reason| AxisRecordingError::Message {
-            at: format!("{file}: {}, message {number}, log time {} s", self.topic, seconds(log_time)),
+            at: format!(
+                "{file}: {}, message {number}, log time {} s",
+                shortened(&self.topic),
+                seconds(log_time)
+            ),
             reason,
         })
     }
@@ -211,7 +215,7 @@ impl Series {
             false => ("there is no joint", nearest(joint, names.iter().map(|name| name.as_str()))),
         };
         Err(AxisRecordingError::Joint {
-            at: format!("{file}: {}", self.topic),
+            at: format!("{file}: {}", shortened(&self.topic)),
             reason,
             joint: joint.to_owned(),
             joints: names.iter().map(|name| shortened(name)).collect(),

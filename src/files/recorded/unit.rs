@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::config::{AxisConfig, AxisKind};
+use crate::files::shortened;
 use crate::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, MILLISECOND, MINUTE, RPM};
 
 /// What is recorded of an axis, as in [`RawRecording`](crate::recording::RawRecording).
@@ -162,20 +163,20 @@ impl Unit {
             Some((factor, symbol)) => (Some(factor), symbol.trim()),
             None => (None, text),
         };
-        let factor =
-            match factor {
-                None => 1.0,
-                Some(factor) => factor
-                    .parse()
-                    .ok()
-                    .filter(|factor: &f64| factor.is_finite() && *factor != 0.0)
-                    .ok_or_else(|| format!("the factor \"{factor}\" is not a finite number other than 0"))?,
-            };
+        let factor = match factor {
+            None => 1.0,
+            Some(factor) => {
+                factor.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor != 0.0).ok_or_else(
+                    || format!("the factor \"{}\" is not a finite number other than 0", shortened(factor)),
+                )?
+            }
+        };
         let known = SYMBOLS.iter().map(|symbol| (*symbol, *symbol)).chain(SPELLINGS);
         match known.clone().find(|(spelling, _)| *spelling == symbol) {
             Some((_, symbol)) => Ok(Unit { factor, symbol }),
             None => Err(format!(
-                "there is no unit \"{symbol}\"; there are {}, N.m, each behind a factor if need be: [0.1 um]",
+                "there is no unit \"{}\"; there are {}, N.m, each behind a factor if need be: [0.1 um]",
+                shortened(symbol),
                 SYMBOLS.join(", ")
             )),
         }

@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use ros2_client::service::RmwRequestId;
 
-use super::cancel::{Candidate, select};
 use super::{GoalId, uuid};
+use crate::door::{Candidate, select};
 use crate::messages::action_msgs::msg::{GoalInfo, GoalStatus, GoalStatusArray};
 use crate::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
 use crate::messages::{FollowJointTrajectoryResult, GetResultResponse, stamp};

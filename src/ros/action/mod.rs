@@ -5,22 +5,17 @@
 //! `psec`; one that cannot be run is accepted and aborted at once, since only a goal that was accepted
 //! has a result that can say why.
 
-mod cancel;
 mod feedback;
-mod goal;
 mod goals;
 mod outcome;
 mod server;
 
+pub use crate::door::{GoalChecks, GoalId};
 pub use feedback::{Feedback, feedback_period};
-pub use goal::GoalChecks;
 pub use outcome::GoalEvent;
 pub use server::{ActionServer, Ending, Tell, Work};
 
 use crate::messages::unique_identifier_msgs::msg::UUID;
-
-/// Names a goal; its client chose it.
-pub type GoalId = [u8; 16];
 
 fn uuid(id: GoalId) -> UUID {
     UUID { uuid: id }

@@ -15,17 +15,16 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
 
 use super::feedback::Running;
-use super::goal::GoalChecks;
 use super::goals::{Answer, Goals, MOST_LIVE, State};
 use super::outcome::{self, GoalEvent};
-use super::{GoalId, goal_name};
+use super::{GoalChecks, GoalId, goal_name};
+use crate::door::args::RosArgs;
 use crate::messages::action_msgs::msg::GoalStatusArray;
 use crate::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
 use crate::messages::{
     CONTROL_PACKAGE, FeedbackMessage, FollowJointTrajectoryResult, GetResultRequest, GetResultResponse,
     JointTrajectoryControllerState, SendGoalRequest, SendGoalResponse, stamp,
 };
-use crate::ros::args::RosArgs;
 use crate::ros::inputs::next_id;
 use crate::ros::outputs::Output;
 use crate::ros::pace::{Command, Health};

@@ -5,10 +5,6 @@
 //! `NodeOptions::new().start_parameter_services(false)`, its spinner stays unused, and the services
 //! are these.
 
-mod list;
-mod types;
-mod wire;
-
 use std::future::Future;
 
 use futures::{
@@ -32,9 +28,9 @@ use ros2_interfaces_jazzy_serde::{
     },
 };
 
-pub use self::types::{Descriptor, ParameterHost, ParameterType, ParameterValue, Range};
 use super::args::RosArgs;
 use super::service::{Service, ServiceError, profile};
+use crate::door::parameters::{self as wire, ParameterHost, list};
 
 /// rmw's profile for parameter services and events keeps this many, so that a client may send that
 /// many requests at once.
@@ -137,6 +133,10 @@ impl ParameterServices {
                 self.types.respond(id, GetParameterTypesResponse { types })
             }
             Request::Set(id, request) => {
+                if let Err(reason) = wire::check_count(request.parameters.len()) {
+                    let results = vec![wire::result_to_wire(Err(reason))];
+                    return self.set.respond(id, SetParametersResponse { results });
+                }
                 let mut results = Vec::with_capacity(request.parameters.len());
                 for parameter in request.parameters {
                     let result = self.set(host, now, vec![parameter]).await;
@@ -150,7 +150,7 @@ impl ParameterServices {
                 self.set_atomically.respond(id, SetParametersAtomicallyResponse { result })
             }
             Request::List(id, request) => {
-                let result = list::list(&host.names(), &request.prefixes, request.depth);
+                let result = list(&host.names(), &request.prefixes, request.depth);
                 self.list.respond(id, ListParametersResponse { result })
             }
             Request::Describe(id, request) => {
@@ -171,6 +171,7 @@ impl ParameterServices {
         now: &(impl Fn() -> Time + Send),
         parameters: Vec<msg::Parameter>,
     ) -> Result<(), String> {
+        wire::check_count(parameters.len())?;
         let changes = parameters.into_iter().map(wire::parameter_from_wire).collect::<Result<Vec<_>, _>>()?;
         if changes.is_empty() {
             return Ok(());

@@ -6,7 +6,8 @@ use crate::units::Nanoseconds;
 
 /// A goal as far as it matters here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Candidate {
+pub struct Candidate {
+    /// Its name.
     pub id: GoalId,
     /// When it was accepted, ns.
     pub stamp: Nanoseconds,
@@ -18,7 +19,10 @@ pub(super) struct Candidate {
 ///
 /// Neither: all; an id alone: that goal; a stamp: those accepted at or before it, and the one with
 /// the id.
-pub(super) fn select(
+///
+/// # Errors
+/// A code of action_msgs/CancelGoal.
+pub fn select(
     id: &GoalId,
     stamp: Nanoseconds,
     goals: impl Iterator<Item = Candidate>,

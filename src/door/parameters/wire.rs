@@ -1,13 +1,15 @@
 //! Between plain values and rcl_interfaces' messages.
 
-use ros2_interfaces_jazzy_serde::rcl_interfaces::msg;
+use crate::messages::rcl_interfaces::msg;
 
 use super::types::{Descriptor, ParameterType, ParameterValue, Range};
+use crate::config::shortened;
 
 /// The type number of a parameter that does not exist.
-pub(super) const NOT_SET: u8 = 0;
+const NOT_SET: u8 = 0;
 
-pub(super) fn value_to_wire(value: Option<ParameterValue>) -> msg::ParameterValue {
+/// A value as a message; none as that of a parameter that does not exist.
+pub fn value_to_wire(value: Option<ParameterValue>) -> msg::ParameterValue {
     let mut wire = msg::ParameterValue {
         type_: value.as_ref().map_or(NOT_SET, |value| value.kind() as u8),
         ..Default::default()
@@ -27,8 +29,11 @@ pub(super) fn value_to_wire(value: Option<ParameterValue>) -> msg::ParameterValu
     wire
 }
 
-/// A parameter that somebody wants to set. On failure, the reason.
-pub(super) fn parameter_from_wire(wire: msg::Parameter) -> Result<(String, ParameterValue), String> {
+/// A parameter that somebody wants to set.
+///
+/// # Errors
+/// The reason, in a sentence that names the parameter.
+pub fn parameter_from_wire(wire: msg::Parameter) -> Result<(String, ParameterValue), String> {
     let msg::Parameter { name, value } = wire;
     let value = match value.type_ {
         1 => ParameterValue::Bool(value.bool_value),
@@ -42,17 +47,20 @@ pub(super) fn parameter_from_wire(wire: msg::Parameter) -> Result<(String, Param
         9 => ParameterValue::StringArray(value.string_array_value),
         NOT_SET => {
             return Err(format!(
-                "parameter '{name}' is to be removed; the parameters of this node cannot be"
+                "parameter '{}' is to be removed; the parameters of this node cannot be",
+                shortened(&name)
             ));
         }
         other => {
+            let name = shortened(&name);
             return Err(format!("parameter '{name}' comes with type number {other}; allowed is 1 to 9"));
         }
     };
     Ok((name, value))
 }
 
-pub(super) fn descriptor_to_wire(name: String, descriptor: Option<Descriptor>) -> msg::ParameterDescriptor {
+/// A description as a message; none as that of a parameter that does not exist.
+pub fn descriptor_to_wire(name: String, descriptor: Option<Descriptor>) -> msg::ParameterDescriptor {
     let Some(descriptor) = descriptor else {
         return msg::ParameterDescriptor { name, ..Default::default() };
     };
@@ -77,12 +85,13 @@ pub(super) fn descriptor_to_wire(name: String, descriptor: Option<Descriptor>) -
     wire
 }
 
-pub(super) fn result_to_wire(result: Result<(), String>) -> msg::SetParametersResult {
+/// What became of a request to set.
+pub fn result_to_wire(result: Result<(), String>) -> msg::SetParametersResult {
     msg::SetParametersResult { successful: result.is_ok(), reason: result.err().unwrap_or_default() }
 }
 
 /// The type number of a value, or of none.
-pub(super) fn type_number(kind: Option<ParameterType>) -> u8 {
+pub fn type_number(kind: Option<ParameterType>) -> u8 {
     kind.map_or(NOT_SET, |kind| kind as u8)
 }
 
@@ -117,6 +126,16 @@ mod tests {
                 value: msg::ParameterValue { type_, ..Default::default() },
             };
             assert!(parameter_from_wire(wire).unwrap_err().contains("'x.gain'"));
+        }
+    }
+
+    #[test]
+    fn a_name_without_end_does_not_come_back_in_the_refusal() {
+        for type_ in [0, 77] {
+            let value = msg::ParameterValue { type_, ..Default::default() };
+            let reason =
+                parameter_from_wire(msg::Parameter { name: "k\n".repeat(100_000), value }).unwrap_err();
+            assert!(reason.len() < 600 && !reason.contains('\n'), "{} bytes", reason.len());
         }
     }
 }

@@ -1,13 +1,13 @@
 //! Which parameters a list request asks for.
 
-use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::ListParametersResult;
+use crate::messages::rcl_interfaces::msg::ListParametersResult;
 
 const SEPARATOR: char = '.';
 
 /// The names under any of `prefixes` (all of them when there is none), at most `depth` parts long
 /// (counted from below the prefix; 0 is any length), and the groups in which they are. As rclcpp
 /// does it: a name that equals a prefix is listed whatever the depth.
-pub(super) fn list(names: &[String], prefixes: &[String], depth: u64) -> ListParametersResult {
+pub fn list(names: &[String], prefixes: &[String], depth: u64) -> ListParametersResult {
     let shallow = |rest: &str| depth == 0 || (rest.matches(SEPARATOR).count() as u64) < depth;
     let is_asked_for = |name: &str| {
         if prefixes.is_empty() {

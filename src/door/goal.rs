@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use super::Checks;
 use crate::config::GoalDefaults;
 use crate::messages::builtin_interfaces::msg::Duration;
 use crate::messages::{FollowJointTrajectoryGoal, JointTolerance};
-use crate::ros::inputs::Checks;
 use crate::simulation::{Tolerance, Tolerances};
 use crate::trajectory::{Code, JointLimits, Rejection, Trajectory};
 use crate::units::{Nanoseconds, SECOND_NS};

@@ -1,0 +1,177 @@
+//! Files of set-points and recordings.
+
+use std::io::Cursor;
+
+use virtual_axes::files::{
+    Columns, PsecCsv, PsecCsvOut, RecordingOptions, Trajectories, read_psec_yaml, read_recording_csv,
+    read_recording_mcap,
+};
+use virtual_axes::messages;
+use virtual_axes::recording::{Conditioning, Finding, RawRecording, condition};
+use virtual_axes::trajectory::{Context, Trajectory};
+
+use crate::{JOINTS, MACHINE, bounded, bounded_beside, names, refused};
+
+/// A record in a compressed chunk is believed to be as long as it says, up to the longest, bytes.
+const COMPRESSED_RECORD: u64 = 256 << 20;
+/// Most instants of a file that are read: a long time in two rows is as long a motion.
+const MOST_INSTANTS: usize = 2000;
+/// Most points of a trajectory that is checked.
+const MOST_POINTS: usize = 1000;
+/// Longest trajectory that is checked, ns: a minute; each instant of it is looked at.
+const LONGEST: i64 = 60_000_000_000;
+
+/// Reads set-points to their end; the joints and the rows.
+fn rows(data: &[u8]) -> Option<(Vec<String>, Vec<Vec<f64>>)> {
+    let mut psec = match PsecCsv::new(data, "my.csv", MACHINE.periods().position, &JOINTS) {
+        Ok(psec) => psec,
+        Err(error) => {
+            refused(&error.to_string());
+            assert!(error.to_string().starts_with("my.csv"), "{error}");
+            return None;
+        }
+    };
+    let joints = psec.joints().iter().map(|&place| names()[place].clone()).collect();
+    let mut row = vec![0.0; psec.joints().len()];
+    let mut rows = Vec::new();
+    while rows.len() < MOST_INSTANTS {
+        match psec.next(&mut row) {
+            Ok(true) => rows.push(row.clone()),
+            Ok(false) => return Some((joints, rows)),
+            Err(error) => {
+                refused(&error.to_string());
+                assert!(matches!(psec.next(&mut row), Ok(false)), "faults are told once");
+                return None;
+            }
+        }
+    }
+    None
+}
+
+/// Set-points as CSV: what is read is written and read back the same.
+pub fn psec_csv(data: &[u8]) {
+    bounded(data.len(), || {
+        let Some((joints, rows_read)) = rows(data) else { return };
+        for row in &rows_read {
+            assert!(row.iter().all(|value| value.is_finite()));
+        }
+        let mut out = PsecCsvOut::new(Vec::new(), &joints).expect("a vector takes all");
+        for (k, row) in rows_read.iter().enumerate() {
+            out.row(k as i64 * MACHINE.periods().position, row).expect("a vector takes all");
+        }
+        let written = out.finish().expect("a vector takes all");
+        let again = rows(&written).expect("what was written can be read");
+        assert_eq!(again, (joints, rows_read));
+    });
+}
+
+fn check(request: virtual_axes::trajectory::Request) {
+    if request.points() > 0 && request.point(request.points() - 1).is_some_and(|(time, _)| time > LONGEST) {
+        return;
+    }
+    let context = Context {
+        joints: &JOINTS,
+        period: MACHINE.periods().position,
+        max_points: MOST_POINTS,
+        allow_nonzero_end_velocity: true,
+    };
+    if let Err(rejection) = Trajectory::new(request, &context) {
+        refused(&rejection.to_string());
+    }
+}
+
+/// Set-points as YAML.
+pub fn psec_yaml(data: &[u8]) {
+    let Ok(text) = str::from_utf8(data) else { return };
+    bounded(data.len(), || match read_psec_yaml(text, "my.yaml") {
+        Ok(requests) => {
+            for request in requests {
+                let message = messages::joint_trajectory(&request);
+                assert_eq!(messages::request(&message, usize::MAX).as_ref(), Ok(&request));
+                check(request);
+            }
+        }
+        Err(error) => {
+            refused(&error.to_string());
+            assert!(error.to_string().starts_with("my.yaml"), "{error}");
+        }
+    });
+}
+
+/// Set-points as MCAP.
+pub fn psec_mcap(data: &[u8]) {
+    bounded_beside(COMPRESSED_RECORD, data.len(), || {
+        let trajectories = match Trajectories::new(Cursor::new(data), "my.mcap", None) {
+            Ok(trajectories) => trajectories,
+            Err(error) => return refused(&error.to_string()),
+        };
+        let announced = trajectories.remaining();
+        let mut seen = 0;
+        let mut last = i64::MIN;
+        for found in trajectories {
+            seen += 1;
+            match found {
+                Ok((time, request)) => {
+                    assert!(time >= last, "in the order of log times");
+                    last = time;
+                    check(request);
+                }
+                Err(error) => refused(&error.to_string()),
+            }
+        }
+        assert!(seen <= announced);
+    });
+}
+
+/// What was read of an axis has as many values as stamps; it is made even, or refused.
+fn conditioned(read: (RawRecording, Vec<Finding>)) {
+    let (raw, _) = read;
+    for channel in [&raw.psec, &raw.position, &raw.velocity, &raw.current] {
+        assert!(channel.as_ref().is_none_or(|values| values.len() == raw.time.len()));
+    }
+    match condition(&raw, &MACHINE.axes()[0], &MACHINE.periods(), &Conditioning::default()) {
+        Ok((signals, _)) => {
+            assert!(signals.period > 0.0 && signals.period.is_finite());
+            for span in &signals.spans {
+                let of = [&span.position, &span.velocity, &span.acceleration];
+                assert!(of.iter().all(|values| values.len() == span.position.len()));
+                assert!(of.iter().all(|values| values.iter().all(|value| value.is_finite())));
+            }
+        }
+        Err(fault) => refused(&fault.to_string()),
+    }
+}
+
+/// A recording as CSV. What stands before a line `---` says which column is what.
+pub fn recording_csv(data: &[u8]) {
+    let mut options = RecordingOptions::default();
+    let mut body = data;
+    if let Ok(text) = str::from_utf8(data)
+        && let Some((columns, rest)) = text.split_once("---\n")
+    {
+        for line in columns.lines() {
+            if let Err(error) = options.columns.set(line, "--columns") {
+                refused(&error.to_string());
+            }
+        }
+        if let Err(error) = Columns::from_yaml(columns, "columns.yaml") {
+            refused(&error.to_string());
+        }
+        body = rest.as_bytes();
+    }
+    bounded(data.len(), || match read_recording_csv(body, "my.csv", &MACHINE.axes()[0], &options) {
+        Ok(read) => conditioned(read),
+        Err(error) => refused(&error.to_string()),
+    });
+}
+
+/// A recording as MCAP.
+pub fn recording_mcap(data: &[u8]) {
+    bounded_beside(COMPRESSED_RECORD, data.len(), || {
+        let options = RecordingOptions::default();
+        match read_recording_mcap(Cursor::new(data), "my.mcap", &MACHINE.axes()[0], &options) {
+            Ok(read) => conditioned(read),
+            Err(error) => refused(&error.to_string()),
+        }
+    });
+}

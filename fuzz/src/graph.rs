@@ -1,0 +1,231 @@
+//! Messages and requests as they come from the network: four bytes of header, then CDR.
+
+use std::fmt::Debug;
+use std::sync::Arc;
+
+use byteorder::{BigEndian, LittleEndian};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use virtual_axes::door::parameters::{
+    LiveNodeParameters, Settings, check_count, descriptor_to_wire, list, parameter_from_wire, result_to_wire,
+    type_number, value_to_wire,
+};
+use virtual_axes::door::{Candidate, Checks, GoalChecks, Order, Setpoints, loads, select};
+use virtual_axes::messages::action_msgs::srv::CancelGoalRequest;
+use virtual_axes::messages::rcl_interfaces::srv::{
+    DescribeParametersRequest, GetParameterTypesRequest, GetParametersRequest, ListParametersRequest,
+    SetParametersAtomicallyRequest, SetParametersRequest,
+};
+use virtual_axes::messages::rosgraph_msgs::msg::Clock;
+use virtual_axes::messages::sensor_msgs::msg::JointState;
+use virtual_axes::messages::std_srvs::srv::TriggerRequest;
+use virtual_axes::messages::trajectory_msgs::msg::JointTrajectory;
+use virtual_axes::messages::{self, GetResultRequest, SendGoalRequest, nanoseconds};
+use virtual_axes::trajectory::MotionId;
+use virtual_axes::units::SECOND_NS;
+
+use crate::{JOINTS, MACHINE, ORIGIN, PARAMETERS, bounded, machine_at_rest, names, refused, step};
+
+/// Header before CDR.
+const HEADER: usize = 4;
+/// Position periods that the machine is run for what it took.
+const PERIODS: usize = 12;
+/// Longest time of a trajectory here, s; the node takes any, and checks longer ones as thoroughly.
+const LONGEST: i32 = 60;
+
+/// What a reader of the node makes of a sample: the decoder that RustDDS calls, in the order of the header.
+fn decode<T: DeserializeOwned + Serialize + PartialEq + Debug>(sample: &[u8]) -> Option<T> {
+    let (header, body) = sample.split_first_chunk::<HEADER>()?;
+    let message = match header[1] {
+        0 => cdr_encoding::from_bytes::<T, BigEndian>(body),
+        _ => cdr_encoding::from_bytes::<T, LittleEndian>(body),
+    };
+    let (message, consumed) = message.ok()?;
+    assert!(consumed <= body.len());
+    // What was understood can be said again, and means the same.
+    let mut written = Vec::new();
+    virtual_axes::files::encode(&message, &mut written).expect("a message can be written");
+    let (again, _) = cdr_encoding::from_bytes::<T, LittleEndian>(&written[HEADER..]).expect("it can be read");
+    // Not by comparing values: NaN is not itself.
+    let mut twice = Vec::new();
+    virtual_axes::files::encode(&again, &mut twice).expect("a message can be written");
+    assert_eq!(written, twice);
+    Some(message)
+}
+
+fn checks() -> Checks {
+    let live = Arc::new(LiveNodeParameters::default());
+    let config = PARAMETERS.node_config();
+    Checks { joints: JOINTS.clone(), period: MACHINE.periods().position, max_points: config.max_points, live }
+}
+
+/// Times that are checked instant by instant take as long as they are.
+fn shorten_times(message: &mut JointTrajectory) {
+    for point in &mut message.points {
+        point.time_from_start.sec = point.time_from_start.sec.clamp(-1, LONGEST);
+    }
+}
+
+/// `psec`: a trajectory is checked, offered to the axes and begun.
+pub fn cdr_psec(data: &[u8]) {
+    bounded(data.len(), || {
+        let Some(mut message) = decode::<JointTrajectory>(data) else { return };
+        shorten_times(&mut message);
+        let trajectory = match checks().check(&message) {
+            Ok(trajectory) => trajectory,
+            Err(rejection) => return refused(&rejection.to_string()),
+        };
+        let request = messages::request(&message, usize::MAX).expect("it has just been read");
+        let again = messages::joint_trajectory(&request);
+        assert_eq!(messages::request(&again, usize::MAX).as_ref(), Ok(&request));
+        let mut simulation = machine_at_rest();
+        if let Err(rejection) = simulation.offer(MotionId(1), Arc::new(trajectory)) {
+            refused(&rejection.to_string());
+        }
+        step(&mut simulation, PERIODS);
+    });
+}
+
+/// `psec_stream` and `load`: set-points and loads of the same message.
+pub fn cdr_joint_state(data: &[u8]) {
+    bounded(data.len(), || {
+        let Some(message) = decode::<JointState>(data) else { return };
+        let names = names();
+        let mut simulation = machine_at_rest();
+        let mut order = Order::default();
+        for publisher in [[1; 16], [1; 16], [2; 16]] {
+            let setpoints = Setpoints::in_order(&message, &names, publisher, &mut order);
+            assert!(!setpoints.overtaken, "the same stamp is not older");
+            assert!(setpoints.positions.len() <= names.len());
+            setpoints.refused.iter().for_each(|rejection| refused(&rejection.to_string()));
+            for &(place, position) in &setpoints.positions {
+                if let Err(rejection) = simulation.stream_sent(place, position, setpoints.sent) {
+                    refused(&rejection.to_string());
+                }
+            }
+            step(&mut simulation, 2);
+        }
+        match loads(&message, &names) {
+            Ok(loads) => loads.iter().for_each(|&(place, load)| simulation.set_load(place, load, SECOND_NS)),
+            Err(reason) => refused(&reason),
+        }
+        step(&mut simulation, PERIODS);
+    });
+}
+
+/// A request of the action: its goal is checked, offered with its tolerances and begun.
+pub fn cdr_goal(data: &[u8]) {
+    bounded(data.len(), || {
+        let Some(mut message) = decode::<SendGoalRequest>(data) else { return };
+        shorten_times(&mut message.goal.trajectory);
+        let goals = GoalChecks { checks: Arc::new(checks()) };
+        match goals.check(&message.goal) {
+            Ok((trajectory, tolerances)) => {
+                let columns = trajectory.joints().len();
+                assert_eq!((tolerances.path.len(), tolerances.goal.len()), (columns, columns));
+                let mut simulation = machine_at_rest();
+                if let Err(rejection) = simulation.offer_within(MotionId(1), Arc::new(trajectory), tolerances)
+                {
+                    refused(&rejection.to_string());
+                }
+                step(&mut simulation, PERIODS);
+            }
+            Err(rejection) => refused(&rejection.to_string()),
+        }
+    });
+}
+
+/// Requests to the parameter services; the last byte of the header says which.
+pub fn cdr_parameters(data: &[u8]) {
+    let settings = || Settings::new(PARAMETERS.clone(), Arc::default());
+    bounded(data.len(), || match data.get(HEADER - 1).copied().unwrap_or_default() % 6 {
+        0 | 1 => {
+            let parameters = match data.get(HEADER - 1).copied().unwrap_or_default() % 6 {
+                0 => decode::<SetParametersRequest>(data).map(|request| request.parameters),
+                _ => decode::<SetParametersAtomicallyRequest>(data).map(|request| request.parameters),
+            };
+            let parameters = parameters.unwrap_or_default();
+            if let Err(reason) = check_count(parameters.len()) {
+                return refused(&reason);
+            }
+            let changes = parameters.into_iter().map(parameter_from_wire);
+            let changes = match changes.collect::<Result<Vec<_>, _>>() {
+                Ok(changes) => changes,
+                Err(reason) => return refused(&reason),
+            };
+            let mut settings = settings();
+            let result = settings.check(changes.clone()).map(|(changed, _)| settings.adopt(changed));
+            if let Err(reason) = &result {
+                refused(reason);
+                assert_eq!(settings.parameters(), &*PARAMETERS, "what is refused changes nothing");
+            } else {
+                // The last value of a name counts, and an integer serves as a number.
+                for (index, (name, value)) in changes.iter().enumerate() {
+                    let kind = settings.get(name).expect("it has just been set").kind();
+                    let is_last = changes[index + 1..].iter().all(|(later, _)| later != name);
+                    if is_last && value.kind() == kind {
+                        assert_eq!(settings.get(name).as_ref(), Some(value));
+                    }
+                }
+                settings.parameters().machine_config().expect("what is accepted is valid");
+            }
+            result_to_wire(result);
+        }
+        2 => {
+            let Some(request) = decode::<GetParametersRequest>(data) else { return };
+            let settings = settings();
+            for name in &request.names {
+                let wire = value_to_wire(settings.get(name));
+                assert_eq!(
+                    wire.type_ != 0,
+                    settings.parameters().definition(name).is_some() && wire.type_ != 0
+                );
+            }
+        }
+        3 => {
+            let Some(request) = decode::<GetParameterTypesRequest>(data) else { return };
+            let settings = settings();
+            for name in &request.names {
+                type_number(settings.get(name).map(|value| value.kind()));
+            }
+        }
+        4 => {
+            let Some(request) = decode::<ListParametersRequest>(data) else { return };
+            let names = settings().names();
+            let found = list(&names, &request.prefixes, request.depth);
+            assert!(found.names.iter().all(|name| names.contains(name)));
+        }
+        _ => {
+            let Some(request) = decode::<DescribeParametersRequest>(data) else { return };
+            let settings = settings();
+            for name in request.names {
+                let known = settings.get(&name).is_some();
+                let descriptor = settings.describe(&name);
+                assert!(!known || descriptor.is_some());
+                descriptor_to_wire(name, descriptor);
+            }
+        }
+    });
+}
+
+/// `/clock`, `~/stop`, `~/reset`, and the action's requests to cancel and for a result.
+pub fn cdr_other(data: &[u8]) {
+    bounded(data.len(), || match data.get(HEADER - 1).copied().unwrap_or_default() % 4 {
+        0 => _ = decode::<Clock>(data).map(|message| nanoseconds(&message.clock)),
+        1 => _ = decode::<TriggerRequest>(data),
+        2 => _ = decode::<GetResultRequest>(data),
+        _ => {
+            let Some(request) = decode::<CancelGoalRequest>(data) else { return };
+            let asked = &request.goal_info;
+            let goals = (0..4u8).map(|n| Candidate {
+                id: [n; 16],
+                stamp: ORIGIN + i64::from(n) * SECOND_NS,
+                cancelable: n != 2,
+            });
+            match select(&asked.goal_id.uuid, nanoseconds(&asked.stamp), goals) {
+                Ok(ids) => assert!(ids.len() <= 3 && !ids.contains(&[2; 16])),
+                Err(code) => assert!(code > 0),
+            }
+        }
+    });
+}

@@ -1,0 +1,130 @@
+//! Texts: machine files, parameters, scenarios, arguments.
+
+use virtual_axes::config::{Parameters, Source};
+use virtual_axes::door::args::Command;
+use virtual_axes::machine::MachineParameters;
+use virtual_axes::scenario::Scenario;
+
+use crate::{JOINTS, MACHINE, PARAMETERS, bounded, refused};
+
+/// Instants at which the path of a scenario is looked at.
+const LOOKS: u32 = 64;
+/// Most moves that are planned; more of them show nothing new.
+const MOST_MOVES: usize = 40;
+
+/// What is valid is written and read back the same, bit for bit.
+fn assert_reads_back(parameters: &Parameters) {
+    let text = parameters.to_yaml("", |_| None);
+    let again = Parameters::from_yaml(&text, "again.yaml").expect("what was written can be read");
+    let values = |p: &Parameters| format!("{:?}", p.iter().collect::<Vec<_>>());
+    assert_eq!(values(&again), values(parameters));
+}
+
+/// Machine files.
+pub fn machine_file(data: &[u8]) {
+    let Ok(text) = str::from_utf8(data) else { return };
+    bounded(data.len(), || match Parameters::from_yaml(text, "my.yaml") {
+        Ok(parameters) => {
+            assert_reads_back(&parameters);
+            let config = parameters.machine_config().expect("valid parameters are a machine");
+            if let Err(error) = MachineParameters::new(&config) {
+                refused(&error.to_string());
+            }
+        }
+        Err(error) => {
+            refused(&error.to_string());
+            assert!(error.to_string().starts_with("my.yaml"), "{error}");
+        }
+    });
+}
+
+/// A parameter file over the default machine, or lines as of `-p` and `--set`.
+pub fn parameter_text(data: &[u8]) {
+    let Ok(text) = str::from_utf8(data) else { return };
+    bounded(data.len(), || {
+        let mut parameters = PARAMETERS.clone();
+        let source = Source::named("-p");
+        let results: Vec<_> = if text.starts_with('/') {
+            let result = parameters.overlay_yaml(text, "over.yaml", Some("/virtual_axes"));
+            vec![result.map(|_| ()).map_err(|error| error.to_string())]
+        } else {
+            text.lines()
+                .map(|line| {
+                    let before = parameters.clone();
+                    let result = parameters.set_text(line, &source);
+                    assert!(result.is_ok() || parameters == before, "what is refused changes nothing");
+                    result.map_err(|error| error.to_string())
+                })
+                .collect()
+        };
+        results.iter().filter_map(|result| result.as_ref().err()).for_each(|error| refused(error));
+        let config = parameters.machine_config().expect("what is accepted is valid");
+        if results.iter().any(Result::is_ok) {
+            assert_reads_back(&parameters);
+            if let Err(error) = MachineParameters::new(&config) {
+                refused(&error.to_string());
+            }
+        }
+    });
+}
+
+/// Scenarios.
+pub fn scenario(data: &[u8]) {
+    let Ok(text) = str::from_utf8(data) else { return };
+    if text.matches("- ").count() > MOST_MOVES {
+        return;
+    }
+    bounded(data.len(), || {
+        let planned = Scenario::from_yaml(text, "my.yaml").and_then(|s| s.program(&MACHINE, None));
+        let program = match planned {
+            Ok(program) => program,
+            Err(error) => {
+                refused(&error.to_string());
+                assert!(error.to_string().starts_with("my.yaml"), "{error}");
+                return;
+            }
+        };
+        let duration = program.duration();
+        assert!(duration.is_finite() && duration >= 0.0);
+        let mut psec = vec![0.0; JOINTS.len()];
+        let mut before = 0.0;
+        for look in 0..=LOOKS {
+            let t = duration * f64::from(look) / f64::from(LOOKS);
+            program.psec(t, &mut psec);
+            // Strokes are looked at by whoever moves the machine.
+            assert!(psec.iter().all(|position| position.is_finite()), "{psec:?} at {t} s");
+            let progress = program.progress(t);
+            assert!(progress >= before, "progress steps back at {t} s");
+            before = progress;
+        }
+    });
+}
+
+/// Arguments of the node, one a line.
+pub fn ros_args(data: &[u8]) {
+    let Ok(text) = str::from_utf8(data) else { return };
+    bounded(data.len(), || {
+        let command = match Command::parse(text.lines(), "virtual_axes") {
+            Ok(command) => command,
+            Err(error) => return assert!(!error.to_string().is_empty()),
+        };
+        let Command::Run(args) = command else { return };
+        assert!(args.node().to_string().starts_with('/'));
+        for name in ["psec", "/clock", "~/reset"] {
+            for resolved in [args.resolve_topic(name), args.resolve_service(name)] {
+                match resolved {
+                    Ok(resolved) => {
+                        let tokens: Vec<&str> = resolved.split('/').collect();
+                        assert!(tokens[0].is_empty() && tokens.len() > 1, "{resolved}");
+                        assert!(tokens[1..].iter().all(|token| !token.is_empty()), "{resolved}");
+                    }
+                    Err(error) => assert!(!error.to_string().is_empty()),
+                }
+            }
+        }
+        for warning in args.warnings() {
+            assert!(!warning.is_empty());
+        }
+        assert!(args.parameters().count() <= text.lines().count());
+    });
+}

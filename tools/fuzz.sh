@@ -1,0 +1,111 @@
+#!/usr/bin/env bash
+# Fuzzes everything that comes from outside (fuzz/), on stable Rust and without cargo-fuzz.
+#
+#     tools/fuzz.sh build            only builds the targets
+#     tools/fuzz.sh short            each target so many runs from its seeds, the same on every machine
+#     tools/fuzz.sh long MINUTES     all targets for so long together, on all cores; a table in Markdown
+#
+# FUZZ_TARGETS names some of them. What the long run finds worth keeping is in fuzz/corpus, what breaks
+# a target in fuzz/artifacts; `tools/fuzz.sh run TARGET FILE` runs one input.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+host=$(rustc -vV | sed -n 's/^host: //p')
+binaries=fuzz/target/$host/release
+targets=${FUZZ_TARGETS:-$(sed -nE 's/^name = "(.*)"$/\1/p' fuzz/Cargo.toml | grep -v virtual_axes)}
+mode=${1:-short}
+
+# An input may take so many seconds and MiB.
+limits=(-timeout=20 -rss_limit_mb=1024)
+# Of the short run.
+seed=20240607
+runs=2500
+
+# As cargo-fuzz does it, without a sanitizer: the library forbids unsafe code.
+build() {
+  command -v g++ >/dev/null || { echo "fuzz: needs g++, in which libFuzzer is written (Debian: apt-get install g++)" >&2; exit 1; }
+  local flag coverage="-Cpasses=sancov-module"
+  for flag in level=4 inline-8bit-counters pc-table trace-compares; do
+    coverage+=" -Cllvm-args=-sanitizer-coverage-$flag"
+  done
+  RUSTFLAGS="$coverage --cfg fuzzing" cargo build --manifest-path fuzz/Cargo.toml --release --locked --target "$host" --bins
+}
+
+fuzz_one() { # target, log, options of libFuzzer
+  local target=$1 log=$2
+  shift 2
+  mkdir -p "fuzz/corpus/$target" "fuzz/artifacts/$target"
+  "$binaries/$target" "${limits[@]}" -dict=fuzz/words.dict -artifact_prefix="fuzz/artifacts/$target/" "$@" >"$log" 2>&1
+}
+
+# The log of a run that failed, cut to what matters.
+show_failure() { # target, log
+  echo "fuzz: $1 failed:" >&2
+  grep -vE '^#[0-9]' "$2" | tail -n 40 >&2
+}
+
+short_one() {
+  local target=$1 status=0 scratch
+  # What is found goes into the first folder: the corpus stays out of it, so that each run is the same.
+  scratch=$(mktemp -d)
+  mkdir "$scratch/found"
+  fuzz_one "$target" "$scratch/log" -seed="$seed" -runs="$runs" -max_len=4096 "$scratch/found" \
+    "fuzz/seeds/$target" || status=1
+  if [ $status -eq 0 ]; then
+    echo "$target: $(sed -nE 's/^Done ([0-9]+) runs in ([0-9]+) second.*/\1 inputs, \2 s/p' "$scratch/log")"
+  else
+    show_failure "$target" "$scratch/log"
+  fi
+  rm -rf "$scratch"
+  return $status
+}
+
+long_one() {
+  local target=$1 seconds=$2 log=$3 status=0
+  fuzz_one "$target" "$log" -max_total_time="$seconds" -max_len=20000 -print_final_stats=1 \
+    "fuzz/corpus/$target" "fuzz/seeds/$target" || status=1
+  local inputs coverage new before after
+  inputs=$(sed -nE 's/^stat::number_of_executed_units: +//p' "$log")
+  new=$(sed -nE 's/^stat::new_units_added: +//p' "$log")
+  before=$(sed -nE 's/^#[0-9]+\s+INITED cov: ([0-9]+) .*/\1/p' "$log")
+  after=$(sed -nE 's/^#[0-9]+.* cov: ([0-9]+) ft: ([0-9]+) .*/\1 | \2/p' "$log" | tail -n 1)
+  echo "| $target | ${inputs:-?} | ${before:-?} | ${after:-? | ?} | ${new:-?} | $status |" >"$log.row"
+  [ $status -eq 0 ] || show_failure "$target" "$log"
+}
+
+case $mode in
+  build) build ;;
+  run)
+    shift
+    target=$1
+    shift
+    build
+    exec "$binaries/$target" "${limits[@]}" "$@"
+    ;;
+  short)
+    build
+    export -f fuzz_one short_one show_failure
+    export binaries seed runs
+    export LIMITS="${limits[*]}"
+    printf '%s\n' $targets | xargs -P "$(nproc)" -I{} bash -euc 'limits=($LIMITS); short_one {}'
+    ;;
+  long)
+    minutes=${2:?minutes, for all targets together}
+    build
+    mkdir -p .build/fuzz
+    rm -f .build/fuzz/*.row
+    count=$(wc -w <<<"$targets")
+    seconds=$((minutes * 60 * $(nproc) / count))
+    export -f fuzz_one long_one show_failure
+    export binaries
+    export LIMITS="${limits[*]}"
+    printf '%s\n' $targets | xargs -P "$(nproc)" -I{} bash -euc 'limits=($LIMITS); long_one {} '"$seconds"' .build/fuzz/{}.log'
+    echo "| target | inputs | edges from the seeds | edges | features | kept | broken |"
+    echo "|---|---|---|---|---|---|---|"
+    cat .build/fuzz/*.row
+    ! grep -q '| 1 |$' .build/fuzz/*.row
+    ;;
+  *)
+    echo "fuzz: $mode? tools/fuzz.sh build | short | long MINUTES | run TARGET FILE" >&2
+    exit 1
+    ;;
+esac
