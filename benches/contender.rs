@@ -74,6 +74,7 @@ fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures
     let mut psec = Vec::with_capacity(machine.axis_count());
     let mut x = vec![0.0; machine.ticks_per_period()];
     let mut y = x.clone();
+    let width = pulp::Arch::new();
     for (k, row) in case.rows.iter().enumerate() {
         psec.clear();
         (0..machines.len()).for_each(|_| psec.extend_from_slice(row));
@@ -85,7 +86,11 @@ fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures
             for (place, radial) in circles.iter_mut().enumerate() {
                 machine.positions(place * axes, &mut x);
                 machine.positions(place * axes + 1, &mut y);
-                radial.push(circle.radius, &x, &y);
+                // As wide as the processor's vectors are, like the library's own loops.
+                width.dispatch(
+                    #[inline(always)]
+                    || radial.push(circle.radius, &x, &y),
+                );
             }
         }
     }
