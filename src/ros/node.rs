@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicU64;
 use std::thread;
 use std::time::Duration;
 
+use futures::future::{join, pending};
 use futures::stream::FuturesUnordered;
 use futures::{FutureExt, StreamExt};
 use ros2_client::{NodeName, NodeOptions};
@@ -27,7 +28,7 @@ use super::inputs::{Checks, PsecInput, next_id, take_loads, take_stream};
 use super::log::LogRecord;
 use super::namesake;
 use super::outputs::{Publishing, WhenFull, queue_length};
-use super::pace::{self, Channels, Command, Health, Pace};
+use super::pace::{self, Channels, Command, Health, Pace, Turns};
 use super::parameter_host::{Host, LiveNodeParameters};
 use super::parameter_services::ParameterServices;
 use super::participant::{Participant, ParticipantError};
@@ -256,25 +257,20 @@ async fn serve(
             results.report(report).await;
         }
     });
+    let heard = join(streamed, loads).then(|_| pending()).boxed();
     let published = outputs.run(frames).boxed();
-    // On a thread of its own, each woken alone: a message wakes it and nobody else.
-    let inputs = FuturesUnordered::from_iter([streamed.boxed(), loads.boxed()]);
     let pace = match mode {
-        TimeMode::Real => {
-            let commands = commands.clone();
-            inputs.push(async move { commands.closed().await }.boxed());
-            Pace::Real { published }
-        }
-        // It may wait for subscribers, and ends after the last frame.
+        TimeMode::Real => Pace::Real(Turns { heard, published }),
         TimeMode::Fast | TimeMode::SimTime => {
-            inputs.push(published);
+            // On a thread of their own, until there are no frames any more: what publishes may wait for subscribers.
+            let woken_alone = FuturesUnordered::from_iter([published, heard]);
+            let runtime = Handle::current();
+            tasks.spawn_blocking(move || {
+                let _ = runtime.block_on(woken_alone.into_future());
+            });
             Pace::Clock { state: clock, runtime: Handle::current() }
         }
     };
-    let runtime = Handle::current();
-    tasks.spawn_blocking(move || {
-        let _ = runtime.block_on(inputs.into_future());
-    });
 
     topics.names.print(args, config.name(), mode);
     let (ended, has_ended) = oneshot::channel();

@@ -110,13 +110,20 @@ pub struct Channels {
     pub health: watch::Sender<Health>,
 }
 
+/// What has its turn on the axes' thread in each period; it must neither block nor end.
+///
+/// A thread of its own would have to be woken each time, which takes longer than what it does.
+pub struct Turns {
+    /// What hears set-points and loads, before each instant: they take effect at one anyway.
+    pub heard: BoxFuture<'static, ()>,
+    /// What takes the frames, after each instant.
+    pub published: BoxFuture<'static, ()>,
+}
+
 /// What the thread keeps step with.
 pub enum Pace {
     /// The wall clock.
-    Real {
-        /// What takes the frames; it has its turn after each instant, and must not wait.
-        published: BoxFuture<'static, ()>,
-    },
+    Real(Turns),
     /// A ROS clock, as the task that watches it tells.
     Clock {
         /// What it tells.
@@ -131,7 +138,7 @@ pub fn run(simulation: Simulation, pace: Pace, channels: Channels) {
     let Channels { commands, frames, reports, health } = channels;
     let axes = axes::Axes::new(simulation, reports, health);
     match pace {
-        Pace::Real { published } => real::run(axes, commands, &frames, published),
+        Pace::Real(turns) => real::run(axes, commands, &frames, turns),
         Pace::Clock { state, runtime } => runtime.block_on(paced::run(axes, commands, &frames, state)),
     }
 }

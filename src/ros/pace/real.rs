@@ -11,21 +11,18 @@ use tracing::warn;
 
 use super::axes::Axes;
 use super::wall::PaceClock;
-use super::{ClockSource, Command, Frame};
+use super::{ClockSource, Command, Frame, Turns};
 
 /// Instants that come later than this are computed and not published: a burst of them would push out of
 /// subscribers' queues what they have not read, and tell nothing of now.
 pub(super) const LONGEST_BURST: Duration = Duration::from_secs(1);
 
 /// Runs until told to shut down; a frame that nobody takes in time is dropped and counted.
-///
-/// `published` takes the frames, and has its turn after each instant: a thread of its own would have to be
-/// woken each time, which takes longer than what it does.
 pub(super) fn run(
     mut axes: Axes,
     mut commands: mpsc::Receiver<Command>,
     frames: &mpsc::Sender<Arc<Frame>>,
-    mut published: BoxFuture<'static, ()>,
+    mut turns: Turns,
 ) {
     let clock = PaceClock::new(axes.simulation());
     axes.tell_clock(|clock| clock.source = ClockSource::Wall);
@@ -35,12 +32,17 @@ pub(super) fn run(
             stood_still(&mut axes, lateness, clock.newest_due(), |k| clock.lateness_of(k));
             lateness = clock.wait_for(axes.simulation().next_instant());
         }
+        have_turn(&mut turns.heard);
         if period(&mut axes, &mut commands, frames, lateness, lateness > clock.period).is_break() {
             return;
         }
-        // It is asked again in the next period, whether or not it has been woken.
-        let _ = published.as_mut().poll(&mut Context::from_waker(Waker::noop()));
+        have_turn(&mut turns.published);
     }
+}
+
+/// It is asked again in the next period, whether or not it has been woken.
+fn have_turn(future: &mut BoxFuture<'static, ()>) {
+    let _ = future.as_mut().poll(&mut Context::from_waker(Waker::noop()));
 }
 
 /// Computes the instants before `newest`, of which the first is due since `lateness`, and keeps them to itself.

@@ -144,7 +144,8 @@ fn what_publishes_gets_each_frame_in_the_period_that_made_it() {
             }
         }
     };
-    let thread = std::thread::spawn(move || real::run(axes, commands, &frames, Box::pin(published)));
+    let turns = Turns { heard: Box::pin(std::future::pending()), published: Box::pin(published) };
+    let thread = std::thread::spawn(move || real::run(axes, commands, &frames, turns));
     for instant in 0..FRAMES {
         let found = found.recv_timeout(Duration::from_secs(20)).expect("a frame");
         assert_eq!(found, (instant, 0), "none may wait");
