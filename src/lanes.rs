@@ -1,7 +1,7 @@
 //! Numbers of several axes side by side, so that one instruction acts on many of them.
 //!
 //! What is reckoned in every tick is written once, over a [`Number`]: an `f64`, or a [`Vector`] that holds
-//! those of several axes. A structure of numbers is declared by [`numbers!`]: `Motor` is that of one axis,
+//! those of several axes. A structure of numbers is declared by the macro `numbers`: `Motor` is that of one axis,
 //! `Motor<[f64; L]>` are those of `L` axes as they stand in memory, `Motor<Vector<S>>` those of a few of them
 //! as they are reckoned with. Each operation gives the same bits in all three.
 
