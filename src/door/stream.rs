@@ -73,36 +73,21 @@ impl Setpoints {
             setpoints.refused.push(rejection);
             return setpoints;
         }
-        for (name, &position) in names.iter().zip(positions) {
-            if position.is_nan() {
-                continue;
-            }
-            let Some(place) = joints.iter().position(|joint| joint == name) else {
-                if setpoints.is_full() {
-                    continue;
+        let mut refused = 0;
+        for (name, &position) in names.iter().zip(positions).filter(|(_, position)| !position.is_nan()) {
+            let place = joints.iter().position(|joint| joint == name);
+            match place.filter(|&place| setpoints.positions.iter().all(|&(taken, _)| taken != place)) {
+                Some(place) => setpoints.positions.push((place, position)),
+                None => {
+                    refused += 1;
+                    if refused <= MOST_REFUSED {
+                        setpoints.refused.push(refusal(name, place.is_some(), joints));
+                    }
                 }
-                let text = format!("unknown joint {name}; there are {}", joints.join(", "));
-                setpoints.refused.push(Rejection::new(Code::UnknownJoint, text).joint(name));
-                continue;
-            };
-            if setpoints.positions.iter().any(|&(taken, _)| taken == place) {
-                if setpoints.is_full() {
-                    continue;
-                }
-                let text = format!("joint {name} is named twice; the first counts");
-                setpoints.refused.push(Rejection::new(Code::DuplicateJoint, text).joint(name));
-                continue;
             }
-            setpoints.positions.push((place, position));
         }
+        setpoints.refused_beside = refused.saturating_sub(MOST_REFUSED) as u64;
         setpoints
-    }
-
-    /// Whether no more refusals are kept; the one that asks is counted then.
-    fn is_full(&mut self) -> bool {
-        let is_full = self.refused.len() == MOST_REFUSED;
-        self.refused_beside += u64::from(is_full);
-        is_full
     }
 
     /// Likewise, of a message of `publisher`; one that was overtaken has none.
@@ -113,6 +98,16 @@ impl Setpoints {
         }
         setpoints
     }
+}
+
+/// Why a joint's set-point is not taken: it has one already, or it is none of `joints`.
+fn refusal(name: &str, is_known: bool, joints: &[String]) -> Rejection {
+    let (code, text) = if is_known {
+        (Code::DuplicateJoint, format!("joint {name} is named twice; the first counts"))
+    } else {
+        (Code::UnknownJoint, format!("unknown joint {name}; there are {}", joints.join(", ")))
+    };
+    Rejection::new(code, text).joint(name)
 }
 
 #[cfg(test)]
