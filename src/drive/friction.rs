@@ -102,25 +102,33 @@ impl<N: Number> Friction<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Parameters;
+    use crate::config::{AxisConfig, Parameters};
 
     /// The law as it is printed, with the exponential of the standard library, A.
     fn printed(law: &FrictionConfig, v: f64) -> f64 {
         law.a * (law.b * v).exp() + law.c * (law.d * v).exp()
     }
 
-    #[test]
-    fn the_law_is_within_1e_12_a_of_what_is_printed() {
+    /// Five times the range that the law was fitted for: as fast as any of the axes goes, m/min or rev/min.
+    const FASTEST: f64 = 5.0 * FITTED_RANGE;
+
+    /// The axes of the default machine with their friction in A, Kt being 1, over m/min or rev/min.
+    fn shipped() -> Vec<(AxisConfig, Friction)> {
         let config = Parameters::embedded_default()
             .and_then(|p| p.machine_config())
             .expect("the embedded machine is valid");
-        for axis in config.axes() {
-            // Kt = 1 and one m/min or rev/min per rad/s.
+        let with_friction = |axis: &AxisConfig| {
             let unit = if axis.kind == AxisKind::Linear { METRE_PER_MINUTE } else { RPM };
-            let friction = Friction::new(axis.friction, axis.kind, unit, 1.0);
-            // Five times the range that the law was fitted for: as fast as any of the axes goes.
+            (axis.clone(), Friction::new(axis.friction, axis.kind, unit, 1.0))
+        };
+        config.axes().iter().map(with_friction).collect()
+    }
+
+    #[test]
+    fn the_law_is_within_1e_12_a_of_what_is_printed() {
+        for (axis, friction) in shipped() {
             for k in 1..=1_000_000 {
-                let v = 5.0 * FITTED_RANGE * f64::from(k) * 1e-6;
+                let v = FASTEST * f64::from(k) * 1e-6;
                 let (found, exact) = (friction.bound(v), printed(&axis.friction, v));
                 assert!((found - exact).abs() <= 1e-12, "{}: {found} A at {v}, not {exact} A", axis.name);
                 assert_eq!(found.to_bits(), friction.bound(-v).to_bits());
@@ -148,16 +156,10 @@ mod tests {
 
     #[test]
     fn the_law_is_as_near_to_what_is_printed_where_it_is_expanded() {
-        let config = Parameters::embedded_default()
-            .and_then(|p| p.machine_config())
-            .expect("the embedded machine is valid");
-        for axis in config.axes() {
-            let unit = if axis.kind == AxisKind::Linear { METRE_PER_MINUTE } else { RPM };
-            let friction = Friction::new(axis.friction, axis.kind, unit, 1.0);
-            let fastest = 5.0 * FITTED_RANGE;
+        for (axis, friction) in shipped() {
             // To and fro with steps of every size: many within an expansion, some over several of them.
-            let slow = (0..2_000_000).map(|k| fastest * (1e-5 * f64::from(k)).sin());
-            let jumping = (0..100_000).map(|k| fastest * (0.37 * f64::from(k)).sin());
+            let slow = (0..2_000_000).map(|k| FASTEST * (1e-5 * f64::from(k)).sin());
+            let jumping = (0..100_000).map(|k| FASTEST * (0.37 * f64::from(k)).sin());
             for (v, found) in on_the_way(&friction, slow.chain(jumping)) {
                 let exact = if v == 0.0 { axis.friction.i0 } else { printed(&axis.friction, v.abs()) };
                 assert!((found - exact).abs() <= 1e-12, "{}: {found} A at {v}, not {exact} A", axis.name);
