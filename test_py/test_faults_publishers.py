@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 import threading
 import time
@@ -275,18 +276,20 @@ def test_of_two_streams_that_contend_no_message_is_mixed(node: Drive):
     go_home(node)
     with Drive(process=node.process) as other:
         begin = node.now()
-        sent: set[tuple[float, float]] = {(0.0, 0.0)}
+        sent: list[tuple[float, float]] = [(0.0, 0.0)]
+        turns = random.Random(8)
         for k in range(300):
-            # By turns, so that each of them is the last of a period now and then.
-            turn = ((node, 1), (other, -1))[:: 1 if k % 2 else -1]
-            for drive, sign in turn:
-                pair = (sign * 1e-6 * (k + 1), sign * 2e-6 * (k + 1))
-                sent.add(pair)
-                drive.stream(["x", "y"], pair)
+            # By lot, so that each of them is the last of a period now and then.
+            for drive, sign in turns.sample(((node, 1), (other, -1)), 2):
+                sent.append((sign * 1e-6 * (k + 1), sign * 2e-6 * (k + 1)))
+                drive.stream(["x", "y"], sent[-1])
             time.sleep(0.002)
         node.wait_until(node.now() + 10 * TSP_NS, 10)
         states = node.record(begin, node.now()).states
-    commanded = set(zip(states["psec", "x"].tolist(), states["psec", "y"].tolist()))
-    assert commanded <= sent
-    assert len({x > 0 for x, _ in commanded - {(0.0, 0.0)}}) == 2, "only one of them was heard"
-    assert len(commanded) > 30
+    commanded = list(zip(states["psec", "x"].tolist(), states["psec", "y"].tolist()))
+    assert set(commanded) <= set(sent)
+    assert commanded[-1] == sent[-1]
+    places = [sent.index(pair) for pair in commanded]
+    assert places == sorted(places), "an older message came after a newer one"
+    assert {x > 0 for x, _ in commanded if x} == {True, False}, "only one of them was heard"
+    assert len(set(commanded)) > 30

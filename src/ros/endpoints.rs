@@ -1,6 +1,6 @@
 //! Topics of the node under their resolved names, with their QoS profiles.
 
-use futures::{Stream, StreamExt};
+use futures::{Stream, StreamExt, stream};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use ros2_client::{Message, MessageInfo, MessageTypeName, Name, Node, ReadResult};
 
@@ -35,15 +35,28 @@ pub struct Subscription<M> {
 }
 
 impl<M: Message + Recorded + Send + Sync + 'static> Subscription<M> {
-    /// The messages as they come, recorded as they came.
+    /// The messages in the order in which they came, recorded so.
     pub fn async_stream(&self) -> impl Stream<Item = ReadResult<(M, MessageInfo)>> + '_ {
-        self.network.async_stream().then(async |received| {
+        in_order_of_arrival(self.network.async_stream()).then(async |received| {
             if let Ok((message, _)) = &received {
                 self.tap.record(message).await;
             }
             received
         })
     }
+}
+
+/// Messages that wait at a time and are put in order.
+const BATCH: usize = 64;
+
+/// What waits, by the time at which it came: RustDDS gives out what waits publisher by publisher.
+fn in_order_of_arrival<M>(
+    messages: impl Stream<Item = ReadResult<(M, MessageInfo)>>,
+) -> impl Stream<Item = ReadResult<(M, MessageInfo)>> {
+    messages.ready_chunks(BATCH).flat_map(|mut batch| {
+        batch.sort_by_key(|received| received.as_ref().ok().and_then(|(_, info)| info.received_timestamp()));
+        stream::iter(batch)
+    })
 }
 
 /// A topic that could not be created.
