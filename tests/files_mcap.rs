@@ -166,8 +166,8 @@ fn a_bad_message_is_told_with_its_topic_number_and_log_time() {
     assert!(message.starts_with(&format!("{at}it is not a message of this type: ")), "{message}");
 }
 
-#[test]
-fn another_encoding_is_refused() {
+/// A recording of one message, `{}`, on `topic`.
+fn record_encoded(topic: &str, encoding: &str) -> Vec<u8> {
     let mut writer = options(None).create(Cursor::new(Vec::new())).expect("in memory");
     let schema = Some(Arc::new(mcap::Schema {
         id: 1,
@@ -177,9 +177,9 @@ fn another_encoding_is_refused() {
     }));
     let channel = mcap::Channel {
         id: 1,
-        topic: "/psec".to_owned(),
+        topic: topic.to_owned(),
         schema,
-        message_encoding: "json".to_owned(),
+        message_encoding: encoding.to_owned(),
         metadata: BTreeMap::new(),
     };
     let data = Cow::Borrowed(b"{}".as_slice());
@@ -187,10 +187,41 @@ fn another_encoding_is_refused() {
         mcap::Message { channel: Arc::new(channel), sequence: 0, log_time: 0, publish_time: 0, data };
     writer.write(&message).expect("in memory");
     writer.finish().expect("in memory");
+    writer.into_inner().into_inner()
+}
+
+#[test]
+fn another_encoding_is_refused() {
     assert_eq!(
-        error(&writer.into_inner().into_inner(), None),
+        error(&record_encoded("/psec", "json"), None),
         "r.mcap: /psec, message 0, log time 0 s: its encoding is \"json\", must be \"cdr\""
     );
+}
+
+#[test]
+fn a_refusal_names_an_encoding_and_topics_in_one_line() {
+    let long = "a\nb\u{1b}[2J\u{2028}c\u{202e}".repeat(10_000);
+    fn entry<'a>(topic: &'a str, kind: &'a str) -> Entry<'a> {
+        (topic, kind, 1, trajectory(0.5, false))
+    }
+    let other = format!("/b{long}");
+    let several = record(&[entry(&long, TYPE), entry(&other, TYPE)], options(None));
+    let foreign = record(&[entry(&long, "std_msgs/msg/Empty")], options(None));
+    let refusals = [
+        error(&record_encoded("/psec", &long), None),
+        error(&record_encoded(&long, "json"), None),
+        error(&several, None),
+        error(&several, Some("/psec")),
+        error(&several, Some(&format!("{long}c"))),
+        error(&foreign, None),
+    ];
+    for refusal in refusals {
+        assert!(refusal.starts_with("r.mcap: ") && refusal.len() < 2_000, "{} bytes", refusal.len());
+        assert!(
+            !refusal.contains(|c: char| c.is_control() || ('\u{2028}'..='\u{202e}').contains(&c)),
+            "{refusal:?}"
+        );
+    }
 }
 
 #[test]

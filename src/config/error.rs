@@ -184,5 +184,11 @@ pub(crate) fn shortened(text: &str) -> String {
     if out.len() < text.len() {
         out.push('…');
     }
-    out.replace(char::is_control, " ")
+    out.replace(breaks_line, " ")
+}
+
+/// Whether a terminal or an editor would do more with `c` than to show it: control characters, line and paragraph
+/// separators, and what turns the direction of writing.
+pub(crate) fn breaks_line(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

@@ -32,8 +32,8 @@ mod yaml;
 mod tests;
 
 pub use definition::{DefaultValue, Definition, Kind, MotorKind, Presence, Scope};
-pub(crate) use error::shortened;
 pub use error::{ConfigError, Source};
+pub(crate) use error::{breaks_line, shortened};
 pub use machine::*;
 pub use node::{GoalDefaults, NodeConfig, QosConfig, TimeMode, ToolConfig};
 pub use parameter_file::{Assignment, parse_assignment};

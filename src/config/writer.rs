@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::definition::Scope;
+use super::error::breaks_line;
 use super::parameters::Parameters;
 use super::value::Value;
 
@@ -141,7 +142,7 @@ fn quoted(value: &str) -> String {
         match c {
             '"' | '\\' => out.extend(['\\', c]),
             // What YAML takes for the end of a line, or does not let stand as it is.
-            c if c.is_control() || ('\u{2028}'..='\u{2029}').contains(&c) || is_unprintable(c) => {
+            c if breaks_line(c) || is_unprintable(c) => {
                 let _ = write!(out, "\\U{:08x}", u32::from(c));
             }
             c => out.push(c),
@@ -157,5 +158,5 @@ fn is_unprintable(c: char) -> bool {
 }
 
 fn one_line(text: &str) -> String {
-    text.replace(|c: char| c.is_control() || ('\u{2028}'..='\u{2029}').contains(&c), " ")
+    text.replace(breaks_line, " ")
 }

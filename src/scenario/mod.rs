@@ -23,7 +23,7 @@ use std::path::Path as FilePath;
 
 use serde_saphyr::{NonFiniteFloatPolicy, options};
 
-use crate::config::MachineConfig;
+use crate::config::{MachineConfig, breaks_line};
 use crate::path::Program;
 
 pub use error::ScenarioError;
@@ -117,11 +117,7 @@ impl Scenario {
             let message = text.rsplit_once(" at line ").map_or(text.as_str(), |(message, _)| message);
             ScenarioError::Syntax {
                 at: format!("{name}{}", line.unwrap_or_default()),
-                message: message
-                    .chars()
-                    .take(LONGEST_MESSAGE)
-                    .collect::<String>()
-                    .replace(char::is_control, " "),
+                message: message.chars().take(LONGEST_MESSAGE).collect::<String>().replace(breaks_line, " "),
             }
         })?;
         Ok(Scenario { name: name.to_owned(), file })

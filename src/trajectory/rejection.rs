@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::config::shortened;
+use crate::config::{breaks_line, shortened};
 
 /// Longest sentence, characters: what it quotes comes from whoever sent the trajectory, in any length.
 const LONGEST_TEXT: usize = 500;
@@ -100,8 +100,8 @@ impl Rejection {
             text.truncate(end);
             text.push('…');
         }
-        if text.contains(char::is_control) {
-            text = text.replace(char::is_control, " ");
+        if text.contains(breaks_line) {
+            text = text.replace(breaks_line, " ");
         }
         Self { code, joint: None, index: None, value: 0.0, limit: 0.0, text }
     }

@@ -33,6 +33,7 @@ use tracing_subscriber::{
 use self::filter::LoggerLevels;
 use self::limit::{Limiter, Verdict};
 use super::args::{LogLevel, RosArgs};
+use crate::config::breaks_line;
 
 /// One message of this program, for `/rosout`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -145,7 +146,7 @@ fn terminal_line(record: &LogRecord) -> String {
         record.logger
     );
     for character in record.message.chars() {
-        if character.is_control() && character != '\t' {
+        if breaks_line(character) && character != '\t' {
             line.extend(character.escape_default());
         } else {
             line.push(character);
