@@ -57,11 +57,13 @@ fn listed<'a>(names: impl IntoIterator<Item = &'a String>) -> Vec<String> {
     names.into_iter().take(MOST_LISTED).map(|name| shortened(name)).collect()
 }
 
-/// The name that looks most like `found`, if one does.
+/// The name that looks most like `found`, if one does. Compared is what a message would show of them: comparing takes
+/// a time that is the product of their lengths.
 fn nearest<'a>(found: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
-    let similar = known.map(|name| (strsim::jaro_winkler(found, name), name));
+    let found = shortened(found);
+    let similar = known.map(shortened).map(|name| (strsim::jaro_winkler(&found, &name), name));
     let (similarity, name) = similar.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (similarity >= NEAR_ENOUGH).then(|| shortened(name))
+    (similarity >= NEAR_ENOUGH).then_some(name)
 }
 
 /// The end of a message about an unknown name.
