@@ -165,7 +165,7 @@ async fn serve(
     let mut publishing = Publishing { dropped: &dropped, listeners: &mut listeners, tasks: &mut tasks };
     let (goal_events, events) = mpsc::unbounded_channel();
     let results_output = publishing.start(topics.results, WhenFull::Wait);
-    let results = Arc::new(Results::new(results_output, joint_limits.clone(), goal_events));
+    let results = Arc::new(Results::new(results_output, joint_limits.clone(), goal_events, node_config.max_points));
     let diagnostics = publishing.start(topics.diagnostics, WhenFull::Drop);
     let every = node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * seconds(period))).round() as i64);
     let (running, running_goals) = watch::channel(Arc::from([]));

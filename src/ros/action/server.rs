@@ -266,7 +266,9 @@ impl Task<'_> {
         self.goals.accept(id, now);
         let checked = if live < MOST_LIVE {
             // A large trajectory takes a while to check; other tasks go on meanwhile.
-            tokio::task::block_in_place(|| self.tell.checks.check(&message.goal))
+            tokio::task::block_in_place(|| self.tell.checks.check(&message.goal)).and_then(
+                |(trajectory, tolerances)| Ok((self.tell.results.hold(trajectory)?, tolerances)),
+            )
         } else {
             let text = format!("{live} goals are under way; at most {MOST_LIVE} are taken");
             Err(Rejection::new(Code::TooManyGoals, text).numbers(live as f64, MOST_LIVE as f64))
@@ -275,7 +277,6 @@ impl Task<'_> {
         match checked {
             Ok((trajectory, tolerances)) => {
                 let motion = next_id(&self.tell.ids);
-                let trajectory = Arc::new(trajectory);
                 self.goals.offered(&id, motion);
                 // Before the simulation is asked, and longer than the goal lasts: its first samples and its
                 // last ones find it here. Frames say themselves which motions they belong to.
