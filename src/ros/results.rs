@@ -137,7 +137,10 @@ impl Results {
                 }
             }
             Report::Ended(end) => self.ended(end).await,
-            Report::StreamEnded(time, end, joints) => self.stream_ended(time, end, joints).await,
+            Report::StreamEnded(time, end, joints, on_its_way) => {
+                self.stream_ended(time, end, joints).await;
+                drop(on_its_way);
+            }
         }
     }
 
