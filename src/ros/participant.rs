@@ -58,6 +58,7 @@ impl Participant {
         let builder = match security {
             Security::Off | Security::Open(_) => builder,
             Security::Enclave(folder) => {
+                super::rtps::secure();
                 // SROS2 keeps keys without a password.
                 let files =
                     DomainParticipantSecurityConfigFiles::with_ros_default_names(folder, String::new());
