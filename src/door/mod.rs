@@ -5,6 +5,7 @@ pub mod args;
 mod cancel;
 mod checks;
 mod goal;
+mod held;
 mod loads;
 pub mod names;
 pub mod parameters;
@@ -13,6 +14,7 @@ mod stream;
 pub use cancel::{Candidate, select};
 pub use checks::Checks;
 pub use goal::GoalChecks;
+pub use held::Held;
 pub use loads::loads;
 pub use stream::{Order, Setpoints};
 

@@ -128,7 +128,7 @@ pub(super) fn check_node_name(name: &str) -> Result<(), NameError> {
 }
 
 /// Checks a namespace: absolute, and without a slash at its end unless it is the root.
-pub(super) fn check_namespace(namespace: &str) -> Result<(), NameError> {
+pub(crate) fn check_namespace(namespace: &str) -> Result<(), NameError> {
     let bad = |reason| Err(NameError::new(namespace, "namespace", reason));
     match namespace.strip_prefix('/') {
         None => bad("it does not begin with a slash"),

@@ -29,7 +29,7 @@ use std::{
 use rustdds::{DomainParticipant, GUID};
 use tracing::debug;
 
-use super::rtps::{Guid, Message, entity};
+use super::rtps::{Guid, Message, entity, is_secured};
 
 /// How a participant's id begins (9.3.1.1).
 const VENDOR_FAST_DDS: [u8; 2] = [0x01, 0x0f];
@@ -54,7 +54,7 @@ impl Asker {
     /// Asks a publisher that has just been matched with a reader of `participant`.
     pub(super) fn matched(&self, participant: &DomainParticipant, reader: GUID, writer: GUID) {
         let (own, other) = (reader.to_bytes(), writer.to_bytes());
-        if !is_asked(&own, &other) {
+        if is_secured() || !is_asked(&own, &other) {
             return;
         }
         let datagram = datagram(&own, &other);

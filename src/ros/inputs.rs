@@ -56,11 +56,11 @@ impl PsecInput {
     async fn take(&self, message: JointTrajectory, info: &MessageInfo) {
         let origin = Origin::of(&message.header.stamp, info);
         // A large trajectory takes a while to check; other tasks go on meanwhile.
-        let checked = tokio::task::block_in_place(|| self.checks.check(&message));
+        let checked = tokio::task::block_in_place(|| self.checks.check(&message))
+            .and_then(|trajectory| self.results.hold(trajectory));
         match checked {
             Ok(trajectory) => {
                 let id = next_id(&self.ids);
-                let trajectory = Arc::new(trajectory);
                 self.results.expect(id, origin, Arc::clone(&trajectory)).await;
                 // The simulation is gone only when the node shuts down.
                 let _ = self.commands.send(Command::Offer { id, trajectory, tolerances: None }).await;

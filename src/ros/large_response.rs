@@ -34,12 +34,15 @@ use ros2_client::service::RmwRequestId;
 use rustdds::{DomainParticipant, RepresentationIdentifier, serialization};
 use serde::{Deserialize, Serialize};
 
-use super::rtps::{CDR_LE, Data, Guid, Message, entity, sequence_number};
+use super::rtps::{CDR_LE, Data, Guid, Message, entity, is_secured, sequence_number};
 
 /// Fast DDS's UDP transport reads no more of a datagram.
 const LARGEST_DATAGRAM: usize = 65_500;
 /// RustDDS sends this many octets unfragmented wherever the MTU is 700 or more.
 const NEVER_FRAGMENTED: usize = 512;
+/// The longest response of a secured participant, octets: RustDDS sends it unfragmented, with what protects it,
+/// wherever the MTU is 1500. In a datagram of our own it would be readable for all.
+const LARGEST_PROTECTED: usize = 1024;
 /// From one datagram to the next of a service: what a client's socket can hold, some 200 KB by
 /// default, must not overflow with this and the useless fragments.
 const PACE: Duration = Duration::from_millis(2);
@@ -98,11 +101,16 @@ impl LargeResponses {
             .map_err(|error| LargeResponseError::Encoding(error.to_string()))?;
         // The overhead does not depend on what identifies the sample.
         let identity = [0; 24];
-        let most = LARGEST_DATAGRAM - data(&[0; 16], 0, &inline_qos(&identity), &[]).overhead();
+        let secured = is_secured();
+        let most = if secured {
+            LARGEST_PROTECTED
+        } else {
+            LARGEST_DATAGRAM - data(&[0; 16], 0, &inline_qos(&identity), &[]).overhead()
+        };
         if payload.len() > most {
             return Err(LargeResponseError::TooLong(payload.len(), most));
         }
-        Ok((payload.len() > NEVER_FRAGMENTED).then_some(payload))
+        Ok((payload.len() > NEVER_FRAGMENTED && !secured).then_some(payload))
     }
 
     /// The datagram of the response that RustDDS wrote as sample `number`.

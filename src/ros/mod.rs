@@ -28,6 +28,7 @@ mod results;
 mod reused;
 pub mod rosout;
 mod rtps;
+pub mod security;
 mod service;
 mod setpoints;
 mod stream;
@@ -35,5 +36,6 @@ mod throttle;
 mod tool;
 mod topics;
 mod trigger;
+mod unsent;
 
 use crate::door::{args, names};

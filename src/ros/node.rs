@@ -35,6 +35,7 @@ use super::participant::{Participant, ParticipantError};
 use super::recorder::{RecordError, Recorder};
 use super::results::Results;
 use super::rosout;
+use super::security::Security;
 use super::service::ServiceError;
 use super::tool::ToolTopics;
 use super::topics::Topics;
@@ -94,6 +95,7 @@ pub enum NodeError {
 pub fn run(
     args: &RosArgs,
     environment: &Environment,
+    security: &Security,
     parameters: Parameters,
     log: mpsc::Receiver<LogRecord>,
 ) -> Result<(), NodeError> {
@@ -103,7 +105,7 @@ pub fn run(
         .enable_all()
         .build()
         .map_err(|source| NodeError::System { what: "start the runtime", source })?;
-    let participant = Participant::open(environment)?;
+    let participant = Participant::open_with(environment, security)?;
     let result = runtime.block_on(serve(args, &participant, parameters, log));
     // Tasks and endpoints are gone; what is left of the runtime is not waited for.
     runtime.shutdown_timeout(Duration::from_millis(50));
@@ -165,7 +167,8 @@ async fn serve(
     let mut publishing = Publishing { dropped: &dropped, listeners: &mut listeners, tasks: &mut tasks };
     let (goal_events, events) = mpsc::unbounded_channel();
     let results_output = publishing.start(topics.results, WhenFull::Wait);
-    let results = Arc::new(Results::new(results_output, joint_limits.clone(), goal_events));
+    let results =
+        Arc::new(Results::new(results_output, joint_limits.clone(), goal_events, node_config.max_points));
     let diagnostics = publishing.start(topics.diagnostics, WhenFull::Drop);
     let every = node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * seconds(period))).round() as i64);
     let (running, running_goals) = watch::channel(Arc::from([]));
@@ -341,7 +344,7 @@ async fn stop_axes(
     stop: Option<Arc<Trajectory>>,
 ) -> Result<String, String> {
     let trajectory = stop.ok_or("this machine has no joint to stop")?;
-    commands.send(Command::Offer { id, trajectory, tolerances: None }).await.map_err(shutting_down)?;
+    commands.send(Command::Stop(id, trajectory)).await.map_err(shutting_down)?;
     Ok("stopping every axis within its limits".to_owned())
 }
 

@@ -4,8 +4,10 @@ use std::time::{Duration, Instant};
 
 use ros2_client::Context;
 use rustdds::DomainParticipant;
+#[cfg(feature = "security")]
+use rustdds::DomainParticipantSecurityConfigFiles;
 
-use super::{environment::Environment, goodbye::Goodbye};
+use super::{environment::Environment, goodbye::Goodbye, security::Security};
 
 /// The node could not join the network.
 #[derive(Debug, thiserror::Error)]
@@ -38,13 +40,37 @@ pub struct Participant {
 }
 
 impl Participant {
-    /// Opens a participant in the domain and on the networks that `environment` names.
+    /// Opens a participant in the domain and on the networks that `environment` names, without DDS Security.
     ///
     /// # Errors
     /// [`ParticipantError::Open`] when the sockets or threads cannot be had.
     pub fn open(environment: &Environment) -> Result<Self, ParticipantError> {
-        let participant = environment.participant_builder().build().map_err(|error| {
-            ParticipantError::Open { domain_id: environment.domain_id(), reason: error.to_string() }
+        Self::open_with(environment, &Security::Off)
+    }
+
+    /// Likewise, secured as `security` says.
+    ///
+    /// # Errors
+    /// Also where the files of the enclave do not allow it to take part in the domain.
+    pub fn open_with(environment: &Environment, security: &Security) -> Result<Self, ParticipantError> {
+        let builder = environment.participant_builder();
+        #[cfg(feature = "security")]
+        let builder = match security {
+            Security::Off | Security::Open(_) => builder,
+            Security::Enclave(folder) => {
+                super::rtps::secure();
+                // SROS2 keeps keys without a password.
+                let files =
+                    DomainParticipantSecurityConfigFiles::with_ros_default_names(folder, String::new());
+                builder.builtin_security(files)
+            }
+        };
+        if let Security::Open(reason) = security {
+            tracing::warn!("nothing of what this node says or hears is protected: {reason}");
+        }
+        let participant = builder.build().map_err(|error| ParticipantError::Open {
+            domain_id: environment.domain_id(),
+            reason: error.to_string(),
         })?;
         Ok(Self { participant: Some(participant), environment: environment.clone() })
     }

@@ -14,6 +14,7 @@ use super::convert::{header, stamp};
 use super::outputs::Output;
 use super::pace::{Accepted, Report};
 use crate::assess::AxisReport;
+use crate::door::Held;
 use crate::messages::{Source, Status, TrajectoryResult};
 use crate::simulation::{Abort, MotionEnd, Outcome, Quantity, Violation};
 use crate::trajectory::{JointLimits, JointSet, MotionId, Rejection, StreamEnd, Trajectory};
@@ -93,16 +94,27 @@ pub struct Results {
     /// What becomes of goals; at most two events for each.
     goals: mpsc::UnboundedSender<GoalEvent>,
     known: Mutex<HashMap<MotionId, Known>>,
+    held: Held,
 }
 
 impl Results {
-    /// Results of a machine with `joints`; those of action goals go to `goals` too.
+    /// Results of a machine with `joints`; those of action goals go to `goals` too. One trajectory has at most
+    /// `max_points` points.
     pub fn new(
         output: Output<TrajectoryResult>,
         joints: Vec<JointLimits>,
         goals: mpsc::UnboundedSender<GoalEvent>,
+        max_points: usize,
     ) -> Self {
-        Results { output, joints, goals, known: Mutex::new(HashMap::new()) }
+        Results { output, joints, goals, known: Mutex::new(HashMap::new()), held: Held::new(max_points) }
+    }
+
+    /// Takes a trajectory in, whatever source it has, while there is room for it.
+    ///
+    /// # Errors
+    /// As [`Held::take`].
+    pub fn hold(&self, trajectory: Trajectory) -> Result<Arc<Trajectory>, Rejection> {
+        self.held.take(trajectory)
     }
 
     /// Remembers where a trajectory came from, before the simulation is asked.
@@ -125,7 +137,10 @@ impl Results {
                 }
             }
             Report::Ended(end) => self.ended(end).await,
-            Report::StreamEnded(time, end, joints) => self.stream_ended(time, end, joints).await,
+            Report::StreamEnded(time, end, joints, on_its_way) => {
+                self.stream_ended(time, end, joints).await;
+                drop(on_its_way);
+            }
         }
     }
 

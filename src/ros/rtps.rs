@@ -3,6 +3,7 @@
 //!
 //! Everything is little endian. Sections are those of RTPS 2.5.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// 8.3.3.1.2, 9.4.4: what RustDDS speaks.
@@ -31,6 +32,20 @@ pub(super) const CDR_LE: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 const HEADER: usize = 20;
 const SUBMESSAGE_HEADER: usize = 4;
 const PARAMETER_HEADER: usize = 4;
+
+/// Whether the participant of this process is secured: no message of ours is encrypted or signed.
+static SECURED: AtomicBool = AtomicBool::new(false);
+
+/// From now on, nothing but what tells that the participant leaves is sent from here.
+#[cfg(feature = "security")]
+pub(super) fn secure() {
+    SECURED.store(true, Ordering::Relaxed);
+}
+
+/// Whether what is sent must be protected, which only RustDDS can do.
+pub(super) fn is_secured() -> bool {
+    SECURED.load(Ordering::Relaxed)
+}
 
 /// 9.3.1: a participant's prefix, then the entity.
 pub(super) type Guid = [u8; 16];

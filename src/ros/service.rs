@@ -19,6 +19,7 @@ use tokio::sync::Mutex;
 use super::args::RosArgs;
 use super::large_response::{self, LargeResponses};
 use super::rtps::Guid;
+use super::unsent::Place;
 
 /// How long a write may wait for a slow reader.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
@@ -198,8 +199,8 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         self.requests().map(move |received| received.map(|(id, request)| wrap(id, request))).boxed()
     }
 
-    /// Sends the response to a request, once its client is known.
-    pub fn respond<'a>(&'a self, id: RmwRequestId, response: A) -> BoxFuture<'a, ()>
+    /// Sends the response to a request, once its client is known; its place is free again then.
+    pub fn respond<'a>(&'a self, id: RmwRequestId, response: A, place: Place) -> BoxFuture<'a, ()>
     where
         Q: Send + Sync,
         A: Send + Sync,
@@ -213,7 +214,9 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
                 }
             };
             self.wait_for_client(&id).await;
-            match self.write(id, response, large).await {
+            let written = self.write(id, response, large).await;
+            drop(place);
+            match written {
                 Ok(None) => {}
                 Ok(Some((datagram, number))) => self.large.repeat(datagram, number).await,
                 Err(reason) => {

@@ -41,7 +41,7 @@ impl Trigger {
                         Ok(message) => (true, message),
                         Err(message) => (false, message),
                     };
-                    self.0.respond(id, TriggerResponse { success, message }).await;
+                    self.0.respond(id, TriggerResponse { success, message }, None).await;
                 }
                 Err(reason) => tracing::warn!("{reason}"),
             }

@@ -10,6 +10,7 @@ use virtual_axes::config::{Parameters, Source, parse_assignment};
 use virtual_axes::door::args::{Command, ParameterSource, RosArgs};
 use virtual_axes::ros::environment::Environment;
 use virtual_axes::ros::node::{self, NodeError};
+use virtual_axes::ros::security::Security;
 use virtual_axes::ros::{log, rosout};
 
 /// Exit status of a wrong command line, environment or machine file.
@@ -58,6 +59,10 @@ fn run(args: &RosArgs) -> ExitCode {
         Ok(environment) => environment,
         Err(error) => return refuse(&error),
     };
+    let security = match Security::from_lookup(|name| std::env::var(name).ok(), args.enclave()) {
+        Ok(security) => security,
+        Err(error) => return refuse(&error),
+    };
     let (log_in, log) = tokio::sync::mpsc::channel(rosout::QUEUE);
     if let Err(error) = log::init(args, Some(log_in)) {
         return refuse(&error);
@@ -69,7 +74,7 @@ fn run(args: &RosArgs) -> ExitCode {
         Ok(parameters) => parameters,
         Err(error) => return refuse(error.as_ref()),
     };
-    match node::run(args, &environment, parameters, log) {
+    match node::run(args, &environment, &security, parameters, log) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error @ NodeError::Record(_)) => refuse(&error),
         Err(error) => {

@@ -10,7 +10,8 @@
 //! | `-r [node:]__node:=name` (or `__name`), `-r [node:]__ns:=/namespace` | who the node is |
 //! | `--log-level [logger:=]LEVEL` | `DEBUG`, `INFO`, `WARN`, `ERROR`, `FATAL`, `UNSET`, in any case |
 //! | `--enable-X-logs`, `--disable-X-logs` | X is `rosout`, `stdout` or `external-lib` |
-//! | `-e`, `--enclave /path`, `--log-file-name P`, `--log-config-file F` | taken, without effect |
+//! | `-e`, `--enclave /path` | the enclave of the node; the last one wins |
+//! | `--log-file-name P`, `--log-config-file F` | taken, without effect |
 //!
 //! `from` may begin with `rostopic://` or `rosservice://`. What rcl leaves for the program to look
 //! at, this program refuses: it has no arguments of its own.
@@ -180,6 +181,7 @@ pub struct RosArgs {
     log_level: Option<LogLevel>,
     logger_levels: Vec<(String, LogLevel)>,
     log_sinks: LogSinks,
+    enclave: Option<String>,
     warnings: Vec<String>,
 }
 
@@ -221,6 +223,12 @@ impl RosArgs {
     #[must_use]
     pub fn log_sinks(&self) -> LogSinks {
         self.log_sinks
+    }
+
+    /// The enclave whose keys the node has, if one was given.
+    #[must_use]
+    pub fn enclave(&self) -> Option<&str> {
+        self.enclave.as_deref()
     }
 
     /// Sentences for the log about arguments that were taken but have no effect.

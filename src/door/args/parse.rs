@@ -75,6 +75,7 @@ struct Draft {
     remaps: Vec<RemapRule>,
     log_level: Option<LogLevel>,
     logger_levels: Vec<(String, LogLevel)>,
+    enclave: Option<String>,
     log_sinks: LogSinks,
     warnings: Vec<String>,
 }
@@ -90,9 +91,10 @@ impl Draft {
             "--params-file" => (FILE, |draft, _, value| draft.parameters_file(value)),
             "-r" | "--remap" => (REMAP, |draft, _, value| draft.remap(value)),
             "--log-level" => (LEVEL, |draft, _, value| draft.level(value)),
-            "-e" | "--enclave" => (ENCLAVE, |draft, flag, value| {
+            "-e" | "--enclave" => (ENCLAVE, |draft, _, value| {
                 check_namespace(value).map_err(|error| error.to_string())?;
-                draft.ignore(flag, value, "this node has no DDS security")
+                draft.enclave = Some(value.to_owned());
+                Ok(())
             }),
             "--log-file-name" => {
                 (PREFIX, |draft, flag, value| draft.ignore(flag, value, "this node writes no log file"))
@@ -230,6 +232,7 @@ impl Draft {
             remaps: self.remaps,
             log_level: self.log_level,
             logger_levels: self.logger_levels,
+            enclave: self.enclave,
             log_sinks: self.log_sinks,
             warnings: self.warnings,
         })

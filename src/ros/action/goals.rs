@@ -18,8 +18,8 @@ pub(super) const MOST_LIVE: usize = 1024;
 const MOST_ENDED: usize = 256;
 /// How long a result is kept.
 const RESULTS_KEPT: Duration = Duration::from_secs(15 * 60);
-/// Most requests that wait for the result of one goal.
-const MOST_WAITING: usize = 256;
+/// Most requests that wait for the results of all goals: each gets its response when the goals end, maybe at once.
+const MOST_WAITING: usize = 4096;
 
 /// Where a goal stands, as action_msgs/GoalStatus numbers it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,11 +136,12 @@ impl Goals {
 
     /// Somebody asks for a result.
     pub fn result(&mut self, id: &GoalId, request: RmwRequestId) -> Answer {
+        let waiting = self.list.iter().map(|goal| goal.waiting.len()).sum::<usize>();
         match self.find(id) {
             Some(Goal { state, ended: Some((result, _)), .. }) => {
                 Answer::Now(GetResultResponse { status: *state as i8, result: result.clone() })
             }
-            Some(goal) if goal.waiting.len() < MOST_WAITING => {
+            Some(goal) if waiting < MOST_WAITING => {
                 goal.waiting.push(request);
                 Answer::Later
             }
@@ -218,6 +219,24 @@ mod tests {
         assert_eq!((waiting.len(), answer.status, answer.result.error_code), (2, 6, -5));
         assert_eq!(response(&mut goals, 1), Answer::Now(answer));
         assert_eq!(response(&mut goals, 2), Answer::Now(GetResultResponse::default()));
+    }
+
+    /// A thousand goals had room for 256 requests each, which are all answered when a reset ends them.
+    #[test]
+    fn requests_for_results_are_bounded_over_all_goals() {
+        let mut goals = Goals::default();
+        for number in 1..=2 {
+            goals.accept(id(number), 5);
+        }
+        for _ in 0..MOST_WAITING / 2 {
+            assert_eq!(response(&mut goals, 1), Answer::Later);
+            assert_eq!(response(&mut goals, 2), Answer::Later);
+        }
+        for number in 1..=2 {
+            assert_eq!(response(&mut goals, number), Answer::Now(GetResultResponse::default()));
+        }
+        goals.end(&id(1), State::Succeeded, FollowJointTrajectoryResult::default(), Instant::now());
+        assert_eq!(response(&mut goals, 2), Answer::Later);
     }
 
     #[test]

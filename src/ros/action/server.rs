@@ -30,6 +30,7 @@ use crate::ros::outputs::Output;
 use crate::ros::pace::{Command, Health};
 use crate::ros::results::{Origin, Results};
 use crate::ros::service::{Service, ServiceError};
+use crate::ros::unsent::{Place, Unsent};
 use crate::trajectory::{Code, Rejection};
 
 /// The action's own name.
@@ -154,6 +155,7 @@ impl ActionServer {
             status: work.status,
         };
         let (asked, done) = end;
+        let unsent = Unsent::default();
         tokio::pin!(asked);
         loop {
             tokio::select! {
@@ -161,8 +163,8 @@ impl ActionServer {
                 _ = &mut asked => break,
                 Some(()) = task.responses.next(), if !task.responses.is_empty() => {}
                 Some(event) = events.recv() => task.note(event).await,
-                Some(request) = requests.next() => match request {
-                    Ok(request) => task.answer(request).await,
+                Some((place, request)) = unsent.next(&mut requests) => match request {
+                    Ok(request) => task.answer(request, place).await,
                     Err(reason) => warn!("{reason}"),
                 },
                 else => break,
@@ -239,24 +241,24 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    async fn answer(&mut self, request: Request) {
+    async fn answer(&mut self, request: Request, place: Place) {
         match request {
-            Request::Goal(request, message) => self.take_goal(request, *message).await,
-            Request::Cancel(request, message) => self.cancel(request, &message).await,
+            Request::Goal(request, message) => self.take_goal(request, *message, place).await,
+            Request::Cancel(request, message) => self.cancel(request, &message, place).await,
             Request::Result(request, message) => {
                 if let Answer::Now(response) = self.goals.result(&message.goal_id.uuid, request) {
-                    self.responses.push(self.server.get_result.respond(request, response));
+                    self.responses.push(self.server.get_result.respond(request, response, place));
                 }
             }
         }
     }
 
-    async fn take_goal(&mut self, request: RmwRequestId, message: SendGoalRequest) {
+    async fn take_goal(&mut self, request: RmwRequestId, message: SendGoalRequest, place: Place) {
         let id = message.goal_id.uuid;
         let now = self.tell.health.borrow().time;
         let accepted = !self.goals.knows(&id);
         let response = SendGoalResponse { accepted, stamp: stamp(now) };
-        self.responses.push(self.server.send_goal.respond(request, response));
+        self.responses.push(self.server.send_goal.respond(request, response, place));
         if !accepted {
             warn!("{} refused: its id is in use", goal_name(&id));
             return;
@@ -267,6 +269,7 @@ impl Task<'_> {
         let checked = if live < MOST_LIVE {
             // A large trajectory takes a while to check; other tasks go on meanwhile.
             tokio::task::block_in_place(|| self.tell.checks.check(&message.goal))
+                .and_then(|(trajectory, tolerances)| Ok((self.tell.results.hold(trajectory)?, tolerances)))
         } else {
             let text = format!("{live} goals are under way; at most {MOST_LIVE} are taken");
             Err(Rejection::new(Code::TooManyGoals, text).numbers(live as f64, MOST_LIVE as f64))
@@ -275,7 +278,6 @@ impl Task<'_> {
         match checked {
             Ok((trajectory, tolerances)) => {
                 let motion = next_id(&self.tell.ids);
-                let trajectory = Arc::new(trajectory);
                 self.goals.offered(&id, motion);
                 // Before the simulation is asked, and longer than the goal lasts: its first samples and its
                 // last ones find it here. Frames say themselves which motions they belong to.
@@ -296,7 +298,7 @@ impl Task<'_> {
         self.publish_status().await;
     }
 
-    async fn cancel(&mut self, request: RmwRequestId, message: &CancelGoalRequest) {
+    async fn cancel(&mut self, request: RmwRequestId, message: &CancelGoalRequest, place: Place) {
         let (response, motions) = self.goals.cancel(message);
         if !motions.is_empty() {
             info!("goals to be cancelled: {}", motions.len());
@@ -306,7 +308,7 @@ impl Task<'_> {
             let (done, _) = oneshot::channel();
             let _ = self.tell.commands.send(Command::Cancel(motion, done)).await;
         }
-        self.responses.push(self.server.cancel_goal.respond(request, response));
+        self.responses.push(self.server.cancel_goal.respond(request, response, place));
         self.publish_status().await;
     }
 
@@ -329,7 +331,7 @@ impl Task<'_> {
     fn end(&mut self, id: &GoalId, state: State, result: FollowJointTrajectoryResult) {
         let (waiting, response) = self.goals.end(id, state, result, Instant::now());
         for request in waiting {
-            self.responses.push(self.server.get_result.respond(request, response.clone()));
+            self.responses.push(self.server.get_result.respond(request, response.clone(), None));
         }
     }
 

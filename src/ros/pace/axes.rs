@@ -13,6 +13,9 @@ use crate::simulation::Simulation;
 use crate::trajectory::{Code, MotionId, Rejection};
 use crate::units::Nanoseconds;
 
+/// Most reports on streams that are on their way; what becomes of streams meanwhile is told by the last.
+const MOST_STREAM_ENDS: usize = 64;
+
 /// The simulation with what it answers.
 pub(super) struct Axes {
     simulation: Simulation,
@@ -24,6 +27,10 @@ pub(super) struct Axes {
     /// The accepted motions that have not ended, with the times of their starts, ns.
     motions: Vec<(MotionId, Nanoseconds)>,
     frames: Reused<Frame>,
+    /// The stops that nobody asked a result of, while they last.
+    stops: Vec<MotionId>,
+    /// Shared by the reports on streams that are on their way.
+    stream_ends: Arc<()>,
 }
 
 impl Axes {
@@ -34,7 +41,8 @@ impl Axes {
     ) -> Self {
         health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
         let (stream, frames) = (StreamLog::default(), Reused::default());
-        Axes { simulation, reports, health, stream, resets: 0, motions: Vec::new(), frames }
+        let (motions, stops, stream_ends) = (Vec::new(), Vec::new(), Arc::new(()));
+        Axes { simulation, reports, health, stream, resets: 0, motions, frames, stops, stream_ends }
     }
 
     pub(super) fn simulation(&self) -> &Simulation {
@@ -80,12 +88,20 @@ impl Axes {
 
     /// Tells of motions and streams that have ended, whether or not time goes on.
     pub(super) fn report_ends(&mut self) {
-        if let Some((end, joints)) = self.simulation.take_stream_end() {
+        if Arc::strong_count(&self.stream_ends) <= MOST_STREAM_ENDS
+            && let Some((end, joints)) = self.simulation.take_stream_end()
+        {
             let now = self.simulation.time_of(self.simulation.next_instant() - 1);
-            let _ = self.reports.send(Report::StreamEnded(now, end, joints));
+            let on_its_way = Arc::clone(&self.stream_ends);
+            let _ = self.reports.send(Report::StreamEnded(now, end, joints, on_its_way));
         }
         for end in self.simulation.take_ends() {
             self.motions.retain(|(id, _)| *id != end.id);
+            let asked_for = self.stops.len();
+            self.stops.retain(|id| *id != end.id);
+            if self.stops.len() < asked_for {
+                continue;
+            }
             // The receiver lives as long as the node; when it is gone, so is whoever wants to know.
             let _ = self.reports.send(Report::Ended(end));
         }
@@ -116,7 +132,7 @@ impl Axes {
 
     /// Takes a command; the next step is the first to show it.
     pub(super) fn obey(&mut self, command: Command) {
-        let Axes { simulation, reports, stream, resets, motions, .. } = self;
+        let Axes { simulation, reports, stream, resets, motions, stops, .. } = self;
         // Between two instants, the time is that of the first.
         let now = simulation.time_of(simulation.next_instant() - 1);
         match command {
@@ -134,6 +150,10 @@ impl Axes {
                 }
                 let _ = reports.send(Report::Decided(id, now, decision));
             }
+            Command::Stop(id, trajectory) => match simulation.offer(id, trajectory) {
+                Ok(_) => stops.push(id),
+                Err(rejection) => warn!("the axes cannot be stopped: {rejection}"),
+            },
             Command::Cancel(id, done) => {
                 let _ = done.send(simulation.cancel(id));
             }

@@ -44,6 +44,8 @@ pub enum Command {
         /// How far it may stray.
         tolerances: Option<Box<Tolerances>>,
     },
+    /// Stop every joint; nobody is told what becomes of this motion.
+    Stop(MotionId, Arc<Trajectory>),
     /// Call a motion off, and say whether there was one.
     Cancel(MotionId, oneshot::Sender<bool>),
     /// Put loads (N or N·m) on axes for a while.
@@ -79,8 +81,8 @@ pub enum Report {
     Decided(MotionId, Nanoseconds, Result<Accepted, Rejection>),
     /// A motion has ended.
     Ended(MotionEnd),
-    /// Joints were taken away from a stream at a time (ns).
-    StreamEnded(Nanoseconds, StreamEnd, JointSet),
+    /// Joints were taken away from a stream at a time (ns); the last field counts how many of these are on their way.
+    StreamEnded(Nanoseconds, StreamEnd, JointSet, Arc<()>),
 }
 
 /// The samples of one position instant.
@@ -104,7 +106,7 @@ pub struct Channels {
     pub commands: mpsc::Receiver<Command>,
     /// Frames out; bounded.
     pub frames: mpsc::Sender<Arc<Frame>>,
-    /// Reports out: at most two for each accepted command.
+    /// Reports out: at most two for each trajectory that is held, and some of streams.
     pub reports: mpsc::UnboundedSender<Report>,
     /// Health out.
     pub health: watch::Sender<Health>,

@@ -143,7 +143,7 @@ impl Paced {
                 self.axes.report_ends();
             }
             // All that waits ends with it.
-            Command::Reset(_) => {
+            Command::Stop(..) | Command::Reset(_) => {
                 self.release();
                 self.axes.obey(command);
                 self.axes.report_ends();

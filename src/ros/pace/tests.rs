@@ -109,6 +109,46 @@ fn a_period_of_the_thread_allocates_and_frees_nothing() {
     assert!(matches!(thread.reports.try_recv(), Ok(Report::Decided(MotionId(1), _, Ok(_)))));
 }
 
+/// Reports that nobody takes wait in a channel without a bound: a reader that never acknowledges a result has that effect.
+#[test]
+fn stops_without_end_leave_no_reports() {
+    let parameters = Parameters::embedded_default().expect("the embedded machine is valid");
+    let limits = joints(&parameters.machine_config().expect("valid"), "");
+    let mut thread = Thread::new();
+    let period = thread.axes.simulation().period();
+    let context = Context { joints: &limits, period, max_points: 1, allow_nonzero_end_velocity: false };
+    let stop = Trajectory::new(Request::new(Start::Now, Vec::new()), &context).map(Arc::new).expect("a stop");
+    for id in 0..200 {
+        thread.command(Command::Stop(MotionId(id), Arc::clone(&stop)));
+        thread.period();
+    }
+    assert!(thread.reports.try_recv().is_err());
+    // Nobody but this test has it when all of them are over.
+    thread.period();
+    assert_eq!(Arc::strong_count(&stop), 1);
+}
+
+#[test]
+fn streams_that_end_without_end_leave_some_reports_and_the_last() {
+    let mut thread = Thread::new();
+    for _ in 0..200 {
+        let setpoints = Setpoints { positions: vec![(0, 0.0)], ..Setpoints::default() };
+        thread.command(Command::Stream(Arc::new(setpoints)));
+        thread.period();
+        thread.command(Command::Reset(oneshot::channel().0));
+        thread.period();
+    }
+    let mut waiting = Vec::new();
+    while let Ok(report) = thread.reports.try_recv() {
+        assert!(matches!(report, Report::StreamEnded(_, StreamEnd::Reset, _, _)), "{report:?}");
+        waiting.push(report);
+    }
+    assert!((2..=64).contains(&waiting.len()), "{} reports", waiting.len());
+    drop(waiting);
+    thread.period();
+    assert!(matches!(thread.reports.try_recv(), Ok(Report::StreamEnded(..))), "what was held back");
+}
+
 #[test]
 fn a_frame_stays_as_it_was_while_somebody_has_it() {
     let mut thread = Thread::new();

@@ -30,6 +30,7 @@ use ros2_interfaces_jazzy_serde::{
 
 use super::args::RosArgs;
 use super::service::{Service, ServiceError, profile};
+use super::unsent::{Place, Unsent};
 use crate::door::parameters::{self as wire, ParameterHost, list};
 
 /// rmw's profile for parameter services and events keeps this many, so that a client may send that
@@ -93,15 +94,16 @@ impl ParameterServices {
         ]);
         // Responses are sent side by side: one client that is slow to be discovered holds up no other.
         let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
+        let unsent = Unsent::default();
         tokio::pin!(stop);
         loop {
             tokio::select! {
                 biased;
                 () = &mut stop => break,
                 Some(()) = responses.next(), if !responses.is_empty() => {}
-                Some(request) = requests.next() => match request {
+                Some((place, request)) = unsent.next(&mut requests) => match request {
                     Ok(request) => {
-                        let response = self.answer(&mut host, &now, request).await;
+                        let response = self.answer(&mut host, &now, request, place).await;
                         responses.push(response);
                     }
                     Err(reason) => tracing::warn!("{reason}"),
@@ -117,49 +119,49 @@ impl ParameterServices {
         host: &mut H,
         now: &(impl Fn() -> Time + Send),
         request: Request,
+        place: Place,
     ) -> BoxFuture<'a, ()> {
         match request {
             Request::Get(id, request) => {
-                let values = request.names.iter().map(|name| host.get(name));
+                let values = within_bounds(&request.names).iter().map(|name| host.get(name));
                 let values = values.map(wire::value_to_wire).collect();
-                self.get.respond(id, GetParametersResponse { values })
+                self.get.respond(id, GetParametersResponse { values }, place)
             }
             Request::Types(id, request) => {
-                let kinds = request
-                    .names
+                let kinds = within_bounds(&request.names)
                     .iter()
                     .map(|name| wire::type_number(host.get(name).map(|value| value.kind())));
                 let types = kinds.collect();
-                self.types.respond(id, GetParameterTypesResponse { types })
+                self.types.respond(id, GetParameterTypesResponse { types }, place)
             }
             Request::Set(id, request) => {
                 if let Err(reason) = wire::check_count(request.parameters.len()) {
                     let results = vec![wire::result_to_wire(Err(reason))];
-                    return self.set.respond(id, SetParametersResponse { results });
+                    return self.set.respond(id, SetParametersResponse { results }, place);
                 }
                 let mut results = Vec::with_capacity(request.parameters.len());
                 for parameter in request.parameters {
                     let result = self.set(host, now, vec![parameter]).await;
                     results.push(wire::result_to_wire(result));
                 }
-                self.set.respond(id, SetParametersResponse { results })
+                self.set.respond(id, SetParametersResponse { results }, place)
             }
             Request::SetAtomically(id, request) => {
                 let result = self.set(host, now, request.parameters).await;
                 let result = wire::result_to_wire(result);
-                self.set_atomically.respond(id, SetParametersAtomicallyResponse { result })
+                self.set_atomically.respond(id, SetParametersAtomicallyResponse { result }, place)
             }
             Request::List(id, request) => {
-                let result = list(&host.names(), &request.prefixes, request.depth);
-                self.list.respond(id, ListParametersResponse { result })
+                let result = list(&host.names(), within_bounds(&request.prefixes), request.depth);
+                self.list.respond(id, ListParametersResponse { result }, place)
             }
             Request::Describe(id, request) => {
-                let descriptors = request.names.into_iter().map(|name| {
-                    let descriptor = host.describe(&name);
-                    wire::descriptor_to_wire(name, descriptor)
+                let descriptors = within_bounds(&request.names).iter().map(|name| {
+                    let descriptor = host.describe(name);
+                    wire::descriptor_to_wire(name.clone(), descriptor)
                 });
                 let descriptors = descriptors.collect();
-                self.describe.respond(id, DescribeParametersResponse { descriptors })
+                self.describe.respond(id, DescribeParametersResponse { descriptors }, place)
             }
         }
     }
@@ -196,6 +198,17 @@ impl ParameterServices {
     }
 }
 
+/// The names of a request, or none of more than a request may have: what is asked for each of them is held together.
+fn within_bounds(names: &[String]) -> &[String] {
+    match wire::check_count(names.len()) {
+        Ok(()) => names,
+        Err(reason) => {
+            tracing::warn!("a request for parameters is answered with none: {reason}");
+            &[]
+        }
+    }
+}
+
 /// Creates the services under the node's name, reliable and with rmw's depth.
 struct Door<'a> {
     node: &'a mut Node,
@@ -223,5 +236,18 @@ impl Door<'_> {
             .create_topic(&name, type_name, &profile(QUEUE_DEPTH))
             .map_err(|e| error(e.to_string()))?;
         self.node.create_publisher(&topic, None).map_err(|e| error(e.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A description is some ten times as long as a name that is asked for, and a request has room for millions.
+    #[test]
+    fn names_without_end_in_a_request_are_not_looked_up() {
+        let names = vec!["x.velocity_loop.gain".to_owned(); 1001];
+        assert_eq!(within_bounds(&names[..1000]).len(), 1000);
+        assert!(within_bounds(&names).is_empty());
     }
 }

@@ -1,0 +1,130 @@
+#!/usr/bin/env python3
+"""The crates that this package is built of: versions, licences, sources; docs/dependencies.md is their table.
+
+    tools/dependencies.py               fails if the table is out of date, a licence is not in deny.toml's list,
+                                        or a crate does not come from the registry
+    tools/dependencies.py --write       writes the table
+    tools/dependencies.py --advisories  asks cargo-audit or cargo-deny, where one of them is installed
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+TABLE = ROOT / "docs" / "dependencies.md"
+BEGIN, END = "<!-- crates -->\n", "<!-- /crates -->\n"
+PLATFORM = "x86_64-unknown-linux-gnu"
+REGISTRY = "registry+https://github.com/rust-lang/crates.io-index"
+PROGRAMS, SECURITY, TESTS, FUZZ = "programs", "feature security", "tests and benchmarks", "fuzz targets"
+
+
+def metadata(manifest: Path, *features: str) -> dict[str, Any]:
+    """What cargo knows of a package, by its lock file, on one platform."""
+    words = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", PLATFORM]
+    done = subprocess.run([*words, "--manifest-path", manifest, *features], capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(f"dependencies: {done.stderr.strip()}")
+    return json.loads(done.stdout)
+
+
+def reached(known: dict[str, Any], with_tests: bool) -> set[str]:
+    """Ids of the packages that the first one needs, and of those they need."""
+    nodes = {node["id"]: node for node in known["resolve"]["nodes"]}
+    found, left = set(), [known["resolve"]["root"]]
+    while left:
+        package = left.pop()
+        if package in found:
+            continue
+        found.add(package)
+        for dependency in nodes[package]["deps"]:
+            kinds = {kind["kind"] for kind in dependency["dep_kinds"]}
+            if with_tests or kinds != {"dev"}:
+                left.append(dependency["pkg"])
+    return found
+
+
+def is_allowed(expression: str, allowed: set[str]) -> bool:
+    """Whether an SPDX expression can be met by the licences of the list; an exception only gives more."""
+    expression = re.sub(r"\s+WITH\s+[\w.-]+", "", expression.replace("/", " OR "))
+    words = re.sub(r"[\w.+-]+", lambda word: {"OR": "or", "AND": "and"}.get(word[0], str(word[0] in allowed)), expression)
+    if not re.fullmatch(r"(True|False|or|and|[()\s])+", words):
+        return False
+    try:
+        return bool(eval(words, {"__builtins__": {}}))  # noqa: S307: nothing but the words above is in it
+    except SyntaxError:
+        return False
+
+
+def crates() -> list[tuple[str, str, str, str, str | None]]:
+    """Name, version, licence, what needs it, source; by name."""
+    own = ROOT / "Cargo.toml"
+    default, secured, fuzz = metadata(own), metadata(own, "--all-features"), metadata(ROOT / "fuzz" / "Cargo.toml")
+    where: dict[tuple[str, str], str] = {}
+    packages: dict[tuple[str, str], dict[str, Any]] = {}
+    for known, with_tests, what in (
+        (default, False, PROGRAMS),
+        (secured, False, SECURITY),
+        (secured, True, TESTS),
+        (fuzz, True, FUZZ),
+    ):
+        needed = reached(known, with_tests)
+        for package in known["packages"]:
+            if package["id"] in needed and not (package["source"] is None and ROOT in Path(package["manifest_path"]).parents):
+                key = package["name"], package["version"]
+                where.setdefault(key, what)
+                packages[key] = package
+    rows = []
+    for key in sorted(packages):
+        package = packages[key]
+        rows.append((*key, package["license"] or "not stated", where[key], package["source"]))
+    return rows
+
+
+def advisories() -> int:
+    """Ask who knows the advisories, with all that they say."""
+    for program, words in (("cargo-audit", ["audit"]), ("cargo-deny", ["deny", "check"])):
+        if shutil.which(program):
+            return subprocess.run(["cargo", *words], cwd=ROOT).returncode
+    print("dependencies: needs cargo-audit or cargo-deny (cargo install cargo-audit), and RustSec's database", file=sys.stderr)
+    return 1
+
+
+def main() -> int:
+    """Take the command line."""
+    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("--write", action="store_true")
+    words.add_argument("--advisories", action="store_true")
+    asked = words.parse_args()
+    if asked.advisories:
+        return advisories()
+    allowed = set(tomllib.loads((ROOT / "deny.toml").read_text())["licenses"]["allow"])
+    rows = crates()
+    faults = [f"{name} {version}: licence {licence}" for name, version, licence, _, _ in rows if not is_allowed(licence, allowed)]
+    faults += [f"{name} {version}: from {source}" for name, version, _, _, source in rows if source != REGISTRY]
+    for fault in faults:
+        print(f"dependencies: {fault}, which deny.toml does not allow", file=sys.stderr)
+    head = "| crate | version | licence | needed by |\n|---|---|---|---|\n"
+    table = head + "".join(f"| {name} | {version} | {licence} | {what} |\n" for name, version, licence, what, _ in rows)
+    text = TABLE.read_text()
+    before, rest = text.split(BEGIN)
+    present, after = rest.split(END)
+    if asked.write:
+        TABLE.write_text(before + BEGIN + table + END + after)
+    elif present != table:
+        faults.append("table")
+        print("dependencies: the table in docs/dependencies.md is out of date: tools/dependencies.py --write", file=sys.stderr)
+    print(f"{len(rows)} crates, {sum(what == PROGRAMS for *_, what, _ in rows)} of them in the programs")
+    return bool(faults)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
