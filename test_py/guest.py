@@ -2,6 +2,9 @@
 
     python test_py/guest.py listen TOPIC DEPTH    reliable; tells the stamps that it got when it is asked
     python test_py/guest.py send POINTS           one trajectory of so many points on psec
+    python test_py/guest.py sink DEPTH            reliable; drops what joint_states, motor_currents, drive_states say
+    python test_py/guest.py echo SERVICE          answers it, always the same
+    python test_py/guest.py probe SERVICE SERVICE calls the two in turns; tells how long they took when it is asked
 """
 
 from __future__ import annotations
@@ -21,10 +24,12 @@ from typing import Any
 import numpy as np
 import rclpy
 from builtin_interfaces.msg import Duration
+from rcl_interfaces.srv import GetParameters
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from virtual_axes.msg import DriveStates, MotorCurrents
 
 from drive import DEEP_QOS, NANOSECONDS, PSEC_QOS, SETTLE_S, _die_with_parent, _stamp_ns
 
@@ -84,6 +89,13 @@ class Guest:
         self._process.stdin.write("\n")
         self._process.stdin.flush()
         return np.array(json.loads(self.says()), dtype=np.int64)
+
+    def latencies_ms(self, calls: int) -> list[float]:
+        """How long a prober's services take, medians of so many calls of each."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{calls}\n")
+        self._process.stdin.flush()
+        return json.loads(self.says())
 
     def go_on(self) -> None:
         """Let a sender send."""
@@ -170,6 +182,47 @@ def send(node: Any, points: int) -> None:
     sys.stdin.readline()
 
 
+def sink(node: Any, depth: int) -> None:
+    """Listen, and do nothing with it."""
+    come = threading.Event()
+    for kind, topic in (
+        (JointState, "/joint_states"),
+        (MotorCurrents, "/virtual_axes/motor_currents"),
+        (DriveStates, "/virtual_axes/drive_states"),
+    ):
+        node.create_subscription(kind, topic, lambda _: come.set(), QoSProfile(depth=depth), raw=True)
+    threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+    come.wait()
+    print(READY, flush=True)
+    sys.stdin.readline()
+
+
+def echo(node: Any, service: str) -> None:
+    """Answer at once, always the same."""
+    node.create_service(GetParameters, service, lambda _, response: response)
+    print(READY, flush=True)
+    rclpy.spin(node)
+
+
+def probe(node: Any, services: tuple[str, str]) -> None:
+    """Call in turns."""
+    clients = [node.create_client(GetParameters, service) for service in services]
+    for client in clients:
+        if not client.wait_for_service(PATIENCE_S):
+            sys.exit("no service")
+    time.sleep(SETTLE_S)
+    print(READY, flush=True)
+
+    def took_ms(client: Any) -> float:
+        begin = time.perf_counter()
+        rclpy.spin_until_future_complete(node, client.call_async(GetParameters.Request()), timeout_sec=PATIENCE_S / 3)
+        return (time.perf_counter() - begin) * 1e3
+
+    for line in sys.stdin:
+        took = [[took_ms(client) for client in clients] for _ in range(int(line))]
+        print(json.dumps(np.median(took, axis=0).tolist()), flush=True)
+
+
 def main() -> None:
     """What the command line says."""
     rclpy.init()
@@ -179,6 +232,12 @@ def main() -> None:
             listen(node, topic, int(depth))
         case ["send", points]:
             send(node, int(points))
+        case ["sink", depth]:
+            sink(node, int(depth))
+        case ["echo", service]:
+            echo(node, service)
+        case ["probe", first, second]:
+            probe(node, (first, second))
         case _:
             sys.exit(__doc__)
 

@@ -8,7 +8,12 @@
 
 Valid and invalid trajectories, streams, loads, services, parameters, goals that are cancelled or not, subscribers
 that come and go, nodes that come, leave and are killed; the same --seed gives the same sequence. With --speed the node
-follows a /clock of this tool's. At first what is bounded is filled to its bound, by a flood.
+follows a /clock of this tool's. At first what is bounded is filled to its bound: floods, endpoints that come and go,
+and listeners that are killed, for whom samples are kept until their lease has ended.
+
+Latency is that of a service to a client that does nothing else, over that of the same client at a process that only
+echoes, call by call in turns: what else the machine does slows both. Memory is what the process has of its own
+(RssAnon), without pages of files.
 
 The exit status is 1 if over the second half something grew by more than it may, or if the node died.
 """
@@ -21,6 +26,7 @@ import math
 import os
 import random
 import sys
+import tempfile
 import threading
 import time
 from collections import Counter
@@ -41,23 +47,33 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from action import Follow, goal, in_executor  # noqa: E402
-from drive import NANOSECONDS, Drive, Node, ParameterRefused, joint_trajectory, to_time  # noqa: E402
+from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, to_time  # noqa: E402
 from guest import Guest  # noqa: E402
 
 JOINTS = {"x": 0.05, "y": 0.05, "z": 0.05, "a": 0.2, "c": 1.0}
 """How far trajectories go from home, m or rad."""
 GAIN = "x.velocity_loop.gain"
+ECHO = "/echo"
+"""The service that only echoes."""
 TICK_S = 0.003
 """Wall time between two messages of the clock."""
 FILL = 12_000
 """More than the 8192 samples that the middleware keeps of a topic."""
+CROWD = 4096
+"""Announcements that the middleware keeps of publishers, and of subscriptions."""
+LEASE_S = 20
+"""For so long a participant of Fast DDS that was killed counts as there."""
+SHORT_LEASE_S = 2
+"""That of those who are killed while the soak runs."""
 KEPT = 64
 """Trajectories that the middleware keeps: depth of psec."""
 LONG = 5_000
 """Points of the longest trajectories."""
 LOOKS = 60
-CALLS = 9
+CALLS = 15
 """Whose median is the latency of a look."""
+MARKS = (0, 25, 50, 75, 100)
+"""Of the time, for the table, %."""
 
 
 @dataclass
@@ -65,13 +81,23 @@ class Look:
     """What was seen at one time."""
 
     minutes: float
-    resident_mb: float
+    memory_mb: float
     files: float
     threads: float
     latency_ms: float
+    """Of the node's service."""
+    echo_ms: float
+    """Of the process that only echoes."""
+    load: float
+    """Of the machine, over a minute."""
+
+    @property
+    def latency_ratio(self) -> float:
+        """The node's service over the echo."""
+        return self.latency_ms / self.echo_ms
 
 
-MAY_GROW = {"resident_mb": (3.0, 0.02), "files": (2.5, 0.0), "threads": (1.5, 0.0), "latency_ms": (2.0, 0.5)}
+MAY_GROW = {"memory_mb": (3.0, 0.02), "files": (2.5, 0.0), "threads": (1.5, 0.0), "latency_ratio": (0.0, 0.5)}
 """Over the second half: so much, and this share of its median there."""
 
 
@@ -100,11 +126,12 @@ class SoakClock:
 class Traffic:
     """What is asked of the node, one thing after the other, by chance."""
 
-    def __init__(self, drive: Drive, follow: Follow, seed: int):
-        """Nothing is sent yet."""
+    def __init__(self, drive: Drive, follow: Follow, seed: int, only: str | None, folder: Path):
+        """Nothing is sent yet; files are written to `folder`."""
         self.drive, self.follow = drive, follow
         self.chance = random.Random(seed)
         self.count: Counter[str] = Counter()
+        self._folder = folder
         self._guests: list[Guest] = []
         self._listening: list[Any] = []
         self._kinds: list[tuple[float, Callable[[], None]]] = [
@@ -123,6 +150,8 @@ class Traffic:
             (1, self.visitor),
             (0.5, self.killed),
         ]
+        if only is not None:
+            self._kinds = [(weight, act) for weight, act in self._kinds if act.__name__ == only]
 
     def step(self) -> None:
         """One of them."""
@@ -246,7 +275,10 @@ class Traffic:
     def killed(self) -> None:
         """A process listens; one of those that do is killed."""
         assert self.drive.process is not None
-        self._guests.append(Guest(self.drive.process.domain_id, "listen", "/joint_states", 10).__enter__())
+        # By a clock the node waits for a listener until its lease has ended.
+        domain = self.drive.process.domain_id
+        guest = Guest(domain, "sink", 10, lease=SHORT_LEASE_S, folder=self._folder)
+        self._guests.append(guest.__enter__())
         if len(self._guests) > 2:
             self._guests.pop(0).kill()
 
@@ -270,8 +302,35 @@ def long_trajectory() -> JointTrajectory:
     return joint_trajectory(["c"], times, 0.2 * np.sin(times - 1))
 
 
+def crowd(drive: Drive) -> None:
+    """Publishers and subscriptions, each announced once and taken back once."""
+    assert drive.process is not None
+    with Drive(process=drive.process) as other:
+
+        def come_and_go() -> None:
+            for _ in range(20):
+                other.node.destroy_subscription(other.node.create_subscription(Clock, "/crowd", lambda _: None, 1))
+                other.node.destroy_publisher(other.node.create_publisher(Clock, "/crowd", 1))
+
+        for _ in range(CROWD // 2 // 20 + 5):
+            in_executor(other, come_and_go)
+            time.sleep(0.02)
+
+
+def kill_listeners(drive: Drive) -> None:
+    """Samples are kept for those who have not acknowledged them, until their lease has ended."""
+    assert drive.process is not None
+    with Guest(drive.process.domain_id, "sink", 10) as guest:
+        guest.kill()
+    time.sleep(LEASE_S + 5)
+
+
 def fill(drive: Drive) -> None:
     """Bring histories and queues to their bounds."""
+    kill_listeners(drive)
+    drive.forget()
+    crowd(drive)
+    drive.forget()
     raw = serialize_message(joint_trajectory(["q"], [0.0], [[0.0]]))
     deadline = time.monotonic() + 60
     while len(drive.results()) < FILL and time.monotonic() < deadline:
@@ -285,23 +344,39 @@ def fill(drive: Drive) -> None:
     time.sleep(7)  # The middleware looks through its histories every 6 s.
 
 
-def look(drive: Drive, began: float) -> Look:
+def look(drive: Drive, prober: Guest, began: float) -> Look:
     """The process as it is now."""
     assert drive.process is not None
     pid = drive.process.pid
     status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
-    took = []
-    for _ in range(CALLS):
-        begin = time.perf_counter()
-        drive.get_parameters([GAIN])
-        took.append((time.perf_counter() - begin) * 1e3)
+    latency, echo = prober.latencies_ms(CALLS)
     return Look(
         minutes=(time.monotonic() - began) / 60,
-        resident_mb=int(status["VmRSS"].split()[0]) / 1e3,
+        memory_mb=int(status["RssAnon"].split()[0]) / 1e3,
         files=len(os.listdir(f"/proc/{pid}/fd")),
         threads=int(status["Threads"]),
-        latency_ms=float(np.median(took)),
+        latency_ms=latency,
+        echo_ms=echo,
+        load=os.getloadavg()[0],
     )
+
+
+def table(looks: list[Look]) -> str:
+    """Some of them, as Markdown."""
+    rows = ["| of the time | memory, MB | files | threads | service, ms | echo, ms | ratio | load |", "|" + "---|" * 8]
+    for mark in MARKS:
+        at = looks[round(mark / 100 * (len(looks) - 1))]
+        rows.append(
+            f"| {mark} % | {at.memory_mb:.1f} | {at.files:.0f} | {at.threads:.0f} | {at.latency_ms:.1f} "
+            f"| {at.echo_ms:.1f} | {at.latency_ratio:.2f} | {at.load:.1f} |"
+        )
+    return "\n".join(rows)
+
+
+def told(drive: Drive) -> dict[str, str]:
+    """What the last diagnostics say of the node."""
+    drive.wait_for(drive.diagnostics, 20, "diagnostics")
+    return {value.key: value.value for value in drive.diagnostics()[-1].status[0].values}
 
 
 def slope(minutes: np.ndarray, values: np.ndarray) -> float:
@@ -315,7 +390,7 @@ def verdict(looks: list[Look]) -> bool:
     half = looks[len(looks) // 2 :]
     minutes = np.array([found.minutes for found in half])
     grew = False
-    print(f"\n{len(looks)} looks in {looks[-1].minutes:.1f} minutes; over the second half:")
+    print(f"\n{table(looks)}\n\n{len(looks)} looks in {looks[-1].minutes:.1f} minutes; over the second half:")
     for name, (at_least, share) in MAY_GROW.items():
         values = np.array([getattr(found, name) for found in half])
         rate = slope(minutes, values)
@@ -323,7 +398,7 @@ def verdict(looks: list[Look]) -> bool:
         bad = growth > most
         grew |= bad
         print(
-            f"  {name:<12}{values.min():9.2f} to {values.max():9.2f}, {rate:+9.4f} a minute, "
+            f"  {name:<14}{values.min():9.2f} to {values.max():9.2f}, {rate:+9.4f} a minute, "
             f"{growth:+7.2f} in all, at most {most:.2f}: {'GROWS' if bad else 'flat'}"
         )
     return grew
@@ -335,6 +410,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=1, help="of the wall clock (1)")
     parser.add_argument("--speed", type=float, default=1, help="of the node's clock against the wall's (1)")
     parser.add_argument("--seed", type=int, default=1, help="of the traffic (1)")
+    parser.add_argument("--only", help="a kind of traffic, to find out what grows by it")
     args = parser.parse_args()
     real = args.speed == 1
     mode = ["-p", "time:=real"] if real else ["-p", "use_sim_time:=true"]
@@ -342,30 +418,39 @@ def main() -> int:
         clock = None if real else SoakClock(drive, args.speed)
         drive.connect(30)
         fill(drive)
-        with Follow(drive) as follow:
-            traffic = Traffic(drive, follow, args.seed)
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            Follow(drive) as follow,
+            Guest(process.domain_id, "echo", ECHO),
+            Guest(process.domain_id, "probe", f"{process.name}/get_parameters", ECHO) as prober,
+        ):
+            traffic = Traffic(drive, follow, args.seed, args.only, Path(folder))
             looks: list[Look] = []
+            values: dict[str, str] = {}
             try:
-                began = time.monotonic()
+                began, first_period = time.monotonic(), int(told(drive)["position_periods"])
                 while (passed := time.monotonic() - began) < args.minutes * 60:
                     traffic.step()
                     if process.poll() is not None:
                         break
                     if passed >= len(looks) * args.minutes * 60 / LOOKS:
                         traffic.forget()
-                        looks.append(look(drive, began))
+                        looks.append(look(drive, prober, began))
                         if len(looks) % (LOOKS // 10) == 0:
                             print(looks[-1], flush=True)
+                if process.poll() is None:
+                    time.sleep(1.5)  # Until the next diagnostics.
+                    values = told(drive)
+                    lived_s = (int(values["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
+                    print(f"\n{lived_s:.0f} s of the axes in {time.monotonic() - began:.0f} s")
             finally:
                 traffic.close()
-        time.sleep(1.5)
-        values = {value.key: value.value for value in drive.diagnostics()[-1].status[0].values}
         if clock is not None:
             clock.close()
         grew = verdict(looks)
         print("  asked:", ", ".join(f"{name} {number}" for name, number in sorted(traffic.count.items())))
         keys = ("position_periods", "missed_periods", "unpublished_periods", "dropped_samples", "max_lateness_ms")
-        print("  told:", ", ".join(f"{key} {values[key]}" for key in keys))
+        print("  told:", ", ".join(f"{key} {values.get(key)}" for key in keys))
         drive.process = None
         died = process.poll() is not None or process.stop() != 0 or "panicked" in process.output()
         if died:

@@ -12,10 +12,10 @@
 
 mod filter;
 mod limit;
+mod terminal;
 
 use std::{
     fmt::{self, Write as _},
-    io::Write as _,
     time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
@@ -27,11 +27,12 @@ use tracing::{
 use tracing_subscriber::{
     layer::{Context, Layer, SubscriberExt},
     registry::LookupSpan,
-    util::SubscriberInitExt,
+    util::{SubscriberInitExt, TryInitError},
 };
 
 use self::filter::LoggerLevels;
 use self::limit::{Limiter, Verdict};
+use self::terminal::Terminal;
 use super::args::{LogLevel, RosArgs};
 use crate::config::breaks_line;
 
@@ -52,26 +53,66 @@ pub struct LogRecord {
     pub line: Option<u32>,
 }
 
-/// The log could not be set up, because there is one already.
+/// The log could not be set up.
 #[derive(Debug, thiserror::Error)]
-#[error("the log is set up already: {0}")]
-pub struct LogError(String);
+pub enum LogError {
+    /// There is one already.
+    #[error("the log is set up already: {0}")]
+    Twice(#[from] TryInitError),
+    /// The operating system gives no thread.
+    #[error("cannot start the thread that writes the log: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// The log of this process.
+#[derive(Debug)]
+pub struct Log {
+    terminal: Terminal,
+}
+
+impl Log {
+    /// Writes a line that is no message, and waits (not for long) until all that was logged is written.
+    pub fn finish(self, line: Option<String>) {
+        if let Some(line) = line {
+            self.terminal.line(line + "\n");
+        }
+        self.terminal.finish();
+    }
+}
 
 /// Sets up the log of this process as `args` ask. Messages of this program (not the middleware's)
-/// also go into `rosout`; when that is full they are dropped, so that logging never waits.
+/// also go into `rosout`; when that is full, or nobody reads stderr, they are dropped, so that logging never waits.
 ///
 /// # Errors
-/// [`LogError`] when the process has a log already.
-pub fn init(args: &RosArgs, rosout: Option<mpsc::Sender<LogRecord>>) -> Result<(), LogError> {
+/// [`LogError`] when the process has a log already, or can have no thread more.
+pub fn init(args: &RosArgs, rosout: Option<mpsc::Sender<LogRecord>>) -> Result<Log, LogError> {
     let logger = logger_name(&args.node().to_string());
     let levels = LoggerLevels::new(&logger, args.log_level(), args.logger_levels());
     let sinks = args.log_sinks();
     let rosout = rosout.filter(|_| sinks.rosout);
-    let layer = RosLayer { logger, terminal: sinks.stdout, rosout, limiter: Limiter::default() };
-    tracing_subscriber::registry()
-        .with(layer.with_filter(levels))
-        .try_init()
-        .map_err(|error| LogError(error.to_string()))
+    let of = logger.clone();
+    let terminal = Terminal::start(std::io::stderr(), move |lines| terminal_line(&missed(&of, lines)))?;
+    let shown = sinks.stdout.then(|| terminal.clone());
+    let layer = RosLayer { logger, terminal: shown, rosout, limiter: Limiter::default() };
+    tracing_subscriber::registry().with(layer.with_filter(levels)).try_init()?;
+    Ok(Log { terminal })
+}
+
+/// What stands in the place of lines that were left out.
+fn missed(logger: &str, lines: u64) -> LogRecord {
+    LogRecord {
+        stamp: now(),
+        level: LogLevel::Warn,
+        logger: logger.to_owned(),
+        message: format!("nobody read this log for a while: {lines} lines are left out here"),
+        file: None,
+        line: None,
+    }
+}
+
+/// Since 1970.
+fn now() -> Duration {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
 }
 
 /// rcl's name for the logger of a node: `/cell/mill` has `cell.mill`.
@@ -81,7 +122,7 @@ fn logger_name(node: &str) -> String {
 
 struct RosLayer {
     logger: String,
-    terminal: bool,
+    terminal: Option<Terminal>,
     rosout: Option<mpsc::Sender<LogRecord>>,
     limiter: Limiter,
 }
@@ -109,16 +150,15 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for RosLayer {
         let logger = if own { self.logger.clone() } else { text.target(event).replace("::", ".") };
         let Some(message) = self.limited(event, text) else { return };
         let record = LogRecord {
-            stamp: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default(),
+            stamp: now(),
             level: severity(*event.metadata().level()),
             logger,
             message,
             file: event.metadata().file(),
             line: event.metadata().line(),
         };
-        if self.terminal {
-            // Nowhere is left to report that stderr is closed.
-            let _ = std::io::stderr().lock().write_all(terminal_line(&record).as_bytes());
+        if let Some(terminal) = &self.terminal {
+            terminal.line(terminal_line(&record));
         }
         if let Some(rosout) = self.rosout.as_ref().filter(|_| own) {
             let _ = rosout.try_send(record);
@@ -209,7 +249,7 @@ mod tests {
     ) -> Vec<LogRecord> {
         let (sender, mut receiver) = mpsc::channel(16);
         let (logger, limiter) = ("cell.mill".to_owned(), Limiter::default());
-        let layer = RosLayer { logger, terminal: false, rosout: Some(sender), limiter };
+        let layer = RosLayer { logger, terminal: None, rosout: Some(sender), limiter };
         let levels = LoggerLevels::new("cell.mill", level, loggers);
         let subscriber = tracing_subscriber::registry().with(layer.with_filter(levels));
         tracing::subscriber::with_default(subscriber, log);

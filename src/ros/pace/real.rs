@@ -10,7 +10,7 @@ use tokio::sync::mpsc;
 use tracing::warn;
 
 use super::axes::Axes;
-use super::wall::PaceClock;
+use super::wall::{PaceClock, since_epoch};
 use super::{ClockSource, Command, Frame, Turns};
 
 /// Instants that come later than this are computed and not published: a burst of them would push out of
@@ -24,7 +24,7 @@ pub(super) fn run(
     frames: &mpsc::Sender<Arc<Frame>>,
     mut turns: Turns,
 ) {
-    let clock = PaceClock::new(axes.simulation());
+    let clock = PaceClock::new(axes.simulation(), since_epoch);
     axes.tell_clock(|clock| clock.source = ClockSource::Wall);
     loop {
         let mut lateness = clock.wait_for(axes.simulation().next_instant());

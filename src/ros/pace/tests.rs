@@ -192,3 +192,72 @@ fn what_publishes_gets_each_frame_in_the_period_that_made_it() {
     }
     thread.join().expect("it ends when it is told to");
 }
+
+#[test]
+fn what_was_missed_is_computed_counted_and_kept_to_itself() {
+    const BEFORE: i64 = 20;
+    const MISSED: i64 = 300;
+    let late = Duration::from_millis(6);
+    let (mut paused, mut in_time) = (Thread::new(), Thread::new());
+    for thread in [&mut paused, &mut in_time] {
+        thread.offer();
+        for _ in 0..BEFORE {
+            thread.period();
+        }
+        while thread.frames.1.try_recv().is_ok() {}
+    }
+    // The commands of the time that was missed wait for the instant of now.
+    paused.command(Command::Load { loads: Arc::new(vec![(0, 200.0)]), hold: 60_000_000 });
+    let newest = BEFORE + MISSED;
+    real::stood_still(&mut paused.axes, late * 300, newest, |k| {
+        late * u32::try_from(newest - k).expect("only what is missed")
+    });
+    assert_eq!(paused.axes.simulation().next_instant(), newest);
+    assert!(paused.frames.1.try_recv().is_err(), "what is old is not published");
+    let health = paused.health.borrow().clone();
+    assert_eq!((health.periods, health.missed, health.unpublished, health.dropped), (320, 300, 300, 0));
+    // Of the first that was missed: 300 periods of 6 ms.
+    assert!((health.max_lateness - 1.8).abs() < 1e-9, "{}", health.max_lateness);
+
+    for _ in 0..MISSED {
+        in_time.period();
+        let _ = in_time.frames.1.try_recv();
+    }
+    in_time.command(Command::Load { loads: Arc::new(vec![(0, 200.0)]), hold: 60_000_000 });
+    let next = [&mut paused, &mut in_time].map(|thread| {
+        thread.period();
+        thread.frames.1.try_recv().expect("a frame")
+    });
+    assert_eq!(next[0].instant, newest);
+    assert_eq!(format!("{:?}", next[0]), format!("{:?}", next[1]), "the same bits as without the pause");
+}
+
+#[test]
+fn an_instant_that_is_due_already_is_not_taken_for_missed() {
+    let mut thread = Thread::new();
+    real::stood_still(&mut thread.axes, Duration::from_secs(2), 0, |_| Duration::ZERO);
+    assert_eq!((thread.axes.simulation().next_instant(), thread.health.borrow().missed), (0, 0));
+}
+
+#[test]
+fn a_wall_clock_that_is_set_neither_stops_nor_hurries_the_axes() {
+    const HOUR: Duration = Duration::from_secs(3600);
+    let thread = Thread::new();
+    let period = Duration::from_nanos(thread.axes.simulation().period().unsigned_abs());
+    let origin = wall::since_epoch();
+    let parameters = Parameters::embedded_default().expect("the embedded machine is valid");
+    let config = parameters.machine_config().expect("valid");
+    let simulation =
+        Simulation::new(&config, joints(&config, ""), i64::try_from(origin.as_nanos()).expect("this century"))
+            .expect("can be simulated");
+    // Set between the choice of the origin and the start; later nobody looks at it (it is an FnOnce).
+    for wall in [origin - HOUR, origin, origin + HOUR] {
+        let began = std::time::Instant::now();
+        let clock = wall::PaceClock::new(&simulation, || wall);
+        clock.wait_for(1);
+        let waited = began.elapsed();
+        assert!(waited >= period && waited < HOUR / 60, "{waited:?}");
+        // An hour of instants would be 600 000.
+        assert!(clock.newest_due() < 10_000, "{}", clock.newest_due());
+    }
+}

@@ -20,12 +20,17 @@ pub fn origin(mode: TimeMode, period: Nanoseconds) -> Nanoseconds {
 }
 
 fn grid_origin(period: Nanoseconds) -> Nanoseconds {
-    let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    let now = Nanoseconds::try_from(since_epoch.as_nanos()).unwrap_or(Nanoseconds::MAX / 2);
+    let now = Nanoseconds::try_from(since_epoch().as_nanos()).unwrap_or(Nanoseconds::MAX / 2);
     (now.div_euclid(period) + 1) * period
 }
 
-/// The wall clock as position instants.
+/// What the wall clock says, since the Unix epoch.
+pub(super) fn since_epoch() -> Duration {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
+}
+
+/// The wall clock as position instants, as it ran when this began: it is read once, so that setting it
+/// later neither stops nor hurries the axes.
 pub(super) struct PaceClock {
     /// When instant 0 is due.
     start: Instant,
@@ -33,12 +38,12 @@ pub(super) struct PaceClock {
 }
 
 impl PaceClock {
-    /// That of the instants of `simulation`.
-    pub(super) fn new(simulation: &Simulation) -> Self {
-        let now_unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    /// That of the instants of `simulation`, whose origin is the next instant by `wall`, or a past one.
+    pub(super) fn new(simulation: &Simulation, wall: impl FnOnce() -> Duration) -> Self {
         let origin = Duration::from_nanos(u64::try_from(simulation.time_of(0)).unwrap_or(0));
-        let start = Instant::now() + origin.saturating_sub(now_unix);
         let period = Duration::from_nanos(u64::try_from(simulation.period()).unwrap_or(1));
+        // More than a period ahead it is only by a wall clock that has been set back since.
+        let start = Instant::now() + origin.saturating_sub(wall()).min(period);
         PaceClock { start, period }
     }
 

@@ -1,0 +1,169 @@
+//! Lines for the terminal, written by a thread of their own: a reader of stderr that stands still (a pipe that nobody
+//! empties, a terminal after Ctrl-S) must not stop the axes.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender, TrySendError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Lines that wait for the reader, several times what a start with `--log-level debug` says at once; at some
+/// 200 bytes a line 200 kB.
+const QUEUE: usize = 1024;
+/// How long the end of the program waits for the reader.
+const LAST_WAIT: Duration = Duration::from_millis(500);
+/// How often it looks then whether there is room.
+const POLL: Duration = Duration::from_millis(1);
+
+/// The sending end: it never waits.
+#[derive(Debug, Clone)]
+pub(super) struct Terminal {
+    queue: SyncSender<Item>,
+    left_out: Arc<AtomicU64>,
+}
+
+#[derive(Debug)]
+enum Item {
+    Line(String),
+    /// Everything before it has been written.
+    Mark(SyncSender<()>),
+}
+
+impl Terminal {
+    /// Starts the thread that writes to `out`; `missed` is the line that says how many were left out.
+    ///
+    /// # Errors
+    /// Those of the operating system that gives no thread.
+    pub(super) fn start(
+        out: impl Write + Send + 'static,
+        missed: impl Fn(u64) -> String + Send + 'static,
+    ) -> io::Result<Self> {
+        let (queue, items) = mpsc::sync_channel(QUEUE);
+        let left_out = Arc::new(AtomicU64::new(0));
+        let counted = Arc::clone(&left_out);
+        thread::Builder::new().name("log".into()).spawn(move || write(out, &items, &counted, missed))?;
+        Ok(Terminal { queue, left_out })
+    }
+
+    /// Hands a line, with its end, over; if as many wait as may, it is left out and counted.
+    pub(super) fn line(&self, line: String) {
+        if self.queue.try_send(Item::Line(line)).is_err() {
+            self.left_out.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Waits until what was handed over is written, but not for long.
+    pub(super) fn finish(&self) {
+        let until = Instant::now() + LAST_WAIT;
+        let (written, is_written) = mpsc::sync_channel(1);
+        let mut mark = Item::Mark(written);
+        while let Err(TrySendError::Full(back)) = self.queue.try_send(mark) {
+            if Instant::now() >= until {
+                return;
+            }
+            mark = back;
+            thread::sleep(POLL);
+        }
+        // Late, or the thread has ended: there is nothing more to be done.
+        let _: Result<(), RecvTimeoutError> =
+            is_written.recv_timeout(until.saturating_duration_since(Instant::now()));
+    }
+}
+
+/// Writes until all senders are gone. Nowhere is left to report that stderr is closed.
+fn write(mut out: impl Write, items: &Receiver<Item>, left_out: &AtomicU64, missed: impl Fn(u64) -> String) {
+    while let Ok(first) = items.recv() {
+        let mut next = Some(first);
+        while let Some(item) = next {
+            match item {
+                Item::Line(line) => drop(out.write_all(line.as_bytes())),
+                // Whoever waited may have given up.
+                Item::Mark(written) => drop(written.try_send(())),
+            }
+            next = items.try_recv().ok();
+        }
+        // What was left out came after all that waited.
+        let left_out = left_out.swap(0, Ordering::Relaxed);
+        if left_out > 0 {
+            let _ = out.write_all(missed(left_out).as_bytes());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PATIENCE: Duration = Duration::from_secs(20);
+
+    /// A reader that takes a line when it is allowed to.
+    struct Slow {
+        allowed: Receiver<()>,
+        taken: mpsc::Sender<String>,
+    }
+
+    impl Write for Slow {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.allowed.recv().map_err(|_| io::ErrorKind::BrokenPipe)?;
+            let _ = self.taken.send(String::from_utf8_lossy(bytes).into_owned());
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn slow() -> (Terminal, mpsc::Sender<()>, Receiver<String>) {
+        let (allow, allowed) = mpsc::channel();
+        let (taken, lines) = mpsc::channel();
+        let missed = |lines| format!("missed {lines}\n");
+        (Terminal::start(Slow { allowed, taken }, missed).expect("a thread"), allow, lines)
+    }
+
+    #[test]
+    fn a_reader_that_stands_still_holds_nobody_up_and_is_told_what_it_missed() {
+        const MISSED: usize = 10;
+        let (terminal, allow, lines) = slow();
+        terminal.line("0\n".to_owned());
+        // One is being written; it is not in the queue any more.
+        while terminal.queue.try_send(Item::Line("1\n".to_owned())).is_ok() {}
+        thread::sleep(Duration::from_millis(20));
+        let mut queued = 0;
+        while terminal.queue.try_send(Item::Line("2\n".to_owned())).is_ok() {
+            queued += 1;
+        }
+        assert!(queued <= 1, "{queued}");
+        for _ in 0..MISSED {
+            terminal.line("3\n".to_owned());
+        }
+        terminal.finish();
+        for _ in 0..2 * QUEUE {
+            allow.send(()).expect("it writes");
+        }
+        let mut before = 0;
+        loop {
+            let line = lines.recv_timeout(PATIENCE).expect("a line");
+            if line.starts_with("missed") {
+                break assert_eq!(line, format!("missed {MISSED}\n"));
+            }
+            assert_ne!(line, "3\n");
+            before += 1;
+        }
+        assert!((QUEUE..=QUEUE + 1).contains(&before), "{before}");
+        terminal.line("4\n".to_owned());
+        assert_eq!(lines.recv_timeout(PATIENCE).expect("a line"), "4\n");
+    }
+
+    #[test]
+    fn the_end_waits_for_a_reader_that_reads() {
+        let (terminal, allow, lines) = slow();
+        for n in 0..100 {
+            terminal.line(format!("{n}\n"));
+            allow.send(()).expect("it writes");
+        }
+        terminal.finish();
+        assert_eq!(lines.try_iter().count(), 100);
+    }
+}
