@@ -8,8 +8,11 @@ use crate::lanes::{Number, numbers};
 /// 1.5·2⁵²: a number that is added to it is rounded to an integer, which then stands in its lowest bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
-/// Largest |x| that an [`Exponential`] is for: its result is a normal number.
-pub(super) const MAX_EXPONENT: f64 = 700.0;
+/// Largest |x| that an [`Exponential`] is for: e^x times any size that it may have is a normal number.
+pub(super) const MAX_EXPONENT: f64 = 600.0;
+/// Size up to which an [`Exponential`] is nothing, far below that of any torque or change of speed that acts:
+/// what decays from it would leave the normal numbers.
+const NO_SIZE: f64 = 1e-40;
 
 /// The polynomial of degree 9 that is nearest to e^r for |r| ≤ ln 2/2; its largest error is 1.4e-14.
 const POWERS: [f64; 10] = [
@@ -34,6 +37,8 @@ numbers! {
     pub(super) struct Exponential {
         pub rate: N,
         rate_log2: N,
+        /// |v| beyond which it stays as it is: one that decays is nothing there beside its size.
+        last: N,
         // The polynomial times the size.
         c0: N,
         c1: N,
@@ -51,16 +56,18 @@ numbers! {
 impl Exponential {
     pub fn new(size: f64, rate: f64) -> Self {
         // Nothing times 2^k would not be nothing: see the last line of `at`.
-        let rate = if size == 0.0 { 0.0 } else { rate };
+        let (size, rate) = if size.abs() < NO_SIZE { (0.0, 0.0) } else { (size, rate) };
+        let last = f64::min(MAX_EXPONENT / rate.abs(), f64::MAX);
         let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9] = POWERS.map(|c| size * c);
-        Exponential { rate, rate_log2: rate * LOG2_E, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 }
+        Exponential { rate, rate_log2: rate * LOG2_E, last, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 }
     }
 }
 
 impl<N: Number> Exponential<N> {
-    /// Its value where |rate·v| ≤ [`MAX_EXPONENT`].
+    /// Its value where rate·v ≤ [`MAX_EXPONENT`].
     #[inline(always)]
     pub fn at(&self, v: N) -> N {
+        let v = self.last.min(v);
         let rounder = v.constant(ROUNDER);
         let integer = v.mul_add(self.rate_log2, rounder);
         let k = integer - rounder;
@@ -134,6 +141,16 @@ mod tests {
     fn an_exponential_of_no_size_is_nothing() {
         for v in [0.0, 1.0, 100.0] {
             assert_eq!(Exponential::new(0.0, 7.0).at(v), 0.0);
+        }
+    }
+
+    #[test]
+    fn an_exponential_that_decays_below_the_normal_numbers_is_nothing_and_not_noise() {
+        for size in [1e18, -1.0, 1e-39, -1e-41, 1e-300] {
+            for v in [7.0, 7.2, 1e3, 1e300] {
+                let found = Exponential::new(size, -100.0).at(v);
+                assert!(found.abs() <= 1e-250 * f64::abs(size).max(1.0), "{size} e^(-100·{v}) = {found:e}");
+            }
         }
     }
 
