@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_1_PI, LN_2, LOG2_E, PI};
 
-use crate::lanes::{Number, numbers};
+use crate::lanes::{Number, limited, numbers};
 
 /// 1.5·2⁵²: a number that is added to it is rounded to an integer, which then stands in its lowest bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
@@ -13,6 +13,9 @@ pub(super) const MAX_EXPONENT: f64 = 600.0;
 /// Size up to which an [`Exponential`] is nothing, far below that of any torque or change of speed that acts:
 /// what decays from it would leave the normal numbers.
 const NO_SIZE: f64 = 1e-40;
+
+/// Largest |x| of which [`sine`] finds the half turns, rad: beyond, neighbouring numbers are parts of a turn apart.
+const FURTHEST_ANGLE: f64 = 1e15;
 
 /// The polynomial of degree 9 that is nearest to e^r for |r| ≤ ln 2/2; its largest error is 1.4e-14.
 const POWERS: [f64; 10] = [
@@ -84,7 +87,8 @@ impl<N: Number> Exponential<N> {
 /// sin x, x in rad.
 ///
 /// ±sin r with |r| ≤ π/2; the polynomial for sin(r)/r in r² is the one of degree 8 with the smallest largest
-/// error, 2.1e-19. Error of the whole below 4e-16 for |x| up to 10⁶ rad.
+/// error, 2.1e-19. Error of the whole below 4e-16 for |x| up to 10⁶ rad; what is beyond [`FURTHEST_ANGLE`] counts
+/// as that.
 #[inline(always)]
 pub(super) fn sine<N: Number>(x: N) -> N {
     /// π − [`PI`].
@@ -101,6 +105,7 @@ pub(super) fn sine<N: Number>(x: N) -> N {
         2.721_574_942_133_496_5e-15,
     ];
     let number = |value: f64| x.constant(value);
+    let x = limited(x, number(FURTHEST_ANGLE));
     let rounder = number(ROUNDER);
     let k = x.mul_add(number(FRAC_1_PI), rounder) - rounder;
     let r = k.mul_add(number(-PI_REST), k.mul_add(number(-PI), x));
@@ -163,5 +168,12 @@ mod tests {
             }
         }
         assert_eq!(sine(0.0), 0.0);
+    }
+
+    #[test]
+    fn the_sine_of_an_axis_that_has_flown_off_is_no_larger_than_1() {
+        for x in [1e12, 7.1e15, 1e16, 3.7e18, 1e40, 1e300, f64::MAX, f64::INFINITY] {
+            assert!(sine(x).abs() <= 1.0 && sine(-x) == -sine(x), "sin {x} = {}", sine(x));
+        }
     }
 }
