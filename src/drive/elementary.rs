@@ -3,13 +3,19 @@
 
 use std::f64::consts::{FRAC_1_PI, LN_2, LOG2_E, PI};
 
-use crate::lanes::{Number, numbers};
+use crate::lanes::{Number, limited, numbers};
 
 /// 1.5·2⁵²: a number that is added to it is rounded to an integer, which then stands in its lowest bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
-/// Largest |x| that an [`Exponential`] is for: its result is a normal number.
-pub(super) const MAX_EXPONENT: f64 = 700.0;
+/// Largest |x| that an [`Exponential`] is for: e^x times any size that it may have is a normal number.
+pub(super) const MAX_EXPONENT: f64 = 600.0;
+/// Size up to which an [`Exponential`] is nothing, far below that of any torque or change of speed that acts:
+/// what decays from it would leave the normal numbers.
+const NO_SIZE: f64 = 1e-40;
+
+/// Largest |x| of which [`sine`] finds the half turns, rad: beyond, neighbouring numbers are parts of a turn apart.
+const FURTHEST_ANGLE: f64 = 1e15;
 
 /// The polynomial of degree 9 that is nearest to e^r for |r| ≤ ln 2/2; its largest error is 1.4e-14.
 const POWERS: [f64; 10] = [
@@ -34,6 +40,8 @@ numbers! {
     pub(super) struct Exponential {
         pub rate: N,
         rate_log2: N,
+        /// |v| beyond which it stays as it is: one that decays is nothing there beside its size.
+        last: N,
         // The polynomial times the size.
         c0: N,
         c1: N,
@@ -51,16 +59,18 @@ numbers! {
 impl Exponential {
     pub fn new(size: f64, rate: f64) -> Self {
         // Nothing times 2^k would not be nothing: see the last line of `at`.
-        let rate = if size == 0.0 { 0.0 } else { rate };
+        let (size, rate) = if size.abs() < NO_SIZE { (0.0, 0.0) } else { (size, rate) };
+        let last = f64::min(MAX_EXPONENT / rate.abs(), f64::MAX);
         let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9] = POWERS.map(|c| size * c);
-        Exponential { rate, rate_log2: rate * LOG2_E, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 }
+        Exponential { rate, rate_log2: rate * LOG2_E, last, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 }
     }
 }
 
 impl<N: Number> Exponential<N> {
-    /// Its value where |rate·v| ≤ [`MAX_EXPONENT`].
+    /// Its value where rate·v ≤ [`MAX_EXPONENT`].
     #[inline(always)]
     pub fn at(&self, v: N) -> N {
+        let v = self.last.min(v);
         let rounder = v.constant(ROUNDER);
         let integer = v.mul_add(self.rate_log2, rounder);
         let k = integer - rounder;
@@ -77,7 +87,8 @@ impl<N: Number> Exponential<N> {
 /// sin x, x in rad.
 ///
 /// ±sin r with |r| ≤ π/2; the polynomial for sin(r)/r in r² is the one of degree 8 with the smallest largest
-/// error, 2.1e-19. Error of the whole below 4e-16 for |x| up to 10⁶ rad.
+/// error, 2.1e-19. Error of the whole below 4e-16 for |x| up to 10⁶ rad; what is beyond [`FURTHEST_ANGLE`] counts
+/// as that.
 #[inline(always)]
 pub(super) fn sine<N: Number>(x: N) -> N {
     /// π − [`PI`].
@@ -94,6 +105,7 @@ pub(super) fn sine<N: Number>(x: N) -> N {
         2.721_574_942_133_496_5e-15,
     ];
     let number = |value: f64| x.constant(value);
+    let x = limited(x, number(FURTHEST_ANGLE));
     let rounder = number(ROUNDER);
     let k = x.mul_add(number(FRAC_1_PI), rounder) - rounder;
     let r = k.mul_add(number(-PI_REST), k.mul_add(number(-PI), x));
@@ -138,6 +150,16 @@ mod tests {
     }
 
     #[test]
+    fn an_exponential_that_decays_below_the_normal_numbers_is_nothing_and_not_noise() {
+        for size in [1e18, -1.0, 1e-39, -1e-41, 1e-300] {
+            for v in [7.0, 7.2, 1e3, 1e300] {
+                let found = Exponential::new(size, -100.0).at(v);
+                assert!(found.abs() <= 1e-250 * f64::abs(size).max(1.0), "{size} e^(-100·{v}) = {found:e}");
+            }
+        }
+    }
+
+    #[test]
     fn the_sine_keeps_its_bound() {
         for limit in [4.0, 100.0, 1e6] {
             for x in range(-limit, limit, 1_000_003) {
@@ -146,5 +168,12 @@ mod tests {
             }
         }
         assert_eq!(sine(0.0), 0.0);
+    }
+
+    #[test]
+    fn the_sine_of_an_axis_that_has_flown_off_is_no_larger_than_1() {
+        for x in [1e12, 7.1e15, 1e16, 3.7e18, 1e40, 1e300, f64::MAX, f64::INFINITY] {
+            assert!(sine(x).abs() <= 1.0 && sine(-x) == -sine(x), "sin {x} = {}", sine(x));
+        }
     }
 }

@@ -3,7 +3,7 @@
 //! From tick to tick a speed changes little. Exponentials that are known at one speed give those near it by a
 //! short polynomial, `e^{b(v+δ)} = e^{bv} e^{bδ}`, and both exponentials of the law make one polynomial in δ.
 
-use super::elementary::Exponential;
+use super::elementary::{Exponential, MAX_EXPONENT};
 use crate::lanes::{Number, numbers};
 
 /// Largest |x| for which [`POWERS`] is e^x.
@@ -11,6 +11,8 @@ const REACH: f64 = 0.125;
 /// Where the middle of a new expansion is, in reaches from the speed that has left the one before: that speed
 /// is likely to go on in its direction.
 const AHEAD: f64 = 0.9;
+/// Largest speed times scale: distances in it are known to 10⁻⁷ of what is left of the reach.
+const FURTHEST: f64 = 1e8;
 
 /// The polynomial of degree 7 whose largest relative error from e^x is smallest for |x| ≤ [`REACH`]: 1.2e-14.
 const POWERS: [f64; 8] = [
@@ -65,9 +67,11 @@ impl Pair {
         Pair { first, second, scale, first_share, second_share, ahead: over_scale(AHEAD * REACH) }
     }
 
-    /// The larger of the two |rates|, per rad/s.
-    pub fn scale(&self) -> f64 {
-        self.scale
+    /// The speed from which on the sum stays as it is: a rising exponential would leave the range of numbers, or
+    /// distances could not be told from one another.
+    pub fn capped_from(&self) -> f64 {
+        let rise = self.first.rate.max(self.second.rate).max(0.0);
+        f64::min(MAX_EXPONENT / rise, FURTHEST / self.scale).min(f64::MAX)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Friction as a function of velocity, and how it acts over one tick.
 
-use super::elementary::{Exponential, MAX_EXPONENT};
+use super::elementary::Exponential;
 use super::expansion::{Expansion, Pair};
 use crate::config::{AxisKind, FrictionConfig};
 use crate::lanes::{Number, numbers};
@@ -19,7 +19,7 @@ numbers! {
         moving: Pair<N>,
         /// Kt i0, N·m.
         breakaway: N,
-        /// Speed from which on the law stays as it is, rad/s: its exponentials leave the range of numbers.
+        /// Speed from which on the law stays as it is, rad/s.
         capped_from: N,
         /// Speed up to which the law was fitted, rad/s.
         fitted_to: N,
@@ -41,7 +41,7 @@ impl Friction {
         Friction {
             moving,
             breakaway: torque_constant * law.i0,
-            capped_from: f64::min(MAX_EXPONENT / moving.scale(), f64::MAX),
+            capped_from: moving.capped_from(),
             fitted_to: FITTED_RANGE / velocity,
         }
     }
@@ -163,6 +163,51 @@ mod tests {
             for (v, found) in on_the_way(&friction, slow.chain(jumping)) {
                 let exact = if v == 0.0 { axis.friction.i0 } else { printed(&axis.friction, v.abs()) };
                 assert!((found - exact).abs() <= 1e-12, "{}: {found} A at {v}, not {exact} A", axis.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_steep_fall_after_breakaway_does_not_freeze_the_rest_of_the_law() {
+        // The steepest fall and rise that a machine may have, over the sizes that short ticks make of them.
+        for d in [-100.0, -35.0, -1e-9] {
+            for b in [0.02, 1.0, 0.0, -100.0] {
+                let law = FrictionConfig { a: 1.5, b, c: -0.5, d, i0: 1.0 };
+                for constant in [1e9, 1.0, 1e-9, 1e-25] {
+                    let friction = Friction::new(law, AxisKind::Linear, METRE_PER_MINUTE, constant);
+                    let fast =
+                        (0..40_000).map(|k| 1e-3 * f64::from(k)).chain((0..200).map(|k| 2.9 * f64::from(k)));
+                    for (v, found) in on_the_way(&friction, fast) {
+                        let exact = if v == 0.0 { law.i0 } else { printed(&law, v).max(0.0) };
+                        let off = (found / constant - exact).abs();
+                        assert!(
+                            off <= 1e-12 * exact.max(1.0),
+                            "{law:?}: {} A at {v}, not {exact}",
+                            found / constant
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_strong_law_at_speeds_beyond_sense_is_a_number_that_resists() {
+        for (a, c) in [(1e4, -1e4), (1e4, 1e4), (1e-300, 1e4)] {
+            for (b, d) in [(1.0, 0.99), (1.0, -100.0), (-100.0, -100.0), (1e-300, -100.0)] {
+                let law = FrictionConfig { a, b, c, d, i0: 1.0 };
+                // Kt 10⁵ and a torque that changes the speed by 10⁹ in a tick.
+                let friction = Friction::new(law, AxisKind::Linear, METRE_PER_MINUTE, 1e14);
+                for speed in [1.0, 6.0, 7.1, 650.0, 1e5, 1e12, 1e300, f64::MAX] {
+                    let whole = friction.bound(speed);
+                    let (_, near) = on_the_way(&friction, [speed].into_iter()).next().expect("there is one");
+                    assert!(whole.is_finite() && whole >= 0.0, "{law:?}: {whole} at {speed}");
+                    let size = 1e14 * (a.abs() + c.abs()) * (b.max(d).max(0.0) * speed.min(600.0)).exp();
+                    assert!(
+                        (near - whole).abs() <= 1e-12 * size,
+                        "{law:?}: {near:e} and {whole:e} at {speed}"
+                    );
+                }
             }
         }
     }

@@ -1,10 +1,16 @@
 //! The motor between two ticks, stepped without discretisation error.
 
+use std::f64::consts::TAU;
+
 use nalgebra::SMatrix;
 
 use super::DriveError;
+use super::response::Response;
 use crate::config::MotorConfig;
 use crate::lanes::{Number, limited, numbers};
+
+/// Largest entry of the system matrix times the tick with which a motor is slow: no interval is halved.
+const SLOW: f64 = 0.5;
 
 numbers! {
     /// State of a motor: what the differential equation integrates.
@@ -63,32 +69,71 @@ impl<N: Number> Row<N> {
     }
 }
 
+impl Row {
+    fn is_finite(&self) -> bool {
+        [self.current, self.speed, self.voltage, self.torque].iter().all(|weight| weight.is_finite())
+    }
+}
+
+/// The system matrix: states i, ω, θ, then the held inputs u and τ.
+fn system(m: &MotorConfig) -> SMatrix<f64, 5, 5> {
+    let mut a = SMatrix::zeros();
+    a[(0, 0)] = -m.resistance / m.inductance;
+    a[(0, 1)] = -m.emf_constant / m.inductance;
+    a[(0, 3)] = 1.0 / m.inductance;
+    a[(1, 0)] = m.torque_constant / m.inertia;
+    a[(1, 4)] = 1.0 / m.inertia;
+    a[(2, 1)] = 1.0;
+    a
+}
+
+/// The rows of a slow motor, by the approximant of Padé that nalgebra takes where it need not halve.
+fn approximant(system: &SMatrix<f64, 5, 5>) -> [Row; 3] {
+    let e = system.exp();
+    [0, 1, 2].map(|k| Row { current: e[(k, 0)], speed: e[(k, 1)], voltage: e[(k, 3)], torque: e[(k, 4)] })
+}
+
+/// The rows of any motor.
+fn closed_form(m: &MotorConfig, response: &Response) -> [Row; 3] {
+    let Response { impulse, step, ramp, slope, held, .. } = *response;
+    let damping = m.resistance / m.inductance;
+    let (per_current, per_speed) = (m.torque_constant / m.inertia, -m.emf_constant / m.inductance);
+    // g′ + a g, integrated once and twice.
+    let (once, twice) = (impulse + damping * step, step + damping * ramp);
+    let row = |current, speed, voltage: f64, torque: f64| Row {
+        current,
+        speed,
+        voltage: voltage / m.inductance,
+        torque: torque / m.inertia,
+    };
+    [
+        row(slope, per_speed * impulse, impulse, per_speed * step),
+        row(per_current * impulse, held, per_current * step, once),
+        row(per_current * step, once, per_current * ramp, twice),
+    ]
+}
+
 impl Motor {
     /// Discretises the motor over `period` seconds.
     ///
     /// # Errors
-    /// [`DriveError::Discretisation`] if the step is not finite, or so long that a torque would turn
-    /// the motor against its own direction within it (friction could not be resolved then).
+    /// [`DriveError::Discretisation`] if the step is not finite; [`DriveError::Swings`] if it is so long that a
+    /// torque would turn the motor against its own direction within it (friction could not be resolved then).
     pub fn new(motor: &MotorConfig, period: f64) -> Result<Self, DriveError> {
-        let m = motor;
-        // States i, ω, θ, then the held inputs u and τ.
-        let mut a = SMatrix::<f64, 5, 5>::zeros();
-        a[(0, 0)] = -m.resistance / m.inductance;
-        a[(0, 1)] = -m.emf_constant / m.inductance;
-        a[(0, 3)] = 1.0 / m.inductance;
-        a[(1, 0)] = m.torque_constant / m.inertia;
-        a[(1, 4)] = 1.0 / m.inertia;
-        a[(2, 1)] = 1.0;
-        let e = (a * period).exp();
-        let row =
-            |k: usize| Row { current: e[(k, 0)], speed: e[(k, 1)], voltage: e[(k, 3)], torque: e[(k, 4)] };
-        let speed = row(1);
+        let damping = motor.resistance / motor.inductance;
+        let stiffness = motor.emf_constant / motor.inductance * (motor.torque_constant / motor.inertia);
+        let response = Response::new(damping, stiffness, period);
+        let system = system(motor) * period;
+        let slow = system.iter().all(|entry| entry.abs() <= SLOW);
+        let [current, speed, angle] = if slow { approximant(&system) } else { closed_form(motor, &response) };
         let torque_per_speed = 1.0 / speed.torque;
-        let sound = e.iter().all(|v| v.is_finite()) && speed.torque > 0.0 && torque_per_speed.is_finite();
-        if !sound {
+        if ![current, speed, angle].iter().all(Row::is_finite) || !torque_per_speed.is_finite() {
             return Err(DriveError::Discretisation { period_s: period, speed_per_torque: speed.torque });
         }
-        let (current, angle) = (row(0), row(2));
+        if !response.keeps_direction {
+            let frequency_hz = (stiffness - damping * damping / 4.0).max(0.0).sqrt() / TAU;
+            return Err(DriveError::Swings { period_s: period, frequency_hz });
+        }
         Ok(Motor {
             current,
             speed,

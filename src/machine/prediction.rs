@@ -127,6 +127,10 @@ fn minimal(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
     if !markov.iter().all(|h| h.is_finite()) {
         return Err(DesignError::Model("the inner loops diverge within a position period".to_owned()));
     }
+    if markov.iter().all(|h| *h == 0.0) {
+        let still = "nothing moves: with velocity_loop.gain or current_loop.gain 0 the drive does not answer";
+        return Err(DesignError::Model(still.to_owned()));
+    }
     let no_model =
         || DesignError::Model("the singular values of the inner loops cannot be computed".to_owned());
     let decomposition = hankel(1).try_svd(true, true, f64::EPSILON, SVD_ITERATIONS).ok_or_else(no_model)?;

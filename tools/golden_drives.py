@@ -1,0 +1,225 @@
+#!/usr/bin/env python3
+"""Writes tests/golden/drives.csv and loops.csv: drives at the edges of their ranges, by matrix exponentials of 120 digits.
+
+    pip install mpmath==1.4.1
+    python tools/golden_drives.py
+
+Nothing here is taken from the library: the differential equations and the laws of the controllers are those that are
+printed in Prévost et al., written as matrices. Inputs are f64 numbers; outputs are exact to the last digit of one.
+"""
+
+import itertools
+import pathlib
+import random
+
+import mpmath
+from mpmath import mpf
+
+# Digits: the largest exponent has 14, the least of the entries that count 60.
+mpmath.mp.dps = 120
+GOLDEN = pathlib.Path(__file__).parent.parent / "tests" / "golden"
+SEED = 8
+
+# SI, smallest and largest as the schema allows them, deviations of the plant included; one in the middle.
+RANGES = {
+    "inertia": (1e-10, 0.028, 1e7),
+    "torque_constant": (1e-10, 2.64, 1e6),
+    "emf_constant": (0.0, 0.88, 1e5),
+    "resistance": (0.0, 0.46, 1e4),
+    "inductance": (1e-9, 8.5e-3, 1e2),
+    "tick": (1e-6, 125e-6, 50e-3),
+}
+# Of a range that begins with nothing, the smallest value that is drawn.
+SMALLEST = 1e-9
+
+
+def exponential(matrix):
+    """e^matrix by a Taylor series on a halved interval, squared back."""
+    norm = max(mpmath.fsum(abs(matrix[i, j]) for j in range(matrix.cols)) for i in range(matrix.rows))
+    halvings = 0
+    while norm > mpf("0.01"):
+        norm, halvings = norm / 2, halvings + 1
+    matrix = matrix / mpf(2) ** halvings
+    total = term = mpmath.eye(matrix.rows)
+    for k in range(1, 200):
+        term = term * matrix / k
+        total = total + term
+        if mpmath.mnorm(term, 1) < mpf(10) ** -150:
+            break
+    for _ in range(halvings):
+        total = total * total
+    return total
+
+
+def step(motor, tick):
+    """States i, ω, θ and the held inputs u and τ over a tick."""
+    j, kt, ke, r, ind = (mpf(motor[k]) for k in list(RANGES)[:5])
+    a = mpmath.zeros(5)
+    a[0, 0], a[0, 1], a[0, 3] = -r / ind, -ke / ind, 1 / ind
+    a[1, 0], a[1, 4] = kt / j, 1 / j
+    a[2, 1] = 1
+    return exponential(a * mpf(tick))
+
+
+def turns_back(motor, tick):
+    """Whether a torque turns the speed against itself within the tick: the condition of a refusal."""
+    j, kt, ke, r, ind = (mpf(motor[k]) for k in list(RANGES)[:5])
+    p, square = r / ind / 2, ke * kt / (j * ind)
+    if square <= p * p:
+        return False
+    nu = mpmath.sqrt(square - p * p)
+    # The response falls from the angle π − atan(ν/p) on, until a whole π later.
+    fall = mpmath.atan2(nu, -p)
+    end = min(mpf(tick) * nu, fall + mpmath.pi)
+    if end <= fall:
+        return False
+    return step_response(p, nu, square, end / nu) <= 0
+
+
+def step_response(p, nu, square, t):
+    """J times ω after a torque of 1 from rest."""
+    decay = mpmath.exp(-p * t)
+    g = decay * mpmath.sin(nu * t) / nu
+    integral = (1 - decay * (mpmath.cos(nu * t) + p / nu * mpmath.sin(nu * t))) / square
+    return g + 2 * p * integral
+
+
+def motors():
+    """Each value at its edges, pairs of edges, and numbers drawn from the whole of the ranges."""
+    names = list(RANGES)
+    middle = {name: RANGES[name][1] for name in names}
+    yield dict(middle)
+    for name in names:
+        for edge in (0, 2):
+            yield middle | {name: RANGES[name][edge]}
+    for first, second in itertools.combinations(names, 2):
+        for one, other in itertools.product((0, 2), repeat=2):
+            yield middle | {first: RANGES[first][one], second: RANGES[second][other]}
+    # All corners: what is worst need not be worst by two.
+    for corner in itertools.product((0, 2), repeat=len(names)):
+        yield {name: RANGES[name][edge] for name, edge in zip(names, corner)}
+    source = random.Random(SEED)
+    for _ in range(300):
+        yield {
+            name: 10 ** source.uniform(mpmath.log10(low or SMALLEST), mpmath.log10(high))
+            for name, (low, _, high) in RANGES.items()
+        }
+
+
+def number(value):
+    """As an f64 is written; what is smaller than any is 0."""
+    value = float(value)
+    return repr(0.0 if abs(value) < 1e-290 else value)
+
+
+def drives():
+    lines = [",".join([*RANGES, "refused", *(f"{row}_{column}" for row in "iwt" for column in "iwuq")])]
+    for motor in motors():
+        fields = [number(motor[name]) for name in RANGES]
+        if turns_back(motor, motor["tick"]):
+            lines.append(",".join([*fields, "1"] + ["0"] * 12))
+            continue
+        e = step(motor, motor["tick"])
+        entries = [e[row, column] for row in range(3) for column in (0, 1, 3, 4)]
+        lines.append(",".join([*fields, "0", *map(number, entries)]))
+    return lines
+
+
+# Of the X axis of the default machine, in the units of machine files: value, and the factor to SI.
+LOOPS = {
+    "motor.inertia_kg_m2": (0.028, 1),
+    "motor.torque_constant_nm_a": (2.64, 1),
+    "motor.emf_constant_v_s_rad": (0.88, 1),
+    "motor.resistance_ohm": (0.46, 1),
+    "motor.inductance_mh": (8.5, 1e-3),
+    "velocity_loop.gain": (5.0, 1),
+    "velocity_loop.integral_time_ms": (4.0, 1e-3),
+    "current_loop.gain": (13.0, 1),
+    "current_loop.integral_time_ms": (2.0, 1e-3),
+}
+# Tsi in ns, Tsi in Tsv, Tsv in Tsp.
+PERIODS = [
+    (125_000, 2, 24),
+    (1_000, 1, 1),
+    (1_000, 1, 6_000),
+    (1_000, 50_000, 1),
+    (1_000, 1, 50_000),
+    (1_000, 250, 200),
+    (125_000, 400, 1),
+    (62_500, 2, 8),
+    (500_000, 100, 1),
+]
+# Periods for which an impulse of Ω* is followed.
+IMPULSE = 12
+
+
+def power(matrix, n):
+    result = mpmath.eye(matrix.rows)
+    while n:
+        if n & 1:
+            result = result * matrix
+        matrix, n = matrix * matrix, n >> 1
+    return result
+
+
+def impulse(values, tick_ns, ticks, instants):
+    """θ at the position instants after Ω* was 1 for one period: loops folded as powers of matrices."""
+    j, kt, ke, r, ind, kv, tv, ki, ti = (mpf(v) * mpf(repr(f)) for v, (_, f) in zip(values, LOOPS.values()))
+    tick = mpf(tick_ns) / 10**9
+    # i, ω, θ, integral of the velocity loop, of the current loop, held u, i*, Ω*.
+    i, w, _, iv, ii, u, cs, ws = range(8)
+    a = mpmath.zeros(8)
+    a[i, i], a[i, w], a[i, u] = -r / ind, -ke / ind, 1 / ind
+    a[w, i] = kt / j
+    a[2, w] = 1
+    plant = exponential(a * tick)
+
+    def pi(gain, step, scale, integral, output, wanted, found):
+        m = mpmath.eye(8)
+        m[integral, wanted], m[integral, found] = step, -step
+        m[output, output] = 0
+        m[output, integral] = 1 / scale
+        m[output, wanted], m[output, found] = (gain + step) / scale, -(gain + step) / scale
+        return m
+
+    current = pi(ki, ki * tick / ti, mpf(1), ii, u, cs, i)
+    velocity = pi(kv, kv * tick * ticks / tv, kt, iv, cs, ws, w)
+    period = power(power(plant * current, ticks) * velocity, instants)
+    x = mpmath.zeros(8, 1)
+    x[ws] = 1
+    angles = []
+    for _ in range(IMPULSE):
+        x = period * x
+        angles.append(x[2])
+        x[ws] = 0
+    return angles
+
+
+def loops():
+    mpmath.mp.dps = 80
+    source = random.Random(SEED)
+    names = list(LOOPS)
+    middle = [value for value, _ in LOOPS.values()]
+    cases = [(middle, periods) for periods in PERIODS]
+    for place in range(len(names)):
+        for factor in (1e-4, 0.1, 10, 1e4):
+            for periods in PERIODS[:2]:
+                cases.append(([v * factor if k == place else v for k, v in enumerate(middle)], periods))
+    for _ in range(80):
+        factors = [10 ** source.uniform(-2, 2) for _ in names]
+        cases.append(([v * f for v, f in zip(middle, factors)], source.choice(PERIODS)))
+    lines = [",".join([*names, "tick_ns", "ticks", "instants", *(f"theta_{k + 1}" for k in range(IMPULSE))])]
+    for values, periods in cases:
+        fields = [*map(repr, values), *map(str, periods)]
+        lines.append(",".join([*fields, *(number(min(abs(v), mpf("1e300")) * mpmath.sign(v)) for v in impulse(values, *periods))]))
+    return lines
+
+
+def main():
+    GOLDEN.mkdir(exist_ok=True)
+    (GOLDEN / "drives.csv").write_text("\n".join(drives()) + "\n")
+    (GOLDEN / "loops.csv").write_text("\n".join(loops()) + "\n")
+
+
+if __name__ == "__main__":
+    main()
