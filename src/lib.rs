@@ -6,7 +6,7 @@
 //! Data flows one way and the rooms stand in that order; a room imports only from rooms before it:
 //! [`units`], [`lanes`], [`config`], [`kinematics`] → [`drive`] → [`control`] → [`design`] → [`machine`] →
 //! [`trajectory`], [`path`] → [`assess`] → [`simulation`] → [`scenario`] → [`trial`] →
-//! [`recording`] → [`identify`], [`tune`] → [`messages`], [`files`], [`report`], [`urdf`] → [`door`] → `ros`.
+//! [`recording`] → [`identify`], [`tune`], [`stress`] → [`messages`], [`files`], [`report`], [`urdf`] → [`door`] → `ros`.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -30,6 +30,7 @@ pub mod report;
 pub mod ros;
 pub mod scenario;
 pub mod simulation;
+pub mod stress;
 pub mod trajectory;
 pub mod trial;
 pub mod tune;

@@ -15,7 +15,7 @@ pub use tolerance::{Quantity, Tolerance, Tolerances, Violation};
 use std::sync::Arc;
 
 use crate::config::{AxisKind, MachineConfig, Periods};
-use crate::machine::{AxisSample, Machine, MachineError, MachineParameters};
+use crate::machine::{AxisSample, Machine, MachineError, MachineParameters, Width};
 use crate::trajectory::{Event, JointLimits, Timeline, TimelineError};
 use crate::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
 
@@ -114,6 +114,11 @@ impl Simulation {
     /// the [`MotionEnd`]s of others are 0. For those who measure themselves.
     pub fn set_assessing(&mut self, assessing: bool) {
         self.motions.set_assessing(assessing);
+    }
+
+    /// How wide the processor's vectors are used from now on; the results are the same.
+    pub fn set_width(&mut self, width: Width) {
+        self.machine.set_width(width);
     }
 
     /// Time of position instant k, ns.

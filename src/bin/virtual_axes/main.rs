@@ -24,6 +24,7 @@ mod report;
 mod robustness;
 mod run;
 mod search;
+mod stress;
 mod subject;
 mod table;
 mod tune;
@@ -65,6 +66,8 @@ enum Command {
     Robustness(Box<robustness::Arguments>),
     /// Find the parameters of an axis from recordings of it, and write a machine file with them.
     Identify(Box<identify::Arguments>),
+    /// Run random trajectories, and check every tick of them: limits, energy, errors against theory.
+    Stress(stress::Arguments),
     /// Check a file: a machine, a scenario, or set-points.
     Check(check::Arguments),
     /// Print the URDF of a machine, for robot_state_publisher and RViz.
@@ -132,6 +135,7 @@ fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Tune(arguments) => tune::run(arguments),
         Command::Robustness(arguments) => robustness::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
+        Command::Stress(arguments) => stress::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Urdf(arguments) => urdf::run(arguments),
         Command::Pose(arguments) => pose::run(arguments),

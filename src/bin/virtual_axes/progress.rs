@@ -85,6 +85,19 @@ impl Runs {
         Runs { bar, began: Instant::now(), shown: AtomicBool::new(false) }
     }
 
+    /// As many have ended.
+    pub fn reached(&self, runs: u64) {
+        self.bar.set_position(runs);
+        self.show();
+    }
+
+    fn show(&self) {
+        if self.began.elapsed() >= PATIENCE && !self.shown.swap(true, Ordering::Relaxed) {
+            // Hidden still where standard error is no terminal.
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+    }
+
     /// Takes the bar away.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
@@ -101,10 +114,7 @@ impl Watch for Runs {
 
     fn done(&self) {
         self.bar.inc(1);
-        if self.began.elapsed() >= PATIENCE && !self.shown.swap(true, Ordering::Relaxed) {
-            // Hidden still where standard error is no terminal.
-            self.bar.set_draw_target(ProgressDrawTarget::stderr());
-        }
+        self.show();
     }
 
     fn go_on(&self) -> io::Result<()> {

@@ -1,0 +1,194 @@
+//! `virtual_axes stress`: random trajectories, checked tick by tick.
+
+use std::error::Error;
+use std::fmt::Write;
+use std::num::NonZeroUsize;
+use std::thread;
+
+use serde_json::{Value, json};
+use virtual_axes::config::Parameters;
+use virtual_axes::machine::Width;
+use virtual_axes::report::{Column, Table};
+use virtual_axes::stress::{self, Bench, Fleet, Options, Plan, Summary};
+use virtual_axes::tune::Watch;
+
+use crate::progress::Runs;
+use crate::{interrupt, table};
+
+/// What to run.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// What everything random follows from.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How many trajectories.
+    #[arg(long, default_value_t = 10_000)]
+    count: u64,
+    /// Number of the first one.
+    #[arg(long, default_value_t = 0)]
+    first: u64,
+    /// Threads; all cores if left out. The result does not depend on it.
+    #[arg(long)]
+    threads: Option<NonZeroUsize>,
+    /// How wide vectors of the processor are used. The result does not depend on it.
+    #[arg(long, value_enum, default_value_t = WidthName::Widest)]
+    width: WidthName,
+    /// A shipped machine or a machine file, with each kind of controller; all shipped ones if left out. Can be given
+    /// several times.
+    #[arg(long)]
+    machine: Vec<String>,
+    /// Run this trajectory alone, and print what it is.
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["count", "first", "threads"])]
+    only: Option<u64>,
+    /// Print the figures as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Widths of vectors.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum WidthName {
+    /// As wide as this processor has them.
+    Widest,
+    /// As every processor of its kind has them; slow.
+    Baseline,
+}
+
+impl From<WidthName> for Width {
+    fn from(name: WidthName) -> Self {
+        match name {
+            WidthName::Widest => Width::Widest,
+            WidthName::Baseline => Width::Baseline,
+        }
+    }
+}
+
+/// Runs them; an error tells what was found wrong.
+pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+    let fleet = if arguments.machine.is_empty() {
+        Fleet::shipped()?
+    } else {
+        let machines: Result<Vec<_>, _> =
+            arguments.machine.iter().map(|machine| Parameters::load(machine)).collect();
+        Fleet::new(&machines?)?
+    };
+    if let Some(number) = arguments.only {
+        return only(&fleet, arguments, number);
+    }
+    let threads = arguments.threads.or_else(|| thread::available_parallelism().ok());
+    let options = Options {
+        seed: arguments.seed,
+        first: arguments.first,
+        count: arguments.count,
+        threads: threads.map_or(1, NonZeroUsize::get),
+        width: arguments.width.into(),
+    };
+    let progress = Runs::new();
+    progress.begin("trajectories", usize::try_from(options.count).unwrap_or(usize::MAX));
+    let summary = stress::run(&fleet, &options, |run| {
+        progress.reached(run);
+        interrupt::check()
+    });
+    progress.finish();
+    let summary = summary?;
+    if !summary.faults.is_empty() {
+        let mut text = format!("{} trajectories with faults, seed {}", summary.faulty, options.seed);
+        for fault in &summary.faults {
+            write!(text, "\n{fault}")?;
+        }
+        return Err(text.into());
+    }
+    Ok(if arguments.json {
+        format!("{:#}\n", object(&fleet, &options, &summary))
+    } else {
+        text(&fleet, &options, &summary)
+    })
+}
+
+/// What one trajectory is and came to.
+fn only(fleet: &Fleet, arguments: &Arguments, number: u64) -> Result<String, Box<dyn Error>> {
+    let plan = Plan::new(fleet, arguments.seed, number)?;
+    let variant = &fleet.variants()[plan.variant];
+    let record = Bench::new(fleet, arguments.seed, arguments.width.into()).run(number)?;
+    let mut text = format!("{}, {}\n{plan:#?}\n{:#?}\n", variant.machine, variant.controllers, record.axes);
+    if let Some(code) = record.refused {
+        writeln!(text, "refused: {}", code.name())?;
+    }
+    for fault in &record.faults {
+        writeln!(text, "{fault}")?;
+    }
+    if record.faults.is_empty() { Ok(text) } else { Err(text.trim_end().into()) }
+}
+
+fn text(fleet: &Fleet, options: &Options, summary: &Summary) -> String {
+    let table = |first: &str, rows: Vec<(String, u64)>| {
+        table::text(&Table {
+            caption: String::new(),
+            columns: vec![Column::new(first, ""), Column::new("trajectories", "")],
+            rows: rows.into_iter().map(|(name, count)| vec![name, count.to_string()]).collect(),
+        })
+    };
+    let kinds = summary.kinds.iter().map(|(kind, count)| (kind.name().to_owned(), *count)).collect();
+    let of_variant = fleet.variants().iter().zip(&summary.variants);
+    let variants = of_variant
+        .map(|(variant, count)| (format!("{}, {}", variant.machine, variant.controllers), *count))
+        .collect();
+    let mut text = format!("{}\n{}\n", table("kind", kinds), table("machine", variants));
+    let Summary { run, time, ticks, loaded, limited, axes, bounded, .. } = summary;
+    let refused: u64 = summary.refused.values().sum();
+    let rows = [
+        ("seed", options.seed.to_string()),
+        ("trajectories", format!("{run}, {refused} refused")),
+        ("simulated time", format!("{time:.1} s, {ticks} ticks of axes")),
+        ("with a load", loaded.to_string()),
+        ("reached a limit", limited.to_string()),
+        ("axes whose error has a bound", format!("{bounded} of {axes}")),
+        ("largest error, of its bound", worst(summary.error)),
+        ("largest difference from the linear loop, of what rounding is allowed", worst(summary.mismatch)),
+        ("largest imbalance of energy in a tick, relative", worst(summary.imbalance)),
+        ("energy supplied, less copper", format!("{:.1} J", summary.supplied)),
+        ("taken by friction", format!("{:.1} J", summary.dissipated)),
+        ("given back by friction in ticks of a standstill", format!("{:.6} J", summary.returned)),
+        ("faults", summary.faulty.to_string()),
+        ("digest", summary.digest()),
+    ];
+    for (name, value) in rows {
+        text.push_str(&format!("{name}: {value}\n"));
+    }
+    text
+}
+
+fn worst((value, number): (f64, u64)) -> String {
+    format!("{value:.3e} (trajectory {number})")
+}
+
+fn object(fleet: &Fleet, options: &Options, summary: &Summary) -> Value {
+    let worst = |(value, number): (f64, u64)| json!({ "value": value, "trajectory": number });
+    let variants = fleet.variants().iter().zip(&summary.variants).map(|(variant, count)| {
+        json!({ "machine": variant.machine, "controllers": variant.controllers, "trajectories": count })
+    });
+    let kinds = summary.kinds.iter().map(|(kind, count)| (kind.name().to_owned(), json!(count)));
+    json!({
+        "seed": options.seed,
+        "first": options.first,
+        "count": options.count,
+        "run": summary.run,
+        "refused": summary.refused,
+        "kinds": kinds.collect::<serde_json::Map<_, _>>(),
+        "machines": variants.collect::<Vec<_>>(),
+        "simulated_s": summary.time,
+        "ticks": summary.ticks,
+        "loaded": summary.loaded,
+        "limited": summary.limited,
+        "axes": summary.axes,
+        "bounded_axes": summary.bounded,
+        "error_of_bound": worst(summary.error),
+        "mismatch": worst(summary.mismatch),
+        "imbalance": worst(summary.imbalance),
+        "supplied_j": summary.supplied,
+        "dissipated_j": summary.dissipated,
+        "returned_j": summary.returned,
+        "faulty": summary.faulty,
+        "digest": summary.digest(),
+    })
+}

@@ -1,0 +1,44 @@
+//! The exponential of a matrix, apart from that of the drive.
+
+use nalgebra::SMatrix;
+
+/// Norm up to which the series is summed; larger matrices are halved.
+const SMALL: f64 = 0.5;
+/// Terms of the series: 0.5¹⁸ / 18! is far below the rounding.
+const TERMS: u32 = 18;
+
+/// e^A by its Taylor series on A/2ˢ, squared s times.
+pub fn exponential<const N: usize>(a: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
+    let mut halved = *a;
+    let mut squarings = 0;
+    while halved.norm() > SMALL {
+        halved *= 0.5;
+        squarings += 1;
+    }
+    let mut term = SMatrix::<f64, N, N>::identity();
+    let mut sum = term;
+    for k in 1..=TERMS {
+        term = term * halved / f64::from(k);
+        sum += term;
+    }
+    for _ in 0..squarings {
+        sum = sum * sum;
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix2;
+
+    use super::*;
+
+    #[test]
+    fn a_turn_is_a_turn() {
+        for angle in [1e-3_f64, 0.7, 3.0, 20.0] {
+            let found = exponential(&Matrix2::new(0.0, -angle, angle, 0.0));
+            let turned = Matrix2::new(angle.cos(), -angle.sin(), angle.sin(), angle.cos());
+            assert!((found - turned).norm() < 1e-13, "{angle}: {found}");
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Many trajectories over several threads, with one result whatever their number.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc;
+use std::thread;
+
+use super::bench::{Bench, Record};
+use super::fleet::{Fleet, FleetError};
+use super::summary::Summary;
+use crate::machine::Width;
+
+/// Trajectories that a thread takes at a time.
+const TOGETHER: u64 = 64;
+/// Such parts that may wait for one before them, for each thread.
+const WAITING: usize = 4;
+
+/// What is to be run.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// What everything random follows from.
+    pub seed: u64,
+    /// Number of the first trajectory.
+    pub first: u64,
+    /// How many.
+    pub count: u64,
+    /// Threads; at least one runs.
+    pub threads: usize,
+    /// How wide vectors are used.
+    pub width: Width,
+}
+
+/// Why a run did not come to its end.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StressError {
+    /// A machine cannot be simulated.
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
+    /// Who looks on ended it.
+    #[error(transparent)]
+    Watch(#[from] io::Error),
+}
+
+/// Runs trajectories on the machines of `fleet`; `watch` is told now and then how many have been run.
+///
+/// # Errors
+/// [`StressError`].
+pub fn run(
+    fleet: &Fleet,
+    options: &Options,
+    mut watch: impl FnMut(u64) -> io::Result<()>,
+) -> Result<Summary, StressError> {
+    let parts = options.count.div_ceil(TOGETHER);
+    let (next, stopped) = (AtomicU64::new(0), AtomicBool::new(false));
+    let threads = options.threads.max(1);
+    let (sender, receiver) = mpsc::sync_channel(WAITING * threads);
+    let mut summary = Summary::new(fleet);
+    thread::scope(|scope| {
+        for _ in 0..threads {
+            let sender = sender.clone();
+            let (next, stopped) = (&next, &stopped);
+            scope.spawn(move || {
+                let mut bench = Bench::new(fleet, options.seed, options.width);
+                while !stopped.load(Ordering::Relaxed) {
+                    let part = next.fetch_add(1, Ordering::Relaxed);
+                    if part >= parts {
+                        break;
+                    }
+                    let numbers = part * TOGETHER..((part + 1) * TOGETHER).min(options.count);
+                    let records = numbers.map(|number| bench.run(options.first.wrapping_add(number)));
+                    let records: Result<Vec<Record>, FleetError> = records.collect();
+                    // Nobody takes them when the run has been ended.
+                    if sender.send((part, records)).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut take = || -> Result<(), StressError> {
+            let mut early = BTreeMap::new();
+            let mut due = 0;
+            for (part, records) in &receiver {
+                early.insert(part, records?);
+                while let Some(records) = early.remove(&due) {
+                    records.iter().for_each(|record| summary.add(fleet, record));
+                    due += 1;
+                }
+                watch((due * TOGETHER).min(options.count))?;
+            }
+            Ok(())
+        };
+        let taken = take();
+        stopped.store(true, Ordering::Relaxed);
+        // Threads that wait to hand theirs over go on.
+        receiver.iter().for_each(drop);
+        taken
+    })?;
+    Ok(summary)
+}
