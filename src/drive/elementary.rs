@@ -10,6 +10,8 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Largest |x| that an [`Exponential`] is for: e^x times any size that it may have is a normal number.
 pub(super) const MAX_EXPONENT: f64 = 600.0;
+/// How much further an exponent may go where a law is expanded ahead of a speed.
+const AHEAD: f64 = 1.0;
 /// Size up to which an [`Exponential`] is nothing, far below that of any torque or change of speed that acts:
 /// what decays from it would leave the normal numbers.
 const NO_SIZE: f64 = 1e-40;
@@ -60,7 +62,7 @@ impl Exponential {
     pub fn new(size: f64, rate: f64) -> Self {
         // Nothing times 2^k would not be nothing: see the last line of `at`.
         let (size, rate) = if size.abs() < NO_SIZE { (0.0, 0.0) } else { (size, rate) };
-        let last = f64::min(MAX_EXPONENT / rate.abs(), f64::MAX);
+        let last = f64::min((MAX_EXPONENT + AHEAD) / rate.abs(), f64::MAX);
         let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9] = POWERS.map(|c| size * c);
         Exponential { rate, rate_log2: rate * LOG2_E, last, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 }
     }

@@ -1,8 +1,8 @@
 //! How a motor answers within a tick, in closed form.
 //!
-//! The matrix exponential of a library halves the interval and squares the result, which loses a digit for every
-//! three halvings: nothing is left of a winding that settles 10⁹ times within a tick. Here each entry is a
-//! sum of terms of one sign, or a difference that is as near to zero as the entry itself.
+//! A matrix exponential that halves the interval and squares the result keeps its largest entries right, and loses
+//! the small ones of a winding that settles many times within a tick. Here each entry is made of terms that do not
+//! cancel, but where it is near zero itself.
 
 /// Largest pole times the tick for which the series is taken: its terms fall from the first on.
 const SERIES: f64 = 1.0;

@@ -11,6 +11,8 @@ use crate::units::seconds;
 
 use super::AxisError;
 
+/// Growth of the steps of θ after which nothing is left of the digits of the first one.
+const RUNAWAY: f64 = 1e9;
 /// What goes on from one position instant to the next: i, ω, the two integrals, and θ.
 const STATES: usize = 5;
 /// What of that the steps of θ depend on: all but θ itself.
@@ -130,6 +132,15 @@ fn minimal(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
     if markov.iter().all(|h| *h == 0.0) {
         let still = "nothing moves: with velocity_loop.gain or current_loop.gain 0 the drive does not answer";
         return Err(DesignError::Model(still.to_owned()));
+    }
+    let (first, largest) = (markov[0].abs(), markov.iter().fold(0.0, |m: f64, h| m.max(h.abs())));
+    if largest > RUNAWAY * first {
+        return Err(DesignError::Model(format!(
+            "the inner loops are unstable: what they make of a step of Ω* grows {:.1e} times within {} position \
+             periods; mend velocity_loop, current_loop or the periods",
+            largest / first,
+            markov.len()
+        )));
     }
     let no_model =
         || DesignError::Model("the singular values of the inner loops cannot be computed".to_owned());
