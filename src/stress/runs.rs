@@ -5,6 +5,7 @@ use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc;
 use std::thread;
+use std::time::Duration;
 
 use super::bench::{Bench, Record};
 use super::fleet::{Fleet, FleetError};
@@ -13,8 +14,12 @@ use crate::machine::Width;
 
 /// Trajectories that a thread takes at a time.
 const TOGETHER: u64 = 64;
-/// Such parts that may wait for one before them, for each thread.
+/// Such parts that may wait to be taken, for each thread.
 const WAITING: usize = 4;
+/// How many parts a thread may be ahead of one that is held up: what is ahead is kept.
+const AHEAD: u64 = 256;
+/// Time between two looks at whether it has come up.
+const LOOK: Duration = Duration::from_millis(1);
 
 /// What is to be run.
 #[derive(Debug, Clone, Copy)]
@@ -53,20 +58,24 @@ pub fn run(
     mut watch: impl FnMut(u64) -> io::Result<()>,
 ) -> Result<Summary, StressError> {
     let parts = options.count.div_ceil(TOGETHER);
-    let (next, stopped) = (AtomicU64::new(0), AtomicBool::new(false));
+    let (next, done, stopped) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
     let threads = options.threads.max(1);
     let (sender, receiver) = mpsc::sync_channel(WAITING * threads);
     let mut summary = Summary::new(fleet);
     thread::scope(|scope| {
         for _ in 0..threads {
             let sender = sender.clone();
-            let (next, stopped) = (&next, &stopped);
+            let (next, done, stopped) = (&next, &done, &stopped);
             scope.spawn(move || {
                 let mut bench = Bench::new(fleet, options.seed, options.width);
                 while !stopped.load(Ordering::Relaxed) {
                     let part = next.fetch_add(1, Ordering::Relaxed);
                     if part >= parts {
                         break;
+                    }
+                    // Who has the part that is waited for never waits here.
+                    while part >= done.load(Ordering::Relaxed) + AHEAD && !stopped.load(Ordering::Relaxed) {
+                        thread::sleep(LOOK);
                     }
                     let numbers = part * TOGETHER..((part + 1) * TOGETHER).min(options.count);
                     let records = numbers.map(|number| bench.run(options.first.wrapping_add(number)));
@@ -88,6 +97,7 @@ pub fn run(
                     records.iter().for_each(|record| summary.add(fleet, record));
                     due += 1;
                 }
+                done.store(due, Ordering::Relaxed);
                 watch((due * TOGETHER).min(options.count))?;
             }
             Ok(())
