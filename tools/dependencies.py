@@ -64,7 +64,13 @@ def is_allowed(expression: str, allowed: set[str]) -> bool:
         return False
 
 
-def crates() -> list[tuple[str, str, str, str, str | None]]:
+def clarified(rules: dict[str, Any], package: dict[str, Any]) -> str:
+    """A package's licence, as it says itself or as somebody has read its files."""
+    said = {rule["crate"]: rule["expression"] for rule in rules.get("clarify", [])}
+    return package["license"] or said.get(package["name"], "not stated")
+
+
+def crates(rules: dict[str, Any]) -> list[tuple[str, str, str, str, str | None]]:
     """Name, version, licence, what needs it, source; by name."""
     own = ROOT / "Cargo.toml"
     default, secured, fuzz = metadata(own), metadata(own, "--all-features"), metadata(ROOT / "fuzz" / "Cargo.toml")
@@ -85,7 +91,7 @@ def crates() -> list[tuple[str, str, str, str, str | None]]:
     rows = []
     for key in sorted(packages):
         package = packages[key]
-        rows.append((*key, package["license"] or "not stated", where[key], package["source"]))
+        rows.append((*key, clarified(rules, package), where[key], package["source"]))
     return rows
 
 
@@ -106,8 +112,9 @@ def main() -> int:
     asked = words.parse_args()
     if asked.advisories:
         return advisories()
-    allowed = set(tomllib.loads((ROOT / "deny.toml").read_text())["licenses"]["allow"])
-    rows = crates()
+    rules = tomllib.loads((ROOT / "deny.toml").read_text())["licenses"]
+    allowed = set(rules["allow"])
+    rows = crates(rules)
     faults = [f"{name} {version}: licence {licence}" for name, version, licence, _, _ in rows if not is_allowed(licence, allowed)]
     faults += [f"{name} {version}: from {source}" for name, version, _, _, source in rows if source != REGISTRY]
     for fault in faults:
