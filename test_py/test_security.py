@@ -21,7 +21,7 @@ KEYSTORE = Path(__file__).resolve().parent.parent / "tools" / "keystore.py"
 SECURE = os.environ.get("VIRTUAL_AXES_SECURE_NODE")
 needs_secure_node = pytest.mark.skipif(not SECURE, reason="VIRTUAL_AXES_SECURE_NODE names no node")
 HEARD, UNHEARD = 500, 100
-"""Messages in the recording of a node that hears the clock it follows (some thousand a second), and of one that does not."""
+"""Messages in the recording of a node that hears the clock it follows (a thousand a second), and of another."""
 PATIENCE_S = 60
 
 

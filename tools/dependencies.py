@@ -55,7 +55,8 @@ def reached(known: dict[str, Any], with_tests: bool) -> set[str]:
 def is_allowed(expression: str, allowed: set[str]) -> bool:
     """Whether an SPDX expression can be met by the licences of the list; an exception only gives more."""
     expression = re.sub(r"\s+WITH\s+[\w.-]+", "", expression.replace("/", " OR "))
-    words = re.sub(r"[\w.+-]+", lambda word: {"OR": "or", "AND": "and"}.get(word[0], str(word[0] in allowed)), expression)
+    known = {"OR": "or", "AND": "and"}
+    words = re.sub(r"[\w.+-]+", lambda word: known.get(word[0], str(word[0] in allowed)), expression)
     if not re.fullmatch(r"(True|False|or|and|[()\s])+", words):
         return False
     try:
@@ -64,7 +65,13 @@ def is_allowed(expression: str, allowed: set[str]) -> bool:
         return False
 
 
-def crates() -> list[tuple[str, str, str, str, str | None]]:
+def clarified(rules: dict[str, Any], package: dict[str, Any]) -> str:
+    """A package's licence, as it says itself or as somebody has read its files."""
+    said = {rule["crate"]: rule["expression"] for rule in rules.get("clarify", [])}
+    return package["license"] or said.get(package["name"], "not stated")
+
+
+def crates(rules: dict[str, Any]) -> list[tuple[str, str, str, str, str | None]]:
     """Name, version, licence, what needs it, source; by name."""
     own = ROOT / "Cargo.toml"
     default, secured, fuzz = metadata(own), metadata(own, "--all-features"), metadata(ROOT / "fuzz" / "Cargo.toml")
@@ -78,14 +85,15 @@ def crates() -> list[tuple[str, str, str, str, str | None]]:
     ):
         needed = reached(known, with_tests)
         for package in known["packages"]:
-            if package["id"] in needed and not (package["source"] is None and ROOT in Path(package["manifest_path"]).parents):
+            is_own = package["source"] is None and ROOT in Path(package["manifest_path"]).parents
+            if package["id"] in needed and not is_own:
                 key = package["name"], package["version"]
                 where.setdefault(key, what)
                 packages[key] = package
     rows = []
     for key in sorted(packages):
         package = packages[key]
-        rows.append((*key, package["license"] or "not stated", where[key], package["source"]))
+        rows.append((*key, clarified(rules, package), where[key], package["source"]))
     return rows
 
 
@@ -94,7 +102,7 @@ def advisories() -> int:
     for program, words in (("cargo-audit", ["audit"]), ("cargo-deny", ["deny", "check"])):
         if shutil.which(program):
             return subprocess.run(["cargo", *words], cwd=ROOT).returncode
-    print("dependencies: needs cargo-audit or cargo-deny (cargo install cargo-audit), and RustSec's database", file=sys.stderr)
+    print("dependencies: needs cargo-audit or cargo-deny, and RustSec's database", file=sys.stderr)
     return 1
 
 
@@ -106,10 +114,15 @@ def main() -> int:
     asked = words.parse_args()
     if asked.advisories:
         return advisories()
-    allowed = set(tomllib.loads((ROOT / "deny.toml").read_text())["licenses"]["allow"])
-    rows = crates()
-    faults = [f"{name} {version}: licence {licence}" for name, version, licence, _, _ in rows if not is_allowed(licence, allowed)]
-    faults += [f"{name} {version}: from {source}" for name, version, _, _, source in rows if source != REGISTRY]
+    rules = tomllib.loads((ROOT / "deny.toml").read_text())["licenses"]
+    allowed = set(rules["allow"])
+    rows = crates(rules)
+    faults = []
+    for name, version, licence, _, source in rows:
+        if not is_allowed(licence, allowed):
+            faults.append(f"{name} {version}: licence {licence}")
+        if source != REGISTRY:
+            faults.append(f"{name} {version}: from {source}")
     for fault in faults:
         print(f"dependencies: {fault}, which deny.toml does not allow", file=sys.stderr)
     head = "| crate | version | licence | needed by |\n|---|---|---|---|\n"
@@ -121,7 +134,7 @@ def main() -> int:
         TABLE.write_text(before + BEGIN + table + END + after)
     elif present != table:
         faults.append("table")
-        print("dependencies: the table in docs/dependencies.md is out of date: tools/dependencies.py --write", file=sys.stderr)
+        print("dependencies: docs/dependencies.md is out of date: tools/dependencies.py --write", file=sys.stderr)
     print(f"{len(rows)} crates, {sum(what == PROGRAMS for *_, what, _ in rows)} of them in the programs")
     return bool(faults)
 

@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn trajectories_are_bounded_in_number_whatever_their_lengths() {
-        let held = Held::new(1000);
+        let held = Held::new(10_000);
         let one = trajectory(1);
         let mut waiting: Vec<_> = (0..MOST_TOGETHER).map(|_| held.take(one.clone()).expect("room")).collect();
         let refused = held.take(one.clone()).expect_err("no room");

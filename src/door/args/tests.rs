@@ -178,8 +178,16 @@ fn log_arguments_are_kept_apart_by_logger() {
 
 #[test]
 fn arguments_without_effect_say_so() {
-    let args = run("--ros-args -e /x --log-file-name a --log-config-file b");
-    assert_eq!(args.warnings().len(), 3);
+    let args = run("--ros-args --log-file-name a --log-config-file b");
+    assert_eq!(args.warnings().len(), 2);
+}
+
+#[test]
+fn the_last_enclave_counts() {
+    let args = run("--ros-args -e /x --enclave /cell/mill");
+    assert_eq!(args.enclave(), Some("/cell/mill"));
+    assert!(args.warnings().is_empty());
+    assert_eq!(run("").enclave(), None);
 }
 
 fn argument() -> impl Strategy<Value = String> {

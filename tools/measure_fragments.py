@@ -1,0 +1,61 @@
+#!/usr/bin/env python3
+"""What one datagram makes the middleware of a node keep: a fragment that says how long its message will be.
+
+    tools/measure_fragments.py [MB]     the length that is announced, of one message on psec
+
+Needs the environment of .build/env.sh. Nothing leaves this machine.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+import sys
+import time
+from pathlib import Path
+
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
+
+from trajectory_msgs.msg import JointTrajectory
+
+from drive import PSEC_QOS, Drive, Node
+from guest import resident_mb
+
+FRAGMENT = 1024
+PROTOCOL, VENDOR = bytes((2, 3)), bytes((1, 15))
+DATA_FRAG, LITTLE_ENDIAN = 0x16, 0x01
+TO_INLINE_QOS = 28
+PARTICIPANTS = 10
+"""Participants of this machine that may be the node."""
+
+
+def fragment(writer: bytes, number: int, length: int) -> bytes:
+    """The first of a message of `length` octets, in the name of a writer (RTPS 2.5, 9.4.5.5)."""
+    body = struct.pack("<HH4s4siIIHHI", 0, TO_INLINE_QOS, bytes(4), writer[12:], 0, number, 1, 1, FRAGMENT, length)
+    body += bytes(FRAGMENT)
+    return b"RTPS" + PROTOCOL + VENDOR + writer[:12] + struct.pack("<BBH", DATA_FRAG, LITTLE_ENDIAN, len(body)) + body
+
+
+def main() -> None:
+    """Measure."""
+    length = int(float(sys.argv[1]) if len(sys.argv) > 1 else 256) * 1_000_000
+    with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:
+        drive.node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
+        time.sleep(1.0)
+        own = [info for info in drive.node.get_publishers_info_by_topic("/psec")]
+        before = resident_mb(process.pid)
+        link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        for info in own:
+            writer = bytes(info.endpoint_gid)[:16]
+            for participant in range(PARTICIPANTS):
+                port = 7400 + 250 * process.domain_id + 11 + 2 * participant
+                link.sendto(fragment(writer, 1, length), ("127.0.0.1", port))
+        for wait in (1, 5, 10, 10):
+            time.sleep(wait)
+            print(f"{resident_mb(process.pid) - before:+.0f} MB after {wait} s more")
+
+
+if __name__ == "__main__":
+    main()
