@@ -111,6 +111,11 @@ class Guest:
         """SIGCONT."""
         self._process.send_signal(signal.SIGCONT)
 
+    def leave(self) -> None:
+        """Let a sink end in order."""
+        self.go_on()
+        self._process.wait(PATIENCE_S)
+
     def kill(self) -> None:
         """SIGKILL; harmless when called twice."""
         self._process.kill()
@@ -240,6 +245,7 @@ def main() -> None:
             probe(node, (first, second))
         case _:
             sys.exit(__doc__)
+    rclpy.try_shutdown()
 
 
 if __name__ == "__main__":

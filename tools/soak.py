@@ -275,8 +275,9 @@ class Traffic:
 
     def visitor(self) -> None:
         """A participant comes and leaves."""
-        with Drive(process=self.drive.process) as other:
-            other.send(JointTrajectory(joint_names=["q"]))
+        assert self.drive.process is not None
+        with Guest(self.drive.process.domain_id, "sink", 10) as guest:
+            guest.leave()
 
     def killed(self) -> None:
         """A process listens; one of those that do is killed."""

@@ -207,9 +207,12 @@ fn a_wall_clock_that_is_set_neither_stops_nor_hurries_the_axes() {
     let origin = wall::since_epoch();
     let parameters = Parameters::embedded_default().expect("the embedded machine is valid");
     let config = parameters.machine_config().expect("valid");
-    let simulation =
-        Simulation::new(&config, joints(&config, ""), i64::try_from(origin.as_nanos()).expect("this century"))
-            .expect("can be simulated");
+    let simulation = Simulation::new(
+        &config,
+        joints(&config, ""),
+        i64::try_from(origin.as_nanos()).expect("this century"),
+    )
+    .expect("can be simulated");
     // Set between the choice of the origin and the start; later nobody looks at it (it is an FnOnce).
     for wall in [origin - HOUR, origin, origin + HOUR] {
         let began = std::time::Instant::now();
