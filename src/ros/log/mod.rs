@@ -35,6 +35,9 @@ use self::limit::{Limiter, Verdict};
 use self::terminal::Terminal;
 use super::args::{LogLevel, RosArgs};
 
+/// How long the end of the program waits for whoever reads its log.
+const LAST_WAIT: Duration = Duration::from_millis(500);
+
 /// One message of this program, for `/rosout`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogRecord {
@@ -75,7 +78,7 @@ impl Log {
         if let Some(line) = line {
             self.terminal.line(line + "\n");
         }
-        self.terminal.finish();
+        self.terminal.finish(LAST_WAIT);
     }
 }
 

@@ -11,8 +11,6 @@ use std::time::{Duration, Instant};
 /// Lines that wait for the reader, several times what a start with `--log-level debug` says at once; at some
 /// 200 bytes a line 200 kB.
 const QUEUE: usize = 1024;
-/// How long the end of the program waits for the reader.
-const LAST_WAIT: Duration = Duration::from_millis(500);
 /// How often it looks then whether there is room.
 const POLL: Duration = Duration::from_millis(1);
 
@@ -53,9 +51,9 @@ impl Terminal {
         }
     }
 
-    /// Waits until what was handed over is written, but not for long.
-    pub(super) fn finish(&self) {
-        let until = Instant::now() + LAST_WAIT;
+    /// Waits until what was handed over is written, but not for longer than `patience`.
+    pub(super) fn finish(&self, patience: Duration) {
+        let until = Instant::now() + patience;
         let (written, is_written) = mpsc::sync_channel(1);
         let mut mark = Item::Mark(written);
         while let Err(TrySendError::Full(back)) = self.queue.try_send(mark) {
@@ -146,7 +144,7 @@ mod tests {
         for _ in 0..MISSED {
             terminal.line("3\n".to_owned());
         }
-        terminal.finish();
+        terminal.finish(Duration::ZERO);
         for _ in 0..2 * QUEUE {
             ends.allow.send(()).expect("it writes");
         }
@@ -171,7 +169,7 @@ mod tests {
             terminal.line(format!("{n}\n"));
             ends.allow.send(()).expect("it writes");
         }
-        terminal.finish();
+        terminal.finish(PATIENCE);
         assert_eq!(ends.lines.try_iter().count(), 100);
     }
 }
