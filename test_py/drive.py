@@ -724,8 +724,12 @@ class Node:
         domain_id: int | None = None,
         env: Mapping[str, str] | None = None,
         binary: Path | None = None,
+        stderr: int | None = None,
     ):
-        """Say what to start; `ros_args` are what follows --ros-args, `name` is the full name they give."""
+        """Say what to start; `ros_args` are what follows --ros-args, `name` is the full name they give.
+
+        `stderr` is a file descriptor for it instead of `output()`.
+        """
         self.name = name
         self._own_domain = DomainId() if domain_id is None else None
         self.domain_id = self._own_domain.value if self._own_domain else domain_id
@@ -736,6 +740,7 @@ class Node:
             "ROS_DOMAIN_ID": str(self.domain_id),
             **(env or {}),
         }
+        self._stderr = stderr
         self._process: subprocess.Popen[bytes] | None = None
         # Appending: the child shares this file, reading it must not move where it writes.
         self._output = tempfile.TemporaryFile("a+b")
@@ -759,7 +764,7 @@ class Node:
             env=self._env,
             stdin=subprocess.DEVNULL,
             stdout=self._output,
-            stderr=subprocess.STDOUT,
+            stderr=subprocess.STDOUT if self._stderr is None else self._stderr,
             preexec_fn=_die_with_parent,
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -22,6 +23,8 @@ from rosgraph_msgs.msg import Clock
 from drive import Drive, Node, joint_trajectory
 
 ROSOUT_QOS = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+PIPE_BYTES = 4096
+"""What Linux writes to a pipe whole, or not at all."""
 IN_THE_CELL = ("-r", "__ns:=/cell", "-r", "__node:=mill")
 LINE = re.compile(r"\[(?P<level>[A-Z]+)\] \[(?P<stamp>\d+\.\d{9})\] \[(?P<logger>[\w.]+)\]: (?P<text>.*)")
 
@@ -172,3 +175,54 @@ def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
     said = lines(process)
     assert {(match["level"], match["logger"]) for match in said} == {("INFO", "virtual_axes")}, [m[0] for m in said]
     assert {(message.level, message.name) for message in found} == {(20, "virtual_axes")}, [m.msg for m in found]
+
+
+def test_a_log_that_nobody_reads_does_not_stop_the_node():
+    """stderr is a pipe that is full already; whoever reads it at last finds what was said meanwhile."""
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    with pytest.raises(BlockingIOError):
+        while True:
+            os.write(write, b"\n" * PIPE_BYTES)
+    os.set_blocking(write, True)
+    os.set_blocking(read, False)
+    try:
+        with Node(stderr=write) as process, Drive(process=process) as drive:
+            refuse(drive)
+            # The thread of the axes itself says that it stood still.
+            os.kill(process.pid, signal.SIGSTOP)
+            time.sleep(1.3)
+            os.kill(process.pid, signal.SIGCONT)
+            accepted = drive.accept(joint_trajectory(["x"], [0.5], [[0.001]], [[0.0]]))
+            assert drive.end(accepted.sequence_number, 20).status == 2
+            text = ""
+
+            def said() -> bool:
+                nonlocal text
+                try:
+                    text += os.read(read, PIPE_BYTES).decode()
+                except BlockingIOError:
+                    pass
+                return "no_such_joint" in text and "the node stood still" in text
+
+            drive.wait_for(said, 10, "log")
+            assert process.stop() == 0
+    finally:
+        os.close(write)
+        os.close(read)
+
+
+def test_a_log_that_nobody_reads_does_not_stop_the_end_of_the_node():
+    """It waits for a reader, but not for long."""
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    with pytest.raises(BlockingIOError):
+        while True:
+            os.write(write, b"\n" * PIPE_BYTES)
+    os.set_blocking(write, True)
+    try:
+        with Node(stderr=write) as process, Drive(process=process):
+            assert process.stop() == 0
+    finally:
+        os.close(write)
+        os.close(read)

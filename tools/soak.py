@@ -13,7 +13,8 @@ and listeners that are killed, for whom samples are kept until their lease has e
 
 Latency is that of a service to a client that does nothing else, over that of the same client at a process that only
 echoes, call by call in turns: what else the machine does slows both. Memory is what the process has of its own
-(RssAnon), without pages of files.
+(RssAnon), without pages of files: the least between two looks is judged, since what comes and goes is what readers
+have not acknowledged yet.
 
 The exit status is 1 if over the second half something grew by more than it may, or if the node died.
 """
@@ -69,6 +70,8 @@ KEPT = 64
 """Trajectories that the middleware keeps: depth of psec."""
 LONG = 5_000
 """Points of the longest trajectories."""
+SAMPLE_S = 0.25
+"""Wall time between two samples of memory."""
 LOOKS = 60
 CALLS = 15
 """Whose median is the latency of a look."""
@@ -82,6 +85,9 @@ class Look:
 
     minutes: float
     memory_mb: float
+    """The least since the look before."""
+    peak_mb: float
+    """The most since then."""
     files: float
     threads: float
     latency_ms: float
@@ -269,8 +275,9 @@ class Traffic:
 
     def visitor(self) -> None:
         """A participant comes and leaves."""
-        with Drive(process=self.drive.process) as other:
-            other.send(JointTrajectory(joint_names=["q"]))
+        assert self.drive.process is not None
+        with Guest(self.drive.process.domain_id, "sink", 10) as guest:
+            guest.leave()
 
     def killed(self) -> None:
         """A process listens; one of those that do is killed."""
@@ -344,15 +351,50 @@ def fill(drive: Drive) -> None:
     time.sleep(7)  # The middleware looks through its histories every 6 s.
 
 
-def look(drive: Drive, prober: Guest, began: float) -> Look:
+class Memory:
+    """What a process has had of its own, looked at all the time."""
+
+    def __init__(self, pid: int):
+        """Begin to look."""
+        self._status = Path(f"/proc/{pid}/status")
+        self._found_mb: list[float] = []
+        self._end = threading.Event()
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self) -> None:
+        while not self._end.wait(SAMPLE_S):
+            try:
+                self._found_mb.append(own_mb(self._status))
+            except OSError:
+                return
+
+    def since_mb(self) -> tuple[float, float]:
+        """The least and the most since this was asked last."""
+        found = [*self._found_mb, own_mb(self._status)]
+        self._found_mb = []
+        return min(found), max(found)
+
+    def close(self) -> None:
+        """End."""
+        self._end.set()
+
+
+def own_mb(status: Path) -> float:
+    """Resident memory without pages of files, MB."""
+    return next(int(line.split()[1]) for line in status.open() if line.startswith("RssAnon")) / 1e3
+
+
+def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
     """The process as it is now."""
     assert drive.process is not None
     pid = drive.process.pid
     status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
     latency, echo = prober.latencies_ms(CALLS)
+    least, most = memory.since_mb()
     return Look(
         minutes=(time.monotonic() - began) / 60,
-        memory_mb=int(status["RssAnon"].split()[0]) / 1e3,
+        memory_mb=least,
+        peak_mb=most,
         files=len(os.listdir(f"/proc/{pid}/fd")),
         threads=int(status["Threads"]),
         latency_ms=latency,
@@ -363,11 +405,11 @@ def look(drive: Drive, prober: Guest, began: float) -> Look:
 
 def table(looks: list[Look]) -> str:
     """Some of them, as Markdown."""
-    rows = ["| of the time | memory, MB | files | threads | service, ms | echo, ms | ratio | load |", "|" + "---|" * 8]
+    rows = ["| of the time | memory, MB | at most | files | threads | service, ms | echo, ms | ratio | load |", "|" + "---|" * 9]
     for mark in MARKS:
         at = looks[round(mark / 100 * (len(looks) - 1))]
         rows.append(
-            f"| {mark} % | {at.memory_mb:.1f} | {at.files:.0f} | {at.threads:.0f} | {at.latency_ms:.1f} "
+            f"| {mark} % | {at.memory_mb:.1f} | {at.peak_mb:.1f} | {at.files:.0f} | {at.threads:.0f} | {at.latency_ms:.1f} "
             f"| {at.echo_ms:.1f} | {at.latency_ratio:.2f} | {at.load:.1f} |"
         )
     return "\n".join(rows)
@@ -425,6 +467,7 @@ def main() -> int:
             Guest(process.domain_id, "probe", f"{process.name}/get_parameters", ECHO) as prober,
         ):
             traffic = Traffic(drive, follow, args.seed, args.only, Path(folder))
+            memory = Memory(process.pid)
             looks: list[Look] = []
             values: dict[str, str] = {}
             try:
@@ -435,7 +478,7 @@ def main() -> int:
                         break
                     if passed >= len(looks) * args.minutes * 60 / LOOKS:
                         traffic.forget()
-                        looks.append(look(drive, prober, began))
+                        looks.append(look(drive, prober, memory, began))
                         if len(looks) % (LOOKS // 10) == 0:
                             print(looks[-1], flush=True)
                 if process.poll() is None:
@@ -444,6 +487,7 @@ def main() -> int:
                     lived_s = (int(values["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
                     print(f"\n{lived_s:.0f} s of the axes in {time.monotonic() - began:.0f} s")
             finally:
+                memory.close()
                 traffic.close()
         if clock is not None:
             clock.close()

@@ -36,6 +36,9 @@ use self::terminal::Terminal;
 use super::args::{LogLevel, RosArgs};
 use crate::config::breaks_line;
 
+/// How long the end of the program waits for whoever reads its log.
+const LAST_WAIT: Duration = Duration::from_millis(500);
+
 /// One message of this program, for `/rosout`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogRecord {
@@ -76,7 +79,7 @@ impl Log {
         if let Some(line) = line {
             self.terminal.line(line + "\n");
         }
-        self.terminal.finish();
+        self.terminal.finish(LAST_WAIT);
     }
 }
 

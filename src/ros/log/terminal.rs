@@ -11,8 +11,6 @@ use std::time::{Duration, Instant};
 /// Lines that wait for the reader, several times what a start with `--log-level debug` says at once; at some
 /// 200 bytes a line 200 kB.
 const QUEUE: usize = 1024;
-/// How long the end of the program waits for the reader.
-const LAST_WAIT: Duration = Duration::from_millis(500);
 /// How often it looks then whether there is room.
 const POLL: Duration = Duration::from_millis(1);
 
@@ -53,9 +51,9 @@ impl Terminal {
         }
     }
 
-    /// Waits until what was handed over is written, but not for long.
-    pub(super) fn finish(&self) {
-        let until = Instant::now() + LAST_WAIT;
+    /// Waits until what was handed over is written, but not for longer than `patience`.
+    pub(super) fn finish(&self, patience: Duration) {
+        let until = Instant::now() + patience;
         let (written, is_written) = mpsc::sync_channel(1);
         let mut mark = Item::Mark(written);
         while let Err(TrySendError::Full(back)) = self.queue.try_send(mark) {
@@ -99,12 +97,14 @@ mod tests {
 
     /// A reader that takes a line when it is allowed to.
     struct Slow {
+        begun: mpsc::Sender<()>,
         allowed: Receiver<()>,
         taken: mpsc::Sender<String>,
     }
 
     impl Write for Slow {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let _ = self.begun.send(());
             self.allowed.recv().map_err(|_| io::ErrorKind::BrokenPipe)?;
             let _ = self.taken.send(String::from_utf8_lossy(bytes).into_owned());
             Ok(bytes.len())
@@ -115,55 +115,61 @@ mod tests {
         }
     }
 
-    fn slow() -> (Terminal, mpsc::Sender<()>, Receiver<String>) {
+    /// The other ends of a slow reader.
+    struct Ends {
+        begun: Receiver<()>,
+        allow: mpsc::Sender<()>,
+        lines: Receiver<String>,
+    }
+
+    fn slow() -> (Terminal, Ends) {
+        let (has_begun, begun) = mpsc::channel();
         let (allow, allowed) = mpsc::channel();
         let (taken, lines) = mpsc::channel();
         let missed = |lines| format!("missed {lines}\n");
-        (Terminal::start(Slow { allowed, taken }, missed).expect("a thread"), allow, lines)
+        let terminal = Terminal::start(Slow { begun: has_begun, allowed, taken }, missed).expect("a thread");
+        (terminal, Ends { begun, allow, lines })
     }
 
     #[test]
     fn a_reader_that_stands_still_holds_nobody_up_and_is_told_what_it_missed() {
         const MISSED: usize = 10;
-        let (terminal, allow, lines) = slow();
+        let (terminal, ends) = slow();
         terminal.line("0\n".to_owned());
-        // One is being written; it is not in the queue any more.
-        while terminal.queue.try_send(Item::Line("1\n".to_owned())).is_ok() {}
-        thread::sleep(Duration::from_millis(20));
-        let mut queued = 0;
-        while terminal.queue.try_send(Item::Line("2\n".to_owned())).is_ok() {
-            queued += 1;
+        // It is being written, and not in the queue any more.
+        ends.begun.recv_timeout(PATIENCE).expect("it is begun");
+        for _ in 0..QUEUE {
+            terminal.line("1\n".to_owned());
         }
-        assert!(queued <= 1, "{queued}");
         for _ in 0..MISSED {
             terminal.line("3\n".to_owned());
         }
-        terminal.finish();
+        terminal.finish(Duration::ZERO);
         for _ in 0..2 * QUEUE {
-            allow.send(()).expect("it writes");
+            ends.allow.send(()).expect("it writes");
         }
         let mut before = 0;
         loop {
-            let line = lines.recv_timeout(PATIENCE).expect("a line");
+            let line = ends.lines.recv_timeout(PATIENCE).expect("a line");
             if line.starts_with("missed") {
                 break assert_eq!(line, format!("missed {MISSED}\n"));
             }
             assert_ne!(line, "3\n");
             before += 1;
         }
-        assert!((QUEUE..=QUEUE + 1).contains(&before), "{before}");
+        assert_eq!(before, QUEUE + 1);
         terminal.line("4\n".to_owned());
-        assert_eq!(lines.recv_timeout(PATIENCE).expect("a line"), "4\n");
+        assert_eq!(ends.lines.recv_timeout(PATIENCE).expect("a line"), "4\n");
     }
 
     #[test]
     fn the_end_waits_for_a_reader_that_reads() {
-        let (terminal, allow, lines) = slow();
+        let (terminal, ends) = slow();
         for n in 0..100 {
             terminal.line(format!("{n}\n"));
-            allow.send(()).expect("it writes");
+            ends.allow.send(()).expect("it writes");
         }
-        terminal.finish();
-        assert_eq!(lines.try_iter().count(), 100);
+        terminal.finish(PATIENCE);
+        assert_eq!(ends.lines.try_iter().count(), 100);
     }
 }
