@@ -149,7 +149,10 @@ impl DriveWatch {
             Held { current: before.current, speed, voltage: before.voltage, torque: -friction - against };
         let work = self.energy.work(&held);
         let (was, is) = (self.energy.stored(before.current, speed), self.energy.stored(s.current, end));
-        let size = was + is + work.size;
+        let torques = [before.current, s.friction_current, s.gravity_current, s.load_current].map(f64::abs);
+        let blur = self.energy.speed_rounding(self.torque_constant * torques.iter().sum::<f64>());
+        let blurred = self.energy.kinetic_difference(speed.abs().max(end.abs()), blur);
+        let size = was + is + work.size + blurred / ROUNDING;
         let imbalance = (is - was - work.done).abs();
         if imbalance.is_nan() || imbalance > ROUNDING * size {
             broken((Check::Energy, imbalance, ROUNDING * size));
@@ -158,7 +161,7 @@ impl DriveWatch {
         let (even, uneven) = (0.5 * self.tick * speed.abs(), self.energy.uneven(&held));
         let taken = friction * work.turned;
         let standing = if product_sign(speed, end) > 0.0 { 0.0 } else { even };
-        let lent = friction.abs() * (standing + uneven);
+        let lent = friction.abs() * (standing + uneven + self.tick * blur);
         if taken < -lent {
             broken((Check::FrictionWork, -taken, lent));
         }
@@ -167,6 +170,7 @@ impl DriveWatch {
         self.supplied += work.done + taken;
         let way = s.position - before.position;
         let rounding = ROUNDING * self.ratio * (even + 0.5 * self.tick * end.abs() + uneven)
+            + self.ratio * self.tick * blur
             + 4.0 * f64::EPSILON * (s.position.abs() + before.position.abs());
         let off = (way - self.ratio * work.turned).abs();
         if off.is_nan() || off > rounding {

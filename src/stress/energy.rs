@@ -63,7 +63,13 @@ pub struct DriveEnergy {
     unevenness: f64,
     resistance: f64,
     emf_constant: f64,
+    /// T, s.
+    tick: f64,
 }
+
+/// Roundings between the torques of a tick and its speed: products, sums, and the division that makes the torque that
+/// stops the axis.
+const ROUNDINGS: f64 = 8.0;
 
 impl DriveEnergy {
     /// The drive of `axis`, as it is with what it deviates by, over ticks of `tick` s.
@@ -98,6 +104,7 @@ impl DriveEnergy {
             unevenness: motor.torque_constant * tick.powi(3) / (6.0 * motor.inertia * motor.inductance),
             resistance: motor.resistance,
             emf_constant: motor.emf_constant,
+            tick,
         }
     }
 
@@ -119,6 +126,17 @@ impl DriveEnergy {
             }
         }
         work
+    }
+
+    /// By how much the speed at the end of a tick is rounded, rad/s (m/s), where torques of these sizes in sum (N·m, N)
+    /// act: they cancel at a standstill, and each is rounded.
+    pub fn speed_rounding(&self, torques: f64) -> f64 {
+        ROUNDINGS * f64::EPSILON * torques * self.tick / (2.0 * self.kinetic)
+    }
+
+    /// The kinetic energy that a difference of speed makes, J, between this one (|ω|) and one that is so much higher.
+    pub fn kinetic_difference(&self, speed: f64, difference: f64) -> f64 {
+        self.kinetic * difference * (2.0 * speed + difference)
     }
 
     /// By how much the way over a tick may differ from that of a speed that goes evenly from its first to its last

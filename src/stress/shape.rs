@@ -154,7 +154,7 @@ mod tests {
         for number in 0..2000 {
             let mut random = Random::new(3, number);
             let periods = 4 + random.below(40);
-            let mut padded = |values: Vec<f64>| {
+            let padded = |values: Vec<f64>| {
                 let last = values[values.len() - 1];
                 [&[0.0; 3][..], &values[..], &[last; 3][..]].concat()
             };
