@@ -149,8 +149,8 @@ impl DriveWatch {
             Held { current: before.current, speed, voltage: before.voltage, torque: -friction - against };
         let work = self.energy.work(&held);
         let (was, is) = (self.energy.stored(before.current, speed), self.energy.stored(s.current, end));
-        let torques = [before.current, s.friction_current, s.gravity_current, s.load_current].map(f64::abs);
-        let blur = self.energy.speed_rounding(self.torque_constant * torques.iter().sum::<f64>());
+        let torques = [s.friction_current, s.gravity_current, s.load_current].map(f64::abs);
+        let blur = self.energy.speed_rounding(&held, self.torque_constant * torques.iter().sum::<f64>());
         let blurred = self.energy.kinetic_difference(speed.abs().max(end.abs()), blur);
         let size = was + is + work.size + blurred / ROUNDING;
         let imbalance = (is - was - work.done).abs();

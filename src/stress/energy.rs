@@ -63,6 +63,8 @@ pub struct DriveEnergy {
     unevenness: f64,
     resistance: f64,
     emf_constant: f64,
+    torque_constant: f64,
+    inductance: f64,
     /// T, s.
     tick: f64,
 }
@@ -104,6 +106,8 @@ impl DriveEnergy {
             unevenness: motor.torque_constant * tick.powi(3) / (6.0 * motor.inertia * motor.inductance),
             resistance: motor.resistance,
             emf_constant: motor.emf_constant,
+            torque_constant: motor.torque_constant,
+            inductance: motor.inductance,
             tick,
         }
     }
@@ -128,10 +132,12 @@ impl DriveEnergy {
         work
     }
 
-    /// By how much the speed at the end of a tick is rounded, rad/s (m/s), where torques of these sizes in sum (N·m, N)
-    /// act: they cancel at a standstill, and each is rounded.
-    pub fn speed_rounding(&self, torques: f64) -> f64 {
-        ROUNDINGS * f64::EPSILON * torques * self.tick / (2.0 * self.kinetic)
+    /// By how much the speed at the end of a tick is rounded, rad/s (m/s), where beside the motor's torques of these
+    /// sizes in sum (N·m, N) act: all of them cancel at a standstill, and each is rounded.
+    pub fn speed_rounding(&self, held: &Held, torques: f64) -> f64 {
+        let current = held.current.abs() + self.tick * held.voltage.abs() / self.inductance;
+        ROUNDINGS * f64::EPSILON * (self.torque_constant * current + torques) * self.tick
+            / (2.0 * self.kinetic)
     }
 
     /// The kinetic energy that a difference of speed makes, J, between this one (|ω|) and one that is so much higher.
