@@ -150,8 +150,8 @@ impl DriveWatch {
         let work = self.energy.work(&held);
         let (was, is) = (self.energy.stored(before.current, speed), self.energy.stored(s.current, end));
         let torques = [s.friction_current, s.gravity_current, s.load_current].map(f64::abs);
-        let blur = self.energy.speed_rounding(&held, self.torque_constant * torques.iter().sum::<f64>());
-        let blurred = self.energy.kinetic_difference(speed.abs().max(end.abs()), blur);
+        let rounded = self.energy.torque_rounding(&held, self.torque_constant * torques.iter().sum::<f64>());
+        let (blur, blurred) = (self.energy.speed_of(rounded), self.energy.work_of(rounded, &held));
         let size = was + is + work.size + blurred / ROUNDING;
         let imbalance = (is - was - work.done).abs();
         if imbalance.is_nan() || imbalance > ROUNDING * size {

@@ -132,17 +132,22 @@ impl DriveEnergy {
         work
     }
 
-    /// By how much the speed at the end of a tick is rounded, rad/s (m/s), where beside the motor's torques of these
-    /// sizes in sum (N·m, N) act: all of them cancel at a standstill, and each is rounded.
-    pub fn speed_rounding(&self, held: &Held, torques: f64) -> f64 {
+    /// By how much the torque τ of a tick is rounded, N·m (N), where it is made of torques of these sizes in sum: at a
+    /// standstill they cancel, with each other and with that of the motor, and each is rounded.
+    pub fn torque_rounding(&self, held: &Held, torques: f64) -> f64 {
         let current = held.current.abs() + self.tick * held.voltage.abs() / self.inductance;
-        ROUNDINGS * f64::EPSILON * (self.torque_constant * current + torques) * self.tick
-            / (2.0 * self.kinetic)
+        ROUNDINGS * f64::EPSILON * (self.torque_constant * current + torques)
     }
 
-    /// The kinetic energy that a difference of speed makes, J, between this one (|ω|) and one that is so much higher.
-    pub fn kinetic_difference(&self, speed: f64, difference: f64) -> f64 {
-        self.kinetic * difference * (2.0 * speed + difference)
+    /// What a difference of τ makes of the work of a tick at most, J.
+    pub fn work_of(&self, difference: f64, held: &Held) -> f64 {
+        let crossed: f64 = self.work[3].iter().zip(held.numbers()).map(|(w, z)| (w * z).abs()).sum();
+        difference * (2.0 * crossed + self.work[3][3].abs() * difference)
+    }
+
+    /// What a difference of τ makes of the speed at the end of a tick, rad/s (m/s).
+    pub fn speed_of(&self, difference: f64) -> f64 {
+        difference * self.tick / (2.0 * self.kinetic)
     }
 
     /// By how much the way over a tick may differ from that of a speed that goes evenly from its first to its last
