@@ -34,7 +34,7 @@ from virtual_axes.msg import DriveStates, MotorCurrents
 from drive import DEEP_QOS, NANOSECONDS, PSEC_QOS, SETTLE_S, _die_with_parent, _stamp_ns
 
 READY = "ready"
-PATIENCE_S = 30
+PATIENCE_S = 120
 """How long a guest's word is waited for."""
 LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
@@ -68,7 +68,11 @@ class Guest:
 
     def __enter__(self) -> Guest:
         """Itself, once it is ready."""
-        assert self.says() == READY
+        try:
+            assert self.says() == READY
+        except BaseException:
+            self.kill()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -102,7 +102,7 @@ fn a_tick_of_any_motor_is_the_matrix_exponential() {
                 (found / exact - 1.0).abs()
             };
             // NaN is worse than anything.
-            if !(off <= worst.0) {
+            if off.is_nan() || off > worst.0 {
                 worst = (off, format!("row {k}, column {l} of {told}: {found:e}, not {exact:e}"));
             }
         }
@@ -171,7 +171,7 @@ fn the_prediction_model_is_the_loops_folded_with_80_digits() {
         for (k, (found, exact)) in impulse(model.a(), model.b(), wanted.len()).iter().zip(wanted).enumerate()
         {
             let off = (found - exact).abs() / largest;
-            if !(off <= worst[place].0) {
+            if off.is_nan() || off > worst[place].0 {
                 worst[place] = (off, format!("period {k} of {told}: {found:e}, not {exact:e}"));
             }
         }
@@ -217,7 +217,7 @@ fn a_second_of_ticks_is_one_step_of_a_second() {
         for (name, found, exact, scale) in pairs {
             // Each tick rounds once, and its matrix is rounded: both add up.
             let off = (found - exact).abs() / scale / (ticks * f64::EPSILON);
-            if !(off <= worst.0) {
+            if off.is_nan() || off > worst.0 {
                 worst = (off, format!("{name} of {:?}: {found:e}, not {exact:e} after {ticks}", drive.motor));
             }
         }

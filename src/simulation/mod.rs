@@ -165,10 +165,10 @@ impl Simulation {
         let k = self.next;
         self.timeline.next();
         self.follow_timeline_events(k);
-        self.awake |= self.motions.any_running() || self.loads.any();
         if !self.awake && self.timeline.is_stream_moving() {
             self.wake_at_rest();
         }
+        self.awake |= self.motions.any_running() || self.loads.any();
         if self.awake {
             self.motions.look_ahead(&self.timeline);
             self.loads.apply(&mut self.machine, k);

@@ -13,11 +13,6 @@ use virtual_axes::ros::node::{self, NodeError};
 use virtual_axes::ros::security::Security;
 use virtual_axes::ros::{log, rosout};
 
-/// That of the C library gives little back of what histories of samples have taken, in each of its arenas: resident
-/// were five times the memory in use after a quarter of an hour (docs/reliability.md, Soak).
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
-
 /// Exit status of a wrong command line, environment or machine file.
 const USAGE: u8 = 2;
 
