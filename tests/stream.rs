@@ -575,3 +575,28 @@ fn a_reset_brings_a_waiting_delay_into_effect() {
     assert_eq!(t.stream_delay(), 0);
     assert_eq!(stream(&mut t, 0, &[0.001, 0.002]), [0.001, 0.002]);
 }
+
+#[test]
+fn a_stream_begins_the_same_whether_or_not_a_load_wakes_the_machine_with_it() {
+    let config = config("cascade");
+    let loaded_from = |instant: Option<usize>| -> Vec<[u64; 4]> {
+        let mut s = simulation(&config);
+        (0..40)
+            .map(|k| {
+                // A load on Y says nothing of X, and wakes the machine.
+                if instant.is_some_and(|instant| k >= instant) {
+                    s.set_load(1, 50.0, TSP);
+                }
+                if k >= 10 {
+                    s.stream(0, 0.001).unwrap();
+                }
+                s.step();
+                signals(&s)
+            })
+            .collect()
+    };
+    let alone = loaded_from(None);
+    assert_ne!(alone[0], alone[39], "X moves");
+    assert_eq!(loaded_from(Some(2)), alone);
+    assert_eq!(loaded_from(Some(10)), alone);
+}
