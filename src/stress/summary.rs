@@ -10,6 +10,9 @@ use super::fleet::Fleet;
 use super::plan::Kind;
 use crate::units::seconds;
 
+/// Bounds of errors below it, m or rad, are those of axes that rest: what errors are there is rounding.
+const SEEN: f64 = 1e-9;
+
 /// Faults that are kept, of all that are found.
 const KEPT: usize = 20;
 
@@ -107,8 +110,7 @@ impl Summary {
             self.axes += 1;
             if let Some(bound) = axis.bound {
                 self.bounded += 1;
-                // An axis that nothing acts on has neither.
-                larger(&mut self.error, if bound > f64::MIN_POSITIVE { axis.error / bound } else { 0.0 });
+                larger(&mut self.error, if bound > SEEN { axis.error / bound } else { 0.0 });
             }
             larger(&mut self.mismatch, axis.mismatch);
             larger(&mut self.imbalance, axis.imbalance);
