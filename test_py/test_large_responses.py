@@ -66,8 +66,8 @@ def test_in_quick_succession(real: Drive):
 
 def test_what_is_too_long_is_said_and_stops_nothing(real: Drive):
     """One datagram holds 65 500 octets; the log names the service, and the next response comes."""
-    names = real.list_parameters()
+    names = (real.list_parameters() * 4)[:1000]
     with pytest.raises(TimeoutError):
-        real.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names * 4), timeout=1)
+        real.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names), timeout=1)
     assert "the response of describe_parameters is not sent" in real.process.output()
     assert len(real.describe(["max_points"])) == 1

@@ -59,7 +59,7 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
     drive.node.create_publisher(Clock, "/clock", 10)
     drive.wait_for(lambda: "holding back" in process.output(), 5, "notice of another clock")
     refuse(drive)
-    names = drive.list_parameters() * 4
+    names = (drive.list_parameters() * 4)[:1000]
     with pytest.raises(TimeoutError):
         drive.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names), timeout=0.5)
     # Only now: all three are history.

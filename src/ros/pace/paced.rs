@@ -109,7 +109,7 @@ async fn until(time: Option<tokio::time::Instant>) {
 /// The axes, and what waits for the first time.
 struct Paced {
     axes: Axes,
-    /// Trajectories that came before there was a time, oldest first.
+    /// Trajectories and stops that came before there was a time, oldest first.
     held: VecDeque<Command>,
     /// Whether there is a time.
     known: bool,
@@ -142,8 +142,11 @@ impl Paced {
                 self.axes.obey(command);
                 self.axes.report_ends();
             }
+            // What came before it is stopped at its start; of several in a row one is enough.
+            Command::Stop(..) if matches!(self.held.back(), Some(Command::Stop(..))) => {}
+            Command::Stop(..) => self.held.push_back(command),
             // All that waits ends with it.
-            Command::Stop(..) | Command::Reset(_) => {
+            Command::Reset(_) => {
                 self.release();
                 self.axes.obey(command);
                 self.axes.report_ends();
