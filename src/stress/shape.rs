@@ -59,10 +59,12 @@ impl Reach {
         let first = (periods + 2).saturating_sub(second + third).max(1);
         let t = self.period;
         let counts = [first, second, third].map(|n| n as f64);
+        let together = counts.iter().map(|n| counts.iter().filter(|other| *other == n).count());
+        let together = together.max().unwrap_or(1) as f64;
         let most = [
             self.velocity * counts[0] * t,
             self.acceleration * counts[0] * counts[1] * t * t,
-            self.jerk * counts[0] * counts[1] * counts[2] * t * t * t,
+            self.jerk * counts[0] * counts[1] * counts[2] * t * t * t / together,
             self.span(),
         ];
         let distance =
