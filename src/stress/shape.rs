@@ -51,7 +51,8 @@ impl Reach {
     /// Displacements of a move from rest to rest within `periods` position periods, at these.
     ///
     /// Its velocity is the convolution of three boxes of n₁, n₂ and n₃ periods: it is D/(n₁T) at most, its difference
-    /// D/(n₁n₂T²), the difference of that D/(n₁n₂n₃T³) (Biagiotti and Melchiorri 2012).
+    /// D/(n₁n₂T²), the difference of that D/(n₁n₂n₃T³), or twice that where no box is as wide as the others together
+    /// (Biagiotti and Melchiorri 2012).
     pub fn rest_to_rest(&self, random: &mut Random, periods: usize) -> Vec<f64> {
         let spare = periods.saturating_sub(3).max(1);
         let second = random.below(spare / 2 + 1) + 1;
@@ -59,12 +60,13 @@ impl Reach {
         let first = (periods + 2).saturating_sub(second + third).max(1);
         let t = self.period;
         let counts = [first, second, third].map(|n| n as f64);
-        let together = counts.iter().map(|n| counts.iter().filter(|other| *other == n).count());
-        let together = together.max().unwrap_or(1) as f64;
+        // Two of the edges that lower the acceleration act at once unless the widest box is as wide as the others together.
+        let widest = first.max(second).max(third);
+        let at_once = if 2 * widest < first + second + third { 2.0 } else { 1.0 };
         let most = [
             self.velocity * counts[0] * t,
             self.acceleration * counts[0] * counts[1] * t * t,
-            self.jerk * counts[0] * counts[1] * counts[2] * t * t * t / together,
+            self.jerk * counts[0] * counts[1] * counts[2] * t * t * t / at_once,
             self.span(),
         ];
         let distance =
