@@ -9,7 +9,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -177,16 +178,26 @@ def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
     assert {(message.level, message.name) for message in found} == {(20, "virtual_axes")}, [m.msg for m in found]
 
 
+@contextmanager
+def full_pipe() -> Iterator[tuple[int, int]]:
+    """Both ends of a pipe that takes nothing more until it is read."""
+    read, write = os.pipe()
+    try:
+        os.set_blocking(write, False)
+        with pytest.raises(BlockingIOError):
+            while True:
+                os.write(write, b"\n" * PIPE_BYTES)
+        os.set_blocking(write, True)
+        yield read, write
+    finally:
+        os.close(write)
+        os.close(read)
+
+
 def test_a_log_that_nobody_reads_does_not_stop_the_node():
     """stderr is a pipe that is full already; whoever reads it at last finds what was said meanwhile."""
-    read, write = os.pipe()
-    os.set_blocking(write, False)
-    with pytest.raises(BlockingIOError):
-        while True:
-            os.write(write, b"\n" * PIPE_BYTES)
-    os.set_blocking(write, True)
-    os.set_blocking(read, False)
-    try:
+    with full_pipe() as (read, write):
+        os.set_blocking(read, False)
         with Node(stderr=write) as process, Drive(process=process) as drive:
             refuse(drive)
             # The thread of the axes itself says that it stood still.
@@ -207,22 +218,10 @@ def test_a_log_that_nobody_reads_does_not_stop_the_node():
 
             drive.wait_for(said, 10, "log")
             assert process.stop() == 0
-    finally:
-        os.close(write)
-        os.close(read)
 
 
 def test_a_log_that_nobody_reads_does_not_stop_the_end_of_the_node():
     """It waits for a reader, but not for long."""
-    read, write = os.pipe()
-    os.set_blocking(write, False)
-    with pytest.raises(BlockingIOError):
-        while True:
-            os.write(write, b"\n" * PIPE_BYTES)
-    os.set_blocking(write, True)
-    try:
+    with full_pipe() as (_, write):
         with Node(stderr=write) as process, Drive(process=process):
             assert process.stop() == 0
-    finally:
-        os.close(write)
-        os.close(read)

@@ -19,7 +19,7 @@ from drive import DomainId, Node
 
 KEYSTORE = Path(__file__).resolve().parent.parent / "tools" / "keystore.py"
 SECURE = os.environ.get("VIRTUAL_AXES_SECURE_NODE")
-needs_secure_node = pytest.mark.skipif(not SECURE, reason="VIRTUAL_AXES_SECURE_NODE names no node")
+needs_secure_node = pytest.mark.skipif(not SECURE, reason="needs a node with --features security")
 HEARD, UNHEARD = 500, 100
 """Messages in the recording of a node that hears the clock it follows (a thousand a second), and of another."""
 PATIENCE_S = 60
