@@ -325,6 +325,7 @@ fn every_edge_is_refused_with_the_reason_or_runs() {
         }
     }
     println!("edges of one parameter: {ran} run, {refused} refused");
+    assert!(ran > 10 * refused && refused > 10, "{ran}, {refused}");
 }
 
 /// A number of the range, by its digits before and behind the point alike.

@@ -1,4 +1,4 @@
-//! Random trajectories: every check holds, each check can fail, and the digest depends on the seed alone.
+//! Random trajectories: every check holds, each check of a tick can fail, and the digest depends on the seed alone.
 
 use std::process::{Command, Output};
 use std::sync::LazyLock;
@@ -24,13 +24,12 @@ fn stressed(options: Options) -> Summary {
 fn random_trajectories_pass_every_check() {
     let summary = stressed(options(COUNT));
     assert!(summary.faults.is_empty(), "{:#?}", summary.faults);
-    assert_eq!(summary.run + summary.refused.values().sum::<u64>(), COUNT);
-    assert!(summary.refused.is_empty(), "{:?}", summary.refused);
+    assert_eq!(summary.run, COUNT);
     // Of everything there is something.
     assert_eq!(summary.kinds.len(), Kind::ALL.len());
     assert!(summary.variants.iter().all(|count| *count > 0), "{:?}", summary.variants);
     assert!(summary.limited > COUNT / 100 && summary.limited < COUNT, "{}", summary.limited);
-    assert!(summary.bounded * 4 > summary.axes, "{} of {}", summary.bounded, summary.axes);
+    assert!(summary.bounded * 5 > summary.axes * 4, "{} of {}", summary.bounded, summary.axes);
     // The bound is not far from what happens.
     assert!(summary.error.0 > 0.3 && summary.error.0 <= 1.0 + 1e-6, "{:?}", summary.error);
     assert!(summary.dissipated > 1e3 * summary.returned, "{} J, {} J", summary.dissipated, summary.returned);

@@ -118,7 +118,8 @@ class Keystore:
             openssl(*words, "-sha256", *serial, "-out", folder / "cert.pem")
         for part in ("identity_ca.cert.pem", "permissions_ca.cert.pem"):
             shutil.copy(self.certificate, folder / part)
-        shutil.copy(self.enclaves / "governance.p7s", folder)
+        if folder != self.enclaves:  # That of / has it already.
+            shutil.copy(self.enclaves / "governance.p7s", folder)
         topics = "".join(f"<topic>{topic}</topic>" for topic in denied)
         deny = DENY.format(domain=self.domain, topics=topics) if denied else ""
         grant = PERMISSIONS.format(xsi=XSI, schemas=SCHEMAS, name=name, domain=self.domain, deny=deny)

@@ -52,6 +52,9 @@ fn step(simulation: &mut Simulation, periods: usize) {
     }
 }
 
+/// Line and paragraph separators, and what marks or turns the direction of writing (Unicode's Bidi_Control).
+const TURNS: &str = "\u{2028}\u{2029}\u{61c}\u{200e}\u{200f}\u{202a}\u{202b}\u{202c}\u{202d}\u{202e}\u{2066}\u{2067}\u{2068}\u{2069}";
+
 /// A refusal is one short line that says something.
 fn refused(text: &str) {
     assert!(!text.trim().is_empty(), "a refusal without a word");
@@ -62,7 +65,7 @@ fn refused(text: &str) {
         &text[..text.floor_char_boundary(200)]
     );
     assert!(
-        !text.contains(|c: char| c.is_control() || ('\u{2028}'..='\u{202e}').contains(&c)),
+        !text.contains(|c: char| c.is_control() || TURNS.contains(c)),
         "more than a line: {text:?}"
     );
 }

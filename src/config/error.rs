@@ -188,7 +188,8 @@ pub(crate) fn shortened(text: &str) -> String {
 }
 
 /// Whether a terminal or an editor would do more with `c` than to show it: control characters, line and paragraph
-/// separators, and what turns the direction of writing.
+/// separators, and what marks or turns the direction of writing.
 pub(crate) fn breaks_line(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    let marks = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}');
+    marks || c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

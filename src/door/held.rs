@@ -10,6 +10,8 @@ const LONGEST_TOGETHER: usize = 4;
 /// Most trajectories that are held together, whatever their lengths: 1024 may wait for each of five joints, and
 /// as many goals.
 const MOST_TOGETHER: usize = 8192;
+/// More for controlled stops, which have no points and end at once: they must not wait for what they are to stop.
+const SPARE_FOR_STOPS: usize = 1024;
 
 /// The trajectories that exist, of whatever source. Each counts until the last one who needs it has dropped it.
 #[derive(Debug)]
@@ -38,8 +40,9 @@ impl Held {
             );
             Err(Rejection::new(Code::QueueFull, text).numbers(found as f64, most as f64))
         };
-        if list.len() >= MOST_TOGETHER {
-            return full("trajectories", list.len() + 1, MOST_TOGETHER);
+        let most = MOST_TOGETHER + if trajectory.points() == 0 { SPARE_FOR_STOPS } else { 0 };
+        if list.len() >= most {
+            return full("trajectories", list.len() + 1, most);
         }
         let points = list.iter().map(|(_, points)| points).sum::<usize>() + trajectory.points();
         if points > self.most_points {
@@ -87,7 +90,7 @@ mod tests {
         assert!(held.take(trajectory(1)).is_err());
         drop(under_way);
         assert!(held.take(trajectory(10)).is_ok());
-        // A controlled stop has none, and is taken whatever waits.
+        // A controlled stop has none.
         assert!(held.take(trajectory(0)).is_ok());
     }
 
@@ -98,6 +101,9 @@ mod tests {
         let mut waiting: Vec<_> = (0..MOST_TOGETHER).map(|_| held.take(one.clone()).expect("room")).collect();
         let refused = held.take(one.clone()).expect_err("no room");
         assert_eq!((refused.code, refused.limit), (Code::QueueFull, MOST_TOGETHER as f64));
+        let stops: Vec<_> = (0..SPARE_FOR_STOPS).map(|_| held.take(trajectory(0)).expect("room")).collect();
+        assert!(held.take(trajectory(0)).is_err());
+        drop(stops);
         waiting.pop();
         assert!(held.take(one).is_ok());
     }

@@ -8,8 +8,9 @@
 const SERIES: f64 = 1.0;
 /// Terms of the series: with poles within [`SERIES`] what follows is below 10⁻¹⁷ of the first.
 const TERMS: usize = 24;
-/// Slow pole times the tick from which on 1 − e^… is no small difference any more.
-const SETTLING: f64 = 0.5;
+/// Slow pole times the tick from which on 1 − e^… is no small difference any more. Below it the fast pole is 0.2 away
+/// at least: both together are more than [`SERIES`].
+const SETTLING: f64 = 0.4;
 
 /// The answer of `g″ + a g′ + k g = 0` from g = 0, g′ = 1, with its integrals, over one tick.
 ///
@@ -100,7 +101,7 @@ fn aperiodic(p: f64, q: f64, m: f64) -> Answer {
     let (step, ramp) = if -y >= SETTLING {
         settled(g, held, 2.0 * p, m)
     } else {
-        // x and y are far apart.
+        // x and y are apart.
         ((first(y) - first(x)) / (2.0 * q), (second(y) - second(x)) / (2.0 * q))
     };
     Answer { g, step, ramp, slope, held }

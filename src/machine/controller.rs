@@ -8,9 +8,9 @@ use crate::units::{DEGREE, MILLISECOND_NS, Nanoseconds, seconds};
 use super::AxisError;
 use super::prediction::prediction_model;
 
-/// Standstill of the set-point after which an axis is held: a controller with a bandwidth worth its name
-/// has finished a move by then.
-const REST_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
+/// Standstill of the set-point after which an axis under a controller with integral action is held: a controller
+/// with a bandwidth worth its name has finished a move by then.
+pub(crate) const REST_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
 
 /// Error with which an axis may rest, m.
 const REST_ERROR_LINEAR: f64 = 1e-6;

@@ -13,6 +13,7 @@ mod sample;
 
 pub use axis::{Axis, AxisParameters};
 pub use bank::Width;
+pub(crate) use controller::REST_AFTER;
 pub use controller::designed;
 pub use prediction::{deviating_model, prediction_model};
 pub use sample::AxisSample;

@@ -2,13 +2,16 @@
 
 use futures::{Stream, StreamExt, stream};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
-use ros2_client::{Message, MessageInfo, MessageTypeName, Name, Node, ReadResult};
+use ros2_client::{Message, MessageInfo, MessageTypeName, Node, ReadResult};
+
+use rustdds::policy::ResourceLimits;
+use rustdds::{DomainParticipant, QosPolicies, QosPolicyBuilder, TopicKind};
 
 use super::args::RosArgs;
 use super::recorder::{Direction, Recorder, Tap};
 use serde::Serialize;
 
-use crate::config::{Parameters, QosConfig};
+use crate::config::{Parameters, QosConfig, TimeMode};
 use crate::messages::Recorded;
 
 /// A publisher of a topic that is recorded.
@@ -17,15 +20,24 @@ pub struct Publisher<M: Serialize> {
     pub network: ros2_client::Publisher<M>,
     /// To the recording.
     pub tap: Tap<M>,
-    /// Its name in DDS, unless readers that come later want what was sent before.
-    pub volatile: Option<String>,
+    /// Its name in DDS.
+    pub topic: String,
+    /// Whether readers that come later do not want what was sent before.
+    pub volatile: bool,
+    /// Samples that the middleware keeps for readers that have not acknowledged them; then it waits.
+    pub kept: usize,
 }
 
 impl<M: Serialize> Publisher<M> {
-    /// One whose messages are not recorded.
-    pub fn unrecorded(network: ros2_client::Publisher<M>) -> Self {
-        Publisher { network, tap: Tap::none(), volatile: None }
+    /// One of the topic `name` whose messages are not recorded, and are made whoever listens.
+    pub fn unrecorded(network: ros2_client::Publisher<M>, name: &str) -> Self {
+        Publisher { network, tap: Tap::none(), topic: topic_of(name), volatile: false, kept: KEPT }
     }
+}
+
+/// A topic's name in DDS.
+pub(super) fn topic_of(name: &str) -> String {
+    format!("rt{name}")
 }
 
 /// A subscription of a topic that is recorded.
@@ -86,19 +98,49 @@ fn profile(qos: QosConfig) -> QosProfile {
     }
 }
 
-/// Creates topics on a node.
-pub struct Endpoints<'a> {
-    /// The node that they belong to.
-    pub node: &'a mut Node,
-    /// What resolves their names.
-    pub args: &'a RosArgs,
-    /// What configures their quality of service.
-    pub parameters: &'a Parameters,
-    /// What records their messages.
-    pub recorder: &'a mut Recorder,
+/// So many samples that a reader has not acknowledged RustDDS keeps where nothing is said (`DEFAULT_WRITER_MAX_SAMPLES`).
+pub const KEPT: usize = 8192;
+/// So many are under way where the axes wait for their readers anyway: what several topics send at a time fits into the
+/// socket of a reader (some 200 kB), so that nothing is lost. Fast DDS may never get over a loss (see `deaf`).
+const WINDOW: usize = 32;
+
+/// How many samples may be under way of a topic for whose readers the axes wait.
+fn window(qos: QosConfig) -> usize {
+    WINDOW.max(if qos.transient_local { qos.depth } else { 0 })
 }
 
-impl Endpoints<'_> {
+/// The profile of a publisher that keeps so many samples for readers that have not acknowledged them.
+fn keeping(profile: &QosProfile, kept: usize) -> QosPolicies {
+    let most = i32::try_from(kept).unwrap_or(i32::MAX);
+    let limits = ResourceLimits { max_samples: most, max_instances: 1, max_samples_per_instance: most };
+    QosPolicies::from(profile).modify_by(&QosPolicyBuilder::new().resource_limits(limits).build())
+}
+
+/// Creates topics on a node.
+pub struct Endpoints<'a> {
+    node: &'a mut Node,
+    participant: &'a DomainParticipant,
+    args: &'a RosArgs,
+    parameters: &'a Parameters,
+    recorder: &'a mut Recorder,
+    /// Whether the axes wait for slow readers.
+    waits: bool,
+}
+
+impl<'a> Endpoints<'a> {
+    /// On `node`, which belongs to `participant`; `args` resolve their names, `parameters` say their quality of service,
+    /// and `recorder` records their messages.
+    pub fn new(
+        node: &'a mut Node,
+        participant: &'a DomainParticipant,
+        args: &'a RosArgs,
+        parameters: &'a Parameters,
+        recorder: &'a mut Recorder,
+    ) -> Self {
+        let waits = parameters.node_config().time != TimeMode::Real;
+        Endpoints { node, participant, args, parameters, recorder, waits }
+    }
+
     fn configured(&self, name: &str) -> Result<QosConfig, EndpointError> {
         let own_name = name.trim_start_matches(['~', '/']);
         self.parameters.qos(own_name).ok_or_else(|| EndpointError {
@@ -108,16 +150,17 @@ impl Endpoints<'_> {
     }
 
     fn topic(
-        &mut self,
+        &self,
         name: &str,
-        type_name: MessageTypeName,
-        qos: QosConfig,
+        type_name: &MessageTypeName,
+        qos: &QosPolicies,
     ) -> Result<(rustdds::Topic, String), EndpointError> {
         let failed = |reason: String| EndpointError { name: name.to_owned(), reason };
         let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
-        let ros_name = Name::parse(&resolved).map_err(|e| failed(e.to_string()))?;
-        let topic =
-            self.node.create_topic(&ros_name, type_name, &profile(qos)).map_err(|e| failed(e.to_string()))?;
+        let topic = self
+            .participant
+            .create_topic(topic_of(&resolved), type_name.dds_msg_type(), qos, TopicKind::NoKey)
+            .map_err(|e| failed(e.to_string()))?;
         Ok((topic, resolved))
     }
 
@@ -131,14 +174,16 @@ impl Endpoints<'_> {
         type_name: MessageTypeName,
     ) -> Result<(Publisher<M>, String), EndpointError> {
         let qos = self.configured(name)?;
-        let (topic, resolved) = self.topic(name, type_name, qos)?;
+        let kept = if self.waits { window(qos) } else { KEPT };
+        let (topic, resolved) = self.topic(name, &type_name, &keeping(&profile(qos), kept))?;
         let network = self
             .node
             .create_publisher(&topic, None)
             .map_err(|e| EndpointError { name: name.to_owned(), reason: e.to_string() })?;
         let tap = self.recorder.tap(&resolved, qos, Direction::Out);
-        let volatile = (!qos.transient_local).then(|| format!("rt{resolved}"));
-        Ok((Publisher { network, tap, volatile }, resolved))
+        let volatile = !qos.transient_local;
+        let publisher = Publisher { network, tap, topic: topic_of(&resolved), volatile, kept };
+        Ok((publisher, resolved))
     }
 
     /// A subscription, and the name that it listens to.
@@ -163,7 +208,7 @@ impl Endpoints<'_> {
         type_name: MessageTypeName,
         qos: QosConfig,
     ) -> Result<(Subscription<M>, String), EndpointError> {
-        let (topic, resolved) = self.topic(name, type_name, qos)?;
+        let (topic, resolved) = self.topic(name, &type_name, &QosPolicies::from(&profile(qos)))?;
         let network = self
             .node
             .create_subscription(&topic, None)

@@ -25,15 +25,15 @@
 //! fragments would block the clients for good.
 
 use std::collections::BTreeSet;
-use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, SystemTime};
 
 use ros2_client::Context;
 use ros2_client::entities_info::ParticipantEntitiesInfo;
 use ros2_client::service::RmwRequestId;
-use rustdds::{DomainParticipant, RepresentationIdentifier, serialization};
+use rustdds::{RepresentationIdentifier, serialization};
 use serde::{Deserialize, Serialize};
 
+use super::readers::Readers;
 use super::rtps::{CDR_LE, Data, Guid, Message, entity, is_secured, sequence_number};
 
 /// Fast DDS's UDP transport reads no more of a datagram.
@@ -73,21 +73,12 @@ pub(super) enum LargeResponseError {
 
 /// Sends the datagrams of one response writer.
 #[derive(Debug)]
-pub(super) struct LargeResponses {
-    writer: Guid,
-    topic: String,
-    participant: DomainParticipant,
-    socket: UdpSocket,
-}
+pub(super) struct LargeResponses(Readers);
 
 impl LargeResponses {
-    /// For the writer with this GUID on this DDS topic.
-    ///
-    /// # Errors
-    /// What the system says when it gives no socket.
-    pub(super) fn new(writer: Guid, topic: String, participant: DomainParticipant) -> std::io::Result<Self> {
-        let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
-        Ok(Self { writer, topic, participant, socket })
+    /// To the readers of that writer.
+    pub(super) fn new(readers: Readers) -> Self {
+        Self(readers)
     }
 
     /// Encodes a response, to be given to [`Self::datagram`] once RustDDS has written it; `None` when
@@ -115,12 +106,12 @@ impl LargeResponses {
 
     /// The datagram of the response that RustDDS wrote as sample `number`.
     pub(super) fn datagram(&self, request: &RmwRequestId, number: i64, payload: &[u8]) -> Vec<u8> {
-        datagram(&self.writer, number, request, payload, SystemTime::now())
+        datagram(&self.0.writer, number, request, payload, SystemTime::now())
     }
 
     /// Sends a datagram for the first time, and gives its readers the time to take it in.
     pub(super) async fn send(&self, datagram: &[u8]) {
-        self.send_now(datagram);
+        self.0.send(datagram);
         tokio::time::sleep(PACE).await;
     }
 
@@ -130,36 +121,14 @@ impl LargeResponses {
         for wait in REPEATS {
             tokio::time::sleep(wait).await;
             // The clients are looked up anew: one may have come that has to account for this sample.
-            self.send_now(&datagram);
+            self.0.send(&datagram);
         }
         drop(datagram);
-        let gap = Message::from(&self.writer).gap(entity(&self.writer), number);
+        let gap = Message::from(&self.0.writer).gap(entity(&self.0.writer), number, number + 1);
         for wait in GIVE_UP {
             tokio::time::sleep(wait).await;
-            self.send_now(&gap);
+            self.0.send(&gap);
         }
-    }
-
-    fn send_now(&self, datagram: &[u8]) {
-        for client in self.clients() {
-            if let Err(error) = self.socket.send_to(datagram, client) {
-                let (length, topic) = (datagram.len(), &self.topic);
-                tracing::warn!("a message of {length} octets on {topic} cannot go to {client}: {error}");
-            }
-        }
-    }
-
-    /// Where the clients' response readers listen.
-    fn clients(&self) -> BTreeSet<SocketAddr> {
-        self.participant
-            .discovered_readers()
-            .iter()
-            .filter(|reader| reader.subscription_topic_data.topic_name() == &self.topic)
-            .flat_map(|reader| &reader.reader_proxy.unicast_locator_list)
-            .filter(|locator| locator.is_udp())
-            .map(|locator| SocketAddr::from(*locator))
-            .filter(|address| address.is_ipv4() && address.port() != 0)
-            .collect()
     }
 }
 

@@ -20,7 +20,7 @@ use super::args::RosArgs;
 use super::clock::{ClockInput, ClockOutput, ClockState};
 use super::convert;
 use super::diagnostics::Diagnostics;
-use super::endpoints::{EndpointError, Publisher};
+use super::endpoints::{EndpointError, Endpoints, Publisher};
 use super::environment::Environment;
 use super::fan_out::{FanOut, publish_diagnostics};
 use super::heard::{self, Listeners};
@@ -126,7 +126,10 @@ async fn serve(
     let joint_limits = simulation::joints(&config, &node_config.joint_prefix);
     let joints: Vec<String> = joint_limits.iter().map(|j| j.name.clone()).collect();
     let period = config.periods().position;
-    let when_full = if mode == TimeMode::Real { WhenFull::Drop } else { WhenFull::Wait };
+    let (when_full, of_results) = match mode {
+        TimeMode::Real => (WhenFull::Drop, WhenFull::WaitForAWhile),
+        TimeMode::Fast | TimeMode::SimTime => (WhenFull::Wait, WhenFull::Wait),
+    };
     let (health_out, health) = watch::channel(Health::default());
     let mut recorder = Recorder::open(&node_config, when_full, &health)?;
 
@@ -139,10 +142,14 @@ async fn serve(
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
     let rosout_publisher = rosout::publisher(&mut node, args, &mut recorder)?;
-    let mut topics = Topics::create(&mut node, args, &parameters, &mut recorder, mode)?;
+    let mut topics =
+        Topics::create(Endpoints::new(&mut node, &dds, args, &parameters, &mut recorder), args, mode)?;
     let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
+    let [action_status, action_feedback] =
+        ["status", "feedback"].map(|part| format!("{}/_action/{part}", action_topics.name));
     topics.names.goals_on.push(action_topics.name);
-    let tool = ToolTopics::create(&mut node, args, &parameters, &mut recorder, Kinematics::new(&config))?;
+    let endpoints = Endpoints::new(&mut node, &dds, args, &parameters, &mut recorder);
+    let tool = ToolTopics::create(endpoints, Kinematics::new(&config))?;
     topics.names.also_publishes(tool.as_ref().map_or(&[], |tool| &tool.names));
     let reset = Trigger::new(&mut node, &context, args, "reset")?;
     let stop = Trigger::new(&mut node, &context, args, "stop")?;
@@ -164,15 +171,16 @@ async fn serve(
 
     // What goes out.
     let mut listeners = Listeners::default();
-    let mut publishing = Publishing { dropped: &dropped, listeners: &mut listeners, tasks: &mut tasks };
+    let mut publishing =
+        Publishing { participant: &dds, dropped: &dropped, listeners: &mut listeners, tasks: &mut tasks };
     let (goal_events, events) = mpsc::unbounded_channel();
-    let results_output = publishing.start(topics.results, WhenFull::Wait);
+    let results_output = publishing.start(topics.results, of_results);
     let results =
         Arc::new(Results::new(results_output, joint_limits.clone(), goal_events, node_config.max_points));
     let diagnostics = publishing.start(topics.diagnostics, WhenFull::Drop);
     let every = node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * seconds(period))).round() as i64);
     let (running, running_goals) = watch::channel(Arc::from([]));
-    let status = publishing.start(Publisher::unrecorded(action_topics.status), WhenFull::Wait);
+    let status = publishing.start(Publisher::unrecorded(action_topics.status, &action_status), of_results);
     let outputs = FanOut {
         joint_states: publishing.start(topics.joint_states, when_full),
         motor_currents: publishing.start(topics.motor_currents, when_full),
@@ -180,7 +188,8 @@ async fn serve(
         controller_state: publishing.start(topics.controller_state, when_full),
         feedback: Feedback {
             goals: running_goals,
-            output: publishing.start(Publisher::unrecorded(action_topics.feedback), when_full),
+            output: publishing
+                .start(Publisher::unrecorded(action_topics.feedback, &action_feedback), when_full),
             joints: joints.clone(),
             every: feedback_period(node_config.action_monitor_rate, period),
         },

@@ -7,6 +7,8 @@ use rustdds::DomainParticipant;
 #[cfg(feature = "security")]
 use rustdds::DomainParticipantSecurityConfigFiles;
 
+#[cfg(not(feature = "security"))]
+use super::security::SecurityError;
 use super::{environment::Environment, goodbye::Goodbye, security::Security};
 
 /// The node could not join the network.
@@ -51,7 +53,8 @@ impl Participant {
     /// Likewise, secured as `security` says.
     ///
     /// # Errors
-    /// Also where the files of the enclave do not allow it to take part in the domain.
+    /// Also where this build has no DDS Security, or the files of the enclave do not allow it to take part in the
+    /// domain.
     pub fn open_with(environment: &Environment, security: &Security) -> Result<Self, ParticipantError> {
         let builder = environment.participant_builder();
         #[cfg(feature = "security")]
@@ -65,6 +68,11 @@ impl Participant {
                 builder.builtin_security(files)
             }
         };
+        #[cfg(not(feature = "security"))]
+        if let Security::Enclave(_) = security {
+            let reason = SecurityError::NotBuilt.to_string();
+            return Err(ParticipantError::Open { domain_id: environment.domain_id(), reason });
+        }
         if let Security::Open(reason) = security {
             tracing::warn!("nothing of what this node says or hears is protected: {reason}");
         }

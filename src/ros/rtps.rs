@@ -122,16 +122,16 @@ impl Message {
         self
     }
 
-    /// The last submessage: there is nothing, or no more, to be had of this one sample of `writer`
-    /// (GAP, 8.3.8.4). A reader that has the sample keeps it.
-    pub(super) fn gap(mut self, writer: EntityId, number: i64) -> Vec<u8> {
+    /// The last submessage: there is nothing, or no more, to be had of the samples of `writer` from `from` on up to
+    /// that before `before` (GAP, 8.3.8.4). A reader that has them keeps them.
+    pub(super) fn gap(mut self, writer: EntityId, from: i64, before: i64) -> Vec<u8> {
         let octets = &mut self.0;
         octets.extend([SUBMESSAGE_GAP, FLAG_LITTLE_ENDIAN, 28, 0]);
         octets.extend(ANY_READER);
         octets.extend(writer);
-        octets.extend(sequence_number(number));
+        octets.extend(sequence_number(from));
         // A set that begins behind the gap, of no numbers (9.4.2.6).
-        octets.extend(sequence_number(number + 1));
+        octets.extend(sequence_number(before));
         octets.extend([0; 4]);
         self.0
     }
@@ -244,8 +244,8 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_one_sample_wide() {
-        let message = Message::from(&GUID).gap(entity(&GUID), 9);
+    fn a_gap_ends_before_a_sample() {
+        let message = Message::from(&GUID).gap(entity(&GUID), 9, 10);
         assert_eq!(message[20..32], [0x08, 0x01, 28, 0, 0, 0, 0, 0, 0, 0, 0x0f, 0x03]);
         assert_eq!(message[32..], [0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0, 10, 0, 0, 0, 0, 0, 0, 0]);
     }

@@ -18,6 +18,7 @@ use tokio::sync::Mutex;
 
 use super::args::RosArgs;
 use super::large_response::{self, LargeResponses};
+use super::readers::Readers;
 use super::rtps::Guid;
 use super::unsent::Place;
 
@@ -158,10 +159,11 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         response_topic: String,
         participant: DomainParticipant,
     ) -> Result<Self, ServiceError> {
-        let large =
-            LargeResponses::new(writer, response_topic.clone(), participant.clone()).map_err(|error| {
-                ServiceError { name: label.to_owned(), reason: format!("no socket: {error}") }
-            })?;
+        let clients = Readers::new(writer, response_topic.clone(), participant.clone());
+        let large = clients.map(LargeResponses::new).map_err(|error| ServiceError {
+            name: label.to_owned(),
+            reason: format!("no socket: {error}"),
+        })?;
         Ok(Service { label, ends, response_topic, participant, large, written: Mutex::new(0) })
     }
 
@@ -214,15 +216,15 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
                 }
             };
             self.wait_for_client(&id).await;
-            let written = self.write(id, response, large).await;
-            drop(place);
-            match written {
+            match self.write(id, response, large).await {
                 Ok(None) => {}
+                // Kept until it need not be said again.
                 Ok(Some((datagram, number))) => self.large.repeat(datagram, number).await,
                 Err(reason) => {
                     tracing::warn!("the response of {} could not be sent: {reason}", self.label);
                 }
             }
+            drop(place);
         }
         .boxed()
     }

@@ -6,17 +6,15 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use nalgebra::UnitQuaternion;
-use ros2_client::{MessageTypeName, Node};
+use ros2_client::MessageTypeName;
 use ros2_interfaces_jazzy_serde::geometry_msgs::msg::PoseStamped;
 use ros2_interfaces_jazzy_serde::nav_msgs::msg::Path;
 use tokio::time::{Instant, MissedTickBehavior};
 
-use super::args::RosArgs;
 use super::endpoints::{EndpointError, Endpoints, Publisher};
 use super::outputs::{Output, Publishing, WhenFull};
 use super::pace::Frame;
-use super::recorder::Recorder;
-use crate::config::{Parameters, ToolConfig};
+use crate::config::ToolConfig;
 use crate::kinematics::{Kinematics, ToolPose};
 use crate::machine::AxisSample;
 use crate::messages;
@@ -45,16 +43,12 @@ impl ToolTopics {
     /// # Errors
     /// [`EndpointError`] naming the topic that the middleware refuses.
     pub fn create(
-        node: &mut Node,
-        args: &RosArgs,
-        parameters: &Parameters,
-        recorder: &mut Recorder,
+        mut endpoints: Endpoints<'_>,
         kinematics: Kinematics,
     ) -> Result<Option<Self>, EndpointError> {
         if !kinematics.has_linear_axis() && !kinematics.has_rotary_axis() {
             return Ok(None);
         }
-        let mut endpoints = Endpoints { node, args, parameters, recorder };
         let path_type = || MessageTypeName::new("nav_msgs", "Path");
         let (pose, pose_name) =
             endpoints.publisher("~/tool_pose", MessageTypeName::new("geometry_msgs", "PoseStamped"))?;
@@ -68,7 +62,7 @@ impl ToolTopics {
     pub fn start(self, publishing: &mut Publishing, config: ToolConfig, when_full: WhenFull) -> ToolOutput {
         let trace = Arc::new(Mutex::new(Trace::new(config.path_length)));
         if let Some(rate) = config.path_rate {
-            // A task of its own waits for slow readers of the paths; the axes do not.
+            // A task of their own waits for slow readers of the paths; the axes do not.
             let outputs = [self.path, self.setpoint].map(|path| publishing.start(path, WhenFull::Wait));
             let paths = Paths { trace: Arc::clone(&trace), frame: config.frame.clone(), outputs };
             publishing.tasks.spawn(paths.run(Duration::from_secs_f64(1.0 / rate)));

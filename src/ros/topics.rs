@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use ros2_client::{Message, MessageTypeName, Node};
+use ros2_client::{Message, MessageTypeName};
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
 use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
@@ -10,8 +10,7 @@ use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 
 use super::args::RosArgs;
 use super::endpoints::{EndpointError, Endpoints, Publisher, Subscription};
-use super::recorder::Recorder;
-use crate::config::{Parameters, QosConfig, TimeMode};
+use crate::config::{QosConfig, TimeMode};
 use crate::messages::{
     CONTROL_PACKAGE, DriveStates, JointTrajectoryControllerState, MotorCurrents, PACKAGE, TrajectoryResult,
 };
@@ -67,13 +66,10 @@ impl Topics {
     /// # Errors
     /// [`EndpointError`] naming the topic that the middleware refuses.
     pub fn create(
-        node: &mut Node,
+        mut endpoints: Endpoints<'_>,
         args: &RosArgs,
-        parameters: &Parameters,
-        recorder: &mut Recorder,
         time: TimeMode,
     ) -> Result<Self, EndpointError> {
-        let mut endpoints = Endpoints { node, args, parameters, recorder };
         let joint_state = || MessageTypeName::new("sensor_msgs", "JointState");
         let trajectory = MessageTypeName::new("trajectory_msgs", "JointTrajectory");
         let diagnostic = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");

@@ -1,11 +1,14 @@
 //! The services `~/stop` and `~/reset`.
 
 use futures::StreamExt;
+use futures::future::BoxFuture;
+use futures::stream::FuturesUnordered;
 use ros2_client::{Context, Node, ServiceTypeName};
 use ros2_interfaces_jazzy_serde::std_srvs::srv::{TriggerRequest, TriggerResponse};
 
 use super::args::RosArgs;
 use super::service::{Service, ServiceError};
+use super::unsent::Unsent;
 
 /// Requests that may wait.
 const DEPTH: usize = 10;
@@ -34,16 +37,24 @@ impl Trigger {
         F: Future<Output = Result<String, String>> + Send,
     {
         let mut requests = self.0.requests();
-        while let Some(received) = requests.next().await {
-            match received {
-                Ok((id, _)) => {
-                    let (success, message) = match act().await {
-                        Ok(message) => (true, message),
-                        Err(message) => (false, message),
-                    };
-                    self.0.respond(id, TriggerResponse { success, message }, None).await;
-                }
-                Err(reason) => tracing::warn!("{reason}"),
+        // Responses are sent side by side: a client that is gone holds up no other's stop.
+        let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
+        let unsent = Unsent::default();
+        loop {
+            tokio::select! {
+                biased;
+                Some(()) = responses.next(), if !responses.is_empty() => {}
+                Some((place, request)) = unsent.next(&mut requests) => match request {
+                    Ok((id, _)) => {
+                        let (success, message) = match act().await {
+                            Ok(message) => (true, message),
+                            Err(message) => (false, message),
+                        };
+                        responses.push(self.0.respond(id, TriggerResponse { success, message }, place));
+                    }
+                    Err(reason) => tracing::warn!("{reason}"),
+                },
+                else => break,
             }
         }
     }

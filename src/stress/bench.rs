@@ -6,28 +6,24 @@ use blake3::Hasher;
 
 use super::drive::Broken;
 use super::fault::{Check, Fault};
-use super::fleet::{Fleet, FleetError};
+use super::fleet::{Fleet, FleetError, Variant};
 use super::plan::{Ask, Kind, Plan};
 use super::watch::{AxisFigures, AxisWatch};
 use crate::machine::{AxisSample, Width};
 use crate::simulation::Simulation;
 use crate::trajectory::stream::STREAM_PAUSE;
-use crate::trajectory::{Code, Context, JointLimits, MotionId, Rejection, Request, Start, Trajectory};
+use crate::trajectory::{Context, MotionId, Rejection, Request, Start, Trajectory};
 
 /// Most faults of a trajectory that are told.
 const TOLD: usize = 8;
 
 /// What a trajectory came to.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Record {
     /// Its number.
     pub number: u64,
-    /// Place of its machine in the fleet.
-    pub variant: usize,
-    /// Its kind.
-    pub kind: Option<Kind>,
-    /// Why the library did not take it.
-    pub refused: Option<Code>,
+    /// Place of its machine in the fleet, and its kind; none of one that was refused.
+    pub ran: Option<(usize, Kind)>,
     /// Position periods that ran.
     pub periods: usize,
     /// Of each axis.
@@ -36,36 +32,16 @@ pub struct Record {
     pub loaded: bool,
     /// What is wrong.
     pub faults: Vec<Fault>,
-    /// Hash of all that, but the faults, to the bit.
+    /// Hash, to the bit, of number, machine, kind and periods, and of each axis ticks at a limit, peak current, error,
+    /// energies, and where it ended.
     pub digest: [u8; 32],
 }
 
 impl Record {
-    fn new(number: u64) -> Self {
-        Record {
-            number,
-            variant: 0,
-            kind: None,
-            refused: None,
-            periods: 0,
-            axes: Vec::new(),
-            loaded: false,
-            faults: Vec::new(),
-            digest: [0; 32],
-        }
-    }
-
-    fn refused(number: u64, rejection: &Rejection) -> Self {
-        let mut record = Record { refused: Some(rejection.code), ..Record::new(number) };
-        record.digest = record.hash();
-        record
-    }
-
     fn hash(&self) -> [u8; 32] {
         let mut hasher = Hasher::new();
-        let kind = self.kind.map_or(u64::MAX, |kind| kind as u64);
-        let refused = self.refused.map_or(0, |code| code as u64);
-        for word in [self.number, self.variant as u64, kind, refused, self.periods as u64] {
+        let (variant, kind) = self.ran.map_or((0, u64::MAX), |(place, kind)| (place as u64, kind as u64));
+        for word in [self.number, variant, kind, 0, self.periods as u64] {
             hasher.update(&word.to_le_bytes());
         }
         for axis in &self.axes {
@@ -77,13 +53,6 @@ impl Record {
         }
         *hasher.finalize().as_bytes()
     }
-}
-
-/// A simulation of a variant, with what is looked at.
-#[derive(Debug)]
-struct Stand {
-    simulation: Simulation,
-    watches: Vec<AxisWatch>,
 }
 
 /// The simulations of one thread.
@@ -121,31 +90,17 @@ impl Bench {
         number: u64,
         alter: impl FnMut(usize, usize, &mut AxisSample),
     ) -> Result<Record, FleetError> {
-        let plan = match Plan::new(&self.fleet, self.seed, number) {
-            Ok(plan) => plan,
-            Err(rejection) => return Ok(Record::refused(number, &rejection)),
+        let mut faults = Faults { number, found: Vec::new() };
+        let record = match Plan::new(&self.fleet, self.seed, number) {
+            Ok(plan) => self.follow(&plan, &mut faults, alter)?,
+            Err(rejection) => {
+                faults.refused(0, &rejection);
+                Record::default()
+            }
         };
-        self.ready(plan.variant)?;
-        match self.follow(&plan, alter) {
-            Ok(record) => Ok(record),
-            Err(rejection) => Ok(Record::refused(number, &rejection)),
-        }
-    }
-
-    /// Makes the simulation of a variant, if there is none yet.
-    fn ready(&mut self, place: usize) -> Result<(), FleetError> {
-        if self.stands[place].is_none() {
-            let variant = &self.fleet.variants()[place];
-            let mut simulation = Simulation::new(&variant.config, variant.joints.clone(), 0)?;
-            // What is measured here is measured apart.
-            simulation.set_assessing(false);
-            simulation.set_width(self.width);
-            let periods = variant.config.periods();
-            let axes = variant.config.axes().iter().zip(&variant.axes);
-            let watches = axes.map(|(axis, theory)| AxisWatch::new(axis, &periods, theory)).collect();
-            self.stands[place] = Some(Stand { simulation, watches });
-        }
-        Ok(())
+        let mut record = Record { number, faults: faults.found, ..record };
+        record.digest = record.hash();
+        Ok(record)
     }
 
     fn next_motion(&mut self) -> MotionId {
@@ -153,17 +108,58 @@ impl Bench {
         MotionId(self.motions)
     }
 
+    /// Runs `plan`; one that is refused is a fault, since it is within all limits.
     fn follow(
         &mut self,
         plan: &Plan,
+        faults: &mut Faults,
+        alter: impl FnMut(usize, usize, &mut AxisSample),
+    ) -> Result<Record, FleetError> {
+        let motions = [self.next_motion(), self.next_motion()];
+        let variant = &self.fleet.variants()[plan.variant];
+        let place = &mut self.stands[plan.variant];
+        let made = match place.take() {
+            Some(made) => made,
+            None => Stand::new(variant, self.width)?,
+        };
+        let stand = place.insert(made);
+        Ok(stand.follow(plan, variant, motions, faults, alter).unwrap_or_else(|rejection| {
+            let tick = stand.watches.first().map_or(0, AxisWatch::ticks);
+            faults.refused(tick, &rejection);
+            Record::default()
+        }))
+    }
+}
+
+/// A simulation of a variant, with what is looked at.
+#[derive(Debug)]
+struct Stand {
+    simulation: Simulation,
+    watches: Vec<AxisWatch>,
+}
+
+impl Stand {
+    fn new(variant: &Variant, width: Width) -> Result<Self, FleetError> {
+        let mut simulation = Simulation::new(&variant.config, variant.joints.clone(), 0)?;
+        // What is measured here is measured apart.
+        simulation.set_assessing(false);
+        simulation.set_width(width);
+        let periods = variant.config.periods();
+        let axes = variant.config.axes().iter().zip(&variant.axes);
+        let watches = axes.map(|(axis, theory)| AxisWatch::new(axis, &periods, theory)).collect();
+        Ok(Stand { simulation, watches })
+    }
+
+    fn follow(
+        &mut self,
+        plan: &Plan,
+        variant: &Variant,
+        [motion, stop]: [MotionId; 2],
+        faults: &mut Faults,
         mut alter: impl FnMut(usize, usize, &mut AxisSample),
     ) -> Result<Record, Rejection> {
-        let fleet = self.fleet.clone();
-        let (motion, stop) = (self.next_motion(), self.next_motion());
-        let variant = &fleet.variants()[plan.variant];
-        let Some(Stand { simulation, watches }) = self.stands[plan.variant].as_mut() else {
-            return Err(Rejection::new(Code::UnknownJoint, "the machine has not been made ready"));
-        };
+        let Stand { simulation, watches } = self;
+        watches.iter_mut().zip(&plan.start).for_each(|(watch, start)| watch.begin(*start));
         simulation.reset_to(&plan.start)?;
         if matches!(plan.ask, Ask::Stream(_)) {
             // A stop of the trajectory before holds streams off until they have paused.
@@ -181,9 +177,8 @@ impl Bench {
         if let Ask::Follow(request) | Ask::Stop(request, _) = &plan.ask {
             simulation.offer(motion, checked(request.clone())?)?;
         }
-        watches.iter_mut().zip(&plan.start).for_each(|(watch, start)| watch.begin(*start));
         simulation.take_ends().for_each(drop);
-        let mut faults = Faults { number: plan.number, names: &variant.joints, found: Vec::new() };
+        let name = |place: usize| variant.joints[place].name.as_str();
         let mut loads = plan.loads.iter().peekable();
         let (mut periods, mut ends) = (0, 0);
         let mut limited = vec![0; watches.len()];
@@ -209,7 +204,9 @@ impl Bench {
                     let mut sample = *machine.axis(place).sample();
                     alter(place, watch.ticks(), &mut sample);
                     let at = watch.ticks();
-                    watch.see(&sample, [tick == 0, tick == 1], &mut |broken| faults.add(place, at, broken));
+                    watch.see(&sample, [tick == 0, tick == 1], &mut |broken| {
+                        faults.add(name(place), at, broken)
+                    });
                 }
                 tick += 1;
             });
@@ -221,53 +218,61 @@ impl Bench {
             for (place, watch) in watches.iter_mut().enumerate() {
                 let at = watch.ticks();
                 let activity = simulation.machine().activity(place);
-                watch.end_period(&activity, &mut |broken| faults.add(place, at, broken));
+                watch.end_period(&activity, &mut |broken| faults.add(name(place), at, broken));
                 // What is published of an instant tells limits at any tick since the one before.
                 let sample = &simulation.samples()[place];
                 let instant = simulation.machine().axis(place).sample().saturated;
                 if sample.saturated != (instant || limited[place] > 0) {
-                    faults.add(place, at, (Check::Counted, f64::from(u8::from(sample.saturated)), 0.0));
+                    faults.add(name(place), at, (Check::Counted, f64::from(u8::from(sample.saturated)), 0.0));
                 }
                 limited[place] = watch.limited_in_period() - u64::from(instant);
             }
         }
         let asked = matches!(plan.ask, Ask::Follow(_) | Ask::Stop(..));
         if ends != usize::from(asked) {
-            faults.add(0, periods, (Check::Ended, ends as f64, 1.0));
+            let tick = periods * variant.ticks();
+            faults.add("", tick, (Check::Ended, ends as f64, f64::from(u8::from(asked))));
         }
         let foreseen = plan.kind != Kind::Stop;
         let mut record = Record {
-            variant: plan.variant,
-            kind: Some(plan.kind),
+            ran: Some((plan.variant, plan.kind)),
             periods,
             loaded: !plan.loads.is_empty(),
-            ..Record::new(plan.number)
+            ..Record::default()
         };
         for (place, (watch, theory)) in watches.iter().zip(&variant.axes).enumerate() {
             let loaded = plan.loads.iter().any(|load| load.axis == place);
             let at = watch.ticks();
-            record
-                .axes
-                .push(watch.finish(theory, foreseen, loaded, &mut |broken| faults.add(place, at, broken)));
+            record.axes.push(
+                watch.finish(theory, foreseen, loaded, &mut |broken| faults.add(name(place), at, broken)),
+            );
         }
-        record.faults = faults.found;
-        record.digest = record.hash();
         Ok(record)
     }
 }
 
 /// Faults as they are found.
-struct Faults<'a> {
+struct Faults {
     number: u64,
-    names: &'a [JointLimits],
     found: Vec<Fault>,
 }
 
-impl Faults<'_> {
-    fn add(&mut self, place: usize, tick: usize, (check, value, allowed): Broken) {
+impl Faults {
+    fn add(&mut self, axis: &str, tick: usize, (check, value, allowed): Broken) {
         if self.found.len() < TOLD {
-            let axis = self.names[place].name.clone();
-            self.found.push(Fault { check, number: self.number, axis, tick, value, allowed });
+            self.found.push(Fault {
+                check,
+                number: self.number,
+                axis: axis.to_owned(),
+                tick,
+                value,
+                allowed,
+            });
         }
+    }
+
+    fn refused(&mut self, tick: usize, rejection: &Rejection) {
+        let joint = rejection.joint.as_deref().unwrap_or_default();
+        self.add(joint, tick, (Check::Taken(rejection.code), rejection.value, rejection.limit));
     }
 }

@@ -38,7 +38,7 @@ pub struct DriveWatch {
     pub returned: f64,
     /// Energy that came in: by voltage less copper, by gravity and load, J.
     pub supplied: f64,
-    /// Largest imbalance, relative to the sum of the terms by their sizes.
+    /// Largest imbalance of a tick, relative to what rounding is allowed.
     pub imbalance: f64,
 }
 
@@ -152,12 +152,12 @@ impl DriveWatch {
         let torques = [s.friction_current, s.gravity_current, s.load_current].map(f64::abs);
         let rounded = self.energy.torque_rounding(&held, self.torque_constant * torques.iter().sum::<f64>());
         let (blur, blurred) = (self.energy.speed_of(rounded), self.energy.work_of(rounded, &held));
-        let size = was + is + work.size + blurred / ROUNDING;
+        let allowed = ROUNDING * (was + is + work.size) + blurred;
         let imbalance = (is - was - work.done).abs();
-        if imbalance.is_nan() || imbalance > ROUNDING * size {
-            broken((Check::Energy, imbalance, ROUNDING * size));
+        if imbalance.is_nan() || imbalance > allowed {
+            broken((Check::Energy, imbalance, allowed));
         }
-        self.imbalance = self.imbalance.max(if size > 0.0 { imbalance / size } else { 0.0 });
+        self.imbalance = self.imbalance.max(if allowed > 0.0 { imbalance / allowed } else { 0.0 });
         let (even, uneven) = (0.5 * self.tick * speed.abs(), self.energy.uneven(&held));
         let taken = friction * work.turned;
         let standing = if product_sign(speed, end) > 0.0 { 0.0 } else { even };

@@ -2,8 +2,10 @@
 
 use std::fmt;
 
+use crate::trajectory::Code;
+
 /// What is checked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Check {
     /// Every signal is a finite number.
     Finite,
@@ -31,6 +33,8 @@ pub enum Check {
     Superposition,
     /// Each accepted trajectory ends once.
     Ended,
+    /// What is within all limits is taken.
+    Taken(Code),
 }
 
 impl Check {
@@ -50,6 +54,7 @@ impl Check {
             Check::Bound => "the tracking error is beyond its bound",
             Check::Superposition => "the tracking error is not that of the linear loop",
             Check::Ended => "a trajectory did not end once",
+            Check::Taken(_) => "what is within all limits is refused",
         }
     }
 }
@@ -61,7 +66,7 @@ pub struct Fault {
     pub check: Check,
     /// Number of the trajectory.
     pub number: u64,
-    /// The axis.
+    /// The axis; empty if it is none in particular.
     pub axis: String,
     /// Tick since the trajectory began.
     pub tick: usize,
@@ -78,6 +83,7 @@ impl fmt::Display for Fault {
             f,
             "trajectory {number}, {axis}, tick {tick}: {}: {value:e}, allowed {allowed:e}",
             check.text()
-        )
+        )?;
+        if let Check::Taken(code) = check { write!(f, ", {}", code.name()) } else { Ok(()) }
     }
 }

@@ -18,6 +18,9 @@ pub const MOST_TICKS: usize = 3072;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FleetError {
+    /// There is none.
+    #[error("there must be a machine to run on")]
+    Empty,
     /// A machine does not take a controller.
     #[error(transparent)]
     Config(#[from] ConfigError),
@@ -198,6 +201,9 @@ impl Fleet {
             for (name, laws) in VARIANTS {
                 variants.push(Variant::new(machine, name, laws)?);
             }
+        }
+        if variants.is_empty() {
+            return Err(FleetError::Empty);
         }
         Ok(Fleet { variants: variants.into() })
     }

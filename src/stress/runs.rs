@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc;
+use std::sync::mpsc::{self, SyncSender};
 use std::thread;
 use std::time::Duration;
 
@@ -43,9 +43,23 @@ pub enum StressError {
     /// A machine cannot be simulated.
     #[error(transparent)]
     Fleet(#[from] FleetError),
+    /// The system gives no thread.
+    #[error("cannot start a thread: {0}")]
+    Thread(io::Error),
     /// Who looks on ended it.
     #[error(transparent)]
     Watch(#[from] io::Error),
+}
+
+/// Sets a flag when its thread panics: who waits for that thread stops waiting.
+struct Panics<'a>(&'a AtomicBool);
+
+impl Drop for Panics<'_> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
 }
 
 /// Runs trajectories on the machines of `fleet`; `watch` is told now and then how many have been run.
@@ -62,36 +76,40 @@ pub fn run(
     let threads = options.threads.max(1);
     let (sender, receiver) = mpsc::sync_channel(WAITING * threads);
     let mut summary = Summary::new(fleet);
-    thread::scope(|scope| {
-        for _ in 0..threads {
-            let sender = sender.clone();
-            let (next, done, stopped) = (&next, &done, &stopped);
-            scope.spawn(move || {
-                let mut bench = Bench::new(fleet, options.seed, options.width);
-                while !stopped.load(Ordering::Relaxed) {
-                    let part = next.fetch_add(1, Ordering::Relaxed);
-                    if part >= parts {
-                        break;
-                    }
-                    // Who has the part that is waited for never waits here.
-                    while part >= done.load(Ordering::Relaxed) + AHEAD && !stopped.load(Ordering::Relaxed) {
-                        thread::sleep(LOOK);
-                    }
-                    let numbers = part * TOGETHER..((part + 1) * TOGETHER).min(options.count);
-                    let records = numbers.map(|number| bench.run(options.first.wrapping_add(number)));
-                    let records: Result<Vec<Record>, FleetError> = records.collect();
-                    // Nobody takes them when the run has been ended.
-                    if sender.send((part, records)).is_err() {
-                        break;
-                    }
-                }
-            });
+    let work = |sender: SyncSender<_>| {
+        let _panics = Panics(&stopped);
+        let mut bench = Bench::new(fleet, options.seed, options.width);
+        while !stopped.load(Ordering::Relaxed) {
+            let part = next.fetch_add(1, Ordering::Relaxed);
+            if part >= parts {
+                return;
+            }
+            // Who has the part that is waited for never waits here.
+            while part >= done.load(Ordering::Relaxed) + AHEAD && !stopped.load(Ordering::Relaxed) {
+                thread::sleep(LOOK);
+            }
+            let numbers = part * TOGETHER..((part + 1) * TOGETHER).min(options.count);
+            let records = numbers.map(|number| bench.run(options.first.wrapping_add(number)));
+            let records: Result<Vec<Record>, FleetError> = records.collect();
+            // Nobody takes them when the run has been ended.
+            if sender.send((part, records)).is_err() {
+                return;
+            }
         }
-        drop(sender);
-        let mut take = || -> Result<(), StressError> {
+    };
+    thread::scope(|scope| {
+        let _panics = Panics(&stopped);
+        let take = || -> Result<(), StressError> {
+            for _ in 0..threads {
+                let (sender, work) = (sender.clone(), &work);
+                let started = thread::Builder::new().spawn_scoped(scope, move || work(sender));
+                started.map_err(StressError::Thread)?;
+            }
+            drop(sender);
             let mut early = BTreeMap::new();
             let mut due = 0;
-            for (part, records) in &receiver {
+            // Goes before the threads are waited for: those that wait to hand theirs over go on.
+            for (part, records) in receiver {
                 early.insert(part, records?);
                 while let Some(records) = early.remove(&due) {
                     records.iter().for_each(|record| summary.add(fleet, record));
@@ -104,8 +122,6 @@ pub fn run(
         };
         let taken = take();
         stopped.store(true, Ordering::Relaxed);
-        // Threads that wait to hand theirs over go on.
-        receiver.iter().for_each(drop);
         taken
     })?;
     Ok(summary)

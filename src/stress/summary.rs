@@ -21,8 +21,6 @@ const KEPT: usize = 20;
 pub struct Summary {
     /// How many ran.
     pub run: u64,
-    /// How many the library refused, by the name of the code.
-    pub refused: BTreeMap<&'static str, u64>,
     /// How many of each kind ran.
     pub kinds: BTreeMap<Kind, u64>,
     /// How many ran on each variant of the fleet.
@@ -41,9 +39,10 @@ pub struct Summary {
     pub bounded: u64,
     /// Largest error relative to its bound, and the trajectory.
     pub error: (f64, u64),
-    /// Largest difference between an error and that of the linear loop, relative to what rounding is allowed.
+    /// Largest difference between an error and that of the linear loop, relative to what rounding is allowed, and
+    /// the trajectory.
     pub mismatch: (f64, u64),
-    /// Largest imbalance of energy in a tick, relative to the sum of its terms by their sizes.
+    /// Largest imbalance of energy in a tick, relative to what rounding is allowed, and the trajectory.
     pub imbalance: (f64, u64),
     /// Energy that came in, J.
     pub supplied: f64,
@@ -63,7 +62,6 @@ impl Summary {
     pub(super) fn new(fleet: &Fleet) -> Self {
         Summary {
             run: 0,
-            refused: BTreeMap::new(),
             kinds: BTreeMap::new(),
             variants: vec![0; fleet.variants().len()],
             loaded: 0,
@@ -87,16 +85,17 @@ impl Summary {
     /// Adds the trajectory that comes next.
     pub(super) fn add(&mut self, fleet: &Fleet, record: &Record) {
         self.hasher.update(&record.digest);
-        if let Some(code) = record.refused {
-            *self.refused.entry(code.name()).or_default() += 1;
-            return;
-        }
-        let variant = &fleet.variants()[record.variant];
         self.run += 1;
-        if let Some(kind) = record.kind {
-            *self.kinds.entry(kind).or_default() += 1;
+        if !record.faults.is_empty() {
+            self.faulty += 1;
+            let room = KEPT - self.faults.len();
+            self.faults.extend(record.faults.iter().take(room).cloned());
         }
-        self.variants[record.variant] += 1;
+        // One that was refused has no more than that to tell.
+        let Some((place, kind)) = record.ran else { return };
+        let variant = &fleet.variants()[place];
+        *self.kinds.entry(kind).or_default() += 1;
+        self.variants[place] += 1;
         self.loaded += u64::from(record.loaded);
         self.limited += u64::from(record.axes.iter().any(|axis| axis.limited_ticks > 0));
         self.time += record.periods as f64 * seconds(variant.period());
@@ -117,11 +116,6 @@ impl Summary {
             self.supplied += axis.supplied;
             self.dissipated += axis.dissipated;
             self.returned += axis.returned;
-        }
-        if !record.faults.is_empty() {
-            self.faulty += 1;
-            let room = KEPT - self.faults.len();
-            self.faults.extend(record.faults.iter().take(room).cloned());
         }
     }
 

@@ -5,13 +5,10 @@ use super::fault::Check;
 use super::fleet::{MOST_TICKS, Theory};
 use super::response::{Inputs, ORDERS};
 use crate::config::{AxisConfig, LimitsConfig, Periods};
-use crate::machine::{Activity, AxisSample};
+use crate::machine::{Activity, AxisSample, REST_AFTER};
 use crate::trajectory::limits::SPEED_TOLERANCE;
-use crate::units::{MILLISECOND_NS, Nanoseconds, seconds};
+use crate::units::seconds;
 
-/// Standstill after which a controller with integral action gives the axis to its guard: the model is linear until
-/// then.
-const REST_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
 /// Rounding of an error, relative to its bound, and to the position: that of thousands of ticks.
 const ROUNDING: (f64, f64) = (1e-9, 1e-12);
 
@@ -26,7 +23,7 @@ pub struct AxisFigures {
     pub error: f64,
     /// Its bound, m or rad; none where the loop was not linear: a limit acted, or the guard.
     pub bound: Option<f64>,
-    /// How far the error is from what the impulse responses make, relative to the bound.
+    /// How far the error is from what the impulse responses make, relative to what rounding is allowed.
     pub mismatch: f64,
     /// Energy that came in, J.
     pub supplied: f64,
@@ -34,7 +31,7 @@ pub struct AxisFigures {
     pub dissipated: f64,
     /// Energy that friction gave back over ticks of a standstill, J.
     pub returned: f64,
-    /// Largest imbalance of energy, relative to the sum of its terms by their sizes.
+    /// Largest imbalance of energy in a tick, relative to what rounding is allowed.
     pub imbalance: f64,
     /// Where it ended: m or rad, m/s or rad/s, A, V, A.
     pub end: [f64; 5],
@@ -46,7 +43,7 @@ pub struct AxisWatch {
     pub drive: DriveWatch,
     limits: LimitsConfig,
     period: f64,
-    /// [`REST_AFTER`], position periods.
+    /// [`REST_AFTER`], position periods: the loop is linear until then.
     rest_after: usize,
     velocity_ticks: usize,
     gravity: f64,

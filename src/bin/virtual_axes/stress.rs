@@ -38,7 +38,7 @@ pub struct Arguments {
     #[arg(long)]
     machine: Vec<String>,
     /// Run this trajectory alone, and print what it is.
-    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["count", "first", "threads"])]
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["count", "first", "threads", "json"])]
     only: Option<u64>,
     /// Print the figures as one JSON object.
     #[arg(long)]
@@ -111,9 +111,6 @@ fn only(fleet: &Fleet, arguments: &Arguments, number: u64) -> Result<String, Box
     let variant = &fleet.variants()[plan.variant];
     let record = Bench::new(fleet, arguments.seed, arguments.width.into()).run(number)?;
     let mut text = format!("{}, {}\n{plan:#?}\n{:#?}\n", variant.machine, variant.controllers, record.axes);
-    if let Some(code) = record.refused {
-        writeln!(text, "refused: {}", code.name())?;
-    }
     for fault in &record.faults {
         writeln!(text, "{fault}")?;
     }
@@ -135,17 +132,16 @@ fn text(fleet: &Fleet, options: &Options, summary: &Summary) -> String {
         .collect();
     let mut text = format!("{}\n{}\n", table("kind", kinds), table("machine", variants));
     let Summary { run, time, ticks, loaded, limited, axes, bounded, .. } = summary;
-    let refused: u64 = summary.refused.values().sum();
     let rows = [
         ("seed", options.seed.to_string()),
-        ("trajectories", format!("{run}, {refused} refused")),
+        ("trajectories", run.to_string()),
         ("simulated time", format!("{time:.1} s, {ticks} ticks of axes")),
         ("with a load", loaded.to_string()),
         ("reached a limit", limited.to_string()),
         ("axes whose error has a bound", format!("{bounded} of {axes}")),
         ("largest error, of its bound", worst(summary.error)),
         ("largest difference from the linear loop, of what rounding is allowed", worst(summary.mismatch)),
-        ("largest imbalance of energy in a tick, relative", worst(summary.imbalance)),
+        ("largest imbalance of energy in a tick, of what rounding is allowed", worst(summary.imbalance)),
         ("energy supplied, less copper", format!("{:.1} J", summary.supplied)),
         ("taken by friction", format!("{:.1} J", summary.dissipated)),
         ("given back by friction in ticks of a standstill", format!("{:.6} J", summary.returned)),
@@ -173,7 +169,6 @@ fn object(fleet: &Fleet, options: &Options, summary: &Summary) -> Value {
         "first": options.first,
         "count": options.count,
         "run": summary.run,
-        "refused": summary.refused,
         "kinds": kinds.collect::<serde_json::Map<_, _>>(),
         "machines": variants.collect::<Vec<_>>(),
         "simulated_s": summary.time,

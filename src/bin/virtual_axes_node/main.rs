@@ -1,5 +1,7 @@
 //! The ROS 2 node: virtual machine-tool axes.
 
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod heap;
 #[cfg(target_os = "linux")]
 mod interrupted;
 
@@ -30,6 +32,8 @@ Without arguments it runs the embedded Mikron UCP 710 in real time.
     --help, --version";
 
 fn main() -> ExitCode {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    heap::share();
     match Command::parse(std::env::args().skip(1), "virtual_axes") {
         Ok(Command::Help) => say(HELP),
         Ok(Command::Version) => say(concat!("virtual_axes_node ", env!("CARGO_PKG_VERSION"))),
@@ -50,6 +54,10 @@ fn refuse(error: &dyn std::error::Error) -> ExitCode {
     ExitCode::from(USAGE)
 }
 
+fn variable(name: &str) -> Option<String> {
+    std::env::var_os(name).map(|value| value.to_string_lossy().into_owned())
+}
+
 fn complains(error: &str) -> String {
     format!("virtual_axes_node: {error}")
 }
@@ -59,7 +67,7 @@ fn run(args: &RosArgs) -> ExitCode {
         Ok(environment) => environment,
         Err(error) => return refuse(&error),
     };
-    let security = match Security::from_lookup(|name| std::env::var(name).ok(), args.enclave()) {
+    let security = match Security::from_lookup(variable, args.enclave()) {
         Ok(security) => security,
         Err(error) => return refuse(&error),
     };

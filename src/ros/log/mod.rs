@@ -76,10 +76,7 @@ pub struct Log {
 impl Log {
     /// Writes a line that is no message, and waits (not for long) until all that was logged is written.
     pub fn finish(self, line: Option<String>) {
-        if let Some(line) = line {
-            self.terminal.line(line + "\n");
-        }
-        self.terminal.finish(LAST_WAIT);
+        self.terminal.finish(line.map(|line| line + "\n"), LAST_WAIT);
     }
 }
 

@@ -22,10 +22,12 @@ pub(super) struct Terminal {
 }
 
 #[derive(Debug)]
-enum Item {
-    Line(String),
-    /// Everything before it has been written.
-    Mark(SyncSender<()>),
+struct Item {
+    /// Lines that were left out before it.
+    missed: u64,
+    line: Option<String>,
+    /// Who waits until it, and everything before it, has been written.
+    waits: Option<SyncSender<()>>,
 }
 
 impl Terminal {
@@ -46,21 +48,34 @@ impl Terminal {
 
     /// Hands a line, with its end, over; if as many wait as may, it is left out and counted.
     pub(super) fn line(&self, line: String) {
-        if self.queue.try_send(Item::Line(line)).is_err() {
+        if self.push(Item { missed: 0, line: Some(line), waits: None }).is_err() {
             self.left_out.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Waits until what was handed over is written, but not for longer than `patience`.
-    pub(super) fn finish(&self, patience: Duration) {
+    /// Hands an item over with the count of what was left out before it; it comes back if as many wait as may.
+    fn push(&self, item: Item) -> Result<(), Item> {
+        let missed = self.left_out.swap(0, Ordering::Relaxed);
+        match self.queue.try_send(Item { missed, ..item }) {
+            // The thread ends after all senders.
+            Ok(()) | Err(TrySendError::Disconnected(_)) => Ok(()),
+            Err(TrySendError::Full(item)) => {
+                self.left_out.fetch_add(missed, Ordering::Relaxed);
+                Err(item)
+            }
+        }
+    }
+
+    /// Waits until what was handed over is written, and `line` behind it, but not for longer than `patience`.
+    pub(super) fn finish(&self, line: Option<String>, patience: Duration) {
         let until = Instant::now() + patience;
         let (written, is_written) = mpsc::sync_channel(1);
-        let mut mark = Item::Mark(written);
-        while let Err(TrySendError::Full(back)) = self.queue.try_send(mark) {
+        let mut last = Item { missed: 0, line, waits: Some(written) };
+        while let Err(back) = self.push(last) {
             if Instant::now() >= until {
                 return;
             }
-            mark = back;
+            last = back;
             thread::sleep(POLL);
         }
         // Late, or the thread has ended: there is nothing more to be done.
@@ -71,21 +86,21 @@ impl Terminal {
 
 /// Writes until all senders are gone. Nowhere is left to report that stderr is closed.
 fn write(mut out: impl Write, items: &Receiver<Item>, left_out: &AtomicU64, missed: impl Fn(u64) -> String) {
+    let mut put = |line: &str| drop(out.write_all(line.as_bytes()));
+    let gap = |lines: u64| if lines > 0 { missed(lines) } else { String::new() };
     while let Ok(first) = items.recv() {
         let mut next = Some(first);
         while let Some(item) = next {
-            match item {
-                Item::Line(line) => drop(out.write_all(line.as_bytes())),
-                // Whoever waited may have given up.
-                Item::Mark(written) => drop(written.try_send(())),
+            put(&gap(item.missed));
+            item.line.as_deref().into_iter().for_each(&mut put);
+            // Whoever waited may have given up.
+            if let Some(waits) = item.waits {
+                let _ = waits.try_send(());
             }
             next = items.try_recv().ok();
         }
-        // What was left out came after all that waited.
-        let left_out = left_out.swap(0, Ordering::Relaxed);
-        if left_out > 0 {
-            let _ = out.write_all(missed(left_out).as_bytes());
-        }
+        // What nothing has come after.
+        put(&gap(left_out.swap(0, Ordering::Relaxed)));
     }
 }
 
@@ -144,7 +159,7 @@ mod tests {
         for _ in 0..MISSED {
             terminal.line("3\n".to_owned());
         }
-        terminal.finish(Duration::ZERO);
+        terminal.finish(None, Duration::ZERO);
         for _ in 0..2 * QUEUE {
             ends.allow.send(()).expect("it writes");
         }
@@ -169,7 +184,25 @@ mod tests {
             terminal.line(format!("{n}\n"));
             ends.allow.send(()).expect("it writes");
         }
-        terminal.finish(PATIENCE);
+        terminal.finish(None, PATIENCE);
         assert_eq!(ends.lines.try_iter().count(), 100);
+    }
+
+    #[test]
+    fn the_last_line_comes_after_a_gap_that_is_told() {
+        let (terminal, ends) = slow();
+        terminal.line("0\n".to_owned());
+        ends.begun.recv_timeout(PATIENCE).expect("it is begun");
+        for _ in 0..QUEUE + 3 {
+            terminal.line("1\n".to_owned());
+        }
+        let ender = terminal.clone();
+        let end = thread::spawn(move || ender.finish(Some("last\n".to_owned()), PATIENCE));
+        for _ in 0..QUEUE + 3 {
+            ends.allow.send(()).expect("it writes");
+        }
+        end.join().expect("it ends");
+        let lines: Vec<String> = ends.lines.try_iter().collect();
+        assert_eq!(lines[QUEUE + 1..], ["missed 3\n", "last\n"]);
     }
 }

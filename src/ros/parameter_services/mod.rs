@@ -152,7 +152,7 @@ impl ParameterServices {
                 self.set_atomically.respond(id, SetParametersAtomicallyResponse { result }, place)
             }
             Request::List(id, request) => {
-                let result = list(&host.names(), within_bounds(&request.prefixes), request.depth);
+                let result = listed(&host.names(), &request.prefixes, request.depth);
                 self.list.respond(id, ListParametersResponse { result }, place)
             }
             Request::Describe(id, request) => {
@@ -209,6 +209,14 @@ fn within_bounds(names: &[String]) -> &[String] {
     }
 }
 
+/// Likewise the names under `prefixes`: no prefixes would ask for all names.
+fn listed(names: &[String], prefixes: &[String], depth: u64) -> msg::ListParametersResult {
+    if within_bounds(prefixes).len() < prefixes.len() {
+        return msg::ListParametersResult::default();
+    }
+    list(names, prefixes, depth)
+}
+
 /// Creates the services under the node's name, reliable and with rmw's depth.
 struct Door<'a> {
     node: &'a mut Node,
@@ -249,5 +257,8 @@ mod tests {
         let names = vec!["x.velocity_loop.gain".to_owned(); 1001];
         assert_eq!(within_bounds(&names[..1000]).len(), 1000);
         assert!(within_bounds(&names).is_empty());
+        let known = ["x.velocity_loop.gain".to_owned()];
+        assert_eq!(listed(&known, &names[..1000], 0).names, known);
+        assert!(listed(&known, &names, 0).names.is_empty());
     }
 }

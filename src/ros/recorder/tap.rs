@@ -117,7 +117,7 @@ impl<M: Serialize> Line<M> {
     async fn queue(&self, mut entry: Entry, size: u32) -> bool {
         let room = Arc::clone(&self.shared.room);
         let taken = match self.shared.when_full {
-            WhenFull::Wait => room.acquire_many_owned(size).await.ok(),
+            WhenFull::Wait | WhenFull::WaitForAWhile => room.acquire_many_owned(size).await.ok(),
             WhenFull::Drop => room.try_acquire_many_owned(size).ok(),
         };
         let Some(taken) = taken else { return false };
