@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 
-from drive import NANOSECONDS, TSP_NS, Drive
+from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory
 from guest import Guest, resident_mb
 from motion import assert_psec, go_home, start_swing
 
@@ -14,6 +16,8 @@ STOPPED_S = 20
 LEASE_S = 60
 """Of who is stopped: with Fast DDS's own of 20 s it would be given up."""
 SHALLOW, DEEP = 10, 20_000
+FAST_S = 300.0
+"""Of the axes, in `fast`."""
 GROWTH_MB = 24.0
 """What 20 s of unread samples of a topic may take, and whoever comes and goes."""
 
@@ -62,3 +66,16 @@ def test_subscribers_that_are_killed_or_stopped_for_20_s_harm_nobody(real: Drive
         assert set(np.diff(stamps["deep"])) == {TSP_NS}, "it has room for all of them"
         assert np.all(np.diff(stamps["shallow"]) > 0)
         assert real.end(accepted.sequence_number, 10).status == 2
+
+
+def test_shallow_subscribers_do_not_bring_fast_axes_to_a_stand(start: Callable[..., Drive]):
+    """As deep as `ros2 topic echo`: what is lost before such a reader has it can be lost for good, and it never says so."""
+    drive = start("-p", "time:=fast")
+    assert drive.process is not None
+    with ExitStack() as guests:
+        for _ in range(3):
+            guests.enter_context(Guest(drive.process.domain_id, "sink", SHALLOW))
+        recording = drive.run(joint_trajectory(["x"], [0.0, FAST_S], [[0.0], [0.3]]), timeout=120)
+    assert set(np.diff(recording.joints.stamp)) == {TSP_NS}
+    assert len(recording.joints) == FAST_S * NANOSECONDS / TSP_NS + 1
+    assert "given up" not in drive.process.output()

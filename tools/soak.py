@@ -48,7 +48,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from action import Follow, goal, in_executor  # noqa: E402
-from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, _stamp_ns, joint_trajectory, to_time  # noqa: E402
+from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, to_time  # noqa: E402
 from guest import Guest  # noqa: E402
 
 JOINTS = {"x": 0.05, "y": 0.05, "z": 0.05, "a": 0.2, "c": 1.0}
@@ -58,8 +58,6 @@ ECHO = "/echo"
 """The service that only echoes."""
 TICK_S = 0.003
 """Wall time between two messages of the clock."""
-AHEAD_NS = NANOSECONDS
-"""How far the clock may be ahead of the newest sample that has come."""
 FILL = 12_000
 """More than the 8192 samples that the middleware keeps of a topic."""
 CROWD = 4096
@@ -112,27 +110,19 @@ MAY_GROW = {"memory_mb": (3.0, 0.02), "files": (2.5, 0.0), "threads": (1.5, 0.0)
 
 
 class SoakClock:
-    """`/clock` at a multiple of real time, which slows down while the node is behind: what it has missed comes all at
-    once otherwise.
-    """
+    """`/clock` at a multiple of real time."""
 
     def __init__(self, drive: Drive, speed: float):
         """Begin to tick."""
         self._publisher = drive.node.create_publisher(Clock, "/clock", 10)
-        self._samples = drive._samples["joints"]
         self._speed, self._end = speed, threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
-        now, seen, before = NANOSECONDS, NANOSECONDS, time.monotonic()
+        begin = time.monotonic()
         while not self._end.wait(TICK_S):
-            passed, before = time.monotonic() - before, time.monotonic()
-            # A list that others empty.
-            seen = max([seen, *map(_stamp_ns, self._samples[-1:])])
-            passed_ns = int(passed * NANOSECONDS)
-            # In real time at least: who has no sample yet waits for one.
-            now = max(now + passed_ns, min(now + int(passed_ns * self._speed), seen + AHEAD_NS))
+            now = NANOSECONDS + int((time.monotonic() - begin) * self._speed * NANOSECONDS)
             self._publisher.publish(Clock(clock=to_time(now)))
 
     def close(self) -> None:

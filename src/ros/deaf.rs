@@ -11,7 +11,7 @@
 use std::sync::atomic::{AtomicI64, Ordering};
 
 use rustdds::{DomainParticipant, GUID};
-use tracing::{debug, warn};
+use tracing::warn;
 
 use super::readers::Readers;
 use super::rtps::{Message, entity, is_secured};
@@ -19,8 +19,9 @@ use super::rtps::{Message, entity, is_secured};
 /// The readers of a topic, and how far it has been written.
 #[derive(Debug)]
 pub(super) struct Deaf {
-    /// None where there is no socket to be had.
-    readers: Option<Readers>,
+    writer: GUID,
+    topic: String,
+    participant: DomainParticipant,
     /// Samples that are kept for those that have not acknowledged them.
     kept: i64,
     /// Number of the last sample.
@@ -31,10 +32,8 @@ impl Deaf {
     /// The readers of `writer` on `topic`, by its name in DDS, for whom it keeps so many samples, before it has
     /// written anything.
     pub(super) fn new(writer: GUID, topic: String, kept: usize, participant: DomainParticipant) -> Self {
-        let readers = Readers::new(writer.to_bytes(), topic, participant);
-        let readers =
-            readers.inspect_err(|error| debug!("readers that take nothing are waited for: {error}")).ok();
-        Deaf { readers, kept: i64::try_from(kept).unwrap_or(i64::MAX), written: AtomicI64::new(0) }
+        let kept = i64::try_from(kept).unwrap_or(i64::MAX);
+        Deaf { writer, topic, participant, kept, written: AtomicI64::new(0) }
     }
 
     /// Another sample has been written.
@@ -44,16 +43,22 @@ impl Deaf {
 
     /// Tells all readers to do without the oldest samples.
     pub(super) fn give_up(&self, waited_s: u64) {
-        let Some(readers) = self.readers.as_ref().filter(|_| !is_secured()) else { return };
+        if is_secured() {
+            return;
+        }
         let (from, before) = oldest(self.written.load(Ordering::Relaxed), self.kept);
-        let topic = readers.topic.trim_start_matches("rt");
+        let name = self.topic.trim_start_matches("rt");
         warn!(
-            "a reader of {topic} has acknowledged nothing for {waited_s} s, and {} messages wait for it: the oldest {} \
-             are given up",
+            "a reader of {name} has acknowledged nothing for {waited_s} s, and {} messages wait for it: the oldest {} are \
+             given up",
             self.kept,
             before - from
         );
-        readers.send(&Message::from(&readers.writer).gap(entity(&readers.writer), from, before));
+        let writer = self.writer.to_bytes();
+        match Readers::new(writer, self.topic.clone(), self.participant.clone()) {
+            Ok(readers) => readers.send(&Message::from(&writer).gap(entity(&writer), from, before)),
+            Err(error) => warn!("they cannot be given up: {error}"),
+        }
     }
 }
 

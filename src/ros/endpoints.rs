@@ -102,7 +102,7 @@ fn profile(qos: QosConfig) -> QosProfile {
 pub const KEPT: usize = 8192;
 /// So many are under way where the axes wait for their readers anyway: what several topics send at a time fits into the
 /// socket of a reader (some 200 kB), so that nothing is lost. Fast DDS may never get over a loss (see `deaf`).
-const WINDOW: usize = 32;
+const WINDOW: usize = 64;
 
 /// How many samples may be under way of a topic for whose readers the axes wait.
 fn window(qos: QosConfig) -> usize {
