@@ -22,14 +22,15 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "docs" / "dependencies.md"
 BEGIN, END = "<!-- crates -->\n", "<!-- /crates -->\n"
-PLATFORM = "x86_64-unknown-linux-gnu"
+PLATFORMS = ("x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu")
 REGISTRY = "registry+https://github.com/rust-lang/crates.io-index"
 PROGRAMS, SECURITY, TESTS, FUZZ = "programs", "feature security", "tests and benchmarks", "fuzz targets"
 
 
 def metadata(manifest: Path, *features: str) -> dict[str, Any]:
-    """What cargo knows of a package, by its lock file, on one platform."""
-    words = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", PLATFORM]
+    """What cargo knows of a package, by its lock file, on all platforms together."""
+    words = ["cargo", "metadata", "--locked", "--format-version", "1"]
+    words += [word for platform in PLATFORMS for word in ("--filter-platform", platform)]
     done = subprocess.run([*words, "--manifest-path", manifest, *features], capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(f"dependencies: {done.stderr.strip()}")

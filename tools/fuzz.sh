@@ -63,12 +63,13 @@ long_one() {
   local target=$1 seconds=$2 log=$3 status=0
   fuzz_one "$target" "$log" -max_total_time="$seconds" -max_len=20000 -print_final_stats=1 \
     "fuzz/corpus/$target" "fuzz/seeds/$target" || status=1
-  local inputs coverage new before after
+  local inputs all new before after
   inputs=$(sed -nE 's/^stat::number_of_executed_units: +//p' "$log")
   new=$(sed -nE 's/^stat::new_units_added: +//p' "$log")
   before=$(sed -nE 's/^#[0-9]+\s+INITED cov: ([0-9]+) .*/\1/p' "$log")
   after=$(sed -nE 's/^#[0-9]+.* cov: ([0-9]+) ft: ([0-9]+) .*/\1 | \2/p' "$log" | tail -n 1)
-  echo "| $target | ${inputs:-?} | ${before:-?} | ${after:-? | ?} | ${new:-?} | $status |" >"$log.row"
+  all=$(sed -nE 's/^INFO: Loaded 1 modules +\(([0-9]+) inline.*/\1/p' "$log")
+  echo "| $target | ${inputs:-?} | ${before:-?} | ${after:-? | ?} | ${all:-?} | ${new:-?} | $status |" >"$log.row"
   [ $status -eq 0 ] || show_failure "$target" "$log"
 }
 
@@ -99,8 +100,8 @@ case $mode in
     export binaries
     export LIMITS="${limits[*]}"
     printf '%s\n' $targets | xargs -P "$(nproc)" -I{} bash -euc 'limits=($LIMITS); long_one {} '"$seconds"' .build/fuzz/{}.log'
-    echo "| target | inputs | edges from the seeds | edges | features | kept | broken |"
-    echo "|---|---|---|---|---|---|---|"
+    echo "| target | inputs | edges from the seeds | edges | features | edges of the program | kept | broken |"
+    echo "|---|---|---|---|---|---|---|---|"
     cat .build/fuzz/*.row
     ! grep -q '| 1 |$' .build/fuzz/*.row
     ;;

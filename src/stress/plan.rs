@@ -82,7 +82,7 @@ pub enum Ask {
     Follow(Request),
     /// One that is stopped before this position period.
     Stop(Request, usize),
-    /// Positions of each moving axis at each position period.
+    /// Of each axis that moves its place and a position for each position period, m or rad; the last one holds.
     Stream(Vec<(usize, Vec<f64>)>),
     /// Nothing.
     Rest,
