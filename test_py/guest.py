@@ -9,6 +9,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import select
@@ -25,6 +26,8 @@ import numpy as np
 import rclpy
 from builtin_interfaces.msg import Duration
 from rcl_interfaces.srv import GetParameters
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.executors import ExternalShutdownException
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
@@ -34,6 +37,8 @@ from virtual_axes.msg import DriveStates, MotorCurrents
 from drive import DEEP_QOS, NANOSECONDS, PSEC_QOS, SETTLE_S, _die_with_parent, _stamp_ns
 
 READY = "ready"
+SPINS = "spins"
+"""Name of the thread that serves a node."""
 PATIENCE_S = 120
 """How long a guest's word is waited for."""
 LEASE = """<?xml version="1.0" encoding="UTF-8"?>
@@ -164,12 +169,23 @@ def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:
 # ------------------------------------------------------------------------------------ the programs
 
 
+def spin(node: Any) -> None:
+    """Serve a node in a thread of its own, until rclpy is shut down."""
+
+    def run() -> None:
+        # What rclpy says at its end depends on where it meets it.
+        with contextlib.suppress(ExternalShutdownException, RCLError):
+            rclpy.spin(node)
+
+    threading.Thread(target=run, name=SPINS, daemon=True).start()
+
+
 def listen(node: Any, topic: str, depth: int) -> None:
     """Keep stamps, and tell them all for each line that comes in."""
     stamps: list[int] = []
     qos = QoSProfile(depth=depth, reliability=DEEP_QOS.reliability)
     node.create_subscription(JointState, topic, lambda raw: stamps.append(_stamp_ns(raw)), qos, raw=True)
-    threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+    spin(node)
     while not stamps:
         time.sleep(0.01)
     print(READY, flush=True)
@@ -200,7 +216,7 @@ def sink(node: Any, depth: int) -> None:
         (DriveStates, "/virtual_axes/drive_states"),
     ):
         node.create_subscription(kind, topic, lambda _: come.set(), QoSProfile(depth=depth), raw=True)
-    threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+    spin(node)
     come.wait()
     print(READY, flush=True)
     sys.stdin.readline()
@@ -221,7 +237,7 @@ def probe(node: Any, services: tuple[str, str]) -> None:
             sys.exit("no service")
     time.sleep(SETTLE_S)
     # In a thread that spins on: rclpy's spin_until_future_complete takes longer with each call.
-    threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+    spin(node)
     print(READY, flush=True)
 
     def took_ms(client: Any) -> float:
@@ -255,7 +271,11 @@ def main() -> None:
         case _:
             sys.exit(__doc__)
     rclpy.try_shutdown()
-    # The thread that spins would be in the way of the interpreter's end.
+    for thread in threading.enumerate():
+        if thread.name == SPINS:
+            thread.join(PATIENCE_S)
+    # Its participant goes with it: who is not told so counts it as there until its lease has ended.
+    node.destroy_node()
     os._exit(0)
 
 
