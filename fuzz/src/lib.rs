@@ -64,10 +64,7 @@ fn refused(text: &str) {
         text.len(),
         &text[..text.floor_char_boundary(200)]
     );
-    assert!(
-        !text.contains(|c: char| c.is_control() || TURNS.contains(c)),
-        "more than a line: {text:?}"
-    );
+    assert!(!text.contains(|c: char| c.is_control() || TURNS.contains(c)), "more than a line: {text:?}");
 }
 
 /// Runs `body`, which may take memory in proportion to `input`, a length in bytes.
