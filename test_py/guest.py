@@ -90,7 +90,10 @@ class Guest:
         assert out is not None
         if not select.select([out], [], [], PATIENCE_S)[0]:
             raise TimeoutError("a guest says nothing")
-        return out.readline().rstrip("\n")
+        line = out.readline()
+        if not line:
+            raise ChildProcessError(f"a guest has ended, status {self._process.wait(PATIENCE_S)}")
+        return line.rstrip("\n")
 
     def stamps(self) -> np.ndarray:
         """What a listener has got so far, ns."""
