@@ -72,12 +72,19 @@ def start_swing(drive: Drive, joints: Sequence[str] = ("x",), duration: float = 
 
 def go_home(drive: Drive) -> None:
     """Rest at the start position, old samples dropped."""
-    drive.reset()
 
     def at_home() -> bool:
         return not any(value for field in ("position", "psec") for value in drive.latest(field).values())
 
-    # On a busy machine samples from before the reset are still to come.
-    drive.wait_for(at_home, 60, "rest at home")
+    # A set-point of a stream that is on its way when the axes are reset takes them away again.
+    for patience_s in (10, 20, 60):
+        drive.reset()
+        try:
+            # On a busy machine samples from before the reset are still to come.
+            drive.wait_for(at_home, patience_s, "rest at home")
+            break
+        except TimeoutError:
+            if patience_s == 60:
+                raise
     drive.wait_until(drive.now() + 2 * TSP_NS, 5)
     drive.forget()

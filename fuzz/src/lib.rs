@@ -53,7 +53,8 @@ fn step(simulation: &mut Simulation, periods: usize) {
 }
 
 /// Line and paragraph separators, and what marks or turns the direction of writing (Unicode's Bidi_Control).
-const TURNS: &str = "\u{2028}\u{2029}\u{61c}\u{200e}\u{200f}\u{202a}\u{202b}\u{202c}\u{202d}\u{202e}\u{2066}\u{2067}\u{2068}\u{2069}";
+const TURNS: &str = "\u{2028}\u{2029}\u{61c}\u{200e}\u{200f}\u{202a}\u{202b}\u{202c}\u{202d}\u{202e}\
+    \u{2066}\u{2067}\u{2068}\u{2069}";
 
 /// A refusal is one short line that says something.
 fn refused(text: &str) {
