@@ -1,6 +1,6 @@
 """DDS Security: what a node does that cannot have it, and who takes part where it can (docs/security.md).
 
-The second needs a node that is built with the cargo feature `security`: VIRTUAL_AXES_SECURE_NODE names it.
+Who takes part needs a node that is built with the cargo feature `security`: VIRTUAL_AXES_SECURE_NODE names it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,11 @@ from drive import DomainId, Node
 
 KEYSTORE = Path(__file__).resolve().parent.parent / "tools" / "keystore.py"
 SECURE = os.environ.get("VIRTUAL_AXES_SECURE_NODE")
-needs_secure_node = pytest.mark.skipif(not SECURE, reason="needs a node with --features security")
+needs_secure_node = pytest.mark.skipif(
+    not SECURE,
+    reason="DDS Security is a cargo feature that needs OpenSSL's headers and is not built by default; build the node with "
+    "--features security and name it in VIRTUAL_AXES_SECURE_NODE (docs/security.md)",
+)
 HEARD, UNHEARD = 500, 100
 """Messages in the recording of a node that hears the clock it follows (a thousand a second), and of another."""
 PATIENCE_S = 60

@@ -61,7 +61,7 @@ impl PsecInput {
         match checked {
             Ok(trajectory) => {
                 let id = next_id(&self.ids);
-                self.results.expect(id, origin, Arc::clone(&trajectory)).await;
+                self.results.remember(id, origin, Arc::clone(&trajectory)).await;
                 // The simulation is gone only when the node shuts down.
                 let _ = self.commands.send(Command::Offer { id, trajectory, tolerances: None }).await;
             }

@@ -118,7 +118,7 @@ impl Results {
     }
 
     /// Remembers where a trajectory came from, before the simulation is asked.
-    pub async fn expect(&self, id: MotionId, origin: Origin, trajectory: Arc<Trajectory>) {
+    pub async fn remember(&self, id: MotionId, origin: Origin, trajectory: Arc<Trajectory>) {
         let known = Known { origin, start: Time::default(), _trajectory: trajectory };
         self.known.lock().await.insert(id, known);
     }

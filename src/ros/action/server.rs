@@ -285,7 +285,7 @@ impl Task<'_> {
                 self.running.retain(|running| live.contains(&running.id));
                 self.running.push(Running { id, motion, places: trajectory.joints().to_vec() });
                 self.show_running();
-                self.tell.results.expect(motion, origin, Arc::clone(&trajectory)).await;
+                self.tell.results.remember(motion, origin, Arc::clone(&trajectory)).await;
                 let offer = Command::Offer { id: motion, trajectory, tolerances: Some(Box::new(tolerances)) };
                 // The simulation is gone only when the node shuts down.
                 let _ = self.tell.commands.send(offer).await;
