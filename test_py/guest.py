@@ -63,7 +63,7 @@ class Guest:
             profile.write_text(LEASE.format(seconds=lease))
             env["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profile)
         self._process = subprocess.Popen(
-            [sys.executable, __file__, *map(str, words)],
+            [sys.executable, "-X", "faulthandler", __file__, *map(str, words)],
             env=env,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

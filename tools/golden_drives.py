@@ -31,6 +31,10 @@ RANGES = {
 }
 # Of a range that begins with nothing, the smallest value that is drawn.
 SMALLEST = 1e-9
+# How far from a double pole: as parts of the resistance that makes one.
+NEAR = (0.0, 1e-15, 1e-12, 1e-8, 1e-4, 1e-2)
+# The double pole times the tick.
+DOUBLE = (0.01, 0.39, 0.41, 0.99, 1.01, 3.0, 30.0)
 
 
 def exponential(matrix):
@@ -85,7 +89,7 @@ def step_response(p, nu, square, t):
 
 
 def motors():
-    """Each value at its edges, pairs of edges, and numbers drawn from the whole of the ranges."""
+    """Each value at its edges, pairs of edges, numbers drawn from the whole of the ranges, and nearly double poles."""
     names = list(RANGES)
     middle = {name: RANGES[name][1] for name in names}
     yield dict(middle)
@@ -104,6 +108,12 @@ def motors():
             name: 10 ** source.uniform(mpmath.log10(low or SMALLEST), mpmath.log10(high))
             for name, (low, _, high) in RANGES.items()
         }
+    # The winding alone decays at twice the double pole: R = 2 L x/T, and Ke Kt/(L J) = (x/T)².
+    for pole, near, side in itertools.product(DOUBLE, NEAR, (-1, 1)):
+        rate = pole / middle["tick"]
+        resistance = 2 * middle["inductance"] * rate * (1 + side * near)
+        inertia = middle["emf_constant"] * middle["torque_constant"] / (middle["inductance"] * rate**2)
+        yield middle | {"resistance": resistance, "inertia": inertia}
 
 
 def number(value):

@@ -170,6 +170,10 @@ class Traffic:
             self.count[act.__name__] += 1
         except TimeoutError:
             self.count["timeouts"] += 1
+        except (ChildProcessError, BrokenPipeError) as ended:
+            # Of a guest: what is judged is the node.
+            self.count["guests_ended"] += 1
+            print(f"{act.__name__}: {ended}", flush=True)
         time.sleep(self.chance.expovariate(20))
 
     def _way(self) -> tuple[list[str], list[float], float]:
