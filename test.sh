@@ -112,6 +112,7 @@ stage "library without ROS" cargo clippy --release --lib --no-default-features -
 stage "cargo doc" env RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --locked
 stage "cargo build" cargo build --release --locked --bins
 finish_background
+stage "ruff: formatting and lints of Python" bash -c ".venv/bin/ruff format --check && .venv/bin/ruff check"
 background "cargo test" nice -n 15 cargo test --release --locked
 stage "rclpy against the node" python_tests "$@"
 finish_background

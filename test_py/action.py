@@ -3,6 +3,8 @@
     with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive, Follow(drive) as follow:
         sent = follow.send(goal(joint_trajectory(["x"], [0, 1], [0, 0.1])))
         print(sent.result().error_string)
+
+Every wait is bounded and raises TimeoutError.
 """
 
 from __future__ import annotations

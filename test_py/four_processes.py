@@ -89,9 +89,7 @@ def recorder(seconds: float, file: Path) -> None:
         for topic, kind in TOPICS.items():
             name = f"/{topic}" if topic == "joint_states" else f"/virtual_axes/{topic}"
             # Raw: taking a sample must not cost more than the node needs to make one.
-            node.create_subscription(
-                kind, name, lambda message, topic=topic: keep(topic, message), DEEP_QOS, raw=True
-            )
+            node.create_subscription(kind, name, lambda message, topic=topic: keep(topic, message), DEEP_QOS, raw=True)
         node.create_subscription(
             DiagnosticArray,
             "/diagnostics",
@@ -189,7 +187,6 @@ class Figures:
             return float(v @ i / (v @ v)), float(np.corrcoef(v, i)[0, 1]), float(lag)
 
         return max((fit(lag) for lag in range(21)), key=lambda found: found[1])
-
 
     def answered(self, load_per_velocity: float) -> float:
         """Share of the loads (A, where there is one) that are this times a velocity published before.

@@ -5,6 +5,8 @@
     python test_py/guest.py sink DEPTH            reliable; drops what joint_states, motor_currents, drive_states say
     python test_py/guest.py echo SERVICE          answers it, always the same
     python test_py/guest.py probe SERVICE SERVICE calls the two in turns; tells how long they took when it is asked
+
+Each says that it is ready by a line on its standard output, and ends with whoever started it.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from virtual_axes.msg import DriveStates, MotorCurrents
 
-from drive import DEEP_QOS, NANOSECONDS, PSEC_QOS, SETTLE_S, _die_with_parent, _stamp_ns
+from drive import DEEP_QOS, PSEC_QOS, SETTLE_S, die_with_parent, stamp_of
 
 READY = "ready"
 SPINS = "spins"
@@ -68,7 +70,7 @@ class Guest:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            preexec_fn=_die_with_parent,
+            preexec_fn=die_with_parent,
         )
 
     def __enter__(self) -> Guest:
@@ -146,7 +148,7 @@ def resident_mb(pid: int) -> float:
 
 
 def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:
-    """A gentle swing of two joints at a point per millisecond, as it is sent: to make half a million objects takes long."""
+    """A gentle swing of two joints at a point per millisecond, as it is sent: half a million objects take long."""
     values, stamp = (0.25, 0.75), (7, 13)
     known = [*(struct.pack("<d", value) for value in values), struct.pack("<iI", *stamp)]
     point = JointTrajectoryPoint(positions=values, time_from_start=Duration(sec=stamp[0], nanosec=stamp[1]))
@@ -187,7 +189,7 @@ def listen(node: Any, topic: str, depth: int) -> None:
     """Keep stamps, and tell them all for each line that comes in."""
     stamps: list[int] = []
     qos = QoSProfile(depth=depth, reliability=DEEP_QOS.reliability)
-    node.create_subscription(JointState, topic, lambda raw: stamps.append(_stamp_ns(raw)), qos, raw=True)
+    node.create_subscription(JointState, topic, lambda raw: stamps.append(stamp_of(raw)), qos, raw=True)
     spin(node)
     while not stamps:
         time.sleep(0.01)

@@ -50,7 +50,9 @@ def test_a_goal_is_followed_with_feedback_to_success(follow: Follow) -> None:
     assert (completed.sequence_number, bytes(completed.publisher_gid)) == (0, bytes(16))
 
     end = to_ns(completed.header.stamp)
-    follow.drive.wait_for(lambda: sent.feedback and to_ns(sent.feedback[-1].header.stamp) > end - 3 * TSP_NS, 10, "all of its feedback")
+    follow.drive.wait_for(
+        lambda: sent.feedback and to_ns(sent.feedback[-1].header.stamp) > end - 3 * TSP_NS, 10, "all of its feedback"
+    )
     feedback = sent.feedback
     assert all(list(message.joint_names) == ["y", "x"] for message in feedback)
     stamps = np.array([to_ns(message.header.stamp) for message in feedback])

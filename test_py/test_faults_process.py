@@ -70,9 +70,7 @@ def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
     missed = (PAUSE_S - BURST_S) * NANOSECONDS // TSP_NS
 
     def counted(values: dict[str, str]) -> bool:
-        return all(
-            int(values[key]) - int(before[key]) >= missed for key in ("missed_periods", "unpublished_periods")
-        )
+        return all(int(values[key]) - int(before[key]) >= missed for key in ("missed_periods", "unpublished_periods"))
 
     real.wait_for(lambda: counted(diagnostics(real)[-1]), 10, "count of the missed periods")
     messages = [array.status[0].message for array in real.diagnostics()]

@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 from virtual_axes.msg import TrajectoryResult as R
 
 from action import in_executor
-from drive import TSP_NS, Drive, Node, _parameters, joint_trajectory, to_ns
+from drive import TSP_NS, Drive, Node, joint_trajectory, parameter_messages, to_ns
 from guest import Guest, long_trajectory, resident_mb
 from motion import TSP, assert_psec, go_home, start_swing, swing
 
@@ -78,7 +78,7 @@ def kill_while_sending(drive: Drive, folder: Path) -> bool:
 
 
 def test_a_publisher_killed_in_the_middle_of_a_message_harms_nobody(node: Drive, tmp_path: Path):
-    """The next publisher's trajectory runs to the same bits as before; what has come of the message is all that is kept."""
+    """The next publisher's trajectory runs to the same bits as before; of the message what came is kept."""
     time_s, position = swing(1.2)
     motion = joint_trajectory(["x", "c"], time_s, np.column_stack([position, 3 * position]))
     go_home(node)
@@ -206,7 +206,7 @@ def test_a_flood_of_service_calls(node: Drive):
     time.sleep(0.2)
     go_home(node)
     begin = time.monotonic()
-    request = SetParameters.Request(parameters=_parameters({"x.velocity_loop.gain": 5.0}))
+    request = SetParameters.Request(parameters=parameter_messages({"x.velocity_loop.gain": 5.0}))
     calls = [setter.call_async(request) for _ in range(FLOOD // 10)]
     calls += [stopper.call_async(Trigger.Request()) for _ in range(FLOOD // 10)]
     print(f"\n{len(calls) / (time.monotonic() - begin):.0f} a second")

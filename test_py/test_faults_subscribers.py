@@ -69,7 +69,7 @@ def test_subscribers_that_are_killed_or_stopped_for_20_s_harm_nobody(real: Drive
 
 
 def test_shallow_subscribers_do_not_bring_fast_axes_to_a_stand(start: Callable[..., Drive]):
-    """As deep as `ros2 topic echo`: what is lost before such a reader has it can be lost for good, and it never says so."""
+    """As deep as `ros2 topic echo`: what is lost before such a reader has it can be lost for good, unsaid."""
     drive = start("-p", "time:=fast")
     assert drive.process is not None
     with ExitStack() as guests:

@@ -59,12 +59,14 @@ def test_type_hash_is_not_sent(fast: Drive):
     """A limit of RustDDS (docs/middleware.md). Should this fail, the hash has come: compare it with rclpy's then."""
     fast.node.create_publisher(JointState, "/joint_states", 10)
     hashes = fast.wait_for(
-        lambda: {
-            info.node_name: str(info.topic_type_hash).split("_")[0]
-            for info in fast.node.get_publishers_info_by_topic("/joint_states")
-        }
-        if fast.node.count_publishers("/joint_states") == 2
-        else None,
+        lambda: (
+            {
+                info.node_name: str(info.topic_type_hash).split("_")[0]
+                for info in fast.node.get_publishers_info_by_topic("/joint_states")
+            }
+            if fast.node.count_publishers("/joint_states") == 2
+            else None
+        ),
         5,
         "both publishers",
     )

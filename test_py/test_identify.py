@@ -109,7 +109,10 @@ def write_mcap(file: Path, recording: Recording, seed: int) -> None:
         writer = Writer(out, compression=CompressionType.NONE)
         writer.start(profile="ros2", library="test")
         channels = {}
-        for topic, kind in (("/virtual_axes/drive_states", DriveStates), ("/virtual_axes/motor_currents", MotorCurrents)):
+        for topic, kind in (
+            ("/virtual_axes/drive_states", DriveStates),
+            ("/virtual_axes/motor_currents", MotorCurrents),
+        ):
             name = f"virtual_axes/msg/{kind.__name__}"
             text = (Path(__file__).parents[1] / "msg" / f"{kind.__name__}.msg").read_bytes()
             schema = writer.register_schema(name=name, encoding="ros2msg", data=text)

@@ -330,7 +330,10 @@ def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
     messages, _, _ = read(path, whole=False)
     assert len(messages[DRIVES]) > 0 and set(np.diff(stamps(messages[DRIVES]))) <= {TSP_NS}
     again = tmp_path / "again.mcap"
-    with Node(["-p", f"record:={again}", "-p", "time:=fast"], binary=binary) as process, Drive(process=process) as drive:
+    with (
+        Node(["-p", f"record:={again}", "-p", "time:=fast"], binary=binary) as process,
+        Drive(process=process) as drive,
+    ):
         drive.wait_until(drive.now() + 100 * TSP_NS, 20)
         assert process.stop(signal.SIGTERM) == 0
     assert len(read(again)[0][DRIVES]) > 100

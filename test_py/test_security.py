@@ -21,8 +21,8 @@ KEYSTORE = Path(__file__).resolve().parent.parent / "tools" / "keystore.py"
 SECURE = os.environ.get("VIRTUAL_AXES_SECURE_NODE")
 needs_secure_node = pytest.mark.skipif(
     not SECURE,
-    reason="DDS Security is a cargo feature that needs OpenSSL's headers and is not built by default; build the node with "
-    "--features security and name it in VIRTUAL_AXES_SECURE_NODE (docs/security.md)",
+    reason="DDS Security is a cargo feature that needs OpenSSL's headers and is not built by default; build the node "
+    "with --features security and name it in VIRTUAL_AXES_SECURE_NODE (docs/security.md)",
 )
 HEARD, UNHEARD = 500, 100
 """Messages in the recording of a node that hears the clock it follows (a thousand a second), and of another."""

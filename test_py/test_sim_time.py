@@ -12,7 +12,7 @@ from rclpy.qos import ReliabilityPolicy
 from virtual_axes.msg import TrajectoryResult
 
 from action import Follow, goal, line
-from drive import NANOSECONDS, TSP_NS, Drive, Node, _stamp_ns, joint_trajectory, to_ns
+from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, stamp_of, to_ns
 from motion import assert_psec, swing
 from sim_clock import SimClock
 
@@ -50,7 +50,7 @@ def begin_anew(clock: SimClock, first: int) -> None:
     """Jump to a position instant, and keep no sample from before it."""
     clock.set(first)
     samples = clock.drive._samples.values()
-    clock.drive.wait_for(lambda: all(_stamp_ns(s[-1]) == first for s in samples), 5, f"samples of {first}")
+    clock.drive.wait_for(lambda: all(stamp_of(s[-1]) == first for s in samples), 5, f"samples of {first}")
     clock.drive.forget()
 
 
@@ -234,7 +234,9 @@ def test_jumps_are_counted(clock: SimClock):
     assert int(state_of(drive, "paused")["clock_jumps"]) == jumps
     begin_anew(clock, begin // TSP_NS * TSP_NS)
     drive.wait_for(
-        lambda: any(v.key == "clock_jumps" and int(v.value) == jumps + 1 for v in drive.diagnostics()[-1].status[0].values),
+        lambda: any(
+            v.key == "clock_jumps" and int(v.value) == jumps + 1 for v in drive.diagnostics()[-1].status[0].values
+        ),
         5,
         "count of the jump",
     )

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes tests/golden/drives.csv and loops.csv: drives at the edges of their ranges, by matrix exponentials of 120 digits.
+"""Writes tests/golden/drives.csv and loops.csv: drives at the edges of their ranges, by exponentials of 120 digits.
 
     pip install mpmath==1.4.1
     python tools/golden_drives.py
@@ -221,7 +221,11 @@ def loops():
     lines = [",".join([*names, "tick_ns", "ticks", "instants", *(f"theta_{k + 1}" for k in range(IMPULSE))])]
     for values, periods in cases:
         fields = [*map(repr, values), *map(str, periods)]
-        lines.append(",".join([*fields, *(number(min(abs(v), mpf("1e300")) * mpmath.sign(v)) for v in impulse(values, *periods))]))
+        lines.append(
+            ",".join(
+                [*fields, *(number(min(abs(v), mpf("1e300")) * mpmath.sign(v)) for v in impulse(values, *periods))]
+            )
+        )
     return lines
 
 

@@ -94,7 +94,8 @@ def run(command: list[str], outputs: list[Path]) -> Run:
 
 
 def measure(arguments: argparse.Namespace, folder: Path) -> None:
-    wanted = [("--report", folder / "page.html")] * arguments.report + [("--trace", folder / "trace.csv")] * arguments.trace
+    pages = [("--report", folder / "page.html")] * arguments.report
+    wanted = pages + [("--trace", folder / "trace.csv")] * arguments.trace
     outputs = [output for _, output in wanted]
     options = [word for option, output in wanted for word in (option, str(output))]
     runs: dict[int, list[Run]] = {seconds: [] for seconds in arguments.seconds}
@@ -112,7 +113,8 @@ def measure(arguments: argparse.Namespace, folder: Path) -> None:
 def row(seconds: int, runs: list[Run], read: int, first: tuple[int, list[Run]]) -> None:
     """Prints the medians of a length's runs; the heads before the first."""
     if seconds == first[0]:
-        heads = ["length, s", "processor, s", "clock, s", "× real time", "per s", "memory, MiB", "read, MB", "written, MB"]
+        heads = ["length, s", "processor, s", "clock, s", "× real time", "per s", "memory, MiB"]
+        heads += ["read, MB", "written, MB"]
         print(" ".join(f"{head:>12}" for head in heads))
     processor = statistics.median(run.processor for run in runs)
     clock = statistics.median(run.clock for run in runs)
@@ -136,7 +138,9 @@ def length(text: str) -> int:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--command", type=Path, default=COMMAND, help="the program virtual_axes")
-    parser.add_argument("--seconds", type=length, nargs="+", default=LENGTHS, metavar="S", help="lengths of the set-points")
+    parser.add_argument(
+        "--seconds", type=length, nargs="+", default=LENGTHS, metavar="S", help="lengths of the set-points"
+    )
     parser.add_argument("--report", action="store_true", help="write a page, too")
     parser.add_argument("--trace", action="store_true", help="write a trace, too")
     parser.add_argument("--rounds", type=length, default=1, metavar="N", help="how often each length is run")

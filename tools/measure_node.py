@@ -50,9 +50,9 @@ from drive import (  # noqa: E402
     STREAM_QOS,
     TSP_NS,
     Node,
-    _stamp_ns,
     ballbar,
     joint_trajectory,
+    stamp_of,
 )
 
 JOINTS = {"/joint_states": JointState}
@@ -105,7 +105,7 @@ class Guest:
             pass
 
     def _keep(self, message: bytes) -> None:
-        self.stamps.append(_stamp_ns(message))
+        self.stamps.append(stamp_of(message))
 
     def _wait_for(self, condition: Callable[[], Any], what: str) -> None:
         deadline = time.monotonic() + 20

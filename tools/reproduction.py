@@ -3,6 +3,8 @@
 
     cargo build --release && tools/reproduction.py            # rewrites the page
     tools/reproduction.py --check                             # status 1 if the page is not what comes out
+
+Each number is what the command beside it prints.
 """
 
 from __future__ import annotations

@@ -411,12 +411,15 @@ def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
 
 def table(looks: list[Look]) -> str:
     """Some of them, as Markdown."""
-    rows = ["| of the time | memory, MB | at most | files | threads | service, ms | echo, ms | ratio | load |", "|" + "---|" * 9]
+    rows = [
+        "| of the time | memory, MB | at most | files | threads | service, ms | echo, ms | ratio | load |",
+        "|" + "---|" * 9,
+    ]
     for mark in MARKS:
         at = looks[round(mark / 100 * (len(looks) - 1))]
         rows.append(
-            f"| {mark} % | {at.memory_mb:.1f} | {at.peak_mb:.1f} | {at.files:.0f} | {at.threads:.0f} | {at.latency_ms:.1f} "
-            f"| {at.echo_ms:.1f} | {at.latency_ratio:.2f} | {at.load:.1f} |"
+            f"| {mark} % | {at.memory_mb:.1f} | {at.peak_mb:.1f} | {at.files:.0f} | {at.threads:.0f} "
+            f"| {at.latency_ms:.1f} | {at.echo_ms:.1f} | {at.latency_ratio:.2f} | {at.load:.1f} |"
         )
     return "\n".join(rows)
 

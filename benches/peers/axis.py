@@ -6,8 +6,9 @@ import math
 from pathlib import Path
 from typing import NamedTuple
 
-from cases import POSITION_PERIOD
 from scipy.linalg import expm
+
+from cases import POSITION_PERIOD
 
 VELOCITY_PERIOD = 250e-6
 CURRENT_PERIOD = 125e-6

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
+
 from axis import TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
 from protocol import Figures, asked, figures, serve
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 
-from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
-from protocol import Figures, asked, figures, serve
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
+
+from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
+from protocol import Figures, asked, figures, serve
 
 
 class Drive(LeafSystem):

@@ -9,14 +9,16 @@ and compiling are not in the time.
 from __future__ import annotations
 
 import jax
+
 from protocol import Figures, asked, figures, serve
 
 jax.config.update("jax_enable_x64", True)
 
 import jax.numpy as jnp  # noqa: E402  (after the choice of float64)
 import jaxonomy  # noqa: E402
-from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis  # noqa: E402
 from jaxonomy.simulation import SimulatorOptions  # noqa: E402
+
+from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis  # noqa: E402
 
 
 def pi(gain, integral_gain, scale, limit, integral, error, feedforward):

@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
 from numba import njit
+
+from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
 from protocol import Figures, asked, figures, serve
 
 

@@ -1,39 +1,16 @@
-"""Drive the virtual axes from Python: the example to copy, and what the tests and the demo use.
-
-    with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
-        path = ballbar()
-        recording = drive.run(joint_trajectory(["x", "y"], path.time, np.column_stack([path.x, path.y])))
-        print(recording.radial_deviation(path.centre, path.radius)[recording.within(path.steady)].mean())
-
-Needs rclpy and this package's messages: `tools/setup.sh && source .build/env.sh`, or a ROS 2 Jazzy
-workspace with virtual_axes built. Units are SI (m, rad, s, A); times of the node are integer ns.
-"""
+"""A ROS 2 node that speaks with the virtual axes."""
 
 from __future__ import annotations
 
-import array
-import ctypes
-import fcntl
 import itertools
-import math
 import os
-import random
-import signal
-import socket
 import struct
-import subprocess
-import sys
-import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
-import numpy as np
 import rclpy
-from builtin_interfaces.msg import Duration, Time
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterDescriptor
@@ -48,236 +25,22 @@ from rclpy._rclpy_pybind11 import InvalidHandle
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult
 
-NANOSECONDS = 1_000_000_000
-TSP_NS = 6_000_000
-"""Position period of the default machine, ns."""
-
-DEFAULT_NODE = "/virtual_axes"
-PSEC_QOS = QoSProfile(depth=64, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
-STREAM_QOS = QoSProfile(depth=1)
-"""Reliable, of one sample: as ros2_control's topic-based hardware publishes."""
-DEEP_QOS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST)
-"""Deep enough that a reader which is late by two minutes at 6 ms loses nothing."""
-# Deeper than the node's own 50: a burst of trajectories has two results each.
-RESULT_QOS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+from .process import DEFAULT_NODE, Node
+from .qos import DEEP_QOS, PSEC_QOS, RESULT_QOS, STREAM_QOS
+from .recording import CURRENT_FIELDS, JOINT_FIELDS, STATE_FIELDS, Recording, Series
+from .trajectories import NANOSECONDS, to_ns, to_time
 
 SAMPLES_AT_ONCE = 200
 """Few enough that other callbacks have their turn."""
 SETTLE_S = 0.2
 """A reliable sample written in the instant after matching can wait for the next heartbeat."""
-
-
-# ------------------------------------------------------------------------------------ trajectories
-
-
-def to_time(stamp_ns: int) -> Time:
-    """A ROS time from integer ns."""
-    return Time(sec=stamp_ns // NANOSECONDS, nanosec=stamp_ns % NANOSECONDS)
-
-
-def to_ns(stamp: Time) -> int:
-    """Integer ns from a ROS time."""
-    return stamp.sec * NANOSECONDS + stamp.nanosec
-
-
-def joint_trajectory(
-    names: Sequence[str],
-    times: Sequence[float] | np.ndarray,
-    positions: Any,
-    velocities: Any = None,
-    accelerations: Any = None,
-    stamp: int | None = None,
-) -> JointTrajectory:
-    """Set-points for `names`: `times` in s from the start, a row of positions (m, rad) per time.
-
-    Without velocities the axes go from point to point linearly, with them along cubics, with
-    accelerations too along quintics. `stamp` is the start in ns; None starts at once.
-    """
-    nanoseconds = np.rint(np.asarray(times, dtype=float) * NANOSECONDS).astype(np.int64)
-    seconds, rest = np.divmod(nanoseconds, NANOSECONDS)
-
-    def rows(values: Any) -> Iterable[array.array]:
-        if values is None:
-            return itertools.repeat(array.array("d"))
-        table = np.ascontiguousarray(values, dtype=np.float64).reshape(len(nanoseconds), -1)
-        width = table.shape[1] * table.itemsize
-        data = table.tobytes()
-        return (array.array("d", data[i * width : (i + 1) * width]) for i in range(len(nanoseconds)))
-
-    message = JointTrajectory(joint_names=list(names))
-    message.points = [
-        JointTrajectoryPoint(
-            positions=position,
-            velocities=velocity,
-            accelerations=acceleration,
-            time_from_start=Duration(sec=sec, nanosec=nanosec),
-        )
-        for sec, nanosec, position, velocity, acceleration in zip(
-            seconds.tolist(), rest.tolist(), rows(positions), rows(velocities), rows(accelerations)
-        )
-    ]
-    if stamp is not None:
-        message.header.stamp = to_time(stamp)
-    return message
-
-
-class Ballbar(NamedTuple):
-    """A circle at constant feed with ramps, sampled on the position grid."""
-
-    time: np.ndarray
-    """s from the start, one per position period."""
-    x: np.ndarray
-    """m"""
-    y: np.ndarray
-    """m"""
-    steady: tuple[float, float]
-    """From when to when the feed is steady, 0.5 s clear of both ramps, s."""
-    centre: tuple[float, float]
-    """m"""
-    radius: float
-    """m"""
-
-
-def ballbar(
-    radius: float = 0.150,
-    feed: float = 15 / 60,
-    turns: float = 2.0,
-    rest: float = 0.5,
-    ramp: float = 0.5,
-    period_ns: int = TSP_NS,
-    clear: float = 0.5,
-) -> Ballbar:
-    """The circular test: counter-clockwise from (0, 0) about (-radius, 0).
-
-    `rest` s at rest, the feed (m/s) rises as feed/2 (1 - cos(pi t/ramp)), `turns` full turns at full
-    feed, the same ramp down, `rest` s at rest. The ramps are extra path.
-    """
-    cruise = turns * 2 * math.pi * radius / feed
-    duration = rest + ramp + cruise + ramp + rest
-    time_ns = np.arange(math.ceil(duration * NANOSECONDS / period_ns) + 1, dtype=np.int64) * period_ns
-    time_s = time_ns / NANOSECONDS
-
-    def ramp_path(t: np.ndarray) -> np.ndarray:
-        """Integral of the rising feed, m."""
-        return feed / 2 * (t - ramp / math.pi * np.sin(math.pi * t / ramp))
-
-    up = np.clip(time_s - rest, 0, ramp)
-    at_feed = np.clip(time_s - rest - ramp, 0, cruise)
-    down = np.clip(time_s - rest - ramp - cruise, 0, ramp)
-    # The ramp down is the ramp up run backwards from its end.
-    half = feed * ramp / 2
-    path = ramp_path(up) + feed * at_feed + half - ramp_path(ramp - down)
-    angle = path / radius
-    return Ballbar(
-        time=time_s,
-        x=radius * (np.cos(angle) - 1),
-        y=radius * np.sin(angle),
-        steady=(rest + ramp + clear, rest + ramp + cruise - clear),
-        centre=(-radius, 0.0),
-        radius=radius,
-    )
-
-
-# --------------------------------------------------------------------------------------- recording
-
-
-class Series:
-    """What one topic said over a span of time: a row per message, a column per joint."""
-
-    def __init__(self, messages: Sequence[Any], fields: Sequence[str]):
-        """Keep `fields` of `messages`, which carry header and name."""
-        self.stamp = np.array([to_ns(m.header.stamp) for m in messages], dtype=np.int64)
-        """ns"""
-        self.name: list[str] = list(messages[0].name) if messages else []
-        for message in messages:
-            if list(message.name) != self.name:
-                raise ValueError(f"the joints changed from {self.name} to {list(message.name)}")
-        self._columns = {field: np.array([getattr(m, field) for m in messages]) for field in fields}
-
-    def __getitem__(self, key: str | tuple[str, str]) -> np.ndarray:
-        """`series["position"]` is rows by joints, `series["position", "x"]` one joint's."""
-        if isinstance(key, tuple):
-            return self._columns[key[0]][:, self.name.index(key[1])]
-        return self._columns[key]
-
-    def __len__(self) -> int:
-        """Number of messages."""
-        return len(self.stamp)
-
-
-STATE_FIELDS = (
-    "psec",
-    "position",
-    "tracking_error",
-    "synchronized_tracking_error",
-    "velocity",
-    "velocity_setpoint",
-    "velocity_feedforward",
-    "torque_feedforward",
-    "voltage",
-    "controller",
-)
-CURRENT_FIELDS = ("current", "current_setpoint", "friction", "gravity", "load", "saturated")
-JOINT_FIELDS = ("position", "velocity", "effort")
-
-
-@dataclass(frozen=True)
-class Recording:
-    """All that the node published while it executed a trajectory."""
-
-    start: int
-    """When time 0 of the trajectory was, ns."""
-    joints: Series
-    """`joint_states`: position, velocity (m, m/s; rad, rad/s), effort (N, N.m)."""
-    currents: Series
-    """`~/motor_currents`: current, current_setpoint, friction, gravity, load (A), saturated."""
-    states: Series
-    """`~/drive_states`: psec, position, ..., see DriveStates.msg."""
-    result: TrajectoryResult | None = None
-    """How it ended."""
-
-    @property
-    def time(self) -> np.ndarray:
-        """Time of the joint states, s from the start of the trajectory."""
-        return (self.joints.stamp - self.start) / NANOSECONDS
-
-    def within(self, span: tuple[float, float]) -> np.ndarray:
-        """Mask of the joint states from span[0] to span[1], s from the start."""
-        return (self.time >= span[0]) & (self.time <= span[1])
-
-    def tracking_error(self, joint: str) -> np.ndarray:
-        """PSEC - SP at every position instant; contains the pure delay."""
-        return self.states["psec", joint] - self.states["position", joint]
-
-    def synchronized_tracking_error(self, joint: str, alpha_periods: float = 1.5) -> np.ndarray:
-        """PSEC_floor(k - alpha) - SP_k: what the controller is asked to follow."""
-        shift = math.ceil(alpha_periods)
-        psec = self.states["psec", joint]
-        delayed = np.concatenate([np.full(shift, psec[0]), psec])[: len(psec)]
-        return delayed - self.states["position", joint]
-
-    def radial_deviation(
-        self, centre: tuple[float, float], radius: float, axes: tuple[str, str] = ("x", "y")
-    ) -> np.ndarray:
-        """Distance from the centre less the radius, at every joint state, m (ISO 230-4)."""
-        x, y = (self.joints["position", axis] for axis in axes)
-        return np.hypot(x - centre[0], y - centre[1]) - radius
-
-
-def circular_deviation(radial_deviation: np.ndarray) -> float:
-    """Circular deviation G after ISO 230-4: the largest less the smallest radial deviation, m."""
-    return float(np.ptp(radial_deviation))
-
-
-# ------------------------------------------------------------------------------------ the network
 
 
 class Refused(Exception):
@@ -469,12 +232,12 @@ class Drive:
     def now(self) -> int:
         """The newest position instant that the axes have published, ns of the node's clock."""
         with self._changed:
-            return _stamp_ns(self._samples["states"][-1])
+            return stamp_of(self._samples["states"][-1])
 
     def wait_until(self, stamp_ns: int, timeout: float) -> None:
         """Wait until everything up to `stamp_ns` has been published."""
         self.wait_for(
-            lambda: all(samples and _stamp_ns(samples[-1]) >= stamp_ns for samples in self._samples.values()),
+            lambda: all(samples and stamp_of(samples[-1]) >= stamp_ns for samples in self._samples.values()),
             timeout,
             f"samples up to {stamp_ns} ns",
         )
@@ -549,7 +312,7 @@ class Drive:
 
         def gather(key: str, kind: type, fields: Sequence[str]) -> Series:
             with self._changed:
-                raw = [sample for sample in self._samples[key] if start <= _stamp_ns(sample) <= end]
+                raw = [sample for sample in self._samples[key] if start <= stamp_of(sample) <= end]
             return Series([deserialize_message(sample, kind) for sample in raw], fields)
 
         return Recording(
@@ -634,7 +397,7 @@ class Drive:
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Set parameters, each by itself; raises ParameterRefused with the node's reasons."""
-        request = SetParameters.Request(parameters=_parameters(values))
+        request = SetParameters.Request(parameters=parameter_messages(values))
         results = self.call(SetParameters, "set_parameters", request).results
         reasons = [result.reason for result in results if not result.successful]
         if reasons or len(results) != len(values):
@@ -642,160 +405,18 @@ class Drive:
 
     def set_parameters_atomically(self, values: Mapping[str, Any]) -> None:
         """Set parameters, all at the same position instant or none; raises ParameterRefused."""
-        request = SetParametersAtomically.Request(parameters=_parameters(values))
+        request = SetParametersAtomically.Request(parameters=parameter_messages(values))
         result = self.call(SetParametersAtomically, "set_parameters_atomically", request).result
         if not result.successful:
             raise ParameterRefused(result.reason)
 
 
-def _parameters(values: Mapping[str, Any]) -> list[ParameterMsg]:
+def parameter_messages(values: Mapping[str, Any]) -> list[ParameterMsg]:
+    """As requests to set them carry them."""
     return [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
 
 
-def _stamp_ns(sample: bytes) -> int:
+def stamp_of(sample: bytes) -> int:
     """Stamp of a serialised message that begins with a header (CDR, little endian)."""
     sec, nanosec = struct.unpack_from("<iI", sample, 4)
     return sec * NANOSECONDS + nanosec
-
-
-# ------------------------------------------------------------------------------------- the process
-
-
-class DomainId:
-    """A ROS_DOMAIN_ID that nobody on this machine uses, ours until released."""
-
-    # DDS listens at 7400 + 250 id: above 101 that reaches into Linux's ephemeral ports.
-    RANGE = "1-101"
-
-    def __init__(self) -> None:
-        """Take a free one; VIRTUAL_AXES_DOMAIN_IDS=50-59 narrows the choice."""
-        first, last = map(int, os.environ.get("VIRTUAL_AXES_DOMAIN_IDS", self.RANGE).split("-"))
-        for value in random.sample(range(first, last + 1), last - first + 1):
-            # Ours against other runs of this file, by a lock that the kernel takes back.
-            path = Path(tempfile.gettempdir()) / f"virtual_axes_domain_{os.getuid()}_{value}.lock"
-            lock = path.open("w")
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                lock.close()
-                continue
-            if all(_port_is_free(7400 + 250 * value + offset) for offset in (0, 10, 11)):
-                self.value, self._lock = value, lock
-                return
-            lock.close()
-        raise RuntimeError(f"no free ROS_DOMAIN_ID in {first}-{last}")
-
-    def release(self) -> None:
-        """Give it back."""
-        self._lock.close()
-
-
-def _port_is_free(port: int) -> bool:
-    """Whether nobody listens at the port: DDS shares its ports, so binding alone must fail."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("", port))
-        except OSError:
-            return False
-    return True
-
-
-def node_binary() -> Path:
-    """The node's program: VIRTUAL_AXES_NODE, or what `cargo build --release` made."""
-    if named := os.environ.get("VIRTUAL_AXES_NODE"):
-        return Path(named)
-    root = Path(__file__).resolve().parent.parent
-    return root / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "virtual_axes_node"
-
-
-def _die_with_parent() -> None:
-    """Linux: end the child when this process dies, however it dies."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
-
-
-class Node:
-    """A process that runs the node, in a domain of its own, on this machine only."""
-
-    def __init__(
-        self,
-        ros_args: Sequence[str] = (),
-        name: str = DEFAULT_NODE,
-        domain_id: int | None = None,
-        env: Mapping[str, str] | None = None,
-        binary: Path | None = None,
-        stderr: int | None = None,
-    ):
-        """Say what to start; `ros_args` are what follows --ros-args, `name` is the full name they give.
-
-        `stderr` is a file descriptor for it instead of `output()`.
-        """
-        self.name = name
-        self._own_domain = DomainId() if domain_id is None else None
-        self.domain_id = self._own_domain.value if self._own_domain else domain_id
-        self._command = [str(binary or node_binary()), *(["--ros-args", *ros_args] if ros_args else [])]
-        self._env = {
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            **os.environ,
-            "ROS_DOMAIN_ID": str(self.domain_id),
-            **(env or {}),
-        }
-        self._stderr = stderr
-        self._process: subprocess.Popen[bytes] | None = None
-        # Appending: the child shares this file, reading it must not move where it writes.
-        self._output = tempfile.TemporaryFile("a+b")
-
-    def __enter__(self) -> Node:
-        """Start."""
-        self.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Stop, by force if need be."""
-        if self._process is not None and self.poll() is None:
-            self.stop()
-        if self._own_domain is not None:
-            self._own_domain.release()
-
-    def start(self) -> None:
-        """Start the program; `Drive(process=...)` waits until it is heard."""
-        self._process = subprocess.Popen(
-            self._command,
-            env=self._env,
-            stdin=subprocess.DEVNULL,
-            stdout=self._output,
-            stderr=subprocess.STDOUT if self._stderr is None else self._stderr,
-            preexec_fn=_die_with_parent,
-        )
-
-    @property
-    def pid(self) -> int:
-        """Process id."""
-        assert self._process is not None, "not started"
-        return self._process.pid
-
-    def poll(self) -> int | None:
-        """Exit status, or None while it runs."""
-        return self._process.poll() if self._process is not None else None
-
-    def wait(self, timeout: float) -> int:
-        """Exit status of a program that ends by itself; subprocess.TimeoutExpired if it does not."""
-        assert self._process is not None, "not started"
-        return self._process.wait(timeout)
-
-    def stop(self, number: signal.Signals = signal.SIGINT, timeout: float = 5.0) -> int:
-        """Ask the program to end and return its exit status; kills it when it does not (status -9)."""
-        assert self._process is not None, "not started"
-        if self._process.poll() is None:
-            self._process.send_signal(number)
-            try:
-                self._process.wait(timeout)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait(timeout)
-        return self._process.returncode
-
-    def output(self) -> str:
-        """What it wrote so far to stdout and stderr."""
-        descriptor = self._output.fileno()
-        return os.pread(descriptor, os.fstat(descriptor).st_size, 0).decode(errors="replace")

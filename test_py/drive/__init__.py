@@ -1,0 +1,54 @@
+"""Drive the virtual axes from Python: the example to copy, and what the tests and the demo use.
+
+    with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
+        path = ballbar()
+        recording = drive.run(joint_trajectory(["x", "y"], path.time, np.column_stack([path.x, path.y])))
+        print(recording.radial_deviation(path.centre, path.radius)[recording.within(path.steady)].mean())
+
+`trajectories` makes set-points, `client` sends them and keeps what comes back, `recording` makes arrays of it, and
+`process` starts a node of one's own.
+
+Needs rclpy and this package's messages: `tools/setup.sh && source .build/env.sh`, or a ROS 2 Jazzy
+workspace with virtual_axes built. Units are SI (m, rad, s, A); times of the node are integer ns.
+"""
+
+from .client import (
+    SETTLE_S,
+    Drive,
+    ParameterRefused,
+    Refused,
+    parameter_messages,
+    stamp_of,
+)
+from .process import DEFAULT_NODE, DomainId, Node, die_with_parent, node_binary
+from .qos import DEEP_QOS, PSEC_QOS, RESULT_QOS, STREAM_QOS
+from .recording import Recording, Series, circular_deviation
+from .trajectories import NANOSECONDS, TSP_NS, Ballbar, ballbar, joint_trajectory, to_ns, to_time
+
+__all__ = [
+    "DEEP_QOS",
+    "DEFAULT_NODE",
+    "NANOSECONDS",
+    "PSEC_QOS",
+    "RESULT_QOS",
+    "SETTLE_S",
+    "STREAM_QOS",
+    "TSP_NS",
+    "Ballbar",
+    "DomainId",
+    "Drive",
+    "Node",
+    "ParameterRefused",
+    "Recording",
+    "Refused",
+    "Series",
+    "ballbar",
+    "circular_deviation",
+    "die_with_parent",
+    "joint_trajectory",
+    "node_binary",
+    "parameter_messages",
+    "stamp_of",
+    "to_ns",
+    "to_time",
+]

@@ -1,0 +1,157 @@
+"""The node's process, in a domain of its own."""
+
+from __future__ import annotations
+
+import ctypes
+import fcntl
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+DEFAULT_NODE = "/virtual_axes"
+
+
+class DomainId:
+    """A ROS_DOMAIN_ID that nobody on this machine uses, ours until released."""
+
+    # DDS listens at 7400 + 250 id: above 101 that reaches into Linux's ephemeral ports.
+    RANGE = "1-101"
+
+    def __init__(self) -> None:
+        """Take a free one; VIRTUAL_AXES_DOMAIN_IDS=50-59 narrows the choice."""
+        first, last = map(int, os.environ.get("VIRTUAL_AXES_DOMAIN_IDS", self.RANGE).split("-"))
+        for value in random.sample(range(first, last + 1), last - first + 1):
+            # Ours against other runs of this file, by a lock that the kernel takes back.
+            path = Path(tempfile.gettempdir()) / f"virtual_axes_domain_{os.getuid()}_{value}.lock"
+            lock = path.open("w")
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                lock.close()
+                continue
+            if all(_port_is_free(7400 + 250 * value + offset) for offset in (0, 10, 11)):
+                self.value, self._lock = value, lock
+                return
+            lock.close()
+        raise RuntimeError(f"no free ROS_DOMAIN_ID in {first}-{last}")
+
+    def release(self) -> None:
+        """Give it back."""
+        self._lock.close()
+
+
+def _port_is_free(port: int) -> bool:
+    """Whether nobody listens at the port: DDS shares its ports, so binding alone must fail."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("", port))
+        except OSError:
+            return False
+    return True
+
+
+def node_binary() -> Path:
+    """The node's program: VIRTUAL_AXES_NODE, or what `cargo build --release` made."""
+    if named := os.environ.get("VIRTUAL_AXES_NODE"):
+        return Path(named)
+    root = Path(__file__).resolve().parents[2]
+    return root / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "virtual_axes_node"
+
+
+def die_with_parent() -> None:
+    """Linux: end the child when this process dies, however it dies."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
+
+
+class Node:
+    """A process that runs the node, in a domain of its own, on this machine only."""
+
+    def __init__(
+        self,
+        ros_args: Sequence[str] = (),
+        name: str = DEFAULT_NODE,
+        domain_id: int | None = None,
+        env: Mapping[str, str] | None = None,
+        binary: Path | None = None,
+        stderr: int | None = None,
+    ):
+        """Say what to start; `ros_args` are what follows --ros-args, `name` is the full name they give.
+
+        `stderr` is a file descriptor for it instead of `output()`.
+        """
+        self.name = name
+        self._own_domain = DomainId() if domain_id is None else None
+        self.domain_id = self._own_domain.value if self._own_domain else domain_id
+        self._command = [str(binary or node_binary()), *(["--ros-args", *ros_args] if ros_args else [])]
+        self._env = {
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            **os.environ,
+            "ROS_DOMAIN_ID": str(self.domain_id),
+            **(env or {}),
+        }
+        self._stderr = stderr
+        self._process: subprocess.Popen[bytes] | None = None
+        # Appending: the child shares this file, reading it must not move where it writes.
+        self._output = tempfile.TemporaryFile("a+b")
+
+    def __enter__(self) -> Node:
+        """Start."""
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop, by force if need be."""
+        if self._process is not None and self.poll() is None:
+            self.stop()
+        if self._own_domain is not None:
+            self._own_domain.release()
+
+    def start(self) -> None:
+        """Start the program; `Drive(process=...)` waits until it is heard."""
+        self._process = subprocess.Popen(
+            self._command,
+            env=self._env,
+            stdin=subprocess.DEVNULL,
+            stdout=self._output,
+            stderr=subprocess.STDOUT if self._stderr is None else self._stderr,
+            preexec_fn=die_with_parent,
+        )
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        assert self._process is not None, "not started"
+        return self._process.pid
+
+    def poll(self) -> int | None:
+        """Exit status, or None while it runs."""
+        return self._process.poll() if self._process is not None else None
+
+    def wait(self, timeout: float) -> int:
+        """Exit status of a program that ends by itself; subprocess.TimeoutExpired if it does not."""
+        assert self._process is not None, "not started"
+        return self._process.wait(timeout)
+
+    def stop(self, number: signal.Signals = signal.SIGINT, timeout: float = 5.0) -> int:
+        """Ask the program to end and return its exit status; kills it when it does not (status -9)."""
+        assert self._process is not None, "not started"
+        if self._process.poll() is None:
+            self._process.send_signal(number)
+            try:
+                self._process.wait(timeout)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait(timeout)
+        return self._process.returncode
+
+    def output(self) -> str:
+        """What it wrote so far to stdout and stderr."""
+        descriptor = self._output.fileno()
+        return os.pread(descriptor, os.fstat(descriptor).st_size, 0).decode(errors="replace")
