@@ -36,6 +36,11 @@ impl Deaf {
         Deaf { writer, topic, participant, kept, written: AtomicI64::new(0) }
     }
 
+    /// Number of the last sample.
+    pub(super) fn written(&self) -> i64 {
+        self.written.load(Ordering::Relaxed)
+    }
+
     /// Another sample has been written.
     pub(super) fn wrote(&self) {
         self.written.fetch_add(1, Ordering::Relaxed);
@@ -46,7 +51,7 @@ impl Deaf {
         if is_secured() {
             return;
         }
-        let (from, before) = oldest(self.written.load(Ordering::Relaxed), self.kept);
+        let (from, before) = oldest(self.written(), self.kept);
         let name = self.topic.trim_start_matches("rt");
         warn!(
             "a reader of {name} has acknowledged nothing for {waited_s} s, and {} messages wait for it: the oldest {} are \

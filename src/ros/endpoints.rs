@@ -5,7 +5,7 @@ use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use ros2_client::{Message, MessageInfo, MessageTypeName, Node, ReadResult};
 
 use rustdds::policy::ResourceLimits;
-use rustdds::{DomainParticipant, QosPolicies, QosPolicyBuilder, TopicKind};
+use rustdds::{DomainParticipant, QosPolicies, QosPolicyBuilder, Topic, TopicKind};
 
 use super::args::RosArgs;
 use super::recorder::{Direction, Recorder, Tap};
@@ -20,18 +20,18 @@ pub struct Publisher<M: Serialize> {
     pub network: ros2_client::Publisher<M>,
     /// To the recording.
     pub tap: Tap<M>,
-    /// Its name in DDS.
-    pub topic: String,
-    /// Whether readers that come later do not want what was sent before.
+    /// Its topic.
+    pub topic: Topic,
+    /// Whether readers that come later do not want what was sent before: a message that nobody hears is not made.
     pub volatile: bool,
     /// Samples that the middleware keeps for readers that have not acknowledged them; then it waits.
     pub kept: usize,
 }
 
 impl<M: Serialize> Publisher<M> {
-    /// One of the topic `name` whose messages are not recorded, and are made whoever listens.
-    pub fn unrecorded(network: ros2_client::Publisher<M>, name: &str) -> Self {
-        Publisher { network, tap: Tap::none(), topic: topic_of(name), volatile: false, kept: KEPT }
+    /// One whose messages are not recorded, and are made whoever listens.
+    pub fn unrecorded(network: ros2_client::Publisher<M>, topic: Topic) -> Self {
+        Publisher { network, tap: Tap::none(), topic, volatile: false, kept: KEPT }
     }
 }
 
@@ -154,7 +154,7 @@ impl<'a> Endpoints<'a> {
         name: &str,
         type_name: &MessageTypeName,
         qos: &QosPolicies,
-    ) -> Result<(rustdds::Topic, String), EndpointError> {
+    ) -> Result<(Topic, String), EndpointError> {
         let failed = |reason: String| EndpointError { name: name.to_owned(), reason };
         let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
         let topic = self
@@ -182,7 +182,7 @@ impl<'a> Endpoints<'a> {
             .map_err(|e| EndpointError { name: name.to_owned(), reason: e.to_string() })?;
         let tap = self.recorder.tap(&resolved, qos, Direction::Out);
         let volatile = !qos.transient_local;
-        let publisher = Publisher { network, tap, topic: topic_of(&resolved), volatile, kept };
+        let publisher = Publisher { network, tap, topic, volatile, kept };
         Ok((publisher, resolved))
     }
 

@@ -53,9 +53,16 @@ impl Listeners {
         heard
     }
 
-    /// A reader has been matched with `writer`.
-    fn matched(&self, writer: GUID) {
-        self.0.iter().filter(|topic| topic.writer == writer).for_each(|topic| topic.heard.set(true));
+    /// A reader has been matched with `writer`; whether that is the first one of a topic.
+    fn matched(&self, writer: GUID) -> bool {
+        let topic = self.0.iter().find(|topic| topic.writer == writer);
+        topic.inspect(|topic| topic.heard.set(true)).is_some()
+    }
+
+    /// Looks which topics have readers.
+    fn look(&self, participant: &DomainParticipant) {
+        let readers = participant.discovered_readers();
+        self.update(&readers.iter().map(|r| r.subscription_topic_data.topic_name().as_str()).collect());
     }
 
     /// The topics that have readers are those of `names`.
@@ -75,7 +82,10 @@ pub(super) async fn run(participant: DomainParticipant, listeners: Listeners) {
         tokio::select! {
             event = events.next() => match event {
                 Some(DomainParticipantStatusEvent::RemoteReaderMatched { local_writer, .. }) => {
-                    listeners.matched(local_writer);
+                    // One that has been renewed is not known.
+                    if !listeners.matched(local_writer) {
+                        listeners.look(&participant);
+                    }
                 }
                 Some(DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer }) => {
                     if let Some(asker) = &asker {
@@ -85,12 +95,7 @@ pub(super) async fn run(participant: DomainParticipant, listeners: Listeners) {
                 Some(_) => {}
                 None => return,
             },
-            _ = timer.tick() => {
-                let readers = participant.discovered_readers();
-                listeners.update(
-                    &readers.iter().map(|r| r.subscription_topic_data.topic_name().as_str()).collect(),
-                );
-            }
+            _ = timer.tick() => listeners.look(&participant),
         }
     }
 }

@@ -39,5 +39,6 @@ mod tool;
 mod topics;
 mod trigger;
 mod unsent;
+mod writers;
 
 use crate::door::{args, names};

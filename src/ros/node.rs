@@ -20,7 +20,7 @@ use super::args::RosArgs;
 use super::clock::{ClockInput, ClockOutput, ClockState};
 use super::convert;
 use super::diagnostics::Diagnostics;
-use super::endpoints::{EndpointError, Endpoints, Publisher};
+use super::endpoints::{EndpointError, Endpoints};
 use super::environment::Environment;
 use super::fan_out::{FanOut, publish_diagnostics};
 use super::heard::{self, Listeners};
@@ -40,6 +40,7 @@ use super::service::ServiceError;
 use super::tool::ToolTopics;
 use super::topics::Topics;
 use super::trigger::Trigger;
+use super::writers::Renewals;
 use crate::config::{ConfigError, Parameters, TimeMode};
 use crate::kinematics::Kinematics;
 use crate::simulation::{self, Simulation, SimulationError};
@@ -145,8 +146,6 @@ async fn serve(
     let mut topics =
         Topics::create(Endpoints::new(&mut node, &dds, args, &parameters, &mut recorder), args, mode)?;
     let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
-    let [action_status, action_feedback] =
-        ["status", "feedback"].map(|part| format!("{}/_action/{part}", action_topics.name));
     topics.names.goals_on.push(action_topics.name);
     let endpoints = Endpoints::new(&mut node, &dds, args, &parameters, &mut recorder);
     let tool = ToolTopics::create(endpoints, Kinematics::new(&config))?;
@@ -171,8 +170,14 @@ async fn serve(
 
     // What goes out.
     let mut listeners = Listeners::default();
-    let mut publishing =
-        Publishing { participant: &dds, dropped: &dropped, listeners: &mut listeners, tasks: &mut tasks };
+    let mut renewals = Renewals::default();
+    let mut publishing = Publishing {
+        participant: &dds,
+        dropped: &dropped,
+        listeners: &mut listeners,
+        tasks: &mut tasks,
+        renewals: &mut renewals,
+    };
     let (goal_events, events) = mpsc::unbounded_channel();
     let results_output = publishing.start(topics.results, of_results);
     let results =
@@ -180,7 +185,7 @@ async fn serve(
     let diagnostics = publishing.start(topics.diagnostics, WhenFull::Drop);
     let every = node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * seconds(period))).round() as i64);
     let (running, running_goals) = watch::channel(Arc::from([]));
-    let status = publishing.start(Publisher::unrecorded(action_topics.status, &action_status), of_results);
+    let status = publishing.start(action_topics.status, of_results);
     let outputs = FanOut {
         joint_states: publishing.start(topics.joint_states, when_full),
         motor_currents: publishing.start(topics.motor_currents, when_full),
@@ -188,8 +193,7 @@ async fn serve(
         controller_state: publishing.start(topics.controller_state, when_full),
         feedback: Feedback {
             goals: running_goals,
-            output: publishing
-                .start(Publisher::unrecorded(action_topics.feedback, &action_feedback), when_full),
+            output: publishing.start(action_topics.feedback, when_full),
             joints: joints.clone(),
             every: feedback_period(node_config.action_monitor_rate, period),
         },
@@ -210,6 +214,7 @@ async fn serve(
 
     // What comes in.
     tasks.spawn(heard::run(dds.clone(), listeners));
+    tasks.spawn(renewals.run(node));
     if let Some((subscription, name)) = topics.clock_input {
         let (participant, health) = (dds.clone(), health.clone());
         let input = ClockInput { subscription, name, participant, period, health, state: clock_out };
@@ -308,7 +313,6 @@ async fn serve(
         recording.close().await;
     }
     drop(dds);
-    drop(node);
     drop(context);
     Ok(())
 }

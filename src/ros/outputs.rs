@@ -5,20 +5,20 @@
 use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use futures::FutureExt;
-use rustdds::DomainParticipant;
+use rustdds::qos::HasQoSPolicy;
+use rustdds::{DomainParticipant, TopicDescription};
 use serde::Serialize;
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::timeout;
-use tracing::warn;
 
-use super::deaf::Deaf;
 use super::endpoints::Publisher;
 use super::heard::{Heard, Listeners};
 use super::recorder::Tap;
+use super::writers::{Renewals, Succession, Writer};
 
 /// What happens when a queue is full because its subscribers are slow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,8 +62,7 @@ type Write = Pin<Box<dyn Future<Output = ()> + Send>>;
 
 /// The sending end of a topic.
 pub struct Output<M: Serialize> {
-    network: Arc<ros2_client::Publisher<M>>,
-    deaf: Arc<Deaf>,
+    writers: Arc<Succession<Writer<M>>>,
     queue: Queue,
     tap: Tap<M>,
     heard: Heard,
@@ -143,6 +142,8 @@ pub struct Publishing<'a> {
     pub listeners: &'a mut Listeners,
     /// Where the tasks run.
     pub tasks: &'a mut JoinSet<()>,
+    /// Renews the writers.
+    pub renewals: &'a mut Renewals,
 }
 
 impl Publishing<'_> {
@@ -153,18 +154,22 @@ impl Publishing<'_> {
         when_full: WhenFull,
     ) -> Output<M> {
         let Publisher { network, tap, topic, volatile, kept } = publisher;
-        let deaf = Arc::new(Deaf::new(network.guid(), topic.clone(), kept, self.participant.clone()));
-        let longest = longest_wait(when_full);
-        let readers = Arc::clone(&deaf);
-        let (queue, task) =
-            Queue::new(when_full, self.dropped, longest, move || readers.give_up(longest.as_secs()));
-        self.tasks.spawn(task);
         let heard = if volatile && !tap.records() {
-            self.listeners.of(network.guid(), topic)
+            self.listeners.of(network.guid(), topic.name())
         } else {
             Heard::always()
         };
-        Output { network: Arc::new(network), deaf, queue, tap, heard }
+        let writers = Arc::new(Succession::new(Writer::new(network, &topic, kept, self.participant)));
+        let longest = longest_wait(when_full);
+        let stuck = Arc::clone(&writers);
+        let (queue, task) = Queue::new(when_full, self.dropped, longest, move || {
+            stuck.current().deaf.give_up(longest.as_secs())
+        });
+        self.tasks.spawn(task);
+        if topic.qos().is_volatile() {
+            self.renewals.add(Arc::clone(&writers), topic, kept, self.participant.clone());
+        }
+        Output { writers, queue, tap, heard }
     }
 }
 
@@ -177,13 +182,8 @@ impl<M: Serialize + Send + Sync + 'static> Output<M> {
     /// Hands a message over, to the recording first: a subscriber that is slow leaves no gap there.
     pub async fn send(&self, message: M) {
         self.tap.record(&message).await;
-        let (network, deaf) = (Arc::clone(&self.network), Arc::clone(&self.deaf));
-        let write = Box::pin(async move {
-            match network.async_publish(message).await {
-                Ok(()) => deaf.wrote(),
-                Err(_) => warn!("a message could not be published"),
-            }
-        });
+        let writers = Arc::clone(&self.writers);
+        let write = Box::pin(async move { writers.turn(Instant::now).write(message).await });
         self.queue.write(write).await;
     }
 }
@@ -192,7 +192,6 @@ impl<M: Serialize + Send + Sync + 'static> Output<M> {
 mod tests {
     use super::*;
     use futures::future::pending;
-    use std::time::Instant;
     use tokio::sync::watch;
 
     /// Where writes go to while `open`, counted.

@@ -11,7 +11,7 @@ use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
 use tokio::sync::mpsc;
 
 use super::args::{LogLevel, RosArgs};
-use super::endpoints::{EndpointError, KEPT, Publisher, topic_of};
+use super::endpoints::{EndpointError, KEPT, Publisher};
 use super::log::LogRecord;
 use super::recorder::{Direction, Recorder};
 use crate::config::QosConfig;
@@ -53,7 +53,7 @@ pub(super) fn publisher(
     let network = node.create_publisher(&topic, None).map_err(|e| failed(e.to_string()))?;
     let qos = QosConfig { reliable: true, transient_local: true, depth: DEPTH };
     let tap = recorder.tap(&resolved, qos, Direction::Out);
-    Ok(Some(Publisher { network, tap, topic: topic_of(&resolved), volatile: false, kept: KEPT }))
+    Ok(Some(Publisher { network, tap, topic, volatile: false, kept: KEPT }))
 }
 
 /// Publishes what comes until the log is closed.

@@ -9,7 +9,7 @@ use futures::future::BoxFuture;
 use futures::stream::{FuturesUnordered, select_all};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use ros2_client::service::RmwRequestId;
-use ros2_client::{Context, Message, MessageTypeName, Name, Node, Publisher, ServiceTypeName};
+use ros2_client::{Context, Message, MessageTypeName, Name, Node, ServiceTypeName};
 use rustdds::TopicKind;
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
@@ -25,6 +25,7 @@ use crate::messages::{
     CONTROL_PACKAGE, FeedbackMessage, FollowJointTrajectoryResult, GetResultRequest, GetResultResponse,
     JointTrajectoryControllerState, SendGoalRequest, SendGoalResponse, stamp,
 };
+use crate::ros::endpoints::Publisher;
 use crate::ros::inputs::next_id;
 use crate::ros::outputs::Output;
 use crate::ros::pace::{Command, Health};
@@ -117,10 +118,10 @@ impl ActionServer {
         };
         let status_name = Name::parse(&part("status")).map_err(|e| failed(e.to_string()))?;
         let status_type = MessageTypeName::new("action_msgs", "GoalStatusArray");
-        let status = node
+        let status_topic = node
             .create_topic(&status_name, status_type, &qos(Durability::TransientLocal, 1))
-            .and_then(|topic| node.create_publisher(&topic, None))
             .map_err(|e| failed(e.to_string()))?;
+        let status = node.create_publisher(&status_topic, None).map_err(|e| failed(e.to_string()))?;
         // A topic of a type that the crate cannot name.
         let feedback_qos = (&qos(Durability::Volatile, FEEDBACK_DEPTH)).into();
         let feedback_topic = context
@@ -133,6 +134,8 @@ impl ActionServer {
             )
             .map_err(|e| failed(e.to_string()))?;
         let feedback = node.create_publisher(&feedback_topic, None).map_err(|e| failed(e.to_string()))?;
+        let status = Publisher::unrecorded(status, status_topic);
+        let feedback = Publisher::unrecorded(feedback, feedback_topic);
         Ok((server, ActionTopics { status, feedback, name }))
     }
 
