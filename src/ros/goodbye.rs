@@ -1,4 +1,4 @@
-//! The last word of a participant, in a form that Fast DDS understands.
+//! The last word of a participant or of a writer, in a form that Fast DDS understands.
 //!
 //! RustDDS disposes of its participant when it is dropped, with a DATA submessage that carries the
 //! key (the participant's GUID) as a parameter list of 28 octets. Fast DDS passes over any key-only
@@ -35,6 +35,8 @@ const PARTICIPANTS_PER_HOST: u32 = 120;
 
 /// 9.3.1.3: the writer of the announcements.
 const SPDP_WRITER: EntityId = [0x00, 0x01, 0x00, 0xc2];
+/// That of announcements of writers.
+const SEDP_PUBLICATIONS_WRITER: EntityId = [0x00, 0x00, 0x03, 0xc2];
 const PID_KEY_HASH: u16 = 0x0070;
 const PID_STATUS_INFO: u16 = 0x0071;
 const DISPOSED_AND_UNREGISTERED: [u8; 4] = [0, 0, 0, 3];
@@ -60,6 +62,21 @@ impl Goodbye {
     /// Notes who `participant` is, and whom it has met so far.
     pub(super) fn of(participant: &DomainParticipant, range: DiscoveryRange) -> Self {
         let guid = participant.guid().to_bytes();
+        Self::with(dispose_datagram(&guid, SPDP_WRITER, LAST_SEQUENCE_NUMBER), participant, range)
+    }
+
+    /// Of one of its writers. RustDDS announces writers in samples that are numbered: `number` is that of the one in which
+    /// it disposes of this writer, which it is about to send. Who has this one takes that for a repetition.
+    pub(super) fn of_writer(
+        writer: &Guid,
+        number: i64,
+        participant: &DomainParticipant,
+        range: DiscoveryRange,
+    ) -> Self {
+        Self::with(dispose_datagram(writer, SEDP_PUBLICATIONS_WRITER, number), participant, range)
+    }
+
+    fn with(datagram: Vec<u8>, participant: &DomainParticipant, range: DiscoveryRange) -> Self {
         let endpoints: Vec<SocketAddr> = participant
             .discovered_readers()
             .iter()
@@ -73,7 +90,7 @@ impl Goodbye {
             .map(SocketAddr::from)
             .collect();
         Self {
-            datagram: dispose_datagram(&guid),
+            datagram,
             destinations: destinations(participant.domain_id(), range, &endpoints),
             sources: match range {
                 DiscoveryRange::Off => Vec::new(),
@@ -85,15 +102,20 @@ impl Goodbye {
         }
     }
 
-    /// Sends it; takes about 30 ms. What cannot be reached is left alone: there is nobody to tell.
+    /// Sends it some times; takes about 30 ms. What cannot be reached is left alone: there is nobody to tell.
     pub(super) fn send(&self) {
-        let sockets: Vec<UdpSocket> =
-            self.sources.iter().filter_map(|source| UdpSocket::bind((*source, 0)).ok()).collect();
         for round in 0..ROUNDS {
             if round > 0 {
                 thread::sleep(ROUND_PERIOD);
             }
-            for socket in &sockets {
+            self.send_once();
+        }
+    }
+
+    /// Sends it once.
+    pub(super) fn send_once(&self) {
+        for source in &self.sources {
+            if let Ok(socket) = UdpSocket::bind((*source, 0)) {
                 let from_loopback = socket.local_addr().is_ok_and(|from| from.ip().is_loopback());
                 for to in &self.destinations {
                     // Nothing but multicast may go out by both.
@@ -106,11 +128,11 @@ impl Goodbye {
     }
 }
 
-/// The whole datagram for the participant with this GUID.
-fn dispose_datagram(guid: &Guid) -> Vec<u8> {
+/// The whole datagram for the participant or the endpoint with this GUID, as that sample of this writer of announcements.
+fn dispose_datagram(guid: &Guid, writer: EntityId, sequence_number: i64) -> Vec<u8> {
     Message::from(guid).data(&Data {
-        writer: SPDP_WRITER,
-        sequence_number: LAST_SEQUENCE_NUMBER,
+        writer,
+        sequence_number,
         inline_qos: &[(PID_KEY_HASH, guid), (PID_STATUS_INFO, &DISPOSED_AND_UNREGISTERED)],
         payload: None,
     })
@@ -148,7 +170,7 @@ mod tests {
     #[test]
     fn the_datagram_carries_the_key_hash_that_fast_dds_looks_for() {
         let guid: [u8; 16] = [1, 0x12, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0, 1, 0xc1];
-        let datagram = dispose_datagram(&guid);
+        let datagram = dispose_datagram(&guid, SPDP_WRITER, LAST_SEQUENCE_NUMBER);
         assert_eq!(&datagram[..8], b"RTPS\x02\x04\x01\x12");
         assert_eq!(datagram[8..20], guid[..12]);
         assert_eq!(datagram[20..24], [0x15, 0x03, 52, 0]);

@@ -40,7 +40,7 @@ use super::service::ServiceError;
 use super::tool::ToolTopics;
 use super::topics::Topics;
 use super::trigger::Trigger;
-use super::writers::Renewals;
+use super::writers::{Owner, Renewals};
 use crate::config::{ConfigError, Parameters, TimeMode};
 use crate::kinematics::Kinematics;
 use crate::simulation::{self, Simulation, SimulationError};
@@ -214,7 +214,8 @@ async fn serve(
 
     // What comes in.
     tasks.spawn(heard::run(dds.clone(), listeners));
-    tasks.spawn(renewals.run(node));
+    let owner = Owner { node, context: context.clone(), range: participant.range() };
+    tasks.spawn(renewals.run(owner));
     if let Some((subscription, name)) = topics.clock_input {
         let (participant, health) = (dds.clone(), health.clone());
         let input = ClockInput { subscription, name, participant, period, health, state: clock_out };

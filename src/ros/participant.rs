@@ -7,9 +7,10 @@ use rustdds::DomainParticipant;
 #[cfg(feature = "security")]
 use rustdds::DomainParticipantSecurityConfigFiles;
 
+use super::environment::{DiscoveryRange, Environment};
 #[cfg(not(feature = "security"))]
 use super::security::SecurityError;
-use super::{environment::Environment, goodbye::Goodbye, security::Security};
+use super::{goodbye::Goodbye, security::Security};
 
 /// The node could not join the network.
 #[derive(Debug, thiserror::Error)]
@@ -94,6 +95,11 @@ impl Participant {
             .ok_or_else(|| ParticipantError::Context { reason: "the participant is shut down".to_owned() })?;
         Context::from_domain_participant(participant)
             .map_err(|error| ParticipantError::Context { reason: error.to_string() })
+    }
+
+    /// Where it is known.
+    pub fn range(&self) -> DiscoveryRange {
+        self.environment.range()
     }
 
     /// Leaves the network: disposes of the participant and tells everybody who may know it.

@@ -3,17 +3,20 @@
 //! When a reader comes, a volatile writer of RustDDS's makes a set of the numbers of all samples that it has ever
 //! written, since they are not for that reader: some 30 bytes for each, in the thread that sends everything. It has the
 //! set until the reader acknowledges, for one of best effort as long as that is there. A topic therefore gets a new
-//! writer after [`MANY`] samples, with numbers from 1 on.
+//! writer after [`MANY`] samples, with numbers from 1 on, and the old one takes its leave.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use ros2_client::Node;
+use ros2_client::{Context, Node};
 use rustdds::{DomainParticipant, Topic, TopicDescription};
 use serde::Serialize;
 use tracing::warn;
 
 use super::deaf::Deaf;
+use super::environment::DiscoveryRange;
+use super::goodbye::Goodbye;
+use super::rtps::{Guid, is_secured};
 
 /// Samples that a writer writes at most before there is another: 52 minutes of them at the default rate.
 const MANY: i64 = 1 << 19;
@@ -102,11 +105,10 @@ impl<W> Succession<W> {
         self.lock().next = Some((Arc::new(next), now));
     }
 
-    /// Lets the predecessor go when it has stayed long enough.
-    fn retire(&self, now: Instant) {
+    /// The predecessor, once it has stayed long enough.
+    fn retired(&self, now: Instant) -> Option<Arc<W>> {
         let gone = self.lock().before.take_if(|(_, since)| now.duration_since(*since) >= STAYS);
-        // Not while others wait for the lock.
-        drop(gone);
+        gone.map(|(before, _)| before)
     }
 }
 
@@ -122,10 +124,38 @@ impl<W> Generations<W> {
 #[derive(Default)]
 pub struct Renewals(Vec<Box<dyn Renewed>>);
 
+/// Who has the writers.
+pub struct Owner {
+    /// Their node.
+    pub node: Node,
+    /// Where that lives.
+    pub context: Context,
+    /// Where it is known.
+    pub range: DiscoveryRange,
+}
+
+/// Writers that the crate does not know of: of responses to the requests of goals and results
+/// (`service::Service::of_action`).
+const NOT_OF_THE_NODE: i64 = 2;
+
+impl Owner {
+    /// Writers that have been announced, each in a sample.
+    fn announced(&self) -> i64 {
+        // The crate tells the number of a node's writers in no other way.
+        let entities = serde_json::to_value(self.context.participant_entities_info()).unwrap_or_default();
+        let nodes = entities["node_entities_info_seq"].as_array().map_or(&[][..], Vec::as_slice);
+        let writers =
+            nodes.iter().filter_map(|node| node["writer_gid_seq"].as_array()).map(Vec::len).sum::<usize>();
+        i64::try_from(writers).unwrap_or(0) + NOT_OF_THE_NODE
+    }
+}
+
 /// Such a topic, of whatever type.
 trait Renewed: Send {
-    /// Creates a writer where the present one has written much, and lets the last go after some time.
+    /// Creates a writer where the present one has written much.
     fn look(&self, node: &mut Node, now: Instant) -> Result<(), String>;
+    /// Lets the last writer go when it has stayed long enough, after `goodbye` to its GUID.
+    fn retire(&self, now: Instant, goodbye: &mut dyn FnMut(Guid));
     /// Its name in DDS.
     fn name(&self) -> String;
 }
@@ -139,12 +169,17 @@ struct Renewable<M: Serialize> {
 
 impl<M: Serialize + Send + Sync + 'static> Renewed for Renewable<M> {
     fn look(&self, node: &mut Node, now: Instant) -> Result<(), String> {
-        self.writers.retire(now);
         if self.writers.is_alone() && self.writers.current().deaf.written() >= MANY {
             let network = node.create_publisher(&self.topic, None).map_err(|e| e.to_string())?;
             self.writers.prepare(Writer::new(network, &self.topic, self.kept, &self.participant), now);
         }
         Ok(())
+    }
+
+    fn retire(&self, now: Instant, goodbye: &mut dyn FnMut(Guid)) {
+        if let Some(retired) = self.writers.retired(now) {
+            goodbye(retired.network.guid().to_bytes());
+        }
     }
 
     fn name(&self) -> String {
@@ -164,14 +199,24 @@ impl Renewals {
         self.0.push(Box::new(Renewable { writers, topic, kept, participant }));
     }
 
-    /// Renews them on `node`, to which they belong, until the task is ended.
-    pub async fn run(self, mut node: Node) {
+    /// Renews them until the task is ended.
+    pub async fn run(self, mut owner: Owner) {
         let mut timer = tokio::time::interval(LOOK_PERIOD);
+        // Writers that were disposed of, each in a sample.
+        let mut disposed = 0;
         loop {
             timer.tick().await;
             let now = Instant::now();
             for topic in &self.0 {
-                if let Err(reason) = topic.look(&mut node, now) {
+                topic.retire(now, &mut |writer| {
+                    disposed += 1;
+                    if !is_secured() {
+                        let participant = owner.context.domain_participant();
+                        let number = owner.announced() + disposed;
+                        Goodbye::of_writer(&writer, number, &participant, owner.range).send_once();
+                    }
+                });
+                if let Err(reason) = topic.look(&mut owner.node, now) {
                     let name = topic.name();
                     warn!("{} gets no new writer: {reason}", name.trim_start_matches("rt"));
                 }
@@ -196,10 +241,8 @@ mod tests {
         // Nothing was written for long; then at once by the second.
         assert_eq!(*writers.current(), "first");
         assert_eq!((turn(100), *writers.current()), ("second", "second"));
-        writers.retire(at(129));
-        assert!(!writers.is_alone());
-        writers.retire(at(130));
-        assert!(writers.is_alone());
+        assert_eq!((writers.retired(at(129)), writers.is_alone()), (None, false));
+        assert_eq!((writers.retired(at(130)).as_deref(), writers.is_alone()), (Some(&"first"), true));
         assert_eq!(turn(200), "second");
     }
 }

@@ -72,8 +72,11 @@ class Drive:
         timeout: float = 20.0,
         connect: bool = True,
         remaps: Sequence[str] = (),
+        listen: bool = True,
     ):
         """Join the graph and, unless `connect` is false, wait until the axes are there.
+
+        Unless `listen` is false it keeps what they say at each position instant.
 
         `remaps` are the names that the axes' node was given others for, as in "joint_states:=/states".
 
@@ -86,7 +89,7 @@ class Drive:
         if domain_id is None and process is not None:
             domain_id = process.domain_id
         self._changed = threading.Condition()
-        self._samples: dict[str, list[bytes]] = {"joints": [], "currents": [], "states": []}
+        self._samples: dict[str, list[bytes]] = {key: [] for key in ("joints", "currents", "states") if listen}
         self._results: list[TrajectoryResult] = []
         self._diagnostics: list[DiagnosticArray] = []
         self._sent = 0
@@ -114,6 +117,7 @@ class Drive:
                 ("currents", MotorCurrents, f"{self.target}/motor_currents"),
                 ("states", DriveStates, f"{self.target}/drive_states"),
             )
+            if listen
         ]
         self._subscriptions.append(
             self.node.create_subscription(

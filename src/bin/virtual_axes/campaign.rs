@@ -1,7 +1,7 @@
 //! `virtual_axes psec campaign`: the set-points that an axis is identified from.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
@@ -11,6 +11,7 @@ use virtual_axes::identify::campaign::{Campaign, Options, Run};
 use virtual_axes::report::{Column, Table};
 
 use crate::axis::{self, Units};
+use crate::input::must_not_replace;
 use crate::{interrupt, table, variant};
 
 /// Which axis, and where to.
@@ -73,6 +74,7 @@ fn range(text: &str) -> Result<[f64; 2], String> {
 
 /// Writes them; tells what to set when.
 pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+    must_not_replace(&arguments.out, Path::new(&arguments.machine))?;
     let machine = Parameters::load(&arguments.machine)?;
     let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
     let config = parameters.machine_config()?;

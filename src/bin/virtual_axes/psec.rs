@@ -1,14 +1,14 @@
 //! `virtual_axes psec`: set-points as a file.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
 use virtual_axes::files::psec_writer;
 use virtual_axes::simulation::joints;
 use virtual_axes::trial::Setpoints;
 
-use crate::input::Input;
+use crate::input::{Input, must_not_replace};
 use crate::{campaign, interrupt, variant};
 
 /// Those of a scenario, or a campaign.
@@ -63,6 +63,7 @@ fn of_scenario(arguments: &OfScenario) -> Result<String, Box<dyn Error>> {
     let config = variant::parameters(&machine, None, &arguments.set, &[])?.machine_config()?;
     let input = Input::open(&arguments.scenario, None)?;
     input.must_not_be(&arguments.out)?;
+    must_not_replace(&arguments.out, Path::new(&arguments.machine))?;
     let program = input.program(&config, arguments.feed)?;
     let Setpoints::Grid(mut source) = input.setpoints(&config, program.as_ref())? else {
         return Err(format!("{}: trajectories already; psec wants a scenario", arguments.scenario).into());

@@ -84,6 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let input = arguments.subject.input()?;
     for output in [&arguments.trace, &arguments.report].into_iter().flatten() {
         input.must_not_be(output)?;
+        arguments.subject.machine_must_not_be(output)?;
     }
     if let (Some(trace), Some(report)) = (&arguments.trace, &arguments.report)
         && trace == report

@@ -1,10 +1,11 @@
 //! What the commands that run something are given: set-points and a machine.
 
 use std::error::Error;
+use std::path::Path;
 
 use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
 
-use crate::input::Input;
+use crate::input::{Input, must_not_replace};
 use crate::variant;
 
 /// A machine as a command is given it.
@@ -22,6 +23,11 @@ impl MachineChoice {
     /// As the user named it.
     pub fn name(&self) -> &str {
         &self.machine
+    }
+
+    /// Refuses to write where it is read from.
+    pub fn must_not_be(&self, output: &Path) -> Result<(), String> {
+        must_not_replace(output, Path::new(&self.machine))
     }
 
     /// The machine file, with what `--set` says.
@@ -55,6 +61,11 @@ impl Subject {
     /// The machine file, without what `--set` says.
     pub fn machine(&self) -> Result<Parameters, Box<dyn Error>> {
         Ok(Parameters::load(&self.machine)?)
+    }
+
+    /// Refuses to write where the machine is read from.
+    pub fn machine_must_not_be(&self, output: &Path) -> Result<(), String> {
+        must_not_replace(output, Path::new(&self.machine))
     }
 
     /// The set-points.

@@ -10,7 +10,7 @@ use virtual_axes::tune::{
 };
 use virtual_axes::units::MILLISECOND;
 
-use crate::input::Input;
+use crate::input::{Input, must_not_replace};
 use crate::progress::Runs;
 use crate::run::Run;
 use crate::search::{course, named};
@@ -186,9 +186,8 @@ fn limits(arguments: &Arguments) -> MarginLimits {
 fn check_outputs(arguments: &Arguments, input: &Input) -> Result<(), Box<dyn Error>> {
     for output in [&arguments.out, &arguments.report].into_iter().flatten() {
         input.must_not_be(output)?;
-        if Path::new(&arguments.subject.machine) == output {
-            return Err(format!("{}: the output would replace the machine file", output.display()).into());
-        }
+        arguments.subject.machine_must_not_be(output)?;
+        arguments.also.iter().try_for_each(|path| must_not_replace(output, Path::new(path)))?;
     }
     if let (Some(out), Some(report)) = (&arguments.out, &arguments.report)
         && out == report

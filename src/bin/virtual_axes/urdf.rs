@@ -29,6 +29,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let text =
         urdf(&config, &arguments.joint_prefix).map_err(|error| format!("{}: {error}", machine.name()))?;
     let Some(path) = &arguments.out else { return Ok(text) };
+    machine.must_not_be(path)?;
     let mut file = OutputFile::create(path)?;
     file.write_all(text.as_bytes())?;
     file.finish()?;

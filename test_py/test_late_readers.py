@@ -1,0 +1,72 @@
+"""Readers that come when a topic has been written for long: what a reader costs the node does not grow with that."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState
+
+from action import in_executor
+from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, stamp_of
+
+TOPIC = "/joint_states"
+MANY = 1 << 19
+"""Samples after which a topic gets another writer (src/ros/writers.rs)."""
+MORE = 5_000
+BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+LATE = 3
+MAY_GROW_MB = 1.5
+"""By each late reader: half a million numbers are some ten times that."""
+
+
+def own_mb(pid: int) -> float:
+    """Memory of its own, MB."""
+    return next(int(line.split()[1]) for line in Path(f"/proc/{pid}/status").open() if line.startswith("RssAnon")) / 1e3
+
+
+def test_a_late_reader_costs_no_more_after_half_a_million_samples():
+    """The topic has another writer by then; who listens meanwhile misses nothing, gets nothing twice, and in order."""
+    with Node(["-p", "time:=fast"]) as process, Drive(process=process, listen=False) as drive:
+
+        def listen(qos: QoSProfile, stamps: list[int]) -> Subscription:
+            def keep(sample: bytes) -> None:
+                stamps.append(stamp_of(sample))
+
+            return in_executor(drive, lambda: drive.node.create_subscription(JointState, TOPIC, keep, qos, raw=True))
+
+        def writers() -> set[bytes]:
+            return {bytes(info.endpoint_gid) for info in drive.node.get_publishers_info_by_topic(TOPIC)}
+
+        early: list[int] = []
+        listen(BEST_EFFORT, early)
+        drive.wait_for(lambda: early, 10, "first sample")
+        first = drive.wait_for(writers, 10, "publisher")
+
+        def write_many(target: float) -> None:
+            # Nobody acknowledges, so that the axes wait for nobody.
+            duration = (MANY + MORE) * TSP_NS / 1e9
+            accepted = drive.accept(joint_trajectory(["x"], [duration], [target], [[0.0]]))
+            drive.end(accepted.sequence_number, 200)
+
+        write_many(0.05)
+        reliable: list[int] = []
+        subscription = listen(DEEP_QOS, reliable)
+        drive.wait_for(lambda: len(writers()) == 1 and writers() != first, 90, "another publisher alone")
+        drive.wait_for(lambda: len(reliable) > 1000, 30, "samples")
+        assert set(np.diff(reliable)) == {TSP_NS}
+        second = writers()
+
+        before = own_mb(process.pid)
+        late: list[list[int]] = [[] for _ in range(LATE)]
+        for stamps in late:
+            listen(BEST_EFFORT, stamps)
+        drive.wait_for(lambda: all(late), 20, "samples of the late readers")
+        assert own_mb(process.pid) - before < LATE * MAY_GROW_MB
+
+        # Whoever was told that the first has gone hears of the next one.
+        in_executor(drive, lambda: drive.node.destroy_subscription(subscription))
+        write_many(0.0)
+        drive.wait_for(lambda: writers() - second, 20, "next publisher")
