@@ -324,6 +324,26 @@ fn repeated_and_overtaken_stamps_are_dropped_and_sorted() {
 }
 
 #[test]
+fn rows_that_stand_more_than_once_are_dropped_however_many_they_are() {
+    let wanted = recording();
+    for (every, times) in [(5, 1), (2, 1), (1, 1), (1, 3)] {
+        let mut raw = wanted.clone();
+        let rows =
+            (0..SAMPLES).flat_map(|n| std::iter::repeat_n(n, if n % every == 0 { 1 + times } else { 1 }));
+        let rows: Vec<usize> = rows.collect();
+        raw.time = rows.iter().map(|&n| wanted.time[n]).collect();
+        for channel in channels(&mut raw).into_iter().flatten() {
+            *channel = rows.iter().map(|&n| channel[n]).collect();
+        }
+        let (signals, findings) = run(&raw);
+        assert_eq!(codes(&findings), ["duplicate-stamps"], "{times} more of each {every}th: {findings:?}");
+        assert_eq!(signals.period, run(&wanted).0.period);
+        assert_eq!(Some(&signals.spans[0].position), wanted.position.as_ref());
+        assert_eq!(signals.spans[0].current, wanted.current);
+    }
+}
+
+#[test]
 fn two_runs_in_one_file_are_two_spans() {
     let mut raw = recording();
     let half: Vec<f64> = raw.time[..SAMPLES / 2].to_vec();

@@ -2,7 +2,7 @@
 
 use super::filter::{Filtered, Gaussian, MAX_CUTOFF_PERIOD, default_cutoff, deviation};
 use super::lag::{self, HIGHEST_LAG, LOWEST_LAG};
-use super::order::ordered;
+use super::order::{drop_copies, ordered};
 use super::spans::{
     CHANNELS, CURRENT, NAMES, POSITION, PSEC, Piece, TORQUE_FEEDFORWARD, VELOCITY, VELOCITY_FEEDFORWARD,
     channels, columns, pieces, stamped_smoother,
@@ -98,8 +98,9 @@ pub fn condition(
 ) -> Result<(Signals, Vec<Finding>), RecordingFault> {
     let mut findings = Vec::new();
     check_lengths(raw)?;
-    let ordered = ordered(raw, &mut findings)?;
+    let mut ordered = ordered(raw, &mut findings)?;
     let mut columns = columns(raw, &mut findings);
+    drop_copies(&mut ordered, &raw.name, columns.iter().flatten(), &mut findings);
     drop_constant_current(&raw.name, &mut columns, &mut findings);
     let Some(position) = &columns[POSITION] else {
         return Err(RecordingFault::NoPosition { name: raw.name.clone() });

@@ -60,6 +60,34 @@ pub(super) fn ordered(raw: &RawRecording, findings: &mut Vec<Finding>) -> Result
     Ok(ordered)
 }
 
+/// Leaves out rows that stand more than once: with the stamp and all values of the row before.
+///
+/// Where a stamp is repeated with other values the clock of the logger is coarser than its sampling, and such a recording
+/// has equal rows only while nothing changes: then they stay.
+pub(super) fn drop_copies<'a>(
+    ordered: &mut Ordered,
+    name: &str,
+    columns: impl Iterator<Item = &'a Vec<f64>> + Clone,
+    findings: &mut Vec<Finding>,
+) {
+    let is_repeated = |n: usize| ordered.stamps[n] == ordered.stamps[n - 1];
+    let is_copy = |n: usize| {
+        let (row, before) = (ordered.rows[n], ordered.rows[n - 1]);
+        columns.clone().all(|values| values[row].to_bits() == values[before].to_bits())
+    };
+    let repeated: Vec<usize> = (1..ordered.stamps.len()).filter(|&n| is_repeated(n)).collect();
+    if repeated.is_empty() || !repeated.iter().all(|&n| is_copy(n)) {
+        return;
+    }
+    let mut copies = repeated.iter().copied().peekable();
+    let keep: Vec<usize> = (0..ordered.stamps.len()).filter(|&n| copies.next_if_eq(&n).is_none()).collect();
+    ordered.rows = keep.iter().map(|&n| ordered.rows[n]).collect();
+    ordered.stamps = keep.iter().map(|&n| ordered.stamps[n]).collect();
+    let what =
+        format!("{name}: {} samples that are repeated, stamp and values, are left out", repeated.len());
+    findings.push(Finding::note("duplicate-stamps", what));
+}
+
 /// Stamps that step back by less than a period are late stamps that jitter: the file has the order.
 fn hold_jitter(stamps: &mut [f64]) {
     let period = period(stamps);
