@@ -17,6 +17,8 @@ pub struct ContourTracker {
     ring: Box<[f64]>,
     count: u64,
     nearest: u64,
+    /// The first of the set-points that are where the newest is.
+    still: u64,
 }
 
 impl ContourTracker {
@@ -27,6 +29,7 @@ impl ContourTracker {
             ring: vec![0.0; dimension * CAPACITY].into_boxed_slice(),
             count: 0,
             nearest: 0,
+            still: 0,
         }
     }
 
@@ -35,6 +38,9 @@ impl ContourTracker {
         let start = (self.count % CAPACITY as u64) as usize * self.dimension;
         for (place, value) in self.ring[start..start + self.dimension].iter_mut().zip(point) {
             *place = value;
+        }
+        if self.count > 0 && self.point(self.count) != self.point(self.count - 1) {
+            self.still = self.count;
         }
         self.count += 1;
     }
@@ -64,7 +70,8 @@ impl ContourTracker {
         let from = self.nearest.saturating_sub(LOOK_BACK).max(oldest);
         let mut best = foot_on_segment(position, self.point(from), self.point(from));
         self.nearest = from;
-        for k in from..self.count - 1 {
+        // Segments of no length behind the first one of them come no nearer.
+        for k in from..(self.count - 1).min(self.still + 1) {
             let foot = foot_on_segment(position, self.point(k), self.point(k + 1));
             if foot.square_distance < best.square_distance {
                 best = foot;
@@ -112,6 +119,25 @@ mod tests {
         // 0.3 from the first leg, 0.1 from the second.
         assert!((contour.distance(&[0.9, 0.3]) - 0.1).abs() < 1e-15);
         assert!((contour.distance(&[1.0, 1.25]) - 0.25).abs() < 1e-15);
+    }
+
+    #[test]
+    fn set_points_that_stand_still_are_one_place() {
+        let mut contour = ContourTracker::new(1);
+        for k in 0..=20 {
+            contour.push(std::iter::once(f64::from(k)));
+        }
+        for behind in 0..2 * CAPACITY {
+            contour.push(std::iter::once(20.0));
+            // Swung back, past the end, and away from it as long as the way there is remembered.
+            assert_eq!(contour.distance(&[20.0]), 0.0);
+            assert_eq!(contour.distance(&[23.0]), 3.0);
+            let on_the_way = behind + 20 < CAPACITY - 1;
+            if on_the_way {
+                assert_eq!(contour.distance(&[12.5]), 0.0, "{behind} behind");
+            }
+        }
+        assert_eq!(contour.distance(&[12.5]), 7.5);
     }
 
     #[test]
