@@ -28,7 +28,7 @@ import numpy as np
 import rclpy
 from builtin_interfaces.msg import Duration
 from rcl_interfaces.srv import GetParameters
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
 from rclpy.executors import ExternalShutdownException
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
@@ -179,7 +179,7 @@ def spin(node: Any) -> None:
 
     def run() -> None:
         # What rclpy says at its end depends on where it meets it.
-        with contextlib.suppress(ExternalShutdownException, RCLError):
+        with contextlib.suppress(ExternalShutdownException, InvalidHandle, RCLError):
             rclpy.spin(node)
 
     threading.Thread(target=run, name=SPINS, daemon=True).start()

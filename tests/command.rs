@@ -46,6 +46,8 @@ fn machines_and_parameters_are_listed() {
     let machines = run(&["machines"]);
     let text = String::from_utf8_lossy(&machines.stdout);
     assert!(text.starts_with("mikron_ucp710: Mikron UCP 710\n"), "{text}");
+    let file = run(&["machines", "--show", "linear_motor_center"]).stdout;
+    assert_eq!(String::from_utf8_lossy(&file), include_str!("../config/linear_motor_center.yaml"));
     let table = run(&["parameters", "--markdown"]);
     let text = String::from_utf8_lossy(&table.stdout);
     assert!(text.contains("| `<joint>.motor.inertia_kg_m2` | 1e-9 … 1e3 kg·m² |"), "{text}");

@@ -42,6 +42,11 @@ pub struct Overlay {
     pub skipped: Vec<String>,
 }
 
+/// The names of the shipped machines, with commas.
+fn shipped() -> String {
+    Parameters::builtin_names().collect::<Vec<_>>().join(", ")
+}
+
 impl Parameters {
     /// The machine that runs when none is given, the Mikron UCP 710.
     ///
@@ -63,13 +68,19 @@ impl Parameters {
     ///
     /// [`ConfigError::UnknownMachine`].
     pub fn builtin(name: &str) -> Result<Self, ConfigError> {
-        match BUILTIN.iter().find(|(known, _)| *known == name) {
-            Some((_, text)) => Self::from_yaml(text, &format!("{name}.yaml")),
-            None => Err(ConfigError::UnknownMachine {
-                name: shortened(name),
-                known: Self::builtin_names().collect::<Vec<_>>().join(", "),
-            }),
-        }
+        Self::from_yaml(Self::builtin_text(name)?, &format!("{name}.yaml"))
+    }
+
+    /// The file of a shipped machine.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError::UnknownMachine`].
+    pub fn builtin_text(name: &str) -> Result<&'static str, ConfigError> {
+        let found = BUILTIN.iter().find(|(known, _)| *known == name);
+        found
+            .map(|(_, text)| *text)
+            .ok_or_else(|| ConfigError::UnknownMachine { name: shortened(name), known: shipped() })
     }
 
     /// A machine file's content, complete in itself; `source` is its name in messages.
@@ -102,10 +113,17 @@ impl Parameters {
     /// Any [`ConfigError`].
     pub fn load(machine: &str) -> Result<Self, ConfigError> {
         if Self::builtin_names().any(|name| name == machine) {
-            Self::builtin(machine)
-        } else {
-            Self::from_file(machine)
+            return Self::builtin(machine);
         }
+        Self::from_file(machine).map_err(|error| match error {
+            ConfigError::Unreadable { path, reason } if !Path::new(machine).exists() => {
+                ConfigError::Unreadable {
+                    path,
+                    reason: format!("{reason}; machines that are shipped: {}", shipped()),
+                }
+            }
+            other => other,
+        })
     }
 
     /// Sets what a ROS 2 parameter file holds for the node `node` (fully qualified, `/ns/name`;

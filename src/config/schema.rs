@@ -178,10 +178,10 @@ const MACHINE: &[Definition] = &[
         .is("umax, limit of the motor voltage."),
     Definition::number("motor.max_speed_rpm", "rpm", 1e-6, 1e6)
         .driven_by(RotatingMotor)
-        .is("Maximum motor speed, limit of the velocity set-point."),
+        .is("Maximum motor speed, limit of what the position controller asks for; velocity feedforward is added behind it."),
     Definition::number("motor.max_speed_m_min", "m/min", 1e-6, 1e5)
         .driven_by(LinearMotor)
-        .is("Maximum motor speed, limit of the velocity set-point."),
+        .is("Maximum motor speed, limit of what the position controller asks for; velocity feedforward is added behind it."),
     // Friction.
     friction_current("friction.a")
         .is("Amplitude a of the friction law a·exp(b·V) + c·exp(d·V) (Prévost eq. 3)."),

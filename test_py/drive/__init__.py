@@ -3,7 +3,8 @@
     with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
         path = ballbar()
         recording = drive.run(joint_trajectory(["x", "y"], path.time, np.column_stack([path.x, path.y])))
-        print(recording.radial_deviation(path.centre, path.radius)[recording.within(path.steady)].mean())
+        deviation = recording.radial_deviation(path.centre, path.radius)[recording.within(path.steady)]
+        print(f"{deviation.mean() * 1e6:.1f} µm")
 
 `trajectories` makes set-points, `client` sends them and keeps what comes back, `recording` makes arrays of it, and
 `process` starts a node of one's own.

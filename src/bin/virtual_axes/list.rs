@@ -24,6 +24,11 @@ pub fn machines(as_json: bool) -> Result<String, Box<dyn Error>> {
     Ok(list.iter().map(|(name, title, _)| format!("{name}: {title}\n")).collect())
 }
 
+/// The file of a shipped machine.
+pub fn machine(name: &str) -> Result<String, Box<dyn Error>> {
+    Ok(Parameters::builtin_text(name)?.to_owned())
+}
+
 /// The shipped scenarios, one a line.
 pub fn scenarios(as_json: bool) -> Result<String, Box<dyn Error>> {
     let list: Vec<Scenario> = Scenario::builtin_names().map(Scenario::builtin).collect::<Result<_, _>>()?;

@@ -79,6 +79,9 @@ enum Command {
         /// As a JSON list.
         #[arg(long)]
         json: bool,
+        /// Print the file of this one, to begin another from.
+        #[arg(long, value_name = "MACHINE", conflicts_with = "json")]
+        show: Option<String>,
     },
     /// List the scenarios that come with the program.
     Scenarios {
@@ -139,7 +142,8 @@ fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Check(arguments) => check::run(arguments),
         Command::Urdf(arguments) => urdf::run(arguments),
         Command::Pose(arguments) => pose::run(arguments),
-        Command::Machines { json } => list::machines(*json),
+        Command::Machines { show: Some(name), .. } => list::machine(name),
+        Command::Machines { json, show: None } => list::machines(*json),
         Command::Scenarios { show: Some(name), .. } => list::scenario(name),
         Command::Scenarios { json, show: None } => list::scenarios(*json),
         Command::Parameters { markdown: true } => Ok(listing::markdown()),

@@ -102,6 +102,12 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
     for source in args.parameters() {
         match source {
             ParameterSource::Value { name, text, .. } => {
+                if name == "machine" && Parameters::builtin_names().any(|shipped| shipped == text) {
+                    tracing::warn!(
+                        "-p machine:={text} gives the machine a name and changes no drive; its file does, with \
+                         --params-file (`virtual_axes machines --show {text}` prints it)"
+                    );
+                }
                 together.push(parse_assignment(&format!("{name}:={text}"), &Source::named("-p"))?);
             }
             ParameterSource::File(path) => {
