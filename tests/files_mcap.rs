@@ -226,6 +226,24 @@ fn a_refusal_names_an_encoding_and_topics_in_one_line() {
 }
 
 #[test]
+fn a_refusal_names_schemas_that_differ_in_one_line() {
+    let refusal = error(include_bytes!("../fuzz/seeds/psec_mcap/schemas_that_differ"), None);
+    assert!(refusal.starts_with("r.mcap: not a whole MCAP recording: Schema"), "{refusal}");
+    assert!(!refusal.contains(char::is_control), "{refusal:?}");
+}
+
+#[test]
+fn a_file_whose_chunk_is_damaged_is_said_not_to_be_whole() {
+    let mut bytes =
+        record(&[("/psec", TYPE, 1, trajectory(0.5, false))], options(Some(mcap::Compression::Lz4)));
+    // Of the frame in the first chunk, behind its heads.
+    let frame = bytes.windows(4).position(|w| w == [0x04, 0x22, 0x4d, 0x18]).expect("an LZ4 frame");
+    bytes[frame + 12..frame + 40].fill(0xff);
+    let refusal = error(&bytes, None);
+    assert!(refusal.starts_with("r.mcap: not a whole MCAP recording: "), "{refusal}");
+}
+
+#[test]
 fn a_file_that_is_cut_off_or_no_recording_is_said() {
     let bytes = record(&[("/psec", TYPE, 1, trajectory(0.5, false))], options(None));
     for length in [0, 5, 40, bytes.len() / 2, bytes.len() - 1] {

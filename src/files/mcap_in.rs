@@ -171,7 +171,10 @@ pub(super) fn unreadable(name: &str, error: &io::Error) -> McapFault {
 /// What the reader says, with what stands behind it.
 pub(super) fn damaged(name: &str, error: &McapError) -> McapFault {
     let reason = match error {
-        McapError::Io(error) => return unreadable(name, error),
+        McapError::Io(error) if error.raw_os_error().is_some() => return unreadable(name, error),
+        McapError::Io(error) => {
+            format!("what is compressed cannot be read: {}", shortened(&error.to_string()))
+        }
         McapError::UnexpectedEof => {
             "it ends in the middle of a record (`mcap recover` saves what there is)".to_owned()
         }
@@ -179,7 +182,7 @@ pub(super) fn damaged(name: &str, error: &McapError) -> McapFault {
             format!("a record cannot be read: {}", shortened(&error.to_string()))
         }
         McapError::BadMagic => "it does not begin and end as MCAP does".to_owned(),
-        error => error.to_string(),
+        error => shortened(&error.to_string()),
     };
     McapFault::Damaged { at: name.to_owned(), reason }
 }
