@@ -14,8 +14,8 @@ const QOS: QosConfig = QosConfig { reliable: true, transient_local: false, depth
 const MESSAGE: u64 = 31;
 /// What may be kept free for a message beside its record: its place in an index (16 bytes), the head of its chunk and
 /// zstd's frame (53 + 128), three indexes of messages (3 × 15), the chunk's index (107) and its offset in the
-/// summary (26).
-const OVERHEAD: u64 = 16 + 53 + 128 + 3 * 15 + 107 + 26;
+/// summary (26), and the counts of three channels in the statistics (3 × 10).
+const OVERHEAD: u64 = 16 + 53 + 128 + 3 * 15 + 107 + 26 + 3 * 10;
 
 fn topics() -> Vec<RecordedTopic> {
     let schemas = [Schema::joint_state(), Schema::motor_currents(), Schema::diagnostic_array()];

@@ -100,6 +100,8 @@ pub struct BoundedRecording<W: Write> {
     open: u64,
     /// Messages in the open chunk.
     messages: u64,
+    /// Which topics they are of.
+    present: Vec<bool>,
     /// Bytes of the summary so far.
     summary: u64,
 }
@@ -129,6 +131,7 @@ impl<W: Write> BoundedRecording<W> {
         let statistics = STATISTICS + PER_CHANNEL * topics.len() as u64;
         let mut begun = BoundedRecording {
             recording,
+            present: vec![false; handles.len()],
             topics: handles,
             bound,
             count,
@@ -161,16 +164,12 @@ impl<W: Write> BoundedRecording<W> {
         self.whole
     }
 
-    /// The index of a chunk in the summary.
-    fn chunk_index(&self) -> u64 {
-        CHUNK_INDEX + PER_CHANNEL * self.topics.len() as u64
-    }
-
     /// The longest that the file can be if it is finished now.
     fn longest(&self) -> u64 {
         let chunk = CHUNK_HEAD + self.open + self.open / COMPRESSED_SHARE + COMPRESSED_FRAME;
         let index = MESSAGE_INDEX * self.topics.len() as u64 + MESSAGE_INDEX_ENTRY * self.messages;
-        self.written() + chunk + index + self.chunk_index() + self.summary
+        let chunk_index = CHUNK_INDEX + PER_CHANNEL * self.topics.len() as u64;
+        self.written() + chunk + index + chunk_index + self.summary
     }
 
     /// Whether a message of so many bytes would surely leave the file within its bound.
@@ -201,6 +200,7 @@ impl<W: Write> BoundedRecording<W> {
         self.recording.write_bytes(handle, log, publish, cdr)?;
         self.open += MESSAGE + length;
         self.messages += 1;
+        self.present[topic] = true;
         if self.open >= CHUNK {
             self.flush()?;
         }
@@ -217,7 +217,8 @@ impl<W: Write> BoundedRecording<W> {
         }
         self.recording.flush()?;
         (self.open, self.messages) = (0, 0);
-        self.summary += self.chunk_index();
+        let channels = self.present.iter_mut().map(std::mem::take).filter(|present| *present).count();
+        self.summary += CHUNK_INDEX + PER_CHANNEL * channels as u64;
         self.whole = self.written();
         Ok(())
     }
