@@ -5,6 +5,11 @@
 #     ./demo.sh [--fast] [--out FILE.png]
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+case ${1:-} in
+  "" | --fast | --out | --out=*) ;;
+  -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
+  *) echo "demo: no option $1: --fast, --out FILE.png or --help" >&2 && exit 2 ;;
+esac
 command -v cargo >/dev/null || { echo "demo: needs cargo, Rust's build tool (https://rustup.rs)" >&2; exit 1; }
 
 "$root/tools/setup.sh"

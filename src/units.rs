@@ -4,6 +4,7 @@
 //! (Prévost Appendix 2). The factors below are the only place where the two meet.
 
 use std::f64::consts::{PI, TAU};
+use std::fmt;
 
 /// Metres in a millimetre.
 pub const MILLIMETRE: f64 = 1e-3;
@@ -33,7 +34,45 @@ pub const MILLISECOND_NS: Nanoseconds = 1_000_000;
 /// Nanoseconds in a microsecond.
 pub const MICROSECOND_NS: Nanoseconds = 1_000;
 
+/// A value as messages tell it: with twelve significant digits at most, which leaves out what rounding adds,
+/// and with a power of ten where it is large or small.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Told(pub f64);
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Told(value) = *self;
+        let size = value.abs();
+        let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
+        match size == 0.0 || !size.is_finite() || (1e-5..1e12).contains(&size) {
+            true => write!(f, "{rounded}"),
+            false => write!(f, "{rounded:e}"),
+        }
+    }
+}
+
 /// Seconds in `ns` nanoseconds.
 pub fn seconds(ns: Nanoseconds) -> f64 {
     ns as f64 / SECOND_NS as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_told_without_what_rounding_adds() {
+        for (value, told) in [
+            (1000.0000000000001, "1000"),
+            (0.1 + 0.2, "0.3"),
+            (-0.355_000_000_1, "-0.3550000001"),
+            (2e-7, "2e-7"),
+            (1e300, "1e300"),
+            (0.0, "0"),
+            (f64::NAN, "NaN"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(Told(value).to_string(), told);
+        }
+    }
 }

@@ -22,6 +22,15 @@ fail() {
   exit 1
 }
 
+browser=false
+for argument in "$@"; do
+  case $argument in
+    --browser) browser=true ;;
+    -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
+    *) fail "no option $argument: --browser or --help" ;;
+  esac
+done
+
 # Runs a step with its output in a log; shows the log's end when the step fails.
 step() {
   local title=$1 log=$logs/$2.log began=$SECONDS
@@ -157,4 +166,4 @@ if ! is_done "$messages_stamp" "$messages_hash"; then
   step "messages into .build" messages make_messages
   echo "$messages_hash" >"$messages_stamp"
 fi
-if [ "${1:-}" = --browser ]; then install_browser; fi
+if $browser; then install_browser; fi

@@ -5,6 +5,9 @@
 
 use crate::units::Nanoseconds;
 
+/// How far an axis may overshoot its stroke before that is said, m or rad.
+const OVERSHOOT: f64 = 1e-3;
+
 /// One machine: its axes and its sampling periods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MachineConfig {
@@ -233,6 +236,13 @@ pub struct LimitsConfig {
     pub stroke_min: f64,
     /// Upper end of the stroke, m or rad; +∞ where there is none.
     pub stroke_max: f64,
+}
+
+impl LimitsConfig {
+    /// Whether an axis at `position`, m or rad, has left its stroke by more than it may overshoot: 1 mm or 1 mrad.
+    pub fn is_left_by(&self, position: f64) -> bool {
+        !(self.stroke_min - OVERSHOOT..=self.stroke_max + OVERSHOOT).contains(&position)
+    }
 }
 
 impl MachineConfig {

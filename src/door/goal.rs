@@ -8,7 +8,7 @@ use crate::messages::builtin_interfaces::msg::Duration;
 use crate::messages::{FollowJointTrajectoryGoal, JointTolerance};
 use crate::simulation::{Tolerance, Tolerances};
 use crate::trajectory::{Code, JointLimits, Rejection, Trajectory};
-use crate::units::{Nanoseconds, SECOND_NS};
+use crate::units::{Nanoseconds, SECOND_NS, Told};
 
 /// "No tolerance" in a goal.
 const NONE: f64 = -1.0;
@@ -84,7 +84,8 @@ fn tolerances(
                 NONE => Ok(None),
                 value if value > 0.0 && value.is_finite() => Ok(Some(value)),
                 value => {
-                    let text = format!("{what} is {value}; it must be positive, 0 (default) or -1 (none)");
+                    let told = Told(value);
+                    let text = format!("{what} is {told}; it must be positive, 0 (default) or -1 (none)");
                     Err(wrong(text).numbers(value, 0.0))
                 }
             };

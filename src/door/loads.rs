@@ -3,6 +3,7 @@
 use crate::config::shortened;
 use crate::messages::sensor_msgs::msg::JointState;
 use crate::simulation::MAX_LOAD;
+use crate::units::Told;
 
 /// The loads of a message: place of the axis in `joints` and load, N or N·m.
 ///
@@ -28,7 +29,7 @@ pub fn loads(message: &JointState, joints: &[String]) -> Result<Vec<(usize, f64)
                 return Err(format!("joint {name} is named twice"));
             }
             if load.is_nan() || load.abs() > MAX_LOAD {
-                return Err(format!("joint {name}: effort is {load}, must lie in ±{MAX_LOAD}"));
+                return Err(format!("joint {name}: effort is {}, must lie in ±{MAX_LOAD}", Told(load)));
             }
             Ok((place, load))
         })

@@ -4,6 +4,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::units::Told;
+
 /// Which derivative of a set-point a limit is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
@@ -13,6 +15,17 @@ pub enum Quantity {
     Acceleration,
     /// m/s³ or rad/s³.
     Jerk,
+}
+
+impl Quantity {
+    /// What it is divided by.
+    fn time(self) -> &'static str {
+        match self {
+            Self::Speed => "s",
+            Self::Acceleration => "s²",
+            Self::Jerk => "s³",
+        }
+    }
 }
 
 impl fmt::Display for Quantity {
@@ -159,7 +172,7 @@ pub enum PlanError {
         found: f64,
     },
     /// A value of a move that is out of its range.
-    #[error("move {index}: {what} must be {allowed}; found {found}")]
+    #[error("move {index}: {what} must be {allowed}; found {}", Told(*found))]
     Value {
         /// From 1.
         index: usize,
@@ -171,7 +184,7 @@ pub enum PlanError {
         found: f64,
     },
     /// A move too short for its cosine ramps.
-    #[error("move {index}: its length of {length} is shorter than its two ramps need, {needed}")]
+    #[error("move {index}: its length of {} is shorter than its two ramps need, {}", Told(*length), Told(*needed))]
     TooShort {
         /// From 1.
         index: usize,
@@ -181,12 +194,18 @@ pub enum PlanError {
         needed: f64,
     },
     /// A cosine move at which an axis is too fast; its law is as prescribed.
-    #[error("move {index}: {joint} would run at {found}; its largest speed is {allowed}")]
+    #[error(
+        "move {index}: {joint} would run at {} {unit}/s; its largest speed is {} {unit}/s",
+        Told(*found),
+        Told(*allowed)
+    )]
     TooFast {
         /// From 1.
         index: usize,
         /// The joint.
         joint: String,
+        /// Its unit: m or rad.
+        unit: &'static str,
         /// m/s or rad/s.
         found: f64,
         /// m/s or rad/s.
@@ -201,7 +220,14 @@ pub enum PlanError {
         found: f64,
     },
     /// Sampled set-points that exceed a limit however slow the path is passed.
-    #[error("move {index}, {time} s: {quantity} of {joint} reaches {found}; allowed is {allowed}")]
+    #[error(
+        "move {index}, {} s: {quantity} of {joint} reaches {} {unit}/{}; allowed is {} {unit}/{}",
+        Told(*time),
+        Told(*found),
+        quantity.time(),
+        Told(*allowed),
+        quantity.time()
+    )]
     Exceeds {
         /// From 1.
         index: usize,
@@ -209,6 +235,8 @@ pub enum PlanError {
         time: f64,
         /// The joint.
         joint: String,
+        /// Its unit: m or rad.
+        unit: &'static str,
         /// Which limit.
         quantity: Quantity,
         /// What was found.

@@ -75,10 +75,12 @@ pub(super) fn plan(
         let Some(worst) = &finding.worst else { return Ok(program) };
         round += 1;
         if round == MAX_ROUNDS {
+            let joint = &limits[worst.joint];
             return Err(PlanError::Exceeds {
                 index: program.spans[worst.span].block + 1,
                 time: worst.time,
-                joint: limits[worst.joint].name.clone(),
+                joint: joint.name.clone(),
+                unit: joint.unit(),
                 quantity: worst.quantity,
                 found: worst.ratio * worst.allowed,
                 allowed: worst.allowed,
@@ -138,8 +140,8 @@ fn check_cosines(path: &Path, orders: &[Order], limits: &[JointLimits]) -> Resul
                 // Written so that NaN is too fast.
                 let within = found <= allowed * (1.0 + SPEED_TOLERANCE);
                 if !within {
-                    let joint = joint.name.clone();
-                    return Err(PlanError::TooFast { index: block + 1, joint, found, allowed });
+                    let (unit, joint) = (joint.unit(), joint.name.clone());
+                    return Err(PlanError::TooFast { index: block + 1, joint, unit, found, allowed });
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! Topics of the node under their resolved names, with their QoS profiles.
 
+use std::collections::HashMap;
+
 use futures::{Stream, StreamExt, stream};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use ros2_client::{Message, MessageInfo, MessageTypeName, Node, ReadResult};
@@ -125,6 +127,8 @@ pub struct Endpoints<'a> {
     recorder: &'a mut Recorder,
     /// Whether the axes wait for slow readers.
     waits: bool,
+    /// What each topic carries so far, by its resolved name.
+    types: HashMap<String, String>,
 }
 
 impl<'a> Endpoints<'a> {
@@ -138,7 +142,7 @@ impl<'a> Endpoints<'a> {
         recorder: &'a mut Recorder,
     ) -> Self {
         let waits = parameters.node_config().time != TimeMode::Real;
-        Endpoints { node, participant, args, parameters, recorder, waits }
+        Endpoints { node, participant, args, parameters, recorder, waits, types: HashMap::new() }
     }
 
     fn configured(&self, name: &str) -> Result<QosConfig, EndpointError> {
@@ -149,14 +153,22 @@ impl<'a> Endpoints<'a> {
         })
     }
 
+    /// A topic under its resolved name, which can carry one type only.
     fn topic(
-        &self,
+        &mut self,
         name: &str,
         type_name: &MessageTypeName,
         qos: &QosPolicies,
     ) -> Result<(Topic, String), EndpointError> {
         let failed = |reason: String| EndpointError { name: name.to_owned(), reason };
         let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
+        let wanted = format!("{}/msg/{}", type_name.package_name(), type_name.type_name());
+        let carried = self.types.entry(resolved.clone()).or_insert_with(|| wanted.clone());
+        if *carried != wanted {
+            return Err(failed(format!(
+                "it is remapped to {resolved}, which carries {carried}, not {wanted}"
+            )));
+        }
         let topic = self
             .participant
             .create_topic(topic_of(&resolved), type_name.dds_msg_type(), qos, TopicKind::NoKey)

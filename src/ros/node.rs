@@ -143,13 +143,12 @@ async fn serve(
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
     let rosout_publisher = rosout::publisher(&mut node, args, &mut recorder)?;
-    let mut topics =
-        Topics::create(Endpoints::new(&mut node, &dds, args, &parameters, &mut recorder), args, mode)?;
+    let mut endpoints = Endpoints::new(&mut node, &dds, args, &parameters, &mut recorder);
+    let mut topics = Topics::create(&mut endpoints, args, mode)?;
+    let tool = ToolTopics::create(&mut endpoints, Kinematics::new(&config))?;
+    topics.names.also_publishes(tool.as_ref().map_or(&[], |tool| &tool.names));
     let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
     topics.names.goals_on.push(action_topics.name);
-    let endpoints = Endpoints::new(&mut node, &dds, args, &parameters, &mut recorder);
-    let tool = ToolTopics::create(endpoints, Kinematics::new(&config))?;
-    topics.names.also_publishes(tool.as_ref().map_or(&[], |tool| &tool.names));
     let reset = Trigger::new(&mut node, &context, args, "reset")?;
     let stop = Trigger::new(&mut node, &context, args, "stop")?;
     let parameter_services = ParameterServices::new(&mut node, &context, args)?;

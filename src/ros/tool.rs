@@ -43,7 +43,7 @@ impl ToolTopics {
     /// # Errors
     /// [`EndpointError`] naming the topic that the middleware refuses.
     pub fn create(
-        mut endpoints: Endpoints<'_>,
+        endpoints: &mut Endpoints<'_>,
         kinematics: Kinematics,
     ) -> Result<Option<Self>, EndpointError> {
         if !kinematics.has_linear_axis() && !kinematics.has_rotary_axis() {

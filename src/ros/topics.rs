@@ -66,7 +66,7 @@ impl Topics {
     /// # Errors
     /// [`EndpointError`] naming the topic that the middleware refuses.
     pub fn create(
-        mut endpoints: Endpoints<'_>,
+        endpoints: &mut Endpoints<'_>,
         args: &RosArgs,
         time: TimeMode,
     ) -> Result<Self, EndpointError> {

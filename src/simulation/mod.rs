@@ -25,8 +25,6 @@ use tolerance::Errors;
 
 /// Velocity below which an axis counts as standing, m/s or rad/s.
 const STANDSTILL: f64 = 1e-4;
-/// How far an axis may overshoot its stroke before that is said, m or rad.
-const OVERSHOOT: f64 = 1e-3;
 /// How long after the last motion the axes count as settling.
 const SETTLING: Nanoseconds = SECOND_NS;
 /// How far contour errors look ahead of the set-point: longer than an axis runs ahead of it.
@@ -284,8 +282,7 @@ impl Simulation {
         let (Some(sample), Some(joint)) = (self.samples.get(place), self.timeline.joints().get(place)) else {
             return false;
         };
-        let inside = joint.limits.stroke_min - OVERSHOOT..=joint.limits.stroke_max + OVERSHOOT;
-        !inside.contains(&sample.position)
+        joint.limits.is_left_by(sample.position)
     }
 
     /// Set-point of a joint `periods` instants after the next one, m or rad, by what is known now;

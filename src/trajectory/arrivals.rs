@@ -8,7 +8,7 @@
 use super::limits::{JointLimits, SPEED_TOLERANCE};
 use super::rejection::{Code, Rejection};
 use super::stream::{pause, reach};
-use crate::units::{MILLISECOND_NS, Nanoseconds, seconds};
+use crate::units::{MILLISECOND_NS, Nanoseconds, Told, seconds};
 
 /// How much earlier than it was due a set-point may come: one sample of a sender of 50 Hz that was held
 /// up and comes together with the next.
@@ -151,8 +151,12 @@ fn check_jump(limits: &JointLimits, from: f64, position: f64, allowed: f64) -> R
     }
     let (name, unit) = (&limits.name, limits.unit());
     let text = format!(
-        "{name}: {position} {unit} is {jump} {unit} away from the set-point {from} {unit} before it; \
-         the axis comes {allowed} {unit} in the time between at most"
+        "{name}: {} {unit} is {} {unit} away from the set-point {} {unit} before it; \
+         the axis comes {} {unit} in the time between at most",
+        Told(position),
+        Told(jump),
+        Told(from),
+        Told(allowed)
     );
     Err(Rejection::new(Code::Jump, text).joint(name).numbers(jump, allowed))
 }

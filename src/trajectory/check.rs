@@ -4,7 +4,7 @@ use super::limits::JointLimits;
 use super::path::{Context, Trajectory};
 use super::rejection::{Code, Rejection};
 use super::spline::{Order, Segment};
-use crate::units::{Nanoseconds, seconds};
+use crate::units::{Nanoseconds, Told, seconds};
 
 /// Instants checked per joint and trajectory, as long as each segment gets [`MIN_SHARE`].
 const BUDGET: usize = 1 << 22;
@@ -53,8 +53,9 @@ impl ColumnCheck<'_> {
         Err(Rejection::new(
             Code::VelocityAtEnd,
             format!(
-                "{name}, point {last}: the last velocity is {velocity} {unit}/s, not zero; see \
-                 allow_nonzero_velocity_at_trajectory_end"
+                "{name}, point {last}: the last velocity is {} {unit}/s, not zero; see \
+                 allow_nonzero_velocity_at_trajectory_end",
+                Told(velocity)
             ),
         )
         .joint(name)

@@ -2,6 +2,7 @@
 
 use super::rejection::{Code, Rejection};
 use crate::config::{AxisConfig, AxisKind, LimitsConfig};
+use crate::units::Told;
 
 /// Relative tolerance on speeds: rounding of set-points that sit exactly on the limit.
 pub const SPEED_TOLERANCE: f64 = 1e-9;
@@ -52,9 +53,11 @@ impl JointLimits {
         Err(Rejection::new(
             Code::OutsideStroke,
             format!(
-                "{}, point {index}: position {position} {unit} is outside the stroke \
-                 [{min}, {max}] {unit}",
-                self.name
+                "{}, point {index}: position {} {unit} is outside the stroke [{}, {}] {unit}",
+                self.name,
+                Told(position),
+                Told(min),
+                Told(max)
             ),
         )
         .joint(&self.name)
@@ -76,8 +79,10 @@ impl JointLimits {
         Err(Rejection::new(
             Code::Speed,
             format!(
-                "{}, point {index}: {what} {speed} {unit}/s is beyond the limit {limit} {unit}/s",
-                self.name
+                "{}, point {index}: {what} {} {unit}/s is beyond the limit {} {unit}/s",
+                self.name,
+                Told(speed),
+                Told(limit)
             ),
         )
         .joint(&self.name)
@@ -105,9 +110,13 @@ impl JointLimits {
         Err(Rejection::new(
             Code::Jump,
             format!(
-                "{}: starts at {first} {unit}, {jump} {unit} away from the set-point {before} \
-                 {unit} before it; the axis moves {limit} {unit} in a position period at most",
-                self.name
+                "{}: starts at {} {unit}, {} {unit} away from the set-point {} {unit} before it; the axis \
+                 moves {} {unit} in a position period at most",
+                self.name,
+                Told(first),
+                Told(jump),
+                Told(before),
+                Told(limit)
             ),
         )
         .joint(&self.name)

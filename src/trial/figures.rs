@@ -37,6 +37,8 @@ pub struct AxisFigures {
     pub moves: bool,
     /// Errors, current, saturation.
     pub report: AxisReport,
+    /// Time at which it had left its stroke at position instants, over the whole run, s.
+    pub outside_stroke_time: f64,
     /// Whether the friction law was used beyond the velocities that it was fitted for.
     pub friction_extrapolated: bool,
 }

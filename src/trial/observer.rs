@@ -64,6 +64,8 @@ pub(super) struct Observer<'a> {
     axes: Vec<AxisAssessor>,
     moves: Vec<bool>,
     extrapolated: Vec<bool>,
+    /// Position instants at which an axis had left its stroke.
+    outside: Vec<u64>,
     start: Vec<f64>,
     /// Room for set-points to come.
     ahead: Vec<f64>,
@@ -100,6 +102,7 @@ impl<'a> Observer<'a> {
             axes: vec![AxisAssessor::default(); count],
             moves: vec![false; count],
             extrapolated: vec![false; count],
+            outside: vec![0; count],
             start: start.to_vec(),
             ahead: start.to_vec(),
             looked_ahead: false,
@@ -123,6 +126,8 @@ impl<'a> Observer<'a> {
             let (sample, activity) = (machine.axis(at).sample(), machine.activity(at));
             self.moves[place] |= sample.psec != self.start[place];
             self.extrapolated[place] |= activity.friction_extrapolated;
+            let limits = &self.trial.machine.axes()[place].limits;
+            self.outside[place] += u64::from(limits.is_left_by(sample.position));
             if period.moving {
                 self.axes[place].observe(sample, &activity);
             }
@@ -196,6 +201,7 @@ impl<'a> Observer<'a> {
             kind: axis.kind(),
             moves: self.moves[place],
             report: self.axes[place].report(self.tick),
+            outside_stroke_time: self.outside[place] as f64 * seconds(machine.periods().position),
             friction_extrapolated: self.extrapolated[place],
         });
         let reference = match self.tracker {

@@ -106,6 +106,12 @@ struct Told<'a> {
     units: Units,
 }
 
+/// To two decimals, or two digits of what is slower.
+fn told_speed(speed: f64) -> String {
+    let decimals = (1.0 - speed.log10().floor()).clamp(2.0, 12.0) as usize;
+    format!("{speed:.decimals$}")
+}
+
 impl Told<'_> {
     fn settings(&self, run: &Run) -> Vec<String> {
         let assignments = run.part.assignments(self.parameters, self.axis);
@@ -124,7 +130,7 @@ impl Told<'_> {
         let rows = self.campaign.runs().iter().map(|run| {
             let [from, to] = self.campaign.times(run);
             let speeds: Vec<String> =
-                run.speeds.iter().map(|speed| format!("{:.2}", speed / self.units.speed)).collect();
+                run.speeds.iter().map(|speed| told_speed(speed / self.units.speed)).collect();
             let times = [from, to, to - from].map(|time| format!("{time:.3}"));
             [vec![run.part.name().to_owned()], times.to_vec(), vec![speeds.join(" ")]].concat()
         });

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
 use virtual_axes::files::{self, FileKind};
 use virtual_axes::machine::MachineParameters;
+use virtual_axes::scenario::Scenario;
 use virtual_axes::trial::Trial;
 
 use crate::input::Input;
@@ -27,7 +28,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let name = arguments.file.to_string_lossy();
     let is_machine = match arguments.file.exists() {
         true => files::Input::open(&arguments.file)?.kind() == FileKind::Machine,
-        false => Parameters::builtin_names().any(|known| known == name),
+        false => is_shipped_machine(&name)?,
     };
     if is_machine {
         let config = Parameters::load(&name)?.machine_config()?;
@@ -49,6 +50,21 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let outcome = virtual_axes::trial::run(&trial, setpoints, |_| interrupt::check())
         .map_err(|error| crate::run::named(&input, error))?;
     Ok(format!("{kind} for {}: {:.3} s\nvalid\n", config.name(), outcome.figures.duration))
+}
+
+/// Whether it is a shipped machine, and not a shipped scenario.
+fn is_shipped_machine(name: &str) -> Result<bool, String> {
+    let machines: Vec<&str> = Parameters::builtin_names().collect();
+    let scenarios: Vec<&str> = Scenario::builtin_names().collect();
+    let machine = machines.contains(&name);
+    match machine || scenarios.contains(&name) {
+        true => Ok(machine),
+        false => Err(format!(
+            "{name}: no such file, and neither a shipped machine ({}) nor a shipped scenario ({})",
+            machines.join(", "),
+            scenarios.join(", ")
+        )),
+    }
 }
 
 fn machine(machine: &MachineConfig) -> String {

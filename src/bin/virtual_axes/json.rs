@@ -63,6 +63,7 @@ fn axis(axis: &AxisFigures) -> Value {
         "peak_current_a": report.peak_current,
         "saturation_s": report.saturation_time,
         "control_activity_a": report.control_activity,
+        "outside_stroke_s": axis.outside_stroke_time,
         "friction_extrapolated": axis.friction_extrapolated,
     })
 }

@@ -103,8 +103,17 @@ pub fn remarks(figures: &Figures) -> Vec<String> {
     let still = names(|axis| !axis.moves).map(|names| format!("standing still: {names}"));
     let extrapolated = names(|axis| axis.friction_extrapolated)
         .map(|names| format!("friction law used beyond the velocities that it was fitted for: {names}"));
+    let outside = figures
+        .axes
+        .iter()
+        .filter_map(|axis| Some(format!("{} was outside of its stroke for {} s", axis.name, outside(axis)?)));
     let no_contour = figures.contour.is_none().then(|| format!("no contour error: {NO_CONTOUR}"));
-    still.into_iter().chain(extrapolated).chain(no_contour).chain(more(figures)).collect()
+    still.into_iter().chain(outside).chain(extrapolated).chain(no_contour).chain(more(figures)).collect()
+}
+
+/// For how long an axis had left its stroke, s; none if it had not.
+pub fn outside(axis: &AxisFigures) -> Option<String> {
+    (axis.outside_stroke_time > 0.0).then(|| format!("{:.3}", axis.outside_stroke_time))
 }
 
 /// What of the path has no figures of its own, a line each.

@@ -37,6 +37,12 @@ const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 /// Why the node does not record as it should.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
+    /// The name is that of another kind of file.
+    #[error("record: {path}: a recording is an MCAP file: .mcap")]
+    Name {
+        /// The file.
+        path: String,
+    },
     /// The file is there.
     #[error(
         "record: {path} exists already, and a recording overwrites nothing: name a file that is not there"
@@ -101,7 +107,7 @@ impl Recorder {
     /// Makes the file that the parameters name, or records nothing if they name none.
     ///
     /// # Errors
-    /// [`RecordError`] if it exists or cannot be made.
+    /// [`RecordError`] if it is no name for a recording, exists or cannot be made.
     pub fn open(
         config: &NodeConfig,
         when_full: WhenFull,
@@ -109,6 +115,9 @@ impl Recorder {
     ) -> Result<Self, RecordError> {
         let Some(path) = config.record.clone() else { return Ok(Recorder { begun: None }) };
         let name = path.display().to_string();
+        if path.extension().is_some_and(|extension| !extension.eq_ignore_ascii_case("mcap")) {
+            return Err(RecordError::Name { path: name });
+        }
         let file = File::options().write(true).create_new(true).open(&path).map_err(|source| {
             let path = name.clone();
             match source.kind() {
