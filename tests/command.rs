@@ -107,6 +107,24 @@ fn set_points_are_run_and_traced() {
 }
 
 #[test]
+fn an_axis_that_left_its_stroke_is_told() {
+    let folder = Folder::new("stroke");
+    // To the stroke's end at nearly full speed, which no axis can end at once.
+    let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.726,0.355\n");
+    let trace = folder.path("trace.csv");
+    let found = figures(&[&psec, "--trace", &trace]);
+    let text = std::fs::read_to_string(&trace).expect("readable");
+    let positions = text.lines().skip(1).filter_map(|line| line.split(',').nth(2)?.parse::<f64>().ok());
+    let outside = positions.filter(|position| *position > 0.356).count();
+    assert!(outside > 0);
+    let told = &found["runs"][0]["axes"];
+    assert_eq!(told["x"]["outside_stroke_s"], outside as f64 * 0.006);
+    assert_eq!(told["y"]["outside_stroke_s"], 0.0);
+    let line = format!("x was outside of its stroke for {:.3} s", outside as f64 * 0.006);
+    assert!(assert_runs(&["run", &psec]).contains(&line), "{line}");
+}
+
+#[test]
 fn a_trace_has_a_row_per_trace_period() {
     let folder = Folder::new("period");
     let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.6,0.01\n");
@@ -445,5 +463,5 @@ fn a_machine_without_a_tool_says_so() {
 fn what_is_shipped_is_checked_by_its_name() {
     assert!(assert_runs(&["check", "linear_motor_center"]).contains("valid"));
     assert!(assert_runs(&["check", "corner-90"]).contains("valid"));
-    assert_refused(&run(&["check", "corner-91"]), &["corner-91", "corner-90"]);
+    assert_refused(&run(&["check", "corner-91"]), &["corner-91", "corner-90", "linear_motor_center"]);
 }
