@@ -32,8 +32,8 @@ pub struct Publisher<M: Serialize> {
 
 impl<M: Serialize> Publisher<M> {
     /// One whose messages are not recorded, and are made whoever listens.
-    pub fn unrecorded(network: ros2_client::Publisher<M>, topic: Topic) -> Self {
-        Publisher { network, tap: Tap::none(), topic, volatile: false, kept: KEPT }
+    pub fn unrecorded(network: ros2_client::Publisher<M>, topic: Topic, kept: usize) -> Self {
+        Publisher { network, tap: Tap::none(), topic, volatile: false, kept }
     }
 }
 
@@ -75,12 +75,27 @@ fn in_order_of_arrival<M>(
 
 /// A topic that could not be created.
 #[derive(Debug, thiserror::Error)]
-#[error("topic {name} cannot be created: {reason}")]
-pub struct EndpointError {
-    /// Its name.
-    pub name: String,
-    /// Why not.
-    pub reason: String,
+pub enum EndpointError {
+    /// The middleware refuses it.
+    #[error("topic {name} cannot be created: {reason}")]
+    Refused {
+        /// Its name.
+        name: String,
+        /// Why not.
+        reason: String,
+    },
+    /// It is remapped to a topic of another type.
+    #[error("-r: topic {name} is to be {resolved}, which carries {carried} already, not {wanted}")]
+    TwoTypes {
+        /// Its own name.
+        name: String,
+        /// That in the graph.
+        resolved: String,
+        /// The type of the topic that has that name.
+        carried: String,
+        /// Its own.
+        wanted: String,
+    },
 }
 
 /// The profile of a topic as it is configured.
@@ -104,18 +119,31 @@ fn profile(qos: QosConfig) -> QosProfile {
 pub const KEPT: usize = 8192;
 /// So many are under way where the axes wait for their readers anyway: what several topics send at a time fits into the
 /// socket of a reader (some 200 kB), so that nothing is lost. Fast DDS may never get over a loss (see `deaf`).
-const WINDOW: usize = 64;
+pub const WINDOW: usize = 64;
 
 /// How many samples may be under way of a topic for whose readers the axes wait.
 fn window(qos: QosConfig) -> usize {
     WINDOW.max(if qos.transient_local { qos.depth } else { 0 })
 }
 
-/// The profile of a publisher that keeps so many samples for readers that have not acknowledged them.
-fn keeping(profile: &QosProfile, kept: usize) -> QosPolicies {
+/// The profile of a publisher that keeps so many samples for readers that have not acknowledged them, and, if it keeps
+/// any for readers that come later, while it has no reader.
+pub(super) fn keeping(profile: &QosProfile, kept: usize) -> QosPolicies {
     let most = i32::try_from(kept).unwrap_or(i32::MAX);
     let limits = ResourceLimits { max_samples: most, max_instances: 1, max_samples_per_instance: most };
     QosPolicies::from(profile).modify_by(&QosPolicyBuilder::new().resource_limits(limits).build())
+}
+
+/// The topic of a resolved name, or why the middleware refuses it.
+pub(super) fn topic(
+    participant: &DomainParticipant,
+    resolved: &str,
+    type_name: &MessageTypeName,
+    qos: &QosPolicies,
+) -> Result<Topic, String> {
+    participant
+        .create_topic(topic_of(resolved), type_name.dds_msg_type(), qos, TopicKind::NoKey)
+        .map_err(|e| e.to_string())
 }
 
 /// Creates topics on a node.
@@ -147,7 +175,7 @@ impl<'a> Endpoints<'a> {
 
     fn configured(&self, name: &str) -> Result<QosConfig, EndpointError> {
         let own_name = name.trim_start_matches(['~', '/']);
-        self.parameters.qos(own_name).ok_or_else(|| EndpointError {
+        self.parameters.qos(own_name).ok_or_else(|| EndpointError::Refused {
             name: name.to_owned(),
             reason: "it is not in the schema".to_owned(),
         })
@@ -160,19 +188,15 @@ impl<'a> Endpoints<'a> {
         type_name: &MessageTypeName,
         qos: &QosPolicies,
     ) -> Result<(Topic, String), EndpointError> {
-        let failed = |reason: String| EndpointError { name: name.to_owned(), reason };
+        let failed = |reason: String| EndpointError::Refused { name: name.to_owned(), reason };
         let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
         let wanted = format!("{}/msg/{}", type_name.package_name(), type_name.type_name());
         let carried = self.types.entry(resolved.clone()).or_insert_with(|| wanted.clone());
         if *carried != wanted {
-            return Err(failed(format!(
-                "it is remapped to {resolved}, which carries {carried}, not {wanted}"
-            )));
+            let (name, carried) = (name.to_owned(), carried.clone());
+            return Err(EndpointError::TwoTypes { name, resolved, carried, wanted });
         }
-        let topic = self
-            .participant
-            .create_topic(topic_of(&resolved), type_name.dds_msg_type(), qos, TopicKind::NoKey)
-            .map_err(|e| failed(e.to_string()))?;
+        let topic = topic(self.participant, &resolved, type_name, qos).map_err(failed)?;
         Ok((topic, resolved))
     }
 
@@ -191,7 +215,7 @@ impl<'a> Endpoints<'a> {
         let network = self
             .node
             .create_publisher(&topic, None)
-            .map_err(|e| EndpointError { name: name.to_owned(), reason: e.to_string() })?;
+            .map_err(|e| EndpointError::Refused { name: name.to_owned(), reason: e.to_string() })?;
         let tap = self.recorder.tap(&resolved, qos, Direction::Out);
         let volatile = !qos.transient_local;
         let publisher = Publisher { network, tap, topic, volatile, kept };
@@ -224,7 +248,7 @@ impl<'a> Endpoints<'a> {
         let network = self
             .node
             .create_subscription(&topic, None)
-            .map_err(|e| EndpointError { name: name.to_owned(), reason: e.to_string() })?;
+            .map_err(|e| EndpointError::Refused { name: name.to_owned(), reason: e.to_string() })?;
         let tap = self.recorder.tap(&resolved, qos, Direction::In);
         Ok((Subscription { network, tap }, resolved))
     }

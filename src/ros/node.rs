@@ -89,6 +89,14 @@ pub enum NodeError {
     Record(#[from] RecordError),
 }
 
+impl NodeError {
+    /// Whether what the user asked for is wrong, not what the system or the middleware makes of it.
+    #[must_use]
+    pub fn is_usage(&self) -> bool {
+        matches!(self, Self::Record(_) | Self::Endpoint(EndpointError::TwoTypes { .. }))
+    }
+}
+
 /// Runs the node until SIGINT, SIGTERM or SIGHUP; what comes through `log` goes to `/rosout`.
 ///
 /// # Errors
@@ -142,7 +150,7 @@ async fn serve(
     let options = NodeOptions::new().start_parameter_services(false).enable_rosout(false);
     let mut node = context.new_node(name, options).map_err(|e| node_error(e.to_string()))?;
 
-    let rosout_publisher = rosout::publisher(&mut node, args, &mut recorder)?;
+    let rosout_publisher = rosout::publisher(&mut node, &dds, args, &mut recorder)?;
     let mut endpoints = Endpoints::new(&mut node, &dds, args, &parameters, &mut recorder);
     let mut topics = Topics::create(&mut endpoints, args, mode)?;
     let tool = ToolTopics::create(&mut endpoints, Kinematics::new(&config))?;

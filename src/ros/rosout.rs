@@ -5,13 +5,14 @@
 use std::time::Duration;
 
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
-use ros2_client::{MessageTypeName, Name, Node};
+use ros2_client::{MessageTypeName, Node};
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
+use rustdds::DomainParticipant;
 use tokio::sync::mpsc;
 
 use super::args::{LogLevel, RosArgs};
-use super::endpoints::{EndpointError, KEPT, Publisher};
+use super::endpoints::{EndpointError, Publisher, keeping, topic};
 use super::log::LogRecord;
 use super::recorder::{Direction, Recorder};
 use crate::config::QosConfig;
@@ -33,15 +34,15 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 /// [`EndpointError`] when the middleware refuses it.
 pub(super) fn publisher(
     node: &mut Node,
+    participant: &DomainParticipant,
     args: &RosArgs,
     recorder: &mut Recorder,
 ) -> Result<Option<Publisher<Log>>, EndpointError> {
     if !args.log_sinks().rosout {
         return Ok(None);
     }
-    let failed = |reason: String| EndpointError { name: NAME.to_owned(), reason };
+    let failed = |reason: String| EndpointError::Refused { name: NAME.to_owned(), reason };
     let resolved = args.resolve_topic(NAME).map_err(|e| failed(e.to_string()))?;
-    let name = Name::parse(&resolved).map_err(|e| failed(e.to_string()))?;
     let profile = QosProfile {
         durability: Durability::TransientLocal,
         history: History::KeepLast { depth: DEPTH },
@@ -49,11 +50,11 @@ pub(super) fn publisher(
         ..QosProfile::publisher_default().reliability_reliable(WhenFull::Wait(WRITE_TIMEOUT))
     };
     let type_name = MessageTypeName::new("rcl_interfaces", "Log");
-    let topic = node.create_topic(&name, type_name, &profile).map_err(|e| failed(e.to_string()))?;
+    let topic = topic(participant, &resolved, &type_name, &keeping(&profile, DEPTH)).map_err(failed)?;
     let network = node.create_publisher(&topic, None).map_err(|e| failed(e.to_string()))?;
     let qos = QosConfig { reliable: true, transient_local: true, depth: DEPTH };
     let tap = recorder.tap(&resolved, qos, Direction::Out);
-    Ok(Some(Publisher { network, tap, topic, volatile: false, kept: KEPT }))
+    Ok(Some(Publisher { network, tap, topic, volatile: false, kept: DEPTH }))
 }
 
 /// Publishes what comes until the log is closed.

@@ -42,6 +42,10 @@ pub struct ServiceError {
     pub reason: String,
 }
 
+/// How much the middleware keeps of what every reader has acknowledged and nobody asks for again; what a reader has
+/// not acknowledged it keeps whatever is said here. A list of all parameters has 20 kB.
+pub const ACKNOWLEDGED: usize = 1;
+
 /// Reliable, volatile, keep last `depth`.
 pub fn profile(depth: usize) -> QosProfile {
     QosProfile::publisher_default()
@@ -108,7 +112,7 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         let name = Name::parse(resolved).map_err(|e| failed(e.to_string()))?;
         let before = large_response::writers(context);
         let server = node
-            .create_server(ServiceMapping::Enhanced, &name, type_name, profile(depth), profile(depth))
+            .create_server(ServiceMapping::Enhanced, &name, type_name, profile(depth), profile(ACKNOWLEDGED))
             .map_err(|e| failed(e.to_string()))?;
         let response_topic = format!("rr{resolved}Reply");
         let participant = context.domain_participant();
@@ -133,7 +137,7 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
     ) -> Result<Self, ServiceError> {
         let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
         let participant = context.domain_participant();
-        let qos = QosPolicies::from(&profile(depth));
+        let qos = QosPolicies::from(&profile(ACKNOWLEDGED));
         let topic = |name: &str, kind: &str| {
             participant
                 .create_topic(name.to_owned(), format!("{type_name}_{kind}_"), &qos, TopicKind::NoKey)

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use virtual_axes::config::{Parameters, Source, parse_assignment};
 use virtual_axes::door::args::{Command, ParameterSource, RosArgs};
 use virtual_axes::ros::environment::Environment;
-use virtual_axes::ros::node::{self, NodeError};
+use virtual_axes::ros::node;
 use virtual_axes::ros::security::Security;
 use virtual_axes::ros::{log, rosout};
 
@@ -83,8 +83,10 @@ fn run(args: &RosArgs) -> ExitCode {
     let (status, complaint) = match parameters(args) {
         Ok(parameters) => match node::run(args, &environment, &security, parameters, log) {
             Ok(()) => (ExitCode::SUCCESS, None),
-            Err(error @ NodeError::Record(_)) => (ExitCode::from(USAGE), Some(error.to_string())),
-            Err(error) => (ExitCode::FAILURE, Some(error.to_string())),
+            Err(error) => {
+                let status = if error.is_usage() { ExitCode::from(USAGE) } else { ExitCode::FAILURE };
+                (status, Some(error.to_string()))
+            }
         },
         Err(error) => (ExitCode::from(USAGE), Some(error.to_string())),
     };

@@ -9,7 +9,7 @@ use futures::future::BoxFuture;
 use futures::stream::{FuturesUnordered, select_all};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use ros2_client::service::RmwRequestId;
-use ros2_client::{Context, Message, MessageTypeName, Name, Node, ServiceTypeName};
+use ros2_client::{Context, Message, MessageTypeName, Node, ServiceTypeName};
 use rustdds::TopicKind;
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
@@ -25,7 +25,7 @@ use crate::messages::{
     CONTROL_PACKAGE, FeedbackMessage, FollowJointTrajectoryResult, GetResultRequest, GetResultResponse,
     JointTrajectoryControllerState, SendGoalRequest, SendGoalResponse, stamp,
 };
-use crate::ros::endpoints::Publisher;
+use crate::ros::endpoints::{KEPT, Publisher, WINDOW, keeping, topic};
 use crate::ros::inputs::next_id;
 use crate::ros::outputs::Output;
 use crate::ros::pace::{Command, Health};
@@ -116,11 +116,10 @@ impl ActionServer {
             history: History::KeepLast { depth },
             ..QosProfile::publisher_default()
         };
-        let status_name = Name::parse(&part("status")).map_err(|e| failed(e.to_string()))?;
         let status_type = MessageTypeName::new("action_msgs", "GoalStatusArray");
-        let status_topic = node
-            .create_topic(&status_name, status_type, &qos(Durability::TransientLocal, 1))
-            .map_err(|e| failed(e.to_string()))?;
+        let status_qos = keeping(&qos(Durability::TransientLocal, 1), WINDOW);
+        let status_topic = topic(&context.domain_participant(), &part("status"), &status_type, &status_qos)
+            .map_err(failed)?;
         let status = node.create_publisher(&status_topic, None).map_err(|e| failed(e.to_string()))?;
         // A topic of a type that the crate cannot name.
         let feedback_qos = (&qos(Durability::Volatile, FEEDBACK_DEPTH)).into();
@@ -134,8 +133,8 @@ impl ActionServer {
             )
             .map_err(|e| failed(e.to_string()))?;
         let feedback = node.create_publisher(&feedback_topic, None).map_err(|e| failed(e.to_string()))?;
-        let status = Publisher::unrecorded(status, status_topic);
-        let feedback = Publisher::unrecorded(feedback, feedback_topic);
+        let status = Publisher::unrecorded(status, status_topic, WINDOW);
+        let feedback = Publisher::unrecorded(feedback, feedback_topic, KEPT);
         Ok((server, ActionTopics { status, feedback, name }))
     }
 

@@ -29,12 +29,11 @@ use ros2_interfaces_jazzy_serde::{
 };
 
 use super::args::RosArgs;
-use super::service::{Service, ServiceError, profile};
+use super::service::{ACKNOWLEDGED, Service, ServiceError, profile};
 use super::unsent::{Place, Unsent};
 use crate::door::parameters::{self as wire, ParameterHost, list};
 
-/// rmw's profile for parameter services and events keeps this many, so that a client may send that
-/// many requests at once.
+/// rmw's profile for parameter services keeps this many, so that a client may send that many requests at once.
 const QUEUE_DEPTH: usize = 1000;
 enum Request {
     Get(RmwRequestId, GetParametersRequest),
@@ -241,7 +240,7 @@ impl Door<'_> {
         let type_name = MessageTypeName::new("rcl_interfaces", "ParameterEvent");
         let topic = self
             .node
-            .create_topic(&name, type_name, &profile(QUEUE_DEPTH))
+            .create_topic(&name, type_name, &profile(ACKNOWLEDGED))
             .map_err(|e| error(e.to_string()))?;
         self.node.create_publisher(&topic, None).map_err(|e| error(e.to_string()))
     }
