@@ -10,9 +10,14 @@ from rcl_interfaces.srv import DescribeParameters
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 
-from drive import SETTLE_S, Drive
+from drive import SETTLE_S, Drive, own_mb
 
 TIMES = 20
+MANY = 300
+"""Of 40 kB and more each."""
+MAY_GROW_MB = 5.0
+CLEANING_S = 7
+"""The middleware looks through its histories every 6 s."""
 
 
 def describe_all(drive: Drive, times: int) -> None:
@@ -71,3 +76,14 @@ def test_what_is_too_long_is_said_and_stops_nothing(real: Drive):
         real.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names), timeout=1)
     assert "the response of describe_parameters is not sent" in real.process.output()
     assert len(real.describe(["max_points"])) == 1
+
+
+def test_responses_that_were_taken_are_forgotten(real: Drive):
+    """Hundreds of long ones cost the node no memory."""
+    assert real.process is not None
+    describe_all(real, TIMES)
+    time.sleep(CLEANING_S)
+    before = own_mb(real.process.pid)
+    describe_all(real, MANY)
+    time.sleep(CLEANING_S)
+    assert own_mb(real.process.pid) - before < MAY_GROW_MB

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
 from action import in_executor
-from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, stamp_of
+from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, own_mb, stamp_of
 
 TOPIC = "/joint_states"
 MANY = 1 << 19
@@ -22,11 +20,6 @@ JOINING = 200
 LATE = 3
 MAY_GROW_MB = 1.5
 """By each late reader: half a million numbers are some ten times that."""
-
-
-def own_mb(pid: int) -> float:
-    """Memory of its own, MB."""
-    return next(int(line.split()[1]) for line in Path(f"/proc/{pid}/status").open() if line.startswith("RssAnon")) / 1e3
 
 
 def test_a_late_reader_costs_no_more_after_half_a_million_samples():

@@ -91,7 +91,10 @@ def test_publish_rate_thins_the_grid_and_stays_on_it(start: Callable[..., Drive]
         (["-p", "x.velocity_loop.gain:=high"], ["x.velocity_loop.gain", "high"]),
         (["--params-file", "/nowhere/machine.yaml"], ["/nowhere/machine.yaml"]),
         (["-r", "psec"], ["-r psec"]),
-        (["-r", "psec:=/joint_states"], ["/joint_states", "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"]),
+        (
+            ["-r", "psec:=/joint_states"],
+            ["/joint_states", "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"],
+        ),
         (["--log-level", "loud"], ["--log-level", "loud"]),
         (["--frobnicate"], ["--frobnicate"]),
     ],

@@ -48,7 +48,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from action import Follow, goal, in_executor  # noqa: E402
-from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, to_time  # noqa: E402
+from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, own_mb, to_time  # noqa: E402
 from guest import Guest  # noqa: E402
 
 JOINTS = {"x": 0.05, "y": 0.05, "z": 0.05, "a": 0.2, "c": 1.0}
@@ -362,7 +362,7 @@ class Memory:
 
     def __init__(self, pid: int):
         """Begin to look."""
-        self._status = Path(f"/proc/{pid}/status")
+        self._pid = pid
         self._found_mb: list[float] = []
         self._end = threading.Event()
         threading.Thread(target=self._run, daemon=True).start()
@@ -370,24 +370,19 @@ class Memory:
     def _run(self) -> None:
         while not self._end.wait(SAMPLE_S):
             try:
-                self._found_mb.append(own_mb(self._status))
+                self._found_mb.append(own_mb(self._pid))
             except OSError:
                 return
 
     def since_mb(self) -> tuple[float, float]:
         """The least and the most since this was asked last."""
-        found = [*self._found_mb, own_mb(self._status)]
+        found = [*self._found_mb, own_mb(self._pid)]
         self._found_mb = []
         return min(found), max(found)
 
     def close(self) -> None:
         """End."""
         self._end.set()
-
-
-def own_mb(status: Path) -> float:
-    """Resident memory without pages of files, MB."""
-    return next(int(line.split()[1]) for line in status.open() if line.startswith("RssAnon")) / 1e3
 
 
 def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:

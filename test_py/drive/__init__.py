@@ -21,7 +21,7 @@ from .client import (
     parameter_messages,
     stamp_of,
 )
-from .process import DEFAULT_NODE, DomainId, Node, die_with_parent, node_binary
+from .process import DEFAULT_NODE, DomainId, Node, die_with_parent, node_binary, own_mb
 from .qos import DEEP_QOS, PSEC_QOS, RESULT_QOS, STREAM_QOS
 from .recording import Recording, Series, circular_deviation
 from .trajectories import NANOSECONDS, TSP_NS, Ballbar, ballbar, joint_trajectory, to_ns, to_time
@@ -48,6 +48,7 @@ __all__ = [
     "die_with_parent",
     "joint_trajectory",
     "node_binary",
+    "own_mb",
     "parameter_messages",
     "stamp_of",
     "to_ns",

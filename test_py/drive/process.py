@@ -56,6 +56,12 @@ def _port_is_free(port: int) -> bool:
     return True
 
 
+def own_mb(pid: int) -> float:
+    """Resident memory of a process without pages of files, MB."""
+    status = Path(f"/proc/{pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in status if line.startswith("RssAnon")) / 1e3
+
+
 def node_binary() -> Path:
     """The node's program: VIRTUAL_AXES_NODE, or what `cargo build --release` made."""
     if named := os.environ.get("VIRTUAL_AXES_NODE"):
