@@ -15,6 +15,9 @@ use super::names::NodeFqn;
 const TOPIC: &str = "ros_discovery_info";
 const TYPE: &str = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
 
+/// Messages that may wait. With `KEEP_ALL` RustDDS would remember when each came that has ever been taken.
+const DEPTH: i32 = 1024;
+
 type Gid = [u8; 16];
 
 /// `rmw_dds_common/msg/ParticipantEntitiesInfo`. The crate's own type refuses a whole message for
@@ -46,7 +49,7 @@ pub(super) async fn watch(participant: DomainParticipant, node: NodeFqn) {
     let qos = QosPolicyBuilder::new()
         .durability(Durability::TransientLocal)
         .reliability(Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })
-        .history(History::KeepAll)
+        .history(History::KeepLast { depth: DEPTH })
         .build();
     let reader = participant
         .create_topic(TOPIC.to_owned(), TYPE.to_owned(), &qos, TopicKind::NoKey)

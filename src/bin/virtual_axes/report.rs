@@ -41,11 +41,11 @@ pub fn write(
         ];
         let extrapolated = figures.axes.iter().filter(|axis| axis.friction_extrapolated);
         facts.extend(extrapolated.map(|axis| ("friction law extrapolated".to_owned(), axis.name.clone())));
-        let outside = figures.axes.iter().filter_map(|axis| Some((axis, table::outside(axis)?)));
-        facts
-            .extend(outside.map(|(axis, time)| {
-                ("outside of its stroke".to_owned(), format!("{}, {time} s", axis.name))
-            }));
+        for axis in &figures.axes {
+            if let Some(time) = table::outside(axis) {
+                facts.push(("outside of its stroke".to_owned(), format!("{}, {time} s", axis.name)));
+            }
+        }
         if figures.contour.is_none() {
             facts.push(("contour error".to_owned(), table::NO_CONTOUR.to_owned()));
         }
