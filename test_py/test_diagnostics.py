@@ -61,3 +61,14 @@ def test_friction_law_beyond_its_range_is_a_warning(real: Drive):
 
     real.wait_for(warned, 5, "warning about the friction law")
     go_home(real)
+
+
+def test_an_axis_that_leaves_its_stroke_is_logged(real: Drive):
+    """At nearly full speed to the stroke's end, where no axis can stop at once."""
+    assert real.process is not None
+    go_home(real)
+    seen = len(real.diagnostics())
+    real.accept(joint_trajectory(["x"], [0.0, 0.72], [[0.0], [0.355]]))
+    real.wait_for(lambda: [a for a in real.diagnostics()[seen:] if "outside its stroke" in text_of(a)], 8, "a warning")
+    process = real.process
+    real.wait_for(lambda: "x has left its stroke" in process.output(), 5, "a line of the log")

@@ -95,6 +95,8 @@ def test_publish_rate_thins_the_grid_and_stays_on_it(start: Callable[..., Drive]
             ["-r", "psec:=/joint_states"],
             ["/joint_states", "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"],
         ),
+        (["-r", "psec:=/rosout"], ["/rosout", "rcl_interfaces/msg/Log", "psec"]),
+        (["-r", "~/reset:=~/stop"], ["~/reset", "~/stop", "/virtual_axes/stop"]),
         (["--log-level", "loud"], ["--log-level", "loud"]),
         (["--frobnicate"], ["--frobnicate"]),
     ],

@@ -134,8 +134,8 @@ class SoakClock:
 class Traffic:
     """What is asked of the node, one thing after the other, by chance."""
 
-    def __init__(self, drive: Drive, follow: Follow, seed: int, only: str | None, folder: Path):
-        """Nothing is sent yet; files are written to `folder`."""
+    def __init__(self, drive: Drive, follow: Follow, seed: int, kinds: set[str], without: bool, folder: Path):
+        """Of these kinds, or of all but these; nothing is sent yet. Files are written to `folder`."""
         self.drive, self.follow = drive, follow
         self.chance = random.Random(seed)
         self.count: Counter[str] = Counter()
@@ -158,8 +158,13 @@ class Traffic:
             (1, self.visitor),
             (0.5, self.killed),
         ]
-        if only is not None:
-            self._kinds = [(weight, act) for weight, act in self._kinds if act.__name__ == only]
+        known = {act.__name__ for _, act in self._kinds}
+        if not kinds <= known:
+            raise SystemExit(
+                f"no such traffic: {', '.join(sorted(kinds - known))}; there is {', '.join(sorted(known))}"
+            )
+        if kinds:
+            self._kinds = [(weight, act) for weight, act in self._kinds if (act.__name__ in kinds) != without]
 
     def step(self) -> None:
         """One of them."""
@@ -459,8 +464,11 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=1, help="of the wall clock (1)")
     parser.add_argument("--speed", type=float, default=1, help="of the node's clock against the wall's (1)")
     parser.add_argument("--seed", type=int, default=1, help="of the traffic (1)")
-    parser.add_argument("--only", help="a kind of traffic, to find out what grows by it")
+    kinds = parser.add_mutually_exclusive_group()
+    kinds.add_argument("--only", metavar="KIND,...", help="of traffic, to find out what grows by it")
+    kinds.add_argument("--without", metavar="KIND,...", help="all traffic but this")
     args = parser.parse_args()
+    chosen = set(filter(None, (args.only or args.without or "").split(",")))
     real = args.speed == 1
     mode = ["-p", "time:=real"] if real else ["-p", "use_sim_time:=true"]
     with Node([*mode, "-p", "max_points:=20000"]) as process, Drive(process=process, connect=False) as drive:
@@ -473,7 +481,7 @@ def main() -> int:
             Guest(process.domain_id, "echo", ECHO),
             Guest(process.domain_id, "probe", f"{process.name}/get_parameters", ECHO) as prober,
         ):
-            traffic = Traffic(drive, follow, args.seed, args.only, Path(folder))
+            traffic = Traffic(drive, follow, args.seed, chosen, args.without is not None, Path(folder))
             memory = Memory(process.pid)
             looks: list[Look] = []
             values: dict[str, str] = {}

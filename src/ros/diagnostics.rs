@@ -36,12 +36,23 @@ impl Diagnostics {
         now: &Health,
         outputs_dropped: (u64, u64),
     ) -> DiagnosticArray {
-        let axes = self.joints.iter().enumerate().map(|(place, joint)| {
-            let at = |health: &Health| health.axes.get(place).copied().unwrap_or_default();
-            self.axis(joint, at(before), at(now))
-        });
+        let axes = self.axes(before, now).map(|(joint, before, now)| self.axis(joint, before, now));
         let status = std::iter::once(self.node_status(before, now, outputs_dropped)).chain(axes).collect();
         DiagnosticArray { header: header(time), status }
+    }
+
+    /// Joints that stood outside of their stroke between `before` and `now`.
+    pub fn outside_stroke(&self, before: &Health, now: &Health) -> Vec<&str> {
+        let left = |&(_, before, now): &(&str, AxisHealth, AxisHealth)| now.outside > before.outside;
+        self.axes(before, now).filter(left).map(|(joint, ..)| joint).collect()
+    }
+
+    fn axes(&self, before: &Health, now: &Health) -> impl Iterator<Item = (&str, AxisHealth, AxisHealth)> {
+        let of = |health: &Health, place| health.axes.get(place).copied().unwrap_or_default();
+        self.joints
+            .iter()
+            .enumerate()
+            .map(move |(place, joint)| (joint.as_str(), of(before, place), of(now, place)))
     }
 
     fn status(&self, name: String, problems: &[&str], fine: &str, values: Vec<KeyValue>) -> DiagnosticStatus {

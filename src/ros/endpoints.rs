@@ -85,15 +85,17 @@ pub enum EndpointError {
         reason: String,
     },
     /// It is remapped to a topic of another type.
-    #[error("-r: topic {name} is to be {resolved}, which carries {carried} already, not {wanted}")]
+    #[error("-r: topics {first} ({carried}) and {name} ({wanted}) would both be {resolved}")]
     TwoTypes {
-        /// Its own name.
-        name: String,
-        /// That in the graph.
+        /// The name in the graph.
         resolved: String,
-        /// The type of the topic that has that name.
+        /// Own name of the topic that has it.
+        first: &'static str,
+        /// Its type.
         carried: String,
-        /// Its own.
+        /// Own name of the other.
+        name: &'static str,
+        /// Its type.
         wanted: String,
     },
 }
@@ -146,6 +148,10 @@ pub(super) fn topic(
         .map_err(|e| e.to_string())
 }
 
+/// Topics that are created elsewhere, with their types.
+const OTHER_TOPICS: [(&str, &str); 2] =
+    [("/rosout", "rcl_interfaces/msg/Log"), ("/parameter_events", "rcl_interfaces/msg/ParameterEvent")];
+
 /// Creates topics on a node.
 pub struct Endpoints<'a> {
     node: &'a mut Node,
@@ -155,8 +161,8 @@ pub struct Endpoints<'a> {
     recorder: &'a mut Recorder,
     /// Whether the axes wait for slow readers.
     waits: bool,
-    /// What each topic carries so far, by its resolved name.
-    types: HashMap<String, String>,
+    /// Own name and type of each topic so far, by its resolved name.
+    known: HashMap<String, (&'static str, String)>,
 }
 
 impl<'a> Endpoints<'a> {
@@ -170,7 +176,11 @@ impl<'a> Endpoints<'a> {
         recorder: &'a mut Recorder,
     ) -> Self {
         let waits = parameters.node_config().time != TimeMode::Real;
-        Endpoints { node, participant, args, parameters, recorder, waits, types: HashMap::new() }
+        // Those that are made elsewhere.
+        let known = OTHER_TOPICS.iter().filter_map(|&(name, type_name)| {
+            Some((args.resolve_topic(name).ok()?, (name, type_name.to_owned())))
+        });
+        Endpoints { node, participant, args, parameters, recorder, waits, known: known.collect() }
     }
 
     fn configured(&self, name: &str) -> Result<QosConfig, EndpointError> {
@@ -184,17 +194,17 @@ impl<'a> Endpoints<'a> {
     /// A topic under its resolved name, which can carry one type only.
     fn topic(
         &mut self,
-        name: &str,
+        name: &'static str,
         type_name: &MessageTypeName,
         qos: &QosPolicies,
     ) -> Result<(Topic, String), EndpointError> {
         let failed = |reason: String| EndpointError::Refused { name: name.to_owned(), reason };
         let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
         let wanted = format!("{}/msg/{}", type_name.package_name(), type_name.type_name());
-        let carried = self.types.entry(resolved.clone()).or_insert_with(|| wanted.clone());
+        let (first, carried) = self.known.entry(resolved.clone()).or_insert_with(|| (name, wanted.clone()));
         if *carried != wanted {
-            let (name, carried) = (name.to_owned(), carried.clone());
-            return Err(EndpointError::TwoTypes { name, resolved, carried, wanted });
+            let carried = carried.clone();
+            return Err(EndpointError::TwoTypes { resolved, first, carried, name, wanted });
         }
         let topic = topic(self.participant, &resolved, type_name, qos).map_err(failed)?;
         Ok((topic, resolved))
@@ -206,7 +216,7 @@ impl<'a> Endpoints<'a> {
     /// [`EndpointError`] naming the topic.
     pub fn publisher<M: Recorded>(
         &mut self,
-        name: &str,
+        name: &'static str,
         type_name: MessageTypeName,
     ) -> Result<(Publisher<M>, String), EndpointError> {
         let qos = self.configured(name)?;
@@ -228,7 +238,7 @@ impl<'a> Endpoints<'a> {
     /// [`EndpointError`] naming the topic.
     pub fn subscription<M: Message + Recorded + 'static>(
         &mut self,
-        name: &str,
+        name: &'static str,
         type_name: MessageTypeName,
     ) -> Result<(Subscription<M>, String), EndpointError> {
         self.subscription_of(name, type_name, self.configured(name)?)
@@ -240,7 +250,7 @@ impl<'a> Endpoints<'a> {
     /// [`EndpointError`] naming the topic.
     pub fn subscription_of<M: Message + Recorded + 'static>(
         &mut self,
-        name: &str,
+        name: &'static str,
         type_name: MessageTypeName,
         qos: QosConfig,
     ) -> Result<(Subscription<M>, String), EndpointError> {

@@ -7,6 +7,7 @@ use std::time::Duration;
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use tokio::sync::{mpsc, watch};
+use tracing::warn;
 
 use super::action::Feedback;
 use super::clock::ClockOutput;
@@ -86,6 +87,7 @@ pub async fn publish_diagnostics(
 ) {
     let mut timer = tokio::time::interval(DIAGNOSTICS_PERIOD);
     let (mut before, mut dropped_before) = (Health::default(), 0);
+    let mut outside: Vec<&str> = Vec::new();
     loop {
         timer.tick().await;
         let now = health.borrow().clone();
@@ -93,6 +95,11 @@ pub async fn publish_diagnostics(
         let mut message = text.message(now.time, &before, &now, (dropped_before, dropped_now));
         message.status.extend(recording.as_mut().map(|status| status.message(&text.node, &text.machine)));
         output.send(message).await;
+        let left = text.outside_stroke(&before, &now);
+        left.iter()
+            .filter(|joint| !outside.contains(joint))
+            .for_each(|joint| warn!("{joint} has left its stroke"));
+        outside = left;
         (before, dropped_before) = (now, dropped_now);
     }
 }

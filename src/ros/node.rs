@@ -30,16 +30,16 @@ use super::namesake;
 use super::outputs::{Publishing, WhenFull, queue_length};
 use super::pace::{self, Channels, Command, Health, Pace, Turns};
 use super::parameter_host::{Host, LiveNodeParameters};
-use super::parameter_services::ParameterServices;
+use super::parameter_services::{self, ParameterServices};
 use super::participant::{Participant, ParticipantError};
 use super::recorder::{RecordError, Recorder};
 use super::results::Results;
 use super::rosout;
 use super::security::Security;
-use super::service::ServiceError;
+use super::service::{self, ServiceError, TwoServices};
 use super::tool::ToolTopics;
 use super::topics::Topics;
-use super::trigger::Trigger;
+use super::trigger::{RESET, STOP, Trigger};
 use super::writers::{Owner, Renewals};
 use crate::config::{ConfigError, Parameters, TimeMode};
 use crate::kinematics::Kinematics;
@@ -76,6 +76,9 @@ pub enum NodeError {
     /// A service is refused.
     #[error(transparent)]
     Service(#[from] ServiceError),
+    /// Two services have one name.
+    #[error(transparent)]
+    TwoServices(#[from] TwoServices),
     /// The operating system gives no thread, timer or signal handler.
     #[error("cannot {what}: {source}")]
     System {
@@ -93,7 +96,10 @@ impl NodeError {
     /// Whether what the user asked for is wrong, not what the system or the middleware makes of it.
     #[must_use]
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Record(_) | Self::Endpoint(EndpointError::TwoTypes { .. }))
+        matches!(
+            self,
+            Self::Record(_) | Self::Endpoint(EndpointError::TwoTypes { .. }) | Self::TwoServices(_)
+        )
     }
 }
 
@@ -128,6 +134,7 @@ async fn serve(
     parameters: Parameters,
     log: mpsc::Receiver<LogRecord>,
 ) -> Result<(), NodeError> {
+    service::check_names(args, parameter_services::LABELS.into_iter().chain([RESET, STOP]))?;
     let signals = Signals::new()?;
     let config = parameters.machine_config()?;
     let node_config = parameters.node_config();
@@ -157,8 +164,8 @@ async fn serve(
     topics.names.also_publishes(tool.as_ref().map_or(&[], |tool| &tool.names));
     let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
     topics.names.goals_on.push(action_topics.name);
-    let reset = Trigger::new(&mut node, &context, args, "reset")?;
-    let stop = Trigger::new(&mut node, &context, args, "stop")?;
+    let reset = Trigger::new(&mut node, &context, args, RESET)?;
+    let stop = Trigger::new(&mut node, &context, args, STOP)?;
     let parameter_services = ParameterServices::new(&mut node, &context, args)?;
 
     let simulation = Simulation::new(&config, joint_limits.clone(), pace::origin(mode, period))?;

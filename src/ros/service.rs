@@ -1,6 +1,8 @@
 //! Services under their resolved names, whose responses wait for the client to be known and reach it
 //! at (almost) any length.
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::time::Duration;
 
 use futures::{FutureExt, StreamExt, future::BoxFuture, stream::BoxStream};
@@ -40,6 +42,39 @@ pub struct ServiceError {
     pub name: String,
     /// Why not.
     pub reason: String,
+}
+
+/// Two services that are remapped to one name: a request would reach both.
+#[derive(Debug, thiserror::Error)]
+#[error("-r: services ~/{first} and ~/{second} would both be {resolved}")]
+pub struct TwoServices {
+    /// One of them.
+    pub first: &'static str,
+    /// The other.
+    pub second: &'static str,
+    /// The name in the graph.
+    pub resolved: String,
+}
+
+/// Refuses two of the services `~/label` under one name.
+///
+/// # Errors
+/// [`TwoServices`]. A name that cannot be resolved is refused when its service is made.
+pub fn check_names(
+    args: &RosArgs,
+    labels: impl IntoIterator<Item = &'static str>,
+) -> Result<(), TwoServices> {
+    let mut known: HashMap<String, &'static str> = HashMap::new();
+    for second in labels {
+        let Ok(resolved) = args.resolve_service(&format!("~/{second}")) else { continue };
+        match known.entry(resolved) {
+            Entry::Vacant(free) => _ = free.insert(second),
+            Entry::Occupied(taken) => {
+                return Err(TwoServices { first: taken.get(), second, resolved: taken.key().clone() });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// How much the middleware keeps of what every reader has acknowledged and nobody asks for again; what a reader has

@@ -10,6 +10,10 @@ use super::args::RosArgs;
 use super::service::{Service, ServiceError};
 use super::unsent::Unsent;
 
+/// Takes the axes home.
+pub const RESET: &str = "reset";
+/// Stops the axes within their limits.
+pub const STOP: &str = "stop";
 /// Requests that may wait.
 const DEPTH: usize = 10;
 

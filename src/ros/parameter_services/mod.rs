@@ -216,6 +216,16 @@ fn listed(names: &[String], prefixes: &[String], depth: u64) -> msg::ListParamet
     list(names, prefixes, depth)
 }
 
+/// The services under the node's name.
+pub(super) const LABELS: [&str; 6] = [
+    "get_parameters",
+    "get_parameter_types",
+    "set_parameters",
+    "set_parameters_atomically",
+    "describe_parameters",
+    "list_parameters",
+];
+
 /// Creates the services under the node's name, reliable and with rmw's depth.
 struct Door<'a> {
     node: &'a mut Node,
