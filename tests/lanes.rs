@@ -84,8 +84,10 @@ fn every_width_gives_the_same_bits() {
     for config in machines() {
         let mut machine = Machine::new(parameters(&config));
         let widest = seen(&mut machine, 0, AXES);
-        machine.set_width(Width::Baseline);
-        assert!(widest == seen(&mut machine, 0, AXES));
+        for width in [Width::Four, Width::Baseline] {
+            machine.set_width(width);
+            assert!(widest == seen(&mut machine, 0, AXES), "{width:?}");
+        }
     }
 }
 

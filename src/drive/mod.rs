@@ -19,6 +19,7 @@ mod response;
 pub(crate) use expansion::Expansion;
 pub use friction::Friction;
 pub use gravity::Gravity;
+pub(crate) use gravity::Incline;
 pub use motor::{Motor, MotorState};
 pub use plant::{Plant, Torques};
 

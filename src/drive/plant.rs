@@ -1,6 +1,6 @@
 //! Motor, friction, gravity and load together.
 
-use super::{DriveError, Friction, Gravity, Motor, MotorState};
+use super::{DriveError, Friction, Gravity, Incline, Motor, MotorState};
 use crate::config::{AxisConfig, MotorConfig};
 use crate::lanes::{Number, numbers};
 
@@ -99,6 +99,12 @@ impl<N: Number> Plant<N> {
     #[inline(always)]
     pub fn gravity_at(&self, angle: N) -> N {
         self.gravity.torque(self.position(angle))
+    }
+
+    /// Gravity torque at a motor angle θ (rad) by the polynomial at hand, which follows it, N·m at the motor.
+    #[inline(always)]
+    pub(crate) fn gravity_near(&self, near: &mut Incline<N>, angle: N) -> N {
+        self.gravity.torque_near(near, angle)
     }
 
     /// Gravity torque where it does not depend on the position, N·m at the motor.

@@ -11,7 +11,7 @@ const MAX_LANES: usize = 8;
 
 /// As many numbers as a register of the processor holds; none of them lies across two lines of its cache.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(32))]
+#[repr(align(64))]
 pub struct Vector<S: Simd> {
     simd: S,
     value: S::f64s,

@@ -5,10 +5,13 @@ use pulp::{Arch, Scalar, Simd, WithSimd};
 use super::block::{Block, Demand, Done, Loops, LoopsState, Row, Tally, Timing};
 use crate::drive::MotorState;
 
-/// Lanes of a block of few axes: one vector of most processors.
+/// Lanes of a block of few axes: a vector of four, or less.
 const FEW: usize = 4;
-/// Lanes of a block of many: while one vector waits for itself, the other is worked on.
-const MANY: usize = 8;
+/// Lanes of a block of one machine's axes: a vector of eight, or two of four of which one is worked on while the
+/// other waits for itself.
+const SOME: usize = 8;
+/// Lanes of a block of several machines: two vectors of eight.
+const MANY: usize = 16;
 
 /// How wide the processor's vectors are used. The results are the same bits whatever the width.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -16,6 +19,8 @@ pub enum Width {
     /// As wide as this processor has them.
     #[default]
     Widest,
+    /// As wide as this processor has them, but four numbers at most.
+    Four,
     /// As every processor of its kind has them. Where multiplication and addition are not fused by the
     /// hardware this is far slower.
     Baseline,
@@ -33,6 +38,7 @@ pub(super) struct Bank {
 #[derive(Debug, Clone, PartialEq)]
 enum Blocks {
     Few(Vec<Block<FEW>>),
+    Some(Vec<Block<SOME>>),
     Many(Vec<Block<MANY>>),
 }
 
@@ -41,6 +47,10 @@ macro_rules! at {
     ($blocks:expr, $axis:expr, $iter:ident, |$block:ident, $lane:ident| $act:expr) => {
         match $blocks {
             Blocks::Few(blocks) => {
+                let ($block, $lane) = $iter(blocks, $axis);
+                $act
+            }
+            Blocks::Some(blocks) => {
                 let ($block, $lane) = $iter(blocks, $axis);
                 $act
             }
@@ -75,10 +85,10 @@ fn filled<const L: usize>(loops: &[Loops], timing: Timing) -> Vec<Block<L>> {
 impl Bank {
     /// A bank of the axes `loops`.
     pub fn new(loops: &[Loops], timing: Timing) -> Self {
-        let blocks = if loops.len() <= FEW {
-            Blocks::Few(filled(loops, timing))
-        } else {
-            Blocks::Many(filled(loops, timing))
+        let blocks = match loops.len() {
+            ..=FEW => Blocks::Few(filled(loops, timing)),
+            ..=SOME => Blocks::Some(filled(loops, timing)),
+            _ => Blocks::Many(filled(loops, timing)),
         };
         Bank { blocks, timing, width: Width::default() }
     }
@@ -144,6 +154,7 @@ impl Bank {
         let timing = self.timing;
         match &mut self.blocks {
             Blocks::Few(blocks) => run_all(self.width, Period { blocks, timing, traced }),
+            Blocks::Some(blocks) => run_all(self.width, Period { blocks, timing, traced }),
             Blocks::Many(blocks) => run_all(self.width, Period { blocks, timing, traced }),
         }
     }
@@ -155,8 +166,19 @@ fn run_all<const L: usize>(width: Width, period: Period<'_, L>) {
         period.blocks.iter_mut().for_each(|b| b.done.resize_with(period.timing.ticks_per_position, row));
     }
     match width {
-        Width::Widest => Arch::new().dispatch(period),
+        Width::Widest if L > FEW => Arch::new().dispatch(period),
+        Width::Widest | Width::Four => four_at_most(period),
         Width::Baseline => Scalar::new().vectorize(period),
+    }
+}
+
+/// `act` with vectors as wide as the processor has them, but four numbers at most.
+#[inline]
+fn four_at_most<A: WithSimd>(act: A) -> A::Output {
+    match Arch::new() {
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        Arch::V4(eight) => Simd::vectorize(*eight, act),
+        arch => arch.dispatch(act),
     }
 }
 

@@ -3,10 +3,12 @@
 //! This is the only place where the recurrence of an axis is run. What happens to an axis is said once, over
 //! vectors of as many axes as the processor reckons with at a time.
 
+use std::hint::black_box;
+
 use pulp::Simd;
 
 use crate::control::{Pi, PiState};
-use crate::drive::{Expansion, MotorState, Plant};
+use crate::drive::{Expansion, Incline, MotorState, Plant};
 use crate::lanes::{Fetch, Number, Twice, Vector, numbers};
 
 numbers! {
@@ -128,6 +130,8 @@ pub(super) struct Block<const L: usize> {
     demand: Row<Demand<[f64; L]>>,
     /// The friction laws near the speeds at hand.
     near: Row<Expansion<[f64; L]>>,
+    /// Gravity near the angles at hand.
+    incline: Row<Incline<[f64; L]>>,
     pub tally: Row<Tally<[f64; L]>>,
     /// Whether gravity of any axis depends on where it stands.
     tilting: bool,
@@ -147,6 +151,7 @@ impl<const L: usize> Block<L> {
             state: Row(LoopsState::default().fill()),
             demand: Row(Demand::default().fill()),
             near: Row(loops.plant.slowing.near(0.0).fill()),
+            incline: Row(loops.plant.gravity.near(0.0).fill()),
             tally: Row(Tally::default().fill()),
             tilting: loops.plant.gravity.is_tilting(),
             compensation: Vec::new(),
@@ -178,10 +183,11 @@ impl<const L: usize> Block<L> {
         self.tilting = (0..L).any(|lane| self.loops.0.lane(lane).plant.gravity.is_tilting());
     }
 
-    /// Expands the friction law of an axis at the speed that it has.
+    /// Expands friction and gravity of an axis at the speed and the angle that it has.
     fn expand(&mut self, lane: usize) {
-        let (friction, speed) = (self.loops.0.plant.slowing.lane(lane), self.state.0.motor.speed[lane]);
-        self.near.0.set_lane(lane, &friction.near(speed));
+        let (plant, motor) = (&self.loops.0.plant, &self.state.0.motor);
+        self.near.0.set_lane(lane, &plant.slowing.lane(lane).near(motor.speed[lane]));
+        self.incline.0.set_lane(lane, &plant.gravity.lane(lane).near(motor.angle[lane]));
     }
 
     /// Torque feedforward of one lane on top, N·m, by the instant of the velocity loop.
@@ -222,6 +228,9 @@ impl<const L: usize> Block<L> {
         timing: Timing,
         traced: bool,
     ) {
+        // Where something on it asks for that, the compiler aligns the whole stack: vectors that find no register
+        // do not lie across two lines of the cache then.
+        black_box(&mut Row(0_u8));
         let loops: Loops<N> = self.loops.0.fetch(simd, place);
         let demand: Demand<N> = self.demand.0.fetch(simd, place);
         let mut near: Expansion<N> = self.near.0.fetch(simd, place);
@@ -229,8 +238,11 @@ impl<const L: usize> Block<L> {
         let nothing = state.friction.constant(0.0);
         state.current_excess = nothing;
         let mut saturated_ticks = nothing;
-        let mut gravity =
-            if TILTING { loops.plant.gravity_at(state.motor.angle) } else { loops.plant.weight() };
+        let mut incline: Incline<N> = self.incline.0.fetch(simd, place);
+        let mut gravity = match TILTING {
+            true => loops.plant.gravity_near(&mut incline, state.motor.angle),
+            false => loops.plant.weight(),
+        };
         let mut external = demand.load - gravity;
         // From the speed by friction, in the tick before.
         let mut taken = nothing;
@@ -254,7 +266,7 @@ impl<const L: usize> Block<L> {
                     state.friction = loops.plant.friction_taking(taken);
                     state.gravity = gravity;
                     if TILTING {
-                        gravity = loops.plant.gravity_at(state.motor.angle);
+                        gravity = loops.plant.gravity_near(&mut incline, state.motor.angle);
                         external = demand.load - gravity;
                     }
                 }
@@ -271,6 +283,9 @@ impl<const L: usize> Block<L> {
         state.friction = loops.plant.friction_taking(taken);
         state.gravity = gravity;
         self.near.0.put(place, &near);
+        if TILTING {
+            self.incline.0.put(place, &incline);
+        }
         self.state.0.put(place, &state);
         // In a loop of its own: the one above has no register left for it.
         let mut tally = Tally { peak_current: nothing, peak_speed: nothing, saturated_ticks };

@@ -50,6 +50,8 @@ pub struct Arguments {
 enum WidthName {
     /// As wide as this processor has them.
     Widest,
+    /// As wide as this processor has them, but four numbers at most.
+    Four,
     /// As every processor of its kind has them; slow.
     Baseline,
 }
@@ -58,6 +60,7 @@ impl From<WidthName> for Width {
     fn from(name: WidthName) -> Self {
         match name {
             WidthName::Widest => Width::Widest,
+            WidthName::Four => Width::Four,
             WidthName::Baseline => Width::Baseline,
         }
     }
