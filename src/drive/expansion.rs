@@ -4,7 +4,7 @@
 //! short polynomial, `e^{b(v+δ)} = e^{bv} e^{bδ}`, and both exponentials of the law make one polynomial in δ.
 
 use super::elementary::{Exponential, MAX_EXPONENT};
-use crate::lanes::{Number, numbers};
+use crate::lanes::{Number, limited, numbers};
 
 /// Largest |x| for which [`POWERS`] is e^x.
 const REACH: f64 = 0.125;
@@ -67,11 +67,16 @@ impl Pair {
         Pair { first, second, scale, first_share, second_share, ahead: over_scale(AHEAD * REACH) }
     }
 
-    /// The speed from which on the sum stays as it is: a rising exponential would leave the range of numbers, or
-    /// distances could not be told from one another.
+    /// The largest speed at which the sum is expanded: beyond, a rising exponential would leave the range of numbers,
+    /// or distances could not be told from one another.
     pub fn capped_from(&self) -> f64 {
         let rise = self.first.rate.max(self.second.rate).max(0.0);
         f64::min(MAX_EXPONENT / rise, FURTHEST / self.scale).min(f64::MAX)
+    }
+
+    /// The speed from which on the sum stays as it is: the end of that expansion.
+    pub fn level_from(&self) -> f64 {
+        (self.capped_from() + REACH / self.scale).min(f64::MAX)
     }
 }
 
@@ -114,6 +119,12 @@ impl<N: Number> Expansion<N> {
     #[inline(always)]
     pub fn is_left(distance: N) -> bool {
         distance.abs().exceeds(REACH)
+    }
+
+    /// A distance that one of them does hold at: there the sum stays as it is.
+    #[inline(always)]
+    pub fn within(distance: N) -> N {
+        limited(distance, distance.constant(REACH))
     }
 
     /// What is in force at a `distance`: itself as long as it holds, else the `next` one.

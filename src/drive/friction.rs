@@ -19,8 +19,10 @@ numbers! {
         moving: Pair<N>,
         /// Kt i0, N·m.
         breakaway: N,
-        /// Speed from which on the law stays as it is, rad/s.
+        /// Speed beyond which it is not expanded, rad/s.
         capped_from: N,
+        /// Speed from which on the law stays as it is: as far as the last expansion holds, rad/s.
+        level_from: N,
         /// Speed up to which the law was fitted, rad/s.
         fitted_to: N,
     }
@@ -42,18 +44,14 @@ impl Friction {
             moving,
             breakaway: torque_constant * law.i0,
             capped_from: moving.capped_from(),
+            level_from: moving.level_from(),
             fitted_to: FITTED_RANGE / velocity,
         }
     }
 
     /// Largest friction torque at motor speed ω (rad/s), N·m; never negative.
     pub fn bound(&self, speed: f64) -> f64 {
-        self.resisting(speed, self.moving.at(self.size(speed)))
-    }
-
-    /// The law near motor speed ω, rad/s.
-    pub(crate) fn near(&self, speed: f64) -> Expansion {
-        self.moving.near(self.size(speed))
+        self.resisting(speed, self.moving.at(speed.abs().min(self.level_from)))
     }
 
     /// Whether the law is extrapolated at motor speed ω (rad/s).
@@ -64,30 +62,24 @@ impl Friction {
 }
 
 impl<N: Number> Friction<N> {
-    /// How far motor speed ω (rad/s) is from the middle of an expansion.
+    /// The law near motor speed ω, rad/s.
     #[inline(always)]
-    pub(crate) fn distance(&self, near: &Expansion<N>, speed: N) -> N {
-        self.moving.distance(near, self.size(speed))
+    pub(crate) fn near(&self, speed: N) -> Expansion<N> {
+        self.moving.near(self.capped_from.min(speed.abs()))
     }
 
-    /// The expansions to go on with at motor speed ω (rad/s), some of which it has left: each is replaced that
-    /// does not hold at its `distance`, and no other.
+    /// Largest friction torque at motor speed ω (rad/s), N·m. Where the expansion at hand does not hold it is
+    /// renewed, and nowhere else.
     #[inline(always)]
-    pub(crate) fn renewed(&self, near: &Expansion<N>, speed: N, distance: N) -> Expansion<N> {
-        let next = self.moving.near(self.moving.ahead(self.size(speed), distance));
-        near.or(&next, distance)
-    }
-
-    /// Largest friction torque at motor speed ω (rad/s), at a `distance` that the expansion reaches, N·m.
-    #[inline(always)]
-    pub(crate) fn bound_near(&self, near: &Expansion<N>, speed: N, distance: N) -> N {
+    pub(crate) fn bound_near(&self, near: &mut Expansion<N>, speed: N) -> N {
+        let size = speed.abs();
+        let mut distance = self.moving.distance(near, size);
+        if Expansion::is_left(distance) {
+            let next = self.near(self.moving.ahead(size, distance));
+            *near = near.or(&next, distance);
+            distance = Expansion::within(self.moving.distance(near, size));
+        }
         self.resisting(speed, near.at(distance))
-    }
-
-    /// |ω|, as far as the law goes.
-    #[inline(always)]
-    fn size(&self, speed: N) -> N {
-        self.capped_from.min(speed.abs())
     }
 
     #[inline(always)]
@@ -143,15 +135,7 @@ mod tests {
         speeds: impl Iterator<Item = f64>,
     ) -> impl Iterator<Item = (f64, f64)> {
         let mut near = friction.near(0.0);
-        speeds.map(move |speed| {
-            let distance = friction.distance(&near, speed);
-            if Expansion::is_left(distance) {
-                near = friction.renewed(&near, speed, distance);
-            }
-            let distance = friction.distance(&near, speed);
-            assert!(!Expansion::is_left(distance), "{speed} rad/s");
-            (speed, friction.bound_near(&near, speed, distance))
-        })
+        speeds.map(move |speed| (speed, friction.bound_near(&mut near, speed)))
     }
 
     #[test]

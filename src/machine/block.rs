@@ -254,13 +254,7 @@ impl<const L: usize> Block<L> {
             let excess = loops.control_velocity(&demand, &mut state, instant as f64, compensation);
             let ticks = instant * timing.ticks_per_velocity;
             for tick in ticks..ticks + timing.ticks_per_velocity {
-                let friction = &loops.plant.slowing;
-                let mut distance = friction.distance(&near, state.motor.speed);
-                if Expansion::is_left(distance) {
-                    near = friction.renewed(&near, state.motor.speed, distance);
-                    distance = friction.distance(&near, state.motor.speed);
-                }
-                let slowing = friction.bound_near(&near, state.motor.speed, distance);
+                let slowing = loops.plant.slowing.bound_near(&mut near, state.motor.speed);
                 self.seen[tick].0.put(place, &state.motor);
                 if tick > 0 && (traced || TILTING) {
                     state.friction = loops.plant.friction_taking(taken);
