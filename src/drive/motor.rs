@@ -174,11 +174,9 @@ impl<N: Number> Motor<N> {
     ) -> (MotorState<N>, N) {
         let free = self.step(s, voltage, external);
         let taken = limited(free.speed, slowing);
-        let nothing = slowing.constant(0.0);
         let state = MotorState {
             current: taken.mul_add(-self.current_per_speed, free.current),
-            // The same bits as `free.speed - taken`, known earlier.
-            speed: (free.speed - slowing).max((free.speed + slowing).min(nothing)),
+            speed: free.speed - taken,
             angle: taken.mul_add(-self.angle_per_speed, free.angle),
         };
         (state, taken)

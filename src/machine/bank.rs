@@ -5,12 +5,12 @@ use pulp::{Arch, Scalar, Simd, WithSimd};
 use super::block::{Block, Demand, Done, Loops, LoopsState, Row, Tally, Timing};
 use crate::drive::MotorState;
 
-/// Lanes of a block of few axes: a vector of four, or less.
+/// Lanes of a block of few axes, where the processor has no vector of more: one of four, or less.
 const FEW: usize = 4;
-/// Lanes of a block of one machine's axes: a vector of eight, or two of four of which one is worked on while the
-/// other waits for itself.
+/// Lanes of a block of some: a vector of eight, or two of four of which one is worked on while the other waits for
+/// itself.
 const SOME: usize = 8;
-/// Lanes of a block of several machines: two vectors of eight.
+/// Lanes of a block of many: two vectors of eight.
 const MANY: usize = 16;
 
 /// How wide the processor's vectors are used. The results are the same bits whatever the width.
@@ -86,7 +86,7 @@ impl Bank {
     /// A bank of the axes `loops`.
     pub fn new(loops: &[Loops], timing: Timing) -> Self {
         let blocks = match loops.len() {
-            ..=FEW => Blocks::Few(filled(loops, timing)),
+            ..=FEW if Arch::new().dispatch(Lanes) <= FEW => Blocks::Few(filled(loops, timing)),
             ..=SOME => Blocks::Some(filled(loops, timing)),
             _ => Blocks::Many(filled(loops, timing)),
         };
@@ -172,8 +172,19 @@ fn run_all<const L: usize>(width: Width, period: Period<'_, L>) {
     }
 }
 
+/// How many numbers the processor reckons with at a time; with eight it has twice the registers as well.
+struct Lanes;
+
+impl WithSimd for Lanes {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> usize {
+        S::F64_LANES
+    }
+}
+
 /// `act` with vectors as wide as the processor has them, but four numbers at most.
-#[inline]
 fn four_at_most<A: WithSimd>(act: A) -> A::Output {
     match Arch::new() {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
