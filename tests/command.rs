@@ -125,6 +125,26 @@ fn an_axis_that_left_its_stroke_is_told() {
 }
 
 #[test]
+fn a_pose_beyond_a_stroke_is_told() {
+    assert!(!assert_runs(&["pose", "--joints", "x=0.1,z=-0.2"]).contains("stroke"));
+    let beyond = assert_runs(&["pose", "--joints", "x=5,y=0.1,z=9"]);
+    assert!(beyond.ends_with("; outside the stroke: x, z\n"), "{beyond}");
+    let json: Value =
+        serde_json::from_str(&assert_runs(&["pose", "--json", "--joints", "c=9"])).expect("JSON");
+    assert_eq!(json[0]["outside_stroke"], serde_json::json!([]));
+}
+
+#[test]
+fn a_range_of_trajectories_that_nobody_waits_for_is_refused() {
+    for [name, number] in [["--count", "0"], ["--first", "18446744073709551615"]] {
+        let output = run(&["stress", name, number]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(name) && message.contains(number), "{message}");
+    }
+}
+
+#[test]
 fn a_trace_has_a_row_per_trace_period() {
     let folder = Folder::new("period");
     let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.6,0.01\n");

@@ -59,6 +59,11 @@ fn stamps_that_topic_pub_fills_in_are_now() {
 fn faults_name_file_and_line() {
     assert_eq!(error(""), "p.yaml: there is no trajectory; it is a mapping with joint_names and points");
     assert_eq!(error("---\n"), "p.yaml: there is no trajectory; it is a mapping with joint_names and points");
+    assert_eq!(error("joint_names: [x]\npoints: 5\n"), "p.yaml:2: expected sequence start: points: 5");
+    assert_eq!(
+        error("points:\n- positions: [0]\n  time_from_start: 5\n"),
+        "p.yaml:3: expected mapping start: time_from_start: 5"
+    );
     assert_eq!(
         error("joint_names: [x]\npoints:\n- position: [0.0]\n"),
         "p.yaml:3: unknown field position; there are positions, velocities, accelerations, effort, \

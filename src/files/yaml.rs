@@ -34,7 +34,14 @@ pub(super) fn documents<T: DeserializeOwned>(text: &str) -> Result<Vec<T>, (u64,
     };
     serde_saphyr::from_multiple_with_options(text, options).map_err(|error| {
         let line = error.location().map_or(0, |location| location.line());
-        (line, message(error.without_snippet()))
+        let mut reason = message(error.without_snippet());
+        // Of what stands there, such a message says nothing.
+        if reason.starts_with("expected ")
+            && let Some(text) = (line as usize).checked_sub(1).and_then(|row| text.lines().nth(row))
+        {
+            reason += &format!(": {}", shortened(text.trim()));
+        }
+        (line, reason)
     })
 }
 

@@ -34,12 +34,20 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         // No minus before a zero.
         let [[x, y, z], [u, v, w]]: [[f64; 3]; 2] =
             [pose.tip, pose.axis].map(|v| v.map(|value| value + 0.0).into());
-        lines += &format!("tip {x} {y} {z} m, axis {u} {v} {w}\n");
+        let axes = config.axes().iter().zip(&joints);
+        let outside: Vec<&str> =
+            axes.filter(|(axis, at)| axis.limits().is_left_by(**at)).map(|(axis, _)| axis.name()).collect();
+        let remark = match outside.as_slice() {
+            [] => String::new(),
+            names => format!("; outside the stroke: {}", names.join(", ")),
+        };
+        lines += &format!("tip {x} {y} {z} m, axis {u} {v} {w}{remark}\n");
         // In the order of ROS: x, y, z, w.
         let orientation: [f64; 4] = kinematics.orientation(&joints).coords.into();
-        list.push(
-            json!({ "joints": joints, "tip": [x, y, z], "axis": [u, v, w], "orientation": orientation }),
-        );
+        list.push(json!({
+            "joints": joints, "tip": [x, y, z], "axis": [u, v, w], "orientation": orientation,
+            "outside_stroke": outside,
+        }));
     }
     Ok(if arguments.json { format!("{:#}\n", json!(list)) } else { lines })
 }

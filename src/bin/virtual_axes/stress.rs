@@ -15,6 +15,9 @@ use virtual_axes::tune::Watch;
 use crate::progress::Runs;
 use crate::{interrupt, table};
 
+/// Trajectories, and the number of the first, at most: nobody waits for more.
+const MOST: u64 = 1 << 62;
+
 /// What to run.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -22,10 +25,10 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// How many trajectories.
-    #[arg(long, default_value_t = 10_000)]
+    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..=MOST))]
     count: u64,
     /// Number of the first one.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=MOST))]
     first: u64,
     /// Threads; all cores if left out. The result does not depend on it.
     #[arg(long)]
