@@ -45,7 +45,9 @@ fn the_digest_follows_from_the_seed_alone() {
     assert_eq!(one, digest(Options { threads: 5, ..options(count) }));
     assert!(one != digest(Options { seed: 8, ..options(count) }));
     let few = digest(options(count / 4));
-    assert_eq!(few, digest(Options { width: Width::Baseline, ..options(count / 4) }));
+    for width in [Width::Four, Width::Baseline] {
+        assert_eq!(few, digest(Options { width, ..options(count / 4) }), "{width:?}");
+    }
 }
 
 #[test]

@@ -172,7 +172,7 @@ fn run_all<const L: usize>(width: Width, period: Period<'_, L>) {
     }
 }
 
-/// How many numbers the processor reckons with at a time; with eight it has twice the registers as well.
+/// How many numbers the processor reckons with at a time.
 struct Lanes;
 
 impl WithSimd for Lanes {

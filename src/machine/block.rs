@@ -210,6 +210,7 @@ impl<const L: usize> Block<L> {
 
     #[inline(always)]
     fn run_by<S: Simd, N: Fetch<S>>(&mut self, simd: S, timing: Timing, traced: bool) {
+        assert!(L.is_multiple_of(N::LANES), "a vector is no wider than a block");
         for place in 0..L / N::LANES {
             if self.tilting {
                 self.run_lanes::<S, N, true>(simd, place, timing, traced);
