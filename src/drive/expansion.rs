@@ -127,13 +127,10 @@ impl<N: Number> Expansion<N> {
         limited(distance, distance.constant(REACH))
     }
 
-    /// What is in force at a `distance`: itself as long as it holds, else the `next` one.
+    /// Where one of them does not hold at its distance.
     #[inline(always)]
-    pub fn or(&self, next: &Self, distance: N) -> Self {
-        let left = distance.constant(REACH).less(distance.abs());
-        let mut chosen = *next;
-        self.zip(&mut chosen, &mut |old: &N, new: &mut N| *new = new.select(left, *old));
-        chosen
+    pub fn left(distance: N) -> N::Mask {
+        distance.constant(REACH).less(distance.abs())
     }
 
     /// The sum at a distance.

@@ -76,7 +76,7 @@ impl<N: Number> Friction<N> {
         let mut distance = self.moving.distance(near, size);
         if Expansion::is_left(distance) {
             let next = self.near(self.moving.ahead(size, distance));
-            *near = near.or(&next, distance);
+            *near = near.or(next, Expansion::left(distance));
             distance = Expansion::within(self.moving.distance(near, size));
         }
         self.resisting(speed, near.at(distance))

@@ -114,9 +114,7 @@ impl<N: Number> Gravity<N> {
             let nothing = turned.constant(0.0);
             let step = self.ahead.select(nothing.less(turned), -self.ahead);
             let left = turned.constant(REACH).less(turned.abs());
-            let mut next = self.near(angle + step);
-            near.zip(&mut next, &mut |old: &N, new: &mut N| *new = new.select(left, *old));
-            *near = next;
+            *near = near.or(self.near(angle + step), left);
             turned = self.turned(near, angle);
         }
         near.at(turned)

@@ -29,6 +29,16 @@ macro_rules! numbers {
         }
 
         #[allow(dead_code, reason = "each structure is used in its own way")]
+        impl<N: $crate::lanes::Number> $name<N> {
+            /// `other` where the mask holds, else itself.
+            #[inline(always)]
+            pub(crate) fn or(&self, mut other: Self, mask: N::Mask) -> Self {
+                self.zip(&mut other, &mut |own: &N, other: &mut N| *other = other.select(mask, *own));
+                other
+            }
+        }
+
+        #[allow(dead_code, reason = "each structure is used in its own way")]
         impl $name {
             /// The same in `L` lanes.
             pub(crate) fn fill<const L: usize>(&self) -> $name<[f64; L]> {
