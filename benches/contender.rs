@@ -61,7 +61,7 @@ struct Deviation {
 }
 
 /// Machines that are run side by side on a core.
-const TOGETHER: usize = 32;
+const TOGETHER: usize = 16;
 
 /// Runs some machines side by side with all their figures: the part that is measured.
 fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures> {

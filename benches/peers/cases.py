@@ -17,7 +17,7 @@ POSITION_PERIOD = 6e-3
 """Tsp, s."""
 M_MIN = 1.0 / 60.0
 """One metre per minute, m/s."""
-SWEEP_MACHINES = 64
+SWEEP_MACHINES = 256
 """Machines of the sweep; their gains differ."""
 
 

@@ -22,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
@@ -37,6 +38,8 @@ VENV = ROOT / ".build" / "peers"
 C_FLAGS = ("-std=gnu11", "-O3", "-march=native", "-ffast-math")
 """Of the C loop."""
 REFERENCE = "C loop"
+ON_TWO = ", 2 cores"
+"""After the name of who has two cores; of the C loop two processes run at once, which have nothing to share."""
 ROUND_SECONDS = 0.2
 """Time that a contender gets in a round, about; it runs at least once."""
 SAME = 1e-6
@@ -120,6 +123,34 @@ class Contender:
             self.errors = None
 
 
+@dataclass
+class AtOnce(Contender):
+    """As many processes of one program at once as `copies` says: what the machine's cores are worth to it."""
+
+    copies: int = 2
+    others: list[Contender] = field(default_factory=list)
+
+    def start(self) -> None:
+        """Starts them."""
+        super().start()
+        for _ in range(1, self.copies):
+            self.others.append(Contender(self.name, self.command, self.bound))
+            self.others[-1].start()
+
+    def run(self, runs: int) -> dict:
+        """Lets each make these runs; an answer, with the seconds of the slowest divided by their number."""
+        with ThreadPoolExecutor(self.copies) as pool:
+            others = [pool.submit(other.run, runs) for other in self.others]
+            answers = [super().run(runs), *(other.result() for other in others)]
+        return {**answers[0], "seconds": max(answer["seconds"] for answer in answers) / self.copies}
+
+    def end(self) -> None:
+        """Ends them."""
+        super().end()
+        for other in self.others:
+            other.end()
+
+
 def build(source: str, folder: Path, *more: str) -> str:
     """Builds a C program with the flags of the C loop, unless `more` has others."""
     gcc = shutil.which("gcc")
@@ -174,9 +205,9 @@ def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tupl
     found: list[Contender] = []
     missing: dict[str, str] = {}
 
-    def add(name: str, command, bound: float = SAME) -> None:
+    def add(name: str, command, bound: float = SAME, kind: type[Contender] = Contender) -> None:
         try:
-            found.append(Contender(name, command(), bound))
+            found.append(kind(name, command(), bound))
         except NotToBeHad as reason:
             missing[name] = str(reason)
 
@@ -187,7 +218,8 @@ def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tupl
     add("virtual_axes", lambda: [library(program), *setpoints])
     # The time on a core is that of all cores together.
     if case.machines > 1 and not cpu and (os.cpu_count() or 1) > 1:
-        add("virtual_axes, 2 cores", lambda: [library(program), *setpoints, "--cores", "2"])
+        add("virtual_axes" + ON_TWO, lambda: [library(program), *setpoints, "--cores", "2"])
+        add(REFERENCE + ON_TWO, lambda: found[0].command, kind=AtOnce)
     if case.name == "single-axis":
         for name, module, script in (
             ("numba", "numba", "with_numba.py"),
@@ -274,7 +306,24 @@ def measure(case: Case, rounds: int, cpu: bool, program: str | None) -> dict:
                 }
             )
     clock = "time on a core" if cpu else "time"
-    return {"case": case.name, "clock": clock, "rounds": rounds, "results": results, "missing": missing}
+    return {
+        "case": case.name,
+        "clock": clock,
+        "rounds": rounds,
+        "results": results,
+        "two_cores_are_worth": worth_of_two(kept),
+        "missing": missing,
+    }
+
+
+def worth_of_two(kept: list[Contender]) -> dict[str, float]:
+    """How much sooner each that has two cores is done than with one, as the median over the rounds."""
+    times = {contender.name: contender.seconds for contender in kept}
+    return {
+        name: statistics.median(one / two for one, two in zip(seconds, times[name + ON_TWO], strict=True))
+        for name, seconds in times.items()
+        if name + ON_TWO in times
+    }
 
 
 def table(measured: dict) -> str:
@@ -291,6 +340,8 @@ def table(measured: dict) -> str:
             f"| {row['contender']} | {row['time_relative_to_c']:.3g} | {least:.3g} … {largest:.3g} "
             f"| {row['differs_by']:.1g} (bound {row['bound']:.1g}) |"
         )
+    if worth := measured["two_cores_are_worth"]:
+        lines += ["", "Two cores are worth " + ", ".join(f"{v:.2f} to {name}" for name, v in worth.items()) + "."]
     lines += [f"\nNot run: {name}: {reason}" for name, reason in measured["missing"].items()]
     return "\n".join(lines) + "\n"
 
