@@ -155,7 +155,9 @@ impl Radial {
 fn run_case(case: &Case, pool: Option<&ThreadPool>) -> Vec<Figures> {
     let run = |machines| run_machines(machines, case);
     match pool {
-        Some(pool) => pool.install(|| case.machines.par_chunks(TOGETHER).flat_map(run).collect()),
+        Some(pool) => {
+            pool.install(|| case.machines.par_chunks(TOGETHER).with_max_len(1).flat_map(run).collect())
+        }
         None => case.machines.chunks(TOGETHER).flat_map(run).collect(),
     }
 }

@@ -179,7 +179,7 @@ fn sweep(trial: &Trial<'_>, variants: &[MachineConfig], own: &[usize]) -> Vec<Fi
         trial::run_together(trial, setpoints("ballbar", program, trial.machine), some, own, || Ok(()))
             .expect("a run")
     };
-    variants.par_chunks(TOGETHER).flat_map(run).collect()
+    variants.par_chunks(TOGETHER).with_max_len(1).flat_map(run).collect()
 }
 
 /// More and more machines on one core, and the same machines on more cores.

@@ -211,3 +211,57 @@ impl<const L: usize> WithSimd for Period<'_, L> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::config::Parameters;
+    use crate::machine::{Machine, MachineParameters};
+
+    /// Positions of every tick and what the axes have come to, as bits, over motions that differ by axis.
+    fn seen(machine: &mut Machine) -> Vec<u64> {
+        let axes = machine.axis_count();
+        machine.reset(&vec![0.1; axes]);
+        let mut seen = Vec::new();
+        for k in 0..100 {
+            let psec = |axis: usize| 0.1 + 0.02 * (1.0 - (0.05 * (1 + axis) as f64 * f64::from(k)).cos());
+            machine.advance(&Vec::from_iter((0..axes).map(psec)), &[]);
+            for axis in 0..axes {
+                seen.extend(
+                    (0..machine.ticks_per_period()).map(|tick| machine.position(axis, tick).to_bits()),
+                );
+                let activity = machine.activity(axis);
+                seen.extend([activity.peak_current.to_bits(), activity.saturated_ticks]);
+            }
+        }
+        seen
+    }
+
+    /// Which size of blocks a machine gets depends on the processor; what comes out must not.
+    #[test]
+    fn blocks_of_each_size_give_the_same_bits_at_each_width() {
+        let config = Parameters::embedded_default().and_then(|p| p.machine_config()).expect("valid");
+        for first in 0..5 {
+            let places = Vec::from_iter(first..5);
+            let parameters = MachineParameters::of_axes(&config, &places).expect("can be discretised");
+            let loops: Vec<Loops> = parameters.axes.iter().map(|axis| axis.loops).collect();
+            let timing = parameters.timing();
+            let mut machine = Machine::new(Arc::new(parameters));
+            let wanted = seen(&mut machine);
+            let sizes = [
+                Blocks::Few(filled(&loops, timing)),
+                Blocks::Some(filled(&loops, timing)),
+                Blocks::Many(filled(&loops, timing)),
+            ];
+            for (size, blocks) in sizes.into_iter().enumerate() {
+                machine.bank.blocks = blocks;
+                for width in [Width::Widest, Width::Four, Width::Baseline] {
+                    machine.set_width(width);
+                    assert!(seen(&mut machine) == wanted, "axes from {first} on, size {size}, {width:?}");
+                }
+            }
+        }
+    }
+}

@@ -218,7 +218,8 @@ impl<'a> Bench<'a> {
         course: &Course,
         tunings: Vec<(Tuning, Option<Margins>)>,
     ) -> Result<Vec<Candidate>, TuneError> {
-        let some = tunings.par_chunks(TOGETHER).map(|tunings| self.run_some(course, tunings));
+        // A core takes what another has left piece by piece: unasked, rayon hands out several at a time.
+        let some = tunings.par_chunks(TOGETHER).with_max_len(1).map(|tunings| self.run_some(course, tunings));
         Ok(some.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
     }
 

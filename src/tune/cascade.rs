@@ -167,7 +167,11 @@ fn descend_all(
     runs: usize,
     tuning_at: &(impl Fn(&[f64]) -> Tuning + Sync),
 ) -> Result<Vec<Found>, TuneError> {
-    starts.into_par_iter().map(|start| descend(bench, limits, &start, steps, runs, tuning_at)).collect()
+    starts
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|start| descend(bench, limits, &start, steps, runs, tuning_at))
+        .collect()
 }
 
 /// Minimises from `start` on; margins and saturation are constraints.
