@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
@@ -25,6 +26,8 @@ MAY_GROW_MB = 1.5
 def test_a_late_reader_costs_no_more_after_half_a_million_samples():
     """The topic has another writer by then; who listens meanwhile misses nothing, gets nothing twice, and in order."""
     with Node(["-p", "time:=fast"]) as process, Drive(process=process, listen=False) as drive:
+        with pytest.raises(ValueError, match="keeps no samples"):
+            drive.record(0, TSP_NS)
 
         def listen(qos: QoSProfile, stamps: list[int]) -> Subscription:
             def keep(sample: bytes) -> None:

@@ -61,6 +61,10 @@ fn faults_name_file_and_line() {
     assert_eq!(error("---\n"), "p.yaml: there is no trajectory; it is a mapping with joint_names and points");
     assert_eq!(error("joint_names: [x]\npoints: 5\n"), "p.yaml:2: expected sequence start: points: 5");
     assert_eq!(
+        error("joint_names: &names [x]\npoints: *names\n"),
+        "p.yaml:2: expected mapping start: points: *names (what the alias stands for is in line 1)"
+    );
+    assert_eq!(
         error("points:\n- positions: [0]\n  time_from_start: 5\n"),
         "p.yaml:3: expected mapping start: time_from_start: 5"
     );

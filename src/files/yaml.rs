@@ -34,12 +34,19 @@ pub(super) fn documents<T: DeserializeOwned>(text: &str) -> Result<Vec<T>, (u64,
     };
     serde_saphyr::from_multiple_with_options(text, options).map_err(|error| {
         let line = error.location().map_or(0, |location| location.line());
-        let mut reason = message(error.without_snippet());
+        let (error, alias) = match error.without_snippet() {
+            Error::AliasError { error, locations, .. } => (&**error, locations.defined_location.line()),
+            error => (error, line),
+        };
+        let mut reason = message(error);
         // Of what stands there, such a message says nothing.
         if reason.starts_with("expected ")
             && let Some(text) = (line as usize).checked_sub(1).and_then(|row| text.lines().nth(row))
         {
             reason += &format!(": {}", shortened(text.trim()));
+        }
+        if alias != line {
+            reason += &format!(" (what the alias stands for is in line {alias})");
         }
         (line, reason)
     })

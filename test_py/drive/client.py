@@ -235,11 +235,13 @@ class Drive:
 
     def now(self) -> int:
         """The newest position instant that the axes have published, ns of the node's clock."""
+        self._must_listen()
         with self._changed:
             return stamp_of(self._samples["states"][-1])
 
     def wait_until(self, stamp_ns: int, timeout: float) -> None:
         """Wait until everything up to `stamp_ns` has been published."""
+        self._must_listen()
         self.wait_for(
             lambda: all(samples and stamp_of(samples[-1]) >= stamp_ns for samples in self._samples.values()),
             timeout,
@@ -302,6 +304,7 @@ class Drive:
 
     def run(self, trajectory: JointTrajectory, timeout: float = 60.0, settle: float = 0.0) -> Recording:
         """Execute set-points to their end and `settle` s on; raises Refused."""
+        self._must_listen()
         accepted = self.accept(trajectory)
         result = self.end(accepted.sequence_number, timeout)
         start = to_ns(accepted.start)
@@ -313,6 +316,7 @@ class Drive:
 
     def record(self, start: int, end: int, result: TrajectoryResult | None = None) -> Recording:
         """What was published from `start` to `end`, ns of the node's clock, both included."""
+        self._must_listen()
 
         def gather(key: str, kind: type, fields: Sequence[str]) -> Series:
             with self._changed:
@@ -327,6 +331,10 @@ class Drive:
             result=result,
         )
 
+    def _must_listen(self) -> None:
+        if not self._samples:
+            raise ValueError("with listen=False a drive keeps no samples")
+
     def forget(self) -> None:
         """Drop the samples so far but the newest of each topic."""
         with self._changed:
@@ -335,6 +343,7 @@ class Drive:
 
     def latest(self, field: str = "position") -> dict[str, Any]:
         """A field of the newest drive states, by joint."""
+        self._must_listen()
         with self._changed:
             message = deserialize_message(self._samples["states"][-1], DriveStates)
         return dict(zip(message.name, getattr(message, field)))

@@ -31,8 +31,8 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=MOST))]
     first: u64,
     /// Threads; all cores if left out. The result does not depend on it.
-    #[arg(long)]
-    threads: Option<NonZeroUsize>,
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// How wide vectors of the processor are used. The result does not depend on it.
     #[arg(long, value_enum, default_value_t = WidthName::Widest)]
     width: WidthName,
@@ -81,12 +81,12 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     if let Some(number) = arguments.only {
         return only(&fleet, arguments, number);
     }
-    let threads = arguments.threads.or_else(|| thread::available_parallelism().ok());
+    let cores = || thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let options = Options {
         seed: arguments.seed,
         first: arguments.first,
         count: arguments.count,
-        threads: threads.map_or(1, NonZeroUsize::get),
+        threads: arguments.threads.map_or_else(cores, usize::from),
         width: arguments.width.into(),
     };
     let progress = Runs::new();
