@@ -35,6 +35,8 @@ impl Effort {
 
 /// Singular values below this part of the largest carry no information.
 const RANK: f64 = 1e-10;
+/// Iterations for the singular values of a matrix of some ten rows; it takes some ten.
+const SVD_ITERATIONS: usize = 1000;
 
 /// A parameter of a nonlinear fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -219,7 +221,11 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }
     let scale = DMatrix::from_diagonal(&scale);
     let scaled = &scale * matrix * &scale;
-    let values = scaled.singular_values();
+    // With a number that is none among them the decomposition would never end.
+    if !scaled.iter().all(|s| s.is_finite()) {
+        return None;
+    }
+    let values = scaled.clone().try_svd(false, false, f64::EPSILON, SVD_ITERATIONS)?.singular_values;
     let sound = values.min() > RANK * values.max();
     sound.then(|| scaled.try_inverse()).flatten().map(|inverse| &scale * inverse * &scale)
 }
@@ -257,6 +263,14 @@ pub(super) fn robust(values: &[f64]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_matrix_with_a_number_that_is_none_has_no_inverse() {
+        for strange in [f64::INFINITY, f64::NAN] {
+            assert!(inverse(&DMatrix::from_row_slice(2, 2, &[1.0, 0.5, 0.5, strange])).is_none());
+            assert!(inverse(&DMatrix::from_row_slice(2, 2, &[1.0, strange, strange, 1.0])).is_none());
+        }
+    }
 
     #[test]
     fn a_line_through_three_points_has_the_textbook_errors() {
