@@ -9,9 +9,12 @@
 //! figures. Without arguments it says so and ends.
 
 use std::error::Error;
+use std::fmt::Display;
 use std::hint::black_box;
 use std::io::{self, BufRead, Write};
+use std::num::{NonZeroU8, NonZeroU16};
 use std::ops::Range;
+use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -203,13 +206,18 @@ fn without_sections(text: &str, joints: &[String]) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
+/// The value of an option.
+fn value<T: FromStr<Err: Display>>(option: &str, word: &str) -> Result<T, String> {
+    word.parse().map_err(|error| format!("{option} {word}: {error}"))
+}
+
 fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
     let (path, options) = arguments.split_first().ok_or(USAGE)?;
     let text = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
     let mut lines = text.lines();
     let joints: Vec<String> =
         lines.next().ok_or("no first line")?.split_whitespace().map(str::to_owned).collect();
-    let number = |word: &str| word.parse::<f64>();
+    let number = |word: &str| word.parse::<f64>().map_err(|error| format!("{path}: {word}: {error}"));
     let rows: Vec<Vec<f64>> =
         lines.map(|line| line.split_whitespace().map(number).collect()).collect::<Result<_, _>>()?;
     if rows.is_empty() || rows.iter().any(|row| row.len() != joints.len()) {
@@ -218,14 +226,14 @@ fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
     let (mut circle, mut count, mut cores) = (None, 1, 1);
     let mut words = options.iter();
     while let Some(word) = words.next() {
-        let mut next = || words.next().ok_or(USAGE);
+        let mut next = || words.next().ok_or_else(|| format!("{word}: what? {USAGE}"));
         match word.as_str() {
             "--circle" if joints.len() >= 2 => {
-                let (radius, first, last) = (next()?.parse()?, next()?.parse()?, next()?.parse()?);
-                circle = Some(Circle { radius, window: first..last });
+                let radius = value(word, next()?)?;
+                circle = Some(Circle { radius, window: value(word, next()?)?..value(word, next()?)? });
             }
-            "--machines" => count = next()?.parse()?,
-            "--cores" => cores = next()?.parse()?,
+            "--machines" => count = i32::from(value::<NonZeroU16>(word, next()?)?.get()),
+            "--cores" => cores = usize::from(value::<NonZeroU8>(word, next()?)?.get()),
             _ => return Err(format!("{word}: {USAGE}").into()),
         }
     }

@@ -136,9 +136,13 @@ fn a_pose_beyond_a_stroke_is_told() {
 
 #[test]
 fn a_stress_that_nobody_waits_for_is_refused() {
-    for [name, number] in
-        [["--count", "0"], ["--first", "18446744073709551615"], ["--threads", "0"], ["--threads", "1025"]]
-    {
+    for [name, number] in [
+        ["--count", "0"],
+        ["--first", "18446744073709551615"],
+        ["--threads", "0"],
+        ["--threads", "1025"],
+        ["--seed", "-1"],
+    ] {
         let output = run(&["stress", name, number]);
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{message}");

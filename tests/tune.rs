@@ -297,9 +297,10 @@ fn costs_are_read_and_refused_by_name() {
     for (text, message) in [
         ("colour", "unknown term colour; there are contour, contour-rms, tracking, rms, current, activity"),
         ("", "unknown term ; there are contour, contour-rms, tracking, rms, current, activity"),
-        ("rms=-1", "rms=-1: the weight must be a finite number, not negative"),
-        ("rms=inf", "rms=inf: the weight must be a finite number, not negative"),
-        ("rms=much", "rms=much: the weight must be a finite number, not negative"),
+        ("rms=-1", "rms=-1: the weight must be a number from 0 to 1e9"),
+        ("rms=inf", "rms=inf: the weight must be a number from 0 to 1e9"),
+        ("rms=1e10", "rms=10000000000: the weight must be a number from 0 to 1e9"),
+        ("rms=much", "rms=much: the weight must be a number from 0 to 1e9"),
         ("rms=1,rms=2", "rms stands twice"),
         ("rms=0,contour=0", "no term has a weight: every tuning would cost the same"),
     ] {

@@ -31,11 +31,11 @@ def screen(arguments: argparse.Namespace, designs: int, threads: int) -> float:
     ]  # fmt: skip
     environment = {**os.environ, "RAYON_NUM_THREADS": str(threads)}
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
-    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    done = subprocess.run(command, env=environment, capture_output=True)
     seconds = time.monotonic() - start
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}: ended with {done.returncode}")
+        sys.exit(f"{' '.join(command)}: ended with {done.returncode}: {done.stderr.decode(errors='replace').strip()}")
     found = json.loads(done.stdout)
     runs, duration = found["runs"], found["best"]["figures"]["duration_s"]
     core = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
@@ -53,6 +53,8 @@ def main() -> None:
     parser.add_argument("--designs", type=int, default=100_000)
     parser.add_argument("--part", type=int, default=10, help="one core screens the designs divided by this")
     arguments = parser.parse_args()
+    if arguments.part < 1:
+        parser.error("--part: one at least")
     two = screen(arguments, arguments.designs, 2)
     one = screen(arguments, max(arguments.designs // arguments.part, 1), 1)
     print(f"two cores are worth {two / one:.2f} of one")

@@ -5,9 +5,10 @@
 
 Every contender is a process that stays alive, has compiled and warmed up, and runs once for each line that it is
 given. First the figures of each are compared with those of the C loop, to a bound that is printed; only who keeps it
-is timed. Then all run in turns. Only ratios are printed: how much longer a contender takes than the C loop took in
-the same round for the same simulated time, as the median over the rounds. With --cpu the time is that of all threads
-of a contender on a core, as Linux counts it, for machines that have other work to do; without, it is the clock's.
+is timed, and without this library the status is 1. Then all run in turns. Only ratios are printed: how much longer a
+contender takes than the C loop took in the same round for the same simulated time, as the median over the rounds.
+With --cpu the time is that of all threads of a contender on a core, as Linux counts it, for machines that have other
+work to do; without, it is the clock's.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ VENV = ROOT / ".build" / "peers"
 C_FLAGS = ("-std=gnu11", "-O3", "-march=native", "-ffast-math")
 """Of the C loop."""
 REFERENCE = "C loop"
+LIBRARY = "virtual_axes"
 ON_TWO = ", 2 cores"
 """After the name of who has two cores; of the C loop two processes run at once, which have nothing to share."""
 ROUND_SECONDS = 0.2
@@ -70,15 +72,18 @@ class Contender:
         threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
         # Not a pipe: nobody reads it before the end.
         self.errors = tempfile.TemporaryFile("w+")
-        self.process = subprocess.Popen(
-            self.command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self.errors,
-            text=True,
-            cwd=HERE,
-            env={**os.environ, **threads, "PYTHONDONTWRITEBYTECODE": "1", "JAX_PLATFORMS": "cpu"},
-        )
+        try:
+            self.process = subprocess.Popen(
+                self.command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self.errors,
+                text=True,
+                cwd=HERE,
+                env={**os.environ, **threads, "PYTHONDONTWRITEBYTECODE": "1", "JAX_PLATFORMS": "cpu"},
+            )
+        except OSError as reason:
+            raise NotToBeHad(str(reason)) from reason
 
     def on_core(self) -> float:
         """Seconds that its threads have been on a core so far."""
@@ -110,7 +115,13 @@ class Contender:
             self.errors.seek(0)
             said = self.errors.read().strip().splitlines()
             raise NotToBeHad(said[-1] if said else f"ended with status {status}")
-        return json.loads(line)
+        try:
+            answer = json.loads(line)
+            if not float(answer["seconds"]) > 0:
+                raise NotToBeHad(f"it says that a run took {answer['seconds']} s")
+        except (KeyError, TypeError, ValueError) as reason:
+            raise NotToBeHad(f"{line.strip()[:60]} is no answer: {reason!r}") from reason
+        return answer
 
     def end(self) -> None:
         """Ends it, and waits for that."""
@@ -215,10 +226,10 @@ def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tupl
     if not found:
         return found, missing
     add("C loop, -O2", lambda: [build("scalar.c", folder, "-O2"), *table_first])
-    add("virtual_axes", lambda: [library(program), *setpoints])
+    add(LIBRARY, lambda: [library(program), *setpoints])
     # The time on a core is that of all cores together.
     if case.machines > 1 and not cpu and (os.cpu_count() or 1) > 1:
-        add("virtual_axes" + ON_TWO, lambda: [library(program), *setpoints, "--cores", "2"])
+        add(LIBRARY + ON_TWO, lambda: [library(program), *setpoints, "--cores", "2"])
         add(REFERENCE + ON_TWO, lambda: found[0].command, kind=AtOnce)
     if case.name == "single-axis":
         for name, module, script in (
@@ -237,16 +248,22 @@ def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tupl
 
 
 def compared(reference: dict, answer: dict) -> float:
-    """The largest relative difference of a figure that both have."""
+    """The largest relative difference of a figure that both have; infinite where one has none."""
     worst = 0.0
 
-    def compare(value: float, wanted: float, scale: float) -> None:
+    def compare(value: float | None, wanted: float, scale: float) -> None:
         nonlocal worst
-        worst = max(worst, abs(value - wanted) / scale if scale else math.inf if value else 0.0)
+        if value is None or not math.isfinite(value):
+            worst = math.inf
+        else:
+            worst = max(worst, abs(value - wanted) / scale if scale else math.inf if value else 0.0)
 
     for mine, other in zip(reference["machines"], answer["machines"], strict=True):
         for joint, figures in mine["axes"].items():
-            for key in figures.keys() & other["axes"][joint].keys() - {"position"}:
+            both = figures.keys() & other["axes"][joint].keys() - {"position"}
+            if not both:
+                raise ValueError(f"no figure of {joint}")
+            for key in both:
                 compare(other["axes"][joint][key], figures[key], abs(figures[key]))
         # A mean may be next to nothing: each is taken against the largest of the three.
         circle = mine.get("circle", {})
@@ -264,7 +281,10 @@ def check_all(all_of_them: list[Contender], missing: dict[str, str]) -> list[Con
             contender.start()
             answer = contender.run(1)
             reference = reference or answer
-            contender.differs = compared(reference, answer)
+            try:
+                contender.differs = compared(reference, answer)
+            except (KeyError, TypeError, ValueError) as reason:
+                raise NotToBeHad(f"its figures cannot be compared: {reason!r}") from reason
             if not contender.differs <= contender.bound:
                 raise NotToBeHad(f"its figures differ by {contender.differs:.2g}, more than {contender.bound:.2g}")
             again = contender.run(1)["seconds"]
@@ -328,8 +348,9 @@ def worth_of_two(kept: list[Contender]) -> dict[str, float]:
 
 def table(measured: dict) -> str:
     """A case as a table in Markdown."""
+    rounds = measured["rounds"]
     lines = [
-        f"### {measured['case']}: median of {measured['rounds']} rounds",
+        f"### {measured['case']}: " + (f"median of {rounds} rounds" if rounds > 1 else "one round"),
         "",
         f"| contender | {measured['clock']}, C loop = 1 | least … largest of a round | figures differ by at most |",
         "|---|---|---|---|",
@@ -338,7 +359,7 @@ def table(measured: dict) -> str:
         least, largest = row["least_and_largest_of_a_round"]
         lines.append(
             f"| {row['contender']} | {row['time_relative_to_c']:.3g} | {least:.3g} … {largest:.3g} "
-            f"| {row['differs_by']:.1g} (bound {row['bound']:.1g}) |"
+            f"| {row['differs_by']:.1g} (bound {row['bound']:.2g}) |"
         )
     if worth := measured["two_cores_are_worth"]:
         lines += ["", "Two cores are worth " + ", ".join(f"{v:.2f} to {name}" for name, v in worth.items()) + "."]
@@ -357,13 +378,20 @@ def main() -> int:
     arguments = parser.parse_args()
     if arguments.rounds < 1:
         parser.error("--rounds: one at least")
+    if arguments.json:
+        # What cannot be written is said before anything is measured.
+        try:
+            arguments.json.touch()
+        except OSError as reason:
+            parser.error(f"--json: {reason}")
     measured = []
     for name in arguments.case or list(CASES):
         measured.append(measure(CASES[name], arguments.rounds, arguments.cpu, arguments.contender))
         print(table(measured[-1]), flush=True)
     if arguments.json:
         arguments.json.write_text(json.dumps(measured, indent=2) + "\n")
-    return 0 if all(case["results"] for case in measured) else 1
+    took_part = [{row["contender"] for row in case["results"]} for case in measured]
+    return 0 if all({REFERENCE, LIBRARY} <= names for names in took_part) else 1
 
 
 if __name__ == "__main__":

@@ -96,6 +96,9 @@ fn has_contour(figures: &Figures) -> bool {
     figures.contour.is_some() && moving().count() > 1 && moving().any(|axis| axis.kind == AxisKind::Linear)
 }
 
+/// Of a term: beside each other they leave room for any ratio, and a sum of figures stays a number.
+const LARGEST_WEIGHT: f64 = 1e9;
+
 /// A weighted sum of figures, to be as small as possible.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cost {
@@ -112,7 +115,7 @@ pub enum CostError {
         term: String,
     },
     /// A weight that is none.
-    #[error("{term}={weight}: the weight must be a finite number, not negative")]
+    #[error("{term}={weight}: the weight must be a number from 0 to {LARGEST_WEIGHT:e}")]
     Weight {
         /// Of which figure.
         term: &'static str,
@@ -144,7 +147,7 @@ impl Cost {
     /// [`CostError`].
     pub fn new(terms: &[(Term, f64)]) -> Result<Self, CostError> {
         for (place, (term, weight)) in terms.iter().enumerate() {
-            if !(weight.is_finite() && *weight >= 0.0) {
+            if !(0.0..=LARGEST_WEIGHT).contains(weight) {
                 return Err(CostError::Weight { term: term.name(), weight: weight.to_string() });
             }
             if terms[..place].iter().any(|(before, _)| before == term) {

@@ -22,16 +22,16 @@ const MOST: u64 = 1 << 62;
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// What everything random follows from.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// How many trajectories.
-    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..=MOST))]
+    #[arg(long, default_value_t = 10_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=MOST))]
     count: u64,
     /// Number of the first one.
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=MOST))]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(..=MOST))]
     first: u64,
     /// Threads; all cores if left out. The result does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// How wide vectors of the processor are used. The result does not depend on it.
     #[arg(long, value_enum, default_value_t = WidthName::Widest)]
@@ -41,7 +41,7 @@ pub struct Arguments {
     #[arg(long)]
     machine: Vec<String>,
     /// Run this trajectory alone, and print what it is.
-    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["count", "first", "threads", "json"])]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, conflicts_with_all = ["count", "first", "threads", "json"])]
     only: Option<u64>,
     /// Print the figures as one JSON object.
     #[arg(long)]

@@ -50,7 +50,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// Designs of predictive controllers in the first grid, at least: more of λ between its first and its last.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_DESIGNS))]
+    #[arg(long, allow_negative_numbers = true, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_DESIGNS))]
     designs: Option<u64>,
     /// One more path to run the tuning that was found on; can be given several times.
     #[arg(long, value_name = "SCENARIO|FILE")]
