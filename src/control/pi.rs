@@ -64,7 +64,7 @@ impl<N: Number> Pi<N> {
         let y = limited(wanted, self.limit);
         s.excess = wanted - y;
         let nothing = error.constant(0.0);
-        s.integral = s.integral + nothing.select(nothing.less(error * s.excess), step);
+        s.integral = (s.integral + step).select((error * s.excess).at_most(nothing), s.integral);
         y
     }
 }

@@ -85,9 +85,9 @@ impl<N: Number> Friction<N> {
     #[inline(always)]
     fn resisting(&self, speed: N, moving: N) -> N {
         let nothing = speed.constant(0.0);
-        let torque = moving.select(nothing.less(speed.abs()), self.breakaway);
+        let moves = nothing.less(speed.abs());
         // Extrapolated, the law may change its sign.
-        torque.max(nothing)
+        moving.select(moves, nothing).max(nothing.select(moves, self.breakaway))
     }
 }
 

@@ -41,6 +41,9 @@ pub trait Number:
     /// Where `self` is smaller.
     fn less(self, other: Self) -> Self::Mask;
 
+    /// Where `self` is smaller or equal.
+    fn at_most(self, other: Self) -> Self::Mask;
+
     /// `self` where the mask holds, else `other`.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
 
@@ -89,6 +92,11 @@ impl Number for f64 {
     }
 
     #[inline(always)]
+    fn at_most(self, other: f64) -> bool {
+        self <= other
+    }
+
+    #[inline(always)]
     fn select(self, mask: bool, other: f64) -> f64 {
         if mask { self } else { other }
     }
@@ -120,11 +128,11 @@ mod tests {
     /// Values whose minimum, maximum and bounds have rules of their own.
     const ODD: [f64; 8] = [0.0, -0.0, 1.5, -2.5, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-320];
 
-    fn all<N: Number>(a: N, b: N) -> [N; 10] {
-        let chosen = a.select(a.less(b), b + b);
+    fn all<N: Number>(a: N, b: N) -> [N; 11] {
+        let (chosen, kept) = (a.select(a.less(b), b + b), a.select(a.at_most(b), b + b));
         let product = a.mul_add(b, -a);
         let power = (a + a.constant(3.0)).times_power_of_two(a.constant(6_755_399_441_055_734.0));
-        [a + b, a - b, a * b, product, a.abs(), a.min(b), a.max(b), chosen, limited(a, b), power]
+        [a + b, a - b, a * b, product, a.abs(), a.min(b), a.max(b), chosen, kept, limited(a, b), power]
     }
 
     struct Everything;

@@ -80,6 +80,11 @@ impl<N: Number> Number for Twice<N> {
     }
 
     #[inline(always)]
+    fn at_most(self, other: Self) -> Self::Mask {
+        (self.0.at_most(other.0), self.1.at_most(other.1))
+    }
+
+    #[inline(always)]
     fn select(self, mask: Self::Mask, other: Self) -> Self {
         Twice(self.0.select(mask.0, other.0), self.1.select(mask.1, other.1))
     }

@@ -131,6 +131,11 @@ impl<S: Simd> Number for Vector<S> {
     }
 
     #[inline(always)]
+    fn at_most(self, other: Self) -> Self::Mask {
+        self.simd.less_than_or_equal_f64s(self.value, other.value)
+    }
+
+    #[inline(always)]
     fn select(self, mask: S::m64s, other: Self) -> Self {
         self.with(self.simd.select_f64s(mask, self.value, other.value))
     }

@@ -237,6 +237,7 @@ impl<const L: usize> Block<L> {
         let mut near: Expansion<N> = self.near.0.fetch(simd, place);
         let mut state: LoopsState<N> = self.state.0.fetch(simd, place);
         let nothing = state.friction.constant(0.0);
+        let one = nothing.constant(1.0);
         state.current_excess = nothing;
         let mut saturated_ticks = nothing;
         let mut incline: Incline<N> = self.incline.0.fetch(simd, place);
@@ -266,10 +267,11 @@ impl<const L: usize> Block<L> {
                     }
                 }
                 let (voltage, saturated) = loops.control_current(&mut state, excess);
-                saturated_ticks = saturated_ticks + saturated;
+                saturated_ticks = (saturated_ticks + one).select(saturated, saturated_ticks);
                 taken = loops.plant.step_under(&mut state.motor, voltage, external, slowing);
                 if traced || tick == 0 {
                     let LoopsState { current_setpoint, friction, gravity, .. } = state;
+                    let saturated = one.select(saturated, nothing);
                     let done = Done { current_setpoint, voltage, friction, gravity, saturated };
                     self.done[tick].0.put(place, &done);
                 }
@@ -307,15 +309,13 @@ impl<N: Number> Loops<N> {
         excess + demand.velocity_excess.abs()
     }
 
-    /// The current loop: the voltage comes back, and 1 where a set-point was at its limit, else 0. `excess` is
-    /// that of the outer loops.
+    /// The current loop: the voltage comes back, and where a set-point was at its limit. `excess` is that of the
+    /// outer loops.
     #[inline(always)]
-    fn control_current(&self, state: &mut LoopsState<N>, excess: N) -> (N, N) {
+    fn control_current(&self, state: &mut LoopsState<N>, excess: N) -> (N, N::Mask) {
         let error = state.current_setpoint - state.motor.current;
         let voltage = self.current.update(&mut state.current, error);
         let nothing = excess.constant(0.0);
-        let beyond = nothing.less(excess + state.current.excess.abs());
-        let saturated = excess.constant(1.0).select(beyond, nothing);
-        (voltage, saturated)
+        (voltage, nothing.less(excess + state.current.excess.abs()))
     }
 }
