@@ -5,11 +5,16 @@
 #     ./demo.sh [--fast] [--out FILE.png]
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-case ${1:-} in
-  "" | --fast | --out | --out=*) ;;
-  -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
-  *) echo "demo: no option $1: --fast, --out FILE.png or --help" >&2 && exit 2 ;;
-esac
+options=("$@")
+while [ $# -gt 0 ]; do
+  case $1 in
+    --fast | --out=?*) ;;
+    --out) [ $# -gt 1 ] || { echo "demo: --out wants a file" >&2 && exit 2; } && shift ;;
+    -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
+    *) echo "demo: no option $1: --fast, --out FILE.png or --help" >&2 && exit 2 ;;
+  esac
+  shift
+done
 command -v cargo >/dev/null || { echo "demo: needs cargo, Rust's build tool (https://rustup.rs)" >&2; exit 1; }
 
 "$root/tools/setup.sh"
@@ -22,7 +27,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 unset ROS_STATIC_PEERS ROS_LOCALHOST_ONLY
 
 # demo.py stops the node however it ends; this shell only makes sure that it is told to.
-python "$root/test_py/demo.py" "$@" &
+python "$root/test_py/demo.py" "${options[@]}" &
 demo=$!
 trap 'kill -TERM "$demo" 2>/dev/null || true; wait "$demo" || true' EXIT
 trap 'exit 130' INT

@@ -3,6 +3,9 @@
 #
 #     ./test.sh [arguments for pytest]
 set -euo pipefail
+case ${1:-} in
+  -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
+esac
 cd "$(dirname "${BASH_SOURCE[0]}")"
 root=$PWD
 logs=$root/.build/logs

@@ -12,7 +12,7 @@ use std::error::Error;
 use std::fmt::Display;
 use std::hint::black_box;
 use std::io::{self, BufRead, Write};
-use std::num::{NonZeroU8, NonZeroU16};
+use std::num::{NonZeroU8, NonZeroU16, NonZeroU32};
 use std::ops::Range;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -276,13 +276,14 @@ fn serve(case: &Case) -> Result<(), Box<dyn Error>> {
         (case.cores > 1).then(|| ThreadPoolBuilder::new().num_threads(case.cores).build()).transpose()?;
     for line in io::stdin().lock().lines() {
         let line = line?;
-        let runs: u32 = line.strip_prefix("run ").ok_or("`run N` is wanted")?.trim().parse()?;
+        let runs = line.strip_prefix("run ").and_then(|runs| runs.trim().parse::<NonZeroU32>().ok());
+        let runs = runs.ok_or("`run N` is wanted, N from 1 on")?.get();
         let began = Instant::now();
         let mut figures = Vec::new();
-        for _ in 0..runs.max(1) {
+        for _ in 0..runs {
             figures = black_box(run_case(black_box(case), pool.as_ref()));
         }
-        let seconds = began.elapsed().as_secs_f64() / f64::from(runs.max(1));
+        let seconds = began.elapsed().as_secs_f64() / f64::from(runs);
         let machines: Vec<Value> = figures.iter().map(|figures| as_json(figures, &case.joints)).collect();
         println!("{}", json!({ "seconds": seconds, "machines": machines }));
         io::stdout().flush()?;

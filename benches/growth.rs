@@ -210,9 +210,16 @@ fn machines(config: &MachineConfig, counts: &[usize], cores: &[usize]) {
     }
 }
 
+/// What can be asked for.
+const TABLES: [&str; 4] = ["length", "axes", "machines", "cores"];
+
 fn main() {
     // `cargo bench` says --bench.
     let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    // Other words are for the other benchmarks of `cargo bench`.
+    if !wanted.is_empty() && !wanted.iter().any(|word| TABLES.contains(&word.as_str())) {
+        println!("none is named {}: there are {}", wanted.join(", "), TABLES.join(", "));
+    }
     let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
     let config = parameters::<&str>(&[]).machine_config().expect("the shipped machine");
     if is_wanted("length") {

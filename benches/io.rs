@@ -280,6 +280,8 @@ fn ratios(cases: &mut [Case]) {
 }
 
 fn main() {
+    // It ends the program at an option that it does not know: before there is anything to clear away.
+    let mut criterion = Criterion::default().sample_size(10).configure_from_args();
     let folder = Folder(std::env::temp_dir().join(format!("virtual_axes_io_{}", std::process::id())));
     fs::create_dir_all(&folder.0).expect("a folder for files");
     let machine: &'static MachineConfig = Box::leak(Box::new(
@@ -291,7 +293,6 @@ fn main() {
     let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| name.contains(word.as_str()));
     cases.retain(|case| case.against.is_none() || is_wanted(case.name));
     ratios(&mut cases);
-    let mut criterion = Criterion::default().sample_size(10).configure_from_args();
     let mut group = criterion.benchmark_group("files");
     for case in &mut cases {
         group.throughput(Throughput::Bytes(case.bytes));

@@ -16,6 +16,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from drive import Ballbar, Drive, Node, Recording, ballbar, circular_deviation, joint_trajectory
@@ -128,6 +129,13 @@ def main() -> int:
     parser.add_argument("--fast", action="store_true", help="as fast as the machine can, not in real time")
     parser.add_argument("--out", type=Path, default=Path(__file__).resolve().parent.parent / ".build" / "ballbar.png")
     arguments = parser.parse_args()
+    kinds = Figure().canvas.get_supported_filetypes()
+    if arguments.out.suffix[1:].lower() not in kinds:
+        parser.error(f"--out: {arguments.out} is no picture: its name must end in one of {', '.join(sorted(kinds))}")
+    try:
+        arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"--out: {error}")
     # A polite end for SIGTERM and a closed terminal too, so that the node is stopped.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: sys.exit(1))
@@ -146,7 +154,6 @@ def main() -> int:
         status = process.stop()
     print(f"node ended with status {status}\n")
     print(report(path, runs))
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
     draw(path, runs, arguments.out)
     print(f"\npicture: {arguments.out}")
     return 0

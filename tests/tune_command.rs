@@ -182,6 +182,7 @@ fn options_that_cannot_be_are_refused_by_name() {
         (vec!["--controller", "rst"], vec!["--controller", "gpc", "cascade"]),
         (vec!["--set", "x.position_loop.controller=rst"], vec!["x.position_loop"]),
         (vec!["--seed", "-1"], vec!["--seed"]),
+        (vec!["--seed", "2", "--controller", "gpc"], vec!["--seed", "cascade"]),
         (vec!["--contrast"], vec!["--also"]),
         (vec!["--contrast", "--also", "corner-90", "--controller", "cascade"], vec!["--contrast", "gpc"]),
         (vec!["--designs", "10", "--controller", "cascade"], vec!["--designs", "gpc"]),

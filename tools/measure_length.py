@@ -128,28 +128,33 @@ def row(seconds: int, runs: list[Run], read: int, first: tuple[int, list[Run]]) 
     )
 
 
-def length(text: str) -> int:
-    seconds = int(text)
-    if seconds <= 0:
-        raise argparse.ArgumentTypeError(f"{text} s is no length")
-    return seconds
+def whole(text: str) -> int:
+    """A number from 1 on."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 on")
+    return int(text)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--command", type=Path, default=COMMAND, help="the program virtual_axes")
     parser.add_argument(
-        "--seconds", type=length, nargs="+", default=LENGTHS, metavar="S", help="lengths of the set-points"
+        "--seconds", type=whole, nargs="+", default=LENGTHS, metavar="S", help="lengths of the set-points"
     )
     parser.add_argument("--report", action="store_true", help="write a page, too")
     parser.add_argument("--trace", action="store_true", help="write a trace, too")
-    parser.add_argument("--rounds", type=length, default=1, metavar="N", help="how often each length is run")
+    parser.add_argument("--rounds", type=whole, default=1, metavar="N", help="how often each length is run")
     parser.add_argument("--folder", type=Path, help="where set-points and outputs are for a while")
     parser.add_argument("--write", nargs=2, metavar=("S", "FILE"), help="write set-points and run nothing")
     arguments = parser.parse_args()
     if arguments.write:
-        write_psec(Path(arguments.write[1]), int(arguments.write[0]))
+        try:
+            write_psec(Path(arguments.write[1]), whole(arguments.write[0]))
+        except (argparse.ArgumentTypeError, OSError) as error:
+            parser.error(f"--write: {error}")
         return
+    if arguments.folder and not arguments.folder.is_dir():
+        parser.error(f"--folder: there is no folder {arguments.folder}")
     if not arguments.command.is_file():
         parser.error(f"there is no {arguments.command}: cargo build --release --bin virtual_axes")
     with tempfile.TemporaryDirectory(dir=arguments.folder) as folder:

@@ -239,10 +239,18 @@ def memory(process: Node, guest: Guest, minutes: float) -> None:
     print(f"  open files: {files[0]:.0f} at first, at most {files.max():.0f}, {files[-1]:.0f} at last")
 
 
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    value = float(text)
+    if not 0 < value < np.inf:
+        raise argparse.ArgumentTypeError(f"{text}: above 0 is wanted")
+    return value
+
+
 def main() -> int:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=20, help="of each span of which the share is taken (20)")
+    parser.add_argument("--seconds", type=positive, default=20, help="of each span of which the share is taken (20)")
     parser.add_argument("--minutes", type=float, default=10, help="of motion while memory is looked at (10)")
     args = parser.parse_args()
     with Node(["-p", "time:=real"]) as process:

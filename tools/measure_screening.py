@@ -53,8 +53,11 @@ def main() -> None:
     parser.add_argument("--designs", type=int, default=100_000)
     parser.add_argument("--part", type=int, default=10, help="one core screens the designs divided by this")
     arguments = parser.parse_args()
-    if arguments.part < 1:
-        parser.error("--part: one at least")
+    for option, number in (("--part", arguments.part), ("--designs", arguments.designs)):
+        if number < 1:
+            parser.error(f"{option}: one at least, not {number}")
+    if not arguments.program.is_file():
+        parser.error(f"there is no {arguments.program}: cargo build --release --bin virtual_axes")
     two = screen(arguments, arguments.designs, 2)
     one = screen(arguments, max(arguments.designs // arguments.part, 1), 1)
     print(f"two cores are worth {two / one:.2f} of one")

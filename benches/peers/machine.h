@@ -16,6 +16,14 @@ _Noreturn static void fail(const char *what, const char *which) {
   exit(1);
 }
 
+/* The number that a word is. */
+static double number(const char *word) {
+  char *end;
+  const double value = strtod(word, &end);
+  if (end == word || *end) fail("no number", word);
+  return value;
+}
+
 static FILE *open_text(const char *path) {
   FILE *file = fopen(path, "r");
   if (!file) fail("cannot open", path);
@@ -43,7 +51,7 @@ static void read_table(const char *path, struct table *t) {
     int column = 0;
     for (char *word; column < MAX_AXES && (word = strtok(NULL, " \t\n")); column++) {
       if (joints) snprintf(t->joints[column], sizeof t->joints[0], "%s", word);
-      else t->values[t->rows][column] = atof(word);
+      else t->values[t->rows][column] = number(word);
     }
     if (joints) t->axes = column;
     else if (column != t->axes) fail("a value per joint is wanted of", t->keys[t->rows]);
@@ -173,8 +181,12 @@ static void read_setpoints(const char *path, const struct table *t, struct setpo
         s->psec[a] += LOOKBACK;
       }
     }
-    char *rest = line;
-    for (int a = 0; a < s->axes; a++) s->psec[a][s->count] = strtod(rest, &rest);
+    char *word = strtok(line, " \t\n");
+    for (int a = 0; a < s->axes; a++, word = strtok(NULL, " \t\n")) {
+      if (!word) fail("a value per joint is wanted in each row of", path);
+      s->psec[a][s->count] = number(word);
+    }
+    if (word) fail("a value per joint is wanted in each row of", path);
     s->count++;
   }
   fclose(file);

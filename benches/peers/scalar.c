@@ -144,10 +144,12 @@ int main(int argc, char **argv) {
   read_setpoints(argv[2], &table, &setpoints);
   for (int arg = 3; arg < argc; arg++) {
     if (!strcmp(argv[arg], "--circle") && arg + 3 < argc && setpoints.axes >= 2) {
-      circle = (struct circle){.radius = atof(argv[arg + 1]), .first = atoi(argv[arg + 2]), .last = atoi(argv[arg + 3])};
+      circle.radius = number(argv[arg + 1]);
+      circle.first = number(argv[arg + 2]);
+      circle.last = number(argv[arg + 3]);
       arg += 3;
     } else if (!strcmp(argv[arg], "--machines") && arg + 1 < argc) {
-      count = atoi(argv[++arg]);
+      count = number(argv[++arg]);
     } else if (!strcmp(argv[arg], "--positions")) {
       positions = 1;
     } else {

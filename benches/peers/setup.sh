@@ -4,6 +4,11 @@
 #
 #     benches/peers/setup.sh
 set -euo pipefail
+case ${1:-} in
+  "") ;;
+  -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
+  *) echo "setup: no option $1" >&2 && exit 2 ;;
+esac
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 peers=benches/peers
 venv=$PWD/.build/peers

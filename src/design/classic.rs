@@ -5,7 +5,7 @@ use super::polynomial::{product, sum};
 use crate::control::Rst;
 
 /// Largest gain, s⁻¹: a hundred times what the loop of a feed drive takes.
-const MAX_GAIN: f64 = 1e4;
+pub const MAX_GAIN: f64 = 1e4;
 /// Longest time of an integral part, s: a slower one does nothing during a motion.
 const MAX_INTEGRAL_TIME: f64 = 100.0;
 /// Longest time of a derivative part and of its filter, s.

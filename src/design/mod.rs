@@ -8,7 +8,7 @@ mod pole_placement;
 mod poles;
 pub(crate) mod polynomial;
 
-pub use classic::{Pid, p, pi, pid};
+pub use classic::{MAX_GAIN, Pid, p, pi, pid};
 pub use gpc::{GpcTuning, Weight, gpc};
 pub use margins::{Margins, margins};
 pub use model::PredictionModel;

@@ -6,8 +6,8 @@ use nalgebra::Complex;
 use virtual_axes::config::{AxisConfig, DEFAULT_MACHINE, Parameters, Periods, Value};
 use virtual_axes::control::Rst;
 use virtual_axes::design::{
-    DesignError, GpcTuning, Margins, Pid, PolePlacement, PredictionModel, Weight, accept, gpc, margins, p,
-    pi, pid, pole_pair, pole_placement, poles,
+    DesignError, GpcTuning, MAX_GAIN, Margins, Pid, PolePlacement, PredictionModel, Weight, accept, gpc,
+    margins, p, pi, pid, pole_pair, pole_placement, poles,
 };
 use virtual_axes::machine::prediction_model;
 use virtual_axes::units::{MILLISECOND, POSITION_GAIN};
@@ -310,6 +310,13 @@ impl Preset<'_> {
     /// Kp in s⁻¹, the weight of the feedforward, and both as given.
     fn proportional(&self, given: &Proportional) -> Result<Gains, Box<dyn Error>> {
         let gain = self.number(given.gain, "position_loop.gain")?;
+        if given.gain.is_some() && !(gain > 0.0 && gain * POSITION_GAIN <= MAX_GAIN) {
+            let most = MAX_GAIN / POSITION_GAIN;
+            return Err(format!(
+                "--gain: {gain} must be above 0 and at most {most:.0} (m/min)/mm or (1000 °/min)/°"
+            )
+            .into());
+        }
         let feedforward = self.number(given.feedforward, FEEDFORWARD)?;
         Ok((gain * POSITION_GAIN, feedforward, vec![("gain", gain), ("feedforward", feedforward)]))
     }

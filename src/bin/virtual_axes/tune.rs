@@ -46,9 +46,9 @@ pub struct Arguments {
     /// Smallest delay margin of the worst axis, ms; 5, or with --contrast 0, if it is not given.
     #[arg(long, allow_negative_numbers = true, value_parser = delay_margin)]
     delay_margin_ms: Option<f64>,
-    /// Seed of the starts of the search of the cascade's gains.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
-    seed: u64,
+    /// Seed of the starts of the search of the cascade's gains; 1 if it is not given.
+    #[arg(long, allow_negative_numbers = true)]
+    seed: Option<u64>,
     /// Designs of predictive controllers in the first grid, at least: more of λ between its first and its last.
     #[arg(long, allow_negative_numbers = true, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_DESIGNS))]
     designs: Option<u64>,
@@ -69,6 +69,12 @@ pub struct Arguments {
     /// Print the result as one JSON object.
     #[arg(long)]
     json: bool,
+}
+
+impl Arguments {
+    fn seed(&self) -> u64 {
+        self.seed.unwrap_or(1)
+    }
 }
 
 fn modulus_margin(text: &str) -> Result<f64, String> {
@@ -120,6 +126,9 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     if arguments.designs.is_some() && (arguments.contrast || tunable != Tunable::Gpc) {
         return Err("--designs: is for --controller gpc without --contrast".into());
     }
+    if arguments.seed.is_some() && tunable != Tunable::Cascade {
+        return Err("--seed: is for --controller cascade, the search of gpc has none".into());
+    }
     if arguments.contrast && arguments.also.len() > 1 {
         return Err(format!("--contrast: takes one --also path, not {}", arguments.also.len()).into());
     }
@@ -159,7 +168,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     if arguments.json {
         return Ok(format!(
             "{:#}\n",
-            output::object(&input, tunable, &limits, arguments.seed, &bench, &found)
+            output::object(&input, tunable, &limits, arguments.seed(), &bench, &found)
         ));
     }
     Ok(output::text(&bench, &found))
@@ -225,7 +234,7 @@ fn search(
             Some(designs) => tune_gpc_from(bench, limits, fine_grid(designs))?,
             None => tune_gpc(bench, limits)?,
         },
-        Tunable::Cascade => tune_cascade(bench, limits, arguments.seed)?,
+        Tunable::Cascade => tune_cascade(bench, limits, arguments.seed())?,
     };
     let elsewhere = paths.iter().map(|path| {
         Ok(Elsewhere {
