@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from sensor_msgs.msg import JointState
 
-from drive import NANOSECONDS, Drive, joint_trajectory, to_ns
+from drive import NANOSECONDS, Drive, joint_trajectory, own_mb, to_ns
 from motion import go_home, start_swing
 
 
@@ -72,3 +73,19 @@ def test_an_axis_that_leaves_its_stroke_is_logged(real: Drive):
     real.wait_for(lambda: [a for a in real.diagnostics()[seen:] if "outside its stroke" in text_of(a)], 8, "a warning")
     process = real.process
     real.wait_for(lambda: "x has left its stroke" in process.output(), 5, "a line of the log")
+
+
+def test_who_has_come_is_counted_and_memory_told(real: Drive):
+    """Each subscription of others counts once, also when it has gone; memory is what Linux says of the node."""
+
+    def values() -> dict[str, str]:
+        return {value.key: value.value for value in next_one(real).status[0].values}
+
+    before = int(values()["endpoints_discovered"])
+    for _ in range(20):
+        real.node.destroy_subscription(real.node.create_subscription(JointState, "joint_states", print, 1))
+
+    real.wait_for(lambda: int(values()["endpoints_discovered"]) >= before + 20, 20, "20 subscriptions counted")
+    after = values()
+    assert int(after["endpoints_discovered"]) == before + 20
+    assert abs(float(after["memory_mb"]) - own_mb(real.process.pid)) < 5.0

@@ -72,6 +72,8 @@ LONG = 5_000
 """Points of the longest trajectories."""
 SAMPLE_S = 0.25
 """Wall time between two samples of memory."""
+KEPT_MB = 0.83e-3
+"""What the middleware keeps of an endpoint that has left (docs/middleware.md)."""
 LOOKS = 60
 FEWEST = 3
 """In the second half, to tell whether something grew."""
@@ -98,6 +100,8 @@ class Look:
     """Of the process that only echoes."""
     load: float
     """Of the machine, over a minute."""
+    endpoints: int
+    """Of others, that have come since the start."""
 
     @property
     def latency_ratio(self) -> float:
@@ -390,6 +394,12 @@ class Memory:
         self._end.set()
 
 
+def told(drive: Drive) -> dict[str, str]:
+    """What the last diagnostics say of the node."""
+    drive.wait_for(drive.diagnostics, 20, "diagnostics")
+    return {value.key: value.value for value in drive.diagnostics()[-1].status[0].values}
+
+
 def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
     """The process as it is now."""
     assert drive.process is not None
@@ -406,6 +416,7 @@ def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
         latency_ms=latency,
         echo_ms=echo,
         load=os.getloadavg()[0],
+        endpoints=int(told(drive)["endpoints_discovered"]),
     )
 
 
@@ -422,12 +433,6 @@ def table(looks: list[Look]) -> str:
             f"| {at.latency_ms:.1f} | {at.echo_ms:.1f} | {at.latency_ratio:.2f} | {at.load:.1f} |"
         )
     return "\n".join(rows)
-
-
-def told(drive: Drive) -> dict[str, str]:
-    """What the last diagnostics say of the node."""
-    drive.wait_for(drive.diagnostics, 20, "diagnostics")
-    return {value.key: value.value for value in drive.diagnostics()[-1].status[0].values}
 
 
 def slope(minutes: np.ndarray, values: np.ndarray) -> float:
@@ -455,6 +460,8 @@ def verdict(looks: list[Look]) -> bool:
             f"  {name:<14}{values.min():9.2f} to {values.max():9.2f}, {rate:+9.4f} a minute, "
             f"{growth:+7.2f} in all, at most {most:.2f}: {'GROWS' if bad else 'flat'}"
         )
+    came = half[-1].endpoints - half[0].endpoints
+    print(f"  {came} endpoints of others came, of which the middleware keeps up to {came * KEPT_MB:.2f} MB for good")
     return grew
 
 

@@ -5,6 +5,7 @@ use std::fmt::Display;
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 
 use super::convert::header;
+use super::footprint::{Discovered, own_memory_mb};
 use super::pace::{AxisHealth, ClockSource, Health};
 use crate::units::{MILLISECOND_NS, Nanoseconds};
 
@@ -19,6 +20,8 @@ pub struct Diagnostics {
     pub joints: Vec<String>,
     /// `real`, `fast` or `sim`.
     pub time_mode: &'static str,
+    /// Counts the endpoints elsewhere.
+    pub discovered: Discovered,
 }
 
 fn value(key: &str, value: impl Display) -> KeyValue {
@@ -37,7 +40,10 @@ impl Diagnostics {
         outputs_dropped: (u64, u64),
     ) -> DiagnosticArray {
         let axes = self.axes(before, now).map(|(joint, before, now)| self.axis(joint, before, now));
-        let status = std::iter::once(self.node_status(before, now, outputs_dropped)).chain(axes).collect();
+        let mut node = self.node_status(before, now, outputs_dropped);
+        node.values.push(value("endpoints_discovered", self.discovered.count()));
+        node.values.extend(own_memory_mb().map(|memory| value("memory_mb", format!("{memory:.1}"))));
+        let status = std::iter::once(node).chain(axes).collect();
         DiagnosticArray { header: header(time), status }
     }
 
@@ -164,6 +170,7 @@ mod tests {
             machine: "m".into(),
             joints: vec!["x".into()],
             time_mode: "real",
+            discovered: Discovered::default(),
         };
         let before = Health { axes: vec![AxisHealth::default()], ..Health::default() };
         let mut now = before.clone();

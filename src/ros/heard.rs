@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use futures::StreamExt;
-use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, StatusEvented};
+use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, RTPSEntity, StatusEvented};
 
 use super::ask_again::Asker;
+use super::footprint::Discovered;
 
 /// How often it is looked whether those who listened have gone; a reader that comes is told of at once.
 const LOOK_PERIOD: Duration = Duration::from_secs(1);
@@ -71,10 +72,11 @@ impl Listeners {
     }
 }
 
-/// Follows what the middleware tells of readers, and asks writers that it has matched for what they sent
-/// before, until the task is ended. A participant tells each event once, to one that listens.
-pub(super) async fn run(participant: DomainParticipant, listeners: Listeners) {
+/// Follows what the middleware tells of readers, asks writers that it has matched for what they sent before, and
+/// counts what is discovered, until the task is ended. A participant tells each event once, to one that listens.
+pub(super) async fn run(participant: DomainParticipant, listeners: Listeners, discovered: Discovered) {
     let asker = Asker::open();
+    let own = participant.guid().prefix;
     let status = participant.status_listener();
     let mut events = status.as_async_status_stream();
     let mut timer = tokio::time::interval(LOOK_PERIOD);
@@ -92,6 +94,10 @@ pub(super) async fn run(participant: DomainParticipant, listeners: Listeners) {
                         asker.matched(&participant, local_reader, remote_writer);
                     }
                 }
+                Some(
+                    DomainParticipantStatusEvent::ReaderDetected { reader: endpoint }
+                    | DomainParticipantStatusEvent::WriterDetected { writer: endpoint },
+                ) if endpoint.guid.prefix != own => discovered.another(),
                 Some(_) => {}
                 None => return,
             },

@@ -12,6 +12,7 @@ mod diagnostics;
 mod endpoints;
 pub mod environment;
 mod fan_out;
+mod footprint;
 mod goodbye;
 mod heard;
 mod inputs;

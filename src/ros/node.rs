@@ -23,6 +23,7 @@ use super::diagnostics::Diagnostics;
 use super::endpoints::{EndpointError, Endpoints};
 use super::environment::Environment;
 use super::fan_out::{FanOut, publish_diagnostics};
+use super::footprint::Discovered;
 use super::heard::{self, Listeners};
 use super::inputs::{Checks, PsecInput, next_id, take_loads, take_stream};
 use super::log::LogRecord;
@@ -227,7 +228,8 @@ async fn serve(
     let recording = recorder.start()?;
 
     // What comes in.
-    tasks.spawn(heard::run(dds.clone(), listeners));
+    let discovered = Discovered::default();
+    tasks.spawn(heard::run(dds.clone(), listeners, discovered.clone()));
     let owner = Owner { node, context: context.clone(), range: participant.range() };
     tasks.spawn(renewals.run(owner));
     if let Some((subscription, name)) = topics.clock_input {
@@ -280,6 +282,7 @@ async fn serve(
             TimeMode::Fast => "fast",
             TimeMode::SimTime => "sim",
         },
+        discovered,
     };
     let recording_status = recording.as_ref().map(|recording| recording.status());
     let dropped = Arc::clone(&dropped);

@@ -1,0 +1,93 @@
+//! What the process holds: its memory, and others that the middleware remembers.
+
+use std::fs;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use tracing::warn;
+
+/// So many endpoints more, and the log says what they cost.
+const WARN_EVERY: u64 = 100_000;
+/// What the middleware keeps of an endpoint that has left, kB (docs/middleware.md).
+const KEPT_KB: f64 = 0.83;
+
+/// Endpoints of others that have been discovered since the start: publishers, subscriptions, and both of each
+/// service and client. The middleware never forgets one altogether.
+#[derive(Debug, Clone, Default)]
+pub struct Discovered(Arc<AtomicU64>);
+
+impl Discovered {
+    /// How many they are.
+    pub fn count(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// Another one has been discovered.
+    pub fn another(&self) {
+        let count = self.0.fetch_add(1, Ordering::Relaxed) + 1;
+        if count.is_multiple_of(WARN_EVERY) {
+            warn!(
+                "{count} publishers, subscriptions, services and clients of others have come since the start: the \
+                 middleware keeps up to {:.0} MB of those that have left until this node ends",
+                count as f64 * KEPT_KB * 1e-3
+            );
+        }
+    }
+}
+
+/// Memory that is the process's own (RssAnon), MB; none where Linux does not tell.
+pub fn own_memory_mb() -> Option<f64> {
+    fs::read_to_string("/proc/self/status").ok().and_then(|status| anonymous_mb(&status))
+}
+
+fn anonymous_mb(status: &str) -> Option<f64> {
+    let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:"))?;
+    let kibibytes: u32 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(f64::from(kibibytes) * 1.024e-3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_read_as_linux_tells_it() {
+        let status = "Name:\tvirtual_axes\nVmRSS:\t   9000 kB\nRssAnon:\t    1000 kB\nThreads:\t12\n";
+        assert_eq!(anonymous_mb(status), Some(1.024));
+        assert_eq!(anonymous_mb("Name:\tvirtual_axes\n"), None);
+        assert_eq!(anonymous_mb("RssAnon:\tmany kB\n"), None);
+    }
+
+    #[test]
+    fn the_log_says_what_a_hundred_thousand_endpoints_cost() {
+        use std::sync::Mutex;
+        use tracing_subscriber::fmt::MakeWriter;
+
+        #[derive(Clone, Default)]
+        struct Text(Arc<Mutex<Vec<u8>>>);
+        impl std::io::Write for Text {
+            fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+                self.0.lock().expect("not poisoned").extend_from_slice(bytes);
+                Ok(bytes.len())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        impl MakeWriter<'_> for Text {
+            type Writer = Text;
+            fn make_writer(&self) -> Text {
+                self.clone()
+            }
+        }
+
+        let text = Text::default();
+        let subscriber = tracing_subscriber::fmt().with_writer(text.clone()).finish();
+        let discovered = Discovered::default();
+        tracing::subscriber::with_default(subscriber, || (0..250_000).for_each(|_| discovered.another()));
+        let said = String::from_utf8(text.0.lock().expect("not poisoned").clone()).expect("text");
+        assert_eq!(discovered.count(), 250_000);
+        assert_eq!(said.lines().count(), 2, "{said}");
+        assert!(said.contains("100000 publishers") && said.contains("83 MB"), "{said}");
+    }
+}
