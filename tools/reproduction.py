@@ -13,6 +13,7 @@ import json
 import os
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -30,6 +31,9 @@ to see the plots, `--trace signals.csv` for the signals.
 `tools/reproduction.py` writes this page; the tests look that it is what comes out.
 """
 
+
+WIDTH = 120
+"""Of the page's text, in characters."""
 
 CONTINUED = " \\\n        "
 """Where a command goes on in the next line, as a shell reads it."""
@@ -54,7 +58,7 @@ def number(value: float, digits: int = 1) -> str:
 
 def section(title: str, text: str, command: str, rows: list[tuple[str, str, str, str]]) -> str:
     """One figure of the paper."""
-    lines = [f"\n## {title}\n", text, f"\n    virtual_axes run {command}\n"]
+    lines = [f"\n## {title}\n", textwrap.fill(text, WIDTH, break_on_hyphens=False), f"\n    virtual_axes run {command}\n"]
     lines += ["| what | paper | specified | here |", "|---|---|---|---|"]
     lines += ["| " + " | ".join(row) + " |" for row in rows]
     return "\n".join(lines) + "\n"
