@@ -58,7 +58,11 @@ def number(value: float, digits: int = 1) -> str:
 
 def section(title: str, text: str, command: str, rows: list[tuple[str, str, str, str]]) -> str:
     """One figure of the paper."""
-    lines = [f"\n## {title}\n", textwrap.fill(text, WIDTH, break_on_hyphens=False), f"\n    virtual_axes run {command}\n"]
+    lines = [
+        f"\n## {title}\n",
+        textwrap.fill(text, WIDTH, break_on_hyphens=False),
+        f"\n    virtual_axes run {command}\n",
+    ]
     lines += ["| what | paper | specified | here |", "|---|---|---|---|"]
     lines += ["| " + " | ".join(row) + " |" for row in rows]
     return "\n".join(lines) + "\n"
