@@ -13,8 +13,8 @@ and listeners that are killed, for whom samples are kept until their lease has e
 
 Latency is that of a service to a client that does nothing else, over that of the same client at a process that only
 echoes, call by call in turns: what else the machine does slows both. Memory is what the process has of its own
-(RssAnon), without pages of files. Its mean between two looks is judged: the middleware empties the history of each
-topic every 6 s, and the least depends on how many of them are emptied at about the same time.
+(RssAnon), without pages of files: the least between two looks is judged, since what comes and goes is what readers
+have not acknowledged yet.
 
 The exit status is 1 if over the second half something grew by more than it may, or if the node died.
 """
@@ -89,11 +89,9 @@ class Look:
 
     minutes: float
     memory_mb: float
-    """On average since the look before."""
-    least_mb: float
-    """The least since then."""
+    """The least since the look before."""
     peak_mb: float
-    """The most."""
+    """The most since then."""
     files: float
     threads: float
     latency_ms: float
@@ -385,11 +383,11 @@ class Memory:
             except OSError:
                 return
 
-    def since_mb(self) -> tuple[float, float, float]:
-        """The mean, the least and the most since this was asked last."""
+    def since_mb(self) -> tuple[float, float]:
+        """The least and the most since this was asked last."""
         found = [*self._found_mb, own_mb(self._pid)]
         self._found_mb = []
-        return float(np.mean(found)), min(found), max(found)
+        return min(found), max(found)
 
     def close(self) -> None:
         """End."""
@@ -408,11 +406,10 @@ def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
     pid = drive.process.pid
     status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
     latency, echo = prober.latencies_ms(CALLS)
-    mean, least, most = memory.since_mb()
+    least, most = memory.since_mb()
     return Look(
         minutes=(time.monotonic() - began) / 60,
-        memory_mb=mean,
-        least_mb=least,
+        memory_mb=least,
         peak_mb=most,
         files=len(os.listdir(f"/proc/{pid}/fd")),
         threads=int(status["Threads"]),
@@ -426,14 +423,14 @@ def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
 def table(looks: list[Look]) -> str:
     """Some of them, as Markdown."""
     rows = [
-        "| of the time | memory, MB | at least | at most | files | threads | service, ms | echo, ms | ratio | load |",
-        "|" + "---|" * 10,
+        "| of the time | memory, MB | at most | files | threads | service, ms | echo, ms | ratio | load |",
+        "|" + "---|" * 9,
     ]
     for mark in MARKS:
         at = looks[round(mark / 100 * (len(looks) - 1))]
         rows.append(
-            f"| {mark} % | {at.memory_mb:.1f} | {at.least_mb:.1f} | {at.peak_mb:.1f} | {at.files:.0f} "
-            f"| {at.threads:.0f} | {at.latency_ms:.1f} | {at.echo_ms:.1f} | {at.latency_ratio:.2f} | {at.load:.1f} |"
+            f"| {mark} % | {at.memory_mb:.1f} | {at.peak_mb:.1f} | {at.files:.0f} | {at.threads:.0f} "
+            f"| {at.latency_ms:.1f} | {at.echo_ms:.1f} | {at.latency_ratio:.2f} | {at.load:.1f} |"
         )
     return "\n".join(rows)
 

@@ -230,8 +230,7 @@ async fn serve(
     // What comes in.
     let discovered = Discovered::default();
     tasks.spawn(heard::run(dds.clone(), listeners, discovered.clone()));
-    let owner =
-        Owner { node, context: context.clone(), range: participant.range(), discovered: discovered.clone() };
+    let owner = Owner { node, context: context.clone(), range: participant.range() };
     tasks.spawn(renewals.run(owner));
     if let Some((subscription, name)) = topics.clock_input {
         let (participant, health) = (dds.clone(), health.clone());

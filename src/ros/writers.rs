@@ -3,8 +3,7 @@
 //! When a reader comes, a volatile writer of RustDDS's makes a set of the numbers of all samples that it has ever
 //! written, since they are not for that reader: some 30 bytes for each, in the thread that sends everything. It has the
 //! set until the reader acknowledges, for one of best effort as long as that is there. A topic therefore gets a new
-//! writer after [`MANY`] samples, with numbers from 1 on, and the old one takes its leave; after [`FEWER`] already where
-//! others come.
+//! writer after [`MANY`] samples, with numbers from 1 on, and the old one takes its leave.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,14 +15,11 @@ use tracing::warn;
 
 use super::deaf::Deaf;
 use super::environment::DiscoveryRange;
-use super::footprint::Discovered;
 use super::goodbye::Goodbye;
 use super::rtps::{Guid, is_secured};
 
 /// Samples that a writer writes at most before there is another: 52 minutes of them at the default rate.
 const MANY: i64 = 1 << 19;
-/// The same if others have come to the graph since it was created, who may want to read: 6.5 minutes.
-const FEWER: i64 = 1 << 16;
 /// How long readers have to find a writer before it begins to write.
 const FOUND: Duration = Duration::from_secs(5);
 /// How long a writer stays for readers that have not acknowledged the last of its samples.
@@ -31,23 +27,15 @@ const STAYS: Duration = Duration::from_secs(30);
 /// How often it is looked whether one has written much.
 const LOOK_PERIOD: Duration = Duration::from_secs(1);
 
-/// Whether a writer of so many samples is to have a successor, when so many endpoints of others have come in its time.
-fn has_written_much(written: i64, came: u64) -> bool {
-    written >= if came > 0 { FEWER } else { MANY }
-}
-
 /// A writer, and what is to be done when its readers take nothing.
 pub(super) struct Writer<M: Serialize> {
     network: ros2_client::Publisher<M>,
     /// Its readers.
     pub(super) deaf: Deaf,
-    /// Endpoints of others that had come before.
-    came_before: u64,
 }
 
 impl<M: Serialize> Writer<M> {
-    /// Of samples of `topic`, of which it keeps so many for readers that have not acknowledged them; the first of a
-    /// topic.
+    /// Of samples of `topic`, of which it keeps so many for readers that have not acknowledged them.
     pub(super) fn new(
         network: ros2_client::Publisher<M>,
         topic: &Topic,
@@ -55,18 +43,7 @@ impl<M: Serialize> Writer<M> {
         participant: &DomainParticipant,
     ) -> Self {
         let deaf = Deaf::new(network.guid(), topic.name(), kept, participant.clone());
-        Writer { network, deaf, came_before: 0 }
-    }
-
-    /// One that is created when so many endpoints of others have come.
-    fn after(mut self, came: u64) -> Self {
-        self.came_before = came;
-        self
-    }
-
-    /// Whether there is to be another, now that so many endpoints have come.
-    fn is_due(&self, came: u64) -> bool {
-        has_written_much(self.deaf.written(), came.saturating_sub(self.came_before))
+        Writer { network, deaf }
     }
 
     /// Hands a message to the middleware as soon as that has room for it.
@@ -155,8 +132,6 @@ pub struct Owner {
     pub context: Context,
     /// Where it is known.
     pub range: DiscoveryRange,
-    /// Who came.
-    pub discovered: Discovered,
 }
 
 /// Writers that the crate does not know of: of responses to the requests of goals and results
@@ -177,8 +152,8 @@ impl Owner {
 
 /// Such a topic, of whatever type.
 trait Renewed: Send {
-    /// Creates a writer where the present one has written much, now that so many endpoints of others have come.
-    fn look(&self, node: &mut Node, came: u64, now: Instant) -> Result<(), String>;
+    /// Creates a writer where the present one has written much.
+    fn look(&self, node: &mut Node, now: Instant) -> Result<(), String>;
     /// Lets the last writer go when it has stayed long enough, after `goodbye` to its GUID.
     fn retire(&self, now: Instant, goodbye: &mut dyn FnMut(Guid));
     /// Its name in DDS.
@@ -193,11 +168,10 @@ struct Renewable<M: Serialize> {
 }
 
 impl<M: Serialize + Send + Sync + 'static> Renewed for Renewable<M> {
-    fn look(&self, node: &mut Node, came: u64, now: Instant) -> Result<(), String> {
-        if self.writers.is_alone() && self.writers.current().is_due(came) {
+    fn look(&self, node: &mut Node, now: Instant) -> Result<(), String> {
+        if self.writers.is_alone() && self.writers.current().deaf.written() >= MANY {
             let network = node.create_publisher(&self.topic, None).map_err(|e| e.to_string())?;
-            let next = Writer::new(network, &self.topic, self.kept, &self.participant).after(came);
-            self.writers.prepare(next, now);
+            self.writers.prepare(Writer::new(network, &self.topic, self.kept, &self.participant), now);
         }
         Ok(())
     }
@@ -242,7 +216,7 @@ impl Renewals {
                         Goodbye::of_writer(&writer, number, &participant, owner.range).send_once();
                     }
                 });
-                if let Err(reason) = topic.look(&mut owner.node, owner.discovered.count(), now) {
+                if let Err(reason) = topic.look(&mut owner.node, now) {
                     let name = topic.name();
                     warn!("{} gets no new writer: {reason}", name.trim_start_matches("rt"));
                 }
@@ -254,12 +228,6 @@ impl Renewals {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_writer_is_followed_sooner_where_others_come() {
-        assert_eq!((has_written_much(FEWER - 1, 100), has_written_much(FEWER, 1)), (false, true));
-        assert_eq!((has_written_much(MANY - 1, 0), has_written_much(MANY, 0)), (false, true));
-    }
 
     #[test]
     fn a_successor_writes_when_it_could_be_found_and_the_predecessor_stays_for_some_time() {
