@@ -9,7 +9,13 @@ clock of the first.
 from pathlib import Path
 
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, GroupAction, IncludeLaunchDescription, OpaqueFunction
+from launch.actions import (
+    DeclareLaunchArgument,
+    GroupAction,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    TimerAction,
+)
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -29,6 +35,8 @@ ARGUMENTS = [
     ("log_level", "info", None, "Level of the nodes' logs"),
 ]
 SIDES = ["left", "right"]
+APART_S = 2.0
+"""Time between their starts: who starts with both at once may miss topics (docs/middleware.md)."""
 
 
 def start(context: LaunchContext) -> list[object]:
@@ -51,7 +59,7 @@ def start(context: LaunchContext) -> list[object]:
         }
         # In a group: the arguments of one must not reach the other.
         include = IncludeLaunchDescription(PythonLaunchDescriptionSource(source), launch_arguments=of_side.items())
-        actions.append(GroupAction([include]))
+        actions.append(TimerAction(period=APART_S * place, actions=[GroupAction([include])]))
         if argument["robot_state_publisher"] == "true":
             x = float(argument["distance"]) * place
             actions.append(

@@ -53,11 +53,23 @@ def test_an_idle_fast_node_floods_nobody(start: Callable[..., Drive]):
     assert 0 < shown < 1.5 * passed
 
 
-def machine(stack: ExitStack, name: str, domain: DomainId, *ros_args: str, connect: bool = True) -> Drive:
-    """A machine of a name of its own in a domain that others share."""
+def node(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> Node:
+    """The process of a machine of a name of its own in a domain that others share."""
     arguments = ["-r", f"__ns:=/{name}", *(ros_args or ("-p", "time:=fast"))]
-    process = stack.enter_context(Node(arguments, name=f"/{name}/virtual_axes", domain_id=domain.value))
-    return stack.enter_context(Drive(process=process, connect=connect))
+    return stack.enter_context(Node(arguments, name=f"/{name}/virtual_axes", domain_id=domain.value))
+
+
+def machine(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> Drive:
+    """Such a machine, and who drives it."""
+    return stack.enter_context(Drive(process=node(stack, name, domain, *ros_args)))
+
+
+def wait_for_topics(process: Node) -> None:
+    """Until all of a node's topics are there: docs/middleware.md, "Processes that start at the same time"."""
+    deadline = time.monotonic() + 20
+    while "Ctrl-C" not in process.output():
+        assert time.monotonic() < deadline, process.output()
+        time.sleep(0.02)
 
 
 class Ticks:
@@ -133,9 +145,10 @@ def test_the_second_machine_follows_the_first_and_takes_over(shared: tuple[ExitS
 def test_of_machines_that_start_together_one_leads(shared: tuple[ExitStack, DomainId]):
     """Which one, their ids decide."""
     stack, domain = shared
-    both = [machine(stack, name, domain, connect=False) for name in ("left", "right")]
-    for drive in both:
-        drive.connect()
+    processes = [node(stack, name, domain) for name in ("left", "right")]
+    for process in processes:
+        wait_for_topics(process)
+    both = [stack.enter_context(Drive(process=process)) for process in processes]
     both[0].wait_for(lambda: sum(map(leads, both)) == 1, 5, "one machine that gives the clock")
     ticks = Ticks(both[0])
     count = len(ticks.shown)

@@ -155,6 +155,7 @@ def test_two_machines_run_in_one_domain():
     assert [node.values["frame_prefix"] for node in found["robot_state_publisher"]] == ["left/", "right/"]
     assert [node.namespace for node in found["robot_state_publisher"]] == ["left", "right"]
     assert len(found["rviz2"]) == 1
+    assert [action.period for action in actions(TWO) if isinstance(action, launch.actions.TimerAction)] == [0.0, 2.0]
     with ExitStack() as stack:
         # One after the other: docs/middleware.md, "Processes that start at the same time".
         first = process(left, stack)

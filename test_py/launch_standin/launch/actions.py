@@ -102,6 +102,19 @@ class GroupAction(Action):
         return [*self.actions, *after]
 
 
+class TimerAction(Action):
+    """Actions after a time; nothing is waited for here."""
+
+    def __init__(self, *, period: float, actions: Iterable[Action], **kwargs: object) -> None:
+        """Keep them, and the time in s."""
+        super().__init__(**kwargs)
+        self.period, self.actions = period, list(actions)
+
+    def execute(self, context: LaunchContext) -> list[Action]:
+        """Give the actions."""
+        return self.actions
+
+
 __all__ = [
     "DeclareLaunchArgument",
     "GroupAction",
@@ -109,4 +122,5 @@ __all__ = [
     "LaunchDescription",
     "LogInfo",
     "OpaqueFunction",
+    "TimerAction",
 ]
