@@ -5,6 +5,7 @@ from __future__ import annotations
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 
+from action import in_executor
 from drive import NANOSECONDS, Drive, joint_trajectory, own_mb, to_ns
 from motion import go_home, start_swing
 
@@ -82,9 +83,13 @@ def test_who_has_come_is_counted_and_memory_told(real: Drive):
         return {value.key: value.value for value in next_one(real).status[0].values}
 
     before = int(values()["endpoints_discovered"])
-    for _ in range(20):
-        real.node.destroy_subscription(real.node.create_subscription(JointState, "joint_states", print, 1))
 
+    def come_and_go() -> None:
+        for _ in range(20):
+            subscription = real.node.create_subscription(JointState, "joint_states", lambda _: None, 1)
+            real.node.destroy_subscription(subscription)
+
+    in_executor(real, come_and_go)
     real.wait_for(lambda: int(values()["endpoints_discovered"]) >= before + 20, 20, "20 subscriptions counted")
     after = values()
     assert int(after["endpoints_discovered"]) == before + 20

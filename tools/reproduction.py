@@ -9,6 +9,7 @@ Each number is what the command beside it prints.
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import subprocess
@@ -276,8 +277,11 @@ def page() -> str:
 
 def main() -> int:
     """Writes or checks the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing")
+    checks = parser.parse_args().check
     text = page()
-    if "--check" in sys.argv[1:]:
+    if checks:
         return 0 if PAGE.read_text(encoding="utf-8") == text else 1
     PAGE.write_text(text, encoding="utf-8")
     return 0
