@@ -6,10 +6,22 @@
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 options=("$@")
+
+# Refuses a name that is none of a picture, before anything is built.
+picture() {
+  case $1 in
+    -* | .png | .pdf | .svg) ;;
+    *.png | *.pdf | *.svg) return ;;
+  esac
+  echo "demo: --out: '$1' is no picture: its name must end in .png, .pdf or .svg" >&2
+  exit 2
+}
+
 while [ $# -gt 0 ]; do
   case $1 in
-    --fast | --out=?*) ;;
-    --out) [ $# -gt 1 ] || { echo "demo: --out wants a file" >&2 && exit 2; } && shift ;;
+    --fast) ;;
+    --out=*) picture "${1#--out=}" ;;
+    --out) [ $# -gt 1 ] || { echo "demo: --out wants a file" >&2 && exit 2; } && shift && picture "$1" ;;
     -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
     *) echo "demo: no option $1: --fast, --out FILE.png or --help" >&2 && exit 2 ;;
   esac

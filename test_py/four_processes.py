@@ -30,7 +30,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from virtual_axes.msg import DriveStates, MotorCurrents
 
-from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, to_ns
+from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, status_values, to_ns
 
 JOINTS = ("x", "y")
 DAMPING = 4000.0
@@ -93,7 +93,7 @@ def recorder(seconds: float, file: Path) -> None:
         node.create_subscription(
             DiagnosticArray,
             "/diagnostics",
-            lambda array: statuses.append({v.key: v.value for v in array.status[0].values}),
+            lambda array: statuses.append(status_values(array.status[0])),
             QoSProfile(depth=10),
         )
         wait_for_match(node, lambda: all(samples.values()))

@@ -144,7 +144,9 @@ class Guest:
 
 def resident_mb(pid: int) -> float:
     """Resident set of a process, MB."""
-    return next(int(line.split()[1]) for line in Path(f"/proc/{pid}/status").open() if line.startswith("VmRSS")) / 1e3
+    return (
+        next(int(line.split()[1]) for line in Path(f"/proc/{pid}/status").open() if line.startswith("VmRSS")) * 1.024e-3
+    )
 
 
 def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:

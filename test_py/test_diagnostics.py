@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 
 from action import in_executor
-from drive import NANOSECONDS, Drive, joint_trajectory, own_mb, to_ns
+from drive import NANOSECONDS, Drive, joint_trajectory, own_mb, status_values, to_ns
 from motion import go_home, start_swing
-
-
-def next_one(drive: Drive, timeout: float = 5.0) -> DiagnosticArray:
-    """The diagnostics after now, past what is on its way."""
-    seen = len(drive.diagnostics())
-    return drive.wait_for(lambda: drive.diagnostics()[seen + 1 :], timeout, "diagnostics")[0]
 
 
 def text_of(array: DiagnosticArray) -> str:
@@ -43,12 +40,12 @@ def test_once_a_second_by_the_nodes_clock(real: Drive):
 def test_at_rest_and_moving(real: Drive):
     """Holding or running; at rest everything is well, but for what a busy computer releases late."""
     go_home(real)
-    at_rest = next_one(real)
+    at_rest = real.next_diagnostics()
     assert "holding" in text_of(at_rest)
     messages = {status.message for status in at_rest.status if status.level != DiagnosticStatus.OK}
     assert all("released late" in message and ";" not in message for message in messages), messages
     start_swing(real, duration=6.0)
-    assert "running" in text_of(next_one(real))
+    assert "running" in text_of(real.next_diagnostics())
     real.stop()
 
 
@@ -76,13 +73,23 @@ def test_an_axis_that_leaves_its_stroke_is_logged(real: Drive):
     real.wait_for(lambda: "x has left its stroke" in process.output(), 5, "a line of the log")
 
 
+def test_the_document_has_every_key_and_no_other(real: Drive):
+    document = (Path(__file__).resolve().parent.parent / "docs" / "graph.md").read_text()
+    section = document.split("## What `/diagnostics` tells")[1].split("\n## ")[0]
+    documented = re.findall(r"^\| [^|]*\| `(\w+)` \|", section, re.MULTILINE)
+    of_a_recording = ["file", "recording", "size_mb", "messages", "left_out"]
+    found = real.next_diagnostics().status
+    told = dict.fromkeys(key for status in found for key in status_values(status))
+    assert [*told, *of_a_recording] == documented
+
+
 def test_who_has_come_is_counted_and_memory_told(real: Drive):
     """Each subscription of others counts once, also when it has gone; memory is what Linux says of the node."""
 
-    def values() -> dict[str, str]:
-        return {value.key: value.value for value in next_one(real).status[0].values}
+    def count() -> int:
+        return int(real.told()["endpoints_discovered"])
 
-    before = int(values()["endpoints_discovered"])
+    before = count()
 
     def come_and_go() -> None:
         for _ in range(20):
@@ -90,7 +97,7 @@ def test_who_has_come_is_counted_and_memory_told(real: Drive):
             real.node.destroy_subscription(subscription)
 
     in_executor(real, come_and_go)
-    real.wait_for(lambda: int(values()["endpoints_discovered"]) >= before + 20, 20, "20 subscriptions counted")
-    after = values()
+    real.wait_for(lambda: count() >= before + 20, 20, "20 subscriptions counted")
+    after = real.told()
     assert int(after["endpoints_discovered"]) == before + 20
     assert abs(float(after["memory_mb"]) - own_mb(real.process.pid)) < 5.0

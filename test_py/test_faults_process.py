@@ -13,7 +13,7 @@ from action_msgs.msg import GoalStatus
 from sensor_msgs.msg import JointState
 
 from action import Follow, goal, in_executor, line
-from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, to_ns
+from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, status_values, to_ns
 from motion import assert_psec, go_home, start_swing, swing
 
 PAUSE_S = 5
@@ -29,7 +29,7 @@ Answer = TypeVar("Answer")
 
 def diagnostics(drive: Drive) -> list[dict[str, str]]:
     """Values of all diagnostics so far."""
-    return [{v.key: v.value for v in array.status[0].values} for array in drive.diagnostics()]
+    return [status_values(array.status[0]) for array in drive.diagnostics()]
 
 
 def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):

@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 from virtual_axes.msg import TrajectoryResult as R
 
 from action import in_executor
-from drive import TSP_NS, Drive, Node, joint_trajectory, parameter_messages, to_ns
+from drive import TSP_NS, Drive, Node, joint_trajectory, parameter_messages, status_values, to_ns
 from guest import Guest, long_trajectory, resident_mb
 from motion import TSP, assert_psec, go_home, start_swing, swing
 
@@ -56,7 +56,7 @@ def numbers(drive: Drive) -> dict[str, str]:
 
     def young() -> list[dict[str, str]]:
         arrays = [a for a in drive.diagnostics()[seen:] if to_ns(a.header.stamp) > now + 2 * TSP_NS]
-        return [{value.key: value.value for value in array.status[0].values} for array in arrays]
+        return [status_values(array.status[0]) for array in arrays]
 
     return drive.wait_for(young, 10, "diagnostics")[-1]
 

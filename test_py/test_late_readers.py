@@ -38,10 +38,14 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
         def writers() -> set[bytes]:
             return {bytes(info.endpoint_gid) for info in drive.node.get_publishers_info_by_topic(TOPIC)}
 
+        def came() -> int:
+            return int(drive.told()["endpoints_discovered"])
+
         early: list[int] = []
         listen(BEST_EFFORT, early)
         drive.wait_for(lambda: early, 10, "first sample")
         first = drive.wait_for(writers, 10, "publisher")
+        before_came = came()
 
         def write_many(target: float) -> None:
             # Nobody acknowledges, so that the axes wait for nobody.
@@ -56,6 +60,8 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
         drive.wait_for(lambda: len(reliable) > 1000, 30, "samples")
         assert set(np.diff(reliable[JOINING:])) == {TSP_NS}
         second = writers()
+        # The middleware tells of every reader again when there is another publisher.
+        assert came() == before_came + 1
 
         before = own_mb(process.pid)
         late: list[list[int]] = [[] for _ in range(LATE)]

@@ -29,7 +29,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult
 
-from drive import DEEP_QOS, NANOSECONDS, RESULT_QOS, TSP_NS, Drive, Node, joint_trajectory, node_binary
+from drive import DEEP_QOS, NANOSECONDS, RESULT_QOS, TSP_NS, Drive, Node, joint_trajectory, node_binary, status_values
 
 MEGABYTE = 1_000_000
 STATES, CURRENTS, DRIVES = "/joint_states", "/virtual_axes/motor_currents", "/virtual_axes/drive_states"
@@ -108,10 +108,6 @@ def recording_status(drive: Drive) -> DiagnosticStatus | None:
             if status.name == f"{drive.target}: recording":
                 return status
     return None
-
-
-def values(status: DiagnosticStatus) -> dict[str, str]:
-    return {value.key: value.value for value in status.values}
 
 
 @dataclass
@@ -237,8 +233,9 @@ def to_ns_of(data: bytes) -> int:
 
 def test_the_diagnostics_and_the_log_tell_of_it(session: Session):
     """Where it goes, and that nothing is missing."""
-    found = values(session.status)
+    found = status_values(session.status)
     assert session.status.level == DiagnosticStatus.OK and found["recording"] == "true"
+    assert list(found) == ["file", "recording", "size_mb", "messages", "left_out"]
     assert found["file"] == str(session.path) and found["left_out"] == "0"
     messages, _, _ = read(session.path)
     assert f"{sum(map(len, messages.values()))} messages, 0 left out" in session.output
@@ -281,7 +278,7 @@ def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive
     times = np.arange(1, len(noise) + 1) * (2 * TSP_NS / NANOSECONDS)
     drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120)
     ended = drive.wait_for(
-        lambda: (status := recording_status(drive)) and values(status)["recording"] == "false" and status,
+        lambda: (status := recording_status(drive)) and status_values(status)["recording"] == "false" and status,
         20,
         "end of the recording",
     )
@@ -289,7 +286,7 @@ def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive
     assert ended.message == "recording has ended: it has reached 1 MB"
 
     def left_out(status: DiagnosticStatus) -> int:
-        return int(values(status)["left_out"])
+        return int(status_values(status)["left_out"])
 
     drive.wait_for(lambda: left_out(recording_status(drive)) > left_out(ended), 10, "more")
     assert 0.9 * MEGABYTE < path.stat().st_size <= MEGABYTE
@@ -298,7 +295,7 @@ def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive
     last = [stamps(messages[topic])[-1] for topic in (STATES, CURRENTS, DRIVES)]
     assert all(set(np.diff(stamps(messages[topic]))) == {TSP_NS} for topic in (STATES, CURRENTS, DRIVES, "/clock"))
     assert max(last) - min(last) <= TSP_NS
-    assert str(sum(map(len, messages.values()))) == values(ended)["messages"]
+    assert str(sum(map(len, messages.values()))) == status_values(ended)["messages"]
     assert drive.process.output().count("has ended: it has reached 1 MB; the axes go on") == 1
 
 
@@ -317,7 +314,7 @@ def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
         result = drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120).result
         assert result.status == TrajectoryResult.COMPLETED
         ended = drive.wait_for(
-            lambda: (status := recording_status(drive)) and values(status)["recording"] == "false" and status,
+            lambda: (status := recording_status(drive)) and status_values(status)["recording"] == "false" and status,
             20,
             "end of the recording",
         )

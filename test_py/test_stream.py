@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import TSP_NS, Drive, joint_trajectory, to_ns
+from drive import TSP_NS, Drive, joint_trajectory, status_values, to_ns
 from motion import TSP, assert_psec, go_home, start_swing
 
 ATTEMPTS = 4
@@ -43,14 +43,9 @@ def node_status(drive: Drive, condition: Callable[[dict[str, str]], bool]) -> Di
     seen = len(drive.diagnostics())
 
     def found() -> list[DiagnosticStatus]:
-        return [array.status[0] for array in drive.diagnostics()[seen:] if condition(values(array.status[0]))]
+        return [array.status[0] for array in drive.diagnostics()[seen:] if condition(status_values(array.status[0]))]
 
     return drive.wait_for(found, 5, "diagnostics of the stream")[0]
-
-
-def values(status: DiagnosticStatus) -> dict[str, str]:
-    """Values of a status by key."""
-    return {value.key: value.value for value in status.values}
 
 
 def numbers(drive: Drive, *keys: str) -> tuple[int, ...]:
@@ -59,7 +54,9 @@ def numbers(drive: Drive, *keys: str) -> tuple[int, ...]:
     seen = len(drive.diagnostics())
 
     def young() -> list[dict[str, str]]:
-        return [values(a.status[0]) for a in drive.diagnostics()[seen:] if to_ns(a.header.stamp) > now + 2 * TSP_NS]
+        return [
+            status_values(a.status[0]) for a in drive.diagnostics()[seen:] if to_ns(a.header.stamp) > now + 2 * TSP_NS
+        ]
 
     newest = drive.wait_for(young, 5, "diagnostics")[-1]
     return tuple(int(newest[key]) for key in keys)
@@ -235,7 +232,7 @@ def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):
     def ignored() -> bool:
         real.stream(["x"], [next(positions)])
         statuses = [array.status[0] for array in real.diagnostics()[seen:]]
-        return any(values(s)["stream_held_off"] == "true" and s.level == DiagnosticStatus.WARN for s in statuses)
+        return any(status_values(s)["stream_held_off"] == "true" and s.level == DiagnosticStatus.WARN for s in statuses)
 
     real.wait_for(ignored, 5, "diagnostics of a stream that is held off")
     assert real.latest("psec")["x"] == 0.001
@@ -265,7 +262,7 @@ def test_a_stream_that_breaks_off_in_motion_holds_and_is_told(start: Callable[..
     status = node_status(drive, lambda v: v["stream_gaps"] != "0")
     assert status.level == DiagnosticStatus.WARN and "broke off in motion" in status.message
     # More than one on a machine that stood still for a tenth of a second.
-    gaps = int(values(status)["stream_gaps"])
+    gaps = int(status_values(status)["stream_gaps"])
     assert drive.latest("psec")["x"] == REACH * 5 * 0.9
     # A tenth of the speed that the axis can brake from in one period.
     follow(drive, ["x"], REACH * 4.5 + np.arange(1, 6).reshape(-1, 1) * 1e-6)
@@ -279,7 +276,7 @@ def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
     """Without a controller that looks ahead there is no delay."""
     go_home(real)
     status = node_status(real, lambda v: v["stream_drives"] == "false" and v["state"] == "holding")
-    assert values(status)["stream_delay_ms"] == "0"
+    assert status_values(status)["stream_delay_ms"] == "0"
 
     seen = len(real.diagnostics())
     positions = iter(np.tile(wave(0.01), 50))
@@ -287,7 +284,7 @@ def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
     def streaming() -> bool:
         real.stream(["x"], [next(positions)])
         return any(
-            (found := values(a.status[0]))["stream_drives"] == "true" and found["state"] == "streaming"
+            (found := status_values(a.status[0]))["stream_drives"] == "true" and found["state"] == "streaming"
             for a in real.diagnostics()[seen:]
         )
 

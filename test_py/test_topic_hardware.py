@@ -11,7 +11,6 @@ import pytest
 
 from drive import TSP_NS, Drive, Node
 from motion import TSP, go_home
-from test_stream import values
 from topic_hardware import COMMANDS_TOPIC, STATES_TOPIC, Network, TopicHardware
 
 REMAPS = (f"psec_stream:={COMMANDS_TOPIC}", f"joint_states:={STATES_TOPIC}")
@@ -52,10 +51,8 @@ COUNTS = (
 
 def counts(drive: Drive) -> dict[str, int]:
     """The node's counts, younger than now."""
-    seen = len(drive.diagnostics())
-    # The first one that comes can be of an instant before this call.
-    status = drive.wait_for(lambda: drive.diagnostics()[seen + 1 :], 5, "diagnostics")[0].status[0]
-    return {key: int(values(status)[key]) for key in COUNTS}
+    told = drive.told()
+    return {key: int(told[key]) for key in COUNTS}
 
 
 def rise(amplitude: float, duration: float, t: float) -> float:

@@ -127,6 +127,7 @@ fn an_axis_that_left_its_stroke_is_told() {
 #[test]
 fn a_pose_beyond_a_stroke_is_told() {
     assert!(!assert_runs(&["pose", "--joints", "x=0.1,z=-0.2"]).contains("stroke"));
+    assert_refused(&run(&["pose", "--joints", "x=1e300"]), &["x is '1e300'", "of 1000000 at most"]);
     let beyond = assert_runs(&["pose", "--joints", "x=5,y=0.1,z=9"]);
     assert!(beyond.ends_with("; outside the stroke: x, z\n"), "{beyond}");
     let json: Value =
@@ -180,7 +181,7 @@ fn bad_set_points_are_refused_with_file_and_line() {
         ("long.csv", &long, &["long.csv:4711", "x", "NaN"]),
         ("far.csv", "time,x\n0,0\n10,2.5\n", &["far.csv", "x", "0.355", "stroke"]),
         ("fast.csv", "time,x\n0,0\n0.1,0.3\n", &["fast.csv", "x", "0.5"]),
-        ("eternal.csv", "time,x\n0,0\n1e300,0\n", &["eternal.csv:3", "time"]),
+        ("eternal.csv", "time,x\n0,0\n1e300,0\n", &["eternal.csv:3", "time is 1e300 s"]),
         ("joint.csv", "time,q\n0,0\n", &["joint.csv", "q"]),
         ("columns.csv", "time,x,y\n0,0,0\n0.006,0\n", &["columns.csv", "3"]),
         ("notime.csv", "x,y\n0,0\n", &["notime.csv", "time"]),

@@ -136,9 +136,10 @@ fn bad_input_is_refused_by_name() {
     assert_refused(&["gpc", "--lambda", "nan"], &["lambda = NaN must be finite"]);
     assert_refused(&["gpc", "--axis", "w"], &["--axis w: the machine has x, y, z, a, c"]);
     assert_refused(&["pi", "--integral-time-ms", "0"], &["integral_time = 0 must be above 0"]);
-    for gain in ["-1", "1e6", "nan"] {
+    for gain in ["-1", "1e6", "nan", "1e-7", "1e-320"] {
         assert_refused(&["p", "--gain", gain], &["--gain", "at most 600 (m/min)/mm"]);
     }
+    assert_refused(&["p", "--feedforward", "1e300"], &["velocity_feedforward = 1e300 must"]);
     assert_refused(&["poles", "--pole", "1.5"], &["the wanted pole 1.500000 has the modulus 1.5"]);
     assert_refused(&["poles", "--pole", "a"], &["--pole"]);
     assert_refused(&["poles"], &["--bandwidth"]);

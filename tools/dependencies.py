@@ -11,7 +11,6 @@ What cargo says of the lock file is the source, of the node's as of the fuzz tar
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
 import shutil
@@ -20,6 +19,8 @@ import sys
 import tomllib
 from pathlib import Path
 from typing import Any
+
+import options
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "docs" / "dependencies.md"
@@ -111,7 +112,7 @@ def advisories() -> int:
 
 def main() -> int:
     """Take the command line."""
-    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words = options.parser(__doc__)
     words.add_argument("--write", action="store_true")
     words.add_argument("--advisories", action="store_true")
     asked = words.parse_args()

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import matplotlib
 
+import options
+
 matplotlib.use("svg")
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen before)
 
@@ -83,6 +85,7 @@ def draw(contrast: dict) -> None:
 
 def main() -> int:
     """Searches, draws and says what was found."""
+    options.parser(__doc__).parse_args()
     contrast = search()
     draw(contrast)
     there = contrast["also"][0]

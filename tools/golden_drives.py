@@ -15,6 +15,8 @@ import random
 import mpmath
 from mpmath import mpf
 
+import options
+
 # Digits: the largest exponent has 14, the least of the entries that count 60.
 mpmath.mp.dps = 120
 GOLDEN = pathlib.Path(__file__).parent.parent / "tests" / "golden"
@@ -230,6 +232,7 @@ def loops():
 
 
 def main():
+    options.parser(__doc__).parse_args()
     GOLDEN.mkdir(exist_ok=True)
     (GOLDEN / "drives.csv").write_text("\n".join(drives()) + "\n")
     (GOLDEN / "loops.csv").write_text("\n".join(loops()) + "\n")

@@ -11,11 +11,12 @@ rq/ and rr/ before that of a service.
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import subprocess
 import tempfile
 from pathlib import Path
+
+import options
 
 DAYS = 3650
 CURVE = "prime256v1"
@@ -129,7 +130,7 @@ class Keystore:
 
 def main() -> None:
     """Take the command line."""
-    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words = options.parser(__doc__)
     words.add_argument("folder", type=Path)
     words.add_argument("--domain", type=int, default=0, help="ROS_DOMAIN_ID that the keystore is for")
     kinds = ("NONE", "SIGN", "ENCRYPT")

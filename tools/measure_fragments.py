@@ -15,6 +15,8 @@ import sys
 import time
 from pathlib import Path
 
+import options
+
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 
@@ -40,7 +42,9 @@ def fragment(writer: bytes, number: int, length: int) -> bytes:
 
 def main() -> None:
     """Measure."""
-    length = int(float(sys.argv[1]) if len(sys.argv) > 1 else 256) * 1_000_000
+    parser = options.parser(__doc__)
+    parser.add_argument("megabytes", type=options.positive, nargs="?", default=256, help="that are announced (256)")
+    length = int(parser.parse_args().megabytes * 1_000_000)
     with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:
         drive.node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
         time.sleep(1.0)

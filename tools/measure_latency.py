@@ -17,7 +17,6 @@ the transport there and back.
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import sys
@@ -27,6 +26,8 @@ from pathlib import Path
 import numpy as np
 from sensor_msgs.msg import JointState
 from virtual_axes.msg import DriveStates
+
+import options
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -78,8 +79,8 @@ def measure(drive: Drive, messages: int, seed: int) -> dict[str, np.ndarray]:
 
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--messages", type=int, default=300, help="set-points (300)")
+    parser = options.parser(__doc__)
+    parser.add_argument("--messages", type=options.whole, default=300, help="set-points (300)")
     parser.add_argument("--seed", type=int, default=1, help="of the phases (1)")
     args = parser.parse_args()
     with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:

@@ -25,6 +25,8 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+import options
+
 COMMAND = Path(__file__).resolve().parent.parent / "target" / "release" / "virtual_axes"
 LENGTHS = [60, 600, 3600, 36000]
 # The position period of the default machine, ms.
@@ -128,28 +130,21 @@ def row(seconds: int, runs: list[Run], read: int, first: tuple[int, list[Run]]) 
     )
 
 
-def whole(text: str) -> int:
-    """A number from 1 on."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 on")
-    return int(text)
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = options.parser(__doc__)
     parser.add_argument("--command", type=Path, default=COMMAND, help="the program virtual_axes")
     parser.add_argument(
-        "--seconds", type=whole, nargs="+", default=LENGTHS, metavar="S", help="lengths of the set-points"
+        "--seconds", type=options.whole, nargs="+", default=LENGTHS, metavar="S", help="lengths of the set-points"
     )
     parser.add_argument("--report", action="store_true", help="write a page, too")
     parser.add_argument("--trace", action="store_true", help="write a trace, too")
-    parser.add_argument("--rounds", type=whole, default=1, metavar="N", help="how often each length is run")
+    parser.add_argument("--rounds", type=options.whole, default=1, metavar="N", help="how often each length is run")
     parser.add_argument("--folder", type=Path, help="where set-points and outputs are for a while")
     parser.add_argument("--write", nargs=2, metavar=("S", "FILE"), help="write set-points and run nothing")
     arguments = parser.parse_args()
     if arguments.write:
         try:
-            write_psec(Path(arguments.write[1]), whole(arguments.write[0]))
+            write_psec(Path(arguments.write[1]), options.whole(arguments.write[0]))
         except (argparse.ArgumentTypeError, OSError) as error:
             parser.error(f"--write: {error}")
         return

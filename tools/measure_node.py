@@ -18,7 +18,6 @@ what is bounded has grown to its bound: the middleware keeps the last 64.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import threading
@@ -39,6 +38,8 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import DriveStates, MotorCurrents
+
+import options
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -239,19 +240,11 @@ def memory(process: Node, guest: Guest, minutes: float) -> None:
     print(f"  open files: {files[0]:.0f} at first, at most {files.max():.0f}, {files[-1]:.0f} at last")
 
 
-def positive(text: str) -> float:
-    """A finite number above 0."""
-    value = float(text)
-    if not 0 < value < np.inf:
-        raise argparse.ArgumentTypeError(f"{text}: above 0 is wanted")
-    return value
-
-
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=positive, default=20, help="of each span of which the share is taken (20)")
-    parser.add_argument("--minutes", type=float, default=10, help="of motion while memory is looked at (10)")
+    parser = options.parser(__doc__)
+    parser.add_argument("--seconds", type=options.positive, default=20, help="of each span (20)")
+    parser.add_argument("--minutes", type=options.from_zero, default=10, help="of motion, for memory (10)")
     args = parser.parse_args()
     with Node(["-p", "time:=real"]) as process:
         time.sleep(STARTED_S)

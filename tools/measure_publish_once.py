@@ -22,6 +22,8 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import options
+
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
@@ -66,17 +68,17 @@ for number in range(int(first), int(first) + int(runs)):
 
 def arguments() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=100, help="publishers, one after another (100)")
+    parser = options.parser(__doc__)
+    parser.add_argument("--runs", type=options.whole, default=100, help="publishers, one after another (100)")
     parser.add_argument("--durability", choices=["transient_local", "volatile"], default="transient_local")
-    parser.add_argument("--poll", type=float, default=0.001, help="s between looks for a match (0.001)")
-    parser.add_argument("--settle", type=float, default=0.0, help="s from the match to the sample (0)")
-    parser.add_argument("--keep-alive", type=float, default=0.1, help="s from the sample to the end (0.1)")
-    parser.add_argument("--times", type=int, default=1, help="samples, one a second (1)")
-    parser.add_argument("--points", type=int, default=1, help="points of each trajectory; 2000 need fragments (1)")
-    parser.add_argument("--load", type=int, default=0, help="busy processes beside (0)")
+    parser.add_argument("--poll", type=options.from_zero, default=0.001, help="s between looks for a match (0.001)")
+    parser.add_argument("--settle", type=options.from_zero, default=0.0, help="s from the match to the sample (0)")
+    parser.add_argument("--keep-alive", type=options.from_zero, default=0.1, help="s from the sample to the end (0.1)")
+    parser.add_argument("--times", type=options.whole, default=1, help="samples, one a second (1)")
+    parser.add_argument("--points", type=options.whole, default=1, help="of each trajectory; 2000 need fragments (1)")
+    parser.add_argument("--load", type=options.whole_from_zero, default=0, help="busy processes beside (0)")
     parser.add_argument("--node-last", action="store_true", help="a new node for each publisher, started after it")
-    parser.add_argument("--per-process", type=int, default=1, help="publishers in one process (1)")
+    parser.add_argument("--per-process", type=options.whole, default=1, help="publishers in one process (1)")
     parser.add_argument("--log-level", help="of the node, as for --ros-args; its output goes to --output")
     parser.add_argument("--output", type=Path, help="file for the node's output")
     return parser.parse_args()

@@ -14,7 +14,6 @@ rclpy keeps all too: samples a second. Rates are multiples of the default one, a
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import subprocess
@@ -31,6 +30,8 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
+
+import options
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "test_py"))
@@ -184,8 +185,8 @@ def fast(seconds: float) -> None:
 
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=5, help="of each span (5)")
+    parser = options.parser(__doc__)
+    parser.add_argument("--seconds", type=options.positive, default=5, help="of each span (5)")
     args = parser.parse_args()
     real_time(args.seconds)
     fast(args.seconds)

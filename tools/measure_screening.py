@@ -20,6 +20,8 @@ import sys
 import time
 from pathlib import Path
 
+import options
+
 PROGRAM = Path(__file__).resolve().parent.parent / "target" / "release" / "virtual_axes"
 
 
@@ -47,15 +49,12 @@ def screen(arguments: argparse.Namespace, designs: int, threads: int) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = options.parser(__doc__)
     parser.add_argument("--program", type=Path, default=PROGRAM)
     parser.add_argument("--scenario", default="ballbar")
-    parser.add_argument("--designs", type=int, default=100_000)
-    parser.add_argument("--part", type=int, default=10, help="one core screens the designs divided by this")
+    parser.add_argument("--designs", type=options.whole, default=100_000)
+    parser.add_argument("--part", type=options.whole, default=10, help="one core screens the designs divided by this")
     arguments = parser.parse_args()
-    for option, number in (("--part", arguments.part), ("--designs", arguments.designs)):
-        if number < 1:
-            parser.error(f"{option}: one at least, not {number}")
     if not arguments.program.is_file():
         parser.error(f"there is no {arguments.program}: cargo build --release --bin virtual_axes")
     two = screen(arguments, arguments.designs, 2)

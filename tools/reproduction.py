@@ -9,13 +9,14 @@ Each number is what the command beside it prints.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
 import sys
 import textwrap
 from pathlib import Path
+
+import options
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAM = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "virtual_axes"
@@ -277,7 +278,7 @@ def page() -> str:
 
 def main() -> int:
     """Writes or checks the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = options.parser(__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing")
     checks = parser.parse_args().check
     text = page()

@@ -10,13 +10,14 @@ and a recorder. The exit status tells whether a stamp was missing or came twice.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
+
+import options
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -29,8 +30,8 @@ TORQUE_CONSTANT = 2.64
 
 def main() -> int:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=60.0, help="of motion (60)")
+    parser = options.parser(__doc__)
+    parser.add_argument("--seconds", type=options.positive, default=60.0, help="of motion (60)")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         figures = run_graph(args.seconds, Path(folder) / "recorded.json")

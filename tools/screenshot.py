@@ -5,13 +5,19 @@ import sys
 import tempfile
 from pathlib import Path
 
+import options
+
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 from browser import Browser, find_browser  # noqa: E402  (the path to it is set above)
 
 
 def main() -> int:
     """Takes the picture, or says why there is none."""
-    page, picture = (Path(argument).resolve() for argument in sys.argv[1:3])
+    parser = options.parser(__doc__)
+    parser.add_argument("page", type=Path)
+    parser.add_argument("picture", type=Path)
+    arguments = parser.parse_args()
+    page, picture = arguments.page.resolve(), arguments.picture.resolve()
     program = find_browser()
     if program is None:
         print("no Chromium here to make a picture of it")

@@ -21,7 +21,6 @@ The exit status is 1 if over the second half something grew by more than it may,
 
 from __future__ import annotations
 
-import argparse
 import gc
 import math
 import os
@@ -44,6 +43,8 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import DriveStates, MotorCurrents
 
+import options
+
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
@@ -51,6 +52,23 @@ from action import Follow, goal, in_executor  # noqa: E402
 from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, own_mb, to_time  # noqa: E402
 from guest import Guest  # noqa: E402
 
+WEIGHTS = {
+    "trajectory": 20,
+    "invalid": 10,
+    "long_trajectory": 1,
+    "halt": 3,
+    "stream": 8,
+    "load": 5,
+    "parameters": 8,
+    "wrong_parameter": 4,
+    "descriptions": 2,
+    "reset": 1,
+    "goal": 8,
+    "listener": 8,
+    "visitor": 1,
+    "killed": 0.5,
+}
+"""Kinds of traffic, and how often each is sent against the others: methods of Traffic."""
 JOINTS = {"x": 0.05, "y": 0.05, "z": 0.05, "a": 0.2, "c": 1.0}
 """How far trajectories go from home, m or rad."""
 GAIN = "x.velocity_loop.gain"
@@ -147,26 +165,8 @@ class Traffic:
         self._guests: list[Guest] = []
         self._listening: list[Any] = []
         self._kinds: list[tuple[float, Callable[[], None]]] = [
-            (20, self.trajectory),
-            (10, self.invalid),
-            (1, self.long_trajectory),
-            (3, self.halt),
-            (8, self.stream),
-            (5, self.load),
-            (8, self.parameters),
-            (4, self.wrong_parameter),
-            (2, self.descriptions),
-            (1, self.reset),
-            (8, self.goal),
-            (8, self.listener),
-            (1, self.visitor),
-            (0.5, self.killed),
+            (weight, getattr(self, kind)) for kind, weight in WEIGHTS.items()
         ]
-        known = {act.__name__ for _, act in self._kinds}
-        if not kinds <= known:
-            raise SystemExit(
-                f"no such traffic: {', '.join(sorted(kinds - known))}; there is {', '.join(sorted(known))}"
-            )
         if kinds:
             self._kinds = [(weight, act) for weight, act in self._kinds if (act.__name__ in kinds) != without]
 
@@ -394,12 +394,6 @@ class Memory:
         self._end.set()
 
 
-def told(drive: Drive) -> dict[str, str]:
-    """What the last diagnostics say of the node."""
-    drive.wait_for(drive.diagnostics, 20, "diagnostics")
-    return {value.key: value.value for value in drive.diagnostics()[-1].status[0].values}
-
-
 def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
     """The process as it is now."""
     assert drive.process is not None
@@ -416,7 +410,7 @@ def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
         latency_ms=latency,
         echo_ms=echo,
         load=os.getloadavg()[0],
-        endpoints=int(told(drive)["endpoints_discovered"]),
+        endpoints=int(drive.told()["endpoints_discovered"]),
     )
 
 
@@ -467,15 +461,19 @@ def verdict(looks: list[Look]) -> bool:
 
 def main() -> int:
     """Run and judge."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--minutes", type=float, default=1, help="of the wall clock (1)")
-    parser.add_argument("--speed", type=float, default=1, help="of the node's clock against the wall's (1)")
+    parser = options.parser(__doc__)
+    parser.add_argument("--minutes", type=options.positive, default=1, help="of the wall clock (1)")
+    parser.add_argument("--speed", type=options.positive, default=1, help="of the node's clock against the wall's (1)")
     parser.add_argument("--seed", type=int, default=1, help="of the traffic (1)")
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("--only", metavar="KIND,...", help="of traffic, to find out what grows by it")
     kinds.add_argument("--without", metavar="KIND,...", help="all traffic but this")
     args = parser.parse_args()
     chosen = set(filter(None, (args.only or args.without or "").split(",")))
+    if not chosen <= set(WEIGHTS):
+        parser.error(f"no such traffic: {', '.join(sorted(chosen - set(WEIGHTS)))}; there is {', '.join(WEIGHTS)}")
+    if args.without and chosen == set(WEIGHTS):
+        parser.error("--without: nothing is left")
     real = args.speed == 1
     mode = ["-p", "time:=real"] if real else ["-p", "use_sim_time:=true"]
     with Node([*mode, "-p", "max_points:=20000"]) as process, Drive(process=process, connect=False) as drive:
@@ -493,19 +491,23 @@ def main() -> int:
             looks: list[Look] = []
             values: dict[str, str] = {}
             try:
-                began, first_period = time.monotonic(), int(told(drive)["position_periods"])
+                began, first_period = time.monotonic(), int(drive.told()["position_periods"])
                 while (passed := time.monotonic() - began) < args.minutes * 60:
                     traffic.step()
                     if process.poll() is not None:
                         break
                     if passed >= len(looks) * args.minutes * 60 / LOOKS:
                         traffic.forget()
-                        looks.append(look(drive, prober, memory, began))
+                        try:
+                            looks.append(look(drive, prober, memory, began))
+                        except (TimeoutError, OSError):
+                            if process.poll() is None:
+                                raise
+                            break
                         if len(looks) % (LOOKS // 10) == 0:
                             print(looks[-1], flush=True)
                 if process.poll() is None:
-                    time.sleep(1.5)  # Until the next diagnostics.
-                    values = told(drive)
+                    values = drive.told()
                     lived_s = (int(values["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
                     print(f"\n{lived_s:.0f} s of the axes in {time.monotonic() - began:.0f} s")
             finally:

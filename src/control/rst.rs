@@ -1,6 +1,7 @@
 //! Linear position controllers in RST form.
 
 use crate::config::{MAX_HORIZON, RST_TERMS};
+use crate::units::Told;
 
 /// Most coefficients of R and of S.
 pub const MAX_COEFFICIENTS: usize = RST_TERMS;
@@ -59,7 +60,8 @@ pub enum RstError {
     },
     /// The axis would not go where it is told to.
     #[error(
-        "T(1) = {t} and R(1) = {r} differ; they must be equal, or the axis does not go where it is told to"
+        "T(1) = {} and R(1) = {} differ; they must be equal, or the axis does not go where it is told to",
+        Told(*t), Told(*r)
     )]
     Gain {
         /// T(1).

@@ -16,13 +16,14 @@ pub use pole_placement::{PolePlacement, pole_pair, pole_placement};
 pub use poles::{accept, check_stable, poles};
 
 use crate::control::RstError;
+use crate::units::Told;
 
 /// Why there is no controller.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DesignError {
     /// A tuning parameter out of its range.
-    #[error("{name} = {value} must {allowed}")]
+    #[error("{name} = {} must {allowed}", Told(*value))]
     OutOfRange {
         /// Name of the parameter, in SI units.
         name: &'static str,

@@ -3,6 +3,7 @@
 use super::nearest_name;
 use super::psec_csv::{LONGEST, TIME};
 use crate::trajectory::Rejection;
+use crate::units::Told;
 
 /// Why a file of set-points cannot be used; each names file and line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -64,7 +65,7 @@ pub enum PsecError {
         found: String,
     },
     /// A time is out of range.
-    #[error("{at}: {TIME} is {found} s, must lie in 0 … {LONGEST} s")]
+    #[error("{at}: {TIME} is {} s, must lie in 0 … {LONGEST} s", Told(*found))]
     Time {
         /// File and line.
         at: String,
@@ -72,7 +73,7 @@ pub enum PsecError {
         found: f64,
     },
     /// A time is not after the one before it.
-    #[error("{at}: {TIME} is {found} s, must be later than {before} s of the line before it")]
+    #[error("{at}: {TIME} is {} s, must be later than {} s of the line before it", Told(*found), Told(*before))]
     NotIncreasing {
         /// File and line.
         at: String,

@@ -1,9 +1,11 @@
 //! What the process holds: its memory, and others that the middleware remembers.
 
+use std::collections::HashSet;
 use std::fs;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use rustdds::{DomainParticipantStatusEvent, GUID};
 use tracing::warn;
 
 /// So many endpoints more, and the log says what they cost.
@@ -23,14 +25,55 @@ impl Discovered {
     }
 
     /// Another one has been discovered.
-    pub fn another(&self) {
+    fn another(&self) {
         let count = self.0.fetch_add(1, Ordering::Relaxed) + 1;
         if count.is_multiple_of(WARN_EVERY) {
             warn!(
-                "{count} publishers, subscriptions, services and clients of others have come since the start: the \
-                 middleware keeps up to {:.0} MB of those that have left until this node ends",
+                "{count} endpoints of others (publishers and subscriptions, and two of each service and client) have \
+                 come since the start: the middleware keeps up to {:.0} MB of those that have left until this node ends",
                 count as f64 * KEPT_KB * 1e-3
             );
+        }
+    }
+}
+
+/// The endpoints of others that are there now. The middleware tells of one again when its announcement is repeated, and
+/// of each that suits when one of the node's own is made.
+#[derive(Debug)]
+pub struct Present {
+    /// The participant of the node.
+    own: GUID,
+    there: HashSet<GUID>,
+    discovered: Discovered,
+}
+
+impl Present {
+    /// Nobody's yet; those of the participant `own` are not counted.
+    pub fn new(own: GUID, discovered: Discovered) -> Self {
+        Present { own, there: HashSet::new(), discovered }
+    }
+
+    /// Takes note of what the middleware tells.
+    pub fn tell(&mut self, event: &DomainParticipantStatusEvent) {
+        match event {
+            DomainParticipantStatusEvent::ReaderDetected { reader: endpoint }
+            | DomainParticipantStatusEvent::WriterDetected { writer: endpoint } => {
+                self.is_there(endpoint.guid)
+            }
+            DomainParticipantStatusEvent::ReaderLost { guid, .. }
+            | DomainParticipantStatusEvent::WriterLost { guid, .. } => {
+                self.there.remove(guid);
+            }
+            DomainParticipantStatusEvent::ParticipantLost { id, .. } => {
+                self.there.retain(|guid| guid.prefix != *id)
+            }
+            _ => {}
+        }
+    }
+
+    fn is_there(&mut self, guid: GUID) {
+        if guid.prefix != self.own.prefix && self.there.insert(guid) {
+            self.discovered.another();
         }
     }
 }
@@ -56,6 +99,35 @@ mod tests {
         assert_eq!(anonymous_mb(status), Some(1.024));
         assert_eq!(anonymous_mb("Name:\tvirtual_axes\n"), None);
         assert_eq!(anonymous_mb("RssAnon:\tmany kB\n"), None);
+    }
+
+    #[test]
+    fn an_endpoint_is_counted_once_for_each_time_that_it_comes() {
+        use DomainParticipantStatusEvent::{ParticipantLost, ReaderLost, WriterLost};
+        use rustdds::LostReason;
+
+        let endpoint = |participant: u8, entity: u8| {
+            let mut bytes = [participant; 16];
+            bytes[12..].copy_from_slice(&[0, 0, entity, 4]);
+            GUID::from_bytes(bytes)
+        };
+        let (own, one, other) = (endpoint(1, 1), endpoint(2, 1), endpoint(2, 2));
+        let discovered = Discovered::default();
+        let mut present = Present::new(own, discovered.clone());
+        [own, one, other, one, one, other].into_iter().for_each(|guid| present.is_there(guid));
+        assert_eq!(discovered.count(), 2);
+        present.tell(&ReaderLost { guid: one, reason: LostReason::Disposed });
+        present.is_there(one);
+        present.tell(&WriterLost { guid: other, reason: LostReason::Disposed });
+        present.is_there(other);
+        assert_eq!(discovered.count(), 4);
+        present.tell(&ParticipantLost { id: own.prefix, reason: LostReason::Disposed });
+        present.is_there(one);
+        assert_eq!(discovered.count(), 4);
+        present.tell(&ParticipantLost { id: one.prefix, reason: LostReason::Disposed });
+        assert_eq!(present.there.len(), 0);
+        [one, other].into_iter().for_each(|guid| present.is_there(guid));
+        assert_eq!(discovered.count(), 6);
     }
 
     #[test]
@@ -88,6 +160,6 @@ mod tests {
         let said = String::from_utf8(text.0.lock().expect("not poisoned").clone()).expect("text");
         assert_eq!(discovered.count(), 250_000);
         assert_eq!(said.lines().count(), 2, "{said}");
-        assert!(said.contains("100000 publishers") && said.contains("83 MB"), "{said}");
+        assert!(said.contains("100000 endpoints") && said.contains("83 MB"), "{said}");
     }
 }

@@ -9,7 +9,7 @@ use futures::StreamExt;
 use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, RTPSEntity, StatusEvented};
 
 use super::ask_again::Asker;
-use super::footprint::Discovered;
+use super::footprint::{Discovered, Present};
 
 /// How often it is looked whether those who listened have gone; a reader that comes is told of at once.
 const LOOK_PERIOD: Duration = Duration::from_secs(1);
@@ -76,7 +76,7 @@ impl Listeners {
 /// counts what is discovered, until the task is ended. A participant tells each event once, to one that listens.
 pub(super) async fn run(participant: DomainParticipant, listeners: Listeners, discovered: Discovered) {
     let asker = Asker::open();
-    let own = participant.guid().prefix;
+    let mut present = Present::new(participant.guid(), discovered);
     let status = participant.status_listener();
     let mut events = status.as_async_status_stream();
     let mut timer = tokio::time::interval(LOOK_PERIOD);
@@ -94,11 +94,7 @@ pub(super) async fn run(participant: DomainParticipant, listeners: Listeners, di
                         asker.matched(&participant, local_reader, remote_writer);
                     }
                 }
-                Some(
-                    DomainParticipantStatusEvent::ReaderDetected { reader: endpoint }
-                    | DomainParticipantStatusEvent::WriterDetected { writer: endpoint },
-                ) if endpoint.guid.prefix != own => discovered.another(),
-                Some(_) => {}
+                Some(event) => present.tell(&event),
                 None => return,
             },
             _ = timer.tick() => listeners.look(&participant),

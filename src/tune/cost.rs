@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use crate::config::{AxisKind, MachineConfig};
 use crate::trial::{AxisFigures, Figures};
-use crate::units::{DEGREE, MILLIMETRE};
+use crate::units::{DEGREE, MILLIMETRE, Told};
 
 /// m in µm.
 const MICROMETRE: f64 = 1e-3 * MILLIMETRE;
@@ -148,7 +148,7 @@ impl Cost {
     pub fn new(terms: &[(Term, f64)]) -> Result<Self, CostError> {
         for (place, (term, weight)) in terms.iter().enumerate() {
             if !(0.0..=LARGEST_WEIGHT).contains(weight) {
-                return Err(CostError::Weight { term: term.name(), weight: weight.to_string() });
+                return Err(CostError::Weight { term: term.name(), weight: Told(*weight).to_string() });
             }
             if terms[..place].iter().any(|(before, _)| before == term) {
                 return Err(CostError::Twice { term: term.name() });

@@ -20,6 +20,7 @@ from .client import (
     Refused,
     parameter_messages,
     stamp_of,
+    status_values,
 )
 from .process import DEFAULT_NODE, DomainId, Node, die_with_parent, node_binary, own_mb
 from .qos import DEEP_QOS, PSEC_QOS, RESULT_QOS, STREAM_QOS
@@ -51,6 +52,7 @@ __all__ = [
     "own_mb",
     "parameter_messages",
     "stamp_of",
+    "status_values",
     "to_ns",
     "to_time",
 ]

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.srv import (
@@ -367,6 +367,15 @@ class Drive:
         with self._changed:
             return list(self._diagnostics)
 
+    def next_diagnostics(self, timeout: float = 8.0) -> DiagnosticArray:
+        """The diagnostics after now, past what is on its way."""
+        seen = len(self.diagnostics())
+        return self.wait_for(lambda: self.diagnostics()[seen + 1 :], timeout, "diagnostics")[0]
+
+    def told(self) -> dict[str, str]:
+        """What the next diagnostics say of the node, by key."""
+        return status_values(self.next_diagnostics().status[0])
+
     # ---- services
 
     def call(self, kind: Any, service: str, request: Any, timeout: float = 10.0) -> Any:
@@ -427,6 +436,11 @@ class Drive:
 def parameter_messages(values: Mapping[str, Any]) -> list[ParameterMsg]:
     """As requests to set them carry them."""
     return [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+
+
+def status_values(status: DiagnosticStatus) -> dict[str, str]:
+    """Values of a status of /diagnostics, by key."""
+    return {value.key: value.value for value in status.values}
 
 
 def stamp_of(sample: bytes) -> int:

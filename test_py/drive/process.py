@@ -59,7 +59,7 @@ def _port_is_free(port: int) -> bool:
 def own_mb(pid: int) -> float:
     """Resident memory of a process without pages of files, MB."""
     status = Path(f"/proc/{pid}/status").read_text().splitlines()
-    return next(int(line.split()[1]) for line in status if line.startswith("RssAnon")) / 1e3
+    return next(int(line.split()[1]) for line in status if line.startswith("RssAnon")) * 1.024e-3
 
 
 def node_binary() -> Path:

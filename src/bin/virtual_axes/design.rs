@@ -10,9 +10,12 @@ use virtual_axes::design::{
     margins, p, pi, pid, pole_pair, pole_placement, poles,
 };
 use virtual_axes::machine::prediction_model;
-use virtual_axes::units::{MILLISECOND, POSITION_GAIN};
+use virtual_axes::units::{MILLISECOND, POSITION_GAIN, Told};
 
 use crate::{design_output, variant};
+
+/// Least `--gain`, (m/min)/mm: with less, what rounding leaves of the feedforward counts beside it.
+const LEAST_GAIN: f64 = 1e-6;
 
 /// Which controllers.
 #[derive(Debug, clap::Args)]
@@ -310,10 +313,10 @@ impl Preset<'_> {
     /// Kp in s⁻¹, the weight of the feedforward, and both as given.
     fn proportional(&self, given: &Proportional) -> Result<Gains, Box<dyn Error>> {
         let gain = self.number(given.gain, "position_loop.gain")?;
-        if given.gain.is_some() && !(gain > 0.0 && gain * POSITION_GAIN <= MAX_GAIN) {
-            let most = MAX_GAIN / POSITION_GAIN;
+        if given.gain.is_some() && !(gain >= LEAST_GAIN && gain * POSITION_GAIN <= MAX_GAIN) {
+            let (gain, most) = (Told(gain), MAX_GAIN / POSITION_GAIN);
             return Err(format!(
-                "--gain: {gain} must be above 0 and at most {most:.0} (m/min)/mm or (1000 °/min)/°"
+                "--gain: {gain} must be at least {LEAST_GAIN:e} and at most {most:.0} (m/min)/mm or (1000 °/min)/°"
             )
             .into());
         }

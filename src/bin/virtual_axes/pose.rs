@@ -8,6 +8,9 @@ use virtual_axes::kinematics::Kinematics;
 
 use crate::subject::MachineChoice;
 
+/// Furthest position from 0, m or rad.
+const FURTHEST: f64 = 1e6;
+
 /// Which machine, and where its joints are.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -64,9 +67,10 @@ fn positions(machine: &MachineConfig, text: &str) -> Result<Vec<f64>, String> {
             let known: Vec<&str> = axes.iter().map(|axis| axis.name()).collect();
             return Err(format!("unknown joint {name}; there are {}", known.join(", ")));
         };
-        let position = number.trim().parse().ok().filter(|number: &f64| number.is_finite());
-        let position =
-            position.ok_or_else(|| format!("{name} is '{number}', must be a number in m or rad"))?;
+        let position = number.trim().parse().ok().filter(|number: &f64| number.abs() <= FURTHEST);
+        let position = position.ok_or_else(|| {
+            format!("{name} is '{number}', must be a number in m or rad, of {FURTHEST} at most")
+        })?;
         if positions[place].replace(position).is_some() {
             return Err(format!("joint {name} is named twice"));
         }
