@@ -47,7 +47,7 @@ LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
   <participant profile_name="lease" is_default_profile="true"><rtps><builtin><discovery_config>
     <leaseDuration><sec>{seconds}</sec></leaseDuration>
-    <leaseAnnouncement><sec>0</sec><nanosec>300000000</nanosec></leaseAnnouncement>
+    <leaseAnnouncement><sec>0</sec><nanosec>{announces}</nanosec></leaseAnnouncement>
   </discovery_config></builtin></rtps></participant>
 </profiles>
 """
@@ -56,13 +56,22 @@ LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 class Guest:
     """A process that runs this file, ended by its id."""
 
-    def __init__(self, domain_id: int, *words: object, lease: int | None = None, folder: Path | None = None):
-        """Begin; `lease` is how long it may be silent before it counts as gone, s, by a profile in `folder`."""
+    def __init__(
+        self,
+        domain_id: int,
+        *words: object,
+        lease: int | None = None,
+        announces_s: float = 0.3,
+        folder: Path | None = None,
+    ):
+        """Begin; `lease` is how long it may be silent before it counts as gone, s, by a profile in `folder`, which also
+        says how often it tells that it is there.
+        """
         env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
         if lease is not None:
             assert folder is not None
             profile = folder / f"lease_{lease}.xml"
-            profile.write_text(LEASE.format(seconds=lease))
+            profile.write_text(LEASE.format(seconds=lease, announces=round(announces_s * 1e9)))
             env["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profile)
         self._process = subprocess.Popen(
             [sys.executable, "-X", "faulthandler", __file__, *map(str, words)],

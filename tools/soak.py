@@ -6,15 +6,17 @@
     tools/soak.py --minutes 10                 # ten minutes in real time
     tools/soak.py --minutes 60 --speed 10      # an hour, in which the axes live ten
 
-Valid and invalid trajectories, streams, loads, services, parameters, goals that are cancelled or not, subscribers
-that come and go, nodes that come, leave and are killed; the same --seed gives the same sequence. With --speed the node
-follows a /clock of this tool's. At first what is bounded is filled to its bound: floods, endpoints that come and go,
-and listeners that are killed, for whom samples are kept until their lease has ended.
+Valid and invalid trajectories, streams, loads, services, parameters, goals that are cancelled or not, one after the
+other as fast as they are answered, the same for the same --seed; beside them, by the wall clock, subscriptions that
+come and go, processes that come, leave and are killed: a subscription every 4 s, a process every 24 s, or --churn times
+as many. With --speed the node follows a /clock of this tool's. At first what is bounded is filled to its bound: floods,
+endpoints that come and go, announcements of participants, and listeners that are killed, for whom samples are kept
+until their lease has ended.
 
 Latency is that of a service to a client that does nothing else, over that of the same client at a process that only
 echoes, call by call in turns: what else the machine does slows both. Memory is what the process has of its own
-(RssAnon), without pages of files: the least between two looks is judged, since what comes and goes is what readers
-have not acknowledged yet.
+(RssAnon), without pages of files, on average between two looks: the middleware looks every 6 s for what it need not
+keep, for each topic at another time, so that the least depends on whether they coincide.
 
 The exit status is 1 if over the second half something grew by more than it may, or if the node died.
 """
@@ -30,12 +32,12 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from control_msgs.msg import JointTrajectoryControllerState
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
@@ -49,7 +51,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from action import Follow, goal, in_executor  # noqa: E402
-from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, own_mb, to_time  # noqa: E402
+from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, own_mb, status_values, to_time  # noqa: E402
 from guest import Guest  # noqa: E402
 
 WEIGHTS = {
@@ -64,11 +66,10 @@ WEIGHTS = {
     "descriptions": 2,
     "reset": 1,
     "goal": 8,
-    "listener": 8,
-    "visitor": 1,
-    "killed": 0.5,
 }
 """Kinds of traffic, and how often each is sent against the others: methods of Traffic."""
+COMING_S = {"listener": 4.0, "visitor": 30.0, "killed": 120.0}
+"""Kinds of those who come, and the wall time from one to the next on average: methods of Traffic."""
 JOINTS = {"x": 0.05, "y": 0.05, "z": 0.05, "a": 0.2, "c": 1.0}
 """How far trajectories go from home, m or rad."""
 GAIN = "x.velocity_loop.gain"
@@ -79,7 +80,9 @@ TICK_S = 0.003
 FILL = 12_000
 """More than the 8192 samples that the middleware keeps of a topic."""
 CROWD = 4096
-"""Announcements that the middleware keeps of publishers, and of subscriptions."""
+"""Announcements that the middleware keeps of publishers, of subscriptions, and of participants."""
+AT_A_TIME = 512
+"""Of the crowd, in one participant."""
 LEASE_S = 20
 """For so long a participant of Fast DDS that was killed counts as there."""
 SHORT_LEASE_S = 2
@@ -107,7 +110,9 @@ class Look:
 
     minutes: float
     memory_mb: float
-    """The least since the look before."""
+    """On average since the look before."""
+    least_mb: float
+    """The least since then."""
     peak_mb: float
     """The most since then."""
     files: float
@@ -156,34 +161,45 @@ class SoakClock:
 class Traffic:
     """What is asked of the node, one thing after the other, by chance."""
 
-    def __init__(self, drive: Drive, follow: Follow, seed: int, kinds: set[str], without: bool, folder: Path):
-        """Of these kinds, or of all but these; nothing is sent yet. Files are written to `folder`."""
+    def __init__(self, drive: Drive, follow: Follow, seed: int, kinds: set[str], churn: float, folder: Path):
+        """Of these kinds, with so many times as many who come; nothing is sent yet. Files are written to `folder`."""
         self.drive, self.follow = drive, follow
         self.chance = random.Random(seed)
+        # Of its own: those who come by the clock do not change what is sent.
+        self._comings = random.Random(seed + 1)
         self.count: Counter[str] = Counter()
         self._folder = folder
         self._guests: list[Guest] = []
         self._listening: list[Any] = []
-        self._kinds: list[tuple[float, Callable[[], None]]] = [
-            (weight, getattr(self, kind)) for kind, weight in WEIGHTS.items()
-        ]
-        if kinds:
-            self._kinds = [(weight, act) for weight, act in self._kinds if (act.__name__ in kinds) != without]
+        self._kinds = {kind: weight for kind, weight in WEIGHTS.items() if kind in kinds}
+        now = time.monotonic()
+        self._every = {kind: every / churn for kind, every in COMING_S.items() if kind in kinds and churn > 0}
+        self._due = {kind: now + self._comings.expovariate(1 / every) for kind, every in self._every.items()}
 
     def step(self) -> None:
-        """One of them."""
-        weights, acts = zip(*self._kinds)
-        [act] = self.chance.choices(acts, weights)
+        """Whoever is due to come, or else one of what is sent."""
+        now = time.monotonic()
+        due = next((kind for kind, at in self._due.items() if at <= now), None)
+        if due is not None:
+            self._due[due] += self._comings.expovariate(1 / self._every[due])
+            self._do(due)
+        elif self._kinds:
+            [kind] = self.chance.choices(list(self._kinds), list(self._kinds.values()))
+            self._do(kind)
+            time.sleep(self.chance.expovariate(20))
+        else:
+            time.sleep(0.05)
+
+    def _do(self, kind: str) -> None:
         try:
-            act()
-            self.count[act.__name__] += 1
+            getattr(self, kind)()
+            self.count[kind] += 1
         except TimeoutError:
             self.count["timeouts"] += 1
         except (ChildProcessError, BrokenPipeError) as ended:
             # Of a guest: what is judged is the node.
             self.count["guests_ended"] += 1
-            print(f"{act.__name__}: {ended}", flush=True)
-        time.sleep(self.chance.expovariate(20))
+            print(f"{kind}: {ended}", flush=True)
 
     def _way(self) -> tuple[list[str], list[float], float]:
         names = self.chance.sample(list(JOINTS), self.chance.randint(1, len(JOINTS)))
@@ -273,11 +289,11 @@ class Traffic:
 
     def listener(self) -> None:
         """A subscription comes; the oldest of some goes."""
-        kind, topic = self.chance.choice(
+        kind, topic = self._comings.choice(
             [(JointState, "/joint_states"), (MotorCurrents, "/virtual_axes/motor_currents"),
              (DriveStates, "/virtual_axes/drive_states")]
         )  # fmt: skip
-        profile = QoSProfile(depth=self.chance.choice([1, 10, 1000]))
+        profile = QoSProfile(depth=self._comings.choice([1, 10, 1000]))
         node = self.drive.node
 
         def change() -> None:
@@ -325,18 +341,32 @@ def long_trajectory() -> JointTrajectory:
 
 
 def crowd(drive: Drive) -> None:
-    """Publishers and subscriptions, each announced once and taken back once."""
+    """Publishers and subscriptions that leave with their participants, by names and types as long as most."""
     assert drive.process is not None
-    with Drive(process=drive.process) as other:
+    kind, name = JointTrajectoryControllerState, "/crowd/of_those_who_leave_together"
 
-        def come_and_go() -> None:
-            for _ in range(20):
-                other.node.destroy_subscription(other.node.create_subscription(Clock, "/crowd", lambda _: None, 1))
-                other.node.destroy_publisher(other.node.create_publisher(Clock, "/crowd", 1))
+    def count() -> int:
+        return int(drive.told()["endpoints_discovered"])
 
-        for _ in range(CROWD // 2 // 20 + 5):
-            in_executor(other, come_and_go)
-            time.sleep(0.02)
+    for _ in range(CROWD // AT_A_TIME):
+        before = count()
+        with Drive(process=drive.process, listen=False) as other:
+
+            def come() -> None:
+                for _ in range(AT_A_TIME):
+                    # Of different topics, or each would be matched with all others.
+                    other.node.create_subscription(kind, f"{name}/in", lambda _: None, 1)
+                    other.node.create_publisher(kind, f"{name}/out", 1)
+
+            in_executor(other, come)
+            drive.wait_for(lambda: count() >= before + 2 * AT_A_TIME, 60, "the crowd")
+
+
+def announce(drive: Drive, folder: Path) -> None:
+    """A participant that says again and again that it is there."""
+    assert drive.process is not None
+    with Guest(drive.process.domain_id, "sink", 10, lease=LEASE_S, announces_s=0.005, folder=folder):
+        time.sleep(CROWD * 0.005 * 1.5)
 
 
 def kill_listeners(drive: Drive) -> None:
@@ -347,11 +377,13 @@ def kill_listeners(drive: Drive) -> None:
     time.sleep(LEASE_S + 5)
 
 
-def fill(drive: Drive) -> None:
+def fill(drive: Drive, folder: Path) -> None:
     """Bring histories and queues to their bounds."""
     kill_listeners(drive)
     drive.forget()
     crowd(drive)
+    drive.forget()
+    announce(drive, folder)
     drive.forget()
     raw = serialize_message(joint_trajectory(["q"], [0.0], [[0.0]]))
     deadline = time.monotonic() + 60
@@ -383,11 +415,10 @@ class Memory:
             except OSError:
                 return
 
-    def since_mb(self) -> tuple[float, float]:
-        """The least and the most since this was asked last."""
-        found = [*self._found_mb, own_mb(self._pid)]
-        self._found_mb = []
-        return min(found), max(found)
+    def since_mb(self) -> tuple[float, float, float]:
+        """On average, the least and the most since this was asked last."""
+        found, self._found_mb = [*self._found_mb, own_mb(self._pid)], []
+        return sum(found) / len(found), min(found), max(found)
 
     def close(self) -> None:
         """End."""
@@ -400,30 +431,33 @@ def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
     pid = drive.process.pid
     status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
     latency, echo = prober.latencies_ms(CALLS)
-    least, most = memory.since_mb()
+    average, least, most = memory.since_mb()
+    drive.wait_for(drive.diagnostics, 20, "diagnostics")
     return Look(
         minutes=(time.monotonic() - began) / 60,
-        memory_mb=least,
+        memory_mb=average,
+        least_mb=least,
         peak_mb=most,
         files=len(os.listdir(f"/proc/{pid}/fd")),
         threads=int(status["Threads"]),
         latency_ms=latency,
         echo_ms=echo,
         load=os.getloadavg()[0],
-        endpoints=int(drive.told()["endpoints_discovered"]),
+        endpoints=int(status_values(drive.diagnostics()[-1].status[0])["endpoints_discovered"]),
     )
 
 
 def table(looks: list[Look]) -> str:
     """Some of them, as Markdown."""
     rows = [
-        "| of the time | memory, MB | at most | files | threads | service, ms | echo, ms | ratio | load |",
-        "|" + "---|" * 9,
+        "| of the time | memory, MB | at least | at most | files | threads | service, ms | echo, ms | ratio | load |",
+        "|" + "---|" * 10,
     ]
     for mark in MARKS:
         at = looks[round(mark / 100 * (len(looks) - 1))]
         rows.append(
-            f"| {mark} % | {at.memory_mb:.1f} | {at.peak_mb:.1f} | {at.files:.0f} | {at.threads:.0f} "
+            f"| {mark} % | {at.memory_mb:.1f} | {at.least_mb:.1f} | {at.peak_mb:.1f} "
+            f"| {at.files:.0f} | {at.threads:.0f} "
             f"| {at.latency_ms:.1f} | {at.echo_ms:.1f} | {at.latency_ratio:.2f} | {at.load:.1f} |"
         )
     return "\n".join(rows)
@@ -465,28 +499,30 @@ def main() -> int:
     parser.add_argument("--minutes", type=options.positive, default=1, help="of the wall clock (1)")
     parser.add_argument("--speed", type=options.positive, default=1, help="of the node's clock against the wall's (1)")
     parser.add_argument("--seed", type=int, default=1, help="of the traffic (1)")
+    parser.add_argument("--churn", type=options.from_zero, default=1, help="times as many who come and go (1)")
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("--only", metavar="KIND,...", help="of traffic, to find out what grows by it")
     kinds.add_argument("--without", metavar="KIND,...", help="all traffic but this")
     args = parser.parse_args()
-    chosen = set(filter(None, (args.only or args.without or "").split(",")))
-    if not chosen <= set(WEIGHTS):
-        parser.error(f"no such traffic: {', '.join(sorted(chosen - set(WEIGHTS)))}; there is {', '.join(WEIGHTS)}")
-    if args.without and chosen == set(WEIGHTS):
-        parser.error("--without: nothing is left")
+    known = {**WEIGHTS, **COMING_S}
+    named = set(filter(None, (args.only or args.without or "").split(",")))
+    if not named <= set(known):
+        parser.error(f"no such traffic: {', '.join(sorted(named - set(known)))}; there is {', '.join(known)}")
+    chosen = named if args.only else set(known) - named
     real = args.speed == 1
     mode = ["-p", "time:=real"] if real else ["-p", "use_sim_time:=true"]
     with Node([*mode, "-p", "max_points:=20000"]) as process, Drive(process=process, connect=False) as drive:
         clock = None if real else SoakClock(drive, args.speed)
         drive.connect(30)
-        fill(drive)
+        with tempfile.TemporaryDirectory() as folder:
+            fill(drive, Path(folder))
         with (
             tempfile.TemporaryDirectory() as folder,
             Follow(drive) as follow,
             Guest(process.domain_id, "echo", ECHO),
             Guest(process.domain_id, "probe", f"{process.name}/get_parameters", ECHO) as prober,
         ):
-            traffic = Traffic(drive, follow, args.seed, chosen, args.without is not None, Path(folder))
+            traffic = Traffic(drive, follow, args.seed, chosen, args.churn, Path(folder))
             memory = Memory(process.pid)
             looks: list[Look] = []
             values: dict[str, str] = {}
@@ -497,13 +533,13 @@ def main() -> int:
                     if process.poll() is not None:
                         break
                     if passed >= len(looks) * args.minutes * 60 / LOOKS:
-                        traffic.forget()
                         try:
                             looks.append(look(drive, prober, memory, began))
                         except (TimeoutError, OSError):
                             if process.poll() is None:
                                 raise
                             break
+                        traffic.forget()
                         if len(looks) % (LOOKS // 10) == 0:
                             print(looks[-1], flush=True)
                 if process.poll() is None:
