@@ -32,6 +32,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -98,6 +99,8 @@ KEPT_MB = 0.83e-3
 LOOKS = 60
 FEWEST = 3
 """In the second half, to tell whether something grew."""
+PROBERS = 3
+"""That may end by themselves before the soak is given up."""
 CALLS = 15
 """Whose median is the latency of a look."""
 MARKS = (0, 25, 50, 75, 100)
@@ -425,12 +428,48 @@ class Memory:
         self._end.set()
 
 
-def look(drive: Drive, prober: Guest, memory: Memory, began: float) -> Look:
+class Prober:
+    """Two guests: one echoes, the other calls that one and the node in turns."""
+
+    def __init__(self, process: Node):
+        """Begin."""
+        self.failed = 0
+        """How often it had to begin anew."""
+        self._process = process
+        self._guests = ExitStack()
+        self._begin()
+
+    def _begin(self) -> None:
+        domain = self._process.domain_id
+        self._guests.enter_context(Guest(domain, "echo", ECHO))
+        names = (f"{self._process.name}/get_parameters", ECHO)
+        self._caller = self._guests.enter_context(Guest(domain, "probe", *names))
+
+    def __enter__(self) -> Prober:
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End both."""
+        self._guests.close()
+
+    def begin_anew(self) -> None:
+        """With others in their places."""
+        self.failed += 1
+        self._guests.close()
+        self._begin()
+
+    def latencies_ms(self) -> list[float]:
+        """Of the node's service and of the echo."""
+        return self._caller.latencies_ms(CALLS)
+
+
+def look(drive: Drive, prober: Prober, memory: Memory, began: float) -> Look:
     """The process as it is now."""
     assert drive.process is not None
     pid = drive.process.pid
     status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
-    latency, echo = prober.latencies_ms(CALLS)
+    latency, echo = prober.latencies_ms()
     average, least, most = memory.since_mb()
     drive.wait_for(drive.diagnostics, 20, "diagnostics")
     return Look(
@@ -519,8 +558,7 @@ def main() -> int:
         with (
             tempfile.TemporaryDirectory() as folder,
             Follow(drive) as follow,
-            Guest(process.domain_id, "echo", ECHO),
-            Guest(process.domain_id, "probe", f"{process.name}/get_parameters", ECHO) as prober,
+            Prober(process) as prober,
         ):
             traffic = Traffic(drive, follow, args.seed, chosen, args.churn, Path(folder))
             memory = Memory(process.pid)
@@ -535,10 +573,15 @@ def main() -> int:
                     if passed >= len(looks) * args.minutes * 60 / LOOKS:
                         try:
                             looks.append(look(drive, prober, memory, began))
-                        except (TimeoutError, OSError):
-                            if process.poll() is None:
+                        except (TimeoutError, OSError) as failed:
+                            if process.poll() is not None:
+                                break
+                            if prober.failed >= PROBERS:
                                 raise
-                            break
+                            # One of the prober's processes: what is judged is the node.
+                            print(f"a look failed: {failed}", flush=True)
+                            prober.begin_anew()
+                            continue
                         traffic.forget()
                         if len(looks) % (LOOKS // 10) == 0:
                             print(looks[-1], flush=True)
