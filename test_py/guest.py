@@ -4,7 +4,8 @@
     python test_py/guest.py send POINTS           one trajectory of so many points on psec
     python test_py/guest.py sink DEPTH            reliable; drops what joint_states, motor_currents, drive_states say
     python test_py/guest.py echo SERVICE          answers it, always the same
-    python test_py/guest.py probe SERVICE SERVICE calls the two in turns; tells how long they took when it is asked
+    python test_py/guest.py probe SERVICE SERVICE calls the two in turns; tells how long they took when it is asked,
+                                                  or which of them did not answer
 
 Each says that it is ready by a line on its standard output, and ends with whoever started it.
 """
@@ -43,6 +44,8 @@ SPINS = "spins"
 """Name of the thread that serves a node."""
 PATIENCE_S = 120
 """How long a guest's word is waited for."""
+ANSWER_S = 40
+"""How long a prober waits for an answer."""
 LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
   <participant profile_name="lease" is_default_profile="true"><rtps><builtin><discovery_config>
@@ -118,7 +121,10 @@ class Guest:
         assert self._process.stdin is not None
         self._process.stdin.write(f"{calls}\n")
         self._process.stdin.flush()
-        return json.loads(self.says())
+        told = json.loads(self.says())
+        if isinstance(told, str):
+            raise TimeoutError(f"{told} did not answer a prober within {ANSWER_S} s")
+        return told
 
     def go_on(self) -> None:
         """Let a sender send."""
@@ -185,7 +191,11 @@ def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:
 # ------------------------------------------------------------------------------------ the programs
 
 
-def spin(node: Any) -> None:
+class Silent(Exception):
+    """A service that did not answer."""
+
+
+def spin(node: Any) -> threading.Thread:
     """Serve a node in a thread of its own, until rclpy is shut down."""
 
     def run() -> None:
@@ -193,7 +203,9 @@ def spin(node: Any) -> None:
         with contextlib.suppress(ExternalShutdownException, InvalidHandle, RCLError):
             rclpy.spin(node)
 
-    threading.Thread(target=run, name=SPINS, daemon=True).start()
+    thread = threading.Thread(target=run, name=SPINS, daemon=True)
+    thread.start()
+    return thread
 
 
 def listen(node: Any, topic: str, depth: int) -> None:
@@ -253,20 +265,26 @@ def probe(node: Any, services: tuple[str, str]) -> None:
             sys.exit("no service")
     time.sleep(SETTLE_S)
     # In a thread that spins on: rclpy's spin_until_future_complete takes longer with each call.
-    spin(node)
+    spins = spin(node)
     print(READY, flush=True)
 
     def took_ms(client: Any) -> float:
         answered = threading.Event()
         begin = time.perf_counter()
         client.call_async(GetParameters.Request()).add_done_callback(lambda _: answered.set())
-        if not answered.wait(PATIENCE_S / 3):
-            sys.exit("no answer")
+        if not answered.wait(ANSWER_S):
+            if not spins.is_alive():
+                sys.exit("rclpy's executor has ended")
+            raise Silent(client.srv_name)
         return (time.perf_counter() - begin) * 1e3
 
     for line in sys.stdin:
-        took = [[took_ms(client) for client in clients] for _ in range(int(line))]
-        print(json.dumps(np.median(took, axis=0).tolist()), flush=True)
+        try:
+            took = [[took_ms(client) for client in clients] for _ in range(int(line))]
+            told = np.median(took, axis=0).tolist()
+        except Silent as silent:
+            told = str(silent)
+        print(json.dumps(told), flush=True)
 
 
 def main() -> None:

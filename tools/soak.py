@@ -18,7 +18,8 @@ echoes, call by call in turns: what else the machine does slows both. Memory is 
 (RssAnon), without pages of files, on average between two looks: the middleware looks every 6 s for what it need not
 keep, for each topic at another time, so that the least depends on whether they coincide.
 
-The exit status is 1 if over the second half something grew by more than it may, or if the node died.
+The exit status is 1 if over the second half something grew by more than it may, if the node died or no longer
+answered, or if the fourth prober ended by itself.
 """
 
 from __future__ import annotations
@@ -532,6 +533,41 @@ def verdict(looks: list[Look]) -> bool:
     return grew
 
 
+def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple[list[Look], bool]:
+    """Traffic for so long; what was seen, and whether it ended before its time."""
+    assert drive.process is not None
+    memory = Memory(drive.process.pid)
+    looks: list[Look] = []
+    first_period = int(drive.told()["position_periods"])
+    began = time.monotonic()
+    try:
+        while (passed := time.monotonic() - began) < seconds:
+            traffic.step()
+            if passed < len(looks) * seconds / LOOKS:
+                continue
+            try:
+                looks.append(look(drive, prober, memory, began))
+            except (ChildProcessError, BrokenPipeError) as ended:
+                # One of the prober's processes: what is judged is the node.
+                print(f"a prober has ended: {ended}", flush=True)
+                if prober.failed >= PROBERS or drive.process.poll() is not None:
+                    raise
+                prober.begin_anew()
+                continue
+            traffic.forget()
+            if len(looks) % (LOOKS // 10) == 0:
+                print(looks[-1], flush=True)
+        lived_s = (int(drive.told()["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
+        print(f"\n{lived_s:.0f} s of the axes in {time.monotonic() - began:.0f} s")
+    except OSError as failed:  # A timeout, too, and a process that has ended.
+        print(f"after {time.monotonic() - began:.0f} s: {failed}", flush=True)
+        return looks, True
+    finally:
+        memory.close()
+        traffic.close()
+    return looks, False
+
+
 def main() -> int:
     """Run and judge."""
     parser = options.parser(__doc__)
@@ -561,37 +597,8 @@ def main() -> int:
             Prober(process) as prober,
         ):
             traffic = Traffic(drive, follow, args.seed, chosen, args.churn, Path(folder))
-            memory = Memory(process.pid)
-            looks: list[Look] = []
-            values: dict[str, str] = {}
-            try:
-                began, first_period = time.monotonic(), int(drive.told()["position_periods"])
-                while (passed := time.monotonic() - began) < args.minutes * 60:
-                    traffic.step()
-                    if process.poll() is not None:
-                        break
-                    if passed >= len(looks) * args.minutes * 60 / LOOKS:
-                        try:
-                            looks.append(look(drive, prober, memory, began))
-                        except (TimeoutError, OSError) as failed:
-                            if process.poll() is not None:
-                                break
-                            if prober.failed >= PROBERS:
-                                raise
-                            # One of the prober's processes: what is judged is the node.
-                            print(f"a look failed: {failed}", flush=True)
-                            prober.begin_anew()
-                            continue
-                        traffic.forget()
-                        if len(looks) % (LOOKS // 10) == 0:
-                            print(looks[-1], flush=True)
-                if process.poll() is None:
-                    values = drive.told()
-                    lived_s = (int(values["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
-                    print(f"\n{lived_s:.0f} s of the axes in {time.monotonic() - began:.0f} s")
-            finally:
-                memory.close()
-                traffic.close()
+            looks, broken_off = run(drive, prober, traffic, args.minutes * 60)
+            values = {} if broken_off else drive.told()
         if clock is not None:
             clock.close()
         drive.process = None
@@ -602,7 +609,7 @@ def main() -> int:
         print("  asked:", ", ".join(f"{name} {number}" for name, number in sorted(traffic.count.items())))
         keys = ("position_periods", "missed_periods", "unpublished_periods", "dropped_samples", "max_lateness_ms")
         print("  told:", ", ".join(f"{key} {values.get(key)}" for key in keys))
-    return int(grew or died)
+    return int(grew or died or broken_off)
 
 
 if __name__ == "__main__":
