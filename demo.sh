@@ -7,13 +7,13 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 options=("$@")
 
-# Refuses a name that is none of a picture, before anything is built.
+# Refuses what is no name of a picture, before anything is built.
 picture() {
-  case $1 in
+  case ${1,,} in
     -* | .png | .pdf | .svg) ;;
     *.png | *.pdf | *.svg) return ;;
   esac
-  echo "demo: --out: '$1' is no picture: its name must end in .png, .pdf or .svg" >&2
+  echo "demo: --out: '$1': the name of the picture must end in .png, .pdf or .svg" >&2
   exit 2
 }
 

@@ -49,11 +49,20 @@ ANSWER_S = 40
 LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
   <participant profile_name="lease" is_default_profile="true"><rtps><builtin><discovery_config>
-    <leaseDuration><sec>{seconds}</sec></leaseDuration>
-    <leaseAnnouncement><sec>0</sec><nanosec>{announces}</nanosec></leaseAnnouncement>
+    <leaseDuration><sec>{lease}</sec></leaseDuration>
+    <leaseAnnouncement><sec>{seconds}</sec><nanosec>{nanoseconds}</nanosec></leaseAnnouncement>
   </discovery_config></builtin></rtps></participant>
 </profiles>
 """
+
+
+class Silent(TimeoutError):
+    """A service that did not answer a prober."""
+
+    def __init__(self, service: str):
+        """The one of this name."""
+        super().__init__(f"{service} did not answer within {ANSWER_S} s")
+        self.service = service
 
 
 class Guest:
@@ -73,8 +82,9 @@ class Guest:
         env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
         if lease is not None:
             assert folder is not None
-            profile = folder / f"lease_{lease}.xml"
-            profile.write_text(LEASE.format(seconds=lease, announces=round(announces_s * 1e9)))
+            profile = folder / f"lease_{lease}_{announces_s}.xml"
+            seconds, nanoseconds = divmod(round(announces_s * 1e9), 1_000_000_000)
+            profile.write_text(LEASE.format(lease=lease, seconds=seconds, nanoseconds=nanoseconds))
             env["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profile)
         self._process = subprocess.Popen(
             [sys.executable, "-X", "faulthandler", __file__, *map(str, words)],
@@ -123,7 +133,7 @@ class Guest:
         self._process.stdin.flush()
         told = json.loads(self.says())
         if isinstance(told, str):
-            raise TimeoutError(f"{told} did not answer a prober within {ANSWER_S} s")
+            raise Silent(told)
         return told
 
     def go_on(self) -> None:
@@ -157,13 +167,6 @@ class Guest:
                     pass
 
 
-def resident_mb(pid: int) -> float:
-    """Resident set of a process, MB."""
-    return (
-        next(int(line.split()[1]) for line in Path(f"/proc/{pid}/status").open() if line.startswith("VmRSS")) * 1.024e-3
-    )
-
-
 def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:
     """A gentle swing of two joints at a point per millisecond, as it is sent: half a million objects take long."""
     values, stamp = (0.25, 0.75), (7, 13)
@@ -189,10 +192,6 @@ def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:
 
 
 # ------------------------------------------------------------------------------------ the programs
-
-
-class Silent(Exception):
-    """A service that did not answer."""
 
 
 def spin(node: Any) -> threading.Thread:
@@ -283,7 +282,7 @@ def probe(node: Any, services: tuple[str, str]) -> None:
             took = [[took_ms(client) for client in clients] for _ in range(int(line))]
             told = np.median(took, axis=0).tolist()
         except Silent as silent:
-            told = str(silent)
+            told = silent.service
         print(json.dumps(told), flush=True)
 
 

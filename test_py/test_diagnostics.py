@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 
 from action import in_executor
-from drive import NANOSECONDS, Drive, joint_trajectory, own_mb, status_values, to_ns
+from drive import NANOSECONDS, RECORDING_KEYS, Drive, joint_trajectory, own_mb, status_values, to_ns
 from motion import go_home, start_swing
 
 
@@ -77,14 +77,13 @@ def test_the_document_has_every_key_and_no_other(real: Drive):
     document = (Path(__file__).resolve().parent.parent / "docs" / "graph.md").read_text()
     section = document.split("## What `/diagnostics` tells")[1].split("\n## ")[0]
     documented = re.findall(r"^\| [^|]*\| `(\w+)` \|", section, re.MULTILINE)
-    of_a_recording = ["file", "recording", "size_mb", "messages", "left_out"]
     found = real.next_diagnostics().status
     told = dict.fromkeys(key for status in found for key in status_values(status))
-    assert [*told, *of_a_recording] == documented
+    assert [*told, *RECORDING_KEYS] == documented
 
 
 def test_who_has_come_is_counted_and_memory_told(real: Drive):
-    """Each subscription of others counts once, also when it has gone; memory is what Linux says of the node."""
+    """Each endpoint of others counts once, also when it has gone; memory is what Linux says of the node."""
 
     def count() -> int:
         return int(real.told()["endpoints_discovered"])
@@ -95,9 +94,11 @@ def test_who_has_come_is_counted_and_memory_told(real: Drive):
         for _ in range(20):
             subscription = real.node.create_subscription(JointState, "joint_states", lambda _: None, 1)
             real.node.destroy_subscription(subscription)
+        for _ in range(5):
+            real.node.destroy_publisher(real.node.create_publisher(JointState, "joint_states", 1))
 
     in_executor(real, come_and_go)
-    real.wait_for(lambda: count() >= before + 20, 20, "20 subscriptions counted")
+    real.wait_for(lambda: count() >= before + 25, 20, "20 subscriptions and 5 publishers counted")
     after = real.told()
-    assert int(after["endpoints_discovered"]) == before + 20
+    assert int(after["endpoints_discovered"]) == before + 25
     assert abs(float(after["memory_mb"]) - own_mb(real.process.pid)) < 5.0

@@ -15,7 +15,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from virtual_axes.msg import TrajectoryResult
 
-from drive import NANOSECONDS, TSP_NS, DomainId, Drive, Node, joint_trajectory, to_ns
+from drive import NANOSECONDS, TSP_NS, DomainId, Drive, Node, joint_trajectory, status_values, to_ns
 from motion import swing
 from sim_clock import SimClock
 
@@ -187,7 +187,7 @@ def stands(drive: Drive, timeout: float = 60.0) -> int:
 
     def counts() -> list[str]:
         said = [array.status[0] for array in drive.diagnostics()[seen:]][-2:]
-        counted = [v.value for status in said for v in status.values if v.key == "position_periods"]
+        counted = [status_values(status)["position_periods"] for status in said]
         is_held = all(status.message == "waiting for a slow subscriber" for status in said)
         return counted if len(counted) == 2 and is_held and counted[0] == counted[1] else []
 

@@ -20,8 +20,8 @@ from std_srvs.srv import Trigger
 from virtual_axes.msg import TrajectoryResult as R
 
 from action import in_executor
-from drive import TSP_NS, Drive, Node, joint_trajectory, parameter_messages, status_values, to_ns
-from guest import Guest, long_trajectory, resident_mb
+from drive import TSP_NS, Drive, Node, joint_trajectory, parameter_messages, resident_mb, to_ns
+from guest import Guest, long_trajectory
 from motion import TSP, assert_psec, go_home, start_swing, swing
 
 POINTS = 500_000
@@ -48,17 +48,6 @@ def pid_of(drive: Drive) -> int:
     """Process id of the node."""
     assert drive.process is not None
     return drive.process.pid
-
-
-def numbers(drive: Drive) -> dict[str, str]:
-    """Values of the node's diagnostics that are younger than now."""
-    now, seen = drive.now(), len(drive.diagnostics())
-
-    def young() -> list[dict[str, str]]:
-        arrays = [a for a in drive.diagnostics()[seen:] if to_ns(a.header.stamp) > now + 2 * TSP_NS]
-        return [status_values(array.status[0]) for array in arrays]
-
-    return drive.wait_for(young, 10, "diagnostics")[-1]
 
 
 def kill_while_sending(drive: Drive, folder: Path) -> bool:
@@ -143,7 +132,7 @@ def move_through(drive: Drive, act: Callable[[], None]) -> str:
     assert_psec(drive, start, plan)
     assert drive.end(accepted.sequence_number, 30).status == R.COMPLETED
     # What is told by diagnostics is told by now, and the last of the log is out.
-    numbers(drive)
+    drive.told()
     log, seconds = drive.process.output()[said:], time.monotonic() - begin
     kinds: dict[str, int] = {}
     for line in log.splitlines():
@@ -167,7 +156,7 @@ FLOODS = {
 def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
     """What moves is not disturbed, memory and log are bounded, and commands are taken as before."""
     publisher, message = FLOODS[what]
-    refused = int(numbers(node)["stream_setpoints_refused"])
+    refused = int(node.told()["stream_setpoints_refused"])
     memory = resident_mb(pid_of(node))
 
     def act() -> None:
@@ -185,7 +174,7 @@ def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
         assert "lines of this kind" in log, "nothing was left out"
         forget_results(node)
     if what == "set-points that are refused":
-        assert int(numbers(node)["stream_setpoints_refused"]) > refused
+        assert int(node.told()["stream_setpoints_refused"]) > refused
         assert log.count("set-point of the stream refused") <= 10
     if what == "loads that are refused":
         assert 1 <= log.count("a message on load is left out") <= 10

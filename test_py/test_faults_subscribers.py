@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory, status_values
-from guest import Guest, resident_mb
+from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory, resident_mb, status_values
+from guest import Guest
 from motion import assert_psec, go_home, start_swing
 
 STOPPED_S = 20

@@ -29,7 +29,18 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult
 
-from drive import DEEP_QOS, NANOSECONDS, RESULT_QOS, TSP_NS, Drive, Node, joint_trajectory, node_binary, status_values
+from drive import (
+    DEEP_QOS,
+    NANOSECONDS,
+    RECORDING_KEYS,
+    RESULT_QOS,
+    TSP_NS,
+    Drive,
+    Node,
+    joint_trajectory,
+    node_binary,
+    status_values,
+)
 
 MEGABYTE = 1_000_000
 STATES, CURRENTS, DRIVES = "/joint_states", "/virtual_axes/motor_currents", "/virtual_axes/drive_states"
@@ -235,7 +246,7 @@ def test_the_diagnostics_and_the_log_tell_of_it(session: Session):
     """Where it goes, and that nothing is missing."""
     found = status_values(session.status)
     assert session.status.level == DiagnosticStatus.OK and found["recording"] == "true"
-    assert list(found) == ["file", "recording", "size_mb", "messages", "left_out"]
+    assert list(found) == RECORDING_KEYS
     assert found["file"] == str(session.path) and found["left_out"] == "0"
     messages, _, _ = read(session.path)
     assert f"{sum(map(len, messages.values()))} messages, 0 left out" in session.output

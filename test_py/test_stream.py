@@ -49,17 +49,9 @@ def node_status(drive: Drive, condition: Callable[[dict[str, str]], bool]) -> Di
 
 
 def numbers(drive: Drive, *keys: str) -> tuple[int, ...]:
-    """Counts of the node so far, by diagnostics that are younger than now."""
-    now = drive.now()
-    seen = len(drive.diagnostics())
-
-    def young() -> list[dict[str, str]]:
-        return [
-            status_values(a.status[0]) for a in drive.diagnostics()[seen:] if to_ns(a.header.stamp) > now + 2 * TSP_NS
-        ]
-
-    newest = drive.wait_for(young, 5, "diagnostics")[-1]
-    return tuple(int(newest[key]) for key in keys)
+    """Counts of the node so far, by the next diagnostics."""
+    told = drive.told()
+    return tuple(int(told[key]) for key in keys)
 
 
 def counts(drive: Drive) -> tuple[int, int]:

@@ -1,14 +1,19 @@
-"""Options of the tools: what makes no sense is refused before anything is done."""
+"""The tools: options that make no sense are refused before anything is done; the soak finds what grows."""
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+LOOKS = 60
+"""Of an hour."""
 
 
 @pytest.mark.parametrize(
@@ -22,7 +27,9 @@ ROOT = Path(__file__).resolve().parent.parent
         ("measure_rate", ["--seconds", "inf"], ["--seconds", "'inf'"]),
         ("measure_latency", ["--messages", "0"], ["--messages", "'0'", "from 1 on"]),
         ("measure_length", ["--rounds", "1.5"], ["--rounds", "'1.5'", "from 1 on"]),
-        ("measure_publish_once", ["--load=-1"], ["--load", "'-1'"]),
+        ("measure_publish_once", ["--load=-1"], ["--load", "'-1'", "from 0 on"]),
+        ("measure_fragments", ["5000"], ["5000000000 octets", "4294967295"]),
+        ("keystore", ["--domain", "233", "store", "/one"], ["--domain", "'233'", "from 0 to 232"]),
         ("run_graph", ["--seconds", "long"], ["--seconds", "'long'"]),
         ("figure11", ["--fast"], ["unrecognized arguments: --fast"]),
     ],
@@ -33,3 +40,51 @@ def test_what_makes_no_sense_is_refused(tool: str, options: list[str], words: li
     assert ended.returncode == 2 and not ended.stdout
     for word in words:
         assert word in ended.stderr
+
+
+@pytest.fixture(scope="module")
+def soak() -> ModuleType:
+    """The tool as a module."""
+    tools = str(ROOT / "tools")
+    sys.path.insert(0, tools)
+    try:
+        spec = spec_from_file_location("soak", ROOT / "tools" / "soak.py")
+        assert spec is not None and spec.loader is not None
+        module = sys.modules["soak"] = module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+    finally:
+        sys.path.remove(tools)
+
+
+def an_hour(soak: ModuleType, **growth: float) -> list:
+    """Looks at a process whose figures wander, and grow by so much in the second half."""
+    looks = []
+    for k in range(LOOKS):
+        passed = max(2 * k / (LOOKS - 1) - 1, 0.0)
+        wave = math.sin(1.7 * k)
+        figures = {
+            "memory_mb": 46 + 3 * wave,
+            "files": 175 + round(wave),
+            "threads": 14,
+            "latency_ms": 0.8 + 0.1 * wave,
+        }
+        figures = {name: value + passed * growth.get(name, 0.0) for name, value in figures.items()}
+        looks.append(soak.Look(k, least_mb=33, peak_mb=80, echo_ms=1.0, load=2.0, endpoints=33 * k, **figures))
+    return looks
+
+
+def test_the_soak_calls_flat_what_wanders(soak: ModuleType, capsys: pytest.CaptureFixture[str]):
+    assert not soak.verdict(an_hour(soak))
+    told = capsys.readouterr().out
+    assert told.count(": flat") == len(soak.MAY_GROW) and "GROWS" not in told
+
+
+@pytest.mark.parametrize("growth", [{"memory_mb": 6.0}, {"files": 4.0}, {"threads": 3.0}, {"latency_ms": 0.8}])
+def test_the_soak_finds_what_grows(soak: ModuleType, capsys: pytest.CaptureFixture[str], growth: dict[str, float]):
+    assert soak.verdict(an_hour(soak, **growth))
+    assert capsys.readouterr().out.count("GROWS") == 1
+
+
+def test_the_soak_does_not_judge_by_few_looks(soak: ModuleType):
+    assert soak.verdict(an_hour(soak)[:4])

@@ -127,7 +127,10 @@ fn an_axis_that_left_its_stroke_is_told() {
 #[test]
 fn a_pose_beyond_a_stroke_is_told() {
     assert!(!assert_runs(&["pose", "--joints", "x=0.1,z=-0.2"]).contains("stroke"));
-    assert_refused(&run(&["pose", "--joints", "x=1e300"]), &["x is '1e300'", "of 1000000 at most"]);
+    assert_refused(
+        &run(&["pose", "--joints", "x=1e300"]),
+        &["x is '1e300'", "from -1000000 to 1000000 m or rad"],
+    );
     let beyond = assert_runs(&["pose", "--joints", "x=5,y=0.1,z=9"]);
     assert!(beyond.ends_with("; outside the stroke: x, z\n"), "{beyond}");
     let json: Value =

@@ -132,7 +132,7 @@ def main() -> None:
     """Take the command line."""
     words = options.parser(__doc__)
     words.add_argument("folder", type=Path)
-    words.add_argument("--domain", type=int, default=0, help="ROS_DOMAIN_ID that the keystore is for")
+    words.add_argument("--domain", type=options.domain_id, default=0, help="ROS_DOMAIN_ID that the keystore is for")
     kinds = ("NONE", "SIGN", "ENCRYPT")
     words.add_argument("--rtps", choices=kinds, default="SIGN", help="protection of whole messages")
     words.add_argument("enclaves", nargs="+", metavar="/ENCLAVE[:-TOPIC]...")

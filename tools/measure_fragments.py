@@ -22,10 +22,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 
 from trajectory_msgs.msg import JointTrajectory
 
-from drive import PSEC_QOS, Drive, Node
-from guest import resident_mb
+from drive import PSEC_QOS, Drive, Node, resident_mb
 
 FRAGMENT = 1024
+"""Octets of the only one that is sent."""
+LONGEST = 2**32 - 1
+"""Octets of a message: its length has 32 bits."""
 PROTOCOL, VENDOR = bytes((2, 3)), bytes((1, 15))
 DATA_FRAG, LITTLE_ENDIAN = 0x16, 0x01
 TO_INLINE_QOS = 28
@@ -44,7 +46,9 @@ def main() -> None:
     """Measure."""
     parser = options.parser(__doc__)
     parser.add_argument("megabytes", type=options.positive, nargs="?", default=256, help="that are announced (256)")
-    length = int(parser.parse_args().megabytes * 1_000_000)
+    length = round(parser.parse_args().megabytes * 1_000_000)
+    if not FRAGMENT < length <= LONGEST:
+        parser.error(f"a message of {length} octets: it must be longer than a fragment, {FRAGMENT}, up to {LONGEST}")
     with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:
         drive.node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
         time.sleep(1.0)

@@ -54,6 +54,7 @@ from drive import (  # noqa: E402
     ballbar,
     joint_trajectory,
     stamp_of,
+    status_of,
 )
 
 JOINTS = {"/joint_states": JointState}
@@ -134,11 +135,6 @@ def wakeups(pid: int) -> int:
     label = "voluntary_ctxt_switches:"
     lines = (line for status in Path(f"/proc/{pid}/task").glob("*/status") for line in status.open())
     return sum(int(line.removeprefix(label)) for line in lines if line.startswith(label))
-
-
-def resident_kb(pid: int) -> int:
-    """Resident set of a process, kB."""
-    return next(int(line.split()[1]) for line in Path(f"/proc/{pid}/status").open() if line.startswith("VmRSS"))
 
 
 def open_files(pid: int) -> int:
@@ -225,7 +221,7 @@ def memory(process: Node, guest: Guest, minutes: float) -> None:
     start = time.monotonic()
     with motion:
         while (passed := time.monotonic() - start) < minutes * 60:
-            looks.append((passed, resident_kb(process.pid), open_files(process.pid)))
+            looks.append((passed, status_of(process.pid, "VmRSS"), open_files(process.pid)))
             first = len(guest.stamps)
             time.sleep(LOOK_S)
             check(process, guest.stamps[first:], LOOK_S)

@@ -1,9 +1,15 @@
-"""Numbers on the command lines of tools: what makes no sense is refused before anything is done."""
+"""Command lines of tools: what makes no sense is refused before anything is done."""
 
 from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
+
+LARGEST_DOMAIN_ID = 232
+"""Beyond, ports of RTPS are too large."""
+DIGITS = 18
+"""Of a whole number at most."""
 
 
 def parser(doc: str | None) -> argparse.ArgumentParser:
@@ -23,17 +29,31 @@ def from_zero(text: str) -> float:
 
 def whole(text: str) -> int:
     """A whole number from 1 on."""
-    if not (text.isascii() and text.isdecimal()) or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 on")
-    return int(text)
+    return _whole(text, 1)
 
 
 def whole_from_zero(text: str) -> int:
     """A whole number from 0 on."""
-    return 0 if text == "0" else whole(text)
+    return _whole(text, 0)
 
 
-def _number(text: str, wrong: str, right) -> float:
+def domain_id(text: str) -> int:
+    """A ROS_DOMAIN_ID."""
+    return _whole(text, 0, LARGEST_DOMAIN_ID)
+
+
+def _whole(text: str, least: int, most: int | None = None) -> int:
+    wrong = f"{text!r} is no whole number from {least} {'on' if most is None else f'to {most}'}"
+    # int() is slow with very many digits.
+    if not (text.isascii() and text.isdecimal()) or len(text) > DIGITS:
+        raise argparse.ArgumentTypeError(wrong)
+    value = int(text)
+    if value < least or (most is not None and value > most):
+        raise argparse.ArgumentTypeError(wrong)
+    return value
+
+
+def _number(text: str, wrong: str, right: Callable[[float], bool]) -> float:
     try:
         value = float(text)
     except ValueError:

@@ -2,7 +2,7 @@
 """Random traffic for a long time: whether the node's memory, open files, threads and latency stay as they are.
 
     cargo build --release && source .build/env.sh
-    tools/soak.py --minutes 1                  # does the tool work
+    tools/soak.py --minutes 1                  # does the tool work; too short to judge memory
     tools/soak.py --minutes 10                 # ten minutes in real time
     tools/soak.py --minutes 60 --speed 10      # an hour, in which the axes live ten
 
@@ -10,8 +10,8 @@ Valid and invalid trajectories, streams, loads, services, parameters, goals that
 other as fast as they are answered, the same for the same --seed; beside them, by the wall clock, subscriptions that
 come and go, processes that come, leave and are killed: a subscription every 4 s, a process every 24 s, or --churn times
 as many. With --speed the node follows a /clock of this tool's. At first what is bounded is filled to its bound: floods,
-endpoints that come and go, announcements of participants, and listeners that are killed, for whom samples are kept
-until their lease has ended.
+endpoints that come and go, announcements of participants, and a listener that is killed, for whom samples are kept
+until its lease has ended.
 
 Latency is that of a service to a client that does nothing else, over that of the same client at a process that only
 echoes, call by call in turns: what else the machine does slows both. Memory is what the process has of its own
@@ -54,7 +54,7 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from action import Follow, goal, in_executor  # noqa: E402
 from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, own_mb, status_values, to_time  # noqa: E402
-from guest import Guest  # noqa: E402
+from guest import Guest, Silent  # noqa: E402
 
 WEIGHTS = {
     "trajectory": 20,
@@ -84,7 +84,7 @@ FILL = 12_000
 CROWD = 4096
 """Announcements that the middleware keeps of publishers, of subscriptions, and of participants."""
 AT_A_TIME = 512
-"""Of the crowd, in one participant."""
+"""Of the crowd, in one participant: of more than 2048 events at once RustDDS does not tell some."""
 LEASE_S = 20
 """For so long a participant of Fast DDS that was killed counts as there."""
 SHORT_LEASE_S = 2
@@ -98,8 +98,12 @@ SAMPLE_S = 0.25
 KEPT_MB = 0.83e-3
 """What the middleware keeps of an endpoint that has left (docs/middleware.md)."""
 LOOKS = 60
+LOOK_S = 12.0
+"""From one look to the next at least: twice the 6 s after which the middleware looks through its histories."""
 FEWEST = 3
 """In the second half, to tell whether something grew."""
+TOLD_EVERY = 6
+"""Looks, one is printed."""
 PROBERS = 3
 """That may end by themselves before the soak is given up."""
 CALLS = 15
@@ -201,6 +205,8 @@ class Traffic:
         except TimeoutError:
             self.count["timeouts"] += 1
         except (ChildProcessError, BrokenPipeError) as ended:
+            if self.drive.process is None or self.drive.process.poll() is not None:
+                raise
             # Of a guest: what is judged is the node.
             self.count["guests_ended"] += 1
             print(f"{kind}: {ended}", flush=True)
@@ -285,8 +291,9 @@ class Traffic:
     def goal(self) -> None:
         """A goal, cancelled now and then."""
         names, to, duration = self._way()
+        cancels = self.chance.random() < 0.5
         sent = self.follow.send(goal(joint_trajectory(names, [duration], [to], [[0.0] * len(names)])))
-        if sent.handle.accepted and self.chance.random() < 0.5:
+        if cancels and sent.handle.accepted:
             sent.cancel()
         self.follow.feedback.clear()
         self.follow.statuses.clear()
@@ -373,8 +380,8 @@ def announce(drive: Drive, folder: Path) -> None:
         time.sleep(CROWD * 0.005 * 1.5)
 
 
-def kill_listeners(drive: Drive) -> None:
-    """Samples are kept for those who have not acknowledged them, until their lease has ended."""
+def kill_listener(drive: Drive) -> None:
+    """Samples are kept for one that has not acknowledged them, until its lease has ended."""
     assert drive.process is not None
     with Guest(drive.process.domain_id, "sink", 10) as guest:
         guest.kill()
@@ -383,7 +390,7 @@ def kill_listeners(drive: Drive) -> None:
 
 def fill(drive: Drive, folder: Path) -> None:
     """Bring histories and queues to their bounds."""
-    kill_listeners(drive)
+    kill_listener(drive)
     drive.forget()
     crowd(drive)
     drive.forget()
@@ -396,6 +403,8 @@ def fill(drive: Drive, folder: Path) -> None:
             drive._psec.publish(raw)
             drive._sent += 1
         time.sleep(0.02)
+    if len(drive.results()) < FILL:
+        print(f"only {len(drive.results())} of {FILL} trajectories were answered in a minute", flush=True)
     for _ in range(KEPT + 16):
         drive.send(long_trajectory())
         time.sleep(0.05)
@@ -461,8 +470,13 @@ class Prober:
         self._begin()
 
     def latencies_ms(self) -> list[float]:
-        """Of the node's service and of the echo."""
-        return self._caller.latencies_ms(CALLS)
+        """Of the node's service and of the echo; ChildProcessError where one of the guests no longer works."""
+        try:
+            return self._caller.latencies_ms(CALLS)
+        except Silent as silent:
+            if silent.service != ECHO:
+                raise
+            raise ChildProcessError("the echo does not answer") from None
 
 
 def look(drive: Drive, prober: Prober, memory: Memory, began: float) -> Look:
@@ -533,39 +547,44 @@ def verdict(looks: list[Look]) -> bool:
     return grew
 
 
-def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple[list[Look], bool]:
-    """Traffic for so long; what was seen, and whether it ended before its time."""
-    assert drive.process is not None
-    memory = Memory(drive.process.pid)
+def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple[list[Look], dict[str, str]]:
+    """Traffic for so long; what was seen, and what the node told at the end, unless it was broken off."""
+    process = drive.process
+    assert process is not None
+    memory = Memory(process.pid)
     looks: list[Look] = []
-    first_period = int(drive.told()["position_periods"])
+    between_s = max(seconds / LOOKS, LOOK_S)
     began = time.monotonic()
     try:
+        first_period = int(drive.told()["position_periods"])
         while (passed := time.monotonic() - began) < seconds:
             traffic.step()
-            if passed < len(looks) * seconds / LOOKS:
+            if process.poll() is not None:
+                raise ChildProcessError("the node has ended")
+            if passed < len(looks) * between_s:
                 continue
             try:
                 looks.append(look(drive, prober, memory, began))
             except (ChildProcessError, BrokenPipeError) as ended:
                 # One of the prober's processes: what is judged is the node.
                 print(f"a prober has ended: {ended}", flush=True)
-                if prober.failed >= PROBERS or drive.process.poll() is not None:
+                if prober.failed >= PROBERS or process.poll() is not None:
                     raise
                 prober.begin_anew()
                 continue
             traffic.forget()
-            if len(looks) % (LOOKS // 10) == 0:
+            if len(looks) % TOLD_EVERY == 0:
                 print(looks[-1], flush=True)
-        lived_s = (int(drive.told()["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
+        told = drive.told()
+        lived_s = (int(told["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
         print(f"\n{lived_s:.0f} s of the axes in {time.monotonic() - began:.0f} s")
+        return looks, told
     except OSError as failed:  # A timeout, too, and a process that has ended.
-        print(f"after {time.monotonic() - began:.0f} s: {failed}", flush=True)
-        return looks, True
+        print(f"broken off after {time.monotonic() - began:.0f} s: {failed}", flush=True)
+        return looks, {}
     finally:
         memory.close()
         traffic.close()
-    return looks, False
 
 
 def main() -> int:
@@ -591,14 +610,9 @@ def main() -> int:
         drive.connect(30)
         with tempfile.TemporaryDirectory() as folder:
             fill(drive, Path(folder))
-        with (
-            tempfile.TemporaryDirectory() as folder,
-            Follow(drive) as follow,
-            Prober(process) as prober,
-        ):
-            traffic = Traffic(drive, follow, args.seed, chosen, args.churn, Path(folder))
-            looks, broken_off = run(drive, prober, traffic, args.minutes * 60)
-            values = {} if broken_off else drive.told()
+            with Follow(drive) as follow, Prober(process) as prober:
+                traffic = Traffic(drive, follow, args.seed, chosen, args.churn, Path(folder))
+                looks, told = run(drive, prober, traffic, args.minutes * 60)
         if clock is not None:
             clock.close()
         drive.process = None
@@ -608,8 +622,8 @@ def main() -> int:
         grew = verdict(looks)
         print("  asked:", ", ".join(f"{name} {number}" for name, number in sorted(traffic.count.items())))
         keys = ("position_periods", "missed_periods", "unpublished_periods", "dropped_samples", "max_lateness_ms")
-        print("  told:", ", ".join(f"{key} {values.get(key)}" for key in keys))
-    return int(grew or died or broken_off)
+        print("  told:", ", ".join(f"{key} {told.get(key)}" for key in keys))
+    return int(grew or died or not told)
 
 
 if __name__ == "__main__":

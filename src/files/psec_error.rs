@@ -73,7 +73,7 @@ pub enum PsecError {
         found: f64,
     },
     /// A time is not after the one before it.
-    #[error("{at}: {TIME} is {} s, must be later than {} s of the line before it", Told(*found), Told(*before))]
+    #[error("{at}: {TIME} is {found} s, must be later than {before} s of the line before it")]
     NotIncreasing {
         /// File and line.
         at: String,

@@ -37,8 +37,9 @@ impl Discovered {
     }
 }
 
-/// The endpoints of others that are there now. The middleware tells of one again when its announcement is repeated, and
-/// of each that suits when one of the node's own is made.
+/// The endpoints of others that are there now, as far as the middleware tells: of one it tells again when its
+/// announcement is repeated, and of each that suits when one of the node's own is made. One that goes before it was told
+/// of stays until its participant goes, and of more than 2048 events at once some are not told.
 #[derive(Debug)]
 pub struct Present {
     /// The participant of the node.

@@ -14,6 +14,7 @@ workspace with virtual_axes built. Units are SI (m, rad, s, A); times of the nod
 """
 
 from .client import (
+    RECORDING_KEYS,
     SETTLE_S,
     Drive,
     ParameterRefused,
@@ -22,7 +23,7 @@ from .client import (
     stamp_of,
     status_values,
 )
-from .process import DEFAULT_NODE, DomainId, Node, die_with_parent, node_binary, own_mb
+from .process import DEFAULT_NODE, DomainId, Node, die_with_parent, node_binary, own_mb, resident_mb, status_of
 from .qos import DEEP_QOS, PSEC_QOS, RESULT_QOS, STREAM_QOS
 from .recording import Recording, Series, circular_deviation
 from .trajectories import NANOSECONDS, TSP_NS, Ballbar, ballbar, joint_trajectory, to_ns, to_time
@@ -32,6 +33,7 @@ __all__ = [
     "DEFAULT_NODE",
     "NANOSECONDS",
     "PSEC_QOS",
+    "RECORDING_KEYS",
     "RESULT_QOS",
     "SETTLE_S",
     "STREAM_QOS",
@@ -51,7 +53,9 @@ __all__ = [
     "node_binary",
     "own_mb",
     "parameter_messages",
+    "resident_mb",
     "stamp_of",
+    "status_of",
     "status_values",
     "to_ns",
     "to_time",

@@ -37,6 +37,8 @@ from .qos import DEEP_QOS, PSEC_QOS, RESULT_QOS, STREAM_QOS
 from .recording import CURRENT_FIELDS, JOINT_FIELDS, STATE_FIELDS, Recording, Series
 from .trajectories import NANOSECONDS, to_ns, to_time
 
+RECORDING_KEYS = ["file", "recording", "size_mb", "messages", "left_out"]
+"""Of the status in /diagnostics of a node that records (docs/graph.md)."""
 SAMPLES_AT_ONCE = 200
 """Few enough that other callbacks have their turn."""
 SETTLE_S = 0.2

@@ -58,8 +58,21 @@ def _port_is_free(port: int) -> bool:
 
 def own_mb(pid: int) -> float:
     """Resident memory of a process without pages of files, MB."""
-    status = Path(f"/proc/{pid}/status").read_text().splitlines()
-    return next(int(line.split()[1]) for line in status if line.startswith("RssAnon")) * 1.024e-3
+    return status_of(pid, "RssAnon") * 1.024e-3
+
+
+def resident_mb(pid: int) -> float:
+    """Resident set of a process, MB."""
+    return status_of(pid, "VmRSS") * 1.024e-3
+
+
+def status_of(pid: int, key: str) -> int:
+    """A number that Linux tells of a process: kB, where it is memory."""
+    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+        if line.startswith(f"{key}:"):
+            return int(line.split()[1])
+    # It has ended, and nobody has asked for its exit status.
+    raise ProcessLookupError(f"process {pid} has no {key}")
 
 
 def node_binary() -> Path:

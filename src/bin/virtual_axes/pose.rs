@@ -8,7 +8,7 @@ use virtual_axes::kinematics::Kinematics;
 
 use crate::subject::MachineChoice;
 
-/// Furthest position from 0, m or rad.
+/// Furthest position from 0, m or rad: with more, its figures would have no digits left for micrometres.
 const FURTHEST: f64 = 1e6;
 
 /// Which machine, and where its joints are.
@@ -69,7 +69,7 @@ fn positions(machine: &MachineConfig, text: &str) -> Result<Vec<f64>, String> {
         };
         let position = number.trim().parse().ok().filter(|number: &f64| number.abs() <= FURTHEST);
         let position = position.ok_or_else(|| {
-            format!("{name} is '{number}', must be a number in m or rad, of {FURTHEST} at most")
+            format!("{name} is '{number}', must be a number from -{FURTHEST} to {FURTHEST} m or rad")
         })?;
         if positions[place].replace(position).is_some() {
             return Err(format!("joint {name} is named twice"));
