@@ -10,7 +10,7 @@ Every wait is bounded and raises TimeoutError.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -53,15 +53,6 @@ def goal(
     )
 
 
-def in_executor(drive: Drive, call: Callable[[], Any]) -> Any:
-    """What `call()` gives in the thread that spins: from another one rclpy's ActionClient can meet a
-    response before it has noted the request, and drops it.
-    """
-    task = drive.node.executor.create_task(call)
-    drive.wait_for(task.done, 20.0, "turn of the executor")
-    return task.result()
-
-
 class Sent:
     """A goal that was sent, and what came back so far."""
 
@@ -70,7 +61,7 @@ class Sent:
         drive = follow.drive
         self._drive = drive
         self._follow = follow
-        self._accepting = in_executor(drive, lambda: follow.client.send_goal_async(message, goal_uuid=uuid))
+        self._accepting = drive.in_executor(lambda: follow.client.send_goal_async(message, goal_uuid=uuid))
 
     @property
     def feedback(self) -> list[FollowJointTrajectory.Feedback]:
@@ -92,7 +83,7 @@ class Sent:
     def ask(self) -> Any:
         """Ask for status and result; a future."""
         handle = self.handle
-        return in_executor(self._drive, handle.get_result_async)
+        return self._drive.in_executor(handle.get_result_async)
 
     def ended(self, timeout: float = 30.0) -> Any:
         """Status and result."""
@@ -116,7 +107,7 @@ class Sent:
     def cancel(self) -> CancelGoal.Response:
         """Ask for its end."""
         handle = self.handle
-        future = in_executor(self._drive, handle.cancel_goal_async)
+        future = self._drive.in_executor(handle.cancel_goal_async)
         self._drive.wait_for(future.done, 20.0, "answer to a cancel request")
         return future.result()
 
@@ -152,10 +143,14 @@ class Follow:
 
     def __exit__(self, *_: object) -> None:
         """Leave the action; the Drive stays."""
-        self.client.destroy()
-        self.drive.node.destroy_subscription(self._feedback)
-        self.drive.node.destroy_client(self._cancelling)
-        self.drive.node.destroy_subscription(self._statuses)
+
+        def leave() -> None:
+            self.client.destroy()
+            self.drive.node.destroy_subscription(self._feedback)
+            self.drive.node.destroy_client(self._cancelling)
+            self.drive.node.destroy_subscription(self._statuses)
+
+        self.drive.in_executor(leave)
 
     def send(self, message: FollowJointTrajectory.Goal, uuid: bytes | None = None) -> Sent:
         """Send a goal, under an id if it is to have a certain one."""

@@ -67,4 +67,4 @@ class SimClock:
 
     def close(self) -> None:
         """Take the publisher away."""
-        self.drive.node.destroy_publisher(self._publisher)
+        self.drive.in_executor(lambda: self.drive.node.destroy_publisher(self._publisher))

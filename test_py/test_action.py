@@ -15,7 +15,7 @@ from rclpy.subscription import Subscription
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from virtual_axes.msg import TrajectoryResult
 
-from action import Follow, Result, ending, goal, in_executor, line, results_of, wave
+from action import Follow, Result, ending, goal, line, results_of, wave
 from drive import DEEP_QOS, NANOSECONDS, TSP_NS, Drive, joint_trajectory, to_ns, to_time
 
 TSP = TSP_NS / NANOSECONDS
@@ -265,11 +265,11 @@ def test_controller_state_compares_the_axes_with_their_set_points(follow: Follow
     def listen() -> Subscription:
         return drive.node.create_subscription(JointTrajectoryControllerState, topic, messages.append, DEEP_QOS)
 
-    subscription = in_executor(drive, listen)
+    subscription = drive.in_executor(listen)
     drive.wait_for(lambda: messages, 10, topic)
     drive.run(line(["x", "c"], [0.05, 0.5], 1.0))
     drive.wait_for(lambda: to_ns(messages[-1].header.stamp) >= drive.now(), 10, topic)
-    in_executor(drive, lambda: drive.node.destroy_subscription(subscription))
+    drive.in_executor(lambda: drive.node.destroy_subscription(subscription))
     drive.wait_until(to_ns(messages[-1].header.stamp), 10)
     recording = drive.record(to_ns(messages[0].header.stamp), to_ns(messages[-1].header.stamp))
     assert [to_ns(message.header.stamp) for message in messages] == list(recording.joints.stamp)

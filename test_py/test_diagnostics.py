@@ -8,7 +8,6 @@ from pathlib import Path
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 
-from action import in_executor
 from drive import NANOSECONDS, RECORDING_KEYS, Drive, joint_trajectory, own_mb, status_values, to_ns
 from motion import go_home, start_swing
 
@@ -97,7 +96,7 @@ def test_who_has_come_is_counted_and_memory_told(real: Drive):
         for _ in range(5):
             real.node.destroy_publisher(real.node.create_publisher(JointState, "joint_states", 1))
 
-    in_executor(real, come_and_go)
+    real.in_executor(come_and_go)
     real.wait_for(lambda: count() >= before + 25, 20, "20 subscriptions and 5 publishers counted")
     after = real.told()
     assert int(after["endpoints_discovered"]) == before + 25

@@ -12,7 +12,7 @@ import numpy as np
 from action_msgs.msg import GoalStatus
 from sensor_msgs.msg import JointState
 
-from action import Follow, goal, in_executor, line
+from action import Follow, goal, line
 from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, status_values, to_ns
 from motion import assert_psec, go_home, start_swing, swing
 
@@ -79,7 +79,7 @@ def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
     # The middleware's threads have outlived it.
     assert "poll" not in real.process.output()
     assert real.end(accepted.sequence_number, 20).status == 2
-    in_executor(real, lambda: real.node.destroy_subscription(subscription))
+    real.in_executor(lambda: real.node.destroy_subscription(subscription))
     go_home(real)
     time_s, position = swing(0.6, amplitude=0.01)
     again = real.run(joint_trajectory(["y"], time_s, position))

@@ -19,7 +19,6 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from virtual_axes.msg import TrajectoryResult as R
 
-from action import in_executor
 from drive import TSP_NS, Drive, Node, joint_trajectory, parameter_messages, resident_mb, to_ns
 from guest import Guest, long_trajectory
 from motion import TSP, assert_psec, go_home, start_swing, swing
@@ -201,7 +200,7 @@ def test_a_flood_of_service_calls(node: Drive):
     print(f"\n{len(calls) / (time.monotonic() - begin):.0f} a second")
     node.wait_for(lambda: sum(call.done() for call in calls) > len(calls) // 10, 60, "answers")
     for client in (setter, stopper):
-        in_executor(node, lambda client=client: node.node.destroy_client(client))
+        node.in_executor(lambda client=client: node.node.destroy_client(client))
     # Who calls now waits for what is before it, and no more.
     assert node.reset(timeout=60)
     assert resident_mb(pid_of(node)) - memory < GROWTH_MB

@@ -66,7 +66,7 @@ def test_in_quick_succession(real: Drive):
         futures = [client.call_async(DescribeParameters.Request(names=names)) for _ in range(100)]
         real.wait_for(lambda: all(future.done() for future in futures), 10, "a hundred answers")
     finally:
-        real.node.destroy_client(client)
+        real.in_executor(lambda: real.node.destroy_client(client))
     assert all(len(future.result().descriptors) == len(names) for future in futures)
 
 

@@ -8,7 +8,6 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
-from action import in_executor
 from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, own_mb, stamp_of
 
 TOPIC = "/joint_states"
@@ -33,7 +32,7 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
             def keep(sample: bytes) -> None:
                 stamps.append(stamp_of(sample))
 
-            return in_executor(drive, lambda: drive.node.create_subscription(JointState, TOPIC, keep, qos, raw=True))
+            return drive.in_executor(lambda: drive.node.create_subscription(JointState, TOPIC, keep, qos, raw=True))
 
         def writers() -> set[bytes]:
             return {bytes(info.endpoint_gid) for info in drive.node.get_publishers_info_by_topic(TOPIC)}
@@ -73,6 +72,6 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
         assert grown < LATE * MAY_GROW_MB
 
         # Whoever was told that the first has gone hears of the next one.
-        in_executor(drive, lambda: drive.node.destroy_subscription(subscription))
+        drive.in_executor(lambda: drive.node.destroy_subscription(subscription))
         write_many(0.0)
         drive.wait_for(lambda: writers() - second, 20, "next publisher")

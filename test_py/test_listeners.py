@@ -8,7 +8,6 @@ import time
 from control_msgs.msg import JointTrajectoryControllerState
 from rclpy.subscription import Subscription
 
-from action import in_executor
 from drive import TSP_NS, Drive, to_ns
 
 TOPIC = "/virtual_axes/controller_state"
@@ -31,8 +30,8 @@ def test_each_listener_gets_an_unbroken_grid_of_samples_whoever_left_before(real
         def listen(keep=keep) -> Subscription:
             return real.node.create_subscription(JointTrajectoryControllerState, TOPIC, keep, 100)
 
-        subscription = in_executor(real, listen)
+        subscription = real.in_executor(listen)
         assert came.wait(5), f"{len(stamps)} samples"
         assert {b - a for a, b in zip(stamps[:SAMPLES], stamps[1:SAMPLES])} == {TSP_NS}
-        in_executor(real, lambda subscription=subscription: real.node.destroy_subscription(subscription))
+        real.in_executor(lambda subscription=subscription: real.node.destroy_subscription(subscription))
         time.sleep(LOOKED_S)

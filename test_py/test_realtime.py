@@ -7,7 +7,6 @@ import time
 import numpy as np
 from sensor_msgs.msg import JointState
 
-from action import in_executor
 from drive import DEEP_QOS, NANOSECONDS, TSP_NS, Drive, to_ns
 
 
@@ -18,12 +17,12 @@ def test_ten_seconds_are_an_unbroken_grid(real: Drive):
     def keep(message: JointState) -> None:
         arrivals.append((to_ns(message.header.stamp), time.time_ns()))
 
-    subscription = in_executor(real, lambda: real.node.create_subscription(JointState, "/joint_states", keep, DEEP_QOS))
+    subscription = real.in_executor(lambda: real.node.create_subscription(JointState, "/joint_states", keep, DEEP_QOS))
     try:
         begin = real.now()
         real.wait_until(begin + 10 * NANOSECONDS, 20)
     finally:
-        in_executor(real, lambda: real.node.destroy_subscription(subscription))
+        real.in_executor(lambda: real.node.destroy_subscription(subscription))
     recording = real.record(begin, begin + 10 * NANOSECONDS)
     for series in (recording.joints, recording.currents, recording.states):
         assert len(series) == 10 * NANOSECONDS // TSP_NS + 1

@@ -67,7 +67,7 @@ def drive_hardware(
     """Move joints by ros2_control's way and let them settle; what came of it."""
     go_home(drive)
     before, begin = counts(drive), drive.now()
-    hardware = TopicHardware(drive.node, JOINTS, ["x", "y", "a", "c"], threshold)
+    hardware = TopicHardware(drive, JOINTS, ["x", "y", "a", "c"], threshold)
     try:
         drive.wait_for(hardware.is_connected, 10, "hardware's contact")
         drive.wait_until(drive.now() + 20 * TSP_NS, 5)

@@ -16,9 +16,10 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from rclpy.node import Node
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
+
+from drive import Drive
 
 COMMANDS_TOPIC = "/robot_joint_commands"
 STATES_TOPIC = "/robot_joint_states"
@@ -64,7 +65,7 @@ class TopicHardware:
 
     def __init__(
         self,
-        node: Node,
+        drive: Drive,
         joints: Sequence[str],
         position_interfaces: Sequence[str],
         threshold: float = THRESHOLD,
@@ -78,9 +79,12 @@ class TopicHardware:
         self.state = dict.fromkeys(joints, math.nan)
         """m or rad, as of the last `read`."""
         self._newest: JointState | None = None
-        self.node = node
-        self._publisher = node.create_publisher(JointState, COMMANDS_TOPIC, QoSProfile(depth=1))
-        self._subscription = node.create_subscription(JointState, STATES_TOPIC, self._keep, qos_profile_sensor_data)
+        self._drive = drive
+        self.node = drive.node
+        self._publisher = self.node.create_publisher(JointState, COMMANDS_TOPIC, QoSProfile(depth=1))
+        self._subscription = self.node.create_subscription(
+            JointState, STATES_TOPIC, self._keep, qos_profile_sensor_data
+        )
 
     def _keep(self, message: JointState) -> None:
         self._newest = message
@@ -111,8 +115,12 @@ class TopicHardware:
 
     def close(self) -> None:
         """Leave."""
-        self.node.destroy_publisher(self._publisher)
-        self.node.destroy_subscription(self._subscription)
+
+        def leave() -> None:
+            self.node.destroy_publisher(self._publisher)
+            self.node.destroy_subscription(self._subscription)
+
+        self._drive.in_executor(leave)
 
     def run(
         self,

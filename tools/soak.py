@@ -52,7 +52,7 @@ import options
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from action import Follow, goal, in_executor  # noqa: E402
+from action import Follow, goal  # noqa: E402
 from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, own_mb, status_values, to_time  # noqa: E402
 from guest import Guest, Silent  # noqa: E402
 
@@ -312,8 +312,7 @@ class Traffic:
             if len(self._listening) > 5:
                 node.destroy_subscription(self._listening.pop(0))
 
-        # In the thread that spins: rclpy's executor does not bear that what it waits for goes.
-        in_executor(self.drive, change)
+        self.drive.in_executor(change)
 
     def visitor(self) -> None:
         """A participant comes and leaves."""
@@ -369,7 +368,7 @@ def crowd(drive: Drive) -> None:
                     other.node.create_subscription(kind, f"{name}/in", lambda _: None, 1)
                     other.node.create_publisher(kind, f"{name}/out", 1)
 
-            in_executor(other, come)
+            other.in_executor(come)
             drive.wait_for(lambda: count() >= before + 2 * AT_A_TIME, 60, "the crowd")
 
 

@@ -41,6 +41,8 @@ RECORDING_KEYS = ["file", "recording", "size_mb", "messages", "left_out"]
 """Of the status in /diagnostics of a node that records (docs/graph.md)."""
 SAMPLES_AT_ONCE = 200
 """Few enough that other callbacks have their turn."""
+TURN_S = 20.0
+"""Until it is the turn of a call in the executor, at most."""
 SETTLE_S = 0.2
 """A reliable sample written in the instant after matching can wait for the next heartbeat."""
 
@@ -196,6 +198,14 @@ class Drive:
                 self._changed.notify_all()
 
         return callback
+
+    def in_executor(self, call: Callable[[], Any]) -> Any:
+        """What `call()` gives in the thread that spins. From another one rclpy's ActionClient can meet a response
+        before it has noted the request, and drops it; nor does the executor bear that what it waits for goes.
+        """
+        task = self._executor.create_task(call)
+        self.wait_for(task.done, TURN_S, "turn of the executor")
+        return task.result()
 
     def wait_for(self, condition: Callable[[], Any], timeout: float, what: str) -> Any:
         """Wait until `condition()` holds and return what it gave; `what` is for the error."""
