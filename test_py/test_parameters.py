@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 
 import numpy as np
@@ -120,8 +121,9 @@ def test_feedforward_can_be_halved_while_moving(real: Drive):
         (["--params-file", "/nowhere/to/be/found.yaml"], "found.yaml"),
         (["--no-such-option"], "--no-such-option"),
         (["-p", "time:=slow"], "time"),
+        (["-p", os.fsdecode(b"x:=\xff")], "is not UTF-8"),
     ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+    ids=lambda value: ascii(" ".join(value)) if isinstance(value, list) else "",
 )
 def test_wrong_arguments_are_refused_with_a_message(arguments: list[str], named: str):
     """One that names what is wrong; the program ends with a status that is not zero."""

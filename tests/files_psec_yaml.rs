@@ -59,14 +59,17 @@ fn stamps_that_topic_pub_fills_in_are_now() {
 fn faults_name_file_and_line() {
     assert_eq!(error(""), "p.yaml: there is no trajectory; it is a mapping with joint_names and points");
     assert_eq!(error("---\n"), "p.yaml: there is no trajectory; it is a mapping with joint_names and points");
-    assert_eq!(error("joint_names: [x]\npoints: 5\n"), "p.yaml:2: expected sequence start: points: 5");
+    for nothing in ["joint_names: [x]\n", "joint_names: [x]\npoints: []\n---\njoint_names: [y]\n"] {
+        assert_eq!(error(nothing), "p.yaml: there is no set-point: no trajectory has points");
+    }
+    assert_eq!(error("joint_names: [x]\npoints: 5\n"), "p.yaml:2: expected a list: points: 5");
     assert_eq!(
         error("joint_names: &names [x]\npoints: *names\n"),
-        "p.yaml:2: expected mapping start: points: *names (what the alias stands for is in line 1)"
+        "p.yaml:2: expected a mapping: points: *names (what the alias stands for is in line 1)"
     );
     assert_eq!(
         error("points:\n- positions: [0]\n  time_from_start: 5\n"),
-        "p.yaml:3: expected mapping start: time_from_start: 5"
+        "p.yaml:3: expected a mapping: time_from_start: 5"
     );
     assert_eq!(
         error("joint_names: [x]\npoints:\n- position: [0.0]\n"),

@@ -29,6 +29,9 @@ fn syntax_message(error: &serde_saphyr::Error) -> String {
         let key = key.as_deref().unwrap_or("a key");
         return format!("{} stands twice in one mapping", shortened(key));
     }
+    if let serde_saphyr::Error::MultipleDocuments { .. } = error {
+        return "a second YAML document begins; a file of parameters is one".to_owned();
+    }
     let text = error.to_string();
     let message = text.rsplit_once(" at line ").map_or(text.as_str(), |(message, _)| message);
     format!("not YAML: {}", shortened(message))

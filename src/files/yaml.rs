@@ -67,7 +67,12 @@ fn message(error: &Error) -> String {
         error => {
             let text = error.to_string();
             let message = text.rsplit_once(" at line ").map_or(text.as_str(), |(message, _)| message);
-            shortened(message.trim_start_matches("error: "))
+            let message = message.trim_start_matches("error: ");
+            match message {
+                "expected sequence start" => "expected a list".to_owned(),
+                "expected mapping start" => "expected a mapping".to_owned(),
+                message => shortened(message),
+            }
         }
     }
 }

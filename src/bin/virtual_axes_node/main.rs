@@ -3,11 +3,12 @@
 #[cfg(target_os = "linux")]
 mod interrupted;
 
+use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
 use virtual_axes::config::{Parameters, Source, parse_assignment};
-use virtual_axes::door::args::{Command, ParameterSource, RosArgs};
+use virtual_axes::door::args::{ArgsError, Command, ParameterSource, RosArgs};
 use virtual_axes::ros::environment::Environment;
 use virtual_axes::ros::node;
 use virtual_axes::ros::security::Security;
@@ -31,16 +32,23 @@ Without arguments it runs the embedded Mikron UCP 710 in real time.
                --params-file FILE    a machine, or some of its parameters
                -r FROM:=TO           another name for a topic or service
                -r __ns:=/NAMESPACE   -r __node:=NAME
-               --log-level LEVEL     debug, info, warn, error or fatal
+               --log-level LEVEL     debug, info, warn, error or fatal; NAME:=LEVEL of one logger
+               --disable-rosout-logs, --disable-stdout-logs
+               --enclave /PATH       of DDS Security
     --help, --version";
 
 fn main() -> ExitCode {
-    match Command::parse(std::env::args().skip(1), "virtual_axes") {
+    match arguments().and_then(|arguments| Command::parse(arguments, "virtual_axes")) {
         Ok(Command::Help) => say(HELP),
         Ok(Command::Version) => say(concat!("virtual_axes_node ", env!("CARGO_PKG_VERSION"))),
         Ok(Command::Run(args)) => run(&args),
         Err(error) => refuse(&error),
     }
+}
+
+fn arguments() -> Result<Vec<String>, ArgsError> {
+    let refused = |found: OsString| ArgsError::NotUtf8 { found: found.to_string_lossy().into_owned() };
+    std::env::args_os().skip(1).map(|argument| argument.into_string().map_err(refused)).collect()
 }
 
 fn say(text: &str) -> ExitCode {

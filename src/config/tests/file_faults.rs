@@ -32,6 +32,14 @@ fn not_yaml() {
 }
 
 #[test]
+fn two_machines_in_one_file() {
+    let mikron = mikron_with("    x:\n", "    x:\n");
+    let message = refusal(&format!("{mikron}---\n{mikron}"));
+    assert!(message.starts_with("my.yaml:"), "{message}");
+    assert!(message.ends_with(": a second YAML document begins; a file of parameters is one"), "{message}");
+}
+
+#[test]
 fn not_a_ros_parameter_file() {
     let beginning = "a file begins with `/**:`, below it `ros__parameters:`, below that the keys";
     for (text, expected) in [

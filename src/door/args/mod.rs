@@ -123,6 +123,12 @@ impl Default for LogSinks {
 /// An argument that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ArgsError {
+    /// Not text.
+    #[error("argument '{found}' is not UTF-8")]
+    NotUtf8 {
+        /// The argument, with U+FFFD for what is none.
+        found: String,
+    },
     /// Outside `--ros-args … --`.
     #[error(
         "argument '{found}' is not known; allowed are --help, --version, and ROS arguments after --ros-args"
