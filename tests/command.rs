@@ -125,6 +125,13 @@ fn an_axis_that_left_its_stroke_is_told() {
 }
 
 #[test]
+fn trajectories_without_any_point_are_refused() {
+    let folder = Folder::new("no_points");
+    let file = folder.text_file("psec.yaml", "joint_names: [x]\n---\njoint_names: [y]\npoints: []\n");
+    assert_refused(&run(&["run", &file]), &["psec.yaml: there is no set-point: no trajectory has points"]);
+}
+
+#[test]
 fn a_pose_beyond_a_stroke_is_told() {
     assert!(!assert_runs(&["pose", "--joints", "x=0.1,z=-0.2"]).contains("stroke"));
     assert_refused(

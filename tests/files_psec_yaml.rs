@@ -59,9 +59,6 @@ fn stamps_that_topic_pub_fills_in_are_now() {
 fn faults_name_file_and_line() {
     assert_eq!(error(""), "p.yaml: there is no trajectory; it is a mapping with joint_names and points");
     assert_eq!(error("---\n"), "p.yaml: there is no trajectory; it is a mapping with joint_names and points");
-    for nothing in ["joint_names: [x]\n", "joint_names: [x]\npoints: []\n---\njoint_names: [y]\n"] {
-        assert_eq!(error(nothing), "p.yaml: there is no set-point: no trajectory has points");
-    }
     assert_eq!(error("joint_names: [x]\npoints: 5\n"), "p.yaml:2: expected a list: points: 5");
     assert_eq!(
         error("joint_names: &names [x]\npoints: *names\n"),

@@ -38,12 +38,6 @@ pub enum TrajectoryYamlError {
         /// Why.
         rejection: Rejection,
     },
-    /// Messages, all without points.
-    #[error("{at}: there is no set-point: no trajectory has points")]
-    NoPoints {
-        /// The file.
-        at: String,
-    },
     /// There is no message.
     #[error("{at}: there is no trajectory; it is a mapping with joint_names and points")]
     Empty {
@@ -67,9 +61,6 @@ pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<Request>, Trajectory
     })?;
     if documents.is_empty() {
         return Err(TrajectoryYamlError::Empty { at: file.to_owned() });
-    }
-    if documents.iter().all(|document| document.value.points.is_empty()) {
-        return Err(TrajectoryYamlError::NoPoints { at: file.to_owned() });
     }
     documents
         .into_iter()

@@ -132,7 +132,13 @@ fn content_of(file: files::Input, topic: Option<&str>) -> Result<Content, Box<dy
             Content::Scenario(Box::new(Scenario::from_yaml(text, &name)?))
         }
         FileKind::PsecCsv => Content::Csv(RefCell::new(Some(file))),
-        FileKind::PsecYaml => Content::Yaml(read_psec_yaml(file.text().unwrap_or_default(), &name)?),
+        FileKind::PsecYaml => {
+            let requests = read_psec_yaml(file.text().unwrap_or_default(), &name)?;
+            if requests.iter().all(|request| request.points() == 0) {
+                return Err(format!("{name}: there is no set-point: no trajectory has points").into());
+            }
+            Content::Yaml(requests)
+        }
         FileKind::Mcap => Content::Mcap { topic: topic.map(str::to_owned) },
         kind @ FileKind::Machine => {
             return Err(format!("{name}: it is {kind}, to be given to --machine").into());
