@@ -1,6 +1,7 @@
 //! Command line of the virtual axes; needs no network.
 
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
 mod axis;
 mod campaign;

@@ -1,5 +1,7 @@
 //! The ROS 2 node: virtual machine-tool axes.
 
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
+
 #[cfg(target_os = "linux")]
 mod interrupted;
 
