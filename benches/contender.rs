@@ -21,10 +21,10 @@ use std::time::Instant;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::{Value, json};
-use virtual_axes::assess::{AxisAssessor, AxisReport};
-use virtual_axes::config::{Assignment, Parameters, Source, Value as Setting};
-use virtual_axes::machine::{Machine, MachineParameters};
-use virtual_axes::units::seconds;
+use virtual_axes_core::assess::{AxisAssessor, AxisReport};
+use virtual_axes_core::config::{Assignment, Parameters, Source, Value as Setting};
+use virtual_axes_core::machine::{Machine, MachineParameters};
+use virtual_axes_core::units::seconds;
 
 const USAGE: &str = "contender SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--cores COUNT]   (see benches/peers/run.py)";
 const MACHINE: &str = include_str!("../config/mikron_ucp710.yaml");

@@ -6,22 +6,19 @@
 //! The rows of a table are run in turns, so that what the computer does besides falls on all of them; medians over
 //! the rounds, and their ratio to the first row per simulated second of a machine.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
 use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use common::{AXES, parameters, program, setpoints};
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
-use virtual_axes::assess::AxisAssessor;
-use virtual_axes::config::MachineConfig;
-use virtual_axes::machine::{Machine, MachineParameters};
-use virtual_axes::trial::{self, Figures, GridSource, Setpoints, SourceError, Trial};
-use virtual_axes::units::seconds;
+use virtual_axes_core::assess::AxisAssessor;
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::machine::{Machine, MachineParameters};
+use virtual_axes_core::trial::{self, Figures, GridSource, Setpoints, SourceError, Trial};
+use virtual_axes_core::units::seconds;
+use virtual_axes_verification::fixtures::common::{AXES, parameters, program, setpoints};
 
 /// Rounds of a table, an odd number.
 const ROUNDS: usize = 11;

@@ -13,16 +13,16 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput};
-use virtual_axes::config::{MachineConfig, Parameters};
-use virtual_axes::files::{
+use virtual_axes_core::config::{MachineConfig, Parameters};
+use virtual_axes_core::machine::AxisSample;
+use virtual_axes_core::simulation::joints;
+use virtual_axes_core::units::Nanoseconds;
+use virtual_axes_io::files::{
     OutputFile, PsecCsv, RecordingOptions, Trajectories, encode, psec_writer, read_psec_yaml, read_recording,
     trace_writer,
 };
-use virtual_axes::machine::AxisSample;
-use virtual_axes::messages::sensor_msgs::msg::JointState;
-use virtual_axes::messages::{DriveStates, MotorCurrents, Sampled};
-use virtual_axes::simulation::joints;
-use virtual_axes::units::Nanoseconds;
+use virtual_axes_io::messages::sensor_msgs::msg::JointState;
+use virtual_axes_io::messages::{DriveStates, MotorCurrents, Sampled};
 
 /// Rounds of the first table.
 const ROUNDS: usize = 11;

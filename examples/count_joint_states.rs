@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 use futures::StreamExt;
 use ros2_client::qos::{History, QosProfile};
 use ros2_client::{MessageTypeName, Name, NodeName, NodeOptions};
-use virtual_axes::messages::sensor_msgs::msg::JointState;
 use virtual_axes::ros::environment::Environment;
 use virtual_axes::ros::participant::Participant;
+use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
 /// How long the first sample is waited for.
 const FIRST: Duration = Duration::from_secs(10);

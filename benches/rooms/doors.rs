@@ -6,21 +6,21 @@ use std::sync::Arc;
 
 use byteorder::LittleEndian;
 use criterion::{Criterion, Throughput};
-use virtual_axes::assess::Recording;
-use virtual_axes::config::Parameters;
-use virtual_axes::files::encode;
-use virtual_axes::machine::{AxisSample, Machine, MachineParameters};
-use virtual_axes::messages::sensor_msgs::msg::JointState;
-use virtual_axes::messages::trajectory_msgs::msg::JointTrajectory;
-use virtual_axes::messages::{self, DriveStates, MotorCurrents, Sampled};
-use virtual_axes::report::{Report, ReportRun};
-use virtual_axes::scenario::Scenario;
-use virtual_axes::trajectory::{Request, Row, Start};
-use virtual_axes::trial::{self, Trial};
-use virtual_axes::urdf::urdf;
+use virtual_axes_core::assess::Recording;
+use virtual_axes_core::config::Parameters;
+use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters};
+use virtual_axes_core::scenario::Scenario;
+use virtual_axes_core::trajectory::{Request, Row, Start};
+use virtual_axes_core::trial::{self, Trial};
+use virtual_axes_io::files::encode;
+use virtual_axes_io::messages::sensor_msgs::msg::JointState;
+use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectory;
+use virtual_axes_io::messages::{self, DriveStates, MotorCurrents, Sampled};
+use virtual_axes_io::urdf::urdf;
+use virtual_axes_report::report::{Report, ReportRun};
 
-use crate::common::{program, setpoints};
 use crate::{Group, bench, shipped, swing};
+use virtual_axes_verification::fixtures::common::{program, setpoints};
 
 /// The four bytes before a message's own.
 const CDR_HEADER: usize = 4;

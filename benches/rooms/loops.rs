@@ -6,15 +6,15 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::Criterion;
-use virtual_axes::config::{AxisKind, FeedforwardConfig, FrictionConfig, PiConfig};
-use virtual_axes::control::{
+use virtual_axes_core::config::{AxisKind, FeedforwardConfig, FrictionConfig, PiConfig};
+use virtual_axes_core::control::{
     Feedforward, Guard, Pi, PiState, PositionController, PositionState, Reach, Rst, SetpointHistory, Transfer,
 };
-use virtual_axes::design::{GpcTuning, PolePlacement, Weight, gpc, margins, pole_pair, pole_placement};
-use virtual_axes::drive::{Friction, MotorState, Plant};
-use virtual_axes::kinematics::{Kinematics, Poses, Turned};
-use virtual_axes::machine::{Machine, MachineParameters, Width, prediction_model};
-use virtual_axes::units::{POSITION_GAIN, seconds};
+use virtual_axes_core::design::{GpcTuning, PolePlacement, Weight, gpc, margins, pole_pair, pole_placement};
+use virtual_axes_core::drive::{Friction, MotorState, Plant};
+use virtual_axes_core::kinematics::{Kinematics, Poses, Turned};
+use virtual_axes_core::machine::{Machine, MachineParameters, Width, prediction_model};
+use virtual_axes_core::units::{POSITION_GAIN, seconds};
 
 use crate::{bench, shipped, swing};
 

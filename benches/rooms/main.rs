@@ -6,9 +6,6 @@
 //! The name of a group says what its rate counts. Rooms that read and write files are in `io.rs`, growth with length,
 //! axes, machines and cores in `growth.rs`.
 
-#[path = "../../tests/common/mod.rs"]
-mod common;
-
 mod doors;
 mod loops;
 mod motion;
@@ -18,7 +15,7 @@ use std::time::Duration;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput};
-use virtual_axes::config::{MachineConfig, Parameters};
+use virtual_axes_core::config::{MachineConfig, Parameters};
 
 type Group<'a> = BenchmarkGroup<'a, WallTime>;
 

@@ -4,18 +4,20 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{BatchSize, Criterion, Throughput};
-use virtual_axes::assess::{AxisAssessor, CircleAssessor, Deviations, PathTracker};
-use virtual_axes::config::MachineConfig;
-use virtual_axes::kinematics::{Kinematics, Poses, Turned};
-use virtual_axes::machine::{Machine, MachineParameters};
-use virtual_axes::path::Program;
-use virtual_axes::scenario::Scenario;
-use virtual_axes::simulation::{Simulation, joints};
-use virtual_axes::trajectory::{Context, JointLimits, MotionId, Request, Row, Start, Timeline, Trajectory};
-use virtual_axes::units::seconds;
+use virtual_axes_core::assess::{AxisAssessor, CircleAssessor, Deviations, PathTracker};
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::kinematics::{Kinematics, Poses, Turned};
+use virtual_axes_core::machine::{Machine, MachineParameters};
+use virtual_axes_core::path::Program;
+use virtual_axes_core::scenario::Scenario;
+use virtual_axes_core::simulation::{Simulation, joints};
+use virtual_axes_core::trajectory::{
+    Context, JointLimits, MotionId, Request, Row, Start, Timeline, Trajectory,
+};
+use virtual_axes_core::units::seconds;
 
-use crate::common::program;
 use crate::{bench, shipped};
+use virtual_axes_verification::fixtures::common::program;
 
 /// Points of a long trajectory: a minute at 6 ms.
 const POINTS: usize = 10_000;

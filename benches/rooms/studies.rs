@@ -5,17 +5,19 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::Criterion;
-use virtual_axes::config::{MachineConfig, Parameters};
-use virtual_axes::identify::campaign::{Campaign, Options as CampaignOptions};
-use virtual_axes::identify::{FeedforwardMode, Input, Options, Refine, identify};
-use virtual_axes::recording::{Conditioning, RawRecording, Signals, condition};
-use virtual_axes::trial::{self, Trial};
-use virtual_axes::tune::{Bench, Cost, Course, MarginLimits, Tuning, Unwatched, fine_grid, tune_gpc_from};
-use virtual_axes::units::seconds;
+use virtual_axes_core::config::{MachineConfig, Parameters};
+use virtual_axes_core::trial::{self, Trial};
+use virtual_axes_core::units::seconds;
+use virtual_axes_identify::identify::campaign::{Campaign, Options as CampaignOptions};
+use virtual_axes_identify::identify::{FeedforwardMode, Input, Options, Refine, identify};
+use virtual_axes_identify::recording::{Conditioning, RawRecording, Signals, condition};
+use virtual_axes_identify::tune::{
+    Bench, Cost, Course, MarginLimits, Tuning, Unwatched, fine_grid, tune_gpc_from,
+};
 
-use crate::common::recordings::{Disturbance, ignorant, record_campaign, truth};
-use crate::common::{program, setpoints};
 use crate::{bench, shipped};
+use virtual_axes_verification::fixtures::common::{program, setpoints};
+use virtual_axes_verification::fixtures::recordings::{Disturbance, ignorant, record_campaign, truth};
 
 /// Machines that are run side by side, as a search does.
 const TOGETHER: usize = 32;

@@ -2,13 +2,13 @@
 
 use std::io::Cursor;
 
-use virtual_axes::files::{
+use virtual_axes_io::files::{
     Columns, PsecCsv, PsecCsvOut, RecordingOptions, Trajectories, read_psec_yaml, read_recording_csv,
     read_recording_mcap,
 };
-use virtual_axes::messages;
-use virtual_axes::recording::{Conditioning, Finding, RawRecording, condition};
-use virtual_axes::trajectory::{Context, Trajectory};
+use virtual_axes_io::messages;
+use virtual_axes_identify::recording::{Conditioning, Finding, RawRecording, condition};
+use virtual_axes_core::trajectory::{Context, Trajectory};
 
 use crate::{JOINTS, MACHINE, bounded, bounded_beside, names, refused};
 
@@ -65,7 +65,7 @@ pub fn psec_csv(data: &[u8]) {
     });
 }
 
-fn check(request: virtual_axes::trajectory::Request) {
+fn check(request: virtual_axes_core::trajectory::Request) {
     if request.points() > 0 && request.point(request.points() - 1).is_some_and(|(time, _)| time > LONGEST) {
         return;
     }

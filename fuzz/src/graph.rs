@@ -11,18 +11,18 @@ use virtual_axes::door::parameters::{
     type_number, value_to_wire,
 };
 use virtual_axes::door::{Candidate, Checks, GoalChecks, Order, Setpoints, loads, select};
-use virtual_axes::messages::action_msgs::srv::CancelGoalRequest;
-use virtual_axes::messages::rcl_interfaces::srv::{
+use virtual_axes_io::messages::action_msgs::srv::CancelGoalRequest;
+use virtual_axes_io::messages::rcl_interfaces::srv::{
     DescribeParametersRequest, GetParameterTypesRequest, GetParametersRequest, ListParametersRequest,
     SetParametersAtomicallyRequest, SetParametersRequest,
 };
-use virtual_axes::messages::rosgraph_msgs::msg::Clock;
-use virtual_axes::messages::sensor_msgs::msg::JointState;
-use virtual_axes::messages::std_srvs::srv::TriggerRequest;
-use virtual_axes::messages::trajectory_msgs::msg::JointTrajectory;
-use virtual_axes::messages::{self, GetResultRequest, SendGoalRequest, nanoseconds};
-use virtual_axes::trajectory::MotionId;
-use virtual_axes::units::SECOND_NS;
+use virtual_axes_io::messages::rosgraph_msgs::msg::Clock;
+use virtual_axes_io::messages::sensor_msgs::msg::JointState;
+use virtual_axes_io::messages::std_srvs::srv::TriggerRequest;
+use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectory;
+use virtual_axes_io::messages::{self, GetResultRequest, SendGoalRequest, nanoseconds};
+use virtual_axes_core::trajectory::MotionId;
+use virtual_axes_core::units::SECOND_NS;
 
 use crate::{JOINTS, MACHINE, ORIGIN, PARAMETERS, bounded, machine_at_rest, names, refused, step};
 
@@ -44,11 +44,11 @@ fn decode<T: DeserializeOwned + Serialize + PartialEq + Debug>(sample: &[u8]) ->
     assert!(consumed <= body.len());
     // What was understood can be said again, and means the same.
     let mut written = Vec::new();
-    virtual_axes::files::encode(&message, &mut written).expect("a message can be written");
+    virtual_axes_io::files::encode(&message, &mut written).expect("a message can be written");
     let (again, _) = cdr_encoding::from_bytes::<T, LittleEndian>(&written[HEADER..]).expect("it can be read");
     // Not by comparing values: NaN is not itself.
     let mut twice = Vec::new();
-    virtual_axes::files::encode(&again, &mut twice).expect("a message can be written");
+    virtual_axes_io::files::encode(&again, &mut twice).expect("a message can be written");
     assert_eq!(written, twice);
     Some(message)
 }

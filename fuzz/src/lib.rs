@@ -14,10 +14,10 @@ pub use text::{machine_file, parameter_text, ros_args, scenario};
 
 use std::sync::LazyLock;
 
-use virtual_axes::config::{MachineConfig, Parameters};
-use virtual_axes::simulation::{self, Simulation};
-use virtual_axes::trajectory::JointLimits;
-use virtual_axes::units::Nanoseconds;
+use virtual_axes_core::config::{MachineConfig, Parameters};
+use virtual_axes_core::simulation::{self, Simulation};
+use virtual_axes_core::trajectory::JointLimits;
+use virtual_axes_core::units::Nanoseconds;
 
 /// Longest refusal, bytes: a few quoted texts and what is allowed.
 const LONGEST_REFUSAL: usize = 2000;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
-use virtual_axes::trajectory::{Context, MotionId, Request, Row, Start, Trajectory};
-use virtual_axes::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
+use virtual_axes_core::trajectory::{Context, MotionId, Request, Row, Start, Trajectory};
+use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
 
 use crate::{JOINTS, MACHINE, ORIGIN, bounded, machine_at_rest, refused, step};
 

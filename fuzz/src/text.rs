@@ -1,9 +1,9 @@
 //! Texts: machine files, parameters, scenarios, arguments.
 
-use virtual_axes::config::{Parameters, Source};
+use virtual_axes_core::config::{Parameters, Source};
 use virtual_axes::door::args::Command;
-use virtual_axes::machine::MachineParameters;
-use virtual_axes::scenario::Scenario;
+use virtual_axes_core::machine::MachineParameters;
+use virtual_axes_core::scenario::Scenario;
 
 use crate::{JOINTS, MACHINE, PARAMETERS, bounded, refused};
 

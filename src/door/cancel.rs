@@ -1,8 +1,8 @@
 //! Which goals a request to cancel means (action_msgs/CancelGoal).
 
 use super::GoalId;
-use crate::messages::action_msgs::srv::CancelGoalResponse;
-use crate::units::Nanoseconds;
+use virtual_axes_core::units::Nanoseconds;
+use virtual_axes_io::messages::action_msgs::srv::CancelGoalResponse;
 
 /// A goal as far as it matters here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

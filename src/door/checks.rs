@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::parameters::LiveNodeParameters;
-use crate::messages;
-use crate::messages::trajectory_msgs::msg::JointTrajectory;
-use crate::trajectory::{Context, JointLimits, Rejection, Trajectory};
-use crate::units::Nanoseconds;
+use virtual_axes_core::trajectory::{Context, JointLimits, Rejection, Trajectory};
+use virtual_axes_core::units::Nanoseconds;
+use virtual_axes_io::messages;
+use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectory;
 
 /// The checks of a trajectory that need no state of the axes.
 pub struct Checks {

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use super::Checks;
-use crate::config::GoalDefaults;
-use crate::messages::builtin_interfaces::msg::Duration;
-use crate::messages::{FollowJointTrajectoryGoal, JointTolerance};
-use crate::simulation::{Tolerance, Tolerances};
-use crate::trajectory::{Code, JointLimits, Rejection, Trajectory};
-use crate::units::{Nanoseconds, SECOND_NS, Told};
+use virtual_axes_core::config::GoalDefaults;
+use virtual_axes_core::simulation::{Tolerance, Tolerances};
+use virtual_axes_core::trajectory::{Code, JointLimits, Rejection, Trajectory};
+use virtual_axes_core::units::{Nanoseconds, SECOND_NS, Told};
+use virtual_axes_io::messages::builtin_interfaces::msg::Duration;
+use virtual_axes_io::messages::{FollowJointTrajectoryGoal, JointTolerance};
 
 /// "No tolerance" in a goal.
 const NONE: f64 = -1.0;
@@ -122,9 +122,9 @@ fn goal_time(asked: &Duration, default: Option<Nanoseconds>) -> Result<Option<Na
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Parameters;
-    use crate::messages::JointComponentTolerance;
-    use crate::simulation;
+    use virtual_axes_core::config::Parameters;
+    use virtual_axes_core::simulation;
+    use virtual_axes_io::messages::JointComponentTolerance;
 
     fn joints() -> Vec<JointLimits> {
         let parameters = Parameters::embedded_default().expect("the default machine");

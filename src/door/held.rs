@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use crate::trajectory::{Code, Rejection, Trajectory};
+use virtual_axes_core::trajectory::{Code, Rejection, Trajectory};
 
 /// Trajectories of the largest allowed length that are held together: one under way, one that takes over, and
 /// as many on their way.
@@ -58,9 +58,9 @@ impl Held {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Parameters;
-    use crate::simulation;
-    use crate::trajectory::{Context, Request, Row, Start};
+    use virtual_axes_core::config::Parameters;
+    use virtual_axes_core::simulation;
+    use virtual_axes_core::trajectory::{Context, Request, Row, Start};
 
     fn trajectory(points: usize) -> Trajectory {
         let parameters = Parameters::embedded_default().expect("the default machine");

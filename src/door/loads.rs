@@ -1,9 +1,9 @@
 //! Loads at the axes from messages.
 
-use crate::config::shortened;
-use crate::messages::sensor_msgs::msg::JointState;
-use crate::simulation::MAX_LOAD;
-use crate::units::Told;
+use virtual_axes_core::config::shortened;
+use virtual_axes_core::simulation::MAX_LOAD;
+use virtual_axes_core::units::Told;
+use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
 /// The loads of a message: place of the axis in `joints` and load, N or N·m.
 ///

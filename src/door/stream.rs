@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
-use crate::messages::nanoseconds;
-use crate::messages::sensor_msgs::msg::JointState;
-use crate::trajectory::{Code, Rejection};
-use crate::units::{Nanoseconds, SECOND_NS};
+use virtual_axes_core::trajectory::{Code, Rejection};
+use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
+use virtual_axes_io::messages::nanoseconds;
+use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
 /// A message whose stamp is older than the one before by more than this comes from a clock that was
 /// set back; by less, it was overtaken on its way.

@@ -1,12 +1,12 @@
-//! ROS messages to typed values and back, by the conversions of [`crate::messages`], [`crate::door`] and
+//! ROS messages to typed values and back, by the conversions of [`virtual_axes_io::messages`], [`crate::door`] and
 //! those that only the node needs.
 
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 
 use super::pace::Frame;
 pub use crate::door::loads;
-use crate::messages::{DriveStates, MotorCurrents, Sampled};
-pub use crate::messages::{header, stamp};
+use virtual_axes_io::messages::{DriveStates, MotorCurrents, Sampled};
+pub use virtual_axes_io::messages::{header, stamp};
 
 /// `joint_states` of a frame.
 pub fn joint_state(frame: &Frame, joints: &[String]) -> JointState {

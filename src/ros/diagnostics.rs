@@ -7,7 +7,7 @@ use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::{DiagnosticArray, Diagnos
 use super::convert::header;
 use super::footprint::{Discovered, own_memory_mb};
 use super::pace::{AxisHealth, ClockSource, Health};
-use crate::units::{MILLISECOND_NS, Nanoseconds};
+use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds};
 
 /// What stays the same from message to message.
 #[derive(Debug, Clone)]

@@ -13,8 +13,8 @@ use super::args::RosArgs;
 use super::recorder::{Direction, Recorder, Tap};
 use serde::Serialize;
 
-use crate::config::{Parameters, QosConfig, TimeMode};
-use crate::messages::Recorded;
+use virtual_axes_core::config::{Parameters, QosConfig, TimeMode};
+use virtual_axes_io::messages::Recorded;
 
 /// A publisher of a topic that is recorded.
 pub struct Publisher<M: Serialize> {

@@ -18,7 +18,7 @@ use super::pace::{Frame, Health};
 use super::recorder::RecordingStatus;
 use super::setpoints::{SetpointVelocities, controller_state};
 use super::tool::ToolOutput;
-use crate::messages::{DriveStates, JointTrajectoryControllerState, MotorCurrents};
+use virtual_axes_io::messages::{DriveStates, JointTrajectoryControllerState, MotorCurrents};
 
 /// Period of `/diagnostics` (REP-107).
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);

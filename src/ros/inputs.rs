@@ -19,8 +19,8 @@ use super::reused::Reused;
 use super::stream::{Order, Setpoints};
 use super::throttle::Throttle;
 pub use crate::door::Checks;
-use crate::trajectory::MotionId;
-use crate::units::Nanoseconds;
+use virtual_axes_core::trajectory::MotionId;
+use virtual_axes_core::units::Nanoseconds;
 
 /// Takes trajectories in, makes the checks that need no state, and hands them to the simulation.
 pub struct PsecInput {

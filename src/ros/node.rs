@@ -42,11 +42,11 @@ use super::tool::ToolTopics;
 use super::topics::Topics;
 use super::trigger::{RESET, STOP, Trigger};
 use super::writers::{Owner, Renewals};
-use crate::config::{ConfigError, Parameters, TimeMode};
-use crate::kinematics::Kinematics;
-use crate::simulation::{self, Simulation, SimulationError};
-use crate::trajectory::{Context, JointLimits, MotionId, Request, Start, Trajectory};
-use crate::units::{Nanoseconds, seconds};
+use virtual_axes_core::config::{ConfigError, Parameters, TimeMode};
+use virtual_axes_core::kinematics::Kinematics;
+use virtual_axes_core::simulation::{self, Simulation, SimulationError};
+use virtual_axes_core::trajectory::{Context, JointLimits, MotionId, Request, Start, Trajectory};
+use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// How long the end of the simulation's thread is waited for.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(300);

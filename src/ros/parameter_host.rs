@@ -5,9 +5,9 @@ use std::sync::Arc;
 use tokio::sync::mpsc;
 
 use super::pace::Command;
-use crate::config::Parameters;
 pub use crate::door::parameters::LiveNodeParameters;
 use crate::door::parameters::{Descriptor, ParameterHost, ParameterValue, Settings};
+use virtual_axes_core::config::Parameters;
 
 /// Checks what is set against the schema, and hands it to the simulation as a command.
 pub struct Host {

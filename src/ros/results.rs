@@ -13,12 +13,12 @@ use super::action::{GoalEvent, GoalId, goal_name};
 use super::convert::{header, stamp};
 use super::outputs::Output;
 use super::pace::{Accepted, Report};
-use crate::assess::AxisReport;
 use crate::door::Held;
-use crate::messages::{Source, Status, TrajectoryResult};
-use crate::simulation::{Abort, MotionEnd, Outcome, Quantity, Violation};
-use crate::trajectory::{JointLimits, JointSet, MotionId, Rejection, StreamEnd, Trajectory};
-use crate::units::{Nanoseconds, seconds};
+use virtual_axes_core::assess::AxisReport;
+use virtual_axes_core::simulation::{Abort, MotionEnd, Outcome, Quantity, Violation};
+use virtual_axes_core::trajectory::{JointLimits, JointSet, MotionId, Rejection, StreamEnd, Trajectory};
+use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_io::messages::{Source, Status, TrajectoryResult};
 
 /// Where a trajectory came from.
 #[derive(Debug, Clone, PartialEq)]

@@ -15,7 +15,7 @@ use super::args::{LogLevel, RosArgs};
 use super::endpoints::{EndpointError, Publisher, keeping, topic};
 use super::log::LogRecord;
 use super::recorder::{Direction, Recorder};
-use crate::config::QosConfig;
+use virtual_axes_core::config::QosConfig;
 
 /// Messages that may wait; more are dropped, so that logging never waits.
 pub const QUEUE: usize = 256;

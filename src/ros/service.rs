@@ -16,6 +16,8 @@ use rustdds::{
     DomainParticipant, QosPolicies, RTPSEntity, SampleIdentity, SequenceNumber, Timestamp, TopicKind,
     WriteOptionsBuilder,
 };
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use tokio::sync::Mutex;
 
 use super::args::RosArgs;
@@ -88,16 +90,23 @@ pub fn profile(depth: usize) -> QosProfile {
         .history(History::KeepLast { depth })
 }
 
+/// Message of a service, for which ros2-client requires a trait of its own that other crates' types do not have.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(transparent)]
+struct Wire<M>(M);
+
+impl<M: Serialize + DeserializeOwned> Message for Wire<M> {}
+
 /// The two ends of a service.
-enum Ends<Q: Message, A: Message> {
+enum Ends<Q: Serialize + DeserializeOwned, A: Serialize + DeserializeOwned> {
     /// The crate's.
-    Server(Server<Q, A>),
+    Server(Server<Wire<Q>, Wire<A>>),
     /// Of a type that the crate cannot name: a subscription and a writer.
     Topics { requests: Subscription<Q>, responses: DataWriterCdr<A> },
 }
 
 /// One service: its server, and the DDS topic on which its responses go out.
-pub struct Service<Q: Message, A: Message> {
+pub struct Service<Q: Serialize + DeserializeOwned, A: Serialize + DeserializeOwned> {
     label: &'static str,
     ends: Ends<Q, A>,
     response_topic: String,
@@ -107,7 +116,7 @@ pub struct Service<Q: Message, A: Message> {
     written: Mutex<i64>,
 }
 
-impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
+impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned + 'static> Service<Q, A> {
     /// The service `~/label`; `context` is the one that `node` lives in.
     ///
     /// # Errors
@@ -216,7 +225,10 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         let unreadable = move |error| format!("a request to {label} could not be read: {error:?}");
         match &self.ends {
             Ends::Server(server) => {
-                server.receive_request_stream().map(move |received| received.map_err(unreadable)).boxed()
+                let requests = server.receive_request_stream();
+                requests
+                    .map(move |received| received.map(|(id, Wire(q))| (id, q)).map_err(unreadable))
+                    .boxed()
             }
             Ends::Topics { requests, .. } => requests
                 .async_stream()
@@ -281,7 +293,7 @@ impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
         let mut written = self.written.lock().await;
         match &self.ends {
             Ends::Server(server) => {
-                server.async_send_response(id, response).await.map_err(|error| format!("{error:?}"))?;
+                server.async_send_response(id, Wire(response)).await.map_err(|error| format!("{error:?}"))?;
             }
             Ends::Topics { responses, .. } => {
                 let options = WriteOptionsBuilder::new()

@@ -2,9 +2,9 @@
 //! and the action's feedback compare the axes with.
 
 use super::pace::Frame;
-use crate::messages::trajectory_msgs::msg::JointTrajectoryPoint;
-use crate::messages::{JointTrajectoryControllerState, header};
-use crate::units::{Nanoseconds, seconds};
+use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectoryPoint;
+use virtual_axes_io::messages::{JointTrajectoryControllerState, header};
 
 /// The velocities of the synchronised set-points, by difference from frame to frame:
 /// `(PSEC_floor(k − α/Tsp) − the one before) / Tsp`.
@@ -89,8 +89,8 @@ pub fn controller_state(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::AxisSample;
-    use crate::units::MILLISECOND_NS;
+    use virtual_axes_core::machine::AxisSample;
+    use virtual_axes_core::units::MILLISECOND_NS;
 
     fn frame(instant: i64, setpoint: f64) -> Frame {
         let sample =

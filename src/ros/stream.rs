@@ -4,9 +4,9 @@ use tracing::warn;
 
 use super::throttle::Throttle;
 pub use crate::door::{Order, Setpoints};
-use crate::simulation::Simulation;
-use crate::trajectory::{Code, Rejection, StreamCounts};
-use crate::units::Nanoseconds;
+use virtual_axes_core::simulation::Simulation;
+use virtual_axes_core::trajectory::{Code, Rejection, StreamCounts};
+use virtual_axes_core::units::Nanoseconds;
 
 /// What the diagnostics say about the stream.
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,6 +1,6 @@
 //! A log that is not flooded.
 
-use crate::units::{Nanoseconds, SECOND_NS};
+use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
 /// How often the log tells of the same thing at most.
 const LOG_PERIOD: Nanoseconds = SECOND_NS;

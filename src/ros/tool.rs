@@ -14,11 +14,11 @@ use tokio::time::{Instant, MissedTickBehavior};
 use super::endpoints::{EndpointError, Endpoints, Publisher};
 use super::outputs::{Output, Publishing, WhenFull};
 use super::pace::Frame;
-use crate::config::ToolConfig;
-use crate::kinematics::{Kinematics, ToolPose};
-use crate::machine::AxisSample;
-use crate::messages;
-use crate::units::Nanoseconds;
+use virtual_axes_core::config::ToolConfig;
+use virtual_axes_core::kinematics::{Kinematics, ToolPose};
+use virtual_axes_core::machine::AxisSample;
+use virtual_axes_core::units::Nanoseconds;
+use virtual_axes_io::messages;
 
 /// From one pose of a path to the next at least, m: below what can be seen of a machine on a screen.
 const SPACING: f64 = 1e-4;

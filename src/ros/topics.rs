@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use ros2_client::{Message, MessageTypeName};
+use ros2_client::MessageTypeName;
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
 use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
@@ -10,14 +10,10 @@ use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 
 use super::args::RosArgs;
 use super::endpoints::{EndpointError, Endpoints, Publisher, Subscription};
-use crate::config::{QosConfig, TimeMode};
-use crate::messages::{
+use virtual_axes_core::config::{QosConfig, TimeMode};
+use virtual_axes_io::messages::{
     CONTROL_PACKAGE, DriveStates, JointTrajectoryControllerState, MotorCurrents, PACKAGE, TrajectoryResult,
 };
-
-impl Message for MotorCurrents {}
-impl Message for DriveStates {}
-impl Message for TrajectoryResult {}
 
 /// Publishers of `/clock` may be reliable or not, and of what they say only the newest counts; the
 /// depth is for several of them.

@@ -1,7 +1,7 @@
 //! One axis of a machine, and the units that people give its motion in.
 
-use virtual_axes::config::{AxisKind, MachineConfig};
-use virtual_axes::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, RPM};
+use virtual_axes_core::config::{AxisKind, MachineConfig};
+use virtual_axes_core::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, RPM};
 
 /// Least similarity (Jaro-Winkler) of a name that is offered in place of an unknown one.
 const NEAR_ENOUGH: f64 = 0.7;

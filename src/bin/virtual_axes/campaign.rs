@@ -4,11 +4,11 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
-use virtual_axes::files::psec_writer;
-use virtual_axes::identify::FeedforwardMode;
-use virtual_axes::identify::campaign::{Campaign, Options, Run};
-use virtual_axes::report::{Column, Table};
+use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
+use virtual_axes_identify::identify::FeedforwardMode;
+use virtual_axes_identify::identify::campaign::{Campaign, Options, Run};
+use virtual_axes_io::files::psec_writer;
+use virtual_axes_report::report::{Column, Table};
 
 use crate::axis::{self, Units};
 use crate::input::must_not_replace;

@@ -3,11 +3,11 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use virtual_axes::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
-use virtual_axes::files::{self, FileKind};
-use virtual_axes::machine::MachineParameters;
-use virtual_axes::scenario::Scenario;
-use virtual_axes::trial::Trial;
+use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
+use virtual_axes_core::machine::MachineParameters;
+use virtual_axes_core::scenario::Scenario;
+use virtual_axes_core::trial::Trial;
+use virtual_axes_io::files::{self, FileKind};
 
 use crate::input::Input;
 use crate::interrupt;
@@ -47,7 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     };
     // The surest check is to run it.
     let setpoints = input.setpoints(&config, program.as_ref())?;
-    let outcome = virtual_axes::trial::run(&trial, setpoints, |_| interrupt::check())
+    let outcome = virtual_axes_core::trial::run(&trial, setpoints, |_| interrupt::check())
         .map_err(|error| crate::run::named(&input, error))?;
     Ok(format!("{kind} for {}: {:.3} s\nvalid\n", config.name(), outcome.figures.duration))
 }

@@ -3,14 +3,14 @@
 use std::error::Error;
 
 use nalgebra::Complex;
-use virtual_axes::config::{AxisConfig, DEFAULT_MACHINE, Parameters, Periods, Value};
-use virtual_axes::control::Rst;
-use virtual_axes::design::{
+use virtual_axes_core::config::{AxisConfig, DEFAULT_MACHINE, Parameters, Periods, Value};
+use virtual_axes_core::control::Rst;
+use virtual_axes_core::design::{
     DesignError, GpcTuning, MAX_GAIN, Margins, Pid, PolePlacement, PredictionModel, Weight, accept, gpc,
     margins, p, pi, pid, pole_pair, pole_placement, poles,
 };
-use virtual_axes::machine::prediction_model;
-use virtual_axes::units::{MILLISECOND, POSITION_GAIN, Told};
+use virtual_axes_core::machine::prediction_model;
+use virtual_axes_core::units::{MILLISECOND, POSITION_GAIN, Told};
 
 use crate::{design_output, variant};
 

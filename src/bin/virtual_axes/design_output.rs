@@ -2,9 +2,9 @@
 
 use nalgebra::Complex;
 use serde_json::{Map, Value, json};
-use virtual_axes::design::Margins;
-use virtual_axes::report::{Column, Table};
-use virtual_axes::units::{DEGREE, MILLISECOND};
+use virtual_axes_core::design::Margins;
+use virtual_axes_core::units::{DEGREE, MILLISECOND};
+use virtual_axes_report::report::{Column, Table};
 
 use crate::design::Design;
 use crate::table;

@@ -5,12 +5,14 @@ use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use virtual_axes::config::{AxisConfig, DEFAULT_MACHINE, Kind, MachineConfig, Parameters, Periods};
-use virtual_axes::files::OutputFile;
-use virtual_axes::identify::{Agreement, Breakaway, Identification, Identified, Input, Options, Refine};
-use virtual_axes::recording::{Finding, Severity};
-use virtual_axes::report::{IdentificationCheck, IdentificationPage};
-use virtual_axes::units::MILLISECOND_NS;
+use virtual_axes_core::config::{AxisConfig, DEFAULT_MACHINE, Kind, MachineConfig, Parameters, Periods};
+use virtual_axes_core::units::MILLISECOND_NS;
+use virtual_axes_identify::identify::{
+    Agreement, Breakaway, Identification, Identified, Input, Options, Refine,
+};
+use virtual_axes_identify::recording::{Finding, Severity};
+use virtual_axes_io::files::OutputFile;
+use virtual_axes_report::report::{IdentificationCheck, IdentificationPage};
 
 use crate::campaign::PartName;
 use crate::input::must_not_replace;
@@ -216,7 +218,7 @@ fn find(
     let inputs: Vec<Input<'_>> = recordings.iter().map(Recorded::input).collect();
     let i0 = if arguments.free_i0 { Breakaway::Freed } else { Breakaway::Held };
     let options = Options { i0, refine: refine(arguments) };
-    let identification = virtual_axes::identify::identify(&inputs, axis, &periods, &options);
+    let identification = virtual_axes_identify::identify::identify(&inputs, axis, &periods, &options);
     let of_files = recordings.iter().chain(&others).flat_map(|recorded| &recorded.findings);
     // A file can be given twice.
     let mut findings: Vec<Finding> = Vec::new();
@@ -231,14 +233,14 @@ fn find(
         return Err(nothing(axis.name(), &findings).into());
     }
     let mut identified = parameters.clone();
-    virtual_axes::identify::adopt(&mut identified, axis.name(), &values)?;
+    virtual_axes_identify::identify::adopt(&mut identified, axis.name(), &values)?;
     // With the digits of the machine file.
     let adopted = identified.machine_config()?;
 
     spinner.now(format!("validating {}", axis.name()))?;
     let validations = others.into_iter().map(|recorded| {
         let agreement =
-            virtual_axes::identify::validate(&recorded.input(), &adopted.axes()[place], &periods)?;
+            virtual_axes_identify::identify::validate(&recorded.input(), &adopted.axes()[place], &periods)?;
         Ok(Validation { recorded, agreement })
     });
     let validations = validations.collect::<Result<_, Box<dyn Error>>>()?;

@@ -3,12 +3,12 @@
 //! Units stand in the keys; those of an axis in `position_unit`, `velocity_unit` and `speed_unit`.
 
 use serde_json::{Value, json};
-use virtual_axes::identify::{
+use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS};
+use virtual_axes_identify::identify::{
     Agreement, Comparison, DelayFit, Deviation, Friction, FrictionLaw, Gravity, GravityCurrent,
     GravitySource, Identified, LawFit, Level, Refinement, Regression,
 };
-use virtual_axes::recording::Finding;
-use virtual_axes::units::{DEGREE, MILLISECOND, MILLISECOND_NS};
+use virtual_axes_identify::recording::Finding;
 
 use crate::axis::Units;
 use crate::identify::Found;
@@ -119,8 +119,9 @@ fn law(law: &LawFit) -> Value {
 fn inertia(found: &Found) -> Value {
     let Some(inertia) = &found.identification.inertia else { return Value::Null };
     let refined = found.identification.refinement.as_ref().and_then(|refinement| {
-        let of =
-            |r: &&virtual_axes::identify::Refined| r.parameter == virtual_axes::identify::Parameter::Inertia;
+        let of = |r: &&virtual_axes_identify::identify::Refined| {
+            r.parameter == virtual_axes_identify::identify::Parameter::Inertia
+        };
         refinement.parameters.iter().find(of)
     });
     json!({

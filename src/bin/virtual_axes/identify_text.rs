@@ -1,13 +1,13 @@
 //! What `virtual_axes identify` prints.
 
-use virtual_axes::config::AxisKind;
-use virtual_axes::identify::{
+use virtual_axes_core::config::AxisKind;
+use virtual_axes_core::units::{DEGREE, MILLIMETRE, MILLISECOND, MILLISECOND_NS};
+use virtual_axes_identify::identify::{
     Agreement, Comparison, Deviation, Friction, FrictionLaw, Gravity, GravitySource, Identification,
     Identified, LawFit, Level, Parameter, Regression,
 };
-use virtual_axes::recording::{Finding, Severity};
-use virtual_axes::report::{Column, Table};
-use virtual_axes::units::{DEGREE, MILLIMETRE, MILLISECOND, MILLISECOND_NS};
+use virtual_axes_identify::recording::{Finding, Severity};
+use virtual_axes_report::report::{Column, Table};
 
 use crate::axis::Units;
 use crate::identify::Found;

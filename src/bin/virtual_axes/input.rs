@@ -7,13 +7,13 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-use virtual_axes::config::MachineConfig;
-use virtual_axes::files::{self, FileKind, PsecCsv, Trajectories, read_psec_yaml};
-use virtual_axes::path::Program;
-use virtual_axes::scenario::Scenario;
-use virtual_axes::simulation::joints;
-use virtual_axes::trajectory::Request;
-use virtual_axes::trial::{GridSource, ProgramSource, Setpoints, SourceError};
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::path::Program;
+use virtual_axes_core::scenario::Scenario;
+use virtual_axes_core::simulation::joints;
+use virtual_axes_core::trajectory::Request;
+use virtual_axes_core::trial::{GridSource, ProgramSource, Setpoints, SourceError};
+use virtual_axes_io::files::{self, FileKind, PsecCsv, Trajectories, read_psec_yaml};
 
 /// A scenario or set-points.
 #[derive(Debug)]

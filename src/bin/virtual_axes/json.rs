@@ -3,10 +3,10 @@
 //! Units stand in the keys; those of an axis in its `unit`: um and mdeg.
 
 use serde_json::{Map, Value, json};
-use virtual_axes::trial::{
+use virtual_axes_core::trial::{
     AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
 };
-use virtual_axes::units::{DEGREE, MILLIMETRE};
+use virtual_axes_core::units::{DEGREE, MILLIMETRE};
 
 use crate::input::Input;
 use crate::run::Run;

@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use serde_json::json;
-use virtual_axes::config::Parameters;
-use virtual_axes::scenario::Scenario;
+use virtual_axes_core::config::Parameters;
+use virtual_axes_core::scenario::Scenario;
 
 /// The shipped machines, one a line.
 pub fn machines(as_json: bool) -> Result<String, Box<dyn Error>> {

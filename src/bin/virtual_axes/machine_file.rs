@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use virtual_axes::files::OutputFile;
+use virtual_axes_io::files::OutputFile;
 
 /// Refuses a name that says that it is something else; devices and pipes have no extension.
 pub fn check_name(path: &Path) -> Result<(), String> {

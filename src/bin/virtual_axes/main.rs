@@ -25,7 +25,6 @@ mod report;
 mod robustness;
 mod run;
 mod search;
-mod stress;
 mod subject;
 mod table;
 mod tune;
@@ -40,7 +39,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use virtual_axes::config::listing;
+use virtual_axes_core::config::listing;
 
 /// Exit status of a command that refused its input, or could not write its output.
 const BAD_INPUT: u8 = 2;
@@ -67,8 +66,6 @@ enum Command {
     Robustness(Box<robustness::Arguments>),
     /// Find the parameters of an axis from recordings of it, and write a machine file with them.
     Identify(Box<identify::Arguments>),
-    /// Run random trajectories, and check every tick of them: limits, energy, errors against theory.
-    Stress(stress::Arguments),
     /// Check a file: a machine, a scenario, or set-points.
     Check(check::Arguments),
     /// Print the URDF of a machine, for robot_state_publisher and RViz.
@@ -139,7 +136,6 @@ fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Tune(arguments) => tune::run(arguments),
         Command::Robustness(arguments) => robustness::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
-        Command::Stress(arguments) => stress::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Urdf(arguments) => urdf::run(arguments),
         Command::Pose(arguments) => pose::run(arguments),

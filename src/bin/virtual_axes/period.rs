@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use virtual_axes::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, SECOND_NS};
+use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, SECOND_NS};
 
 /// Units, longest first where one ends with another.
 const UNITS: [(&str, Nanoseconds); 5] =

@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use serde_json::json;
-use virtual_axes::config::MachineConfig;
-use virtual_axes::kinematics::Kinematics;
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::kinematics::Kinematics;
 
 use crate::subject::MachineChoice;
 

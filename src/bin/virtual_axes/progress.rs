@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use virtual_axes::tune::Watch;
+use virtual_axes_identify::tune::Watch;
 
 use crate::interrupt;
 
@@ -83,12 +83,6 @@ impl Runs {
             bar.set_style(style);
         }
         Runs { bar, began: Instant::now(), shown: AtomicBool::new(false) }
-    }
-
-    /// As many have ended.
-    pub fn reached(&self, runs: u64) {
-        self.bar.set_position(runs);
-        self.show();
     }
 
     fn show(&self) {

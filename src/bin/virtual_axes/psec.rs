@@ -3,10 +3,10 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
-use virtual_axes::files::psec_writer;
-use virtual_axes::simulation::joints;
-use virtual_axes::trial::Setpoints;
+use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
+use virtual_axes_core::simulation::joints;
+use virtual_axes_core::trial::Setpoints;
+use virtual_axes_io::files::psec_writer;
 
 use crate::input::{Input, must_not_replace};
 use crate::{campaign, interrupt, variant};

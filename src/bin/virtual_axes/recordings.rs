@@ -3,11 +3,11 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use virtual_axes::config::{AxisConfig, Periods};
-use virtual_axes::files::{Columns, RecordingOptions, read_recording};
-use virtual_axes::identify::{FeedforwardMode, Input};
-use virtual_axes::recording::{Conditioning, Finding, Signals, condition};
-use virtual_axes::units::MILLISECOND;
+use virtual_axes_core::config::{AxisConfig, Periods};
+use virtual_axes_core::units::MILLISECOND;
+use virtual_axes_identify::identify::{FeedforwardMode, Input};
+use virtual_axes_identify::recording::{Conditioning, Finding, Signals, condition};
+use virtual_axes_io::files::{Columns, RecordingOptions, read_recording};
 
 use crate::campaign::PartName;
 

@@ -3,9 +3,9 @@
 use std::error::Error;
 use std::path::Path;
 
-use virtual_axes::assess::Recording;
-use virtual_axes::files::OutputFile;
-use virtual_axes::report::{Report, ReportRun, Scatter};
+use virtual_axes_core::assess::Recording;
+use virtual_axes_io::files::OutputFile;
+use virtual_axes_report::report::{Report, ReportRun, Scatter};
 
 use crate::input::Input;
 use crate::run::Run;

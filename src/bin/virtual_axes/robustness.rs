@@ -3,9 +3,9 @@
 use std::error::Error;
 
 use serde_json::{Value, json};
-use virtual_axes::config::MachineConfig;
-use virtual_axes::report::Table;
-use virtual_axes::tune::{Cost, Deviated, Deviation, Robustness, robustness};
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_identify::tune::{Cost, Deviated, Deviation, Robustness, robustness};
+use virtual_axes_report::report::Table;
 
 use crate::progress::Runs;
 use crate::search::{columns, course, named, object, row};

@@ -4,11 +4,11 @@ use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use virtual_axes::config::{MachineConfig, Parameters};
-use virtual_axes::files::{TraceWriter, trace_writer};
-use virtual_axes::machine::AxisSample;
-use virtual_axes::trial::{Outcome, Tick, Trial, TrialError};
-use virtual_axes::units::{Nanoseconds, seconds};
+use virtual_axes_core::config::{MachineConfig, Parameters};
+use virtual_axes_core::machine::AxisSample;
+use virtual_axes_core::trial::{Outcome, Tick, Trial, TrialError};
+use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_io::files::{TraceWriter, trace_writer};
 
 use crate::input::Input;
 use crate::period::Period;
@@ -143,9 +143,9 @@ fn trial(
         trace.as_mut().map_or(Ok(()), |trace| trace.observe(tick))
     };
     let result = if between_instants {
-        virtual_axes::trial::trace(&trial, setpoints, watch)
+        virtual_axes_core::trial::trace(&trial, setpoints, watch)
     } else {
-        virtual_axes::trial::run(&trial, setpoints, watch)
+        virtual_axes_core::trial::run(&trial, setpoints, watch)
     };
     progress.finish();
     let outcome = result.map_err(|error| named(input, error))?;

@@ -3,12 +3,12 @@
 use std::error::Error;
 
 use serde_json::{Map, Value, json};
-use virtual_axes::config::MachineConfig;
-use virtual_axes::design::Margins;
-use virtual_axes::report::Column;
-use virtual_axes::trial::Figures;
-use virtual_axes::tune::{Candidate, Cost, Course, Term, TuneError, Tuning};
-use virtual_axes::units::{DEGREE, MILLISECOND};
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::design::Margins;
+use virtual_axes_core::trial::Figures;
+use virtual_axes_core::units::{DEGREE, MILLISECOND};
+use virtual_axes_identify::tune::{Candidate, Cost, Course, Term, TuneError, Tuning};
+use virtual_axes_report::report::Column;
 
 use crate::input::Input;
 use crate::interrupt;

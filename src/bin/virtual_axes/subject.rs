@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use virtual_axes::config::{DEFAULT_MACHINE, Parameters};
+use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
 
 use crate::input::{Input, must_not_replace};
 use crate::variant;

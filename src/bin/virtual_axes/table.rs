@@ -1,9 +1,9 @@
 //! Figures as tables: on the terminal and in reports.
 
-use virtual_axes::config::AxisKind;
-use virtual_axes::report::{Column, Table};
-use virtual_axes::trial::{AxisFigures, Figures, Reference};
-use virtual_axes::units::{DEGREE, MILLIMETRE};
+use virtual_axes_core::config::AxisKind;
+use virtual_axes_core::trial::{AxisFigures, Figures, Reference};
+use virtual_axes_core::units::{DEGREE, MILLIMETRE};
+use virtual_axes_report::report::{Column, Table};
 
 /// Metres in a micrometre.
 pub const MICROMETRE: f64 = 1e-6;

@@ -3,12 +3,12 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use virtual_axes::config::Parameters;
-use virtual_axes::tune::{
+use virtual_axes_core::config::Parameters;
+use virtual_axes_core::units::MILLISECOND;
+use virtual_axes_identify::tune::{
     Bench, Candidate, Contrast, Cost, Course, MarginLimits, Search, TuneError, Tuning, contrast, fine_grid,
     tune_cascade, tune_gpc, tune_gpc_from,
 };
-use virtual_axes::units::MILLISECOND;
 
 use crate::input::{Input, must_not_replace};
 use crate::progress::Runs;

@@ -1,9 +1,9 @@
 //! What `virtual_axes tune` prints, and the pictures of its report.
 
 use serde_json::{Map, Value, json};
-use virtual_axes::report::{Column, PointGroup, PointStyle, Scatter, Table};
-use virtual_axes::tune::{Bench, Candidate, MarginLimits, Term, Tuning, front};
-use virtual_axes::units::MILLISECOND;
+use virtual_axes_core::units::MILLISECOND;
+use virtual_axes_identify::tune::{Bench, Candidate, MarginLimits, Term, Tuning, front};
+use virtual_axes_report::report::{Column, PointGroup, PointStyle, Scatter, Table};
 
 use crate::input::Input;
 use crate::search::{candidate, columns, row};
@@ -83,7 +83,7 @@ pub fn text(bench: &Bench<'_>, found: &Found) -> String {
 /// The parameters that the tuning sets, before and behind.
 fn values(bench: &Bench<'_>, tuning: &Tuning) -> Table {
     let columns = ["parameter", "as it is", "tuned"].map(|name| Column::new(name, ""));
-    let row = |(key, value): (String, virtual_axes::config::Value)| {
+    let row = |(key, value): (String, virtual_axes_core::config::Value)| {
         let before = bench.parameters().get(&key).map_or("–".to_owned(), |value| value.to_string());
         vec![key, before, value.to_string()]
     };

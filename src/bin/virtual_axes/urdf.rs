@@ -4,8 +4,8 @@ use std::error::Error;
 use std::io::Write;
 use std::path::PathBuf;
 
-use virtual_axes::files::OutputFile;
-use virtual_axes::urdf::urdf;
+use virtual_axes_io::files::OutputFile;
+use virtual_axes_io::urdf::urdf;
 
 use crate::subject::MachineChoice;
 

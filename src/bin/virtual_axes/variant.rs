@@ -2,8 +2,8 @@
 
 use std::error::Error;
 
-use virtual_axes::config::{Assignment, MachineConfig, Parameters, Source, Value, parse_assignment};
-use virtual_axes::machine::MachineParameters;
+use virtual_axes_core::config::{Assignment, MachineConfig, Parameters, Source, Value, parse_assignment};
+use virtual_axes_core::machine::MachineParameters;
 
 /// Position controllers that a run can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

@@ -9,12 +9,12 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
-use virtual_axes::config::{Parameters, Source, parse_assignment};
 use virtual_axes::door::args::{ArgsError, Command, ParameterSource, RosArgs};
 use virtual_axes::ros::environment::Environment;
 use virtual_axes::ros::node;
 use virtual_axes::ros::security::Security;
 use virtual_axes::ros::{log, rosout};
+use virtual_axes_core::config::{Parameters, Source, parse_assignment};
 
 /// Messages are made in one thread and freed in another, in waves: the middleware looks every 6 s for what it need not keep.
 /// That of the C library gives little of it back, and a node that runs for days holds several times what it uses.

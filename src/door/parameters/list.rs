@@ -1,6 +1,6 @@
 //! Which parameters a list request asks for.
 
-use crate::messages::rcl_interfaces::msg::ListParametersResult;
+use virtual_axes_io::messages::rcl_interfaces::msg::ListParametersResult;
 
 const SEPARATOR: char = '.';
 

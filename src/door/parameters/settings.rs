@@ -4,8 +4,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::types::{Descriptor, ParameterType, ParameterValue, Range};
-use crate::config::{Assignment, Definition, GoalDefaults, Kind, Parameters, Source, Value, shortened};
-use crate::machine::MachineParameters;
+use virtual_axes_core::config::{
+    Assignment, Definition, GoalDefaults, Kind, Parameters, Source, Value, shortened,
+};
+use virtual_axes_core::machine::MachineParameters;
 
 /// Most parameters of one request to set; a machine has a few hundred, and each set alone is checked with
 /// the whole machine.

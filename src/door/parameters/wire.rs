@@ -1,9 +1,9 @@
 //! Between plain values and rcl_interfaces' messages.
 
-use crate::messages::rcl_interfaces::msg;
+use virtual_axes_io::messages::rcl_interfaces::msg;
 
 use super::types::{Descriptor, ParameterType, ParameterValue, Range};
-use crate::config::shortened;
+use virtual_axes_core::config::shortened;
 
 /// The type number of a parameter that does not exist.
 const NOT_SET: u8 = 0;

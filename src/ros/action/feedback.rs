@@ -5,12 +5,12 @@ use std::sync::Arc;
 use tokio::sync::watch;
 
 use super::{GoalId, uuid};
-use crate::messages::{FeedbackMessage, FollowJointTrajectoryFeedback, duration, header};
 use crate::ros::outputs::Output;
 use crate::ros::pace::Frame;
 use crate::ros::setpoints::Comparison;
-use crate::trajectory::MotionId;
-use crate::units::{Nanoseconds, seconds};
+use virtual_axes_core::trajectory::MotionId;
+use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_io::messages::{FeedbackMessage, FollowJointTrajectoryFeedback, duration, header};
 
 /// A goal that the axes follow or will follow.
 #[derive(Debug, Clone)]
@@ -83,7 +83,7 @@ fn message(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::MILLISECOND_NS;
+    use virtual_axes_core::units::MILLISECOND_NS;
 
     #[test]
     fn feedback_comes_at_the_nearest_whole_number_of_periods_and_at_most_once_in_one() {

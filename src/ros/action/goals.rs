@@ -6,11 +6,11 @@ use ros2_client::service::RmwRequestId;
 
 use super::{GoalId, uuid};
 use crate::door::{Candidate, select};
-use crate::messages::action_msgs::msg::{GoalInfo, GoalStatus, GoalStatusArray};
-use crate::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
-use crate::messages::{FollowJointTrajectoryResult, GetResultResponse, stamp};
-use crate::trajectory::MotionId;
-use crate::units::{Nanoseconds, SECOND_NS};
+use virtual_axes_core::trajectory::MotionId;
+use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
+use virtual_axes_io::messages::action_msgs::msg::{GoalInfo, GoalStatus, GoalStatusArray};
+use virtual_axes_io::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
+use virtual_axes_io::messages::{FollowJointTrajectoryResult, GetResultResponse, stamp};
 
 /// Most goals under way at once; each holds its trajectory.
 pub(super) const MOST_LIVE: usize = 1024;

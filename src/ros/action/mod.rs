@@ -15,7 +15,7 @@ pub use feedback::{Feedback, feedback_period};
 pub use outcome::GoalEvent;
 pub use server::{ActionServer, Ending, Tell, Work};
 
-use crate::messages::unique_identifier_msgs::msg::UUID;
+use virtual_axes_io::messages::unique_identifier_msgs::msg::UUID;
 
 fn uuid(id: GoalId) -> UUID {
     UUID { uuid: id }

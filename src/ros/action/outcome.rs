@@ -2,9 +2,9 @@
 
 use super::GoalId;
 use super::goals::State;
-use crate::messages::{ErrorCode, FollowJointTrajectoryResult};
-use crate::simulation::Outcome;
-use crate::trajectory::{Code, Rejection};
+use virtual_axes_core::simulation::Outcome;
+use virtual_axes_core::trajectory::{Code, Rejection};
+use virtual_axes_io::messages::{ErrorCode, FollowJointTrajectoryResult};
 
 /// What became of a goal that was handed to the simulation.
 #[derive(Debug)]

@@ -9,7 +9,7 @@ use futures::future::BoxFuture;
 use futures::stream::{FuturesUnordered, select_all};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use ros2_client::service::RmwRequestId;
-use ros2_client::{Context, Message, MessageTypeName, Node, ServiceTypeName};
+use ros2_client::{Context, MessageTypeName, Node, ServiceTypeName};
 use rustdds::TopicKind;
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
@@ -19,12 +19,6 @@ use super::goals::{Answer, Goals, MOST_LIVE, State};
 use super::outcome::{self, GoalEvent};
 use super::{GoalChecks, GoalId, goal_name};
 use crate::door::args::RosArgs;
-use crate::messages::action_msgs::msg::GoalStatusArray;
-use crate::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
-use crate::messages::{
-    CONTROL_PACKAGE, FeedbackMessage, FollowJointTrajectoryResult, GetResultRequest, GetResultResponse,
-    JointTrajectoryControllerState, SendGoalRequest, SendGoalResponse, stamp,
-};
 use crate::ros::endpoints::{KEPT, Publisher, WINDOW, keeping, topic};
 use crate::ros::inputs::next_id;
 use crate::ros::outputs::Output;
@@ -32,7 +26,13 @@ use crate::ros::pace::{Command, Health};
 use crate::ros::results::{Origin, Results};
 use crate::ros::service::{Service, ServiceError};
 use crate::ros::unsent::{Place, Unsent};
-use crate::trajectory::{Code, Rejection};
+use virtual_axes_core::trajectory::{Code, Rejection};
+use virtual_axes_io::messages::action_msgs::msg::GoalStatusArray;
+use virtual_axes_io::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
+use virtual_axes_io::messages::{
+    CONTROL_PACKAGE, FeedbackMessage, FollowJointTrajectoryResult, GetResultRequest, GetResultResponse,
+    SendGoalRequest, SendGoalResponse, stamp,
+};
 
 /// The action's own name.
 const ACTION: &str = "~/follow_joint_trajectory";
@@ -44,13 +44,6 @@ const SERVICE_DEPTH: usize = 10;
 const FEEDBACK_DEPTH: usize = 10;
 /// How long a node that shuts down waits for the results of its goals to be sent.
 const LAST_RESPONSES: Duration = Duration::from_millis(100);
-
-impl Message for SendGoalRequest {}
-impl Message for SendGoalResponse {}
-impl Message for GetResultRequest {}
-impl Message for GetResultResponse {}
-impl Message for FeedbackMessage {}
-impl Message for JointTrajectoryControllerState {}
 
 /// The endpoints of the action.
 pub struct ActionServer {

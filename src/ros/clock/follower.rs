@@ -1,6 +1,6 @@
 //! A clock that is followed: which position instants it makes due, and when it has jumped.
 
-use crate::units::{Nanoseconds, SECOND_NS};
+use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
 /// A clock that goes further than this from one message to the next has jumped; less is a stretch of
 /// time to be simulated. The coarsest clocks in use tick once a second, and a recording played a

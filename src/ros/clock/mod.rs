@@ -23,9 +23,9 @@ use tracing::{info, warn};
 use super::endpoints::Subscription;
 use super::outputs::Output;
 use super::pace::Health;
-use crate::units::{Nanoseconds, SECOND_NS};
 use election::{Election, Prefix, Rival};
 use follower::Follower;
+use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
 /// How often it is looked who publishes the clock.
 const LOOK_PERIOD: Duration = Duration::from_millis(50);

@@ -34,7 +34,7 @@ use self::filter::LoggerLevels;
 use self::limit::{Limiter, Verdict};
 use self::terminal::Terminal;
 use super::args::{LogLevel, RosArgs};
-use crate::config::breaks_line;
+use virtual_axes_core::config::breaks_line;
 
 /// How long the end of the program waits for whoever reads its log.
 const LAST_WAIT: Duration = Duration::from_millis(500);

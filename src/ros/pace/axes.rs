@@ -9,9 +9,9 @@ use tracing::{info, warn};
 use super::super::reused::Reused;
 use super::super::stream::StreamLog;
 use super::{Accepted, AxisHealth, COMMAND_QUEUE, ClockHealth, Command, Frame, Health, Report};
-use crate::simulation::Simulation;
-use crate::trajectory::{Code, MotionId, Rejection};
-use crate::units::Nanoseconds;
+use virtual_axes_core::simulation::Simulation;
+use virtual_axes_core::trajectory::{Code, MotionId, Rejection};
+use virtual_axes_core::units::Nanoseconds;
 
 /// Most reports on streams that are on their way; what becomes of streams meanwhile is told by the last.
 const MOST_STREAM_ENDS: usize = 64;

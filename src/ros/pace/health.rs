@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use super::super::stream::StreamHealth;
-use crate::simulation::Simulation;
-use crate::units::Nanoseconds;
+use virtual_axes_core::simulation::Simulation;
+use virtual_axes_core::units::Nanoseconds;
 
 /// How the thread fares; read by the diagnostics.
 #[derive(Debug, Clone, Default)]

@@ -24,10 +24,10 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use super::clock::ClockState;
 use super::stream::Setpoints;
-use crate::machine::{AxisSample, MachineParameters};
-use crate::simulation::{MotionEnd, Simulation, Tolerances};
-use crate::trajectory::{JointSet, MotionId, Rejection, StreamEnd, Trajectory};
-use crate::units::Nanoseconds;
+use virtual_axes_core::machine::{AxisSample, MachineParameters};
+use virtual_axes_core::simulation::{MotionEnd, Simulation, Tolerances};
+use virtual_axes_core::trajectory::{JointSet, MotionId, Rejection, StreamEnd, Trajectory};
+use virtual_axes_core::units::Nanoseconds;
 
 /// Commands that wait for the next position instant; a sender of more waits.
 pub const COMMAND_QUEUE: usize = 64;

@@ -15,7 +15,7 @@ use super::super::clock::{ClockState, Jump, Role, first_instant};
 use super::axes::Axes;
 use super::wall::Pulse;
 use super::{COMMAND_QUEUE, ClockSource, Command, Frame};
-use crate::units::{Nanoseconds, seconds};
+use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// Whether the next position instant may be computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,11 +6,11 @@ use allocation_counter::{AllocationInfo, measure};
 
 use super::super::reused::Reused;
 use super::*;
-use crate::config::Parameters;
-use crate::messages::sensor_msgs::msg::JointState;
-use crate::simulation::joints;
-use crate::trajectory::{Context, Request, Row, Start};
-use crate::units::seconds;
+use virtual_axes_core::config::Parameters;
+use virtual_axes_core::simulation::joints;
+use virtual_axes_core::trajectory::{Context, Request, Row, Start};
+use virtual_axes_core::units::seconds;
+use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
 /// Periods in which queues and buffers grow to their size.
 const WARM_UP: i64 = 256;

@@ -3,9 +3,9 @@
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use crate::config::TimeMode;
-use crate::simulation::Simulation;
-use crate::units::Nanoseconds;
+use virtual_axes_core::config::TimeMode;
+use virtual_axes_core::simulation::Simulation;
+use virtual_axes_core::units::Nanoseconds;
 
 /// Ticks of an idle clock that are made up for when the machine is busy; beyond that, they are lost.
 const CATCH_UP: u32 = 10;

@@ -25,9 +25,9 @@ pub use self::tap::{Direction, Tap};
 use self::thread::{Entry, Writing};
 use super::outputs::WhenFull;
 use super::pace::Health;
-use crate::config::{NodeConfig, QosConfig};
-use crate::files::{BoundedRecording, RecordedTopic};
-use crate::messages::Recorded;
+use virtual_axes_core::config::{NodeConfig, QosConfig};
+use virtual_axes_io::files::{BoundedRecording, RecordedTopic};
+use virtual_axes_io::messages::Recorded;
 
 /// Bytes that may wait to be written: more than a minute of all topics at the default rate.
 const QUEUE_BYTES: u32 = 64 << 20;

@@ -9,12 +9,12 @@ use tokio::sync::watch;
 
 use super::thread::Entry;
 use super::{QUEUE_BYTES, Shared};
-use crate::config::TimeMode;
-use crate::files::encode;
-use crate::messages::Recorded;
 use crate::ros::outputs::WhenFull;
 use crate::ros::pace::Health;
-use crate::units::Nanoseconds;
+use virtual_axes_core::config::TimeMode;
+use virtual_axes_core::units::Nanoseconds;
+use virtual_axes_io::files::encode;
+use virtual_axes_io::messages::Recorded;
 
 /// Bytes that a queued message takes beside its own.
 const ENTRY_BYTES: usize = 128;

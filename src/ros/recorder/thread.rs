@@ -12,7 +12,7 @@ use tracing::warn;
 
 use super::Shared;
 use super::status::MEGABYTE;
-use crate::files::BoundedRecording;
+use virtual_axes_io::files::BoundedRecording;
 
 /// The longest that a message waits until it can be read from the file, whatever happens to the node.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);

@@ -1,0 +1,233 @@
+//! Axes side by side do what each does alone, bit for bit, however wide the vectors are.
+
+use std::sync::Arc;
+
+use virtual_axes_core::assess::{Deviations, PathTracker};
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::kinematics::Kinematics;
+use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters, Width};
+use virtual_axes_core::trial::{Figures, Trial, run, run_together, trace};
+use virtual_axes_core::units::seconds;
+use virtual_axes_verification::fixtures::common::{
+    AXES, TSP, configured, configured_with, program, setpoints, watch_scenario,
+};
+
+/// Position periods of a run.
+const PERIODS: usize = 300;
+
+fn parameters(config: &MachineConfig) -> Arc<MachineParameters> {
+    Arc::new(MachineParameters::new(config).expect("can be discretised"))
+}
+
+/// Set-points that reach limits, reverse and stand still, of each axis another.
+fn psec(axis: usize, k: usize) -> f64 {
+    let t = TSP * k.min(PERIODS / 2) as f64;
+    let size = if axis < 3 { 0.02 } else { 0.3 };
+    size * (1.0 - (9.0 * t + axis as f64).cos()) * (1.0 + 0.3 * axis as f64)
+}
+
+fn bits(sample: &AxisSample) -> [u64; 8] {
+    let s = sample;
+    let numbers = [
+        s.position,
+        s.velocity,
+        s.current,
+        s.voltage,
+        s.velocity_setpoint,
+        s.torque_feedforward,
+        s.friction_current,
+        s.gravity_current,
+    ];
+    numbers.map(f64::to_bits)
+}
+
+/// What can be seen of `count` axes from `first` on: samples of all instants, positions of all ticks, figures.
+fn seen(machine: &mut Machine, first: usize, count: usize) -> Vec<u64> {
+    let axes = machine.axis_count();
+    let start: Vec<f64> = (0..axes).map(|axis| psec(axis % AXES, 0)).collect();
+    machine.reset(&start);
+    let horizon = machine.horizon();
+    let mut seen = Vec::new();
+    for k in 0..PERIODS {
+        for axis in 0..axes {
+            machine.set_load(axis, if k % 50 < 5 { 40.0 * (axis % AXES) as f64 } else { 0.0 });
+        }
+        let now: Vec<f64> = (0..axes).map(|axis| psec(axis % AXES, k)).collect();
+        let ahead: Vec<f64> =
+            (0..axes).flat_map(|axis| (1..=horizon).map(move |j| psec(axis % AXES, k + j))).collect();
+        machine.advance(&now, &ahead);
+        for axis in first..first + count {
+            seen.extend(bits(machine.axis(axis).sample()));
+            seen.extend((0..machine.ticks_per_period()).map(|tick| machine.position(axis, tick).to_bits()));
+            let activity = machine.activity(axis);
+            seen.extend([activity.peak_current.to_bits(), activity.saturated_ticks]);
+        }
+    }
+    seen
+}
+
+/// Machines that differ in everything that lanes can differ in.
+fn machines() -> Vec<MachineConfig> {
+    vec![
+        configured("mikron_ucp710", &[]),
+        configured("mikron_ucp710", &["position_loop.controller=gpc"]),
+        configured(
+            "mikron_ucp710",
+            &["feedforward.friction=1", "delays.friction_ms=11.75", "friction.i0=0.3"],
+        ),
+        configured_with("mikron_ucp710", &["velocity_loop.gain=0.1"], &["a.gravity.tilt_nm=0"]),
+    ]
+}
+
+#[test]
+fn every_width_gives_the_same_bits() {
+    for config in machines() {
+        let mut machine = Machine::new(parameters(&config));
+        let widest = seen(&mut machine, 0, AXES);
+        for width in [Width::Four, Width::Baseline] {
+            machine.set_width(width);
+            assert!(widest == seen(&mut machine, 0, AXES), "{width:?}");
+        }
+    }
+}
+
+#[test]
+fn an_axis_does_the_same_alone_and_beside_any_others() {
+    let all: Vec<_> = machines().iter().map(parameters).collect();
+    let together = MachineParameters::together(&all).expect("alike in their periods");
+    let mut together = Machine::new(Arc::new(together));
+    for (place, one) in all.iter().enumerate() {
+        let mut alone = Machine::new(Arc::clone(one));
+        assert!(seen(&mut alone, 0, AXES) == seen(&mut together, place * AXES, AXES), "machine {place}");
+    }
+}
+
+#[test]
+fn machines_of_other_periods_do_not_go_together() {
+    let slow = configured("mikron_ucp710", &[]);
+    let fast = virtual_axes_verification::fixtures::common::parameters(&[("periods.current_us", 62.5)])
+        .machine_config()
+        .expect("valid");
+    assert!(MachineParameters::together(&[parameters(&slow), parameters(&fast)]).is_none());
+    assert!(MachineParameters::together(&[]).is_none());
+}
+
+#[test]
+fn what_is_shown_tick_by_tick_is_what_is_summed_up() {
+    for config in machines() {
+        let mut machine = Machine::new(parameters(&config));
+        let mut shown = machine.clone();
+        for k in 0..PERIODS {
+            let now: Vec<f64> = (0..AXES).map(|axis| psec(axis, k)).collect();
+            machine.advance(&now, &[]);
+            let mut tick = 0;
+            let mut peaks = [0.0_f64; AXES];
+            let mut saturated = [0; AXES];
+            shown.advance_with(&now, &[], |shown| {
+                for (axis, peak) in peaks.iter_mut().enumerate() {
+                    let sample = shown.axis(axis).sample();
+                    assert_eq!(sample.position.to_bits(), machine.position(axis, tick).to_bits());
+                    *peak = peak.max(sample.current.abs());
+                    saturated[axis] += u64::from(sample.saturated);
+                }
+                tick += 1;
+            });
+            assert_eq!(tick, machine.ticks_per_period());
+            for axis in 0..AXES {
+                let activity = machine.activity(axis);
+                assert_eq!((activity.peak_current, activity.saturated_ticks), (peaks[axis], saturated[axis]));
+                assert_eq!(shown.axis(axis).sample(), machine.axis(axis).sample());
+            }
+        }
+    }
+}
+
+#[test]
+fn variants_that_are_run_together_have_the_figures_that_each_has_alone() {
+    let base = configured("mikron_ucp710", &[]);
+    let (x, y) = (0, 1);
+    let variants: Vec<MachineConfig> = ["2.0", "1.2", "1.5"]
+        .iter()
+        .map(|gain| {
+            let gains = ["x", "y"].map(|joint| format!("{joint}.position_loop.gain={gain}"));
+            configured_with("mikron_ucp710", &[], &gains.each_ref().map(String::as_str))
+        })
+        .chain([configured_with(
+            "mikron_ucp710",
+            &[],
+            &["x.position_loop.controller=gpc", "y.position_loop.controller=gpc"],
+        )])
+        .collect();
+    for scenario in ["corner-90", "ballbar"] {
+        let program = program(scenario, &base);
+        let trial = |machine| Trial {
+            machine,
+            program: Some(Arc::clone(&program)),
+            allow_nonzero_end_velocity: false,
+            record: false,
+        };
+        let setpoints = |machine| setpoints(scenario, Arc::clone(&program), machine);
+        let together =
+            run_together(&trial(&base), setpoints(&base), &variants, &[x, y], || Ok(())).expect("a run");
+        assert_eq!(together.len(), variants.len());
+        for (variant, figures) in variants.iter().zip(&together) {
+            let alone = run(&trial(variant), setpoints(variant), |_| Ok(())).expect("a run").figures;
+            let without_circles = Figures { circles: vec![], bidirectional: vec![], ..alone.clone() };
+            assert_eq!(*figures, without_circles, "{scenario}");
+            let traced = trace(&trial(variant), setpoints(variant), |_| Ok(())).expect("a run").figures;
+            assert_eq!(traced, alone, "{scenario}");
+        }
+        assert_ne!(together[0].contour, together[1].contour);
+    }
+}
+
+#[test]
+fn a_period_of_poses_is_as_far_from_the_path_as_each_of_them() {
+    // Share of the periods that go by a closed form: all but those at rest or about a corner on lines and
+    // circles, none on splines.
+    for (scenario, closed) in [
+        ("ballbar", 0.8..1.0),
+        ("ballbar-both", 0.75..1.0),
+        ("corner-90", 0.2..1.0),
+        ("contour-a", 0.2..1.0),
+        ("bspline-3d", 0.0..0.1),
+        ("five-axis", 0.0..0.9),
+    ] {
+        for controller in ["cascade", "gpc"] {
+            let config = configured("mikron_ucp710", &[&format!("position_loop.controller={controller}")]);
+            let program = program(scenario, &config);
+            let (kinematics, ticks) =
+                (Kinematics::new(&config), config.periods().ticks_per_position() as usize);
+            let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
+            watch_scenario(scenario, &config, |tick| {
+                let joints = (0..AXES).map(|axis| tick.machine.axis(axis).sample().position).collect();
+                seen.push((seconds(tick.time), joints));
+            });
+            let mut one_by_one = PathTracker::new(Arc::clone(program.path()));
+            let mut at_once = one_by_one.clone();
+            let (mut turned, mut poses, mut found) = Default::default();
+            let (mut periods, mut by_closed_form) = (0, 0);
+            for period in seen.chunks(ticks) {
+                let until = |tick: usize| program.progress(period[tick].0) + 5e-3;
+                let axes = (0..AXES).flat_map(|axis| period.iter().map(move |(_, joints)| joints[axis]));
+                kinematics.forward_all(&mut turned, &axes.collect::<Vec<_>>(), period.len(), &mut poses);
+                let followed = at_once.follow(&poses, until, &mut found).expect("poses");
+                let mut expected = Deviations::default();
+                let mut first = None;
+                for (tick, (_, joints)) in period.iter().enumerate() {
+                    let pose = kinematics.forward(joints);
+                    assert_eq!(poses.get(tick), pose);
+                    let nearest = one_by_one.nearest(&pose, until(tick));
+                    first.get_or_insert(nearest);
+                    expected.push(&nearest);
+                }
+                assert_eq!(Some(followed.first), first);
+                assert_eq!(found, expected, "{scenario} at {} s", period[0].0);
+                periods += 1;
+                by_closed_form += u64::from(followed.closed_form);
+            }
+            let share = by_closed_form as f64 / f64::from(periods);
+            assert!(closed.contains(&share), "{scenario} {controller}: {share}");
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! A machine under way, for tests of what it is asked.
+
+use std::sync::Arc;
+
+use virtual_axes_core::simulation::{MotionEnd, Simulation, joints};
+use virtual_axes_core::trajectory::{Context, JointLimits, Request, Row, Start, Trajectory};
+use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds};
+use virtual_axes_verification::fixtures::common::{Ballbar, parameters};
+
+pub const TSP: Nanoseconds = 6 * MILLISECOND_NS;
+pub const X: usize = 0;
+pub const NONE: &[(&str, f64)] = &[];
+
+pub struct Bench {
+    pub simulation: Simulation,
+    pub joints: Vec<JointLimits>,
+    pub origin: Nanoseconds,
+}
+
+impl Bench {
+    pub fn new(changes: &[(&str, f64)], origin: Nanoseconds) -> Self {
+        let config = parameters(changes).machine_config().expect("valid");
+        let joints = joints(&config, "");
+        let simulation = Simulation::new(&config, joints.clone(), origin).expect("can be simulated");
+        Bench { simulation, joints, origin }
+    }
+
+    pub fn trajectory(
+        &self,
+        start: Start,
+        names: &[&str],
+        points: &[(Nanoseconds, &[f64])],
+    ) -> Arc<Trajectory> {
+        let mut request = Request::new(start, names.iter().map(|n| n.to_string()).collect());
+        for &(time, positions) in points {
+            request.push(time, Row { positions, ..Row::default() }).expect("well formed");
+        }
+        let context = Context {
+            joints: &self.joints,
+            period: TSP,
+            max_points: 100_000,
+            allow_nonzero_end_velocity: false,
+        };
+        Arc::new(Trajectory::new(request, &context).expect("within limits"))
+    }
+
+    pub fn ballbar(&self, start: Start) -> Arc<Trajectory> {
+        let trial = Ballbar::paper();
+        let last = (trial.duration() * 1e9 / TSP as f64).ceil() as i64;
+        let points: Vec<_> = (0..=last)
+            .map(|k| {
+                let p = trial.psec(k as f64 * 0.006);
+                (k * TSP, [p[0], p[1]])
+            })
+            .collect();
+        let points: Vec<(i64, &[f64])> = points.iter().map(|(t, p)| (*t, &p[..])).collect();
+        self.trajectory(start, &["x", "y"], &points)
+    }
+
+    /// Steps until nothing is asked; every axis's signals at each instant, and how motions ended.
+    pub fn run(&mut self) -> (Vec<Vec<u64>>, Vec<MotionEnd>) {
+        let (mut rows, mut ends) = (Vec::new(), Vec::new());
+        while self.simulation.is_busy() {
+            self.simulation.step();
+            let bits = |s: &virtual_axes_core::machine::AxisSample| {
+                [s.psec, s.position, s.velocity, s.current, s.voltage].map(f64::to_bits)
+            };
+            rows.push(self.simulation.samples().iter().flat_map(bits).collect());
+            ends.extend(self.simulation.take_ends());
+            assert!(rows.len() < 100_000, "it never settles");
+        }
+        (rows, ends)
+    }
+}

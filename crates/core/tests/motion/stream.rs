@@ -1,0 +1,604 @@
+//! Streamed set-points: the look-ahead buffer, who has the joint, and the delay while it changes.
+
+use std::sync::Arc;
+
+use crate::trajectory_common::*;
+use proptest::prelude::*;
+use virtual_axes_core::config::{Assignment, MachineConfig, Source, Value};
+use virtual_axes_core::machine::MachineParameters;
+use virtual_axes_core::simulation::{Simulation, joints as joints_of};
+use virtual_axes_core::trajectory::stream::{MAX_STREAM_DELAY, STREAM_PAUSE};
+use virtual_axes_core::trajectory::{
+    Code, Context, MotionId, Request, Row, STREAM_JITTER, Start, State, StreamEnd, Timeline, Trajectory,
+};
+
+/// Vmax·Tsp of the joints, m or rad.
+const REACH: f64 = 0.003;
+/// Instants without a change after which a stream has paused.
+const PAUSE: usize = (STREAM_PAUSE / TSP) as usize + 2;
+
+/// A timeline whose streams are delayed by `periods`.
+fn delayed(periods: u32) -> Timeline {
+    let mut t = timeline();
+    t.set_stream_delay(periods);
+    t
+}
+
+/// Streams one set-point per instant to `joint`; what is commanded at each.
+fn stream(t: &mut Timeline, joint: usize, positions: &[f64]) -> Vec<f64> {
+    let command = |&position: &f64| {
+        assert_eq!(t.stream(joint, position), Ok(true));
+        t.next();
+        t.psec()[joint]
+    };
+    positions.iter().map(command).collect()
+}
+
+/// Constant velocity from `from`, `step` m or rad per instant.
+fn ramp(from: f64, step: f64, count: usize) -> Vec<f64> {
+    (1..=count).map(|i| from + step * i as f64).collect()
+}
+
+#[test]
+fn a_set_point_is_commanded_as_many_instants_later_as_the_delay_says() {
+    let positions = ramp(0.0, 0.001, 60);
+    for delay in [0, 1, 2, 14] {
+        let mut t = delayed(delay);
+        run(&mut t, 0, 5);
+        let mut psec = stream(&mut t, 0, &positions);
+        psec.extend(run(&mut t, 0, delay as usize + 3).0);
+        let delay = delay as usize;
+        assert_eq!(psec[..delay], vec![0.0; delay]);
+        assert_eq!(psec[delay..delay + 60], positions);
+        assert_eq!(psec[delay + 60..], [0.06; 3], "the last one holds");
+    }
+}
+
+#[test]
+fn what_is_in_the_buffer_is_known_ahead() {
+    let positions = ramp(0.0, 0.001, 30);
+    let mut t = delayed(14);
+    stream(&mut t, 1, &positions);
+    for periods in 0..40 {
+        let known = positions[(15 + periods as usize).min(29)];
+        assert_eq!(t.psec_ahead(1, periods), Some(known), "{periods} ahead");
+    }
+    // What has arrived for the next instant is ahead of the buffer.
+    t.stream(1, 0.031).unwrap();
+    assert_eq!((t.psec_ahead(1, 14), t.psec_ahead(1, 15)), (Some(0.030), Some(0.031)));
+    assert_eq!(t.psec_ahead(0, 14), Some(0.0), "the other joint stands");
+    let ahead: Vec<_> = (1..=20).map(|periods| t.psec_ahead(1, periods).unwrap()).collect();
+    assert_eq!(run(&mut t, 1, 20).0, ahead, "and what is known ahead is commanded");
+}
+
+#[test]
+fn a_gap_holds_and_goes_on_being_pushed_through_the_buffer() {
+    let mut t = delayed(3);
+    let mut psec = stream(&mut t, 0, &[0.001, 0.002]);
+    psec.extend(run(&mut t, 0, 2).0);
+    psec.extend(stream(&mut t, 0, &[0.003]));
+    psec.extend(run(&mut t, 0, 4).0);
+    assert_eq!(psec, [0.0, 0.0, 0.0, 0.001, 0.002, 0.002, 0.002, 0.003, 0.003]);
+}
+
+#[test]
+fn of_several_in_one_period_the_last_counts() {
+    let mut t = delayed(1);
+    for position in [0.001, -0.002, 0.002] {
+        assert_eq!(t.stream(0, position), Ok(true));
+    }
+    assert_eq!(run(&mut t, 0, 3).0, [0.0, 0.002, 0.002]);
+}
+
+#[test]
+fn a_stream_begins_within_one_periods_reach() {
+    let mut t = timeline();
+    for away in [1.01 * REACH, -0.1] {
+        let rejection = t.stream(0, away).unwrap_err();
+        assert_eq!((rejection.code, rejection.joint.as_deref()), (Code::Jump, Some("x")));
+        assert!((rejection.value - away.abs()).abs() < 1e-15 && (rejection.limit - REACH).abs() < 1e-15);
+    }
+    assert_eq!(run(&mut t, 0, 3).0, [0.0; 3], "the refused ones changed nothing");
+    assert_eq!(stream(&mut t, 0, &[REACH]), [REACH]);
+}
+
+#[test]
+fn a_stream_goes_on_within_what_the_joint_comes_in_the_time_between() {
+    let mut t = delayed(10);
+    let positions = ramp(0.0, REACH, 10);
+    let psec = stream(&mut t, 0, &positions);
+    assert_eq!(psec, [0.0; 10]);
+    let newest = positions[9];
+    // One period has passed.
+    let allowed = REACH * (1.0 + STREAM_JITTER as f64 / TSP as f64);
+    let rejection = t.stream(0, newest + 1.01 * allowed).unwrap_err();
+    assert_eq!((rejection.code, rejection.joint.as_deref()), (Code::Jump, Some("x")));
+    assert!((rejection.value - 1.01 * allowed).abs() < 1e-15, "{rejection}");
+    // None has passed since the one that was refused.
+    let allowed = allowed - REACH;
+    assert_eq!(t.stream(0, newest + 1.01 * allowed).unwrap_err().code, Code::Jump);
+    assert_eq!(t.stream(0, 0.0).unwrap_err().code, Code::Jump, "what is commanded is out of reach");
+    assert_eq!(run(&mut t, 0, 11).0[10], newest, "the refused ones changed nothing");
+}
+
+/// One set-point late, the next on time: the second of them is two periods' reach away.
+#[test]
+fn of_two_in_one_period_the_second_is_approached_at_vmax() {
+    for delay in [0, 14] {
+        let mut t = delayed(delay);
+        let positions = ramp(0.0, REACH, 60);
+        let mut psec = stream(&mut t, 0, &positions[..10]);
+        psec.extend(run(&mut t, 0, 1).0);
+        assert_eq!(t.stream(0, positions[10]), Ok(true));
+        psec.extend(stream(&mut t, 0, &positions[11..40]));
+        psec.extend(run(&mut t, 0, delay as usize + 2).0);
+        let psec = &psec[delay as usize..];
+        assert_eq!(psec[..10], positions[..10]);
+        assert_eq!(psec[10], positions[9], "it held");
+        for two in psec[10..].windows(2) {
+            assert!((0.0..=REACH * (1.0 + 1e-9)).contains(&(two[1] - two[0])), "{two:?}");
+        }
+        assert_eq!(psec.last(), Some(&positions[39]), "and is there");
+        assert!((28..=30).contains(&t.stream_counts().limited), "{:?}", t.stream_counts());
+    }
+}
+
+/// A sender of 100 Hz at nine tenths of Vmax: fewer set-points than periods, each out of one period's
+/// reach.
+#[test]
+fn a_sender_slower_than_the_position_period_is_followed_at_vmax_at_most() {
+    let mut t = timeline();
+    let (sample, count) = (10_000_000_i64, 40_i64);
+    let speed = 0.9 * REACH / TSP_S;
+    let mut psec = vec![0.0];
+    let mut sent = 0;
+    for k in 0..count * sample / TSP + 4 {
+        while sent < count && sent * sample < k * TSP {
+            sent += 1;
+            // The ramp begins within one period's reach.
+            let position = speed * 1e-9 * (sent * sample - sample / 2) as f64;
+            assert_eq!(t.stream(0, position), Ok(true), "{sent}");
+        }
+        t.next();
+        psec.push(t.psec()[0]);
+    }
+    assert!(psec.windows(2).all(|two| (0.0..=REACH * (1.0 + 1e-9)).contains(&(two[1] - two[0]))));
+    let last = speed * 1e-9 * (count * sample - sample / 2) as f64;
+    assert_eq!(psec.last(), Some(&last));
+}
+
+#[test]
+fn a_short_gap_is_caught_up_after_a_pause_the_stream_begins_anew() {
+    let at = |k: usize| REACH * 0.5 * k as f64;
+    for lost in [8, PAUSE + 1] {
+        let mut t = timeline();
+        stream(&mut t, 0, &ramp(0.0, at(1), 10));
+        run(&mut t, 0, lost);
+        let next = t.stream(0, at(10 + lost + 1));
+        if lost == 8 {
+            assert_eq!(next, Ok(true));
+            let psec = run(&mut t, 0, 5).0;
+            let wanted = [1.0, 2.0, 3.0, 4.0, 4.5].map(|periods| at(10) + periods * REACH);
+            assert!(psec.iter().zip(wanted).all(|(p, w)| (p - w).abs() < 1e-15), "{psec:?}");
+            assert_eq!(t.stream_counts().gaps, 0);
+        } else {
+            assert_eq!(next.unwrap_err().code, Code::Jump);
+            assert_eq!(t.stream_counts().gaps, 1);
+            assert_eq!(stream(&mut t, 0, &[at(11)]), [at(11)]);
+        }
+    }
+}
+
+/// What the network lost or held up, the stamps tell.
+#[test]
+fn the_time_between_two_set_points_is_the_longer_of_the_senders_and_the_networks() {
+    for (sent, taken) in [(Some(40_000_000), true), (Some(1_000_000), false), (None, false)] {
+        let mut t = timeline();
+        t.stream_sent(0, 0.001, Some(0)).unwrap();
+        t.next();
+        // 20 mm: 40 ms at Vmax, in one period.
+        assert_eq!(t.stream_sent(0, 0.021, sent).is_ok(), taken, "{sent:?}");
+        let psec = run(&mut t, 0, 1).0[0];
+        assert!((psec - if taken { 0.001 + REACH } else { 0.001 }).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn a_stream_that_comes_to_rest_and_is_silent_has_no_gap() {
+    let mut t = timeline();
+    // Braking at the limit, 2.5 m/s².
+    let brake = |k: i32| 0.02 - 0.5 * 2.5 * (f64::from(20 - k.min(20)) * TSP_S).powi(2);
+    assert_eq!(t.stream(0, brake(0) - brake(0)), Ok(true));
+    let positions: Vec<_> = (1..=20).map(|k| brake(k) - brake(0)).collect();
+    stream(&mut t, 0, &positions);
+    run(&mut t, 0, 3 * PAUSE);
+    assert_eq!(t.stream_counts().gaps, 0);
+}
+
+#[test]
+fn after_a_stop_a_stream_is_ignored_until_it_pauses() {
+    let mut t = timeline();
+    stream(&mut t, 0, &ramp(0.0, 0.0001, 20));
+    assert!(!t.is_stream_held_off());
+    offer(&mut t, 1, &stop(&[])).unwrap();
+    let (end, joints) = t.take_stream_end().expect("it drove x");
+    assert_eq!((end, joints.iter().collect::<Vec<_>>()), (StreamEnd::Stopped(MotionId(1)), vec![0]));
+    assert!(t.take_stream_end().is_none(), "told once");
+    // Within reach all the time, and for longer than the stop takes.
+    for position in ramp(0.002, 0.00001, 60) {
+        assert_eq!(t.stream(0, position), Ok(false));
+        assert!(t.is_stream_held_off());
+        t.next();
+    }
+    let stands = t.psec()[0];
+    // It rests: going on with the same is a pause too.
+    let rest = 0.0026;
+    let ignored = (0..2 * PAUSE).take_while(|_| {
+        let taken = t.stream(0, rest).unwrap();
+        t.next();
+        !taken
+    });
+    assert!((PAUSE - 2..=PAUSE + 1).contains(&ignored.count()));
+    assert!(!t.is_stream_held_off() && stands < 0.0026);
+    assert_eq!(stream(&mut t, 0, &[0.003]), [0.003]);
+}
+
+#[test]
+fn a_stop_holds_off_a_stream_that_begins_while_the_axis_brakes() {
+    let mut t = timeline();
+    offer(&mut t, 1, &stop(&[])).unwrap();
+    assert_eq!(t.take_stream_end(), None, "nothing was streamed");
+    assert_eq!(t.stream(0, 0.001), Ok(false));
+    run(&mut t, 0, 2);
+    assert_eq!(t.stream(0, 0.002), Ok(false));
+    run(&mut t, 0, PAUSE);
+    assert_eq!(t.stream(0, 0.003), Ok(true));
+}
+
+#[test]
+fn who_takes_joints_from_a_stream_is_told_with_those_that_it_drove() {
+    let mut t = timeline();
+    stream(&mut t, 1, &ramp(0.0, 0.001, 5));
+    let end = |t: &mut Timeline| t.take_stream_end().map(|(end, joints)| (end, joints.iter().collect()));
+    offer(&mut t, 1, &path(Start::Now, "x", &[(0, &[0.0]), (4, &[0.001])])).unwrap();
+    assert_eq!(end(&mut t), None, "it drove c");
+    let too_far = path(Start::Now, "c", &[(0, &[1.0]), (4, &[1.0])]);
+    offer(&mut t, 2, &too_far).unwrap_err();
+    assert_eq!(end(&mut t), None, "refused");
+    offer(&mut t, 3, &path(Start::Now, "c", &[(0, &[0.005]), (4, &[0.006])])).unwrap();
+    assert_eq!(end(&mut t), Some((StreamEnd::Displaced(MotionId(3)), vec![1])));
+    run(&mut t, 1, 6);
+    assert_eq!(stream(&mut t, 1, &[0.007]), [0.007], "within reach it goes on at once");
+    t.reset(&[0.0, 0.0]).unwrap();
+    assert_eq!(end(&mut t), Some((StreamEnd::Reset, vec![1])));
+    run(&mut t, 1, PAUSE);
+    offer(&mut t, 4, &path(Start::Now, "c", &[(0, &[0.0]), (4, &[0.001])])).unwrap();
+    assert_eq!(end(&mut t), None, "it was over");
+}
+
+#[test]
+fn what_is_no_position_of_the_joint_is_refused() {
+    let mut t = delayed(2);
+    for (joint, position, code) in [
+        (0, f64::NAN, Code::NotFinite),
+        (0, f64::INFINITY, Code::NotFinite),
+        (0, 0.356, Code::OutsideStroke),
+        (2, 0.0, Code::UnknownJoint),
+    ] {
+        assert_eq!(t.stream(joint, position).unwrap_err().code, code);
+    }
+    assert!(!t.is_streaming());
+}
+
+#[test]
+fn a_trajectory_takes_over_from_the_commanded_state_and_empties_the_buffer() {
+    let mut t = delayed(5);
+    stream(&mut t, 0, &ramp(0.0, 0.002, 10));
+    assert_eq!(t.psec()[0], 0.010);
+    // Within reach of the commanded state, out of reach of the newest.
+    let trajectory = path(Start::Now, "x", &[(0, &[0.009]), (4, &[0.005])]);
+    offer(&mut t, 1, &trajectory).unwrap();
+    assert_eq!(t.stream(0, 0.022), Ok(false));
+    let (psec, _) = run(&mut t, 0, 30);
+    for (psec, wanted) in psec.iter().zip([0.009, 0.008, 0.007, 0.006]) {
+        assert!((psec - wanted).abs() < 1e-15);
+    }
+    assert_eq!(psec[4..], vec![0.005; 26], "nothing of the stream comes back");
+    assert_eq!(t.stream(0, 0.022).unwrap_err().code, Code::Jump);
+    // The next stream is delayed as before.
+    assert_eq!(stream(&mut t, 0, &[0.006; 7]), [0.005, 0.005, 0.005, 0.005, 0.005, 0.006, 0.006]);
+}
+
+#[test]
+fn until_a_trajectory_that_waits_begins_the_buffer_goes_on() {
+    let mut t = delayed(5);
+    let positions = ramp(0.0, 0.001, 10);
+    stream(&mut t, 0, &positions);
+    // The buffer is empty at instant 15; two instants before that the trajectory begins where it is then.
+    offer(&mut t, 1, &path(at(13), "x", &[(0, &[0.009]), (10, &[0.0])])).unwrap();
+    assert_eq!(t.stream(0, 0.011), Ok(false), "while one waits");
+    assert_eq!(t.stream(1, 0.001), Ok(true), "the other joint is free");
+    let (psec, _) = run(&mut t, 0, 5);
+    assert_eq!(psec[..3], positions[5..8]);
+    assert_eq!(psec[3], 0.009);
+    assert!((psec[4] - 0.0081).abs() < 1e-15);
+}
+
+#[test]
+fn a_stop_brakes_from_the_velocity_of_the_stream() {
+    for delay in [0, 8] {
+        let mut t = delayed(delay);
+        stream(&mut t, 0, &ramp(0.0, 0.0012, 40));
+        let from = t.commanded_state(0).unwrap();
+        assert!((from.velocity - 0.2).abs() < 1e-12);
+        let admission = offer(&mut t, 1, &stop(&[])).unwrap();
+        let mut psec = vec![from.position - 0.0012, from.position];
+        psec.extend(run(&mut t, 0, 60).0);
+        // From constant velocity: v/a + a/j = 0.08 s + 0.05 s, on average at half the velocity.
+        assert_eq!(admission.end_k - admission.join_k + 1, 22);
+        assert!((psec[61] - from.position - 0.2 * 0.13 / 2.0).abs() < 1e-12);
+        for three in psec.windows(3) {
+            let acceleration = (three[2] - 2.0 * three[1] + three[0]) / (TSP_S * TSP_S);
+            assert!(acceleration.abs() <= 2.5 * (1.0 + 1e-6), "{acceleration} m/s² at delay {delay}");
+        }
+        assert_eq!(t.commanded_state(0), Some(State::rest(psec[61])));
+    }
+}
+
+#[test]
+fn a_reset_empties_the_buffer() {
+    let mut t = delayed(5);
+    stream(&mut t, 0, &ramp(0.0, 0.001, 10));
+    t.reset(&[0.1, 0.0]).unwrap();
+    assert!(!t.is_streaming() && !t.is_stream_moving());
+    assert_eq!(t.psec_ahead(0, 3), Some(0.1));
+    assert_eq!(run(&mut t, 0, 10).0, [0.1; 10]);
+    assert_eq!(t.stream(0, 0.011).unwrap_err().code, Code::Jump);
+}
+
+#[test]
+fn a_delay_that_changes_waits_for_a_pause_and_moves_nothing() {
+    for (before, after) in [(0, 14), (14, 0), (14, 3), (3, 14)] {
+        let mut t = delayed(before);
+        let positions = ramp(0.0, 0.001, 40);
+        stream(&mut t, 0, &positions);
+        t.set_stream_delay(after);
+        assert_eq!(t.stream_delay(), before);
+        // A stream that goes on keeps its delay, and so does one that falters.
+        let mut psec = stream(&mut t, 0, &ramp(0.040, 0.001, 40));
+        psec.extend(run(&mut t, 0, 10).0);
+        psec.extend(stream(&mut t, 0, &ramp(0.080, 0.001, 10)));
+        assert_eq!(t.stream_delay(), before);
+        psec.extend(run(&mut t, 0, before as usize + PAUSE).0);
+        assert_eq!(t.stream_delay(), after, "{before} to {after}");
+        assert!(psec.windows(2).all(|two| (0.0..=0.001 + 1e-15).contains(&(two[1] - two[0]))));
+        assert_eq!(psec.last(), Some(&0.09));
+        let psec = stream(&mut t, 0, &[0.091; 20]);
+        assert_eq!(psec.iter().position(|&p| p == 0.091), Some(after as usize));
+    }
+}
+
+#[test]
+fn without_a_stream_a_delay_is_in_effect_at_once_and_it_is_bounded() {
+    let mut t = timeline();
+    t.set_stream_delay(u32::MAX);
+    assert_eq!(t.stream_delay(), MAX_STREAM_DELAY);
+    t.set_stream_delay(7);
+    assert_eq!(t.stream_delay(), 7);
+    // Also below a trajectory.
+    offer(&mut t, 1, &path(Start::Now, "x", &[(0, &[0.0]), (10, &[0.01])])).unwrap();
+    run(&mut t, 0, 5);
+    t.set_stream_delay(2);
+    assert_eq!(t.stream_delay(), 2);
+    run(&mut t, 0, 10);
+    assert_eq!(stream(&mut t, 0, &[0.011; 4]), [0.01, 0.01, 0.011, 0.011]);
+}
+
+#[test]
+fn a_stream_drives_until_it_has_paused_and_its_last_set_point_is_commanded() {
+    let mut t = delayed(14);
+    assert!(!t.is_streaming() && !t.is_stream_moving());
+    // A stream that stands drives, and moves nothing.
+    stream(&mut t, 0, &[0.0; 20]);
+    assert!(t.is_streaming() && !t.is_stream_moving());
+    stream(&mut t, 0, &[0.001]);
+    let moving: Vec<_> = (0..20)
+        .map(|_| {
+            t.next();
+            t.is_stream_moving()
+        })
+        .collect();
+    assert_eq!(moving.iter().position(|m| !m), Some(14));
+    assert!(t.is_streaming() && !t.is_moving());
+    run(&mut t, 0, PAUSE);
+    assert!(!t.is_streaming());
+}
+
+proptest! {
+    /// Whatever a sender does, a streamed joint is never asked for more than its speed, and what is
+    /// commanded is the sequence of what entered, delayed; while the delay is changed at will.
+    #[test]
+    fn no_sender_and_no_change_of_delay_makes_a_jump(
+        script in prop::collection::vec((-1.5..1.5f64, 0..30usize, prop::option::weighted(0.2, 0..40u32)), 1..60),
+    ) {
+        let mut t = timeline();
+        let (mut target, mut last) = (0.0, 0.0);
+        for (step, gap, delay) in script {
+            if let Some(delay) = delay {
+                t.set_stream_delay(delay);
+            }
+            if t.stream(0, target + step * REACH) == Ok(true) {
+                target += step * REACH;
+            }
+            let known: Vec<_> = (1..=30).map(|periods| t.psec_ahead(0, periods).unwrap()).collect();
+            let delay = t.stream_delay();
+            for (psec, known) in run(&mut t, 0, gap + 1).0.into_iter().zip(known) {
+                prop_assert!((psec - last).abs() <= REACH * (1.0 + 1e-9));
+                prop_assert!(psec == known || t.stream_delay() != delay);
+                last = psec;
+            }
+        }
+        // What it still has to catch up, at no more than 1.5 periods' reach for each of 60 steps.
+        let rest = t.stream_delay() as usize + 1 + 90;
+        prop_assert_eq!(run(&mut t, 0, rest).0[rest - 1], target);
+    }
+}
+
+/// The default machine with `controller` on X.
+fn config(controller: &str) -> MachineConfig {
+    let mut parameters = virtual_axes_verification::fixtures::common::parameters::<&str>(&[]);
+    let assignment = Assignment {
+        key: "x.position_loop.controller".into(),
+        value: Value::Text(controller.into()),
+        source: Source::named("test"),
+    };
+    parameters.set_all(vec![assignment]).expect("there is such a controller");
+    parameters.machine_config().expect("valid")
+}
+
+fn simulation(config: &MachineConfig) -> Simulation {
+    Simulation::new(config, joints_of(config, ""), 0).expect("can be simulated")
+}
+
+/// What there is to tell of X, bit for bit.
+fn signals(s: &Simulation) -> [u64; 4] {
+    let x = s.samples()[0];
+    [x.psec, x.position, x.current, x.velocity_setpoint].map(f64::to_bits)
+}
+
+/// A trajectory of X on the grid of position instants, from rest.
+fn given(config: &MachineConfig, positions: &[f64]) -> Arc<Trajectory> {
+    let mut request = Request::new(Start::Now, vec!["x".into()]);
+    for (k, position) in positions.iter().enumerate() {
+        request.push(k as i64 * TSP, Row { positions: &[*position], ..Row::default() }).unwrap();
+    }
+    let joints = joints_of(config, "");
+    let context =
+        Context { joints: &joints, period: TSP, max_points: 1000, allow_nonzero_end_velocity: false };
+    Trajectory::new(request, &context).unwrap().into()
+}
+
+/// The delay is what makes it so for a controller that looks ahead, whose T reads up to N2 = 14 periods
+/// beyond the set-point that α = 1.5 periods, in whole ones 2, hold back.
+#[test]
+fn a_streamed_path_is_followed_bit_for_bit_as_the_same_path_in_a_trajectory() {
+    for (controller, delay) in [("cascade", 0), ("gpc", 12)] {
+        let config = config(controller);
+        // Standing first, for the longest preview, and at the end.
+        let wave = |k: i32| 0.02 * (1.0 - (f64::from(k.clamp(0, 314)) * 0.02).cos());
+        let positions: Vec<_> = (-20..400).map(wave).collect();
+        let mut streamed = simulation(&config);
+        assert_eq!(streamed.stream_delay(), delay * TSP, "{controller}");
+        let mut followed = Vec::new();
+        for &position in positions.iter().chain(&[wave(400); 12]) {
+            streamed.stream(0, position).unwrap();
+            streamed.step();
+            followed.push(signals(&streamed));
+        }
+        let mut reference = simulation(&config);
+        reference.offer(MotionId(1), given(&config, &positions)).unwrap();
+        for k in 0..positions.len() {
+            reference.step();
+            assert_eq!(signals(&reference), followed[k + delay as usize], "{controller}, instant {k}");
+        }
+    }
+}
+
+#[test]
+fn another_controller_changes_the_delay_when_the_stream_pauses() {
+    let parameters = |controller| Arc::new(MachineParameters::new(&config(controller)).unwrap());
+    let mut s = simulation(&config("cascade"));
+    for position in ramp(0.0, 0.001, 20) {
+        s.stream(0, position).unwrap();
+        s.step();
+    }
+    s.adopt(parameters("gpc")).unwrap();
+    for _ in 0..3 {
+        s.step();
+        assert_eq!(s.stream_delay(), 0);
+        assert_eq!(s.samples()[0].psec, 0.020);
+    }
+    for _ in 0..PAUSE {
+        s.step();
+    }
+    assert_eq!(s.stream_delay(), 12 * TSP);
+    s.adopt(parameters("cascade")).unwrap();
+    assert_eq!(s.stream_delay(), 0, "it has paused");
+}
+
+#[test]
+fn a_stream_wakes_the_axes_when_it_moves_them_and_asks_for_no_haste() {
+    let mut s = simulation(&config("cascade"));
+    let at_rest = s.machine().tick();
+    for _ in 0..10 {
+        s.stream(0, 0.0).unwrap();
+        s.step();
+    }
+    assert_eq!(s.machine().tick(), at_rest, "a stream that stands at home leaves the machine asleep");
+    s.stream(0, 0.001).unwrap();
+    s.step();
+    assert!(s.machine().tick() > at_rest);
+    assert!(s.is_streaming() && !s.is_moving() && !s.is_busy());
+    for _ in 0..200 {
+        s.step();
+    }
+    virtual_axes_verification::fixtures::common::assert_near(
+        "x follows",
+        s.samples()[0].position,
+        0.001,
+        2e-6,
+    );
+    assert!(!s.is_streaming());
+}
+
+#[test]
+fn a_set_point_comes_with_the_delay_that_it_was_foreseen_with() {
+    for (before, after) in [(20, 0), (3, 14)] {
+        // The stream has paused by the instant at which a set-point and the change of delay meet.
+        for early in 0..4 {
+            let mut t = delayed(before);
+            stream(&mut t, 0, &[0.001]);
+            t.set_stream_delay(after);
+            run(&mut t, 0, before as usize + PAUSE - early);
+            assert_eq!(t.stream(0, 0.0039), Ok(true));
+            let foreseen: Vec<f64> = (1..40).filter_map(|j| t.psec_ahead(0, j)).collect();
+            assert_eq!(run(&mut t, 0, 39).0, foreseen, "{before} to {after}, {early} early");
+        }
+    }
+}
+
+#[test]
+fn a_reset_brings_a_waiting_delay_into_effect() {
+    let mut t = delayed(20);
+    stream(&mut t, 0, &ramp(0.0, 0.001, 10));
+    t.set_stream_delay(0);
+    assert_eq!(t.stream_delay(), 20);
+    t.reset(&vec![0.0; t.joints().len()]).expect("home");
+    assert_eq!(t.stream_delay(), 0);
+    assert_eq!(stream(&mut t, 0, &[0.001, 0.002]), [0.001, 0.002]);
+}
+
+#[test]
+fn a_stream_begins_the_same_whether_or_not_a_load_wakes_the_machine_with_it() {
+    let config = config("cascade");
+    let loaded_from = |instant: Option<usize>| -> Vec<[u64; 4]> {
+        let mut s = simulation(&config);
+        (0..40)
+            .map(|k| {
+                // A load on Y says nothing of X, and wakes the machine.
+                if instant.is_some_and(|instant| k >= instant) {
+                    s.set_load(1, 50.0, TSP);
+                }
+                if k >= 10 {
+                    s.stream(0, 0.001).unwrap();
+                }
+                s.step();
+                signals(&s)
+            })
+            .collect()
+    };
+    let alone = loaded_from(None);
+    assert_ne!(alone[0], alone[39], "X moves");
+    assert_eq!(loaded_from(Some(2)), alone);
+    assert_eq!(loaded_from(Some(10)), alone);
+}

@@ -1,0 +1,91 @@
+//! A machine with a linear axis `x` and a rotary one `c`, and short ways to trajectories on it.
+
+use std::sync::Arc;
+use virtual_axes_core::config::{AxisKind, LimitsConfig};
+use virtual_axes_core::trajectory::path::Context;
+use virtual_axes_core::trajectory::{
+    Admission, Event, JointLimits, MotionId, Rejection, Request, Row, Start, Timeline, Trajectory,
+};
+
+/// Tsp, ns.
+pub const TSP: i64 = 6_000_000;
+/// Tsp, s.
+pub const TSP_S: f64 = 6e-3;
+/// Absolute time of instant 0, ns: a wall clock's, not a multiple of Tsp.
+pub const ORIGIN: i64 = 1_700_000_000_123_456_789;
+
+pub fn joints() -> Vec<JointLimits> {
+    let joint = |name: &str, kind, stroke: f64| JointLimits {
+        name: name.into(),
+        kind,
+        limits: LimitsConfig {
+            velocity: 0.5,
+            acceleration: 2.5,
+            jerk: 50.0,
+            stroke_min: -stroke,
+            stroke_max: stroke,
+        },
+    };
+    vec![joint("x", AxisKind::Linear, 0.355), joint("c", AxisKind::Rotary, f64::INFINITY)]
+}
+
+pub fn timeline() -> Timeline {
+    Timeline::new(joints(), TSP, &[0.0, 0.0]).unwrap()
+}
+
+pub fn check(request: Request, may_move_at_end: bool) -> Result<Arc<Trajectory>, Rejection> {
+    let joints = joints();
+    let context = Context {
+        joints: &joints,
+        period: TSP,
+        max_points: 100_000,
+        allow_nonzero_end_velocity: may_move_at_end,
+    };
+    Trajectory::new(request, &context).map(Arc::new)
+}
+
+/// Start at instant `k`.
+pub fn at(k: i64) -> Start {
+    Start::At(ORIGIN + k * TSP)
+}
+
+/// A request of one joint: (time in ns, position and what else is given).
+pub fn request(start: Start, joint: &str, points: &[(i64, &[f64])]) -> Request {
+    let mut request = Request::new(start, vec![joint.into()]);
+    for &(time, values) in points {
+        let row = Row {
+            positions: &values[..1],
+            velocities: values.get(1..2).unwrap_or(&[]),
+            accelerations: values.get(2..3).unwrap_or(&[]),
+            effort: &[],
+        };
+        request.push(time, row).unwrap();
+    }
+    request
+}
+
+/// A checked trajectory of `joint`, points at multiples of Tsp; the end may move.
+pub fn path(start: Start, joint: &str, points: &[(i64, &[f64])]) -> Arc<Trajectory> {
+    let points: Vec<_> = points.iter().map(|&(k, v)| (k * TSP, v)).collect();
+    check(request(start, joint, &points), true).unwrap()
+}
+
+pub fn stop(joints: &[&str]) -> Arc<Trajectory> {
+    let names = joints.iter().map(|&name| name.to_owned()).collect();
+    check(Request::new(Start::Now, names), false).unwrap()
+}
+
+pub fn offer(timeline: &mut Timeline, id: u64, trajectory: &Arc<Trajectory>) -> Result<Admission, Rejection> {
+    timeline.offer(MotionId(id), Arc::clone(trajectory), ORIGIN)
+}
+
+/// Steps `count` instants; set-points of `joint` and all events with their instants.
+pub fn run(timeline: &mut Timeline, joint: usize, count: usize) -> (Vec<f64>, Vec<(i64, Event)>) {
+    let (mut psec, mut events) = (Vec::new(), Vec::new());
+    for _ in 0..count {
+        let k = timeline.next();
+        psec.push(timeline.psec()[joint]);
+        events.extend(timeline.events().iter().map(|&event| (k, event)));
+    }
+    (psec, events)
+}

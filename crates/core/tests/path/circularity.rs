@@ -1,0 +1,49 @@
+//! Circularity after ISO 230-4 of the ballbar trial, in both directions.
+
+use virtual_axes_core::assess::{CircleAssessor, bidirectional};
+use virtual_axes_verification::fixtures::common::{Ballbar, assert_near, machine, run};
+
+const MICROMETRE: f64 = 1e-6;
+
+/// The steady part of the paper's ballbar; the other direction has Y mirrored.
+fn ballbar(counterclockwise: bool) -> CircleAssessor {
+    let trial = Ballbar::paper();
+    let mut assessor = CircleAssessor::new([-trial.radius, 0.0], trial.radius);
+    let sign = if counterclockwise { 1.0 } else { -1.0 };
+    let psec = |t| {
+        let mut psec = trial.psec(t);
+        psec[1] *= sign;
+        psec
+    };
+    run(&mut machine(&[]), trial.duration(), psec, |t, machine| {
+        if trial.window().contains(&t) {
+            let [x, y] = [0, 1].map(|axis| machine.axes()[axis].sample().position);
+            let deviation = assessor.push(x, y);
+            assert_eq!(deviation, trial.radial_deviation(x, y), "contour error and radial deviation");
+        }
+    });
+    assessor
+}
+
+#[test]
+fn the_ballbar_has_the_radial_deviations_of_the_reference() {
+    let paths = [false, true].map(ballbar);
+    for path in &paths {
+        let report = path.report().expect("points");
+        assert_near("mean", report.mean / MICROMETRE, 49.0, 0.2);
+        assert_near("Fmin", report.min / MICROMETRE, 47.7, 1.0);
+        assert_near("Fmax", report.max / MICROMETRE, 68.6, 1.0);
+        let full = report.full.expect("a full circle");
+        // The centre is where it should be to a few µm, so that G differs from Fmax − Fmin by that.
+        let offset = full.centre[0].hypot(full.centre[1]);
+        assert!((full.circular_deviation - (report.max - report.min)).abs() <= 2.0 * offset);
+    }
+    let both = bidirectional(&paths[0], &paths[1]).expect("two circles");
+    assert_near("D", both.mean_radial_deviation / MICROMETRE, 49.0, 0.2);
+    for path in &paths {
+        let full = path.report().and_then(|report| report.full).expect("a full circle");
+        // Both lie in the ring of the two; about centres that differ by their offsets.
+        let offset = full.centre[0].hypot(full.centre[1]);
+        assert!(both.circular_deviation >= full.circular_deviation - 2.0 * offset);
+    }
+}

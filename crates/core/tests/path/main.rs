@@ -1,0 +1,11 @@
+//! TODO
+
+mod circularity;
+mod kinematics;
+mod path_blocks;
+mod path_common;
+mod path_program;
+mod path_tracker;
+mod reference_numbers;
+mod scenario_properties;
+mod scenarios;

@@ -1,0 +1,85 @@
+//! The default machine as paths see it, and differences of set-points over the position period.
+
+use virtual_axes_core::config::{AxisKind, Parameters};
+use virtual_axes_core::kinematics::Kinematics;
+use virtual_axes_core::path::{Block, Frame, Move, PlanError, Program};
+use virtual_axes_core::trajectory::JointLimits;
+
+/// Position period of the default machine, ns and s.
+pub const PERIOD: i64 = 6_000_000;
+pub const TSP: f64 = 0.006;
+/// x, y, z, a, c.
+pub const KINDS: [AxisKind; 5] =
+    [AxisKind::Linear, AxisKind::Linear, AxisKind::Linear, AxisKind::Rotary, AxisKind::Rotary];
+
+/// Kinematics of the default machine with some parameters changed.
+pub fn kinematics(changes: &[(&str, f64)]) -> Kinematics {
+    Kinematics::new(
+        &virtual_axes_verification::fixtures::common::parameters(changes).machine_config().expect("valid"),
+    )
+}
+
+/// Limits of the default machine.
+pub fn limits() -> Vec<JointLimits> {
+    let parameters = Parameters::embedded_default().expect("valid");
+    let machine = parameters.machine_config().expect("valid");
+    machine.axes().iter().map(JointLimits::of_axis).collect()
+}
+
+/// Plans for the default machine, without a rest.
+pub fn plan(frame: Frame, moves: Vec<Move>) -> Result<Program, PlanError> {
+    Program::plan(kinematics(&[]), frame, &limits(), PERIOD, 0.0, moves)
+}
+
+pub fn line(from: [f64; 5], to: [f64; 5]) -> Block {
+    Block::line(&from, &to, &KINDS).expect("a line")
+}
+
+/// An arc in X–Y.
+pub fn arc(from: [f64; 5], centre: [f64; 2], sweep: f64, to: [f64; 5]) -> Block {
+    Block::arc(&from, [0, 1], centre, sweep, &to, &KINDS).expect("an arc")
+}
+
+/// Set-points at time `t`.
+pub fn psec(program: &Program, t: f64) -> [f64; 5] {
+    let mut joints = [0.0; 5];
+    program.psec(t, &mut joints);
+    joints
+}
+
+/// Largest first, second and third difference of each joint over its limit, in the order of time.
+pub fn use_of_limits(program: &Program) -> [[f64; 5]; 3] {
+    let limits = limits();
+    let last = (program.duration() / TSP).ceil() as i64 + 4;
+    let at = |k: i64| psec(program, virtual_axes_core::units::seconds(k.max(0) * PERIOD));
+    let mut window = [at(0); 4];
+    let mut used = [[0.0_f64; 5]; 3];
+    for k in 1..last {
+        window.rotate_left(1);
+        window[3] = at(k);
+        let [a, b, c, d] = window;
+        for i in 0..5 {
+            let l = &limits[i].limits;
+            let differences = [
+                (d[i] - c[i]) / TSP / l.velocity,
+                (d[i] - 2.0 * c[i] + b[i]) / TSP.powi(2) / l.acceleration,
+                (d[i] - 3.0 * c[i] + 3.0 * b[i] - a[i]) / TSP.powi(3) / l.jerk,
+            ];
+            for (used, difference) in used.iter_mut().zip(differences) {
+                used[i] = used[i].max(difference.abs());
+            }
+        }
+    }
+    used
+}
+
+/// Asserts that no difference exceeds its limit by more than 10⁻⁶, as promised.
+#[track_caller]
+pub fn assert_within_limits(program: &Program) {
+    let used = use_of_limits(program);
+    for (order, joints) in used.iter().enumerate() {
+        for (joint, used) in joints.iter().enumerate() {
+            assert!(*used <= 1.0 + 1.1e-6, "joint {joint}, difference {}: {used} of its limit", order + 1);
+        }
+    }
+}

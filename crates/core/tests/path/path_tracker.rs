@@ -1,0 +1,304 @@
+//! The nearest point of a path against closed forms and against brute force.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use crate::path_common::*;
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use virtual_axes_core::assess::{Nearest, PathTracker};
+use virtual_axes_core::kinematics::ToolPose;
+use virtual_axes_core::path::{Block, Frame, Path};
+use virtual_axes_core::units::DEGREE;
+
+const HOME: [f64; 5] = [0.0; 5];
+
+fn path(frame: Frame, blocks: Vec<Block>) -> Arc<Path> {
+    Arc::new(Path::new(kinematics(&[]), frame, blocks).expect("continuous"))
+}
+
+fn spline(from: [f64; 5], points: &[[f64; 5]]) -> Block {
+    let points: Vec<Vec<f64>> = points.iter().map(|point| point.to_vec()).collect();
+    Block::spline(&from, &points, &KINDS).expect("a spline")
+}
+
+/// Smallest distance of the tip from the path between two values of progress: sampled, then by halving
+/// the interval around the best sample.
+fn brute_force(path: &Path, from: f64, to: f64, tip: &Vector3<f64>) -> f64 {
+    let at = |u: f64| (path.tool(u).tip - tip).norm();
+    let count = 2000;
+    let place = |i: i32| from + (to - from) * f64::from(i.clamp(0, count)) / f64::from(count);
+    let best = (0..=count).min_by(|a, b| at(place(*a)).total_cmp(&at(place(*b)))).expect("samples");
+    let (mut low, mut high) = (place(best - 1), place(best + 1));
+    for _ in 0..90 {
+        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if at(a) < at(b) { high = b } else { low = a }
+    }
+    at(low).min(at(high)).min(at(from)).min(at(to))
+}
+
+#[test]
+fn on_a_circle_the_distance_is_the_radial_deviation() {
+    let radius = 0.15;
+    for (frame, offset) in [(Frame::Joints, 0.1), (Frame::Workpiece, 0.0)] {
+        let mut tracker = PathTracker::new(path(frame, vec![arc(HOME, [-radius, 0.0], 2.0 * TAU, HOME)]));
+        let length = 2.0 * TAU * radius;
+        for i in 0..4000 {
+            let u = length * f64::from(i) / 4000.0;
+            let (deviation, lag) = (60e-6 * (0.01 * f64::from(i)).sin(), 0.08);
+            let angle = (u - 0.01).max(0.0) / radius;
+            let r = radius + deviation;
+            let tip = Vector3::new(r * angle.cos() - radius, r * angle.sin(), -offset);
+            let nearest = tracker.nearest(&ToolPose { tip, axis: Vector3::z() }, u + lag);
+            // The deviation that the rounded point has.
+            let wanted = ((tip.x + radius).hypot(tip.y) - radius).abs();
+            assert!((nearest.distance - wanted).abs() <= 1e-14, "{} {wanted}", nearest.distance);
+            assert!((nearest.progress - angle * radius).abs() < 1e-12, "in order over both turns");
+            assert_eq!(nearest.orientation, 0.0);
+        }
+    }
+}
+
+#[test]
+fn there_and_back_is_followed_in_order() {
+    let end = [0.1, 0.0, 0.0, 0.0, 0.0];
+    let path = path(Frame::Joints, vec![line(HOME, end), line(end, HOME)]);
+    let mut tracker = PathTracker::new(Arc::clone(&path));
+    let lag = 0.012;
+    let mut before = 0.0;
+    for i in 0..=20_000 {
+        let u = 0.2 * f64::from(i) / 20_000.0;
+        let late = (u - lag).max(0.0);
+        let mut pose = path.tool(late);
+        pose.tip.y = 1e-5;
+        let nearest = tracker.nearest(&pose, u);
+        assert!(nearest.progress >= before, "{} after {before}", nearest.progress);
+        // Within the slack around the turning point both legs are as near.
+        assert!((nearest.progress - late).abs() < 3e-5, "{} at {late}", nearest.progress);
+        assert!((nearest.distance - 1e-5).abs() < 1e-15);
+        before = nearest.progress;
+    }
+}
+
+#[test]
+fn a_cut_corner_passes_from_one_leg_to_the_next() {
+    let corner = [0.05, 0.0, 0.0, 0.0, 0.0];
+    let end = [0.05, 0.05, 0.0, 0.0, 0.0];
+    let path = path(Frame::Joints, vec![line(HOME, corner), line(corner, end)]);
+    let mut tracker = PathTracker::new(Arc::clone(&path));
+    // A quarter circle of 1 mm inside the corner: farthest in its middle.
+    let (r, start) = (1e-3, 0.049);
+    let mut largest = 0.0_f64;
+    for i in 0..=1000 {
+        let angle = PI / 2.0 * f64::from(i) / 1000.0;
+        let tip = Vector3::new(start + r * angle.sin(), r * (1.0 - angle.cos()), -0.1);
+        let nearest = tracker.nearest(&ToolPose { tip, axis: Vector3::z() }, 0.06);
+        let wanted = tip.y.min(0.05 - tip.x);
+        assert!((nearest.distance - wanted).abs() < 1e-15);
+        largest = largest.max(nearest.distance);
+    }
+    assert!((largest - r * (1.0 - (PI / 4.0).cos())).abs() < 1e-9);
+}
+
+#[test]
+fn what_overshoots_the_ends_is_reported_apart() {
+    let end = [0.03, 0.04, 0.0, 0.0, 0.0];
+    let path = path(Frame::Joints, vec![line(HOME, end)]);
+    let mut tracker = PathTracker::new(Arc::clone(&path));
+    let along = Vector3::new(0.6, 0.8, 0.0);
+    let across = Vector3::new(-0.8, 0.6, 0.0);
+    let start = path.tool(0.0).tip;
+    let mut at = |s: f64, off: f64| {
+        let tip = start + along * s + across * off;
+        tracker.nearest(&ToolPose { tip, axis: Vector3::z() }, 0.05)
+    };
+    let near = |found: f64, wanted: f64| assert!((found - wanted).abs() < 1e-15, "{found}, wanted {wanted}");
+    let before = at(-3e-4, 4e-4);
+    near(before.distance, 5e-4);
+    near(before.within_ends, 4e-4);
+    let inside = at(0.02, 4e-4);
+    near(inside.distance, 4e-4);
+    near(inside.within_ends, 4e-4);
+    let beyond = at(0.0503, 4e-4);
+    near(beyond.distance, 5e-4);
+    near(beyond.within_ends, 4e-4);
+    assert_eq!(beyond.progress, path.length());
+}
+
+#[test]
+fn where_the_tip_stands_still_the_orientation_tells_the_place() {
+    // A and C turn with the tip fixed in the workpiece frame, between two lines.
+    let a = [0.02, 0.0, 0.0, 0.0, 0.0];
+    let b = [0.02, 0.0, 0.0, 40.0 * DEGREE, 30.0 * DEGREE];
+    let c = [0.02, 0.03, 0.0, 40.0 * DEGREE, 30.0 * DEGREE];
+    let path = path(Frame::Workpiece, vec![line(HOME, a), line(a, b), line(b, c)]);
+    let mut tracker = PathTracker::new(Arc::clone(&path));
+    let lag = 0.01;
+    let mut wobble = 0;
+    let count = 5000;
+    for i in 0..=count {
+        let u = path.length() * f64::from(i) / f64::from(count);
+        let late = (u - lag).max(0.0);
+        let mut pose = path.tool(late);
+        wobble += 1;
+        let error = Vector3::new(3e-6, -2e-6, 1e-6) * (f64::from(wobble) * 0.1).sin();
+        pose.tip += error;
+        let nearest = tracker.nearest(&pose, u);
+        assert!((nearest.progress - late).abs() < 1e-5, "{} at {late}", nearest.progress);
+        assert!(nearest.distance <= error.norm() + 1e-15);
+        assert!(nearest.orientation < 1e-4, "{}", nearest.orientation);
+    }
+}
+
+/// Follows `path` with a lag, off by up to `amplitude`; hands out tip, result and window.
+fn follow(path: &Arc<Path>, amplitude: f64, mut observe: impl FnMut(&ToolPose, Nearest, f64, f64)) {
+    let mut tracker = PathTracker::new(Arc::clone(path));
+    let count = 600;
+    for i in 0..=count {
+        let u = path.length() * f64::from(i) / f64::from(count);
+        let late = (u - 0.012).max(0.0);
+        let mut pose = path.tool(late);
+        let phase = 0.37 * f64::from(i);
+        pose.tip += Vector3::new(phase.sin(), (1.3 * phase).cos(), (0.7 * phase).sin()) * amplitude;
+        let nearest = tracker.nearest(&pose, u);
+        observe(&pose, nearest, late, u);
+    }
+}
+
+#[track_caller]
+fn assert_nearest(path: &Arc<Path>, amplitude: f64, tolerance: f64) {
+    let mut i = 0;
+    follow(path, amplitude, |pose, nearest, late, u| {
+        i += 1;
+        if i % 37 != 0 {
+            return;
+        }
+        let wanted = brute_force(path, (late - 0.004).max(0.0), u, &pose.tip);
+        assert!(
+            (nearest.distance - wanted).abs() < tolerance,
+            "at {late}: {} instead of {wanted}",
+            nearest.distance
+        );
+        let direct = (path.tool(nearest.progress).tip - pose.tip).norm();
+        assert!((direct - nearest.distance).abs() < 1e-12, "point and progress agree");
+    });
+}
+
+#[test]
+fn on_a_spline_the_nearest_point_is_that_of_brute_force() {
+    let points =
+        [[0.02, 0.03, 0.0], [0.05, -0.01, 0.01], [0.08, 0.04, -0.01], [0.1, 0.0, 0.02], [0.12, 0.02, 0.0]];
+    let points = points.map(|[x, y, z]| [x, y, z, 0.0, 0.0]);
+    for frame in [Frame::Joints, Frame::Workpiece] {
+        let path = path(frame, vec![spline(HOME, &points)]);
+        assert_nearest(&path, 2e-5, 1e-11);
+        assert_nearest(&path, 5e-4, 1e-11);
+    }
+}
+
+#[test]
+fn with_five_axes_the_nearest_point_is_that_of_brute_force() {
+    let points = [
+        [0.02, 0.03, 0.0, 0.1, 0.0],
+        [0.05, -0.01, 0.01, 0.3, 0.5],
+        [0.08, 0.04, -0.01, 0.4, 1.0],
+        [0.12, 0.02, 0.0, 0.2, 1.2],
+    ];
+    let far = [0.2, 0.05, 0.03, 0.5, 0.0];
+    for frame in [Frame::Joints, Frame::Workpiece] {
+        let first = spline(HOME, &points);
+        let second = line(points[3], far);
+        let third = arc(far, [0.17, 0.05], 2.0, [0.0, 0.0, 0.03, 0.1, -0.5]);
+        let path = path(frame, vec![first, second, third]);
+        assert_nearest(&path, 2e-5, 1e-11);
+    }
+}
+
+#[test]
+fn an_arc_of_the_joints_over_a_turned_table_is_a_circle_of_the_tip() {
+    let from = [0.03, 0.0, 0.0, 0.5, 0.7];
+    let path = path(Frame::Joints, vec![arc(from, [0.0, 0.0], -4.0, from)]);
+    assert_nearest(&path, 5e-4, 1e-13);
+}
+
+#[test]
+fn a_hundred_thousand_blocks_cost_no_more_per_call_than_a_few() {
+    let count = 100_000;
+    let at = |i: i32| {
+        let t = f64::from(i) * 1e-4;
+        [0.1 * t.cos(), 0.1 * t.sin(), 1e-3 * t, 0.0, 0.0]
+    };
+    let blocks = (0..count).map(|i| line(at(i), at(i + 1))).collect();
+    let path = path(Frame::Joints, blocks);
+    follow_quickly(&path, "100 000 lines");
+}
+
+fn follow_quickly(path: &Arc<Path>, what: &str) {
+    let mut tracker = PathTracker::new(Arc::clone(path));
+    let calls = 400_000;
+    // 15 m/min at 8 kHz.
+    let step = 0.25 * 125e-6;
+    let poses: Vec<(ToolPose, f64)> = (0..calls)
+        .map(|i| {
+            let u = f64::from(i) * step;
+            let mut pose = path.tool((u - 0.012).max(0.0));
+            pose.tip.x += 1e-5;
+            (pose, u)
+        })
+        .collect();
+    let start = std::time::Instant::now();
+    let mut sum = 0.0;
+    for (pose, u) in &poses {
+        sum += tracker.nearest(pose, *u).distance;
+    }
+    println!("{what}: {:.0} ns per call", start.elapsed().as_secs_f64() / f64::from(calls) * 1e9);
+    assert!(sum / f64::from(calls) < 1.0e-5 + 1e-9, "{}", sum / f64::from(calls));
+}
+
+#[test]
+fn cost_of_a_call() {
+    let circle = arc(HOME, [-0.15, 0.0], 20.0 * TAU, HOME);
+    follow_quickly(&path(Frame::Joints, vec![circle]), "circle");
+    follow_quickly(&path(Frame::Joints, vec![line(HOME, [20.0, 0.0, 0.0, 0.0, 0.0])]), "line");
+    let points: Vec<[f64; 5]> =
+        (1..200).map(|i| [0.1 * f64::from(i), 0.05 * f64::from(i % 3), 0.0, 0.0, 0.0]).collect();
+    follow_quickly(&path(Frame::Joints, vec![spline(HOME, &points)]), "spline");
+    let turning: Vec<[f64; 5]> = points.iter().map(|p| [p[0], p[1], 0.0, 0.1 * p[1], p[0]]).collect();
+    follow_quickly(&path(Frame::Workpiece, vec![spline(HOME, &turning)]), "spline of five axes");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn random_polylines_are_tracked(points in prop::collection::vec((-0.05..0.05f64, -0.05..0.05f64, -0.05..0.05f64), 2..6)) {
+        let mut at = HOME;
+        let mut blocks = Vec::new();
+        for (x, y, z) in points {
+            let to = [at[0] + x, at[1] + y, at[2] + z, 0.0, 0.0];
+            blocks.push(line(at, to));
+            at = to;
+        }
+        let path = path(Frame::Joints, blocks);
+        follow(&path, 1e-5, |pose, nearest, late, u| {
+            if u * 1e4 % 23.0 > 1.0 {
+                return;
+            }
+            let wanted = brute_force(&path, (late - 0.004).max(0.0), u, &pose.tip);
+            assert!(nearest.distance <= wanted + 1e-12, "{} {wanted}", nearest.distance);
+            assert!(nearest.progress <= u + 1e-15);
+        });
+    }
+}
+
+#[test]
+fn numbers_that_are_none_do_no_harm() {
+    let end = [0.1, 0.0, 0.0, 0.0, 0.0];
+    let mut tracker = PathTracker::new(path(Frame::Joints, vec![line(HOME, end)]));
+    let nan = Vector3::new(f64::NAN, 0.0, 0.0);
+    assert!(tracker.nearest(&ToolPose { tip: nan, axis: nan }, 0.05).distance.is_nan());
+    let tip = Vector3::new(0.05, 1e-5, -0.1);
+    let nearest = tracker.nearest(&ToolPose { tip, axis: Vector3::z() }, f64::NAN);
+    assert!(nearest.distance.is_finite());
+    let nearest = tracker.nearest(&ToolPose { tip, axis: Vector3::z() }, 1e300);
+    assert!((nearest.distance - 1e-5).abs() < 1e-15);
+}

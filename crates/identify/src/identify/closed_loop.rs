@@ -1,0 +1,261 @@
+//! The whole axis, simulated on the set-points of a recording.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::mode::FeedforwardMode;
+use super::setpoints::Setpoints;
+use crate::recording::{Signals, Span};
+use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig, Periods};
+use virtual_axes_core::machine::{Machine, MachineError, MachineParameters};
+use virtual_axes_core::units::{DEGREE, seconds};
+
+/// How long PSEC must stand, s, before an axis is taken for at rest.
+const AT_REST: f64 = 0.1;
+/// How far the axis may move meanwhile, m: some steps of an encoder; and rad.
+const RESTING: f64 = 5e-6;
+const RESTING_ANGLE: f64 = 5e-3 * DEGREE;
+
+/// A part of a recording that begins at rest, and can be simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// Number of the recording.
+    pub recording: usize,
+    /// Number of the span in [`Signals::spans`], and of its first sample that belongs here.
+    pub span: usize,
+    /// That sample.
+    pub sample: usize,
+    /// What feedforward acted.
+    pub mode: FeedforwardMode,
+    /// PSEC at the position instants from the first one on, m or rad.
+    psec: Vec<f64>,
+    /// Time of the first sample behind the first instant, s, and from sample to sample.
+    first: f64,
+    period: f64,
+    /// Time of the first sample in the recording, s.
+    pub start: f64,
+    /// Recorded position, m or rad.
+    pub position: Vec<f64>,
+    /// Recorded velocity, or that of the filtered position, m/s or rad/s.
+    pub velocity: Vec<f64>,
+    /// Recorded current, A.
+    pub current: Option<Vec<f64>>,
+}
+
+/// An axis at the samples of an experiment.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Simulated {
+    /// SP, m or rad.
+    pub position: Vec<f64>,
+    /// SV, m/s or rad/s.
+    pub velocity: Vec<f64>,
+    /// SMC, A.
+    pub current: Vec<f64>,
+}
+
+impl Experiment {
+    /// Sampling period, s.
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// Whether PSEC moves.
+    pub fn moves(&self) -> bool {
+        self.psec.windows(2).any(|pair| pair[0] != pair[1])
+    }
+
+    /// PSEC under sample i as the staircase shows it, m or rad.
+    pub fn psec_at(&self, i: usize, tsp: f64) -> f64 {
+        let instant = ((self.first + i as f64 * self.period) / tsp + 1e-9).floor().max(0.0) as usize;
+        self.psec.get(instant.min(self.psec.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// The parts of a recording that begin at rest and keep one kind of feedforward; none without PSEC.
+///
+/// `mode` says what feedforward acted where the recording does not show VFFWS and TFFWS.
+pub fn experiments(
+    signals: &Signals,
+    recording: usize,
+    axis: &AxisConfig,
+    periods: &Periods,
+    mode: FeedforwardMode,
+) -> Vec<Experiment> {
+    let mut found = Vec::new();
+    let tsp = seconds(periods.position);
+    let resting = match axis.kind() {
+        AxisKind::Linear => RESTING,
+        AxisKind::Rotary => RESTING_ANGLE,
+    };
+    let instants = (AT_REST / tsp).ceil() as usize;
+    for (number, span) in signals.spans.iter().enumerate() {
+        let Some(setpoints) = Setpoints::of(span, signals.period, tsp) else { continue };
+        for (mode, part) in parts(span, &setpoints, signals.period, tsp, mode) {
+            let (psec, end) = (&setpoints.values[part.clone()], part.end);
+            let sample_of = |instant: usize| {
+                let time = setpoints.first + instant as f64 * tsp;
+                (time / signals.period - 1e-6).ceil().max(0.0) as usize
+            };
+            let position =
+                |k: usize| span.position.get(sample_of(part.start + k)).copied().unwrap_or(f64::NAN);
+            let Some(begin) = rest_from(psec, instants, resting, position).map(|k| part.start + k) else {
+                continue;
+            };
+            let sample = sample_of(begin);
+            let last = if end == setpoints.values.len() { span.position.len() } else { sample_of(end) };
+            let of = |channel: &[f64]| channel.get(sample..last).unwrap_or_default().to_vec();
+            let time = setpoints.first + begin as f64 * tsp;
+            found.push(Experiment {
+                recording,
+                span: number,
+                sample,
+                mode,
+                psec: setpoints.values[begin..end].to_vec(),
+                first: sample as f64 * signals.period - time,
+                period: signals.period,
+                start: span.start + sample as f64 * signals.period,
+                position: of(&span.position),
+                velocity: of(span.recorded_velocity.as_ref().unwrap_or(&span.velocity)),
+                current: span.current.as_deref().map(of),
+            });
+        }
+    }
+    found
+}
+
+/// Position instants of a span with one kind of feedforward: cut in the standstill before it changes.
+fn parts(
+    span: &Span,
+    setpoints: &Setpoints,
+    period: f64,
+    tsp: f64,
+    given: FeedforwardMode,
+) -> Vec<(FeedforwardMode, Range<usize>)> {
+    let count = setpoints.values.len();
+    let Some(velocity) = &span.velocity_feedforward else { return vec![(given, 0..count)] };
+    let instants = (AT_REST / tsp).ceil() as usize;
+    let acts = |channel: Option<&Vec<f64>>, from: usize, to: usize| {
+        let sample = |k: usize| ((setpoints.first + k as f64 * tsp) / period) as usize;
+        let end = channel.map_or(0, Vec::len).min(sample(to));
+        channel.and_then(|c| c.get(sample(from).min(end)..end)).is_some_and(|c| c.iter().any(|v| *v != 0.0))
+    };
+    let mut found: Vec<(FeedforwardMode, Range<usize>)> = Vec::new();
+    for (from, to) in moves(&setpoints.values, instants) {
+        // Delays keep the feedforward acting for a while behind the set-points.
+        let to = (to + instants).min(count);
+        let mode = match (acts(Some(velocity), from, to), acts(span.torque_feedforward.as_ref(), from, to)) {
+            (false, _) => FeedforwardMode::Off,
+            (true, true) => FeedforwardMode::Both,
+            // Without its channel nobody sees whether the torque was fed forward.
+            (true, false) if span.torque_feedforward.is_none() && given == FeedforwardMode::Both => given,
+            (true, false) => FeedforwardMode::Velocity,
+        };
+        match found.last_mut() {
+            Some((last, range)) if *last == mode => range.end = to,
+            Some((_, range)) => {
+                let cut = from.saturating_sub(instants).max(range.end);
+                range.end = cut;
+                found.push((mode, cut..to));
+            }
+            None => found.push((mode, 0..to)),
+        }
+    }
+    if let Some((_, range)) = found.last_mut() {
+        range.end = count;
+    }
+    found
+}
+
+/// Instants from which to which PSEC moves; pauses shorter than `rest` instants belong to a move.
+fn moves(psec: &[f64], rest: usize) -> Vec<(usize, usize)> {
+    let mut found: Vec<(usize, usize)> = Vec::new();
+    for (k, pair) in psec.windows(2).enumerate() {
+        if pair[0] == pair[1] {
+            continue;
+        }
+        match found.last_mut() {
+            Some((_, to)) if k < *to + rest => *to = k + 1,
+            _ => found.push((k, k + 1)),
+        }
+    }
+    found
+}
+
+/// The first instant from which PSEC stands for `count` instants, and the axis with it: its lag has run out.
+fn rest_from(psec: &[f64], count: usize, resting: f64, position: impl Fn(usize) -> f64) -> Option<usize> {
+    let stands = |k: usize| (position(k + count.saturating_sub(1)) - position(k)).abs() <= resting;
+    let windows = psec.windows(count.max(1)).enumerate();
+    windows
+        .filter(|(_, window)| window.iter().all(|value| *value == window[0]))
+        .map(|(k, _)| k)
+        .find(|k| stands(*k))
+}
+
+/// Simulates an axis on an experiment.
+///
+/// # Errors
+/// [`MachineError`] if there is no such axis.
+pub fn simulate(
+    axis: &AxisConfig,
+    periods: &Periods,
+    experiment: &Experiment,
+) -> Result<Simulated, MachineError> {
+    let config = MachineConfig::from_axis(experiment.mode.of(axis), *periods);
+    let mut machine = Machine::new(Arc::new(MachineParameters::new(&config)?));
+    let Some(first) = experiment.psec.first() else { return Ok(Simulated::default()) };
+    machine.reset(&[*first]);
+    let tick = seconds(periods.current);
+    let (count, mut next) = (experiment.position.len(), 0);
+    let mut simulated = Simulated::default();
+    let mut before = [0.0; 3];
+    // Time in ticks; samples between two ticks are interpolated.
+    let time_of = |i: usize| (experiment.first + i as f64 * experiment.period) / tick;
+    let mut due = time_of(0);
+    let mut now = 0_u64;
+    for psec in &experiment.psec {
+        machine.advance_with(&[*psec], &[], |machine| {
+            let s = machine.axis(0).sample();
+            let here = [s.position, s.velocity, s.current];
+            while next < count && due <= now as f64 + 1e-6 {
+                let part = (now as f64 - due).clamp(0.0, 1.0);
+                let at = |k: usize| here[k] + (before[k] - here[k]) * if part < 1e-6 { 0.0 } else { part };
+                simulated.position.push(at(0));
+                simulated.velocity.push(at(1));
+                simulated.current.push(at(2));
+                next += 1;
+                due = time_of(next);
+            }
+            before = here;
+            now += 1;
+        });
+    }
+    Ok(simulated)
+}
+
+/// Simulates all of several experiments, over all cores.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_all(
+    axis: &AxisConfig,
+    periods: &Periods,
+    experiments: &[Experiment],
+) -> Result<Vec<Simulated>, MachineError> {
+    experiments.par_iter().map(|experiment| simulate(axis, periods, experiment)).collect()
+}
+
+/// Simulated minus recorded position at every sample of every experiment, m or rad.
+pub(super) fn deviations(
+    axis: &AxisConfig,
+    periods: &Periods,
+    experiments: &[Experiment],
+) -> Option<DVector<f64>> {
+    let simulated = simulate_all(axis, periods, experiments).ok()?;
+    let pairs = experiments.iter().zip(&simulated);
+    let all = pairs.flat_map(|(e, s)| s.position.iter().zip(&e.position).map(|(s, r)| s - r));
+    let all: Vec<f64> = all.collect();
+    all.iter().all(|d| d.is_finite()).then(|| DVector::from_vec(all))
+}

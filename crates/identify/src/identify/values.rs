@@ -1,0 +1,273 @@
+//! What was identified, as parameters of a machine file.
+
+use super::delays::Delay;
+use super::friction::{FrictionLaw, LawFit, speed_name};
+use super::gravity::{GravityCurrent, GravitySource};
+use super::identification::Identification;
+use super::refine::{Parameter, Refined};
+use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Source, Value};
+use virtual_axes_core::units::{DEGREE, MILLISECOND_NS};
+
+/// Digits of a value behind the first digit of its uncertainty.
+const GUARD_DIGITS: i32 = 2;
+/// Digits of a value whose uncertainty is not known, or is nothing.
+const MOST_DIGITS: i32 = 9;
+
+/// A parameter of the machine file with what is known about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identified {
+    /// Full key: `x.motor.inertia_kg_m2`.
+    pub key: String,
+    /// Value in the machine file's unit.
+    pub value: f64,
+    /// What the machine file said before.
+    pub before: f64,
+    /// Unit; can be empty.
+    pub unit: &'static str,
+    /// Standard error in that unit, if there is one.
+    pub error: Option<f64>,
+    /// For a delay: above the first and up to the second value, the data tell no difference.
+    pub interval: Option<[f64; 2]>,
+    /// Where it comes from: the steps and the equations.
+    pub source: String,
+}
+
+impl Identified {
+    /// What stands as a comment behind the value in a machine file.
+    pub fn comment(&self) -> String {
+        let mut text = String::from("identified: ");
+        match (self.interval, self.error) {
+            (Some([low, high]), _) => text += &format!("{} … {} {}, ", number(low), number(high), self.unit),
+            (None, Some(error)) => text += format!("± {error:.1e} {}", self.unit).trim_end(),
+            (None, None) => {}
+        }
+        if self.interval.is_none() && self.error.is_some() {
+            text += ", ";
+        }
+        text + &self.source
+    }
+}
+
+fn number(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A value to the digits that its uncertainty lets count.
+fn rounded(value: f64, error: Option<f64>) -> f64 {
+    let magnitude = |x: f64| x.abs().log10().floor() as i32;
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    let most = magnitude(value) - MOST_DIGITS + 1;
+    let last = match error.filter(|e| *e > 0.0 && e.is_finite()) {
+        Some(error) => (magnitude(error) - GUARD_DIGITS).max(most),
+        None => most,
+    };
+    format!("{value:.*}", usize::try_from(-last).unwrap_or(0)).parse().unwrap_or(value)
+}
+
+impl Identification {
+    /// Every parameter of `joint` that the recordings have told, in the order of a machine file.
+    ///
+    /// `parameters` is the machine that the identification started from: it says which keys and units the axis
+    /// has. What the data could not tell is not among them.
+    pub fn values(&self, parameters: &Parameters, joint: &str) -> Vec<Identified> {
+        let mut out = Vec::new();
+        let mut put =
+            |keys: &[&str], value: f64, error: Option<f64>, interval: Option<[f64; 2]>, source: String| {
+                let known = keys.iter().map(|key| format!("{joint}.{key}"));
+                let Some((key, definition)) =
+                    known.into_iter().find_map(|key| parameters.definition(&key).map(|d| (key.clone(), d)))
+                else {
+                    return;
+                };
+                let before = match parameters.get(&key) {
+                    Some(Value::Double(value)) => value,
+                    _ => f64::NAN,
+                };
+                let value = if interval.is_some() { value } else { rounded(value, error) };
+                out.push(Identified { key, value, before, unit: definition.unit, error, interval, source });
+            };
+        self.put_plant(&mut put);
+        self.put_control(&mut put);
+        out
+    }
+
+    fn put_plant(&self, put: &mut Put<'_>) {
+        let axis = &self.axis;
+        if let Some((error, source)) =
+            self.told(Parameter::Inertia, self.inertia.as_ref().map(|i| i.error), || match &self.inertia {
+                Some(found) => format!("Prévost eq. 5 ({} accelerations)", found.accelerations),
+                None => "positions".to_owned(),
+            })
+        {
+            put(&["motor.inertia_kg_m2", "motor.mass_kg"], axis.motor.inertia, error, None, source);
+        }
+        self.put_friction(put);
+        self.put_gravity(put);
+    }
+
+    fn put_friction(&self, put: &mut Put<'_>) {
+        let (law, fit) = (&self.axis.friction, self.friction.as_ref().map(|friction| &friction.law));
+        let straight = fit.is_some_and(|fit| fit.law == FrictionLaw::Linear);
+        let parameters =
+            [Parameter::FrictionA, Parameter::FrictionB, Parameter::FrictionC, Parameter::FrictionD];
+        let refined = self.refined(if straight { Parameter::Coulomb } else { Parameter::FrictionA });
+        if fit.is_none() && refined.is_none() {
+            return;
+        }
+        let line = (Parameter::Coulomb.get(&self.axis), Parameter::Viscous.get(&self.axis));
+        let what = |fit: &LawFit| match fit.law {
+            FrictionLaw::Linear => {
+                let unit = speed_name(&self.axis);
+                format!(
+                    "the line {:.4} A + {:.5} A/({unit}) · V in the form of Prévost eq. 3",
+                    line.0, line.1
+                )
+            }
+            FrictionLaw::DoubleExponential => format!("Prévost eq. 3, R² {:.4}", fit.determination),
+        };
+        let source = match (fit, refined) {
+            (Some(fit), Some(_)) => format!("{}; refined on the closed loop", what(fit)),
+            (Some(fit), None) => what(fit),
+            (None, _) => "refined on the closed loop".to_owned(),
+        };
+        let values = [law.a, law.b, law.c, law.d];
+        for (k, key) in ["friction.a", "friction.b", "friction.c", "friction.d"].iter().enumerate() {
+            let error = self.refined(parameters[k]).map(|r| r.error).or(fit.map(|fit| fit.errors[k]));
+            // The terms of a straight line nearly cancel: they keep all of their digits.
+            put(&[key], values[k], error.filter(|e| e.is_finite() && !straight), None, source.clone());
+        }
+        let (source, error) = match self.refined(Parameter::Breakaway) {
+            Some(refined) => ("refined on the closed loop", Some(refined.error)),
+            None => ("i0 = a + c, assumed", self.error_of_sum().or(fit.map(|fit| fit.error_at(0.0)))),
+        };
+        put(&["friction.i0"], law.i0, error, None, source.to_owned());
+    }
+
+    /// Standard error of a + c from the refinement.
+    fn error_of_sum(&self) -> Option<f64> {
+        let refinement = self.refinement.as_ref()?;
+        let place = |parameter| refinement.parameters.iter().position(|p| p.parameter == parameter);
+        if let Some(level) = place(Parameter::Coulomb) {
+            return Some(refinement.parameters[level].error);
+        }
+        let (a, c) = (place(Parameter::FrictionA)?, place(Parameter::FrictionC)?);
+        let (x, y) = (refinement.parameters[a].error, refinement.parameters[c].error);
+        let rho = refinement.correlations.get(a)?.get(c)?;
+        Some((x * x + y * y + 2.0 * rho * x * y).max(0.0).sqrt())
+    }
+
+    fn put_gravity(&self, put: &mut Put<'_>) {
+        let Some(gravity) = &self.gravity else { return };
+        let nothing = if gravity.model == GravityCurrent::default() { ": not significant" } else { "" };
+        let source = || match gravity.source {
+            GravitySource::Motion => format!("constant velocities in both directions{nothing}"),
+            GravitySource::Rest => format!("standstills{nothing}"),
+        };
+        if let Some((_, error)) = gravity.weight
+            && let Some((error, source)) = self.told(Parameter::Weight, Some(error), source)
+        {
+            put(&["gravity.weight_n"], self.axis.gravity.weight, error, None, source);
+        }
+        if let Some((_, error)) = gravity.tilt
+            && let Some((error, source)) = self.told(Parameter::TiltSine, Some(error), source)
+        {
+            put(&["gravity.tilt_nm"], self.axis.gravity.tilt, error, None, source);
+        }
+        if let Some((_, error)) = gravity.phase {
+            let degrees = |angle: f64| angle / DEGREE;
+            put(
+                &["gravity.tilt_phase_deg"],
+                degrees(self.axis.gravity.phase),
+                Some(degrees(error)),
+                None,
+                source(),
+            );
+        }
+    }
+
+    fn put_control(&self, put: &mut Put<'_>) {
+        let weights = &self.axis.feedforward;
+        let regression = |found: &Option<super::feedforward::Regression>, equation: u32| {
+            found.as_ref().map(|r| (r.error, format!("Prévost eq. {equation}, R² {:.6}", r.determination)))
+        };
+        let velocity = regression(&self.feedforward.velocity, 6);
+        if let Some((error, source)) =
+            self.told(Parameter::VelocityFeedforward, velocity.as_ref().map(|v| v.0), || {
+                velocity.as_ref().map_or_else(String::new, |v| v.1.clone())
+            })
+        {
+            put(&["feedforward.velocity"], weights.velocity, error, None, source);
+        }
+        let torque = regression(&self.feedforward.torque, 7);
+        if let Some((error, source)) =
+            self.told(Parameter::TorqueFeedforward, torque.as_ref().map(|t| t.0), || {
+                torque.as_ref().map_or_else(String::new, |t| t.1.clone())
+            })
+        {
+            put(&["feedforward.torque_kg_m2", "feedforward.torque_kg"], weights.torque, error, None, source);
+        }
+        if self.feedforward.no_torque {
+            let keys = ["feedforward.torque_kg_m2", "feedforward.torque_kg"];
+            put(&keys, 0.0, None, None, "TFFWS is 0 throughout".to_owned());
+        }
+        let ms = |delay: i64| delay as f64 / MILLISECOND_NS as f64;
+        for fit in &self.delays {
+            let left = if fit.left { "; left as it was" } else { "" };
+            let source = format!("feedforward {}{left}", fit.delay.mode().name());
+            let key = match fit.delay {
+                Delay::Alpha => "delays.alpha_ms",
+                Delay::Beta => "delays.beta_ms",
+                Delay::Gamma => "delays.gamma_ms",
+            };
+            let interval = Some([ms(fit.interval.0), ms(fit.interval.1)]);
+            put(&[key], ms(fit.delay.of(&self.axis.delays)), None, interval, source);
+        }
+    }
+
+    fn refined(&self, parameter: Parameter) -> Option<&Refined> {
+        self.refinement.as_ref()?.parameters.iter().find(|refined| refined.parameter == parameter)
+    }
+
+    /// Standard error and source of a parameter, refined or as its step found it; none if neither has told it.
+    fn told(
+        &self,
+        parameter: Parameter,
+        step: Option<f64>,
+        source: impl FnOnce() -> String,
+    ) -> Option<(Option<f64>, String)> {
+        match (self.refined(parameter), step) {
+            (Some(refined), None) => Some((Some(refined.error), "refined on the closed loop".to_owned())),
+            (Some(refined), Some(_)) => {
+                Some((Some(refined.error), format!("{}; refined on the closed loop", source())))
+            }
+            (None, Some(error)) => Some((Some(error), source())),
+            (None, None) => None,
+        }
+    }
+}
+
+/// Takes a parameter: keys of which the axis has one, value, standard error, interval, source.
+type Put<'a> = dyn FnMut(&[&str], f64, Option<f64>, Option<[f64; 2]>, String) + 'a;
+
+/// Makes identified values those of a machine.
+///
+/// # Errors
+/// [`ConfigError`] if a value is not within the schema's range.
+pub fn adopt(parameters: &mut Parameters, joint: &str, values: &[Identified]) -> Result<(), ConfigError> {
+    let source = Source::named("identification");
+    let mut assignments: Vec<Assignment> = values
+        .iter()
+        .map(|v| Assignment { key: v.key.clone(), value: Value::Double(v.value), source: source.clone() })
+        .collect();
+    // What was identified is the plant itself.
+    for factor in ["inertia", "friction", "torque_constant"] {
+        let key = format!("{joint}.deviation.{factor}");
+        if parameters.source(&key).is_some() {
+            assignments.push(Assignment { key, value: Value::Double(1.0), source: source.clone() });
+        }
+    }
+    parameters.set_all(assignments)
+}

@@ -1,0 +1,273 @@
+//! Search of the cascade's gains: Powell's COBYLA from several starts, first alike on each axis, then apart.
+
+use std::cell::RefCell;
+use std::f64::consts::LN_10;
+
+use cobyla::{Func, RhoBeg, StopTols, minimize};
+use rayon::prelude::*;
+
+use super::TuneError;
+use super::bench::{Bench, Candidate, Search, ranked};
+use super::loops::MarginLimits;
+use super::tuning::{AxisGains, Tuning, rounded, torque_key};
+use virtual_axes_core::config::Value;
+
+/// Starts of the first part: the machine's own gains, and so many less one beside them.
+const STARTS: usize = 8;
+/// Starts of the second part: the best of the first.
+const FINISHERS: usize = 2;
+/// Runs of a start of the first part.
+const COMMON_RUNS: usize = 50;
+/// Runs of a start of the second part, for each variable.
+const RUNS_PER_VARIABLE: usize = 20;
+/// Variables of an axis: ln of Kp over the machine's, VFFW, TFFW over Jeq.
+const VARIABLES: usize = 3;
+/// Bounds of the variables: a tenth to ten times Kp; feedforward off to beyond the inverse of the plant.
+const BOUNDS: [(f64, f64); VARIABLES] = [(-LN_10, LN_10), (0.0, 1.2), (0.0, 1.2)];
+/// Part of the bounds in which starts lie: beyond a few times Kp no axis is stable.
+const START_BOUNDS: [(f64, f64); VARIABLES] = [(-0.7, 0.7), (0.7, 1.1), (0.0, 1.0)];
+/// First steps of the variables, alike and apart.
+const STEPS: [f64; VARIABLES] = [0.2, 0.05, 0.15];
+const FINE_STEPS: [f64; VARIABLES] = [0.05, 0.01, 0.05];
+/// Steps at which a search ends, part of the first ones.
+const LAST_STEP: f64 = 0.02;
+/// Kp of an axis that has none to begin from, (m/min)/mm.
+const DEFAULT_GAIN: f64 = 1.0;
+/// What a loop without margins costs, times the machine as it is.
+const UNSTABLE: f64 = 10.0;
+/// Delay margins beyond this, s, are as good as any: constraints must be finite.
+const LONG: f64 = 1.0;
+/// Significant digits of the gains.
+const DIGITS: usize = 5;
+
+/// The gains of the cascade (Kp, VFFW, TFFW) of each axis that moves that cost least on the bench's path.
+///
+/// Kv and Tv stay as they are: the margins are those of the position loop and do not guard the loop inside.
+/// The starts beside the machine's own gains come from `seed`; the same seed gives the same gains.
+///
+/// # Errors
+/// [`TuneError`], also if no tuning keeps the limits.
+pub fn tune_cascade(bench: &Bench<'_>, limits: &MarginLimits, seed: u64) -> Result<Search, TuneError> {
+    let axes: Vec<Axis> =
+        bench.joints().iter().zip(bench.axes()).map(|(j, a)| Axis::of(bench, j, a.motor.inertia)).collect();
+    let own: Vec<[f64; VARIABLES]> = axes.iter().map(Axis::own).collect();
+    let mean = |variable: usize| own.iter().map(|o| o[variable]).sum::<f64>() / own.len() as f64;
+    let mut random = SplitMix(seed);
+    let mut starts = vec![vec![mean(0), mean(1), mean(2)]];
+    starts
+        .resize_with(STARTS, || START_BOUNDS.map(|(low, high)| low + (high - low) * random.next()).to_vec());
+
+    bench.watch().begin("alike on each axis", STARTS * COMMON_RUNS);
+    let spread = |x: &[f64]| -> Tuning {
+        let point: Vec<f64> = axes.iter().flat_map(|_| x.iter().copied()).collect();
+        tuning(&axes, &point)
+    };
+    let common = descend_all(bench, limits, starts, &STEPS, COMMON_RUNS, &spread)?;
+    // Where the axes of the machine differ, its own gains are no common ones.
+    let mut ends: Vec<(f64, Vec<f64>)> = common.iter().filter_map(|found| found.end(limits)).collect();
+    ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut tried: Vec<Found> = common;
+
+    let apart = |x: &[f64]| tuning(&axes, x);
+    let mut fine: Vec<Vec<f64>> = ends
+        .iter()
+        .take(FINISHERS)
+        .map(|(_, x)| axes.iter().flat_map(|_| x.iter().copied()).collect())
+        .collect();
+    fine.push(own.concat());
+    let runs = RUNS_PER_VARIABLE * VARIABLES * axes.len();
+    bench.watch().begin("each axis by itself", fine.len() * runs);
+    tried.extend(descend_all(bench, limits, fine, &FINE_STEPS, runs, &apart)?);
+
+    let designs = tried.iter().map(|found| found.history.len()).sum();
+    let all: Vec<Candidate> =
+        tried.into_iter().flat_map(|found| found.history).filter_map(|(_, candidate)| candidate).collect();
+    let runs = all.len();
+    let most = all.iter().filter_map(|c| c.margins).max_by(|a, b| a.modulus.total_cmp(&b.modulus));
+    let kept: Vec<Candidate> =
+        all.into_iter().filter(|c| c.margins.is_some_and(|m| limits.are_kept_by(&m))).collect();
+    if kept.is_empty() {
+        return Err(match most {
+            Some(m) => TuneError::NoMargins { designs, limits: *limits, modulus: m.modulus, delay: m.delay },
+            None => TuneError::NoneStable { designs },
+        });
+    }
+    let tried = ranked(kept);
+    let best = tried.first().cloned().ok_or(TuneError::Saturated { runs })?;
+    Ok(Search { best, tried, designs, runs })
+}
+
+/// An axis and the gains it has.
+struct Axis {
+    joint: String,
+    gains: AxisGains,
+    inertia: f64,
+}
+
+impl Axis {
+    fn of(bench: &Bench<'_>, joint: &str, inertia: f64) -> Self {
+        let number = |key: String| match bench.parameters().get(&key) {
+            Some(Value::Double(value)) => value,
+            _ => 0.0,
+        };
+        let gain = number(format!("{joint}.position_loop.gain"));
+        let gains = AxisGains {
+            gain: if gain > 0.0 { gain } else { DEFAULT_GAIN },
+            velocity: number(format!("{joint}.feedforward.velocity")),
+            torque: number(torque_key(joint, bench.parameters())),
+        };
+        Axis { joint: joint.to_owned(), gains, inertia }
+    }
+
+    /// Its own gains as variables.
+    fn own(&self) -> [f64; VARIABLES] {
+        let own = [0.0, self.gains.velocity, self.gains.torque / self.inertia];
+        let mut within = own.into_iter().zip(BOUNDS).map(|(x, (low, high))| x.clamp(low, high));
+        [(); VARIABLES].map(|()| within.next().unwrap_or_default())
+    }
+}
+
+/// The gains at a point of three variables for each axis.
+fn tuning(axes: &[Axis], x: &[f64]) -> Tuning {
+    let of_axis = |(axis, x): (&Axis, &[f64])| {
+        let at = |variable: usize| x.get(variable).copied().unwrap_or_default();
+        let gains = AxisGains {
+            gain: rounded(axis.gains.gain * at(0).exp(), DIGITS),
+            velocity: rounded(at(1), DIGITS),
+            torque: rounded(at(2) * axis.inertia, DIGITS),
+        };
+        (axis.joint.clone(), gains)
+    };
+    Tuning::Cascade(axes.iter().zip(x.chunks(VARIABLES)).map(of_axis).collect())
+}
+
+/// What a search has seen: its points, with the run where the loop is stable.
+struct Found {
+    history: Vec<(Vec<f64>, Option<Candidate>)>,
+}
+
+impl Found {
+    /// The best point that keeps the limits, with its cost.
+    fn end(&self, limits: &MarginLimits) -> Option<(f64, Vec<f64>)> {
+        let kept = self.history.iter().filter_map(|(x, candidate)| {
+            let candidate = candidate.as_ref()?;
+            let keeps = limits.are_kept_by(&candidate.margins?) && !candidate.saturated;
+            keeps.then(|| (candidate.cost, x.clone()))
+        });
+        kept.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+}
+
+/// One search from each start, over all cores.
+fn descend_all(
+    bench: &Bench<'_>,
+    limits: &MarginLimits,
+    starts: Vec<Vec<f64>>,
+    steps: &[f64; VARIABLES],
+    runs: usize,
+    tuning_at: &(impl Fn(&[f64]) -> Tuning + Sync),
+) -> Result<Vec<Found>, TuneError> {
+    starts
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|start| descend(bench, limits, &start, steps, runs, tuning_at))
+        .collect()
+}
+
+/// Minimises from `start` on; margins and saturation are constraints.
+fn descend(
+    bench: &Bench<'_>,
+    limits: &MarginLimits,
+    start: &[f64],
+    steps: &[f64; VARIABLES],
+    runs: usize,
+    tuning_at: &impl Fn(&[f64]) -> Tuning,
+) -> Result<Found, TuneError> {
+    let seen: RefCell<Vec<(Vec<f64>, Option<Candidate>)>> = RefCell::default();
+    let failed: RefCell<Option<TuneError>> = RefCell::default();
+    // Objective and constraints ask about the same point one after the other.
+    let look = |x: &[f64], read: &dyn Fn(Option<&Candidate>) -> f64| -> f64 {
+        if failed.borrow().is_some() {
+            return 0.0;
+        }
+        let known = seen.borrow().iter().rposition(|(point, _)| point == x);
+        if let Some(place) = known {
+            return read(seen.borrow()[place].1.as_ref());
+        }
+        let tuning = tuning_at(x);
+        let run = match bench.margins(&tuning) {
+            // An unstable axis is not run: it would only saturate.
+            None => Ok(None),
+            margins => bench.run(&tuning, margins).map(Some),
+        };
+        match run {
+            Ok(candidate) => {
+                let value = read(candidate.as_ref());
+                seen.borrow_mut().push((x.to_vec(), candidate));
+                value
+            }
+            Err(error) => {
+                *failed.borrow_mut() = Some(error);
+                0.0
+            }
+        }
+    };
+    let unstable = UNSTABLE * bench.present().cost.max(f64::MIN_POSITIVE);
+    let objective = |x: &[f64], (): &mut ()| look(x, &|c| c.map_or(unstable, |c| c.cost));
+    let modulus = |x: &[f64], (): &mut ()| {
+        look(x, &|c| c.and_then(|c| c.margins).map_or(-1.0, |m| m.modulus - limits.modulus))
+    };
+    let delay = |x: &[f64], (): &mut ()| {
+        // In units of the limit, so that both constraints are of like size.
+        let scale = if limits.delay > 0.0 { limits.delay } else { LONG };
+        look(x, &|c| c.and_then(|c| c.margins).map_or(-1.0, |m| (m.delay.min(LONG) - limits.delay) / scale))
+    };
+    let saturation = |x: &[f64], (): &mut ()| {
+        let time = |c: &Candidate| c.figures.axes.iter().map(|axis| axis.report.saturation_time).sum::<f64>();
+        look(x, &|c| c.map_or(-1.0, |c| -time(c)))
+    };
+    let constraints: [&dyn Func<()>; 3] = [&modulus, &delay, &saturation];
+    let repeated = |values: &[f64; VARIABLES]| -> Vec<f64> {
+        values.iter().copied().cycle().take(start.len()).collect()
+    };
+    let steps = repeated(steps);
+    let bounds: Vec<(f64, f64)> = BOUNDS.into_iter().cycle().take(start.len()).collect();
+    let tolerances =
+        StopTols { xtol_abs: steps.iter().map(|step| step * LAST_STEP).collect(), ..StopTols::default() };
+    // How it ends is of no interest: the best point is taken from all that it has seen.
+    let _ = minimize(objective, start, &bounds, &constraints, (), runs, RhoBeg::Set(steps), Some(tolerances));
+    match failed.into_inner() {
+        Some(error) => Err(error),
+        None => Ok(Found { history: seen.into_inner() }),
+    }
+}
+
+/// Pseudo-random numbers: SplitMix64 (Steele, Lea and Flood 2014).
+struct SplitMix(u64);
+
+impl SplitMix {
+    /// In 0 … 1.
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        // The upper 53 bits fill the mantissa.
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_a_seed_are_those_of_the_published_generator() {
+        // First outputs for seed 0 of the reference implementation: e220a8397b1dcdaf, 6e789e6aa1b965f4.
+        let mut random = SplitMix(0);
+        let expected = [0xe220_a839_7b1d_cdaf_u64, 0x6e78_9e6a_a1b9_65f4];
+        for bits in expected {
+            assert_eq!(random.next(), (bits >> 11) as f64 / (1u64 << 53) as f64);
+        }
+    }
+}

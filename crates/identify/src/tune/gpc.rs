@@ -1,0 +1,176 @@
+//! Search of the tuning of a predictive controller: a grid, then what lies about its best.
+
+use std::collections::HashSet;
+
+use super::TuneError;
+use super::bench::{Bench, Candidate, Search, keeping, ranked};
+use super::loops::MarginLimits;
+use super::tuning::{Tuning, rounded};
+use virtual_axes_core::config::Value;
+
+/// Largest N2 of the grid.
+pub const GRID_N2: usize = 24;
+/// Largest Nu of the grid.
+pub const GRID_NU: usize = 8;
+/// λ_rel of the grid, at least.
+pub const GRID_LAMBDA: [f64; 12] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1, 2e-1, 5e-1];
+
+/// Largest N2 that the search goes to.
+const MAX_N2: usize = 60;
+/// Tunings whose neighbours are looked at in each round.
+const CENTRES: usize = 4;
+/// Steps of N1, N2 and Nu to a neighbour.
+const STEPS: [isize; 4] = [-4, -1, 1, 4];
+/// First factor of λ_rel to a neighbour: less than half a step of the grid.
+const FIRST_FACTOR: f64 = 1.4;
+/// The search ends when λ_rel is known to this.
+const LAST_FACTOR: f64 = 1.02;
+/// A round that saves less than this part of the cost makes the steps of λ_rel smaller.
+const GAIN: f64 = 1e-3;
+/// Rounds at most, however slowly the cost falls.
+const ROUNDS: usize = 16;
+/// Significant digits of λ_rel.
+const DIGITS: usize = 3;
+
+/// Tunings that are remembered, of more the cheapest.
+const REMEMBERED: usize = 10_000;
+
+/// The grid: N1 = 1, N2 up to [`GRID_N2`], Nu up to [`GRID_NU`] and N2, λ_rel of [`GRID_LAMBDA`].
+pub fn grid() -> Vec<Tuning> {
+    let horizons = (1..=GRID_N2).flat_map(|n2| (1..=GRID_NU.min(n2)).map(move |nu| (n2, nu)));
+    let of_horizon = |(n2, nu)| GRID_LAMBDA.map(|lambda_rel| Tuning::Gpc { n1: 1, n2, nu, lambda_rel });
+    horizons.flat_map(of_horizon).collect()
+}
+
+/// The grid with so many λ_rel between its first and its last, evenly on a logarithmic scale, that it has at
+/// least `designs`.
+pub fn fine_grid(designs: usize) -> Vec<Tuning> {
+    let horizons = || (1..=GRID_N2).flat_map(|n2| (1..=GRID_NU.min(n2)).map(move |nu| (n2, nu)));
+    let count = designs.div_ceil(horizons().count()).max(2);
+    let (least, most) = (GRID_LAMBDA[0], GRID_LAMBDA[GRID_LAMBDA.len() - 1]);
+    let lambda = |i: usize| least * (most / least).powf(i as f64 / (count - 1) as f64);
+    let of_horizon = |(n2, nu)| (0..count).map(move |i| Tuning::Gpc { n1: 1, n2, nu, lambda_rel: lambda(i) });
+    horizons().flat_map(of_horizon).collect()
+}
+
+/// The cheapest of `candidates`, as many as are remembered.
+fn remembered(candidates: Vec<Candidate>) -> Vec<Candidate> {
+    let mut candidates = ranked(candidates);
+    candidates.truncate(REMEMBERED);
+    candidates
+}
+
+/// The predictive controller, alike on each axis that moves, that costs least on the bench's path.
+///
+/// Of the grid and the machine's own preset every design that keeps `limits` is run; then, round by round,
+/// the neighbours of the best few, also beyond the grid and between its λ_rel.
+///
+/// # Errors
+/// [`TuneError`], also if no tuning keeps the limits.
+pub fn tune_gpc(bench: &Bench<'_>, limits: &MarginLimits) -> Result<Search, TuneError> {
+    tune_gpc_from(bench, limits, grid())
+}
+
+/// As [`tune_gpc`], with another grid `first`, such as a [`fine_grid`].
+///
+/// # Errors
+/// As [`tune_gpc`].
+pub fn tune_gpc_from(
+    bench: &Bench<'_>,
+    limits: &MarginLimits,
+    mut first: Vec<Tuning>,
+) -> Result<Search, TuneError> {
+    first.extend(preset(bench).filter(|preset| !first.contains(preset)));
+    let mut seen: HashSet<Key> = first.iter().filter_map(key).collect();
+    let mut designs = first.len();
+    let all = bench.designs(first);
+    let closest =
+        all.iter().filter_map(|(_, margins)| *margins).max_by(|a, b| a.modulus.total_cmp(&b.modulus));
+    let kept = keeping(all, limits);
+    if kept.is_empty() {
+        return Err(match closest {
+            Some(most) => {
+                TuneError::NoMargins { designs, limits: *limits, modulus: most.modulus, delay: most.delay }
+            }
+            None => TuneError::NoneStable { designs },
+        });
+    }
+    let mut runs = kept.len();
+    let mut tried = remembered(bench.runs("grid", kept)?);
+    let mut factor = FIRST_FACTOR;
+    for _ in 0..ROUNDS {
+        let Some(best) = tried.first().map(|best| best.cost) else { break };
+        let around: Vec<Tuning> = tried
+            .iter()
+            .take(CENTRES)
+            .flat_map(|centre| neighbours(&centre.tuning, factor))
+            .filter(|tuning| key(tuning).is_some_and(|key| seen.insert(key)))
+            .collect();
+        designs += around.len();
+        let kept = keeping(bench.designs(around), limits);
+        runs += kept.len();
+        tried.extend(bench.runs("about the best", kept)?);
+        tried = remembered(tried);
+        let saved = tried.first().is_some_and(|now| now.cost < best * (1.0 - GAIN));
+        if !saved {
+            factor = factor.sqrt();
+            if factor < LAST_FACTOR {
+                break;
+            }
+        }
+    }
+    let best = tried.first_mut().ok_or(TuneError::Saturated { runs })?;
+    *best = bench.completed(bench.course(), best)?;
+    let best = best.clone();
+    Ok(Search { best, tried, designs, runs })
+}
+
+/// N1, N2, Nu and the bits of λ_rel.
+type Key = (usize, usize, usize, u64);
+
+fn key(tuning: &Tuning) -> Option<Key> {
+    match tuning {
+        Tuning::Gpc { n1, n2, nu, lambda_rel } => Some((*n1, *n2, *nu, lambda_rel.to_bits())),
+        _ => None,
+    }
+}
+
+/// The tuning that the machine file has for a predictive controller, if it is one for all axes.
+pub(super) fn preset(bench: &Bench<'_>) -> Option<Tuning> {
+    let parameters = bench.parameters();
+    let own = |joint: &String| {
+        let get = |key: &str| parameters.get(&format!("{joint}.position_loop.gpc.{key}"));
+        let count = |key: &str| match get(key) {
+            Some(Value::Integer(value)) => usize::try_from(value).ok(),
+            _ => None,
+        };
+        match (get("lambda"), get("lambda_rel")) {
+            (None, Some(Value::Double(lambda_rel))) => {
+                Some(Tuning::Gpc { n1: count("n1")?, n2: count("n2")?, nu: count("nu")?, lambda_rel })
+            }
+            _ => None,
+        }
+    };
+    let mut presets = bench.joints().iter().map(own);
+    let first = presets.next()??;
+    let alike = presets.all(|other| other.as_ref() == Some(&first));
+    alike.then_some(first)
+}
+
+/// What lies about a tuning.
+fn neighbours(centre: &Tuning, factor: f64) -> Vec<Tuning> {
+    let Tuning::Gpc { n1, n2, nu, lambda_rel } = *centre else { return Vec::new() };
+    let mut around = Vec::new();
+    for lambda in [lambda_rel / factor, lambda_rel * factor] {
+        around.push(Tuning::Gpc { n1, n2, nu, lambda_rel: rounded(lambda, DIGITS) });
+    }
+    for step in STEPS {
+        let moved = |value: usize| value.saturating_add_signed(step);
+        for (n1, n2, nu) in [(moved(n1), n2, nu), (n1, moved(n2), nu), (n1, n2, moved(nu))] {
+            if (1..=n2).contains(&n1) && (1..=n2).contains(&nu) && n2 <= MAX_N2 {
+                around.push(Tuning::Gpc { n1, n2, nu, lambda_rel });
+            }
+        }
+    }
+    around
+}

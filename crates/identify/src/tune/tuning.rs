@@ -1,0 +1,132 @@
+//! Values of the parameters that a search turns.
+
+use std::fmt;
+
+use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Source, Value};
+use virtual_axes_core::design::{GpcTuning, Weight};
+
+/// Gains of the cascade on one axis, in the units of a machine file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisGains {
+    /// Kp, (m/min)/mm or (1000 °/min)/°.
+    pub gain: f64,
+    /// VFFW, 1.
+    pub velocity: f64,
+    /// TFFW, kg·m² (kg).
+    pub torque: f64,
+}
+
+/// A tuning of the axes that move.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Tuning {
+    /// As the machine is.
+    Present,
+    /// A predictive controller, alike on each axis.
+    Gpc {
+        /// N1.
+        n1: usize,
+        /// N2.
+        n2: usize,
+        /// Nu.
+        nu: usize,
+        /// λ / trace(GᵀG).
+        lambda_rel: f64,
+    },
+    /// The cascade: the gains of each axis, in the order of the joints that are tuned.
+    Cascade(Vec<(String, AxisGains)>),
+}
+
+impl Tuning {
+    /// The design of a predictive controller; none for the others.
+    pub fn gpc(&self) -> Option<GpcTuning> {
+        match *self {
+            Tuning::Gpc { n1, n2, nu, lambda_rel } => {
+                Some(GpcTuning { n1, n2, nu, weight: Weight::Relative(lambda_rel) })
+            }
+            _ => None,
+        }
+    }
+
+    /// Full keys and values of the parameters that it sets on `joints`.
+    pub fn values(&self, joints: &[String], parameters: &Parameters) -> Vec<(String, Value)> {
+        let count = |value: usize| Value::Integer(i64::try_from(value).unwrap_or(i64::MAX));
+        let controller = |name: &str| ("controller".to_owned(), Value::Text(name.to_owned()));
+        match self {
+            Tuning::Present => Vec::new(),
+            Tuning::Gpc { n1, n2, nu, lambda_rel } => {
+                let values = [
+                    controller("gpc"),
+                    ("gpc.n1".to_owned(), count(*n1)),
+                    ("gpc.n2".to_owned(), count(*n2)),
+                    ("gpc.nu".to_owned(), count(*nu)),
+                    ("gpc.lambda_rel".to_owned(), Value::Double(*lambda_rel)),
+                ];
+                let of_joint = |joint: &String| {
+                    let full = |(key, value)| (format!("{joint}.position_loop.{key}"), value);
+                    values.clone().map(full)
+                };
+                joints.iter().flat_map(of_joint).collect()
+            }
+            Tuning::Cascade(axes) => axes
+                .iter()
+                .flat_map(|(joint, gains)| {
+                    [
+                        (format!("{joint}.position_loop.controller"), controller("cascade").1),
+                        (format!("{joint}.position_loop.gain"), Value::Double(gains.gain)),
+                        (format!("{joint}.feedforward.velocity"), Value::Double(gains.velocity)),
+                        (torque_key(joint, parameters), Value::Double(gains.torque)),
+                    ]
+                })
+                .collect(),
+        }
+    }
+
+    /// The machine `parameters` with this tuning on `joints`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] for a value that the schema does not take.
+    pub fn apply(&self, parameters: &Parameters, joints: &[String]) -> Result<Parameters, ConfigError> {
+        let source = Source::named("tuning");
+        let mut tuned = parameters.clone();
+        if self.gpc().is_some() {
+            for joint in joints {
+                // λ itself would stand in the place of λ_rel.
+                tuned.unset(&format!("{joint}.position_loop.gpc.lambda"), &source)?;
+            }
+        }
+        let values = self.values(joints, parameters).into_iter();
+        let assignments = values.map(|(key, value)| Assignment { key, value, source: source.clone() });
+        tuned.set_all(assignments.collect())?;
+        Ok(tuned)
+    }
+}
+
+/// The key of TFFW: in kg for a linear motor.
+pub(super) fn torque_key(joint: &str, parameters: &Parameters) -> String {
+    let linear = format!("{joint}.feedforward.torque_kg");
+    if parameters.definition(&linear).is_some() { linear } else { format!("{linear}_m2") }
+}
+
+impl fmt::Display for Tuning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Tuning::Present => f.write_str("as it is"),
+            Tuning::Gpc { n1, n2, nu, lambda_rel } => {
+                write!(f, "N1 {n1}, N2 {n2}, Nu {nu}, λ_rel {lambda_rel}")
+            }
+            Tuning::Cascade(axes) => {
+                for (place, (joint, gains)) in axes.iter().enumerate() {
+                    let comma = if place > 0 { "; " } else { "" };
+                    let AxisGains { gain, velocity, torque } = gains;
+                    write!(f, "{comma}{joint} Kp {gain}, VFFW {velocity}, TFFW {torque}")?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// `value` with so many significant digits: what a person would write into a machine file.
+pub(super) fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
+}

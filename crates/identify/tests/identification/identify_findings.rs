@@ -1,0 +1,311 @@
+//! What a recording does not show is said, with what to record; what it shows in another way is still found.
+
+use virtual_axes_core::config::{Parameters, Source, Value};
+use virtual_axes_identify::identify::campaign::{Campaign, Options as Limits};
+use virtual_axes_identify::identify::{
+    Breakaway, FeedforwardMode, FrictionLaw, Identification, Input, Options, Parameter, Refine, identify,
+};
+use virtual_axes_identify::recording::{Conditioning, RawRecording, Severity, condition};
+use virtual_axes_verification::fixtures::common::Profile;
+use virtual_axes_verification::fixtures::recordings::{
+    Disturbance, feedforward, ignorant, place, record, truth,
+};
+
+const TSP: f64 = 6e-3;
+/// Friction of X (model.md section 6).
+const X: [f64; 4] = [1.576, 0.01965, -0.5332, -0.2801];
+
+fn law(v: f64) -> f64 {
+    X[0] * (X[1] * v).exp() + X[2] * (X[3] * v).exp()
+}
+
+/// There and back at each speed (m/min), from rest to rest.
+fn legs(speeds: &[f64], back: bool) -> Vec<f64> {
+    let mut psec = vec![0.0; 100];
+    for &speed in speeds {
+        let v = speed / 60.0;
+        let line = Profile::new(1.2 * v + 0.12 * v.sqrt(), v, (0.99 * (50.0 * v).sqrt()).min(2.5), 50.0);
+        let count = (line.duration() / TSP).ceil() as usize + 1;
+        let rest = 80;
+        let from = *psec.last().expect("it begins at rest");
+        psec.extend((0..count).map(|k| from + line.at(k as f64 * TSP)));
+        psec.extend(vec![*psec.last().expect("a leg"); rest]);
+        if back {
+            let from = *psec.last().expect("a leg");
+            psec.extend((0..count).map(|k| from - line.at(k as f64 * TSP)));
+            psec.extend(vec![*psec.last().expect("a leg"); rest]);
+        }
+    }
+    psec
+}
+
+/// X without feedforward on the way that `psec` says.
+fn recorded(parameters: &Parameters, psec: &[f64], disturbance: &Disturbance) -> RawRecording {
+    record(&feedforward(parameters, "x", FeedforwardMode::Off), "x", psec, disturbance)
+}
+
+fn clean() -> Disturbance {
+    Disturbance { resolution: 1e-6, ..Disturbance::default() }
+}
+
+fn with(mut parameters: Parameters, key: &str, value: Value) -> Parameters {
+    parameters.set(key, value, &Source::named("the test")).expect("a value in range");
+    parameters
+}
+
+fn identified(raw: &[RawRecording], start: &Parameters, options: &Options) -> Identification {
+    let machine = start.machine_config().expect("a machine");
+    let axis = &machine.axes()[place(&machine, "x")];
+    let signals: Vec<_> = raw
+        .iter()
+        .map(|raw| condition(raw, axis, &machine.periods(), &Conditioning::default()).expect("a recording").0)
+        .collect();
+    let inputs: Vec<Input> =
+        signals.iter().map(|signals| Input { signals, feedforward: Some(FeedforwardMode::Off) }).collect();
+    identify(&inputs, axis, &machine.periods(), options)
+}
+
+const STEPS_ONLY: Options = Options { i0: Breakaway::Held, refine: Refine::NONE };
+
+/// The text of the one finding with this code, and its remedy.
+fn finding(found: &Identification, severity: Severity, code: &str) -> String {
+    let mut of_it = found.findings.iter().filter(|finding| finding.code == code);
+    let finding = of_it.next().unwrap_or_else(|| panic!("no {code} in {:?}", found.findings));
+    assert!(of_it.next().is_none(), "{code} is told twice");
+    assert_eq!(finding.severity, severity, "{finding}");
+    finding.to_string()
+}
+
+fn inertia_of(found: &Identification) -> f64 {
+    Parameter::Inertia.get(found.axis())
+}
+
+#[test]
+fn three_speeds_get_a_straight_law_and_are_told_so() {
+    let raw = recorded(&truth(), &legs(&[4.0, 8.0, 12.0], true), &clean());
+    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let told = finding(&found, Severity::Warning, "few-speeds");
+    assert!(told.contains("not fitted to 3 speeds (4.000, 8.000, 12.000 m/min)"), "{told}");
+    assert!(told.contains("record at least 6 speeds"), "{told}");
+    let friction = found.friction.expect("a law");
+    assert_eq!(friction.law.law, FrictionLaw::Linear);
+    let (level, slope) = friction.law.line().expect("a line");
+    // Least squares through the law of model.md at the three speeds.
+    let currents = [law(4.0), law(8.0), law(12.0)];
+    let mean = currents.iter().sum::<f64>() / 3.0;
+    let wanted_slope = (currents[2] - currents[0]) / 8.0;
+    assert!((slope / wanted_slope - 1.0).abs() < 0.01, "{slope} against {wanted_slope}");
+    assert!((level / (mean - 8.0 * wanted_slope) - 1.0).abs() < 0.01, "{level}");
+    // In the form of eq. 3 it is the same line.
+    for v in [0.5, 4.0, 20.0] {
+        assert!((friction.law.at(v) / (level + slope * v) - 1.0).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn six_speeds_that_lie_close_together_are_no_law_of_four_parameters() {
+    let raw = recorded(&truth(), &legs(&[4.0, 5.0, 6.0, 7.0, 8.0, 9.0], true), &clean());
+    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    finding(&found, Severity::Warning, "few-speeds");
+    assert_eq!(found.friction.map(|f| f.law.law), Some(FrictionLaw::Linear));
+}
+
+#[test]
+fn one_speed_is_no_law_at_all() {
+    let raw = recorded(&truth(), &legs(&[6.0], true), &clean());
+    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let told = finding(&found, Severity::Missing, "few-speeds");
+    assert!(told.contains("1 speed"), "{told}");
+    assert!(found.friction.is_none() && found.inertia.is_none());
+    // What is not found stays as the machine file says.
+    assert_eq!(inertia_of(&found), 0.015);
+}
+
+#[test]
+fn a_standstill_tells_of_no_motion() {
+    let raw = recorded(&truth(), &[0.0; 400], &clean());
+    let found = identified(&[raw], &ignorant("x"), &Options::default());
+    finding(&found, Severity::Missing, "few-speeds");
+    assert!(found.friction.is_none() && found.inertia.is_none());
+}
+
+#[test]
+fn speeds_in_one_direction_are_told() {
+    let raw = recorded(&truth(), &legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], false), &clean());
+    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let told = finding(&found, Severity::Warning, "one-direction");
+    assert!(told.contains("record each speed in both directions"), "{told}");
+}
+
+#[test]
+fn a_saturated_current_is_left_out_and_told() {
+    let weak = |parameters| with(parameters, "x.motor.max_current_a", Value::Double(4.0));
+    let raw = recorded(&weak(truth()), &legs(&[1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true), &clean());
+    let found = identified(&[raw], &weak(ignorant("x")), &STEPS_ONLY);
+    let told = finding(&found, Severity::Warning, "saturated-current");
+    assert!(told.contains("4.0 A") && told.contains("lower acceleration"), "{told}");
+}
+
+#[test]
+fn a_recording_that_begins_in_motion_has_no_closed_loop() {
+    let whole = legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true);
+    let mut raw = recorded(&truth(), &whole, &clean());
+    let psec = raw.psec.clone().expect("PSEC is recorded");
+    // From a set-point in motion to the last one in motion, without the rests between: none is as long as 0.1 s.
+    let moving: Vec<usize> = (1..psec.len()).filter(|&k| psec[k] != psec[k - 1]).collect();
+    let pick = |channel: &Option<Vec<f64>>| channel.as_ref().map(|c| moving.iter().map(|&k| c[k]).collect());
+    (raw.psec, raw.position, raw.current) = (pick(&raw.psec), pick(&raw.position), pick(&raw.current));
+    (raw.velocity_feedforward, raw.torque_feedforward) = (None, None);
+    raw.time = (0..moving.len()).map(|k| k as f64 * TSP).collect();
+    let found = identified(&[raw], &ignorant("x"), &Options::default());
+    let told = finding(&found, Severity::Missing, "no-setpoints");
+    assert!(told.contains("from standstill on"), "{told}");
+    finding(&found, Severity::Warning, "no-standstill");
+    assert!(found.refinement.is_none() && found.delays.is_empty());
+}
+
+#[test]
+fn a_friction_that_no_law_describes_is_told() {
+    let rough = Disturbance { friction: Some(|v| 0.6 * (2.5 * v).sin()), ..clean() };
+    let raw = recorded(&truth(), &legs(&[0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0], true), &rough);
+    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    finding(&found, Severity::Warning, "poor-friction-law");
+}
+
+#[test]
+fn an_exponent_at_its_bound_is_told() {
+    // A law that is flat beyond 0.2 m/min: d would have to be far below its bound.
+    let steep = with(with(truth(), "x.friction.d", Value::Double(-60.0)), "x.friction.b", Value::Double(0.0));
+    let raw = recorded(&steep, &legs(&[0.02, 0.04, 0.06, 0.1, 0.5, 2.0, 5.0, 10.0], true), &clean());
+    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let told = finding(&found, Severity::Warning, "at-bound");
+    assert!(told.contains("friction.d"), "{told}");
+}
+
+#[test]
+fn another_position_controller_is_not_taken_for_the_cascade() {
+    let raw = recorded(&truth(), &legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true), &clean());
+    let start = with(ignorant("x"), "x.position_loop.controller", Value::Text("gpc".to_owned()));
+    let found = identified(&[raw], &start, &Options::default());
+    let told = finding(&found, Severity::Missing, "not-a-cascade");
+    assert!(told.contains("controller=cascade"), "{told}");
+    assert!(found.friction.is_some(), "the steps before do not need it");
+}
+
+#[test]
+fn a_current_every_millisecond_shows_the_inertia_by_equation_5_alone() {
+    let psec = legs(&[1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true);
+    let raw = recorded(&truth(), &psec, &Disturbance { every: Some(8), ..clean() });
+    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let inertia = found.inertia.expect("an inertia");
+    println!("eq. 5 at 1 ms: {:.5} ± {:.5}", inertia.value, inertia.error);
+    assert!((inertia.value / 0.028 - 1.0).abs() < 0.03, "{}", inertia.value);
+}
+
+#[test]
+fn positions_alone_tell_inertia_and_friction() {
+    let psec = legs(&[0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true);
+    let mut raw = recorded(&truth(), &psec, &clean());
+    raw.current = None;
+    let found = identified(&[raw], &ignorant("x"), &Options::default());
+    finding(&found, Severity::Missing, "no-current");
+    let inertia = inertia_of(&found);
+    println!("inertia from positions {inertia:.5}");
+    assert!((inertia / 0.028 - 1.0).abs() < 0.01, "{inertia}");
+    let [a, b, c, d] =
+        [Parameter::FrictionA, Parameter::FrictionB, Parameter::FrictionC, Parameter::FrictionD]
+            .map(|parameter| parameter.get(found.axis()));
+    for v in [0.5, 2.0, 8.0, 16.0] {
+        let current = a * (b * v).exp() + c * (d * v).exp();
+        println!("  {v} m/min: {current:.4} against {:.4} A", law(v));
+        assert!((current / law(v) - 1.0).abs() < 0.1, "{current} at {v} m/min");
+    }
+}
+
+#[test]
+fn a_breakaway_above_the_law_is_found_where_it_is_freed() {
+    let sticky = with(truth(), "x.friction.i0", Value::Double(1.4));
+    let psec = legs(&[0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0], true);
+    let raw = recorded(&sticky, &psec, &Disturbance::usual(virtual_axes_core::config::AxisKind::Linear, 5));
+    let options = Options { i0: Breakaway::Freed, refine: Refine::ALL };
+    let found = identified(&[raw], &ignorant("x"), &options);
+    let i0 = Parameter::Breakaway.get(found.axis());
+    println!("i0 {i0:.4} A");
+    assert!((i0 / 1.4 - 1.0).abs() < 0.03, "{i0}");
+}
+
+#[test]
+fn a_logger_that_stalls_jitters_and_leaves_gaps_costs_no_accuracy() {
+    let machine = truth().machine_config().expect("a machine");
+    let campaign =
+        Campaign::plan(&machine, 0, &[FeedforwardMode::Off], &Limits { range: None, max_feed: Some(0.2) })
+            .expect("a campaign");
+    let bad = Disturbance {
+        every: Some(8),
+        jitter: 5e-5,
+        stalls: vec![20.0..20.05, 41.0..41.2],
+        gaps: vec![30.0..30.5],
+        current_lag: 3e-3,
+        ..Disturbance::usual(virtual_axes_core::config::AxisKind::Linear, 6)
+    };
+    let raw = recorded(&truth(), campaign.psec(), &bad);
+    let found = identified(&[raw], &ignorant("x"), &Options::default());
+    let inertia = inertia_of(&found);
+    println!("inertia {inertia:.5}, {} spans", found.agreements[0].experiments.len());
+    assert!((inertia / 0.028 - 1.0).abs() < 0.01, "{inertia}");
+    assert!(found.agreements[0].experiments.len() >= 2, "the gap parts the recording");
+}
+
+#[test]
+fn parts_in_one_recording_are_told_apart_by_their_feedforward() {
+    let parameters = truth();
+    let machine = parameters.machine_config().expect("a machine");
+    let axis = &machine.axes()[0];
+    let short = legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true);
+    let mut all: Option<RawRecording> = None;
+    for mode in FeedforwardMode::ALL {
+        let raw = record(&feedforward(&parameters, "x", mode), "x", &short, &clean());
+        all = Some(match all {
+            None => raw,
+            Some(mut all) => {
+                let offset = all.time.last().expect("samples") + TSP;
+                all.time.extend(raw.time.iter().map(|t| t + offset));
+                let join = |a: &mut Option<Vec<f64>>, b: Option<Vec<f64>>| {
+                    a.iter_mut().zip(b).for_each(|(a, b)| a.extend(b));
+                };
+                join(&mut all.psec, raw.psec);
+                join(&mut all.position, raw.position);
+                join(&mut all.current, raw.current);
+                join(&mut all.velocity_feedforward, raw.velocity_feedforward);
+                join(&mut all.torque_feedforward, raw.torque_feedforward);
+                all
+            }
+        });
+    }
+    let all = all.expect("three parts");
+    let (signals, _) =
+        condition(&all, axis, &machine.periods(), &Conditioning::default()).expect("a recording");
+    let parts = virtual_axes_identify::identify::experiments(
+        &signals,
+        0,
+        axis,
+        &machine.periods(),
+        FeedforwardMode::Both,
+    );
+    let modes: Vec<FeedforwardMode> = parts.iter().map(|part| part.mode).collect();
+    assert_eq!(modes, FeedforwardMode::ALL);
+}
+
+#[test]
+fn only_what_is_chosen_is_refined() {
+    let psec = legs(&[0.5, 1.0, 2.0, 4.0, 8.0, 12.0], true);
+    let raw = recorded(&truth(), &psec, &clean());
+    let chosen = Refine { inertia: true, ..Refine::NONE };
+    let found = identified(&[raw], &ignorant("x"), &Options { i0: Breakaway::Held, refine: chosen });
+    let refinement = found.refinement.as_ref().expect("a refinement");
+    let moved: Vec<Parameter> = refinement.parameters.iter().map(|refined| refined.parameter).collect();
+    assert_eq!(moved, [Parameter::Inertia]);
+    assert!((inertia_of(&found) / 0.028 - 1.0).abs() < 0.01);
+    let law = &found.friction.as_ref().expect("a law").law.config;
+    assert_eq!(Parameter::FrictionA.get(found.axis()), law.a, "as the step found it");
+}

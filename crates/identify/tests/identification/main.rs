@@ -1,0 +1,9 @@
+//! TODO
+
+mod identify_campaign;
+mod identify_criterion;
+mod identify_findings;
+mod identify_recordings;
+mod identify_round_trip;
+mod recording_conditioning;
+mod recording_conditioning_drive;

@@ -1,0 +1,4 @@
+//! TODO
+
+mod tune;
+mod tune_robustness;

@@ -1,0 +1,365 @@
+//! The search of tunings: as good as a grid by brute force, within the margins, the same on every machine.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
+use virtual_axes_core::config::{MachineConfig, Parameters, Source, Value};
+use virtual_axes_core::design::{GpcTuning, Weight, gpc, margins};
+use virtual_axes_core::machine::prediction_model;
+use virtual_axes_core::trial::{self, Trial};
+use virtual_axes_identify::tune::{
+    Bench, Candidate, Cost, MarginLimits, Search, Term, TuneError, Tuning, Unwatched, Watch, contrast, front,
+    tune_cascade, tune_gpc,
+};
+use virtual_axes_verification::fixtures::tune_common::{
+    CIRCLE, CORNER, THERE_AND_BACK, course, machine, program, setpoints,
+};
+
+const MICROMETRE: f64 = 1e-6;
+
+fn set(parameters: &mut Parameters, key: &str, value: Value) {
+    parameters.set(key, value, &Source::named("test")).expect(key);
+}
+
+/// The machine with a predictive controller on each of `joints`, key by key.
+fn with_gpc(parameters: &Parameters, joints: &[&str], tuning: (i64, i64, i64, f64)) -> MachineConfig {
+    let (n1, n2, nu, lambda_rel) = tuning;
+    let mut tuned = parameters.clone();
+    for joint in joints {
+        let key = |name: &str| format!("{joint}.position_loop.{name}");
+        // N2 first where it grows, last where it shrinks: at no time below the others.
+        set(&mut tuned, &key("gpc.n2"), Value::Integer(60));
+        set(&mut tuned, &key("gpc.n1"), Value::Integer(n1));
+        set(&mut tuned, &key("gpc.nu"), Value::Integer(nu));
+        set(&mut tuned, &key("gpc.n2"), Value::Integer(n2));
+        set(&mut tuned, &key("gpc.lambda_rel"), Value::Double(lambda_rel));
+        set(&mut tuned, &key("controller"), Value::Text("gpc".to_owned()));
+    }
+    tuned.machine_config().expect("a machine")
+}
+
+/// Largest synchronised tracking error of the first axis, µm; none where a limit is reached.
+fn tracking_error(config: &MachineConfig, scenario: &str) -> Option<f64> {
+    let program = program(scenario, config);
+    let trial = Trial {
+        machine: config,
+        program: Some(Arc::clone(&program)),
+        allow_nonzero_end_velocity: false,
+        record: false,
+    };
+    let outcome = trial::run(&trial, setpoints(&program, config), |_| Ok(())).expect("a run");
+    let report = outcome.figures.axes[0].report;
+    (report.saturation_time == 0.0).then_some(report.max_synchronized_tracking_error / MICROMETRE)
+}
+
+#[test]
+fn the_tuning_is_as_good_as_any_of_the_grid_by_brute_force() {
+    let parameters = machine(&["x"]);
+    let config = parameters.machine_config().expect("a machine");
+    let model = prediction_model(&config.axes()[0], &config.periods()).expect("a model");
+    // The grid, written down once more.
+    let mut grid = Vec::new();
+    for n2 in 1..=24 {
+        for nu in 1..=n2.min(8) {
+            for decade in [1e-4, 1e-3, 1e-2, 1e-1] {
+                grid.extend([1.0, 2.0, 5.0].map(|digit| (n2, nu, digit * decade)));
+            }
+        }
+    }
+    assert_eq!(grid.len(), 12 * (36 + 16 * 8));
+    let keeping: Vec<_> = grid
+        .into_iter()
+        .filter(|&(n2, nu, lambda_rel)| {
+            let tuning = GpcTuning { n1: 1, n2, nu, weight: Weight::Relative(lambda_rel) };
+            let design = gpc(&model, &tuning).ok().and_then(|rst| margins(&model, &rst).ok());
+            design.is_some_and(|margins| margins.modulus >= 0.5 && margins.delay >= 0.005)
+        })
+        .collect();
+    assert!(keeping.len() > 300, "only {} keep the margins", keeping.len());
+    let cost = |&(n2, nu, lambda_rel): &(usize, usize, f64)| {
+        tracking_error(&with_gpc(&parameters, &["x"], (1, n2 as i64, nu as i64, lambda_rel)), THERE_AND_BACK)
+    };
+    let best =
+        keeping.par_iter().filter_map(cost).min_by(f64::total_cmp).expect("one that does not saturate");
+
+    let course = course(THERE_AND_BACK, &config);
+    let cost = Cost::default();
+    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+    let found = tune_gpc(&bench, &MarginLimits::default()).expect("a tuning");
+    assert!(found.best.cost <= best, "{} found, {best} on the grid", found.best.cost);
+    // One axis has no contour: the cost is its largest synchronised tracking error.
+    let Tuning::Gpc { n1, n2, nu, lambda_rel } = found.best.tuning else { panic!("{}", found.best.tuning) };
+    let again = with_gpc(&parameters, &["x"], (n1 as i64, n2 as i64, nu as i64, lambda_rel));
+    assert_eq!(tracking_error(&again, THERE_AND_BACK), Some(found.best.cost));
+    let rst = gpc(&model, &GpcTuning { n1, n2, nu, weight: Weight::Relative(lambda_rel) }).expect("a design");
+    let kept = margins(&model, &rst).expect("stable");
+    assert!(kept.modulus >= 0.5 && kept.delay >= 0.005, "{kept:?}");
+}
+
+/// A search with so many threads.
+fn with_threads(threads: usize, search: impl Fn() -> Search + Sync) -> Search {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    // Elsewhere than in the pool's own thread, `install` would not use it.
+    let search = &search;
+    std::thread::scope(|scope| scope.spawn(|| pool.install(search)).join().expect("a search"))
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let parameters = machine(&["x", "y"]);
+    let config = parameters.machine_config().expect("a machine");
+    let course = course(CORNER, &config);
+    let cost: Cost = "contour=1,rms=0.5,activity=10".parse().expect("a cost");
+    // High margins leave few designs to run.
+    let limits = MarginLimits { modulus: 0.75, delay: 0.01 };
+    let search = |seed: Option<u64>| {
+        let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+        match seed {
+            None => tune_gpc(&bench, &limits).expect("a tuning"),
+            Some(seed) => tune_cascade(&bench, &limits, seed).expect("a tuning"),
+        }
+    };
+    for seed in [None, Some(7)] {
+        let one = with_threads(1, || search(seed));
+        assert!(one.tried.len() > 20, "only {} tried", one.tried.len());
+        assert_eq!(one, with_threads(2, || search(seed)));
+        assert_eq!(one, with_threads(5, || search(seed)));
+    }
+}
+
+#[test]
+fn the_cascade_is_tuned_within_the_margins() {
+    let parameters = machine(&["x", "y"]);
+    let config = parameters.machine_config().expect("a machine");
+    let course = course(CIRCLE, &config);
+    let cost = Cost::default();
+    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+    let limits = MarginLimits { modulus: 0.7, delay: 0.02 };
+    let found = tune_cascade(&bench, &limits, 1).expect("a tuning");
+    // The lead of the feedforward costs the machine as it is ΔR ≈ v²/(R Kp) Tsp/2: 167 µm here.
+    assert!(bench.present().cost > 150.0, "{}", bench.present().cost);
+    assert!(found.best.cost < bench.present().cost / 5.0, "{}", found.best.cost);
+    let Tuning::Cascade(axes) = &found.best.tuning else { panic!("{}", found.best.tuning) };
+    assert_eq!(axes.iter().map(|(joint, _)| joint.as_str()).collect::<Vec<_>>(), ["x", "y"]);
+    for ((_, gains), axis) in axes.iter().zip(config.axes()) {
+        let model = prediction_model(axis, &config.periods()).expect("a model");
+        // 1 (m/min)/mm is 16.667 s⁻¹.
+        let kp = gains.gain * 1000.0 / 60.0;
+        let rst = virtual_axes_core::control::Rst::new(&[kp], &[1.0], &[kp], 0).expect("a controller");
+        let kept = margins(&model, &rst).expect("stable");
+        assert!(kept.modulus >= 0.7 && kept.delay >= 0.02, "{kept:?}");
+    }
+    assert!(found.tried.iter().all(|c| !c.saturated && c.cost >= found.best.cost));
+}
+
+#[test]
+fn what_saturates_is_not_taken() {
+    let mut parameters = machine(&["x"]);
+    // The move asks for more current than there is, whatever the controller.
+    set(&mut parameters, "x.motor.max_current_a", Value::Double(2.0));
+    let config = parameters.machine_config().expect("a machine");
+    let course = course(THERE_AND_BACK, &config);
+    let cost = Cost::default();
+    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+    assert!(bench.present().saturated);
+    let limits = MarginLimits { modulus: 0.85, delay: 0.02 };
+    let error = tune_gpc(&bench, &limits).expect_err("no tuning");
+    assert!(matches!(error, TuneError::Saturated { runs } if runs > 0), "{error}");
+    assert!(error.to_string().contains("saturates"), "{error}");
+}
+
+#[test]
+fn margins_that_no_design_has_are_refused_with_the_best_there_is() {
+    let parameters = machine(&["x"]);
+    let config = parameters.machine_config().expect("a machine");
+    let course = course(THERE_AND_BACK, &config);
+    let cost = Cost::default();
+    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+    let limits = MarginLimits { modulus: 0.999, delay: 0.005 };
+    match tune_gpc(&bench, &limits).expect_err("no tuning") {
+        TuneError::NoMargins { designs, limits: asked, modulus, .. } => {
+            assert!(designs > 1900 && asked == limits && modulus > 0.8 && modulus < 0.999, "{modulus}");
+        }
+        error => panic!("{error}"),
+    }
+    let error = tune_cascade(&bench, &limits, 1).expect_err("no tuning");
+    assert!(matches!(error, TuneError::NoMargins { .. }), "{error}");
+}
+
+#[test]
+fn a_path_without_motion_has_nothing_to_tune() {
+    let parameters = machine(&["x"]);
+    let cost = Cost::default();
+    let rows = Rows { left: 100 };
+    let setpoints = trial::Setpoints::Grid(Box::new(rows));
+    let course =
+        virtual_axes_identify::tune::Course::read("still", None, setpoints, || Ok(())).expect("set-points");
+    let error = Bench::new(&parameters, &course, &cost, &Unwatched).map(|_| ()).expect_err("nothing moves");
+    assert!(matches!(error, TuneError::NothingMoves), "{error}");
+}
+
+/// So many rows of X at home.
+struct Rows {
+    left: usize,
+}
+
+impl trial::GridSource for Rows {
+    fn joints(&self) -> &[usize] {
+        &[0]
+    }
+
+    fn next(&mut self, row: &mut [f64]) -> Result<bool, trial::SourceError> {
+        row.fill(0.0);
+        self.left = self.left.saturating_sub(1);
+        Ok(self.left > 0)
+    }
+}
+
+/// Ends the search after so many position periods.
+struct Impatient(AtomicUsize);
+
+impl Watch for Impatient {
+    fn go_on(&self) -> io::Result<()> {
+        let left = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+        left.map(|_| ()).map_err(|_| io::Error::other("enough"))
+    }
+}
+
+#[test]
+fn a_weight_given_as_such_does_not_hide_the_relative_one() {
+    let mut parameters = machine(&["x", "y"]);
+    set(&mut parameters, "x.position_loop.gpc.lambda", Value::Double(1.0));
+    let tuning = Tuning::Gpc { n1: 1, n2: 8, nu: 6, lambda_rel: 0.01 };
+    let tuned = tuning.apply(&parameters, &["x".to_owned()]).expect("valid");
+    assert_eq!(tuned.get("x.position_loop.gpc.lambda"), None);
+    assert_eq!(tuned.get("x.position_loop.gpc.lambda_rel"), Some(Value::Double(0.01)));
+    // The other axis is as it was.
+    let y = |parameters: &Parameters| {
+        parameters.iter().filter(|(key, _)| key.starts_with("y.")).collect::<Vec<_>>()
+    };
+    assert_eq!(y(&tuned), y(&parameters));
+}
+
+#[test]
+fn a_search_that_is_interrupted_ends_with_the_reason() {
+    let parameters = machine(&["x", "y"]);
+    let config = parameters.machine_config().expect("a machine");
+    let course = course(CORNER, &config);
+    let cost = Cost::default();
+    for cascade in [false, true] {
+        let watch = Impatient(AtomicUsize::new(2000));
+        let bench = Bench::new(&parameters, &course, &cost, &watch).expect("a bench");
+        let limits = MarginLimits::default();
+        let found = if cascade { tune_cascade(&bench, &limits, 1) } else { tune_gpc(&bench, &limits) };
+        assert_eq!(found.expect_err("interrupted").to_string(), "enough");
+    }
+}
+
+#[test]
+fn contrasts_are_better_here_and_worse_there() {
+    let parameters = machine(&["x", "y"]);
+    let config = parameters.machine_config().expect("a machine");
+    let (circle, corner) = (course(CIRCLE, &config), course(CORNER, &config));
+    let cost = Cost::default();
+    let bench = Bench::new(&parameters, &circle, &cost, &Unwatched).expect("a bench");
+    let limits = MarginLimits { modulus: 0.7, delay: 0.0 };
+    let (present, found) = contrast(&bench, &corner, &limits).expect("contrasts");
+    assert!(!found.is_empty());
+    for pair in &found {
+        assert!(pair.better.cost < bench.present().cost && pair.worse.cost > present.cost);
+        assert_eq!(pair.better.tuning, pair.worse.tuning);
+        assert!(pair.better.margins.is_some_and(|margins| margins.modulus >= 0.7));
+    }
+    assert!(found.windows(2).all(|pair| pair[0].worse.cost >= pair[1].worse.cost));
+    // The other way round the longer path comes first.
+    let bench = Bench::new(&parameters, &corner, &cost, &Unwatched).expect("a bench");
+    let (_, other) = contrast(&bench, &circle, &limits).expect("contrasts");
+    for pair in &other {
+        assert!(
+            pair.better.cost < bench.present().cost && pair.worse.cost > circle_cost(&parameters, &circle)
+        );
+    }
+}
+
+fn circle_cost(parameters: &Parameters, circle: &virtual_axes_identify::tune::Course) -> f64 {
+    let config = parameters.machine_config().expect("a machine");
+    let outcome = circle.run(&config, false, false, |_| Ok(())).expect("a run");
+    outcome.figures.contour.expect("a contour").max / MICROMETRE
+}
+
+#[test]
+fn costs_are_read_and_refused_by_name() {
+    let cost: Cost = "contour=1, rms=0.5,current".parse().expect("a cost");
+    assert_eq!(cost.terms(), [(Term::Contour, 1.0), (Term::Rms, 0.5), (Term::Current, 1.0)]);
+    assert_eq!(cost.to_string(), "contour,rms=0.5,current");
+    for (text, message) in [
+        ("colour", "unknown term colour; there are contour, contour-rms, tracking, rms, current, activity"),
+        ("", "unknown term ; there are contour, contour-rms, tracking, rms, current, activity"),
+        ("rms=-1", "rms=-1: the weight must be a number from 0 to 1e9"),
+        ("rms=inf", "rms=inf: the weight must be a number from 0 to 1e9"),
+        ("rms=1e10", "rms=10000000000: the weight must be a number from 0 to 1e9"),
+        ("rms=much", "rms=much: the weight must be a number from 0 to 1e9"),
+        ("rms=1,rms=2", "rms stands twice"),
+        ("rms=0,contour=0", "no term has a weight: every tuning would cost the same"),
+    ] {
+        assert_eq!(text.parse::<Cost>().expect_err(text).to_string(), message);
+    }
+}
+
+#[test]
+fn a_cost_is_the_weighted_sum_of_figures() {
+    let parameters = machine(&["x", "y"]);
+    let config = parameters.machine_config().expect("a machine");
+    let course = course(CORNER, &config);
+    let figures = course.run(&config, false, false, |_| Ok(())).expect("a run").figures;
+    let of = |text: &str| text.parse::<Cost>().expect("a cost").of(&figures, &config);
+    let contour = figures.contour.expect("a contour");
+    assert_eq!(of("contour"), contour.max / MICROMETRE);
+    assert_eq!(of("contour-rms"), contour.rms / MICROMETRE);
+    let worst = |value: fn(&virtual_axes_core::assess::AxisReport) -> f64| {
+        f64::max(value(&figures.axes[0].report), value(&figures.axes[1].report))
+    };
+    assert_eq!(of("tracking"), worst(|r| r.max_synchronized_tracking_error) / MICROMETRE);
+    assert_eq!(of("rms"), worst(|r| r.rms_synchronized_tracking_error) / MICROMETRE);
+    assert_eq!(of("activity"), worst(|r| r.control_activity));
+    // The motors of X and Y have 54 A.
+    assert_eq!(of("current"), worst(|r| r.peak_current) / 54.0);
+    let sum = of("contour") + 2.0 * of("rms") + 300.0 * of("current");
+    assert!((of("contour=1,rms=2,current=300") - sum).abs() < 1e-9 * sum);
+}
+
+#[test]
+fn the_front_is_what_no_other_beats() {
+    let parameters = machine(&["x"]);
+    let config = parameters.machine_config().expect("a machine");
+    let course = course(THERE_AND_BACK, &config);
+    let cost = Cost::default();
+    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+    let merit = |c: &Candidate| c.margins.map_or(f64::NAN, |m| m.modulus);
+    // Costs and margins that repeat, by a multiplicative sequence.
+    let all: Vec<Candidate> = (0..200)
+        .map(|i| {
+            let mut candidate = bench.present().clone();
+            candidate.cost = f64::from(i * 37 % 41);
+            candidate.margins = candidate
+                .margins
+                .map(|m| virtual_axes_core::design::Margins { modulus: f64::from(i * 53 % 47), ..m });
+            candidate
+        })
+        .collect();
+    let on_front = front(&all, merit);
+    let beats = |a: &Candidate, b: &Candidate| {
+        a.cost <= b.cost && merit(a) >= merit(b) && (a.cost < b.cost || merit(a) > merit(b))
+    };
+    let expected: Vec<(f64, f64)> = {
+        let unbeaten = all.iter().filter(|b| !all.iter().any(|a| beats(a, b)));
+        let mut pairs: Vec<_> = unbeaten.map(|c| (c.cost, merit(c))).collect();
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        pairs.dedup();
+        pairs
+    };
+    assert_eq!(on_front.iter().map(|c| (c.cost, merit(c))).collect::<Vec<_>>(), expected);
+}

@@ -1,0 +1,98 @@
+//! Tunings on plants that deviate, and the measure of control activity.
+
+use virtual_axes_core::assess::AxisAssessor;
+use virtual_axes_core::config::{AxisConfig, Parameters, Source, Value};
+use virtual_axes_core::machine::{Activity, AxisSample, deviating_model, prediction_model};
+use virtual_axes_identify::tune::{Cost, Deviation, Unwatched, robustness};
+use virtual_axes_verification::fixtures::tune_common::{CIRCLE, course, machine};
+
+fn with(parameters: &Parameters, changes: &[(&str, f64)]) -> Parameters {
+    let mut changed = parameters.clone();
+    for (key, value) in changes {
+        changed.set(key, Value::Double(*value), &Source::named("test")).expect(key);
+    }
+    changed
+}
+
+#[test]
+fn a_deviating_model_is_that_of_a_machine_with_such_a_plant() {
+    let nominal = machine(&["x"]);
+    let model = |parameters: &Parameters, of: fn(&AxisConfig, &_) -> Result<_, _>| {
+        let config = parameters.machine_config().expect("a machine");
+        of(&config.axes()[0], &config.periods()).expect("a model")
+    };
+    let deviating = with(&nominal, &[("x.deviation.inertia", 1.3), ("x.deviation.torque_constant", 0.7)]);
+    // The velocity loop divides its torque by the Kt that it knows: a smaller Kt is a smaller Kv.
+    let such = with(
+        &nominal,
+        &[
+            ("x.motor.inertia_kg_m2", 0.028 * 1.3),
+            ("x.motor.torque_constant_nm_a", 2.64 * 0.7),
+            ("x.velocity_loop.gain", 5.0 * 0.7),
+        ],
+    );
+    let (found, expected) = (model(&deviating, deviating_model), model(&such, prediction_model));
+    assert_eq!(found.a().len(), expected.a().len());
+    for (a, b) in found.a().iter().chain(found.b()).zip(expected.a().iter().chain(expected.b())) {
+        assert!((a - b).abs() < 1e-9, "{a} and {b}");
+    }
+    // What it is designed for does not see it.
+    assert_eq!(model(&deviating, prediction_model), model(&nominal, prediction_model));
+    assert_eq!(model(&nominal, deviating_model), model(&nominal, prediction_model));
+}
+
+#[test]
+fn each_deviation_is_a_run_of_its_own() {
+    let parameters = machine(&["x", "y"]);
+    let config = parameters.machine_config().expect("a machine");
+    let course = course(CIRCLE, &config);
+    let cost = Cost::default();
+    let found = robustness(&parameters, &course, &cost, 0.3, &Unwatched).expect("runs");
+    let plain = course.run(&config, false, false, |_| Ok(())).expect("a run").figures;
+    assert_eq!(found.nominal.figures, plain);
+    assert_eq!(found.nominal.deviation, Deviation::NONE);
+    assert_eq!(found.single.len(), 6);
+    for (place, (name, factor)) in [
+        ("inertia", 0.7),
+        ("inertia", 1.3),
+        ("friction", 0.7),
+        ("friction", 1.3),
+        ("torque_constant", 0.7),
+        ("torque_constant", 1.3),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let keys = [format!("x.deviation.{name}"), format!("y.deviation.{name}")];
+        let changed = with(&parameters, &[(&keys[0], factor), (&keys[1], factor)]);
+        let config = changed.machine_config().expect("a machine");
+        let figures = course.run(&config, false, false, |_| Ok(())).expect("a run").figures;
+        assert_eq!(found.single[place].figures, figures, "{name} × {factor}");
+        assert_ne!(figures, plain, "{name} × {factor}");
+    }
+    // Friction is outside the linear loop.
+    assert_eq!(found.single[2].margins, found.nominal.margins);
+    assert_ne!(found.single[1].margins, found.nominal.margins);
+    let combined = Deviation::combined(0.3);
+    assert!(combined.contains(&found.worst.deviation));
+    assert_eq!(
+        combined.map(|d| (d.inertia + d.friction + d.torque_constant) * 10.0).iter().sum::<f64>().round(),
+        240.0
+    );
+}
+
+#[test]
+fn control_activity_is_the_rms_of_changes_at_position_instants() {
+    let mut assessor = AxisAssessor::default();
+    let sample = |current_setpoint: f64| AxisSample { current_setpoint, ..AxisSample::default() };
+    // The first value is no change; what is between position instants is of no concern.
+    let activity = Activity { peak_current: 100.0, ..Activity::default() };
+    for current in [10.0, 13.0, 9.0, 9.0, 9.0] {
+        assessor.observe(&sample(current), &activity);
+    }
+    // √((3² + 4²) / 4)
+    assert_eq!(assessor.report(1.0).control_activity, 2.5);
+    let mut once = AxisAssessor::default();
+    once.observe(&sample(5.0), &activity);
+    assert_eq!(once.report(1.0).control_activity, 0.0);
+}

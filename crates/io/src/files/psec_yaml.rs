@@ -1,0 +1,257 @@
+//! PSEC from YAML: messages `trajectory_msgs/JointTrajectory` as `ros2 topic pub` takes them and
+//! `ros2 topic echo` prints them.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::Deserialize;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, Deserializer, MapAccess, Visitor};
+use serde_saphyr::Spanned;
+
+use super::yaml;
+use crate::messages::builtin_interfaces::msg::{Duration, Time};
+use crate::messages::std_msgs::msg::Header;
+use crate::messages::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
+use crate::messages::{self};
+use virtual_axes_core::trajectory::{Rejection, Request};
+
+/// What `ros2 topic echo` prints in place of what it leaves out.
+const LEFT_OUT: &str = "'...'";
+
+/// Why YAML is not set-points; each names the file, and the line where there is one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TrajectoryYamlError {
+    /// Not YAML, or not a message.
+    #[error("{at}: {reason}")]
+    Syntax {
+        /// File and line.
+        at: String,
+        /// What the reader says.
+        reason: String,
+    },
+    /// A message that no machine could run.
+    #[error("{at}: {rejection}")]
+    Rejected {
+        /// File and line.
+        at: String,
+        /// Why.
+        rejection: Rejection,
+    },
+    /// There is no message.
+    #[error("{at}: there is no trajectory; it is a mapping with joint_names and points")]
+    Empty {
+        /// The file.
+        at: String,
+    },
+}
+
+/// The trajectories of a text, one per document; fields that are missing have their defaults. `file` is
+/// for messages.
+///
+/// # Errors
+/// [`TrajectoryYamlError`], the first fault.
+pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<Request>, TrajectoryYamlError> {
+    let at = |line: u64| if line > 0 { format!("{file}:{line}") } else { file.to_owned() };
+    let documents: Vec<Spanned<Message>> = yaml::documents(text).map_err(|(line, mut reason)| {
+        if text.lines().nth(line.saturating_sub(1) as usize).is_some_and(|text| text.contains(LEFT_OUT)) {
+            reason += "; `ros2 topic echo --full-length` leaves nothing out";
+        }
+        TrajectoryYamlError::Syntax { at: at(line), reason }
+    })?;
+    if documents.is_empty() {
+        return Err(TrajectoryYamlError::Empty { at: file.to_owned() });
+    }
+    documents
+        .into_iter()
+        .map(|document| {
+            let begin = document.referenced.line();
+            let lines: Vec<u64> = document.value.points.iter().map(|p| p.referenced.line()).collect();
+            let message = JointTrajectory::from(document.value);
+            messages::request(&message, usize::MAX).map_err(|rejection| {
+                let line = rejection.index.and_then(|index| lines.get(index).copied());
+                TrajectoryYamlError::Rejected { at: at(line.unwrap_or(begin)), rejection }
+            })
+        })
+        .collect()
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Message {
+    header: Stamped,
+    joint_names: Vec<String>,
+    points: Vec<Spanned<Point>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct HeaderFields {
+    stamp: Stamp,
+    frame_id: String,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Point {
+    positions: Vec<Number>,
+    velocities: Vec<Number>,
+    accelerations: Vec<Number>,
+    effort: Vec<Number>,
+    time_from_start: TimeFields,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct TimeFields {
+    sec: Whole<i32>,
+    nanosec: Whole<u32>,
+}
+
+/// A number, with a better message for what is none.
+struct Number(f64);
+
+/// A whole number, likewise.
+#[derive(Default)]
+struct Whole<T>(T);
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NumberVisitor)
+    }
+}
+
+struct NumberVisitor;
+
+impl Visitor<'_> for NumberVisitor {
+    type Value = Number;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a number")
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Number, E> {
+        Ok(Number(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Number, E> {
+        Ok(Number(value as f64))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Number, E> {
+        Ok(Number(value as f64))
+    }
+}
+
+impl<'de, T: TryFrom<i128> + Bounded> Deserialize<'de> for Whole<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WholeVisitor(PhantomData))
+    }
+}
+
+/// A type with bounds to name.
+trait Bounded {
+    const BOUNDS: (i64, i64);
+}
+
+impl Bounded for i32 {
+    const BOUNDS: (i64, i64) = (i32::MIN as i64, i32::MAX as i64);
+}
+
+impl Bounded for u32 {
+    const BOUNDS: (i64, i64) = (0, u32::MAX as i64);
+}
+
+struct WholeVisitor<T>(PhantomData<T>);
+
+impl<T: TryFrom<i128> + Bounded> Visitor<'_> for WholeVisitor<T> {
+    type Value = Whole<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "a whole number from {} to {}", T::BOUNDS.0, T::BOUNDS.1)
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<Whole<T>, E> {
+        let whole = T::try_from(value.into());
+        whole.map(Whole).map_err(|_| E::invalid_value(de::Unexpected::Signed(value), &self))
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<Whole<T>, E> {
+        let whole = T::try_from(value.into());
+        whole.map(Whole).map_err(|_| E::invalid_value(de::Unexpected::Unsigned(value), &self))
+    }
+}
+
+/// A header, or `auto`, which `ros2 topic pub` fills in: here it is the default.
+#[derive(Default)]
+struct Stamped(HeaderFields);
+
+/// A stamp, or `now`, likewise.
+#[derive(Default)]
+struct Stamp(TimeFields);
+
+impl<'de> Deserialize<'de> for Stamped {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WordOr { word: "auto", build: Stamped })
+    }
+}
+
+impl<'de> Deserialize<'de> for Stamp {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WordOr { word: "now", build: Stamp })
+    }
+}
+
+/// A mapping, or a word or nothing in its place.
+struct WordOr<F, T> {
+    word: &'static str,
+    build: fn(F) -> T,
+}
+
+impl<'de, F: Deserialize<'de> + Default, T> Visitor<'de> for WordOr<F, T> {
+    type Value = T;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "a mapping or `{}`", self.word)
+    }
+
+    fn visit_unit<E>(self) -> Result<T, E> {
+        Ok((self.build)(F::default()))
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {
+        match text == self.word {
+            true => self.visit_unit(),
+            false => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
+        }
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
+        F::deserialize(MapAccessDeserializer::new(map)).map(self.build)
+    }
+}
+
+impl From<Message> for JointTrajectory {
+    fn from(message: Message) -> Self {
+        let HeaderFields { stamp: Stamp(stamp), frame_id } = message.header.0;
+        JointTrajectory {
+            header: Header { stamp: Time { sec: stamp.sec.0, nanosec: stamp.nanosec.0 }, frame_id },
+            joint_names: message.joint_names,
+            points: message.points.into_iter().map(|point| point.value.into()).collect(),
+        }
+    }
+}
+
+impl From<Point> for JointTrajectoryPoint {
+    fn from(point: Point) -> Self {
+        let values = |field: Vec<Number>| field.into_iter().map(|number| number.0).collect();
+        let TimeFields { sec, nanosec } = point.time_from_start;
+        JointTrajectoryPoint {
+            positions: values(point.positions),
+            velocities: values(point.velocities),
+            accelerations: values(point.accelerations),
+            effort: values(point.effort),
+            time_from_start: Duration { sec: sec.0, nanosec: nanosec.0 },
+        }
+    }
+}

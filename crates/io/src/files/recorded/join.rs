@@ -1,0 +1,86 @@
+//! Values of one topic at the stamps of another.
+
+use super::series::Row;
+use virtual_axes_core::units::{MILLISECOND, Nanoseconds, seconds};
+use virtual_axes_identify::recording::Finding;
+
+/// By what messages are put in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Clock {
+    /// `header.stamp`.
+    Stamp,
+    /// When they were recorded.
+    Log,
+}
+
+/// The part of a period beyond which stamps that differ are mentioned.
+const WORTH_MENTION: f64 = 0.01;
+
+/// The stamps that values are wanted at.
+#[derive(Debug)]
+pub(super) struct Times {
+    stamps: Vec<Nanoseconds>,
+    /// Median time from stamp to stamp, ns.
+    period: Nanoseconds,
+}
+
+impl Times {
+    pub fn new(stamps: Vec<Nanoseconds>) -> Self {
+        let mut steps: Vec<Nanoseconds> =
+            stamps.windows(2).map(|pair| pair[1].saturating_sub(pair[0]).saturating_abs()).collect();
+        let middle = steps.len() / 2;
+        let period = if steps.is_empty() { 0 } else { *steps.select_nth_unstable(middle).1 };
+        Times { stamps, period }
+    }
+}
+
+/// The values at `place` of `rows` with the stamps of `times`: of the nearest row, if it is less than half
+/// a period away; else NaN.
+pub(super) fn put(
+    rows: &[Row],
+    place: usize,
+    clock: Clock,
+    times: &Times,
+    what: &str,
+    findings: &mut Vec<Finding>,
+) -> Vec<f64> {
+    let mut others: Vec<(Nanoseconds, f64)> =
+        rows.iter().map(|row| (clock.of(row), row.values[place])).collect();
+    others.sort_by_key(|(time, _)| *time);
+    let mut missing = 0_usize;
+    let mut farthest = 0;
+    let mut at = |stamp: Nanoseconds| {
+        let after = others.partition_point(|(time, _)| *time < stamp);
+        let near = others[after.saturating_sub(1)..].iter().take(2);
+        let distance = |time: Nanoseconds| time.saturating_sub(stamp).saturating_abs();
+        let nearest = near.min_by_key(|(time, _)| distance(*time));
+        match nearest {
+            Some((time, value)) if distance(*time) == 0 || distance(*time) < times.period / 2 => {
+                farthest = farthest.max(distance(*time));
+                *value
+            }
+            _ => {
+                missing += 1;
+                f64::NAN
+            }
+        }
+    };
+    let values = times.stamps.iter().map(|stamp| at(*stamp)).collect();
+    if missing > 0 {
+        findings.push(Finding::warning(
+            "unmatched",
+            format!("{what}: no value at {missing} of {} stamps of the positions", times.stamps.len()),
+            "record every message of both topics, stamped alike",
+        ));
+    }
+    if farthest as f64 > WORTH_MENTION * times.period as f64 {
+        findings.push(Finding::note(
+            "stamps-differ",
+            format!(
+                "{what}: stamps differ from those of the positions by up to {:.3} ms: the nearest value is taken",
+                seconds(farthest) / MILLISECOND
+            ),
+        ));
+    }
+    values
+}

@@ -1,0 +1,193 @@
+//! Channels of a recording, and the units that they can be recorded in.
+
+use std::fmt;
+
+use crate::files::shortened;
+use virtual_axes_core::config::{AxisConfig, AxisKind};
+use virtual_axes_core::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, MILLISECOND, MINUTE, RPM};
+
+/// What is recorded of an axis, as in [`RawRecording`](virtual_axes_identify::recording::RawRecording).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Channel {
+    /// Stamps.
+    Time,
+    /// Set-point at the entrance of the controller.
+    Psec,
+    /// Actual position.
+    Position,
+    /// Actual velocity of the axis.
+    Velocity,
+    /// Motor current.
+    Current,
+    /// VFFWS.
+    VelocityFeedforward,
+    /// TFFWS.
+    TorqueFeedforward,
+}
+
+impl Channel {
+    /// All of them; time and position are needed, the others are not.
+    pub const ALL: [Channel; 7] = [
+        Channel::Time,
+        Channel::Psec,
+        Channel::Position,
+        Channel::Velocity,
+        Channel::Current,
+        Channel::VelocityFeedforward,
+        Channel::TorqueFeedforward,
+    ];
+
+    /// Its name in mappings.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Channel::Time => "time",
+            Channel::Psec => "psec",
+            Channel::Position => "position",
+            Channel::Velocity => "velocity",
+            Channel::Current => "current",
+            Channel::VelocityFeedforward => "velocity_feedforward",
+            Channel::TorqueFeedforward => "torque_feedforward",
+        }
+    }
+
+    /// The one of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|channel| channel.name() == name)
+    }
+
+    /// Whether a recording without it is of no use.
+    pub(super) fn is_needed(self) -> bool {
+        matches!(self, Channel::Time | Channel::Position)
+    }
+
+    /// The units in which it can be recorded of `axis`, with their factors to SI; SI comes first.
+    pub(super) fn units(self, axis: &AxisConfig) -> Vec<(&'static str, f64)> {
+        let linear = axis.kind == AxisKind::Linear;
+        let ratio = axis.transmission_ratio;
+        let constant = axis.motor.torque_constant;
+        // A transmission of 1 m per rad is none: the motor is linear.
+        let linear_motor = linear && ratio == 1.0;
+        let speeds = || if linear { LINEAR_SPEEDS.to_vec() } else { ANGULAR_SPEEDS.to_vec() };
+        // Torque of the motor: N·m at its shaft, or N on the axis.
+        let mut torques = Vec::new();
+        if !linear_motor {
+            torques.push(("N.m", 1.0));
+        }
+        if linear {
+            torques.push(("N", ratio));
+        }
+        let scaled = |units: &[(&'static str, f64)], by: f64| -> Vec<(&'static str, f64)> {
+            units.iter().map(|(symbol, factor)| (*symbol, factor * by)).collect()
+        };
+        match self {
+            Channel::Time => vec![("s", 1.0), ("ms", MILLISECOND), ("us", MICRO), ("ns", NANO)],
+            Channel::Psec | Channel::Position if linear => {
+                vec![("m", 1.0), ("mm", MILLIMETRE), ("um", MICRO)]
+            }
+            Channel::Psec | Channel::Position => {
+                vec![("rad", 1.0), ("deg", DEGREE), ("mdeg", DEGREE * MILLI)]
+            }
+            Channel::Velocity => speeds(),
+            Channel::Current => [CURRENTS.to_vec(), scaled(&torques, 1.0 / constant)].concat(),
+            Channel::VelocityFeedforward if linear_motor => speeds(),
+            Channel::VelocityFeedforward => {
+                let mut units = vec![("rad/s", 1.0), ("rpm", RPM)];
+                if linear {
+                    units.extend(scaled(&LINEAR_SPEEDS, 1.0 / ratio));
+                }
+                units
+            }
+            Channel::TorqueFeedforward => [torques, scaled(&CURRENTS, constant)].concat(),
+        }
+    }
+}
+
+impl fmt::Display for Channel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A thousandth.
+const MILLI: f64 = 1e-3;
+/// A millionth.
+const MICRO: f64 = 1e-6;
+/// A thousand-millionth.
+const NANO: f64 = 1e-9;
+
+/// Speeds of a linear axis in m/s.
+const LINEAR_SPEEDS: [(&str, f64); 4] =
+    [("m/s", 1.0), ("mm/s", MILLIMETRE), ("m/min", METRE_PER_MINUTE), ("mm/min", MILLIMETRE / MINUTE)];
+/// Speeds of a rotary axis in rad/s.
+const ANGULAR_SPEEDS: [(&str, f64); 4] =
+    [("rad/s", 1.0), ("deg/s", DEGREE), ("deg/min", DEGREE / MINUTE), ("rpm", RPM)];
+/// Currents in A.
+const CURRENTS: [(&str, f64); 2] = [("A", 1.0), ("mA", MILLI)];
+
+/// Every symbol.
+const SYMBOLS: [&str; 21] = [
+    "s", "ms", "us", "ns", "m", "mm", "um", "rad", "deg", "mdeg", "m/s", "mm/s", "m/min", "mm/min", "rad/s",
+    "deg/s", "deg/min", "rpm", "A", "mA", "N",
+];
+/// Other ways to write a symbol.
+const SPELLINGS: [(&str, &str); 12] = [
+    ("N.m", "N.m"),
+    ("Nm", "N.m"),
+    ("N·m", "N.m"),
+    ("µs", "us"),
+    ("μs", "us"),
+    ("µm", "um"),
+    ("μm", "um"),
+    ("°", "deg"),
+    ("°/s", "deg/s"),
+    ("°/min", "deg/min"),
+    ("rev/min", "rpm"),
+    ("1/min", "rpm"),
+];
+
+/// A unit as it was given: what one of its numbers is worth is `factor` of `symbol`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Unit {
+    pub factor: f64,
+    pub symbol: &'static str,
+}
+
+impl Unit {
+    /// From the text between the brackets: a factor, if there is one, and a symbol.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        let (factor, symbol) = match text.split_once(char::is_whitespace) {
+            Some((factor, symbol)) => (Some(factor), symbol.trim()),
+            None => (None, text),
+        };
+        let factor = match factor {
+            None => 1.0,
+            Some(factor) => {
+                factor.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor != 0.0).ok_or_else(
+                    || format!("the factor \"{}\" is not a finite number other than 0", shortened(factor)),
+                )?
+            }
+        };
+        let known = SYMBOLS.iter().map(|symbol| (*symbol, *symbol)).chain(SPELLINGS);
+        match known.clone().find(|(spelling, _)| *spelling == symbol) {
+            Some((_, symbol)) => Ok(Unit { factor, symbol }),
+            None => Err(format!(
+                "there is no unit \"{}\"; there are {}, N.m, each behind a factor if need be: [0.1 um]",
+                shortened(symbol),
+                SYMBOLS.join(", ")
+            )),
+        }
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.factor != 1.0 {
+            write!(f, "{} ", self.factor)?;
+        }
+        f.write_str(self.symbol)
+    }
+}

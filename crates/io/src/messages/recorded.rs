@@ -1,0 +1,71 @@
+//! Messages that a recording of the node holds.
+
+use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
+use ros2_interfaces_jazzy_serde::geometry_msgs::msg::PoseStamped;
+use ros2_interfaces_jazzy_serde::nav_msgs::msg::Path;
+use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
+use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
+use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
+use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
+use serde::Serialize;
+
+use super::control::JointTrajectoryControllerState;
+use super::own::{DriveStates, MotorCurrents, TrajectoryResult};
+use super::schema::Schema;
+use super::time::nanoseconds;
+use virtual_axes_core::units::Nanoseconds;
+
+/// A type of message with the definition that a recording carries.
+pub trait Recorded: Serialize {
+    /// The definition.
+    fn schema() -> Schema;
+    /// What the message itself says its time is, ns since the Unix epoch; 0 where it does not say.
+    fn time(&self) -> Nanoseconds;
+}
+
+/// For messages with a header.
+macro_rules! with_header {
+    ($($message:ty => $schema:ident),* $(,)?) => {$(
+        impl Recorded for $message {
+            fn schema() -> Schema {
+                Schema::$schema()
+            }
+
+            fn time(&self) -> Nanoseconds {
+                nanoseconds(&self.header.stamp)
+            }
+        }
+    )*};
+}
+
+with_header! {
+    JointState => joint_state,
+    JointTrajectory => joint_trajectory,
+    MotorCurrents => motor_currents,
+    DriveStates => drive_states,
+    TrajectoryResult => trajectory_result,
+    DiagnosticArray => diagnostic_array,
+    PoseStamped => pose_stamped,
+    Path => path,
+    JointTrajectoryControllerState => controller_state,
+}
+
+impl Recorded for Clock {
+    fn schema() -> Schema {
+        Schema::clock()
+    }
+
+    fn time(&self) -> Nanoseconds {
+        nanoseconds(&self.clock)
+    }
+}
+
+impl Recorded for Log {
+    fn schema() -> Schema {
+        Schema::log()
+    }
+
+    fn time(&self) -> Nanoseconds {
+        nanoseconds(&self.stamp)
+    }
+}

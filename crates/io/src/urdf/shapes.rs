@@ -1,0 +1,209 @@
+//! What the links look like: boxes and cylinders, for the eye only. Nothing is computed from them.
+
+use virtual_axes_core::config::{KinematicsConfig, LimitsConfig};
+use virtual_axes_core::kinematics::Role;
+
+/// Half a stroke that is assumed for the picture where the machine file says none, m.
+const HALF_STROKE: f64 = 0.3;
+/// Largest half stroke that is drawn, m: an axis without end must not fill the picture.
+const LARGEST_HALF_STROKE: f64 = 5.0;
+/// Thickness of plates and of the table, m.
+const PLATE: f64 = 0.04;
+/// Between parts that move past each other, m.
+const GAP: f64 = 0.02;
+/// Cross-section of the slides, m.
+const SLIDE: f64 = 0.16;
+/// Radius of the table, m.
+const TABLE_RADIUS: f64 = 0.2;
+/// Radius of the spindle, m.
+const SPINDLE_RADIUS: f64 = 0.05;
+/// Length of the spindle, m.
+const SPINDLE_LENGTH: f64 = 0.2;
+/// Radius of the tool, m.
+const TOOL_RADIUS: f64 = 0.006;
+/// What edges and places of shapes are rounded to, 1/m: 0.1 mm.
+const ROUNDING: f64 = 1e4;
+/// Radius of the bearings of A, m.
+const BEARING_RADIUS: f64 = 0.07;
+
+/// Name and colour (red, green, blue, opacity) of what a part is painted with.
+pub(super) type Material = (&'static str, [f64; 4]);
+
+pub(super) const CASTING: Material = ("casting", [0.45, 0.48, 0.50, 1.0]);
+pub(super) const SLIDES: Material = ("slides", [0.70, 0.73, 0.76, 1.0]);
+pub(super) const CRADLE: Material = ("cradle", [0.20, 0.38, 0.55, 1.0]);
+pub(super) const TABLE: Material = ("table", [0.55, 0.60, 0.64, 1.0]);
+pub(super) const SPINDLE: Material = ("spindle", [0.25, 0.25, 0.28, 1.0]);
+pub(super) const TOOL: Material = ("tool", [0.85, 0.65, 0.20, 1.0]);
+
+/// Every material, each once.
+pub(super) const MATERIALS: [Material; 6] = [CASTING, SLIDES, CRADLE, TABLE, SPINDLE, TOOL];
+
+/// A shape that fills a space.
+pub(super) enum Geometry {
+    /// Edges along X, Y and Z, m.
+    Box([f64; 3]),
+    /// Along Z unless it is turned, m.
+    Cylinder { radius: f64, length: f64 },
+}
+
+/// A shape in the frame of its link.
+pub(super) struct Visual {
+    pub geometry: Geometry,
+    /// Its middle, m.
+    pub origin: [f64; 3],
+    /// Roll, pitch and yaw, rad.
+    pub turned: [f64; 3],
+    pub material: &'static str,
+}
+
+fn rounded(value: f64) -> f64 {
+    (value * ROUNDING).round() / ROUNDING
+}
+
+/// The box between two corners.
+fn block(from: [f64; 3], to: [f64; 3], (material, _): Material) -> Visual {
+    let edges = std::array::from_fn(|i| rounded((to[i] - from[i]).abs()));
+    let middle = std::array::from_fn(|i| rounded(0.5 * (from[i] + to[i])));
+    Visual { geometry: Geometry::Box(edges), origin: middle, turned: [0.0; 3], material }
+}
+
+/// The cylinder about Z from one height to another.
+fn cylinder(radius: f64, from: f64, to: f64, (material, _): Material) -> Visual {
+    let geometry = Geometry::Cylinder { radius, length: rounded((to - from).abs()) };
+    Visual { geometry, origin: [0.0, 0.0, rounded(0.5 * (from + to))], turned: [0.0; 3], material }
+}
+
+/// The shapes of one machine.
+pub(super) struct Shapes {
+    /// Half strokes of X, Y and Z, m.
+    half: [f64; 3],
+    tool_length: f64,
+    pivot_a: [f64; 2],
+    pivot_c: [f64; 2],
+    /// Height of the table's top in the machine frame at home, m: below the lowest tool tip.
+    top: f64,
+}
+
+impl Shapes {
+    pub fn new<'a>(geometry: &KinematicsConfig, limits: impl Fn(Role) -> Option<&'a LimitsConfig>) -> Self {
+        let half = Role::LINEAR.map(|role| {
+            let reach = limits(role).map(|limits| limits.stroke_max.max(-limits.stroke_min));
+            reach.filter(|reach| reach.is_finite()).unwrap_or(HALF_STROKE).min(LARGEST_HALF_STROKE)
+        });
+        let lowest = (-half[2] - geometry.tool_length).min(geometry.workpiece[2]);
+        Shapes {
+            half,
+            tool_length: geometry.tool_length,
+            pivot_a: geometry.pivot_a,
+            pivot_c: geometry.pivot_c,
+            top: lowest - GAP,
+        }
+    }
+
+    /// Half the room between the side plates of the cradle, m.
+    fn half_cradle(&self) -> f64 {
+        TABLE_RADIUS + self.pivot_c[0].abs() + GAP
+    }
+
+    /// Lower face of the cradle at home, m.
+    fn cradle_bottom(&self) -> f64 {
+        self.top - 2.0 * PLATE - GAP
+    }
+
+    /// Height of the rails of X, above all that turns, m.
+    fn rails(&self) -> f64 {
+        self.half[2] + SPINDLE_LENGTH + 2.0 * SLIDE
+    }
+
+    /// Where the column stands behind the tables, m.
+    fn column(&self) -> f64 {
+        let swing = (self.cradle_bottom() - self.pivot_a[1]).hypot(TABLE_RADIUS + self.pivot_c[1].abs());
+        self.pivot_a[0] + swing + GAP
+    }
+
+    /// Bed, posts that carry A, column with the rails of X.
+    pub fn machine(&self) -> Vec<Visual> {
+        let inner = self.half_cradle() + PLATE + GAP;
+        let (width, back) = (inner + SLIDE, self.column() + SLIDE);
+        // The cradle turns above the bed.
+        let floor = self.pivot_a[1] + self.pivot_a[0] - self.column();
+        let [y, z] = self.pivot_a;
+        let post = |side: f64| {
+            let (from, to) = (side * inner, side * width);
+            block([from, y - SLIDE, floor], [to, y + SLIDE, z + SLIDE], CASTING)
+        };
+        let column = width.max(self.half[0] + SLIDE);
+        vec![
+            block([-column, y - back, floor - SLIDE], [column, back, floor], CASTING),
+            post(-1.0),
+            post(1.0),
+            block([-column, self.column(), floor], [column, back, self.rails() - SLIDE], CASTING),
+        ]
+    }
+
+    /// Two side plates on bearings and a bottom plate, in the frame of A.
+    pub fn cradle(&self) -> Vec<Visual> {
+        let (inner, [y, z]) = (self.half_cradle(), self.pivot_a);
+        let middle = self.pivot_c[1] - y;
+        let bottom = self.cradle_bottom() - z;
+        let plate = |side: f64| {
+            let from = [side * inner, middle - TABLE_RADIUS / 2.0, bottom];
+            block(from, [side * (inner + PLATE), middle + TABLE_RADIUS / 2.0, BEARING_RADIUS], CRADLE)
+        };
+        let bearing = |side: f64| Visual {
+            geometry: Geometry::Cylinder { radius: BEARING_RADIUS, length: PLATE + GAP },
+            origin: [rounded(side * (inner + PLATE)), 0.0, 0.0],
+            turned: [0.0, std::f64::consts::FRAC_PI_2, 0.0],
+            material: CRADLE.0,
+        };
+        let half = TABLE_RADIUS / 2.0;
+        vec![
+            plate(-1.0),
+            plate(1.0),
+            bearing(-1.0),
+            bearing(1.0),
+            block([-inner, middle - half, bottom], [inner, middle + half, bottom + PLATE], CRADLE),
+        ]
+    }
+
+    /// The table of C with a groove that shows how far it has turned, in the frame of C.
+    pub fn table(&self) -> Vec<Visual> {
+        let groove = GAP / 4.0;
+        vec![
+            cylinder(TABLE_RADIUS, self.top - PLATE, self.top, TABLE),
+            block([0.0, -groove, self.top], [TABLE_RADIUS, groove, self.top + groove], SPINDLE),
+        ]
+    }
+
+    /// The carriage on the rails of X, as long as the stroke of Y.
+    pub fn x_slide(&self) -> Vec<Visual> {
+        let rails = self.rails();
+        let from = [-SLIDE, -self.half[1] - SLIDE, rails - SLIDE];
+        vec![block(from, [SLIDE, self.column() + SLIDE, rails], SLIDES)]
+    }
+
+    /// The head that Y moves.
+    pub fn y_slide(&self) -> Vec<Visual> {
+        let bottom = self.rails() - 2.0 * SLIDE;
+        vec![block([-SLIDE, -SLIDE, bottom], [SLIDE, SLIDE, bottom + SLIDE], SLIDES)]
+    }
+
+    /// Quill and spindle; the point that X, Y and Z move is the spindle's nose.
+    pub fn z_slide(&self) -> Vec<Visual> {
+        let quill = SLIDE / 2.0;
+        let (from, to) = (SPINDLE_LENGTH, SPINDLE_LENGTH + 2.0 * self.half[2] + SLIDE);
+        vec![
+            block([-quill, -quill, from], [quill, quill, to], SLIDES),
+            cylinder(SPINDLE_RADIUS, 0.0, SPINDLE_LENGTH, SPINDLE),
+        ]
+    }
+
+    /// From the tip to the spindle's nose; nothing where the tool has no length.
+    pub fn tool(&self) -> Vec<Visual> {
+        if self.tool_length == 0.0 {
+            return Vec::new();
+        }
+        vec![cylinder(TOOL_RADIUS, 0.0, self.tool_length, TOOL)]
+    }
+}

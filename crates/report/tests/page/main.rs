@@ -1,0 +1,8 @@
+//! TODO
+
+mod report_common;
+mod report_compare;
+mod report_document;
+mod report_identification;
+mod report_page;
+mod report_search;

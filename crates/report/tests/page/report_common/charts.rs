@@ -1,0 +1,206 @@
+//! A page of charts with made-up values.
+
+use std::f64::consts::PI;
+
+use virtual_axes_report::report::{
+    Band, BandClass, Chart, ChartAxis, Column, Document, Guide, Notice, NoticeLevel, Panel, Section, Series,
+    SeriesStyle, Table, Unit,
+};
+
+const KILOGRAM: Unit = Unit::new("kg", 1.0, 1e-3);
+/// m/s in a metre per minute.
+const METRE_PER_MINUTE: f64 = 1.0 / 60.0;
+
+/// An axis of a chart.
+pub fn axis(quantity: &str, unit: Unit) -> ChartAxis {
+    ChartAxis::new(quantity, unit)
+}
+
+/// Noise in −1…1 (an xorshift generator).
+pub fn noise(length: usize, seed: u64) -> Vec<f64> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let next = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state as f64 / u64::MAX as f64 * 2.0 - 1.0
+    };
+    std::iter::repeat_with(next).take(length).collect()
+}
+
+/// A law of friction, A over m/s.
+fn friction(velocity: f64) -> f64 {
+    let v = velocity.abs() / METRE_PER_MINUTE;
+    velocity.signum() * (2.4 + 1.6 * (-v / 0.8).exp() + 0.12 * v)
+}
+
+fn friction_law() -> Chart {
+    let speeds = [
+        0.05, 0.1, 0.2, 0.5, 0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.0,
+        20.0,
+    ];
+    let both = speeds.iter().flat_map(|v| [-v, *v]).map(|v| v * METRE_PER_MINUTE);
+    let scatter = noise(2 * speeds.len(), 5);
+    let measured: Vec<[f64; 2]> = both.zip(&scatter).map(|(v, n)| [v, friction(v) + 0.15 * n]).collect();
+    let (fast, slow): (Vec<_>, Vec<_>) = measured.into_iter().partition(|p| p[0] > 0.0);
+    let errors = vec![0.2; speeds.len()];
+    let curve = |sign: f64| (1..=400).map(move |i| sign * f64::from(i) * 0.05 * METRE_PER_MINUTE);
+    let fitted: Vec<[f64; 2]> = curve(-1.0)
+        .collect::<Vec<_>>()
+        .into_iter()
+        .rev()
+        .map(|v| [v, friction(v)])
+        .chain([[0.0, f64::NAN]])
+        .chain(curve(1.0).map(|v| [v, friction(v)]))
+        .collect();
+    let panel = Panel {
+        lines: vec![Guide::new(4.0, "i0 = 4.00 A")],
+        ..Panel::new(
+            axis("Current", Unit::AMPERE),
+            vec![
+                Series::new("measured, forward", SeriesStyle::Points(0), fast).with_errors(errors.clone()),
+                Series::new("measured, backward", SeriesStyle::Points(1), slow).with_errors(errors),
+                Series::new("fitted law", SeriesStyle::Simulated, fitted),
+            ],
+        )
+    };
+    let note = "R² 0.998, bars: standard deviation".to_owned();
+    Chart { note, ..Chart::new("Friction law", axis("Velocity", Unit::METRE_PER_MINUTE), vec![panel]) }
+}
+
+fn inertia() -> Chart {
+    let (values, times, jitter) = (noise(6000, 3), noise(6000, 9), noise(6000, 12));
+    let dots = times.iter().zip(&values).enumerate().map(|(i, (t, n))| {
+        let outlier = if i % 500 == 0 { 60.0 } else { 1.0 };
+        [10.0 * (1.0 + (t * 6.0).floor() / 6.0) + 0.5 + 0.4 * jitter[i], 95.1 + 6.0 * n.powi(3) * outlier]
+    });
+    let panel = Panel {
+        bands: vec![Band::interval("± spread", 93.1, 97.1)],
+        lines: vec![Guide::new(95.1, "robust mean 95.1 kg")],
+        ..Panel::new(
+            axis("Equivalent inertia", KILOGRAM).within(80.0, 110.0),
+            vec![Series::new("instants", SeriesStyle::Points(0), dots.collect())],
+        )
+    };
+    Chart::new("Equivalent inertia", axis("Time", Unit::SECOND), vec![panel])
+}
+
+fn regression() -> Chart {
+    let acceleration: Vec<f64> = noise(4000, 21).iter().map(|n| 3.0 * n).collect();
+    let current: Vec<f64> = acceleration.iter().zip(noise(4000, 8)).map(|(a, n)| 5.2 * a + 0.8 * n).collect();
+    let panel = Panel::new(
+        axis("Feedforward current", Unit::AMPERE),
+        vec![
+            Series::over("recorded", SeriesStyle::Points(0), &acceleration, &current),
+            Series::new("regression", SeriesStyle::Simulated, vec![[-3.0, -15.6], [3.0, 15.6]]),
+        ],
+    );
+    let unit = Unit::new("m/s²", 1.0, 1e-3);
+    Chart {
+        note: "R² 0.994".to_owned(),
+        ..Chart::new("Torque feedforward", axis("Acceleration", unit), vec![panel])
+    }
+}
+
+fn delay() -> Chart {
+    let sums: Vec<[f64; 2]> =
+        (0..=60).map(|i| f64::from(i) * 1e-4).map(|d| [d, 2e-10 + 8e-5 * (d - 2.4e-3).powi(2)]).collect();
+    let unit = Unit::new("µm²", 1e-12, 1.0);
+    let series = vec![
+        Series::new("simulated against recorded", SeriesStyle::Measured, sums.clone()),
+        Series::new("at the comparator", SeriesStyle::Steps(2), sums.iter().step_by(10).copied().collect()),
+    ];
+    Chart {
+        bands: vec![Band::interval("accepted", 1.8e-3, 3.0e-3)],
+        lines: vec![Guide::new(2.4e-3, "2.4 ms")],
+        ..Chart::new(
+            "Delay α",
+            axis("Delay", Unit::MILLISECOND),
+            vec![Panel::new(axis("Sum of squares", unit).with_zero(), series)],
+        )
+    }
+}
+
+/// Deviation, velocity and current of moves there and back, 1 kHz.
+pub fn validation(length: usize) -> Chart {
+    let time: Vec<f64> = (0..length).map(|i| i as f64 * 1e-3).collect();
+    let n = noise(length, 77);
+    let velocity: Vec<f64> =
+        time.iter().map(|t| (2.0 * (PI * t / 4.0).sin()).clamp(-1.0, 1.0) * 0.1).collect();
+    let current: Vec<f64> =
+        velocity.iter().zip(&n).map(|(v, n)| 3.0 * (v * 80.0).tanh() + 20.0 * v + 0.4 * n).collect();
+    let deviation: Vec<f64> = velocity.iter().zip(&n).map(|(v, n)| 3e-5 * v + 1e-6 * n).collect();
+    let panel = |quantity: &str, unit, values: &[f64], factor: f64| {
+        let simulated: Vec<f64> = values.iter().map(|v| v * factor).collect();
+        Panel::new(
+            axis(quantity, unit),
+            vec![
+                Series::over("measured", SeriesStyle::Measured, &time, values),
+                Series::over("simulated", SeriesStyle::Simulated, &time, &simulated),
+            ],
+        )
+    };
+    let count = (length as f64 * 1e-3 / 4.0).ceil() as i32;
+    let bands = (0..count).flat_map(|i| {
+        let start = 4.0 * f64::from(i);
+        [
+            Band::new(BandClass::Accelerating, start - 0.66, start + 0.66),
+            Band::new(BandClass::ConstantVelocity, start + 0.67, start + 2.4),
+            Band::new(BandClass::Static, start + 2.4, start + 3.33),
+        ]
+    });
+    Chart {
+        bands: bands.filter(|band| band.from >= 0.0).collect(),
+        ..Chart::new(
+            "Measured and simulated",
+            axis("Time", Unit::SECOND),
+            vec![
+                panel("Deviation", Unit::MICROMETRE, &deviation, 0.9),
+                panel("Velocity", Unit::METRE_PER_MINUTE, &velocity, 1.02),
+                panel("Current", Unit::AMPERE, &current, 0.85),
+            ],
+        )
+    }
+}
+
+/// A page with each kind of chart, as an identification has them.
+pub fn example() -> Document {
+    let table = Table {
+        caption: "Parameters".to_owned(),
+        columns: vec![
+            Column::new("parameter", ""),
+            Column::new("value", "kg"),
+            Column::new("± (95 %)", "kg"),
+        ],
+        rows: vec![vec!["inertia".to_owned(), "95.1".to_owned(), "-0.4".to_owned()]],
+    };
+    let section = |heading: &str, chart| Section { charts: vec![chart], ..Section::new(heading) };
+    Document {
+        title: "Identification of the X axis".to_owned(),
+        description: "Made from three recordings.".to_owned(),
+        facts: vec![
+            ("recording".to_owned(), "off.csv".to_owned()),
+            ("recording".to_owned(), "both.csv".to_owned()),
+            ("cut-off".to_owned(), "40 Hz".to_owned()),
+        ],
+        sections: vec![
+            Section {
+                paragraphs: vec!["Currents at constant velocity, gravity taken away.".to_owned()],
+                notices: vec![
+                    Notice::new(NoticeLevel::Note, "forward and backward differ by 2 %"),
+                    Notice::new(NoticeLevel::Warning, "the current is saturated in 12 instants"),
+                    Notice::new(
+                        NoticeLevel::Missing,
+                        "γ cannot be seen without torque feedforward; record with both",
+                    ),
+                ],
+                tables: vec![table],
+                ..section("Friction", friction_law())
+            },
+            section("Inertia", inertia()),
+            section("Feedforward", regression()),
+            section("Delays", delay()),
+            section("Validation", validation(20_000)),
+        ],
+    }
+}

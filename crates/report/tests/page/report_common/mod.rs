@@ -1,0 +1,252 @@
+//! Recordings of simulated runs, for reports.
+
+pub mod charts;
+
+use virtual_axes_core::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
+use virtual_axes_core::config::AxisKind;
+use virtual_axes_report::report::{Column, ReportRun, Table};
+
+use virtual_axes_verification::fixtures::common::{self, AXES, Ballbar, machine};
+
+/// Names and kinds of the default machine's axes.
+const JOINTS: [(&str, AxisKind); AXES] = [
+    ("x", AxisKind::Linear),
+    ("y", AxisKind::Linear),
+    ("z", AxisKind::Linear),
+    ("a", AxisKind::Rotary),
+    ("c", AxisKind::Rotary),
+];
+
+/// A position period of the default machine, ticks.
+pub const PERIOD: u64 = 48;
+/// Ticks between two points of a circle.
+const CIRCLE_TICKS: u64 = 4;
+
+/// Velocity feedforward of X and Y off.
+pub const NO_FEEDFORWARD: [(&str, f64); 4] = [
+    ("x.feedforward.velocity", 0.0),
+    ("y.feedforward.velocity", 0.0),
+    ("x.feedforward.torque_kg_m2", 0.0),
+    ("y.feedforward.torque_kg_m2", 0.0),
+];
+
+/// An axis without samples.
+pub fn empty_axis(name: &str, kind: AxisKind) -> AxisTrace {
+    let none = Vec::new;
+    AxisTrace {
+        name: name.to_owned(),
+        kind,
+        moves: true,
+        psec: none(),
+        position: none(),
+        tracking_error: none(),
+        synchronized_tracking_error: none(),
+        velocity: none(),
+        current: none(),
+        current_setpoint: none(),
+        friction_current: none(),
+        gravity_current: none(),
+        load_current: none(),
+    }
+}
+
+/// Every `every`th tick of a motion; `nearest` finds the point of the path that a tip is nearest to.
+pub fn record(
+    changes: &[(&str, f64)],
+    duration: f64,
+    psec: impl Fn(f64) -> [f64; AXES],
+    nearest: impl Fn([f64; 3]) -> [f64; 3],
+    every: u64,
+) -> Recording {
+    let mut machine = machine(changes);
+    let mut axes = JOINTS.map(|(name, kind)| empty_axis(name, kind)).to_vec();
+    let mut tool = ToolTrace::default();
+    let mut recording = Recording::default();
+    common::run(&mut machine, duration, psec, |time, machine| {
+        if !machine.tick().is_multiple_of(every) {
+            return;
+        }
+        recording.time.push(time);
+        let mut tip = [0.0; 3];
+        for (i, axis) in axes.iter_mut().enumerate() {
+            let s = machine.axis(i).sample();
+            axis.psec.push(s.psec);
+            axis.position.push(s.position);
+            axis.tracking_error.push(s.tracking_error());
+            axis.synchronized_tracking_error.push(s.synchronized_tracking_error());
+            axis.velocity.push(s.velocity);
+            axis.current.push(s.current);
+            axis.current_setpoint.push(s.current_setpoint);
+            axis.friction_current.push(s.friction_current);
+            axis.gravity_current.push(s.gravity_current);
+            axis.load_current.push(s.load_current);
+            if i < 3 {
+                tip[i] = s.position;
+            }
+        }
+        let reference = nearest(tip);
+        let error = (0..3).map(|i| (tip[i] - reference[i]).powi(2)).sum::<f64>().sqrt();
+        tool.reference.push(reference);
+        tool.position.push(tip);
+        tool.contour_error.push(error);
+    });
+    for axis in &mut axes {
+        let first = axis.psec.first().copied();
+        axis.moves = axis.psec.iter().any(|p| Some(*p) != first);
+    }
+    recording.axes = axes;
+    recording.tool = Some(tool);
+    recording
+}
+
+/// The ballbar trial, counterclockwise and, unless `one_way`, clockwise as well.
+pub fn ballbar(changes: &[(&str, f64)], every: u64, one_way: bool) -> Recording {
+    let trial = Ballbar::paper();
+    let radius = trial.radius;
+    let nearest = |tip: [f64; 3]| {
+        let angle = tip[1].atan2(tip[0] + radius);
+        [radius * (angle.cos() - 1.0), radius * angle.sin(), 0.0]
+    };
+    let mut recording = record(changes, trial.duration(), |t| trial.psec(t), nearest, every);
+    // A circle is judged at every tick; a few are enough to draw it.
+    let finer = record(changes, trial.duration(), |t| trial.psec(t), nearest, CIRCLE_TICKS);
+    recording.circles.push(circle(&finer, trial, true));
+    if !one_way {
+        let backwards = |t: f64| {
+            let [x, y, z, a, c] = trial.psec(t);
+            [x, -y, z, a, c]
+        };
+        let other = record(changes, trial.duration(), backwards, nearest, CIRCLE_TICKS);
+        recording.circles.push(circle(&other, trial, false));
+    }
+    recording
+}
+
+/// The steady part.
+fn circle(recording: &Recording, trial: Ballbar, counterclockwise: bool) -> CircleTrace {
+    let window = trial.window();
+    let tool = recording.tool.as_ref().expect("it has a tool");
+    let steady = recording.time.iter().zip(&tool.position).filter(|(t, _)| window.contains(t));
+    let (angle, deviation) =
+        steady.map(|(_, p)| (p[1].atan2(p[0] + trial.radius), trial.radial_deviation(p[0], p[1]))).unzip();
+    CircleTrace {
+        plane: ["x", "y"].map(str::to_owned),
+        radius: trial.radius,
+        counterclockwise,
+        angle,
+        deviation,
+    }
+}
+
+/// The nearest point of a motion's tip, sought forward from the last one.
+fn nearest_on(psec: impl Fn(f64) -> [f64; AXES], duration: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
+    let step = 2e-4;
+    let count = (duration / step).ceil() as u32;
+    let path: Vec<[f64; 3]> = (0..=count)
+        .map(|i| {
+            let [x, y, z, ..] = psec(f64::from(i) * step);
+            [x, y, z]
+        })
+        .collect();
+    let last = std::cell::Cell::new(0);
+    move |tip| {
+        let distance = |i: usize| (0..3).map(|k| (path[i][k] - tip[k]).powi(2)).sum::<f64>();
+        let from = last.get();
+        let near = from..(from + 300).min(path.len());
+        // Of equal ones the last: the motion goes on from a rest.
+        let best = near.rev().min_by(|&i, &j| distance(i).total_cmp(&distance(j))).unwrap_or(from);
+        last.set(best);
+        path[best]
+    }
+}
+
+/// All five axes swing, each at its own tempo.
+pub fn five_axes(every: u64) -> Recording {
+    let amplitudes = [0.05, -0.03, 0.02, 0.4, 1.0];
+    let duration = 7.5;
+    let psec = |t: f64| {
+        let mut values = amplitudes;
+        for (i, value) in values.iter_mut().enumerate() {
+            // From rest to rest: a turn of a cosine whose argument starts and ends at rest.
+            let phase = (t / duration).clamp(0.0, 1.0);
+            let turns = [1.0, 2.0, 3.0, 1.0, 2.0][i];
+            let smooth = phase * phase * (3.0 - 2.0 * phase);
+            *value *= (1.0 - (std::f64::consts::TAU * turns * smooth).cos()) / 2.0;
+        }
+        values
+    };
+    let mut recording = record(&[], duration, psec, nearest_on(psec, duration), every);
+    if let Some(tool) = &mut recording.tool {
+        let c = &recording.axes[4].synchronized_tracking_error;
+        tool.orientation_error = c.iter().map(|e| e.abs()).collect();
+    }
+    recording
+}
+
+/// Figures of the axes that move, as on a terminal.
+pub fn figures(recording: &Recording) -> Table {
+    let peak = |values: &[f64]| values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let columns = [("axis", ""), ("largest synchronised error", "µm, mdeg"), ("peak current", "A")];
+    let rows = recording.axes.iter().filter(|a| a.moves).map(|a| {
+        let unit = if a.kind == AxisKind::Linear { 1e6 } else { 180e3 / std::f64::consts::PI };
+        let error = peak(&a.synchronized_tracking_error) * unit;
+        vec![a.name.clone(), format!("{error:.1}"), format!("{:.2}", peak(&a.current))]
+    });
+    Table {
+        caption: "Axes".to_owned(),
+        columns: columns.map(|(name, unit)| Column::new(name, unit)).to_vec(),
+        rows: rows.collect(),
+    }
+}
+
+/// A run of a report with its figures.
+pub fn report_run<'a>(title: &'a str, recording: &'a Recording) -> ReportRun<'a> {
+    let facts = [("machine", "mikron_ucp710"), ("controller", title)];
+    let facts = facts.map(|(name, value)| (name.to_owned(), value.to_owned())).to_vec();
+    ReportRun { title, facts, tables: vec![figures(recording)], recording }
+}
+
+/// The pictures of a page.
+pub fn pictures(page: &str) -> Vec<&str> {
+    let pictures = page.split("<svg role=\"img\"").skip(1);
+    pictures.map(|rest| rest.split_once("</svg>").expect("it ends").0).collect()
+}
+
+/// What stands between `before` and `after`, each time.
+pub fn between<'a>(text: &'a str, before: &'a str, after: &'a str) -> Vec<&'a str> {
+    text.split(before).skip(1).map(|rest| rest.split_once(after).expect("it ends").0).collect()
+}
+
+/// Points of a path, pixels.
+pub fn points(path: &str) -> Vec<[f64; 2]> {
+    let mut spaced = String::new();
+    for c in path.chars() {
+        if "Mlh-".contains(c) {
+            spaced.push(' ');
+        }
+        spaced.push(c);
+        if "Mlh".contains(c) {
+            spaced.push(' ');
+        }
+    }
+    let (mut points, mut numbers) = (Vec::<[f64; 2]>::new(), Vec::new());
+    let mut absolute = false;
+    for token in spaced.split_whitespace() {
+        match token {
+            "M" | "l" | "h" => absolute = token == "M",
+            number => numbers.push(number.parse::<f64>().expect("a number")),
+        }
+        if let [x, y] = numbers[..] {
+            let [x0, y0] = if absolute { [0.0, 0.0] } else { *points.last().expect("a start") };
+            points.push([x0 + x, y0 + y]);
+            numbers.clear();
+        }
+    }
+    points
+}
+
+/// A picture whose title starts so.
+pub fn picture<'a>(page: &'a str, title: &str) -> &'a str {
+    let found = pictures(page).into_iter().find(|p| p.contains(&format!("-t\">{title}")));
+    found.unwrap_or_else(|| panic!("no picture {title}"))
+}

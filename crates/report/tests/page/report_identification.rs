@@ -1,0 +1,396 @@
+//! The page of an identification: every step is told, and what is missing is told as missing.
+
+use std::sync::LazyLock;
+
+use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig, Parameters};
+use virtual_axes_identify::identify::campaign::Options as Course;
+use virtual_axes_identify::identify::{
+    Agreement, FeedforwardMode, Identification, Identified, Input, Options, Refine, identify, validate,
+};
+use virtual_axes_identify::recording::{Conditioning, Finding, RawRecording, Signals, condition};
+use virtual_axes_report::report::{
+    Chart, Document, IdentificationCheck, IdentificationPage, Section, Series, Table,
+};
+use virtual_axes_verification::fixtures::common::{M_MIN, TSP, parameters};
+use virtual_axes_verification::fixtures::recordings::{Disturbance, place, record_campaign};
+
+/// Headings of the sections, in their order.
+const SECTIONS: [&str; 9] = [
+    "What was found",
+    "Recordings",
+    "Gravity",
+    "Friction law",
+    "Equivalent inertia",
+    "Feedforward",
+    "Delays",
+    "Refinement on the closed loop",
+    "Measured against simulated",
+];
+
+/// An axis with its recordings.
+struct Bench {
+    parameters: Parameters,
+    machine: MachineConfig,
+    axis: String,
+    recordings: Vec<(FeedforwardMode, Signals)>,
+    findings: Vec<Vec<Finding>>,
+}
+
+impl Bench {
+    fn new(
+        parameters: Parameters,
+        axis: &str,
+        parts: &[FeedforwardMode],
+        course: &Course,
+        change: impl Fn(&mut RawRecording),
+    ) -> Self {
+        let machine = parameters.machine_config().expect("valid");
+        let config = &machine.axes()[place(&machine, axis)];
+        let disturbance = Disturbance::usual(config.kind(), 11);
+        let (mut recordings, mut findings) = (Vec::new(), Vec::new());
+        for (mode, mut raw) in record_campaign(&parameters, axis, parts, course, &disturbance) {
+            change(&mut raw);
+            let (signals, found) =
+                condition(&raw, config, &machine.periods(), &Conditioning::default()).expect("fit for use");
+            recordings.push((mode, signals));
+            findings.push(found);
+        }
+        Bench { machine, axis: axis.to_owned(), recordings, findings, parameters }
+    }
+
+    fn config(&self) -> &AxisConfig {
+        &self.machine.axes()[place(&self.machine, &self.axis)]
+    }
+
+    fn inputs(&self) -> Vec<Input<'_>> {
+        self.recordings.iter().map(|(mode, signals)| Input { signals, feedforward: Some(*mode) }).collect()
+    }
+
+    fn identify(&self, refine: bool) -> (Identification, Vec<Identified>) {
+        let refine = if refine { Refine::ALL } else { Refine::NONE };
+        let options = Options { refine, ..Options::default() };
+        let found = identify(&self.inputs(), self.config(), &self.machine.periods(), &options);
+        let values = found.values(&self.parameters, &self.axis);
+        (found, values)
+    }
+
+    fn document(&self, found: &Identification, values: &[Identified]) -> Document {
+        self.checked(found, values, &[])
+    }
+
+    fn checked(
+        &self,
+        identification: &Identification,
+        values: &[Identified],
+        validations: &[IdentificationCheck<'_>],
+    ) -> Document {
+        let page = IdentificationPage {
+            machine: self.machine.name(),
+            periods: self.machine.periods(),
+            inputs: &self.inputs(),
+            findings: &self.findings,
+            identification,
+            values,
+            validations,
+        };
+        page.document()
+    }
+}
+
+/// X over a short stroke, all parts, refined; validated on the recording with velocity feedforward, and on the
+/// same without PSEC.
+struct Whole {
+    bench: Bench,
+    found: Identification,
+    values: Vec<Identified>,
+    blind: Signals,
+    validations: Vec<Agreement>,
+}
+
+static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
+    // A machine file that is off, so that there is something to find.
+    let truth = parameters::<&str>(&[]);
+    let course = Course { range: Some([0.0, 0.3]), max_feed: Some(12.0 * M_MIN) };
+    let mut bench = Bench::new(truth, "x", &FeedforwardMode::ALL, &course, |_| {});
+    let off = parameters(&[("x.motor.inertia_kg_m2", 0.024), ("x.friction.a", 1.4)]);
+    bench.machine = off.machine_config().expect("valid");
+    bench.parameters = off;
+    let (found, values) = bench.identify(true);
+    let mut blind = bench.recordings[1].1.clone();
+    blind.name = "blind".to_owned();
+    blind.spans.iter_mut().for_each(|span| span.psec = None);
+    let check = |signals| {
+        let input = Input { signals, feedforward: Some(FeedforwardMode::Velocity) };
+        validate(&input, found.axis(), &bench.machine.periods()).expect("it can be simulated")
+    };
+    let validations = vec![check(&bench.recordings[1].1), check(&blind)];
+    Whole { bench, found, values, blind, validations }
+});
+
+impl Whole {
+    fn document(&self) -> Document {
+        let signals = [&self.bench.recordings[1].1, &self.blind];
+        let checks: Vec<IdentificationCheck> = signals
+            .iter()
+            .zip(&self.validations)
+            .map(|(signals, agreement)| IdentificationCheck {
+                input: Input { signals, feedforward: Some(FeedforwardMode::Velocity) },
+                findings: &[],
+                agreement,
+            })
+            .collect();
+        self.bench.checked(&self.found, &self.values, &checks)
+    }
+}
+
+fn page(document: &Document) -> String {
+    let mut bytes = Vec::new();
+    document.write(&mut bytes).expect("memory takes it");
+    String::from_utf8(bytes).expect("UTF-8")
+}
+
+/// For a look at it.
+fn keep(name: &str, page: &str) {
+    let path = format!("{}/identification_{name}.html", env!("CARGO_TARGET_TMPDIR"));
+    std::fs::write(path, page).expect("a folder of its own");
+}
+
+fn headings(document: &Document) -> Vec<&str> {
+    document.sections.iter().map(|section| section.heading.as_str()).collect()
+}
+
+fn section<'a>(document: &'a Document, heading: &str) -> &'a Section {
+    let found = document.sections.iter().find(|section| section.heading == heading);
+    found.unwrap_or_else(|| panic!("no section {heading}"))
+}
+
+fn text(section: &Section) -> String {
+    let notices = section.notices.iter().map(|notice| notice.text.clone());
+    section.paragraphs.iter().cloned().chain(notices).collect::<Vec<_>>().join(" ")
+}
+
+fn table<'a>(section: &'a Section, caption: &str) -> &'a Table {
+    let found = section.tables.iter().find(|table| table.caption == caption);
+    found.unwrap_or_else(|| panic!("no table {caption}"))
+}
+
+fn chart<'a>(section: &'a Section, title: &str) -> &'a Chart {
+    let found = section.charts.iter().find(|chart| chart.title == title);
+    found.unwrap_or_else(|| panic!("no chart {title}"))
+}
+
+fn series<'a>(chart: &'a Chart, quantity: &str, label: &str) -> &'a Series {
+    let panel = chart.panels.iter().find(|panel| panel.y.quantity == quantity);
+    let panel = panel.unwrap_or_else(|| panic!("no panel {quantity}"));
+    panel.series.iter().find(|s| s.label == label).unwrap_or_else(|| panic!("no series {label}"))
+}
+
+fn value(cell: &str) -> f64 {
+    let plain: String = cell.chars().filter(|c| !c.is_whitespace()).collect();
+    plain.replace('−', "-").parse().unwrap_or_else(|_| panic!("{cell} is no number"))
+}
+
+/// Elements are closed in the order in which they were opened.
+fn assert_well_formed(page: &str) {
+    let mut open: Vec<&str> = Vec::new();
+    let mut rest = page.strip_prefix("<!DOCTYPE html>").expect("a document type");
+    while let Some((_, after)) = rest.split_once('<') {
+        let (tag, after) = after.split_once('>').expect("tags end");
+        let name = tag.trim_matches('/').split(' ').next().unwrap_or_default();
+        if tag.starts_with('/') {
+            assert_eq!(open.pop(), Some(name), "{tag}");
+        } else if name != "meta" && !tag.ends_with('/') {
+            open.push(name);
+        }
+        rest = after;
+    }
+    assert!(open.is_empty() && rest.trim().is_empty(), "{open:?} {rest}");
+}
+
+fn assert_sound(page: &str) {
+    assert_well_formed(page);
+    for forbidden in ["http:", "https:", "src=", "url(", "@import", "<link", "<script", "href", "NaN", "inf "]
+    {
+        assert!(!page.contains(forbidden), "{forbidden}");
+    }
+}
+
+#[test]
+fn every_step_is_told_with_its_picture() {
+    let document = WHOLE.document();
+    let text_of_page = page(&document);
+    keep("x", &text_of_page);
+    assert_sound(&text_of_page);
+    let (steps, validations) = (&headings(&document)[..9], &headings(&document)[9..]);
+    assert_eq!(steps, SECTIONS);
+    assert_eq!(validations, ["Validation on velocity", "Validation on blind"]);
+    for (section, pictures) in document.sections.iter().zip([0, 3, 1, 1, 1, 2, 3, 0, 3, 1, 1]) {
+        assert!(section.charts.len() >= pictures, "{}", section.heading);
+        assert!(!section.paragraphs.is_empty(), "{}", section.heading);
+        assert!(
+            !section.tables.is_empty() || ["Equivalent inertia", "Feedforward"].contains(&&*section.heading)
+        );
+    }
+    for name in ["off", "velocity", "both"] {
+        assert!(document.facts.contains(&("identified from".to_owned(), name.to_owned())), "{name}");
+    }
+}
+
+#[test]
+fn the_same_identification_gives_the_same_bytes() {
+    assert_eq!(page(&WHOLE.document()), page(&WHOLE.document()));
+}
+
+#[test]
+fn every_value_stands_in_the_first_table() {
+    let document = WHOLE.document();
+    let found = table(section(&document, "What was found"), "Identified values");
+    assert!(WHOLE.values.len() >= 9, "{:?}", WHOLE.values);
+    for (row, wanted) in found.rows.iter().zip(&WHOLE.values) {
+        assert_eq!(row[0], wanted.key);
+        assert_eq!(row[1].parse(), Ok(wanted.value));
+        assert_eq!(row[4].parse(), Ok(wanted.before));
+        assert_eq!((row[3].as_str(), &row[5]), (wanted.unit, &wanted.source));
+        assert_eq!(row[2].contains('…'), wanted.interval.is_some(), "{row:?}");
+    }
+    let inertia = found.rows.iter().find(|row| row[0] == "x.motor.inertia_kg_m2").expect("it was identified");
+    assert_eq!(inertia[4], "0.024");
+}
+
+#[test]
+fn the_friction_table_compares_each_speed_with_the_law() {
+    let document = WHOLE.document();
+    let friction = section(&document, "Friction law");
+    let rows = &table(friction, "Constant velocities").rows;
+    assert_eq!(rows.len(), WHOLE.found.steady.levels.len());
+    assert!(rows.len() >= 20, "{}", rows.len());
+    for row in rows {
+        let cells: Vec<f64> = row.iter().map(|cell| value(cell)).collect();
+        let (v, part, law) = (cells[0], cells[2], cells[4]);
+        // The law of X (Prévost Appendix 2), V in m/min.
+        let speed = v.abs();
+        let truth = 1.576 * (0.019_65 * speed).exp() - 0.5332 * (-0.2801 * speed).exp();
+        assert!((law - truth.copysign(v)).abs() < 0.03 * truth, "{row:?}: {truth}");
+        let difference = 100.0 * (law - part) / part;
+        // Half a unit in the last digit of all three.
+        let rounding = 0.05 + 100.0 * 2.0 * 0.5e-3 / part.abs();
+        assert!((cells[5] - difference).abs() <= rounding, "{row:?}: {difference}");
+    }
+    // Points in the picture are those of the table, in m/s and A.
+    let picture = chart(friction, "Friction law");
+    let minus = series(picture, "Friction current", "measured towards minus");
+    assert!(minus.points.iter().all(|[v, i]| *v < 0.0 && *i < 0.0));
+    assert_eq!(minus.points.len(), rows.iter().filter(|row| value(&row[0]) < 0.0).count());
+    assert_eq!(minus.errors.len(), minus.points.len());
+    let fastest = series(picture, "Friction current", "fitted law").points.last().copied().expect("a line");
+    assert!((fastest[0] / M_MIN / value(&rows.last().expect("rows")[0]) - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn pictures_show_simulated_minus_measured_and_a_fast_move_of_the_long_one() {
+    let document = WHOLE.document();
+    let compared = section(&document, "Measured against simulated");
+    let whole = chart(compared, "off, feedforward off");
+    let (experiment, simulated) =
+        (&WHOLE.found.agreements[0].experiments[0], &WHOLE.found.agreements[0].simulated[0]);
+    let deviation = series(whole, "Deviation", "");
+    assert_eq!(deviation.points.len(), experiment.position.len());
+    for (i, [time, value]) in deviation.points.iter().enumerate() {
+        assert!((time - experiment.start - i as f64 * TSP).abs() < 1e-9);
+        assert_eq!(*value, simulated.position[i] - experiment.position[i]);
+    }
+    for quantity in ["Tracking error", "Velocity", "Current"] {
+        for label in ["measured", "simulated"] {
+            assert_eq!(series(whole, quantity, label).points.len(), deviation.points.len());
+        }
+    }
+    let rows = &table(compared, "Simulated minus measured").rows;
+    assert_eq!(rows.len(), 3);
+    // Without feedforward X lags by V/Kp, 25 s⁻¹, and by α, whose 9 ms are two position periods.
+    let window = chart(compared, "off, feedforward off: a fast move");
+    let errors = series(window, "Tracking error", "measured");
+    let lag = errors.points.iter().map(|point| point[1].abs()).fold(0.0, f64::max);
+    assert!((lag / (12.0 * M_MIN * (1.0 / 25.0 + 2.0 * TSP)) - 1.0).abs() < 0.01, "{lag}");
+    assert!(errors.points.len() < deviation.points.len() / 20);
+    let classes: Vec<_> = window.bands.iter().map(|band| band.label.as_str()).collect();
+    assert!(classes.contains(&"constant velocity") && classes.contains(&"accelerating"), "{classes:?}");
+}
+
+#[test]
+fn a_recording_without_setpoints_is_compared_by_inverse_dynamics() {
+    let document = WHOLE.document();
+    let blind = section(&document, "Validation on blind");
+    assert!(text(blind).contains("has no PSEC"), "{}", text(blind));
+    let picture = chart(blind, "blind: current by inverse dynamics");
+    let measured = series(picture, "Current", "measured");
+    assert_eq!(measured.points.len(), series(picture, "Current", "modelled").points.len());
+    assert_eq!(blind.tables.len(), 2);
+}
+
+#[test]
+fn what_is_missing_is_told() {
+    let course = Course { range: Some([0.0, 0.1]), max_feed: Some(5.0 * M_MIN) };
+    let bench = Bench::new(parameters::<&str>(&[]), "y", &[FeedforwardMode::Velocity], &course, |raw| {
+        (raw.psec, raw.current, raw.velocity_feedforward, raw.torque_feedforward) = (None, None, None, None);
+    });
+    let (found, values) = bench.identify(true);
+    assert!(values.is_empty());
+    let document = bench.document(&found, &values);
+    let text_of_page = page(&document);
+    keep("y", &text_of_page);
+    assert_sound(&text_of_page);
+    assert_eq!(headings(&document), SECTIONS);
+    for (heading, wanted) in [
+        ("Gravity", "record the motor current"),
+        ("Delays", "record the position set-points"),
+        ("What was found", "no parameter"),
+        ("What was found", "record the motor current"),
+        ("What was found", "record the position set-points"),
+        ("Gravity", "not identified"),
+        ("Friction law", "No friction law"),
+        ("Equivalent inertia", "not identified"),
+        ("Feedforward", "VFFW was not identified"),
+        ("Delays", "No delay"),
+        ("Refinement on the closed loop", "There is none"),
+        ("Measured against simulated", "nothing to compare"),
+    ] {
+        let told = text(section(&document, heading));
+        assert!(told.contains(wanted), "{heading}: {told}");
+    }
+    // What it does when is still seen.
+    assert_eq!(section(&document, "Recordings").charts.len(), 1);
+    assert!(section(&document, "Measured against simulated").charts.is_empty());
+}
+
+#[test]
+fn a_tilting_axis_is_told_in_degrees() {
+    let parts = [FeedforwardMode::Both];
+    let course = Course { range: None, max_feed: None };
+    let bench = Bench::new(parameters::<&str>(&[]), "a", &parts, &course, |_| {});
+    assert_eq!(bench.config().kind(), AxisKind::Rotary);
+    let (found, values) = bench.identify(false);
+    let document = bench.document(&found, &values);
+    let text_of_page = page(&document);
+    keep("a", &text_of_page);
+    assert_sound(&text_of_page);
+    for wanted in ["Velocity (rpm)", "Deviation (mdeg)", "kg·m²", "min/rev", "factor of sin q"] {
+        assert!(text_of_page.contains(wanted), "{wanted}");
+    }
+    for unwanted in ["m/min", "µm", "(mm)"] {
+        assert!(!text_of_page.contains(unwanted), "{unwanted}");
+    }
+}
+
+#[test]
+fn a_linear_motor_has_a_mass() {
+    let course = Course { range: None, max_feed: None };
+    let machine = Parameters::builtin("linear_motor_center").expect("it is shipped");
+    let bench = Bench::new(machine, "x", &[FeedforwardMode::Both], &course, |_| {});
+    let (found, values) = bench.identify(false);
+    let document = bench.document(&found, &values);
+    let text_of_page = page(&document);
+    keep("linear_motor", &text_of_page);
+    assert_sound(&text_of_page);
+    assert!(text_of_page.contains("linear motor") && text_of_page.contains("Equivalent inertia (kg)"));
+    assert!(!text_of_page.contains("kg·m²") && !text_of_page.contains("rad/s"));
+}

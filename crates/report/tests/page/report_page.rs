@@ -1,0 +1,336 @@
+//! The report as a whole: what stands in it, and what must never.
+
+use std::sync::LazyLock;
+
+use crate::report_common::{
+    NO_FEEDFORWARD, PERIOD, ballbar, between, empty_axis, five_axes, picture, pictures, points, report_run,
+};
+use virtual_axes_core::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
+use virtual_axes_core::config::AxisKind;
+use virtual_axes_report::report::{Column, Report, ReportRun, Table};
+
+static BALLBAR: LazyLock<[Recording; 2]> =
+    LazyLock::new(|| [ballbar(&[], PERIOD, false), ballbar(&NO_FEEDFORWARD, PERIOD, false)]);
+
+fn page(title: &str, runs: Vec<ReportRun>) -> String {
+    let mut bytes = Vec::new();
+    Report { title, description: "", runs }.write(&mut bytes).expect("memory takes it");
+    String::from_utf8(bytes).expect("UTF-8")
+}
+
+fn two_runs() -> Vec<ReportRun<'static>> {
+    let [with, without] = &*BALLBAR;
+    vec![report_run("cascade", with), report_run("cascade-noff", without)]
+}
+
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !c.is_alphanumeric())
+}
+
+/// A run of one axis whose every signal is `values`.
+fn run_of(values: &[f64]) -> Recording {
+    let x = AxisTrace {
+        psec: values.to_vec(),
+        position: values.to_vec(),
+        tracking_error: values.to_vec(),
+        synchronized_tracking_error: values.to_vec(),
+        velocity: values.to_vec(),
+        current: values.to_vec(),
+        current_setpoint: values.to_vec(),
+        friction_current: values.to_vec(),
+        gravity_current: values.to_vec(),
+        load_current: values.to_vec(),
+        ..empty_axis("x", AxisKind::Linear)
+    };
+    let reference: Vec<[f64; 3]> = values.iter().map(|&v| [v, 2.0 * v, 0.0]).collect();
+    let position = values.iter().map(|&v| [v, 2.1 * v, 1e-6]).collect();
+    let tool =
+        ToolTrace { reference, position, contour_error: values.to_vec(), orientation_error: values.to_vec() };
+    let circle = CircleTrace {
+        plane: ["x", "y"].map(str::to_owned),
+        radius: 0.1,
+        counterclockwise: false,
+        angle: values.to_vec(),
+        deviation: values.to_vec(),
+    };
+    let time = (0..values.len()).map(|i| i as f64 * 0.006).collect();
+    Recording { time, axes: vec![x], tool: Some(tool), circles: vec![circle] }
+}
+
+/// Noise in −1…1 (an xorshift generator).
+fn noise(length: usize, seed: u64) -> Vec<f64> {
+    let mut state = seed;
+    let next = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state as f64 / u64::MAX as f64 * 2.0 - 1.0
+    };
+    std::iter::repeat_with(next).take(length).collect()
+}
+
+#[test]
+fn names_from_users_are_inert() {
+    let evil = "</title><script>alert(1)</script><img src=x onerror=alert(2)> \" ' &amp;";
+    let mut recording = run_of(&[0.0, 1e-3, 2e-3]);
+    recording.axes[0].name = evil.to_owned();
+    recording.circles[0].plane[0] = evil.to_owned();
+    let mut standing = AxisTrace { moves: false, ..empty_axis(evil, AxisKind::Rotary) };
+    standing.psec = vec![0.0; 3];
+    recording.axes.push(standing);
+    let table = Table {
+        caption: evil.to_owned(),
+        columns: vec![Column::new(evil, evil); 2],
+        rows: vec![vec![evil.to_owned(); 2]],
+    };
+    let run = || ReportRun {
+        title: evil,
+        facts: vec![(evil.to_owned(), evil.to_owned())],
+        tables: vec![table.clone()],
+        recording: &recording,
+    };
+    let mut bytes = Vec::new();
+    let report = Report { title: evil, description: evil, runs: vec![run(), run()] };
+    report.write(&mut bytes).expect("memory takes it");
+    let page = String::from_utf8(bytes).expect("UTF-8");
+    for tag in ["<script", "<img", "alert(1)</script>", "onerror=alert(2)>", "&amp;amp;amp;"] {
+        assert!(!page.contains(tag), "{tag}");
+    }
+    // Wherever the text stands, it stands in full.
+    let escaped = "&lt;/title&gt;&lt;script&gt;alert(1)&lt;/script&gt;&lt;img src=x onerror=alert(2)&gt; &quot; &#39; &amp;amp;";
+    assert_eq!(page.matches("alert(2)").count(), page.matches(escaped).count());
+    assert!(page.matches(escaped).count() > 20);
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes() {
+    assert_eq!(page("ballbar", two_runs()), page("ballbar", two_runs()));
+}
+
+#[test]
+fn the_page_needs_nothing_from_elsewhere() {
+    let page = page("ballbar", two_runs());
+    for forbidden in ["http:", "https:", "src=", "url(", "@import", "<link", "<script", "href"] {
+        assert!(!page.contains(forbidden), "{forbidden}");
+    }
+    for wanted in ["<html lang=\"en\">", "charset=\"utf-8\"", "name=\"viewport\"", "<title>ballbar</title>"] {
+        assert!(page.contains(wanted), "{wanted}");
+    }
+}
+
+#[test]
+fn no_signal_breaks_the_page() {
+    let (nan, inf) = (f64::NAN, f64::INFINITY);
+    let cases: [&[f64]; 10] = [
+        &[],
+        &[0.0],
+        &[1.0; 50],
+        &[nan; 50],
+        &[nan, 1.0, nan, -inf, 2.0, 3.0, inf],
+        &[f64::MAX, f64::MIN, 0.0],
+        &[1e12, -1e12, 5.0],
+        &[1e-300, -1e-300, f64::MIN_POSITIVE],
+        &[1e9, 1e9 + 1e-6, 1e9],
+        &[-0.0, 0.0, 1e-16],
+    ];
+    for values in cases {
+        let mut recording = run_of(values);
+        for lengthen in [false, true] {
+            if lengthen {
+                // Lists that are not as long as they should be.
+                recording.time.extend([nan, 3.0, inf, 4.0]);
+                recording.axes[0].current.clear();
+                recording.circles[0].angle.push(nan);
+            }
+            // Figures are given as text, whatever they say: this is about the plots.
+            let run = |title| ReportRun { tables: Vec::new(), ..report_run(title, &recording) };
+            let page = page("broken", vec![run("one"), run("two")]);
+            let bad = words(&page).find(|w| ["nan", "inf", "infinity"].contains(&w.to_lowercase().as_str()));
+            let place = bad.and_then(|word| page.find(word)).unwrap_or(0);
+            assert_eq!(
+                bad,
+                None,
+                "{values:?}: …{}",
+                &page[place.saturating_sub(200)..].chars().take(300).collect::<String>()
+            );
+            let most = pictures(&page).iter().map(|p| p.matches("<text").count()).max();
+            assert!(most.unwrap_or(0) < 40, "{most:?} texts in a picture of {values:?}");
+        }
+    }
+    assert!(page("none", vec![report_run("empty", &Recording::default())]).contains("Nothing was recorded."));
+    assert!(page("none", Vec::new()).contains("</html>"));
+}
+
+#[test]
+fn every_plot_says_what_and_in_which_unit() {
+    let five = five_axes(PERIOD);
+    let mut runs = two_runs();
+    runs.push(report_run("five", &five));
+    let page = page("all", runs);
+    let units = ["(mm)", "(°)", "(µm)", "(mdeg)", "(m/min)", "(rpm)", "(A)"];
+    for picture in pictures(&page) {
+        let labels = between(picture, "<text class=\"label\"", "</text>");
+        if picture.contains("class=\"nominal\"") {
+            // A polar plot: directions of the axes, rings with their unit.
+            assert!(labels.len() == 4 && picture.contains("µm</text>"), "{labels:?}");
+        } else {
+            let named =
+                labels.iter().filter(|l| l.contains("Time (s)") || units.iter().any(|u| l.contains(u)));
+            assert_eq!(named.count(), 2, "{labels:?}");
+        }
+        assert!(picture.contains("<title") && picture.contains("<desc"));
+        assert!(!between(picture, "<desc", "</desc>")[0].is_empty());
+    }
+    for unit in units {
+        assert!(page.contains(&format!("{unit}</text>")), "{unit} is nowhere");
+    }
+}
+
+#[test]
+fn a_single_sample_among_many_is_seen() {
+    let mut values = vec![0.0; 60_000];
+    values[34_567] = 3e-6;
+    let recording = run_of(&values);
+    let page = page("spike", vec![report_run("one", &recording)]);
+    let picture = picture(&page, "X axis: tracking error");
+    let line = points(between(picture, "<path class=\"line run-1\" d=\"", "\"")[0]);
+    let heights: Vec<f64> = line.iter().map(|p| p[1]).collect();
+    let (top, bottom) = heights.iter().fold((f64::MAX, f64::MIN), |(t, b), y| (t.min(*y), b.max(*y)));
+    let area: f64 = between(picture, "<rect", "/>")[0]
+        .split("height=\"")
+        .nth(1)
+        .and_then(|rest| rest.split('"').next()?.parse().ok())
+        .expect("an area");
+    assert!(bottom - top > 0.8 * area, "{top}…{bottom} of {area}");
+    let spike = line.iter().find(|p| p[1] == top).expect("it is there");
+    // Where it was: the line runs from the first to the last sample.
+    let (first, last) = (line[0][0], line[line.len() - 1][0]);
+    let share = (spike[0] - first) / (last - first);
+    assert!((share - 34_567.0 / 59_999.0).abs() < 1e-3, "at {share}");
+}
+
+#[test]
+fn a_long_run_makes_no_large_page() {
+    const LONG: usize = 60_000;
+    const MOST_BYTES: usize = 2_000_000;
+    let mut recording =
+        Recording { time: (0..LONG).map(|i| i as f64 * 1e-3).collect(), ..Recording::default() };
+    for (i, name) in ["x", "y", "z", "a", "c"].into_iter().enumerate() {
+        let signal = |n: u64| noise(LONG, 1 + 100 * i as u64 + n);
+        let axis = empty_axis(name, if i < 3 { AxisKind::Linear } else { AxisKind::Rotary });
+        recording.axes.push(AxisTrace {
+            psec: signal(0),
+            position: signal(1),
+            tracking_error: signal(2),
+            synchronized_tracking_error: signal(3),
+            velocity: signal(4),
+            current: signal(5),
+            current_setpoint: signal(6),
+            friction_current: signal(7),
+            gravity_current: signal(8),
+            load_current: signal(9),
+            ..axis
+        });
+    }
+    let points =
+        || noise(LONG, 7).into_iter().zip(noise(LONG, 8)).map(|(x, y)| [x, y, 0.0]).collect::<Vec<_>>();
+    recording.tool = Some(ToolTrace {
+        reference: points(),
+        position: points().into_iter().rev().collect(),
+        contour_error: noise(LONG, 9),
+        orientation_error: noise(LONG, 10),
+    });
+    let circle = |counterclockwise| CircleTrace {
+        plane: ["x", "y"].map(str::to_owned),
+        radius: 0.1,
+        counterclockwise,
+        angle: noise(LONG, 11).iter().map(|v| v * 10.0).collect(),
+        deviation: noise(LONG, 12),
+    };
+    recording.circles = vec![circle(true), circle(false)];
+    let page = page("noise", vec![report_run("one", &recording)]);
+    println!("{} bytes for noise in every signal", page.len());
+    assert!(page.len() < MOST_BYTES, "{} bytes", page.len());
+}
+
+#[test]
+fn runs_are_compared_at_one_scale() {
+    let page = page("ballbar", two_runs());
+    let ticks = |title: &str| between(picture(&page, title), "<text class=\"tick", "</text>").join(" ");
+    for (one, other) in [
+        ("X axis: current and its parts, cascade<", "X axis: current and its parts, cascade-noff<"),
+        ("X–Y circle, R 150\u{a0}mm, cascade<", "X–Y circle, R 150\u{a0}mm, cascade-noff<"),
+        ("X–Y path, cascade<", "X–Y path, cascade-noff<"),
+    ] {
+        assert_eq!(ticks(one), ticks(other), "{one}");
+    }
+    // 64 µm beside 9980 µm would be a straight line: it is shown once more.
+    let errors =
+        pictures(&page).iter().filter(|p| p.contains(">X axis: synchronised tracking error<")).count();
+    assert_eq!(errors, 2);
+    assert_eq!(pictures(&page).iter().filter(|p| p.contains(">X axis: velocity<")).count(), 1);
+    assert!(page.contains("Z (largest tracking error") && page.contains("stand still."));
+}
+
+#[test]
+fn the_circle_is_drawn_where_its_deviation_is() {
+    let page = page("ballbar", vec![report_run("cascade", &BALLBAR[0])]);
+    let polar = picture(&page, "X–Y circle");
+    // Rings every 20 µm from 0 to 80: their radii give the scale.
+    let radii: Vec<f64> = ["<circle class=\"nominal\"", "<circle class=\"ring\""]
+        .into_iter()
+        .flat_map(|circle| between(polar, circle, "/>"))
+        .map(|ring| between(ring, "r=\"", "\"").pop().and_then(|r| r.parse().ok()).expect("a radius"))
+        .collect();
+    assert_eq!(radii.len(), 5);
+    let per_micrometre = (radii[4] - radii[0]) / 80.0;
+    let line = points(between(polar, "<path class=\"line run-1 ccw\" d=\"", "\"")[0]);
+    let centre = 230.0;
+    let deviation = |p: &[f64; 2]| ((p[0] - centre).hypot(p[1] - centre) - radii[0]) / per_micrometre;
+    let (low, high) = line.iter().map(deviation).fold((f64::MAX, f64::MIN), |(l, h), d| (l.min(d), h.max(d)));
+    // The extremes of the reference trial, and what a line of tenths of a pixel can show.
+    assert!((low - 47.7).abs() < 1.0 && (high - 68.6).abs() < 1.0, "{low:.1}…{high:.1} µm");
+}
+
+#[test]
+fn the_error_of_a_path_is_magnified_as_the_caption_says() {
+    // 100 mm along X, 50 µm off towards +Y: a round factor that makes at most 15 % of the path of it.
+    let reference: Vec<[f64; 3]> = (0..=100).map(|i| [f64::from(i) * 1e-3, 0.0, 0.0]).collect();
+    let position = reference.iter().map(|[x, ..]| [*x, 5e-5, 0.0]).collect();
+    let contour_error = vec![5e-5; 101];
+    let recording = Recording {
+        time: (0..=100).map(f64::from).collect(),
+        tool: Some(ToolTrace { reference, position, contour_error, orientation_error: Vec::new() }),
+        ..Recording::default()
+    };
+    let page = page("line", vec![report_run("one", &recording)]);
+    assert!(page.contains("<span class=\"note\">error × 200</span>"));
+    let path = picture(&page, "X–Y path");
+    let line = |before: &str| points(between(path, before, "\"")[0]);
+    let (reference, tip) =
+        (line("<path class=\"reference\" d=\""), line("<path class=\"line solid run-1\" d=\""));
+    let per_millimetre = (reference[reference.len() - 1][0] - reference[0][0]) / 100.0;
+    // Up on the page is towards smaller coordinates; 200 × 50 µm.
+    let shown = (reference[0][1] - tip[0][1]) / per_millimetre;
+    assert!((shown - 10.0).abs() < 0.1, "{shown} mm");
+}
+
+#[test]
+fn figures_of_like_runs_stand_row_by_row() {
+    let page_of_two = page("two", two_runs());
+    assert_eq!(page_of_two.matches("<caption>Axes</caption>").count(), 1);
+    assert!(page_of_two.contains("<th scope=\"rowgroup\" rowspan=\"2\">x</th>"));
+    let mut runs = two_runs();
+    runs[1].tables[0].rows.pop();
+    let unlike = page("two", runs);
+    assert_eq!(unlike.matches("<caption>Axes</caption>").count(), 2);
+    // Several values under one name stand together.
+    let mut runs = two_runs();
+    for change in ["x.position_loop.gain=2", "y.position_loop.gain=2"] {
+        runs[1].facts.push(("set".to_owned(), change.to_owned()));
+    }
+    let changed = page("two", runs);
+    assert!(changed.contains("<td></td><td>x.position_loop.gain=2, y.position_loop.gain=2</td>"));
+    // What all runs share stands once.
+    assert!(page_of_two.contains("<td class=\"same\" colspan=\"2\">mikron_ucp710</td>"));
+}

@@ -1,0 +1,160 @@
+//! Random trajectories: every check holds, each check of a tick can fail, and the digest depends on the seed alone.
+
+use std::process::{Command, Output};
+use std::sync::LazyLock;
+
+use virtual_axes_core::machine::{AxisSample, Width};
+use virtual_axes_verification::stress::{Bench, Check, Fleet, Kind, Options, Summary, run};
+
+/// Trajectories of a test.
+const COUNT: u64 = if cfg!(debug_assertions) { 400 } else { 4000 };
+
+static FLEET: LazyLock<Fleet> =
+    LazyLock::new(|| Fleet::shipped().expect("the shipped machines take all controllers"));
+
+fn options(count: u64) -> Options {
+    Options { seed: 7, first: 0, count, threads: 2, width: Width::Widest }
+}
+
+fn stressed(options: Options) -> Summary {
+    run(&FLEET, &options, |_| Ok(())).expect("nobody ends it")
+}
+
+#[test]
+fn random_trajectories_pass_every_check() {
+    let summary = stressed(options(COUNT));
+    assert!(summary.faults.is_empty(), "{:#?}", summary.faults);
+    assert_eq!(summary.run, COUNT);
+    // Of everything there is something.
+    assert_eq!(summary.kinds.len(), Kind::ALL.len());
+    assert!(summary.variants.iter().all(|count| *count > 0), "{:?}", summary.variants);
+    assert!(summary.limited > COUNT / 100 && summary.limited < COUNT, "{}", summary.limited);
+    assert!(summary.bounded * 5 > summary.axes * 4, "{} of {}", summary.bounded, summary.axes);
+    // The bound is not far from what happens.
+    assert!(summary.error.0 > 0.3 && summary.error.0 <= 1.0 + 1e-6, "{:?}", summary.error);
+    assert!(summary.dissipated > 1e3 * summary.returned, "{} J, {} J", summary.dissipated, summary.returned);
+}
+
+#[test]
+fn the_digest_follows_from_the_seed_alone() {
+    let count = COUNT / 4;
+    let digest = |options: Options| stressed(options).digest();
+    let one = digest(options(count));
+    assert_eq!(one, digest(options(count)));
+    assert_eq!(one, digest(Options { threads: 1, ..options(count) }));
+    assert_eq!(one, digest(Options { threads: 5, ..options(count) }));
+    assert!(one != digest(Options { seed: 8, ..options(count) }));
+    let few = digest(options(count / 4));
+    for width in [Width::Four, Width::Baseline] {
+        assert_eq!(few, digest(Options { width, ..options(count / 4) }), "{width:?}");
+    }
+}
+
+#[test]
+fn a_trajectory_is_the_same_alone() {
+    let mut bench = Bench::new(&FLEET, 7, Width::Widest);
+    let all: Vec<_> = (0..100).map(|number| bench.run(number).expect("runs")).collect();
+    for number in (0..100).rev().step_by(7) {
+        let alone = Bench::new(&FLEET, 7, Width::Widest).run(number).expect("runs");
+        assert_eq!(alone, all[number as usize]);
+    }
+}
+
+/// That `check` finds what `alter` does to the samples of one of many trajectories, none of which has a fault.
+#[track_caller]
+fn assert_found(check: Check, mut alter: impl FnMut(usize, usize, &mut AxisSample)) {
+    let mut bench = Bench::new(&FLEET, 7, Width::Widest);
+    let mut found = |number: u64| {
+        let record = bench.run_altered(number, &mut alter).expect("runs");
+        record.faults.iter().any(|fault| fault.check == check)
+    };
+    assert!((0..200).any(&mut found), "{check:?} is not found");
+}
+
+#[test]
+fn a_number_that_is_none_is_found() {
+    assert_found(Check::Finite, |axis, tick, s| {
+        if (axis, tick) == (1, 200) {
+            s.voltage = f64::NAN
+        }
+    });
+    assert_found(Check::Energy, |axis, tick, s| {
+        if (axis, tick) == (1, 200) {
+            s.voltage = f64::NAN
+        }
+    });
+}
+
+#[test]
+fn a_limit_that_does_not_hold_or_is_not_told_is_found() {
+    assert_found(Check::Limits, |_, tick, s| {
+        if tick == 99 {
+            s.current_setpoint = 1e3
+        }
+    });
+    assert_found(Check::Reported, |_, _, s| s.saturated = false);
+    assert_found(Check::Reported, |axis, tick, s| {
+        if (axis, tick) == (4, 150) {
+            s.saturated = true
+        }
+    });
+    assert_found(Check::Counted, |axis, tick, s| {
+        if (axis, tick) == (0, 150) {
+            s.current += 100.0
+        }
+    });
+    assert_found(Check::SetpointSpeed, |axis, tick, s| {
+        if (axis, tick) == (2, 96) {
+            s.psec += 0.1
+        }
+    });
+}
+
+#[test]
+fn friction_that_drives_is_found() {
+    assert_found(Check::FrictionSign, |_, _, s| s.friction_current = -s.friction_current);
+    assert_found(Check::FrictionWork, |_, _, s| s.friction_current = -s.friction_current);
+    assert_found(Check::FrictionLaw, |_, _, s| s.friction_current *= 1.0 + 1e-9);
+}
+
+#[test]
+fn energy_from_nowhere_is_found() {
+    // A part in 10¹⁰ of the speed at one tick.
+    assert_found(Check::Energy, |_, tick, s| {
+        if tick == 500 {
+            s.velocity *= 1.0 + 1e-10
+        }
+    });
+    assert_found(Check::Energy, |_, _, s| s.friction_current *= 0.999);
+    assert_found(Check::Position, |_, tick, s| {
+        if tick == 500 {
+            s.position += 1e-14
+        }
+    });
+}
+
+#[test]
+fn an_error_that_theory_does_not_know_is_found() {
+    // A nanometre.
+    assert_found(Check::Superposition, |_, _, s| s.delayed_psec += 1e-9);
+    assert_found(Check::Bound, |_, _, s| s.delayed_psec += 0.1);
+}
+
+fn command(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_virtual_axes_stress")).args(arguments).output().expect("it starts")
+}
+
+#[test]
+fn the_command_runs_many_and_shows_one() {
+    let output = command(&["--count", "200", "--seed", "7", "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert_eq!((&object["run"], &object["faulty"]), (&200.into(), &0.into()));
+    assert_eq!(object["digest"], stressed(options(200)).digest());
+    let one = command(&["--only", "12", "--seed", "7", "--machine", "linear_motor_center"]);
+    let text = String::from_utf8_lossy(&one.stdout);
+    assert!(one.status.success() && text.contains("number: 12"), "{text}");
+    let unknown = command(&["--machine", "no/such.yaml"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&unknown.stderr).starts_with("no/such.yaml: "));
+}

@@ -1,0 +1,261 @@
+//! Properties of what comes in from a graph: messages and requests of any content, and of any bytes.
+
+use std::sync::{Arc, LazyLock};
+
+use byteorder::{BigEndian, LittleEndian};
+use proptest::prelude::*;
+use virtual_axes::door::parameters::{LiveNodeParameters, ParameterValue, Settings};
+use virtual_axes::door::{Checks, GoalChecks, Order, Setpoints, loads};
+use virtual_axes_core::config::{Kind, Parameters};
+use virtual_axes_core::simulation::{self, Simulation};
+use virtual_axes_core::trajectory::{JointLimits, MotionId};
+use virtual_axes_core::units::SECOND_NS;
+use virtual_axes_io::messages::builtin_interfaces::msg::Duration;
+use virtual_axes_io::messages::rcl_interfaces::srv::SetParametersRequest;
+use virtual_axes_io::messages::sensor_msgs::msg::JointState;
+use virtual_axes_io::messages::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
+use virtual_axes_io::messages::{FollowJointTrajectoryGoal, JointTolerance, SendGoalRequest};
+
+/// Longest refusal, bytes.
+const LONGEST_REFUSAL: usize = 2000;
+
+static DEFAULT: LazyLock<Parameters> = LazyLock::new(|| Parameters::embedded_default().expect("shipped"));
+
+fn joints() -> Vec<JointLimits> {
+    simulation::joints(&DEFAULT.machine_config().expect("shipped"), "")
+}
+
+fn checks() -> Checks {
+    let config = DEFAULT.machine_config().expect("shipped");
+    let live = Arc::new(LiveNodeParameters::default());
+    Checks { joints: joints(), period: config.periods().position, max_points: 1000, live }
+}
+
+fn at_rest() -> Simulation {
+    Simulation::new(&DEFAULT.machine_config().expect("shipped"), joints(), SECOND_NS).expect("shipped")
+}
+
+fn is_finite(simulation: &mut Simulation) -> bool {
+    (0..10).all(|_| {
+        simulation.step();
+        simulation
+            .samples()
+            .iter()
+            .all(|s| s.psec.is_finite() && s.position.is_finite() && s.current.is_finite())
+    })
+}
+
+/// One short line that says something.
+fn is_told(text: &str) -> bool {
+    !text.is_empty() && text.len() < LONGEST_REFUSAL && !text.contains(char::is_control)
+}
+
+fn joint() -> impl Strategy<Value = String> {
+    prop_oneof![8 => "[xyzac]", 1 => any::<String>(), 1 => Just("x\n".repeat(5000))]
+}
+
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![3 => Just(0.0), 4 => -0.01..0.01f64, 1 => any::<f64>()]
+}
+
+fn numbers() -> impl Strategy<Value = Vec<f64>> {
+    prop::collection::vec(number(), 0..4)
+}
+
+fn time() -> impl Strategy<Value = Duration> {
+    let sec = prop_oneof![6 => 0..3i32, 1 => -2..100i32];
+    let nanosec = prop_oneof![6 => 0..1_000_000_000u32, 1 => any::<u32>()];
+    (sec, nanosec).prop_map(|(sec, nanosec)| Duration { sec, nanosec })
+}
+
+fn trajectory() -> impl Strategy<Value = JointTrajectory> {
+    let point = (numbers(), numbers(), numbers(), time()).prop_map(
+        |(positions, velocities, accelerations, time_from_start)| JointTrajectoryPoint {
+            positions,
+            velocities,
+            accelerations,
+            effort: vec![],
+            time_from_start,
+        },
+    );
+    (prop::collection::vec(joint(), 0..4), prop::collection::vec(point, 0..5), any::<bool>()).prop_map(
+        |(joint_names, mut points, even)| {
+            if even {
+                // As many values as joints, in the order of time: often a good one.
+                points.sort_by_key(|p| (p.time_from_start.sec, p.time_from_start.nanosec));
+                for point in &mut points {
+                    point.positions.resize(joint_names.len(), 0.0);
+                    point.velocities.clear();
+                    point.accelerations.clear();
+                }
+            }
+            JointTrajectory { joint_names, points, ..JointTrajectory::default() }
+        },
+    )
+}
+
+fn tolerances() -> impl Strategy<Value = Vec<JointTolerance>> {
+    let tolerance = (joint(), number(), number()).prop_map(|(name, position, velocity)| JointTolerance {
+        name,
+        position,
+        velocity,
+        acceleration: -1.0,
+    });
+    prop::collection::vec(tolerance, 0..3)
+}
+
+/// A value of any kind, whole numbers and small ones more often.
+fn value() -> impl Strategy<Value = ParameterValue> {
+    prop_oneof![
+        any::<bool>().prop_map(ParameterValue::Bool),
+        prop_oneof![-3..20i64, any::<i64>()].prop_map(ParameterValue::Integer),
+        prop_oneof![0.0..2.0f64, any::<f64>()].prop_map(ParameterValue::Double),
+        prop_oneof!["gpc|cascade|rst", any::<String>()].prop_map(ParameterValue::String),
+        prop::collection::vec(any::<u8>(), 0..3).prop_map(ParameterValue::ByteArray),
+        prop::collection::vec(any::<f64>(), 0..4).prop_map(ParameterValue::DoubleArray),
+        prop::collection::vec(any::<String>(), 0..3).prop_map(ParameterValue::StringArray),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn any_trajectory_is_run_or_refused_in_a_line(message in trajectory()) {
+        match checks().check(&message) {
+            Ok(trajectory) => {
+                let mut simulation = at_rest();
+                if let Err(rejection) = simulation.offer(MotionId(1), Arc::new(trajectory)) {
+                    prop_assert!(is_told(&rejection.text), "{}", rejection);
+                }
+                prop_assert!(is_finite(&mut simulation));
+            }
+            Err(rejection) => {
+                prop_assert!(is_told(&rejection.text), "{}", rejection);
+                prop_assert!(rejection.joint.is_none_or(|joint| joint.len() < LONGEST_REFUSAL));
+            }
+        }
+    }
+
+    #[test]
+    fn any_goal_has_tolerances_for_its_joints_or_is_refused_in_a_line(
+        trajectory in trajectory(), path_tolerance in tolerances(), goal_tolerance in tolerances(), goal_time_tolerance in time(),
+    ) {
+        let goal = FollowJointTrajectoryGoal {
+            trajectory, path_tolerance, goal_tolerance, goal_time_tolerance, ..Default::default()
+        };
+        match (GoalChecks { checks: Arc::new(checks()) }).check(&goal) {
+            Ok((trajectory, tolerances)) => {
+                let columns = trajectory.joints().len();
+                prop_assert_eq!((tolerances.path.len(), tolerances.goal.len()), (columns, columns));
+                let mut simulation = at_rest();
+                let _ = simulation.offer_within(MotionId(1), Arc::new(trajectory), tolerances);
+                prop_assert!(is_finite(&mut simulation));
+            }
+            Err(rejection) => prop_assert!(is_told(&rejection.text), "{}", rejection),
+        }
+    }
+
+    #[test]
+    fn any_set_points_and_loads_leave_the_axes_finite(
+        name in prop::collection::vec(joint(), 0..40), position in numbers(), effort in numbers(), even: bool,
+    ) {
+        let mut message = JointState { name, position, effort, ..JointState::default() };
+        if even {
+            message.position.resize(message.name.len(), 0.001);
+            message.effort.resize(message.name.len(), 5.0);
+        }
+        let names: Vec<String> = joints().into_iter().map(|joint| joint.name).collect();
+        let setpoints = Setpoints::in_order(&message, &names, [0; 16], &mut Order::default());
+        let told = setpoints.refused.len() as u64 + setpoints.refused_beside + setpoints.positions.len() as u64;
+        prop_assert!(told <= message.position.len().max(1) as u64);
+        prop_assert!(setpoints.refused.iter().all(|rejection| is_told(&rejection.text)));
+        let mut simulation = at_rest();
+        for (place, position) in setpoints.positions {
+            let _ = simulation.stream_sent(place, position, setpoints.sent);
+        }
+        match loads(&message, &names) {
+            Ok(loads) => loads.into_iter().for_each(|(place, load)| simulation.set_load(place, load, SECOND_NS)),
+            Err(reason) => prop_assert!(is_told(&reason), "{}", reason),
+        }
+        prop_assert!(is_finite(&mut simulation));
+    }
+
+    #[test]
+    fn any_set_of_parameters_is_taken_whole_or_not_at_all(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), value(), any::<bool>()), 1..5),
+    ) {
+        let mut settings = Settings::new(DEFAULT.clone(), Arc::default());
+        let all: Vec<_> = DEFAULT.definitions().collect();
+        let changes: Vec<_> = changes
+            .into_iter()
+            .map(|(index, value, fit)| {
+                let (name, definition) = &all[index.index(all.len())];
+                // Of the right kind and within its range, every other time.
+                let value = match (definition.kind, fit) {
+                    (Kind::Number { min, max }, true) => ParameterValue::Double(1.0f64.clamp(min, max)),
+                    (Kind::Integer { min, max }, true) => ParameterValue::Integer(2_i64.clamp(min, max)),
+                    (Kind::Flag, true) => ParameterValue::Bool(true),
+                    _ => value,
+                };
+                (name.clone(), value)
+            })
+            .collect();
+        match settings.check(changes.clone()) {
+            Ok((changed, _)) => {
+                prop_assert!(changed.machine_config().is_ok());
+                settings.adopt(changed);
+                let (name, value) = changes.last().expect("at least one");
+                let found = settings.get(name).expect("it has just been set");
+                prop_assert!(found == *value || matches!((value, &found),
+                    (ParameterValue::Integer(i), ParameterValue::Double(d)) if *i as f64 == *d), "{:?}", found);
+            }
+            Err(reason) => {
+                prop_assert!(is_told(&reason), "{}", reason);
+                prop_assert_eq!(settings.parameters(), &*DEFAULT);
+            }
+        }
+    }
+
+    /// What is on the wire is decoded as RustDDS does, whatever has become of it.
+    #[test]
+    fn any_damage_on_the_wire_is_survived(
+        message in trajectory(), tolerance in tolerances(),
+        flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
+        keep in prop_oneof![Just(1.0), 0.0..1.0f64],
+        big: bool,
+    ) {
+        let goal = FollowJointTrajectoryGoal {
+            trajectory: message, path_tolerance: tolerance, ..Default::default()
+        };
+        let request = SendGoalRequest { goal, ..Default::default() };
+        let mut bytes = match big {
+            true => cdr_encoding::to_vec::<_, BigEndian>(&request),
+            false => cdr_encoding::to_vec::<_, LittleEndian>(&request),
+        }.expect("a message can be written");
+        let whole = bytes.len();
+        for &(place, value) in &flips {
+            let place = place.index(bytes.len());
+            bytes[place] = value;
+        }
+        bytes.truncate((whole as f64 * keep) as usize);
+        let found = match big {
+            true => cdr_encoding::from_bytes::<SendGoalRequest, BigEndian>(&bytes),
+            false => cdr_encoding::from_bytes::<SendGoalRequest, LittleEndian>(&bytes),
+        };
+        if let Ok((mut found, consumed)) = found {
+            prop_assert!(consumed <= bytes.len());
+            for point in &mut found.goal.trajectory.points {
+                // Each instant is looked at.
+                point.time_from_start.sec = point.time_from_start.sec.min(100);
+            }
+            if let Err(rejection) = (GoalChecks { checks: Arc::new(checks()) }).check(&found.goal) {
+                prop_assert!(is_told(&rejection.text), "{}", rejection);
+            }
+        } else {
+            prop_assert!(!flips.is_empty() || keep < 1.0, "an intact message is read");
+        }
+        let _ = cdr_encoding::from_bytes::<SetParametersRequest, LittleEndian>(&bytes);
+        let _ = cdr_encoding::from_bytes::<JointState, LittleEndian>(&bytes);
+    }
+}

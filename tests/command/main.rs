@@ -1,0 +1,11 @@
+//! TODO
+
+mod command;
+mod command_campaign;
+mod command_common;
+mod command_design;
+mod door_properties;
+mod files_output;
+mod identify_command;
+mod readme;
+mod tune_command;
