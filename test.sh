@@ -109,7 +109,7 @@ python_tests() (
 # the time; cargo test has what they leave.
 background "set-up and message build" tools/setup.sh --browser
 stage "cargo fmt --check" bash -c "cargo fmt --check && cargo fmt --check --manifest-path fuzz/Cargo.toml"
-stage "dependencies: licences, sources, the table of them" tools/dependencies.py
+stage "dependencies: licenses, sources, the table of them" tools/dependencies.py
 stage "cargo clippy" cargo clippy --release --all-targets --locked -- -D warnings
 stage "library without ROS" cargo clippy --release --lib --no-default-features --locked -- -D warnings
 stage "cargo doc" env RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --locked

@@ -4,7 +4,7 @@
 //! cargo bench --bench contender -- SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--cores COUNT]
 //! ```
 //!
-//! SETPOINTS is text: names of the axes that take part, then a row of set-points (m, rad) for each position period.
+//! SETPOINTS is text: names of the axes that take part, then a row of setpoints (m, rad) for each position period.
 //! Each line `run N` on standard input makes N runs; the answer is a line of JSON with the seconds of a run and the
 //! figures. Without arguments it says so and ends.
 

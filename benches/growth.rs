@@ -1,4 +1,4 @@
-//! How the cost of a simulation grows: with the length of the set-points, with axes, machines and cores.
+//! How the cost of a simulation grows: with the length of the setpoints, with axes, machines and cores.
 //!
 //!     cargo bench --no-default-features --bench growth
 //!     cargo bench --no-default-features --bench growth -- axes cores
@@ -110,7 +110,7 @@ fn cycle() -> Arc<Vec<[f64; AXES]>> {
     Arc::new((0..CYCLE).map(at).collect())
 }
 
-/// Set-points that are computed as they are needed, figures of tool and axes, no trace.
+/// Setpoints that are computed as they are needed, figures of tool and axes, no trace.
 fn length(config: &MachineConfig) {
     let rows = cycle();
     let trial = Trial { machine: config, program: None, allow_nonzero_end_velocity: false, record: false };
@@ -138,7 +138,7 @@ fn axes(config: &MachineConfig) {
     let instants = (AXES_TIME / seconds(config.periods().position)) as usize;
     let row = |count: usize| {
         let places: Vec<usize> = (0..count).map(|axis| axis % AXES).collect();
-        let made = MachineParameters::of_axes(config, &places).expect("it can be discretised");
+        let made = MachineParameters::of_axes(config, &places).expect("it can be discretized");
         let mut machine = Machine::new(Arc::new(made));
         let cycle = Arc::clone(&cycle);
         let mut psec = vec![0.0; count];

@@ -26,9 +26,9 @@ use virtual_axes_io::messages::{DriveStates, MotorCurrents, Sampled};
 
 /// Rounds of the first table.
 const ROUNDS: usize = 11;
-/// Set-points: at 6 ms an hour.
+/// Setpoints: at 6 ms an hour.
 const INSTANTS: i64 = 600_000;
-/// Set-points in YAML, which is bounded in length: ten minutes.
+/// Setpoints in YAML, which is bounded in length: ten minutes.
 const YAML_INSTANTS: i64 = 100_000;
 /// Ticks of a trace: at 125 µs ten seconds.
 const TICKS: i64 = 80_000;
@@ -171,25 +171,25 @@ fn cases(machine: &'static MachineConfig, folder: &Path) -> Vec<Case> {
         case("raw bytes, read", psec_size, None, Box::new(move || _ = black_box(read_raw(&psec_raw)))),
         case("raw bytes, written", psec_size, None, Box::new(move || write_raw(&output, &raw))),
         case(
-            "set-points from CSV",
+            "setpoints from CSV",
             psec_size,
             read,
             Box::new(move || {
-                let mut source = PsecCsv::open(&psec_in, period, &limits).expect("set-points");
+                let mut source = PsecCsv::open(&psec_in, period, &limits).expect("setpoints");
                 let mut row = [0.0; 5];
-                while source.next(&mut row).expect("set-points") {
+                while source.next(&mut row).expect("setpoints") {
                     black_box(&row);
                 }
             }),
         ),
         case(
-            "set-points to CSV",
+            "setpoints to CSV",
             psec_size,
             written,
             Box::new(move || write_psec(&psec_out, names, INSTANTS, period, rows)),
         ),
         case(
-            "set-points from MCAP",
+            "setpoints from MCAP",
             points,
             read,
             Box::new(move || {
@@ -200,19 +200,19 @@ fn cases(machine: &'static MachineConfig, folder: &Path) -> Vec<Case> {
             }),
         ),
         case(
-            "set-points to MCAP",
+            "setpoints to MCAP",
             points,
             written,
             Box::new(move || write_psec(&points_out, names, INSTANTS, period, rows)),
         ),
         case(
-            "set-points from YAML",
+            "setpoints from YAML",
             text.len() as u64,
             read,
             Box::new(move || _ = black_box(read_psec_yaml(&text, "psec.yaml").expect("a trajectory"))),
         ),
         case(
-            "set-points to YAML",
+            "setpoints to YAML",
             size(&psec_yaml),
             written,
             Box::new(move || write_psec(&psec_yaml, names, YAML_INSTANTS, period, rows)),

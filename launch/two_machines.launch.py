@@ -2,7 +2,7 @@
 
 ros2 launch virtual_axes two_machines.launch.py right_controller:=gpc rviz:=true
 
-Give both the same set-points, on /left/psec and /right/psec. With time:=fast the second follows the
+Give both the same setpoints, on /left/psec and /right/psec. With time:=fast the second follows the
 clock of the first.
 """
 

@@ -129,12 +129,12 @@ class Follow:
             self.feedback.append,
             FEEDBACK_QOS,
         )
-        self._cancelling = drive.node.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
+        self._canceling = drive.node.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
         self._statuses = drive.node.create_subscription(
             GoalStatusArray, f"{self.name}/_action/status", self.statuses.append, STATUS_QOS
         )
         drive.wait_for(self.client.server_is_ready, timeout, f"action {self.name}")
-        drive.wait_for(self._cancelling.service_is_ready, timeout, f"cancelling of {self.name}")
+        drive.wait_for(self._canceling.service_is_ready, timeout, f"canceling of {self.name}")
         time.sleep(SETTLE_S)
 
     def __enter__(self) -> Follow:
@@ -147,7 +147,7 @@ class Follow:
         def leave() -> None:
             self.client.destroy()
             self.drive.node.destroy_subscription(self._feedback)
-            self.drive.node.destroy_client(self._cancelling)
+            self.drive.node.destroy_client(self._canceling)
             self.drive.node.destroy_subscription(self._statuses)
 
         self.drive.in_executor(leave)
@@ -159,7 +159,7 @@ class Follow:
     def cancel(self, uuid: bytes = bytes(16), stamp: Time | None = None) -> CancelGoal.Response:
         """Cancel by the rules of action_msgs/CancelGoal."""
         info = GoalInfo(goal_id=UUID(uuid=list(uuid)), stamp=stamp or Time())
-        future = self._cancelling.call_async(CancelGoal.Request(goal_info=info))
+        future = self._canceling.call_async(CancelGoal.Request(goal_info=info))
         self.drive.wait_for(future.done, 20.0, "answer to a cancel request")
         return future.result()
 

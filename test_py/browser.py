@@ -123,7 +123,7 @@ class Browser:
         return result["result"].get("value")
 
     def screenshot(self, keep: Path | None = None) -> np.ndarray:
-        """The whole page: height, width, three colours in 0…1."""
+        """The whole page: height, width, three colors in 0…1."""
         shot = self.send("Page.captureScreenshot", format="png", captureBeyondViewport=True)
         png = base64.b64decode(shot["data"])
         if keep is not None:

@@ -44,10 +44,10 @@ def measure(drive: Drive, path: Ballbar) -> Recording:
 
 def report(path: Ballbar, runs: dict[str, Recording]) -> str:
     """The table of tracking errors, µm."""
-    head = ("ballbar R 150 mm, 15 m/min", "mean", "min", "max", "G", "specified", "paper", "X, Y max |e| synchronised")
+    head = ("ballbar R 150 mm, 15 m/min", "mean", "min", "max", "G", "specified", "paper", "X, Y max |e| synchronized")
     rows = [head]
     for title, run in runs.items():
-        deviation = run.radial_deviation(path.centre, path.radius)[run.within(path.steady)] * 1e6
+        deviation = run.radial_deviation(path.center, path.radius)[run.within(path.steady)] * 1e6
         error = [np.abs(run.states["synchronized_tracking_error", axis]).max() * 1e6 for axis in AXES]
         rows.append(
             (
@@ -78,12 +78,12 @@ def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
     figure, plots = plt.subplots(
         1, len(runs), figsize=(14.5, 6.2), subplot_kw={"projection": "polar"}, layout="constrained"
     )
-    # Black and one strong colour, solid and dashed: readable on a grey printer too.
+    # Black and one strong color, solid and dashed: readable on a gray printer too.
     for plot, (title, run) in zip(np.atleast_1d(plots), runs.items()):
         steady = run.within(path.steady)
         x, y = (run.joints["position", axis][steady] for axis in AXES)
-        angle = np.unwrap(np.arctan2(y - path.centre[1], x - path.centre[0]))
-        deviation = run.radial_deviation(path.centre, path.radius)[steady] * 1e6
+        angle = np.unwrap(np.arctan2(y - path.center[1], x - path.center[0]))
+        deviation = run.radial_deviation(path.center, path.radius)[steady] * 1e6
         turn = np.linspace(0, 2 * np.pi, 361)
         step = _round_step(np.abs(deviation).max() / 2)
         plot.plot(
@@ -95,7 +95,7 @@ def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
             label="programmed circle, R = 150 mm",
         )
         plot.plot(angle, deviation, color="#b2182b", linewidth=1.6, label="simulated position")
-        # The circle is drawn as wide as four steps, so that an inward deviation stays off the centre.
+        # The circle is drawn as wide as four steps, so that an inward deviation stays off the center.
         plot.set_rorigin(-6 * step)
         plot.set_rlim(-4 * step, 3 * step)
         plot.set_rticks([factor * step for factor in range(-3, 4)])

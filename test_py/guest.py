@@ -221,7 +221,7 @@ def listen(node: Any, topic: str, depth: int) -> None:
 
 
 def send(node: Any, points: int) -> None:
-    """Publish one long trajectory when a line comes in, already serialised, so that all the time goes into sending."""
+    """Publish one long trajectory when a line comes in, already serialized, so that all the time goes into sending."""
     psec = node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
     message = long_trajectory(points)
     while psec.get_subscription_count() == 0:

@@ -76,7 +76,7 @@ def go_home(drive: Drive) -> None:
     def at_home() -> bool:
         return not any(value for field in ("position", "psec") for value in drive.latest(field).values())
 
-    # A set-point of a stream that is on its way when the axes are reset takes them away again.
+    # A setpoint of a stream that is on its way when the axes are reset takes them away again.
     for patience_s in (10, 20, 60):
         drive.reset()
         try:

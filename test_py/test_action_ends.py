@@ -1,4 +1,4 @@
-"""How goals of the action end before their time: tolerances, cancelling, and who takes the axes over."""
+"""How goals of the action end before their time: tolerances, canceling, and who takes the axes over."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def constant(feed: float, distance: float) -> JointTrajectory:
 
 @pytest.fixture
 def without_feedforward(follow: Follow) -> Iterator[Follow]:
-    """Without feedforward X trails its set-point by V/Kp."""
+    """Without feedforward X trails its setpoint by V/Kp."""
     before = follow.drive.get_parameters(["x.feedforward.velocity", "x.feedforward.torque_kg_m2"])
     follow.drive.set_parameters_atomically(dict.fromkeys(before, 0.0))
     yield follow
@@ -71,7 +71,7 @@ def test_default_tolerances_are_parameters_and_minus_one_lifts_them(without_feed
 
 def test_a_goal_tolerance_is_waited_for_as_long_as_the_goal_allows(without_feedforward: Follow) -> None:
     follow = without_feedforward
-    # 6 m/min: 4 mm behind when the set-point stops; that falls by 1/e every 40 ms, to 0.1 mm in 0.15 s.
+    # 6 m/min: 4 mm behind when the setpoint stops; that falls by 1/e every 40 ms, to 0.1 mm in 0.15 s.
     trajectory = joint_trajectory(["x"], [0, 1.0], [0, 0.1])
     late = follow.send(goal(trajectory, end={"x": 1e-4}, end_time=0.02)).ended()
     assert (late.status, late.result.error_code) == (GoalStatus.STATUS_ABORTED, Result.GOAL_TOLERANCE_VIOLATED)
@@ -83,10 +83,10 @@ def test_a_goal_tolerance_is_waited_for_as_long_as_the_goal_allows(without_feedf
         assert in_time.status() == GoalStatus.STATUS_SUCCEEDED, (end_time, in_time.result().error_string)
 
 
-# ---- cancelling and displacing
+# ---- canceling and displacing
 
 
-def test_cancelling_stops_the_axes_within_their_limits(follow: Follow) -> None:
+def test_canceling_stops_the_axes_within_their_limits(follow: Follow) -> None:
     sent = follow.send(goal(wave()))
     sent.wait_for_feedback(150)
     answer = sent.cancel()
@@ -110,14 +110,14 @@ def test_cancelling_stops_the_axes_within_their_limits(follow: Follow) -> None:
     assert np.abs(jerk).max() <= limits["x.limits.jerk_m_s3"] * (1 + 1e-6)
 
 
-def test_cancelling_what_is_over_or_unknown_says_so(follow: Follow) -> None:
+def test_canceling_what_is_over_or_unknown_says_so(follow: Follow) -> None:
     over = follow.send(goal(line(["x"], [0.001], 0.1)))
     assert over.status() == GoalStatus.STATUS_SUCCEEDED
     assert follow.cancel(over.id).return_code == CancelGoal.Response.ERROR_GOAL_TERMINATED
     assert follow.cancel(bytes([3] * 16)).return_code == CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID
 
 
-def test_cancelling_all_and_by_time(follow: Follow) -> None:
+def test_canceling_all_and_by_time(follow: Follow) -> None:
     first = follow.send(goal(wave(joint="x")))
     first.wait_for_feedback(5)
     second = follow.send(goal(wave(joint="y")))

@@ -153,7 +153,7 @@ def test_chunks_of_a_long_path_join_without_a_gap(home: Drive):
 
 @pytest.mark.parametrize("names", [[], ["x", "y", "z", "a", "c"]], ids=["no joints", "all joints"])
 def test_no_points_is_a_controlled_stop(home: Drive, names: list[str]):
-    """The set-point comes to rest within the limits of the axis, short of where it was going."""
+    """The setpoint comes to rest within the limits of the axis, short of where it was going."""
     first, start, _ = start_swing(home, duration=3.0, amplitude=0.2)
     home.wait_until(start + 125 * TSP_NS, 5)
     home.accept(JointTrajectory(joint_names=names))

@@ -18,7 +18,7 @@ def run(drive: Drive) -> Recording:
 
 def deviation_um(recording: Recording) -> np.ndarray:
     """Radial deviation while the feed is steady, µm."""
-    return recording.radial_deviation(PATH.centre, PATH.radius)[recording.within(PATH.steady)] * 1e6
+    return recording.radial_deviation(PATH.center, PATH.radius)[recording.within(PATH.steady)] * 1e6
 
 
 def test_path_is_the_specified_one():

@@ -144,8 +144,8 @@ def move_through(drive: Drive, act: Callable[[], None]) -> str:
 FLOODS = {
     "trajectories that are taken": ("_psec", joint_trajectory(["x"], [0.0, 0.06], [[0.0]] * 2)),
     "trajectories that are refused": ("_psec", joint_trajectory(["q"], [0.0], [[0.0]])),
-    "set-points that are taken": ("_stream", JointState(name=["x"], position=[1e-4])),
-    "set-points that are refused": ("_stream", JointState(name=["x"], position=[0.4])),
+    "setpoints that are taken": ("_stream", JointState(name=["x"], position=[1e-4])),
+    "setpoints that are refused": ("_stream", JointState(name=["x"], position=[0.4])),
     "loads": ("_load", JointState(name=["x"], effort=[1.0])),
     "loads that are refused": ("_load", JointState(name=["q"], effort=[1.0])),
 }
@@ -172,9 +172,9 @@ def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
     if publisher == "_psec":
         assert "lines of this kind" in log, "nothing was left out"
         forget_results(node)
-    if what == "set-points that are refused":
+    if what == "setpoints that are refused":
         assert int(node.told()["stream_setpoints_refused"]) > refused
-        assert log.count("set-point of the stream refused") <= 10
+        assert log.count("setpoint of the stream refused") <= 10
     if what == "loads that are refused":
         assert 1 <= log.count("a message on load is left out") <= 10
     node.set_parameters({"x.velocity_loop.gain": 5.0})

@@ -73,7 +73,7 @@ def command(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 def campaign(part: str, folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Times and set-points of a part for all axes; who is done waits for the others."""
+    """Times and setpoints of a part for all axes; who is done waits for the others."""
     columns = []
     for axis in AXES:
         file = folder / f"psec-{axis}-{part}.csv"

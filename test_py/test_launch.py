@@ -143,7 +143,7 @@ def test_the_node_runs_with_what_launch_passes():
 
 
 def test_two_machines_run_in_one_domain():
-    """Each in its namespace with its own controller and frames; set-points of one leave the other at rest."""
+    """Each in its namespace with its own controller and frames; setpoints of one leave the other at rest."""
     found = by_executable(nodes(TWO, right_controller="gpc", rviz="true"))
     left, right = found["virtual_axes_node"]
     assert (left.namespace, right.namespace) == ("left", "right")

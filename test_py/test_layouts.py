@@ -61,7 +61,7 @@ def check(topics: dict[str, str], topic: str, fields: list[str]) -> None:
 
 
 def rviz(name: str) -> dict:
-    """The visualisation manager of a configuration."""
+    """The visualization manager of a configuration."""
     return yaml.safe_load((ROOT / "rviz" / name).read_text())["Visualization Manager"]
 
 
@@ -72,12 +72,12 @@ def frames_of(prefix: str = "") -> set[str]:
 
 
 def test_rviz_shows_what_the_node_publishes(topics: dict[str, str]):
-    """Model, frames, tool and both paths in two colours; every topic with the type of its display."""
+    """Model, frames, tool and both paths in two colors; every topic with the type of its display."""
     manager = rviz("virtual_axes.rviz")
     assert manager["Global Options"]["Fixed Frame"] in frames_of()
     assert frames_of() >= FRAMES
     shown = {}
-    colours = []
+    colors = []
     for display in manager["Displays"]:
         kind = display["Class"].removeprefix("rviz_default_plugins/")
         if kind in RVIZ_TYPES:
@@ -85,9 +85,9 @@ def test_rviz_shows_what_the_node_publishes(topics: dict[str, str]):
             assert topics[topic] == RVIZ_TYPES[kind], topic
             shown[topic] = kind
         if kind == "Path":
-            colours.append(display["Color"])
+            colors.append(display["Color"])
     assert shown.keys() == {f"/virtual_axes/{topic}" for topic in ("tool_pose", "tool_path", "tool_path_setpoint")}
-    assert len(set(colours)) == 2
+    assert len(set(colors)) == 2
     kinds = [display["Class"].removeprefix("rviz_default_plugins/") for display in manager["Displays"]]
     assert {"RobotModel", "TF"} <= set(kinds)
 

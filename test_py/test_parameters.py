@@ -137,7 +137,7 @@ def test_an_argument_that_is_not_utf_8_is_refused_and_no_panic():
         assert "is not UTF-8" in process.output()
 
 
-def test_arguments_are_honoured(start: Callable[..., Drive], tmp_path):
+def test_arguments_are_honored(start: Callable[..., Drive], tmp_path):
     """-p, --params-file, names and namespaces, and -- which ends them."""
     file = tmp_path / "machine.yaml"
     file.write_text("/**:\n  ros__parameters:\n    y:\n      velocity_loop:\n        gain: 4.25\n")

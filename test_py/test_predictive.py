@@ -53,7 +53,7 @@ def run(drive: Drive) -> Recording:
 
 def deviation_um(recording: Recording) -> np.ndarray:
     """Radial deviation while the feed is steady, µm."""
-    return recording.radial_deviation(PATH.centre, PATH.radius)[recording.within(PATH.steady)] * 1e6
+    return recording.radial_deviation(PATH.center, PATH.radius)[recording.within(PATH.steady)] * 1e6
 
 
 @pytest.mark.parametrize("row", ROWS, ids=str)
@@ -87,7 +87,7 @@ def test_the_drive_states_name_the_controller_of_each_axis(predictive: Drive):
 
 
 def test_compensated_friction_leaves_no_spikes(predictive: Drive):
-    """The friction current of the set-point's velocity fed forward, switched on while the node runs."""
+    """The friction current of the setpoint's velocity fed forward, switched on while the node runs."""
     weights = [f"{axis}.feedforward.friction" for axis in AXES]
     assert np.abs(deviation_um(run(predictive))).max() > 2
     predictive.set_parameters(dict.fromkeys(weights, 1.0))
@@ -154,7 +154,7 @@ def test_cascade_to_predictive_and_back_on_a_circle_is_not_felt(real: Drive):
         before, during = change[at - TURN : at].max(), change[at : at + SWITCH].max()
         assert during <= 2 * before, f"{during} rad/s at {names[at]} on instant {at}, a turn before {before}"
 
-    deviation = recording.radial_deviation(LONG.centre, LONG.radius) * 1e6
+    deviation = recording.radial_deviation(LONG.center, LONG.radius) * 1e6
     smallest, largest = (extreme(np.ravel(list(STEADY_UM.values()))) for extreme in (min, max))
     assert deviation.min() >= smallest - WIDENED_UM
     assert deviation.max() <= largest + WIDENED_UM

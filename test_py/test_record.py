@@ -284,7 +284,7 @@ def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive
     """At 1 MB the file is closed, whole and told; in `fast` nothing before that is missing."""
     path = tmp_path / "bounded.mcap"
     drive = start("-p", f"record:={path}", "-p", "record_max_mb:=1", "-p", "time:=fast")
-    # Set-points that no compression makes much of.
+    # Setpoints that no compression makes much of.
     noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (4000, 2))
     times = np.arange(1, len(noise) + 1) * (2 * TSP_NS / NANOSECONDS)
     drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120)

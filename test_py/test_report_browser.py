@@ -109,7 +109,7 @@ def test_its_pictures_are_well_formed(browser: Browser, report: Path):
     for picture in map(ElementTree.fromstring, pictures):
         title, description = picture.find("title"), picture.find("desc")
         assert title is not None and title.text and description is not None and description.text
-        assert picture.get("aria-labelledby") == f"{title.get('id')} {description.get('id')}"
+        assert picture.get("aria-labeledby") == f"{title.get('id')} {description.get('id')}"
         ids |= {title.get("id"), description.get("id")}
     assert len(ids) == 2 * len(pictures)
     assert browser.evaluate("document.querySelectorAll('svg[role=img]').length") == len(pictures)
@@ -128,8 +128,8 @@ def test_it_is_seen(browser: Browser, scheme: str, width: int):
     # From top to bottom there is no long stretch without anything.
     rows = np.flatnonzero(drawn.any(axis=1))
     assert np.diff(rows).max() < 200
-    coloured = np.ptp(image, axis=2) > 0.3
-    assert coloured.mean() > 0.0005, "no coloured lines"
+    colored = np.ptp(image, axis=2) > 0.3
+    assert colored.mean() > 0.0005, "no colored lines"
 
 
 @pytest.mark.parametrize("width", [WIDE, 700, NARROW])
@@ -144,15 +144,15 @@ def test_texts_contrast_with_their_ground(browser: Browser):
     """4.5 : 1 for text and 3 : 1 for lines, as WCAG 2.1 asks, in both schemes."""
     for scheme in (LIGHT, DARK):
         browser.show_as(scheme=scheme)
-        colours = {name: luminance(browser, name) for name in TEXTS + LINES + ["--page", "--area"]}
+        colors = {name: luminance(browser, name) for name in TEXTS + LINES + ["--page", "--area"]}
         for ground in ("--page", "--area"):
             for names, least in ((TEXTS, 4.5), (LINES, 3.0)):
                 for name in names:
-                    low, high = sorted((colours[name], colours[ground]))
+                    low, high = sorted((colors[name], colors[ground]))
                     assert (high + 0.05) / (low + 0.05) >= least, f"{name} on {ground}, {scheme}"
 
 
-def test_it_prints_in_light_colours(browser: Browser):
+def test_it_prints_in_light_colors(browser: Browser):
     """Paper is white whatever the screen is; no sheet is left empty."""
     browser.show_as(scheme=DARK, media="print")
     image = browser.screenshot(keep("print.png"))
@@ -179,7 +179,7 @@ LINES = [*(f"--run-{i}" for i in range(1, 7)), "--friction", "--gravity", "--loa
 
 
 def luminance(browser: Browser, name: str) -> float:
-    """Relative luminance of a colour of the style (WCAG 2.1)."""
+    """Relative luminance of a color of the style (WCAG 2.1)."""
     value = browser.evaluate(f"getComputedStyle(document.documentElement).getPropertyValue('{name}').trim()")
     assert isinstance(value, str) and value.startswith("#") and len(value) == 7, value
     channels = np.array([int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)])

@@ -71,7 +71,7 @@ def test_the_wheels_of_rclpy_have_no_dds_security(tmp_path: Path):
 
 
 @needs_secure_node
-def test_only_who_is_authorised_hears_a_secured_node(tmp_path: Path):
+def test_only_who_is_authorized_hears_a_secured_node(tmp_path: Path):
     """One gives the clock; of those who follow it, a peer of its keystore moves on, others stand still."""
     domain = DomainId()
     with ExitStack() as stack:

@@ -93,7 +93,7 @@ def test_before_the_first_message_there_is_no_time(start: Callable[..., Drive]):
     assert drive.end(soon, 5).status == TrajectoryResult.STOPPED
 
 
-def test_a_goal_cancelled_before_the_first_message_takes_no_other_with_it(start: Callable[..., Drive]):
+def test_a_goal_canceled_before_the_first_message_takes_no_other_with_it(start: Callable[..., Drive]):
     """It ends at once; what waits beside it begins when there is a time."""
     drive = start("-p", "use_sim_time:=true", connect=False)
     with Follow(drive) as follow:

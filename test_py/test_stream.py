@@ -1,4 +1,4 @@
-"""psec_stream: set-points one at a time, as ros2_control's topic-based hardware and teleoperation send them."""
+"""psec_stream: setpoints one at a time, as ros2_control's topic-based hardware and teleoperation send them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def follow(drive: Drive, joints: Sequence[str], rows: np.ndarray) -> None:
     for row in rows:
         drive.stream(joints, row)
         wanted = dict(zip(joints, row))
-        drive.wait_for(lambda: wanted.items() <= drive.latest("psec").items(), 5, f"set-point {wanted}")
+        drive.wait_for(lambda: wanted.items() <= drive.latest("psec").items(), 5, f"setpoint {wanted}")
 
 
 def commanded(drive: Drive, joint: str, begin: int) -> np.ndarray:
@@ -55,7 +55,7 @@ def numbers(drive: Drive, *keys: str) -> tuple[int, ...]:
 
 
 def counts(drive: Drive) -> tuple[int, int]:
-    """Set-points refused and ignored so far."""
+    """Setpoints refused and ignored so far."""
     refused, ignored = numbers(drive, "stream_setpoints_refused", "stream_setpoints_ignored")
     return refused, ignored
 
@@ -100,7 +100,7 @@ def wave(amplitude: float, count: int = 100) -> np.ndarray:
 
 @pytest.mark.parametrize("mode", ["real", "fast"])
 def test_the_axes_are_commanded_what_was_streamed_sample_by_sample(mode: str, request: pytest.FixtureRequest):
-    """Two axes along their own paths: each set-point bit for bit, none twice, none left out."""
+    """Two axes along their own paths: each setpoint bit for bit, none twice, none left out."""
     drive: Drive = request.getfixturevalue(mode)
     go_home(drive)
     begin = drive.now()
@@ -115,7 +115,7 @@ def test_the_axes_are_commanded_what_was_streamed_sample_by_sample(mode: str, re
 
 
 def test_a_sender_with_its_own_clock_is_followed_in_order(real: Drive):
-    """At the position period by another clock: set-points may hold or be overtaken, never go back."""
+    """At the position period by another clock: setpoints may hold or be overtaken, never go back."""
     go_home(real)
     begin, refused = real.now(), counts(real)[0]
     # Slow enough that a sender that was held up is still within reach.
@@ -125,7 +125,7 @@ def test_a_sender_with_its_own_clock_is_followed_in_order(real: Drive):
         real.stream(["x"], [position])
         due += TSP
         time.sleep(max(0.0, due - time.monotonic()))
-    real.wait_for(lambda: real.latest("psec")["x"] == sent[-1], 5, "last set-point")
+    real.wait_for(lambda: real.latest("psec")["x"] == sent[-1], 5, "last setpoint")
     followed = commanded(real, "x", begin)[1:]
     assert set(followed) <= set(sent)
     assert (np.diff(followed) > 0).all()
@@ -139,7 +139,7 @@ def test_nan_and_short_arrays_leave_joints_alone(real: Drive):
     refused = counts(real)[0]
     follow(real, ["y"], np.array([[0.001]]))
     real.stream(["z", "x", "y"], [math.nan, 0.002])
-    real.wait_for(lambda: real.latest("psec")["x"] == 0.002, 5, "set-point of x")
+    real.wait_for(lambda: real.latest("psec")["x"] == 0.002, 5, "setpoint of x")
     real.stream(["x", "y"], [])
     real.stream(["x"], [math.nan])
     assert counts(real)[0] == refused
@@ -149,7 +149,7 @@ def test_nan_and_short_arrays_leave_joints_alone(real: Drive):
 
 
 def test_a_trajectory_takes_over_and_the_stream_is_ignored_meanwhile(real: Drive):
-    """From the joint's streamed set-point; the joints that it leaves go on with the stream."""
+    """From the joint's streamed setpoint; the joints that it leaves go on with the stream."""
     go_home(real)
     follow(real, ["x", "y"], np.array([[0.001, 0.001], [0.002, 0.002]]))
     ignored = counts(real)[1]
@@ -159,7 +159,7 @@ def test_a_trajectory_takes_over_and_the_stream_is_ignored_meanwhile(real: Drive
     real.wait_until(start, 5)
     for position in np.arange(3, 13) * 1e-3:
         real.stream(["x", "y"], [0.002, position])
-        real.wait_for(lambda: real.latest("psec")["y"] == position, 5, "set-point of y")
+        real.wait_for(lambda: real.latest("psec")["y"] == position, 5, "setpoint of y")
     assert real.end(accepted.sequence_number, 10).status == R.COMPLETED
     assert_psec(real, start, {"x": plan})
     assert counts(real)[1] == ignored + 10
@@ -186,8 +186,8 @@ def test_a_set_point_that_cannot_be_is_refused_counted_and_told_once_a_second(st
     assert any(s.level == DiagnosticStatus.WARN and "stream were refused" in s.message for s in statuses)
     assert not commanded(drive, "x", begin).any()
     np.testing.assert_array_equal(commanded(drive, "y", begin), [0.0, 0.001])
-    told = [line for line in drive.process.output().splitlines() if "set-point of the stream refused" in line]
-    for words in ("outside the stroke", "away from the set-point", "unknown joint q"):
+    told = [line for line in drive.process.output().splitlines() if "setpoint of the stream refused" in line]
+    for words in ("outside the stroke", "away from the setpoint", "unknown joint q"):
         lines = [line for line in told if words in line]
         assert 1 <= len(lines) <= 1 + lasted, told
 
@@ -241,7 +241,7 @@ def test_what_comes_twice_counts_once_and_what_was_overtaken_is_left_out(real: D
     for stamp, position in [(1, 0.001), (1, 0.001), (3, 0.003), (2, 0.002), (0, 0.0031), (4, 0.004), (4, 0.004)]:
         real.stream(["x"], [position], stamp and base + stamp * TSP_NS)
         if stamp != 2:
-            real.wait_for(lambda p=position: real.latest("psec")["x"] == p, 5, f"set-point {position}")
+            real.wait_for(lambda p=position: real.latest("psec")["x"] == p, 5, f"setpoint {position}")
     after = numbers(real, "stream_messages_out_of_order", "stream_setpoints_refused")
     assert (after[0] - before[0], after[1] - before[1]) == (1, 0)
     np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, 0.001, 0.003, 0.0031, 0.004])
@@ -290,7 +290,7 @@ def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
 
 
 def test_a_controller_that_looks_ahead_delays_the_stream(start: Callable[..., Drive]):
-    """By what it reads ahead of the set-point that alpha holds back, and all joints alike."""
+    """By what it reads ahead of the setpoint that alpha holds back, and all joints alike."""
     drive = start("-p", "x.position_loop.controller:=gpc")
     found = drive.get_parameters(["x.position_loop.gpc.n2", "x.delays.alpha_ms"])
     delay = found["x.position_loop.gpc.n2"] - math.ceil(found["x.delays.alpha_ms"] * 1e6 / TSP_NS)
@@ -299,7 +299,7 @@ def test_a_controller_that_looks_ahead_delays_the_stream(start: Callable[..., Dr
 
     begin = drive.now()
     drive.stream(["x", "y"], [0.001, 0.001])
-    drive.wait_for(lambda: drive.latest("psec")["x"] == 0.001, 5, "set-point of x")
+    drive.wait_for(lambda: drive.latest("psec")["x"] == 0.001, 5, "setpoint of x")
     states = drive.record(begin, drive.now()).states
     first = {joint: states.stamp[np.flatnonzero(states["psec", joint])[0]] for joint in ("x", "y")}
     assert first["x"] == first["y"]

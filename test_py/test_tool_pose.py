@@ -45,7 +45,7 @@ class Tool:
             self.poses[to_ns(pose.header.stamp)] = pose
 
     def paths_with(self, condition: Callable[[Path], bool], what: str) -> tuple[Path, Path]:
-        """Wait for the newest actual path with a property, and the set-points' path of the same poses."""
+        """Wait for the newest actual path with a property, and the setpoints' path of the same poses."""
 
         def pair() -> tuple[Path, Path] | None:
             for actual in reversed(self.paths["tool_path"][-5:]):
@@ -125,7 +125,7 @@ def test_a_reset_clears_the_paths(tool: Tool):
 
 
 def test_the_paths_show_the_contour_error_of_the_ballbar(fast: Drive):
-    """Actual against set-point: 49 um outside on average, 48 at least; set-points on the circle itself."""
+    """Actual against setpoint: 49 um outside on average, 48 at least; setpoints on the circle itself."""
     tool = Tool(fast)
     path = ballbar(turns=1.0)
     recording = fast.run(joint_trajectory(["x", "y"], path.time, np.column_stack([path.x, path.y])), settle=0.2)
@@ -135,20 +135,20 @@ def test_the_paths_show_the_contour_error_of_the_ballbar(fast: Drive):
     assert (actual.header.frame_id, actual.poses[0].header.frame_id) == ("workpiece", "workpiece")
 
     def radial(points: np.ndarray) -> np.ndarray:
-        return np.hypot(points[:, 0] - path.centre[0], points[:, 1] - path.centre[1]) - path.radius
+        return np.hypot(points[:, 0] - path.center[0], points[:, 1] - path.center[1]) - path.radius
 
     when = (np.array(stamps(actual)) - recording.start) * 1e-9
     steady = (when >= path.steady[0]) & (when <= path.steady[1])
     assert steady.sum() > 400
     outside = radial(tips(actual))[steady]
-    # Where the set-points are delayed by one and a half periods: one and two of them, no others.
+    # Where the setpoints are delayed by one and a half periods: one and two of them, no others.
     assert np.abs(radial(tips(setpoint)[steady])).max() < 1e-9
     # The error that the recorded positions have at the same instants, and the specified figure.
-    expected = recording.radial_deviation(path.centre, path.radius)
+    expected = recording.radial_deviation(path.center, path.radius)
     by_stamp = dict(zip(recording.joints.stamp.tolist(), expected))
     assert outside == pytest.approx([by_stamp[s] for s in np.array(stamps(actual))[steady].tolist()], abs=1e-9)
     assert 1e6 * outside.mean() == pytest.approx(49.0, abs=1.0)
-    # Both paths go together: at equal places in the lists the distance is the synchronised error.
+    # Both paths go together: at equal places in the lists the distance is the synchronized error.
     assert np.linalg.norm(tips(actual) - tips(setpoint), axis=1).max() < 150e-6
 
 

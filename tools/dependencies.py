@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The crates that this package is built of: versions, licences, sources; docs/dependencies.md is their table.
+"""The crates that this package is built of: versions, licenses, sources; docs/dependencies.md is their table.
 
-    tools/dependencies.py               fails if the table is out of date, a licence is not in deny.toml's list,
+    tools/dependencies.py               fails if the table is out of date, a license is not in deny.toml's list,
                                         or a crate does not come from the registry
     tools/dependencies.py --write       writes the table
     tools/dependencies.py --advisories  asks cargo-audit or cargo-deny, where one of them is installed
@@ -57,7 +57,7 @@ def reached(known: dict[str, Any], with_tests: bool) -> set[str]:
 
 
 def is_allowed(expression: str, allowed: set[str]) -> bool:
-    """Whether an SPDX expression can be met by the licences of the list; an exception only gives more."""
+    """Whether an SPDX expression can be met by the licenses of the list; an exception only gives more."""
     expression = re.sub(r"\s+WITH\s+[\w.-]+", "", expression.replace("/", " OR "))
     known = {"OR": "or", "AND": "and"}
     words = re.sub(r"[\w.+-]+", lambda word: known.get(word[0], str(word[0] in allowed)), expression)
@@ -70,13 +70,13 @@ def is_allowed(expression: str, allowed: set[str]) -> bool:
 
 
 def clarified(rules: dict[str, Any], package: dict[str, Any]) -> str:
-    """A package's licence, as it says itself or as somebody has read its files."""
+    """A package's license, as it says itself or as somebody has read its files."""
     said = {rule["crate"]: rule["expression"] for rule in rules.get("clarify", [])}
     return package["license"] or said.get(package["name"], "not stated")
 
 
 def crates(rules: dict[str, Any]) -> list[tuple[str, str, str, str, str | None]]:
-    """Name, version, licence, what needs it, source; by name."""
+    """Name, version, license, what needs it, source; by name."""
     own = ROOT / "Cargo.toml"
     default, secured, fuzz = metadata(own), metadata(own, "--all-features"), metadata(ROOT / "fuzz" / "Cargo.toml")
     where: dict[tuple[str, str], str] = {}
@@ -122,15 +122,15 @@ def main() -> int:
     allowed = set(rules["allow"])
     rows = crates(rules)
     faults = []
-    for name, version, licence, _, source in rows:
-        if not is_allowed(licence, allowed):
-            faults.append(f"{name} {version}: licence {licence}")
+    for name, version, license, _, source in rows:
+        if not is_allowed(license, allowed):
+            faults.append(f"{name} {version}: license {license}")
         if source != REGISTRY:
             faults.append(f"{name} {version}: from {source}")
     for fault in faults:
         print(f"dependencies: {fault}, which deny.toml does not allow", file=sys.stderr)
-    head = "| crate | version | licence | needed by |\n|---|---|---|---|\n"
-    table = head + "".join(f"| {name} | {version} | {licence} | {what} |\n" for name, version, licence, what, _ in rows)
+    head = "| crate | version | license | needed by |\n|---|---|---|---|\n"
+    table = head + "".join(f"| {name} | {version} | {license} | {what} |\n" for name, version, license, what, _ in rows)
     text = TABLE.read_text()
     before, rest = text.split(BEGIN)
     present, after = rest.split(END)

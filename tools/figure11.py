@@ -58,14 +58,14 @@ def draw(contrast: dict) -> None:
     changes += [f"{axis}.position_loop.gpc.{name}={tuning[name]}" for axis in "xy" for name in names]
     label = "GPC " + ", ".join(f"{text} {tuning[name]:g}" for name, text in names.items())
     figure, (circle, corner) = plt.subplots(1, 2, figsize=(11, 5))
-    for changed, name, colour in ([], "cascade with feedforward", "#2a7ab9"), (changes, label, "#d95f02"):
+    for changed, name, color in ([], "cascade with feedforward", "#2a7ab9"), (changes, label, "#d95f02"):
         run = trace(CIRCLE, changed)
         steady = [i for i, time in enumerate(run["time"]) if STEADY[0] <= time <= STEADY[1]]
         # The circle starts at home, at its rightmost point.
         deviation = [((run["x"][i] + RADIUS_MM) ** 2 + run["y"][i] ** 2) ** 0.5 - RADIUS_MM for i in steady]
-        circle.plot([run["time"][i] for i in steady], [d * 1e3 for d in deviation], color=colour, label=name)
+        circle.plot([run["time"][i] for i in steady], [d * 1e3 for d in deviation], color=color, label=name)
         run = trace(CORNER, changed)
-        corner.plot(run["x"], run["y"], color=colour, label=name)
+        corner.plot(run["x"], run["y"], color=color, label=name)
     corner.plot([0, LEG_MM, LEG_MM + LEG_MM], [0, 0, LEG_MM], "k--", linewidth=0.8, label="path")
     circle.set(xlabel="time (s)", ylabel="radial deviation (µm)", title=f"{CIRCLE}: R 150 mm at 15 m/min")
     corner.set(

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""How long a set-point of `psec_stream` takes to the joint state that contains its effect.
+"""How long a setpoint of `psec_stream` takes to the joint state that contains its effect.
 
     cargo build --release && source .build/env.sh
     tools/measure_latency.py --messages 500
 
-One set-point at a time at a random phase of the position period; wall-clock time from the call of
+One setpoint at a time at a random phase of the position period; wall-clock time from the call of
 publish to the callback of the first message
 
 - of ~/drive_states that has it as psec: what the graph costs;
@@ -80,12 +80,12 @@ def measure(drive: Drive, messages: int, seed: int) -> dict[str, np.ndarray]:
 def main() -> int:
     """Measure and print."""
     parser = options.parser(__doc__)
-    parser.add_argument("--messages", type=options.whole, default=300, help="set-points (300)")
+    parser.add_argument("--messages", type=options.whole, default=300, help="setpoints (300)")
     parser.add_argument("--seed", type=int, default=1, help="of the phases (1)")
     args = parser.parse_args()
     with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:
         latencies = measure(drive, args.messages, args.seed)
-    print(f"{args.messages} set-points, position period {TSP_NS / 1e6:g} ms, {os.cpu_count()} cores; in periods:")
+    print(f"{args.messages} setpoints, position period {TSP_NS / 1e6:g} ms, {os.cpu_count()} cores; in periods:")
     for key, name in (("psec", "commanded"), ("position", "axis has moved")):
         periods = latencies[key] * 1e9 / TSP_NS
         low, median, high = np.percentile(periods, [5, 50, 95])

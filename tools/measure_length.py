@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""How time and memory of `virtual_axes run` grow with the length of the set-points.
+"""How time and memory of `virtual_axes run` grow with the length of the setpoints.
 
     cargo build --release
     tools/measure_length.py                        # a minute, ten minutes, an hour, ten hours
     tools/measure_length.py --seconds 60 600 --report --trace
-    tools/measure_length.py --write 36000 psec.csv # only the set-points, five axes every 6 ms
+    tools/measure_length.py --write 36000 psec.csv # only the setpoints, five axes every 6 ms
 
 A row per length: seconds of the processor (and of the clock, which a busy machine makes longer), times real time,
 time per simulated second relative to the first length, largest resident memory, and the length of what was read and
@@ -41,7 +41,7 @@ LOOK_EVERY = 0.005
 
 
 def write_psec(path: Path, seconds: int) -> None:
-    """Set-points of so many seconds, with all digits of their numbers."""
+    """Setpoints of so many seconds, with all digits of their numbers."""
     rows = []
     for k in range(CYCLE):
         values = (size * (1.0 - math.cos(math.tau * turns * k / CYCLE)) for size, turns in AXES.values())
@@ -134,13 +134,13 @@ def main() -> None:
     parser = options.parser(__doc__)
     parser.add_argument("--command", type=Path, default=COMMAND, help="the program virtual_axes")
     parser.add_argument(
-        "--seconds", type=options.whole, nargs="+", default=LENGTHS, metavar="S", help="lengths of the set-points"
+        "--seconds", type=options.whole, nargs="+", default=LENGTHS, metavar="S", help="lengths of the setpoints"
     )
     parser.add_argument("--report", action="store_true", help="write a page, too")
     parser.add_argument("--trace", action="store_true", help="write a trace, too")
     parser.add_argument("--rounds", type=options.whole, default=1, metavar="N", help="how often each length is run")
-    parser.add_argument("--folder", type=Path, help="where set-points and outputs are for a while")
-    parser.add_argument("--write", nargs=2, metavar=("S", "FILE"), help="write set-points and run nothing")
+    parser.add_argument("--folder", type=Path, help="where setpoints and outputs are for a while")
+    parser.add_argument("--write", nargs=2, metavar=("S", "FILE"), help="write setpoints and run nothing")
     arguments = parser.parse_args()
     if arguments.write:
         try:

@@ -77,7 +77,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class Guest:
-    """Somebody in the node's graph who subscribes and may send set-points."""
+    """Somebody in the node's graph who subscribes and may send setpoints."""
 
     def __init__(self, process: Node, topics: dict[str, Any]):
         """Subscribe to `topics`."""

@@ -98,7 +98,7 @@ class Subscriber:
         return Count(len(stamps), time.monotonic() - start, int(np.sum(np.rint(np.diff(stamps) / period_ns) - 1)))
 
     def send(self, trajectory: JointTrajectory) -> None:
-        """Publish set-points once the node listens."""
+        """Publish setpoints once the node listens."""
         while not self._psec.get_subscription_count():
             self._executor.spin_once(timeout_sec=0.1)
         time.sleep(0.2)

@@ -24,7 +24,7 @@ PAGE = ROOT / "docs" / "reproduction.md"
 
 HEAD = """# The paper, figure by figure
 
-Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling for the simulation of tool path tracking in
+Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modeling for the simulation of tool path tracking in
 multi-axis High Speed Machining*. Its figures compare measurements with a simulation; what it prints of
 them stands in the second column. The third is what this package's model is specified to have, the last
 what `virtual_axes` makes of it, by the command above each table. Add `--report page.html` to a command
@@ -71,13 +71,13 @@ def section(title: str, text: str, command: str, rows: list[tuple[str, str, str,
 
 
 def axis_rows(run: dict, axis: str, specified: tuple[str, str], paper: str = "—") -> list[tuple[str, str, str, str]]:
-    """Largest synchronised tracking error and current of an axis."""
+    """Largest synchronized tracking error and current of an axis."""
     figures = run["axes"][axis]
     unit = {"um": "µm", "mdeg": "mdeg"}[figures["unit"]]
     name = axis.upper()
     error, current = figures["synchronized_tracking_error"]["max"], figures["peak_current_a"]
     return [
-        (f"{name}, largest synchronised tracking error, {unit}", paper, specified[0], number(error)),
+        (f"{name}, largest synchronized tracking error, {unit}", paper, specified[0], number(error)),
         (f"{name}, largest current, A", "—", specified[1], number(current, 2)),
     ]
 
@@ -95,12 +95,12 @@ def contour_rows(run: dict) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def synchronised_rows(run: dict) -> list[tuple[str, str, str, str]]:
-    """Largest synchronised tracking error of each axis that moves."""
+def synchronized_rows(run: dict) -> list[tuple[str, str, str, str]]:
+    """Largest synchronized tracking error of each axis that moves."""
     units = {"um": "µm", "mdeg": "mdeg"}
     return [
         (
-            f"{name.upper()}, largest synchronised tracking error, {units[axis['unit']]}",
+            f"{name.upper()}, largest synchronized tracking error, {units[axis['unit']]}",
             "—",
             "—",
             number(axis["synchronized_tracking_error"]["max"]),
@@ -190,7 +190,7 @@ def page() -> str:
                 f"{text[0].upper()}{text[1:]}. In the paper "
                 f"{validated.format('5 µm or 0.005°, on the spline to 12 µm')}.",
                 name,
-                synchronised_rows(single) + contour_rows(single),
+                synchronized_rows(single) + contour_rows(single),
             )
         )
     command = "ballbar --controller cascade,cascade-noff"
@@ -224,7 +224,7 @@ def page() -> str:
     parts.append(
         section(
             "Figure 10, right: the tuning of the machine file, and friction compensated",
-            "The friction current of the set-point's velocity is fed forward, 11.75 ms behind the set-point.",
+            "The friction current of the setpoint's velocity is fed forward, 11.75 ms behind the setpoint.",
             command,
             rows,
         )
@@ -270,7 +270,7 @@ def page() -> str:
                 f"Section 6, the stated aim: {name}",
                 f"{text}: the final geometric error due to the drives, in the workpiece frame.",
                 name,
-                synchronised_rows(single) + contour_rows(single),
+                synchronized_rows(single) + contour_rows(single),
             )
         )
     return "".join(parts)

@@ -6,7 +6,7 @@
     tools/soak.py --minutes 10                 # ten minutes in real time
     tools/soak.py --minutes 60 --speed 10      # an hour, in which the axes live ten
 
-Valid and invalid trajectories, streams, loads, services, parameters, goals that are cancelled or not, one after the
+Valid and invalid trajectories, streams, loads, services, parameters, goals that are canceled or not, one after the
 other as fast as they are answered, the same for the same --seed; beside them, by the wall clock, subscriptions that
 come and go, processes that come, leave and are killed: a subscription every 4 s, a process every 24 s, or --churn times
 as many. With --speed the node follows a /clock of this tool's. At first what is bounded is filled to its bound: floods,
@@ -255,7 +255,7 @@ class Traffic:
             self.drive.stop()
 
     def stream(self) -> None:
-        """A burst of set-points, within reach or not."""
+        """A burst of setpoints, within reach or not."""
         at = self.drive.latest("psec")["y"]
         for k in range(50):
             far = 1.0 if self.chance.random() < 0.05 else 0.0
@@ -289,7 +289,7 @@ class Traffic:
         self.drive.reset()
 
     def goal(self) -> None:
-        """A goal, cancelled now and then."""
+        """A goal, canceled now and then."""
         names, to, duration = self._way()
         cancels = self.chance.random() < 0.5
         sent = self.follow.send(goal(joint_trajectory(names, [duration], [to], [[0.0] * len(names)])))

@@ -105,6 +105,6 @@ def read_axis(path: Path, joint: str) -> Axis:
 
 
 def padded(psec: list[float], axis: Axis) -> tuple[list[float], int]:
-    """Set-points with the first one repeated before the start, and where the start is."""
+    """Setpoints with the first one repeated before the start, and where the start is."""
     before = axis.delay_periods + 2
     return [psec[0]] * before + psec, before

@@ -1,6 +1,6 @@
-"""The cases of the comparison: set-points of each, and the default machine's axes in SI units.
+"""The cases of the comparison: setpoints of each, and the default machine's axes in SI units.
 
-Set-points are written as text that every contender reads: names of the axes, then a row per position period.
+Setpoints are written as text that every contender reads: names of the axes, then a row per position period.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ TABLE = Path(__file__).with_name("mikron_ucp710.txt")
 POSITION_PERIOD = 6e-3
 """Tsp, s."""
 M_MIN = 1.0 / 60.0
-"""One metre per minute, m/s."""
+"""One meter per minute, m/s."""
 SWEEP_MACHINES = 256
 """Machines of the sweep; their gains differ."""
 
@@ -34,7 +34,7 @@ class Case:
     machines: int = 1
 
     def arguments(self) -> list[str]:
-        """What the programs are told beside the set-points."""
+        """What the programs are told beside the setpoints."""
         words: list[str] = []
         if self.circle is not None:
             radius, first, last = self.circle
@@ -53,7 +53,7 @@ class Case:
         return self.periods() * POSITION_PERIOD * self.machines
 
     def write(self, folder: Path) -> Path:
-        """Writes the set-points; returns where."""
+        """Writes the setpoints; returns where."""
         path = folder / f"{self.name}.txt"
         rows = (self.psec(k * POSITION_PERIOD) for k in range(self.periods()))
         lines = [" ".join(self.joints), *(" ".join(map(repr, row)) for row in rows)]
@@ -154,7 +154,7 @@ CASES = {case.name: case for case in (single_axis(), five_axis(), sweep())}
 
 
 def read_setpoints(path: Path) -> tuple[list[str], list[list[float]]]:
-    """Names of the axes, and set-points by axis."""
+    """Names of the axes, and setpoints by axis."""
     first, *rows = path.read_text().splitlines()
     columns = zip(*([float(word) for word in row.split()] for row in rows))
     return first.split(), [list(column) for column in columns]

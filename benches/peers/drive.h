@@ -12,7 +12,7 @@
 enum { TICKS_PER_POSITION = 48, TICKS_PER_VELOCITY = 2 };
 static const double POSITION_PERIOD = 6e-3, VELOCITY_PERIOD = 250e-6, CURRENT_PERIOD = 125e-6;
 
-/* A row of the discretised motor: the weights of i, omega, u and the torque that is held. */
+/* A row of the discretized motor: the weights of i, omega, u and the torque that is held. */
 struct row {
   double current, speed, voltage, torque;
 };
@@ -22,7 +22,7 @@ struct pi {
   double gain, integral_gain, inverse_scale, limit;
 };
 
-/* A delay of the staircase of set-points: it moves on at tick `step` of a period, from `periods` back to one less. */
+/* A delay of the staircase of setpoints: it moves on at tick `step` of a period, from `periods` back to one less. */
 struct delay {
   int periods, step;
 };
@@ -37,7 +37,7 @@ struct axis {
   double friction_a, friction_b, friction_c, friction_d, friction_i0; /* a, c and i0 as torques */
   double weight_torque, tilt_torque, tilt_phase;
   double position_gain;
-  double velocity_feedforward, torque_feedforward; /* per difference, and per second difference, of set-points */
+  double velocity_feedforward, torque_feedforward; /* per difference, and per second difference, of setpoints */
   struct pi velocity_pi, current_pi;
   struct delay alpha, beta, gamma;
 };
@@ -84,7 +84,7 @@ static inline struct state at_rest(const struct axis *p, double position) {
   return s;
 }
 
-/* Position instant. `psec` points at the set-point of the period that begins; those before it are there. */
+/* Position instant. `psec` points at the setpoint of the period that begins; those before it are there. */
 static inline void control_position(const struct axis *p, struct state *s, const double *psec) {
   const double delayed = psec[-(p->alpha.periods)];
   const double wanted = p->position_gain * (delayed * p->inverse_ratio - s->theta);

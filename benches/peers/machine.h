@@ -1,4 +1,4 @@
-/* The machine's table and the set-points, read from text; the motor, discretised; the line protocol. */
+/* The machine's table and the setpoints, read from text; the motor, discretized; the line protocol. */
 #ifndef MACHINE_H
 #define MACHINE_H
 
@@ -97,7 +97,7 @@ static void matrix_exponential(double a[5][5], double e[5][5]) {
 static struct delay delay_of(double seconds) {
   const int ticks = (int)lround(seconds / CURRENT_PERIOD);
   const struct delay d = {ticks / TICKS_PER_POSITION, ticks % TICKS_PER_POSITION};
-  if (d.periods + 3 > LOOKBACK) fail("a delay is longer than", "the set-points that are kept");
+  if (d.periods + 3 > LOOKBACK) fail("a delay is longer than", "the setpoints that are kept");
   /* Before its step the staircase is one period further back; without a step it never is. */
   return d.step ? (struct delay){d.periods + 1, d.step} : (struct delay){d.periods, TICKS_PER_POSITION};
 }
@@ -150,7 +150,7 @@ static struct axis axis_of(const struct table *t, int c, double position_scale, 
   };
 }
 
-/* Set-points of some axes: a row per position period. Each axis has its own column, with its first value repeated
+/* Setpoints of some axes: a row per position period. Each axis has its own column, with its first value repeated
  * before its start. */
 struct setpoints {
   int axes, count;
@@ -190,7 +190,7 @@ static void read_setpoints(const char *path, const struct table *t, struct setpo
     s->count++;
   }
   fclose(file);
-  if (!s->count) fail("no set-points in", path);
+  if (!s->count) fail("no setpoints in", path);
   for (int a = 0; a < s->axes; a++)
     for (int k = 1; k <= LOOKBACK; k++) s->psec[a][-k] = s->psec[a][0];
 }

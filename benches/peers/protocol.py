@@ -22,7 +22,7 @@ class Asked(NamedTuple):
     joint: str
     axis: Axis
     psec: list[float]
-    """Set-points, one a position period."""
+    """Setpoints, one a position period."""
     values: list[float]
     """The same with what the delay reaches behind the first."""
     start: int
@@ -30,7 +30,7 @@ class Asked(NamedTuple):
 
 
 def asked() -> Asked:
-    """What the command line names: the table of the machine and the set-points."""
+    """What the command line names: the table of the machine and the setpoints."""
     table, setpoints = map(Path, sys.argv[1:3])
     (joint,), (psec,) = read_setpoints(setpoints)
     axis = read_axis(table, joint)

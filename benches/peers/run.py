@@ -1,4 +1,4 @@
-"""Runs this library and its peers against each other: same cases, same set-points, in turns.
+"""Runs this library and its peers against each other: same cases, same setpoints, in turns.
 
     benches/peers/setup.sh                 # once: the peers, into .build/peers
     python3 benches/peers/run.py [--case NAME]... [--rounds 10] [--cpu] [--json FILE] [--contender PROGRAM]

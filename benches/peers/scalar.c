@@ -4,13 +4,13 @@
  *     scalar TABLE SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--positions]
  *
  * TABLE is a file such as mikron_ucp710.txt. SETPOINTS is text: names of the axes that take part, then a row of
- * set-points (m, rad) for each position period. --circle adds the radial deviation of the first two axes from a
+ * setpoints (m, rad) for each position period. --circle adds the radial deviation of the first two axes from a
  * circle about (-RADIUS, 0), at every tick of the position periods FIRST up to LAST. --machines runs COUNT machines
  * with different gains one after the other. --positions prints the positions at position instants and ends.
  *
  * Each line "run N" on standard input makes N runs; the answer is a line of JSON with seconds per run and figures.
  *
- * With -ffast-math gcc may contract, reorder and vectorise what it can. Several axes stand side by side in the loop
+ * With -ffast-math gcc may contract, reorder and vectorize what it can. Several axes stand side by side in the loop
  * over ticks, so that the processor overlaps their chains of dependent operations: for five axes that is a fifth
  * faster than one axis after the other.
  */

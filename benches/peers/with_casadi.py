@@ -3,7 +3,7 @@
 A position period is one SX function (its 48 ticks written out), `mapaccum` carries the state through all of them,
 and CasADi's code generator makes it C, compiled with the flags of the C loop and called through `external`: the
 fastest way that CasADi documents. Branches of the model are `if_else`, of which CasADi works out both sides.
-Figures: the largest synchronised error and current only. Generating and compiling are not in the time.
+Figures: the largest synchronized error and current only. Generating and compiling are not in the time.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
 
 
 def position_period(p: Axis) -> ca.Function:
-    """State and set-points (the delayed one, then those of both feedforwards) to the state a period later."""
+    """State and setpoints (the delayed one, then those of both feedforwards) to the state a period later."""
     state = ca.SX.sym("state", 7)
     psec = ca.SX.sym("psec", 4)
     i, omega, theta, velocity_integral, current_integral, synchronized, peak = ca.vertsplit(state)
-    # Newest first: one after the delayed set-point, that itself, and two before it.
+    # Newest first: one after the delayed setpoint, that itself, and two before it.
     after, delayed, before, oldest = ca.vertsplit(psec)
     synchronized = ca.fmax(synchronized, ca.fabs(delayed - theta * p.ratio))
     velocity_setpoint = clamp(p.position_gain * (delayed / p.ratio - theta), p.max_speed)
@@ -93,7 +93,7 @@ def main() -> None:
     array = np.array(values)
     count = len(values) - start
     at = np.arange(start, len(values)) - axis.delay_periods
-    # Before its step the staircase behind the delay shows the delayed set-point, then the one after it.
+    # Before its step the staircase behind the delay shows the delayed setpoint, then the one after it.
     shifted = ca.DM(np.vstack([array[at + 1], array[at], array[at - 1], array[at - 2]]))
     function = compiled(position_period(axis).mapaccum("run", count, {"base": count}))
     initial = ca.DM([0, 0, psec[0] / axis.ratio, 0, 0, 0, 0])

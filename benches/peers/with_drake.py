@@ -3,7 +3,7 @@
 A LeafSystem whose one periodic event updates the discrete state every 125 µs, as a Drake user writes a sampled
 system. The arithmetic is on plain Python floats, which is faster than numpy for so small a state; the outer loops
 are called at their instants from the same event, since events of one time all see the state before it. Figures:
-the largest synchronised error and current only. Building the diagram is not in the time.
+the largest synchronized error and current only. Building the diagram is not in the time.
 """
 
 from __future__ import annotations

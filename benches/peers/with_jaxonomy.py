@@ -2,7 +2,7 @@
 
 In float64, nothing recorded, the compiled simulator kept from run to run (`jax.jit` of `Simulator.advance_to`, as
 its documentation has it for repeated runs). The outer loops are chosen by their instants inside the update: periodic
-updates of one time all see the state before it. Figures: the largest synchronised error and current only. Tracing
+updates of one time all see the state before it. Figures: the largest synchronized error and current only. Tracing
 and compiling are not in the time.
 """
 

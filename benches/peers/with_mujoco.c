@@ -10,7 +10,7 @@
  * What MuJoCo has not: the cascade with its rates, limits and delays, which are those of drive.h, called before each
  * step; the friction law, which is applied as an external torque, with the torque that would stop the axis in MuJoCo's
  * own step as its limit (its constraint solver would be slower). What it does otherwise: it integrates by
- * semi-implicit Euler, where the model has the exact step, so that it needs more STEPS for the same error. Figures: the largest synchronised error and current only.
+ * semi-implicit Euler, where the model has the exact step, so that it needs more STEPS for the same error. Figures: the largest synchronized error and current only.
  */
 #include <mujoco/mujoco.h>
 

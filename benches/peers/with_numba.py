@@ -32,7 +32,7 @@ def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
 
 @njit(fastmath=True)
 def row(r, i, omega, voltage, torque):
-    """A row of the discretised motor."""
+    """A row of the discretized motor."""
     return r[0] * i + r[1] * omega + r[2] * voltage + r[3] * torque
 
 

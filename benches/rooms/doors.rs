@@ -68,7 +68,7 @@ fn bytes_of<T>(group: &mut Group, name: &str, mut work: impl FnMut() -> T) {
 fn messages_as_bytes(criterion: &mut Criterion) {
     let config = shipped();
     let names: Vec<String> = config.axes().iter().map(|axis| axis.name().to_owned()).collect();
-    let mut machine = Machine::new(Arc::new(MachineParameters::new(&config).expect("it can be discretised")));
+    let mut machine = Machine::new(Arc::new(MachineParameters::new(&config).expect("it can be discretized")));
     machine.advance(&[1e-3; 5], &[]);
     let samples: Vec<AxisSample> = machine.axes().iter().map(|axis| *axis.sample()).collect();
     let mut long = Request::new(Start::Now, names.clone());

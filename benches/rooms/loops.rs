@@ -72,7 +72,7 @@ fn drive(criterion: &mut Criterion) {
     let config = shipped();
     let (x, tick) = (&config.axes()[0], seconds(config.periods().current));
     let friction = Friction::new(FRICTION, AxisKind::Linear, RATIO, TORQUE_CONSTANT);
-    let plant = Plant::new(x, tick).expect("it can be discretised");
+    let plant = Plant::new(x, tick).expect("it can be discretized");
     let speeds: Vec<f64> = (0..MANY).map(|k| 100.0 * swing(0, k)).collect();
     let mut group = criterion.benchmark_group("drive, ticks");
     bench(&mut group, "bound of friction", MANY, || {
@@ -114,7 +114,7 @@ fn control(criterion: &mut Criterion) {
     let ticks = periods.ticks_per_position();
     let mut history = SetpointHistory::new(0.0, ticks, Reach { delay: 4 * ticks, lookback: 0, ahead: 0 });
     let feedforward = Feedforward::new(&FEEDFORWARD, period, RATIO);
-    bench(&mut group, "delayed set-point and feedforward", MANY, || {
+    bench(&mut group, "delayed setpoint and feedforward", MANY, || {
         let mut sum = 0.0;
         for k in 0..MANY {
             history.push(swing(0, k));
@@ -157,7 +157,7 @@ fn machine(criterion: &mut Criterion) {
         for &axes in counts {
             let places: Vec<usize> = (0..axes).map(|axis| axis % config.axes().len()).collect();
             let machine = LazyCell::new(|| {
-                let parameters = MachineParameters::of_axes(&config, &places).expect("it can be discretised");
+                let parameters = MachineParameters::of_axes(&config, &places).expect("it can be discretized");
                 let mut machine = Machine::new(Arc::new(parameters));
                 machine.set_width(width);
                 machine
@@ -173,7 +173,7 @@ fn machine(criterion: &mut Criterion) {
             });
         }
     }
-    let mut five = Machine::new(Arc::new(MachineParameters::new(&config).expect("it can be discretised")));
+    let mut five = Machine::new(Arc::new(MachineParameters::new(&config).expect("it can be discretized")));
     let psec: Vec<Vec<f64>> = (0..PERIODS).map(|k| (0..5).map(|axis| swing(axis, k)).collect()).collect();
     bench(&mut group, "5 axes, every tick shown", 5 * ticks * PERIODS, || {
         five.reset(&psec[0]);
@@ -181,6 +181,6 @@ fn machine(criterion: &mut Criterion) {
     });
     group.finish();
     let mut group = criterion.benchmark_group("machine, machines made");
-    bench(&mut group, "five axes discretised", 1, || MachineParameters::new(black_box(&config)));
+    bench(&mut group, "five axes discretized", 1, || MachineParameters::new(black_box(&config)));
     group.finish();
 }

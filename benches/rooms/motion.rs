@@ -23,7 +23,7 @@ use virtual_axes_verification::fixtures::common::program;
 const POINTS: usize = 10_000;
 /// Instants in which a timeline samples it.
 const SAMPLED: usize = 1000;
-/// How far ahead of the set-point a foot is sought, as a trial does, m or rad.
+/// How far ahead of the setpoint a foot is sought, as a trial does, m or rad.
 const AHEAD: f64 = 5e-3;
 /// Linear axes of the shipped machine, the first ones, and by how much they are off the path, m.
 const LINEAR: usize = 3;
@@ -38,7 +38,7 @@ pub fn all(criterion: &mut Criterion) {
     simulation(criterion);
 }
 
-/// Set-points of five axes that move slowly and stand still at both ends; with their velocities if so asked.
+/// Setpoints of five axes that move slowly and stand still at both ends; with their velocities if so asked.
 fn request(config: &MachineConfig, every: i64, with_velocities: bool) -> Request {
     let names = config.axes().iter().map(|axis| axis.name().to_owned()).collect();
     let mut request = Request::new(Start::Now, names);
@@ -77,7 +77,7 @@ fn trajectory(criterion: &mut Criterion) {
         });
     }
     group.finish();
-    let mut group = criterion.benchmark_group("trajectory, set-points of five axes");
+    let mut group = criterion.benchmark_group("trajectory, setpoints of five axes");
     group.throughput(Throughput::Elements(SAMPLED as u64));
     for (name, request) in kinds {
         let trajectory = Arc::new(checked(request, &limits, period));
@@ -112,7 +112,7 @@ fn path(criterion: &mut Criterion) {
         let count = periods_of(&program, &config);
         bench(&mut group, &format!("{name} planned"), count, || scenario.program(black_box(&config), None));
         let mut psec = vec![0.0; config.axes().len()];
-        bench(&mut group, &format!("set-points of {name}"), count, || {
+        bench(&mut group, &format!("setpoints of {name}"), count, || {
             for k in 0..count {
                 program.psec(k as f64 * period, &mut psec);
                 black_box(&psec);
@@ -177,7 +177,7 @@ fn assess(criterion: &mut Criterion) {
         angles.iter().for_each(|[x, y]| _ = black_box(circle.push(radius * x, radius * y)));
     });
     group.finish();
-    let mut machine = Machine::new(Arc::new(MachineParameters::new(&config).expect("it can be discretised")));
+    let mut machine = Machine::new(Arc::new(MachineParameters::new(&config).expect("it can be discretized")));
     machine.advance(&[1e-3; 5], &[]);
     let (sample, activity) = (*machine.axis(0).sample(), machine.activity(0));
     let mut assessor = AxisAssessor::default();

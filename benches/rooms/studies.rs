@@ -78,7 +78,7 @@ fn tune(criterion: &mut Criterion) {
         setpoints("ballbar", program, &config),
         || Ok(()),
     )
-    .expect("set-points");
+    .expect("setpoints");
     let cost = Cost::default();
     let bench_of = LazyCell::new(|| Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench"));
     let designs: Vec<Tuning> = fine_grid(DESIGNS).into_iter().step_by(DESIGNS / SCREENED).collect();

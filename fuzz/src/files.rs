@@ -1,4 +1,4 @@
-//! Files of set-points and recordings.
+//! Files of setpoints and recordings.
 
 use std::io::Cursor;
 
@@ -21,7 +21,7 @@ const MOST_POINTS: usize = 1000;
 /// Longest trajectory that is checked, ns: a minute; each instant of it is looked at.
 const LONGEST: i64 = 60_000_000_000;
 
-/// Reads set-points to their end; the joints and the rows.
+/// Reads setpoints to their end; the joints and the rows.
 fn rows(data: &[u8]) -> Option<(Vec<String>, Vec<Vec<f64>>)> {
     let mut psec = match PsecCsv::new(data, "my.csv", MACHINE.periods().position, &JOINTS) {
         Ok(psec) => psec,
@@ -48,7 +48,7 @@ fn rows(data: &[u8]) -> Option<(Vec<String>, Vec<Vec<f64>>)> {
     None
 }
 
-/// Set-points as CSV: what is read is written and read back the same.
+/// Setpoints as CSV: what is read is written and read back the same.
 pub fn psec_csv(data: &[u8]) {
     bounded(data.len(), || {
         let Some((joints, rows_read)) = rows(data) else { return };
@@ -80,7 +80,7 @@ fn check(request: virtual_axes_core::trajectory::Request) {
     }
 }
 
-/// Set-points as YAML.
+/// Setpoints as YAML.
 pub fn psec_yaml(data: &[u8]) {
     let Ok(text) = str::from_utf8(data) else { return };
     bounded(data.len(), || match read_psec_yaml(text, "my.yaml") {
@@ -98,7 +98,7 @@ pub fn psec_yaml(data: &[u8]) {
     });
 }
 
-/// Set-points as MCAP.
+/// Setpoints as MCAP.
 pub fn psec_mcap(data: &[u8]) {
     bounded_beside(COMPRESSED_RECORD, data.len(), || {
         let trajectories = match Trajectories::new(Cursor::new(data), "my.mcap", None) {

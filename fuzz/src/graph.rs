@@ -86,7 +86,7 @@ pub fn cdr_psec(data: &[u8]) {
     });
 }
 
-/// `psec_stream` and `load`: set-points and loads of the same message.
+/// `psec_stream` and `load`: setpoints and loads of the same message.
 pub fn cdr_joint_state(data: &[u8]) {
     bounded(data.len(), || {
         let Some(message) = decode::<JointState>(data) else { return };

@@ -107,7 +107,7 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
                 for ((sample, before), joint) in simulation.samples().iter().zip(before).zip(JOINTS.iter()) {
                     let reach = joint.speed_bound() * passed * (1.0 + 1e-6);
                     let moved = (sample.psec - before).abs();
-                    // The first set-point of a stream may be one step away from where the axis stands.
+                    // The first setpoint of a stream may be one step away from where the axis stands.
                     assert!(stream || moved <= reach + 1e-9, "{}: {moved} in {passed} s", joint.name);
                 }
             }

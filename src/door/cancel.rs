@@ -11,7 +11,7 @@ pub struct Candidate {
     pub id: GoalId,
     /// When it was accepted, ns.
     pub stamp: Nanoseconds,
-    /// Whether it can be cancelled: it has not ended and has not been cancelled yet.
+    /// Whether it can be canceled: it has not ended and has not been canceled yet.
     pub cancelable: bool,
 }
 

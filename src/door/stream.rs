@@ -1,4 +1,4 @@
-//! Set-points of a stream from messages, and which messages come too late.
+//! Setpoints of a stream from messages, and which messages come too late.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,7 @@ const MOST_REFUSED: usize = 16;
 /// Publishers whose last stamp is remembered.
 const MOST_PUBLISHERS: usize = 64;
 
-/// The set-points of one message.
+/// The setpoints of one message.
 #[derive(Debug, Default)]
 pub struct Setpoints {
     /// Place of the axis in `joints`, and position, m or rad.
@@ -58,7 +58,7 @@ impl Order {
 }
 
 impl Setpoints {
-    /// The set-points of a message, joint by joint: what is wrong with one leaves the others.
+    /// The setpoints of a message, joint by joint: what is wrong with one leaves the others.
     ///
     /// As ros2_control's topic-based hardware means it: NaN and a `position` shorter than `name` leave
     /// the joint alone.
@@ -100,7 +100,7 @@ impl Setpoints {
     }
 }
 
-/// Why a joint's set-point is not taken: it has one already, or it is none of `joints`.
+/// Why a joint's setpoint is not taken: it has one already, or it is none of `joints`.
 fn refusal(name: &str, is_known: bool, joints: &[String]) -> Rejection {
     let (code, text) = if is_known {
         (Code::DuplicateJoint, format!("joint {name} is named twice; the first counts"))

@@ -84,7 +84,7 @@ impl Diagnostics {
             problems.push("samples were dropped: a subscriber is slow");
         }
         if now.stream.refused > before.stream.refused {
-            problems.push("set-points of the stream were refused");
+            problems.push("setpoints of the stream were refused");
         }
         if now.stream.counts.gaps > before.stream.counts.gaps {
             problems.push("the stream broke off in motion");
@@ -142,7 +142,7 @@ impl Diagnostics {
     fn axis(&self, joint: &str, before: AxisHealth, now: AxisHealth) -> DiagnosticStatus {
         let mut problems = Vec::new();
         if now.saturated > before.saturated {
-            problems.push("speed, current or voltage set-point at its limit");
+            problems.push("speed, current or voltage setpoint at its limit");
         }
         if now.extrapolated > before.extrapolated {
             problems.push("friction law used beyond its fitted range of 20 m/min or rev/min");

@@ -73,7 +73,7 @@ impl PsecInput {
     }
 }
 
-/// Takes streamed set-points in until the node shuts down.
+/// Takes streamed setpoints in until the node shuts down.
 pub async fn take_stream(
     subscription: Subscription<JointState>,
     joints: Vec<String>,

@@ -236,7 +236,7 @@ impl Results {
             Outcome::Completed => (Status::Completed, String::new()),
             Outcome::Displaced { by } => (Status::Displaced, taken_over(&known_list, by)),
             Outcome::Stopped => (Status::Stopped, "controlled stop".to_owned()),
-            Outcome::Cancelled => (Status::Stopped, "cancelled".to_owned()),
+            Outcome::Canceled => (Status::Stopped, "canceled".to_owned()),
             Outcome::PathTolerance(violation) => (Status::Aborted, self.violation("path", &violation)),
             Outcome::GoalTolerance(violation) => (Status::Aborted, self.violation("goal", &violation)),
             Outcome::Aborted(Abort::Reset) => (Status::Aborted, "reset".to_owned()),

@@ -1,4 +1,4 @@
-//! Set-points as they reach the position controllers, with their velocities: what `~/controller_state`
+//! Setpoints as they reach the position controllers, with their velocities: what `~/controller_state`
 //! and the action's feedback compare the axes with.
 
 use super::pace::Frame;
@@ -6,7 +6,7 @@ use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectoryPoint;
 use virtual_axes_io::messages::{JointTrajectoryControllerState, header};
 
-/// The velocities of the synchronised set-points, by difference from frame to frame:
+/// The velocities of the synchronized setpoints, by difference from frame to frame:
 /// `(PSEC_floor(k − α/Tsp) − the one before) / Tsp`.
 #[derive(Debug, Default)]
 pub struct SetpointVelocities {
@@ -38,7 +38,7 @@ impl SetpointVelocities {
 
 /// What is asked of some axes and what they do: positions and velocities.
 pub struct Comparison {
-    /// The synchronised set-points.
+    /// The synchronized setpoints.
     pub desired: JointTrajectoryPoint,
     /// The axes.
     pub actual: JointTrajectoryPoint,
@@ -47,7 +47,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Of the axes at `places`, in this order; `velocities` are those of the set-points.
+    /// Of the axes at `places`, in this order; `velocities` are those of the setpoints.
     pub fn of(frame: &Frame, velocities: &[f64], places: impl Iterator<Item = usize>) -> Self {
         let [mut desired, mut actual, mut error] = [(); 3].map(|()| JointTrajectoryPoint::default());
         for place in places {

@@ -1,4 +1,4 @@
-//! `psec_stream`: set-points one at a time, and what becomes of them.
+//! `psec_stream`: setpoints one at a time, and what becomes of them.
 
 use tracing::warn;
 
@@ -13,13 +13,13 @@ use virtual_axes_core::units::Nanoseconds;
 pub struct StreamHealth {
     /// Whether a stream drives, moving or not.
     pub drives: bool,
-    /// Whether set-points come that are ignored after a stop.
+    /// Whether setpoints come that are ignored after a stop.
     pub held_off: bool,
     /// Its delay, ns.
     pub delay: Nanoseconds,
-    /// Set-points refused since the start.
+    /// Setpoints refused since the start.
     pub refused: u64,
-    /// Set-points since the start that came while a trajectory or a stop had the joint, or after a stop.
+    /// Setpoints since the start that came while a trajectory or a stop had the joint, or after a stop.
     pub ignored: u64,
     /// Messages since the start that a younger one had overtaken.
     pub overtaken: u64,
@@ -27,7 +27,7 @@ pub struct StreamHealth {
     pub counts: StreamCounts,
 }
 
-/// Hands set-points to the simulation, counts those that are not taken, and tells of them now and then.
+/// Hands setpoints to the simulation, counts those that are not taken, and tells of them now and then.
 #[derive(Debug, Default)]
 pub struct StreamLog {
     refused: u64,
@@ -65,7 +65,7 @@ impl StreamLog {
     fn refuse(&mut self, rejection: &Rejection, now: Nanoseconds) {
         self.refused += 1;
         if self.told.is_due(Told::Refused(rejection.code), now) {
-            warn!("set-point of the stream refused: {rejection}");
+            warn!("setpoint of the stream refused: {rejection}");
         }
     }
 
@@ -73,7 +73,7 @@ impl StreamLog {
     pub fn watch(&mut self, simulation: &Simulation) {
         let gaps = simulation.stream_counts().gaps;
         if gaps > self.gaps && self.told.is_due(Told::Gap, simulation.time_of(simulation.next_instant())) {
-            warn!("the stream broke off in motion; the axes hold its last set-points");
+            warn!("the stream broke off in motion; the axes hold its last setpoints");
         }
         self.gaps = gaps;
     }

@@ -160,7 +160,7 @@ impl Trace {
         }
     }
 
-    /// Actual and set-point, oldest first.
+    /// Actual and setpoint, oldest first.
     fn read(&mut self) -> Vec<Moment> {
         self.changed = false;
         let newest = self.newest.filter(|newest| self.kept.back() != Some(newest));
@@ -177,7 +177,7 @@ fn lock(trace: &Mutex<Trace>) -> MutexGuard<'_, Trace> {
 struct Paths {
     trace: Arc<Mutex<Trace>>,
     frame: String,
-    /// Of the actual path and of the set-points'.
+    /// Of the actual path and of the setpoints'.
     outputs: [Output<Path>; 2],
 }
 

@@ -3,10 +3,10 @@
     with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
         path = ballbar()
         recording = drive.run(joint_trajectory(["x", "y"], path.time, np.column_stack([path.x, path.y])))
-        deviation = recording.radial_deviation(path.centre, path.radius)[recording.within(path.steady)]
+        deviation = recording.radial_deviation(path.center, path.radius)[recording.within(path.steady)]
         print(f"{deviation.mean() * 1e6:.1f} µm")
 
-`trajectories` makes set-points, `client` sends them and keeps what comes back, `recording` makes arrays of it, and
+`trajectories` makes setpoints, `client` sends them and keeps what comes back, `recording` makes arrays of it, and
 `process` starts a node of one's own.
 
 Needs rclpy and this package's messages: `tools/setup.sh && source .build/env.sh`, or a ROS 2 Jazzy

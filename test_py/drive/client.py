@@ -61,7 +61,7 @@ class ParameterRefused(Exception):
 
 
 class Drive:
-    """A ROS 2 node that sends set-points to the virtual axes and keeps what they publish.
+    """A ROS 2 node that sends setpoints to the virtual axes and keeps what they publish.
 
     It spins in a thread of its own; every wait is bounded and raises TimeoutError.
     """
@@ -271,7 +271,7 @@ class Drive:
         raise LookupError(f"{self.name} does not see its own publisher of {self._psec.topic_name}")
 
     def send(self, trajectory: JointTrajectory) -> int:
-        """Publish set-points; returns the sequence number by which the results name them."""
+        """Publish setpoints; returns the sequence number by which the results name them."""
         with self._changed:
             self._sent += 1
             sequence_number = self._sent
@@ -308,14 +308,14 @@ class Drive:
         )[0]
 
     def accept(self, trajectory: JointTrajectory, timeout: float = 10.0) -> TrajectoryResult:
-        """Publish set-points and return their acceptance; raises Refused."""
+        """Publish setpoints and return their acceptance; raises Refused."""
         result = self.decision(self.send(trajectory), timeout)
         if result.status == TrajectoryResult.REJECTED:
             raise Refused(result)
         return result
 
     def run(self, trajectory: JointTrajectory, timeout: float = 60.0, settle: float = 0.0) -> Recording:
-        """Execute set-points to their end and `settle` s on; raises Refused."""
+        """Execute setpoints to their end and `settle` s on; raises Refused."""
         self._must_listen()
         accepted = self.accept(trajectory)
         result = self.end(accepted.sequence_number, timeout)
@@ -361,7 +361,7 @@ class Drive:
         return dict(zip(message.name, getattr(message, field)))
 
     def stream(self, names: Sequence[str], positions: Sequence[float], stamp: int = 0) -> None:
-        """Publish one set-point of a stream (m, rad); NaN, or none, leaves the joint alone.
+        """Publish one setpoint of a stream (m, rad); NaN, or none, leaves the joint alone.
 
         `stamp` is when it was sent, ns of a clock of the sender's own; 0 does not say.
         """
@@ -456,6 +456,6 @@ def status_values(status: DiagnosticStatus) -> dict[str, str]:
 
 
 def stamp_of(sample: bytes) -> int:
-    """Stamp of a serialised message that begins with a header (CDR, little endian)."""
+    """Stamp of a serialized message that begins with a header (CDR, little endian)."""
     sec, nanosec = struct.unpack_from("<iI", sample, 4)
     return sec * NANOSECONDS + nanosec

@@ -89,11 +89,11 @@ class Recording:
         return delayed - self.states["position", joint]
 
     def radial_deviation(
-        self, centre: tuple[float, float], radius: float, axes: tuple[str, str] = ("x", "y")
+        self, center: tuple[float, float], radius: float, axes: tuple[str, str] = ("x", "y")
     ) -> np.ndarray:
-        """Distance from the centre less the radius, at every joint state, m (ISO 230-4)."""
+        """Distance from the center less the radius, at every joint state, m (ISO 230-4)."""
         x, y = (self.joints["position", axis] for axis in axes)
-        return np.hypot(x - centre[0], y - centre[1]) - radius
+        return np.hypot(x - center[0], y - center[1]) - radius
 
 
 def circular_deviation(radial_deviation: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""Set-points to send: any trajectory, and the circular test."""
+"""Setpoints to send: any trajectory, and the circular test."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def joint_trajectory(
     accelerations: Any = None,
     stamp: int | None = None,
 ) -> JointTrajectory:
-    """Set-points for `names`: `times` in s from the start, a row of positions (m, rad) per time.
+    """Setpoints for `names`: `times` in s from the start, a row of positions (m, rad) per time.
 
     Without velocities the axes go from point to point linearly, with them along cubics, with
     accelerations too along quintics. `stamp` is the start in ns; None starts at once.
@@ -79,7 +79,7 @@ class Ballbar(NamedTuple):
     """m"""
     steady: tuple[float, float]
     """From when to when the feed is steady, 0.5 s clear of both ramps, s."""
-    centre: tuple[float, float]
+    center: tuple[float, float]
     """m"""
     radius: float
     """m"""
@@ -120,6 +120,6 @@ def ballbar(
         x=radius * (np.cos(angle) - 1),
         y=radius * np.sin(angle),
         steady=(rest + ramp + clear, rest + ramp + cruise - clear),
-        centre=(-radius, 0.0),
+        center=(-radius, 0.0),
         radius=radius,
     )

@@ -126,7 +126,7 @@ fn an_axis_that_left_its_stroke_is_told() {
 fn trajectories_without_any_point_are_refused() {
     let folder = Folder::new("no_points");
     let file = folder.text_file("psec.yaml", "joint_names: [x]\n---\njoint_names: [y]\npoints: []\n");
-    assert_refused(&run(&["run", &file]), &["psec.yaml: there is no set-point: no trajectory has points"]);
+    assert_refused(&run(&["run", &file]), &["psec.yaml: there is no setpoint: no trajectory has points"]);
 }
 
 #[test]
@@ -316,7 +316,7 @@ fn set_points_of_a_scenario_run_like_the_scenario() {
         let file = folder.path(&format!("corner.{extension}"));
         assert_runs(&["psec", "corner-90", "--out", &file]);
         let found = figures(&[&file]);
-        // The same set-points give the same axes, to the bit.
+        // The same setpoints give the same axes, to the bit.
         let (expected, found) = (&scenario["runs"][0]["axes"], &found["runs"][0]["axes"]);
         assert_eq!(found, expected, "{extension}");
     }
@@ -418,7 +418,7 @@ fn memory_does_not_grow_with_the_length_of_the_set_points() {
     let (short, long) = (peak_memory(&folder, 60), peak_memory(&folder, 600));
     println!("{short} kB for a minute, {long} kB for ten");
     assert!(short > 0, "memory can be read");
-    // Held whole, ten minutes of five axes are 4 MB of set-points and more of checks.
+    // Held whole, ten minutes of five axes are 4 MB of setpoints and more of checks.
     assert!(long < short + 1024, "{short} kB for a minute, {long} kB for ten");
 }
 

@@ -172,7 +172,7 @@ fn options_that_cannot_be_are_refused_by_name() {
         (vec!["--modulus-margin", "2"], vec!["--modulus-margin", "'2'", "must lie in 0 … 1"]),
         (vec!["--modulus-margin", "nan"], vec!["--modulus-margin", "must lie in 0 … 1"]),
         (vec!["--delay-margin-ms", "-1"], vec!["--delay-margin-ms", "'-1'", "must lie in 0 … 1000"]),
-        (vec!["--cost", "colour"], vec!["--cost", "unknown term colour"]),
+        (vec!["--cost", "color"], vec!["--cost", "unknown term color"]),
         (vec!["--cost", "rms=-1"], vec!["--cost", "rms=-1", "a number from 0 to 1e9"]),
         (vec!["--cost", "rms=1e300"], vec!["--cost", "rms=1e300", "a number from 0 to 1e9"]),
         (vec!["--controller", "rst"], vec!["--controller", "gpc", "cascade"]),

@@ -6,8 +6,8 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt;
 
-/// Metres in a millimetre.
-pub const MILLIMETRE: f64 = 1e-3;
+/// Meters in a millimeter.
+pub const MILLIMETER: f64 = 1e-3;
 /// Seconds in a millisecond.
 pub const MILLISECOND: f64 = 1e-3;
 /// Henries in a millihenry.
@@ -20,8 +20,8 @@ pub const RPM: f64 = TAU / MINUTE;
 pub const REVOLUTION: f64 = TAU;
 /// Radians in a degree.
 pub const DEGREE: f64 = PI / 180.0;
-/// Metres per second in a metre per minute.
-pub const METRE_PER_MINUTE: f64 = 1.0 / MINUTE;
+/// Meters per second in a meter per minute.
+pub const METER_PER_MINUTE: f64 = 1.0 / MINUTE;
 /// Position-loop gain, s⁻¹, in one (m/min)/mm, and in one (1000 °/min)/°: both are 1000/60 s⁻¹.
 pub const POSITION_GAIN: f64 = 1000.0 / MINUTE;
 

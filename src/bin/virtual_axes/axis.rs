@@ -1,7 +1,7 @@
 //! One axis of a machine, and the units that people give its motion in.
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
-use virtual_axes_core::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, RPM};
+use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, RPM};
 
 /// Least similarity (Jaro-Winkler) of a name that is offered in place of an unknown one.
 const NEAR_ENOUGH: f64 = 0.7;
@@ -44,10 +44,10 @@ impl Units {
     pub fn of(kind: AxisKind) -> Self {
         match kind {
             AxisKind::Linear => Units {
-                length: MILLIMETRE,
+                length: MILLIMETER,
                 length_name: "mm",
                 length_key: "mm",
-                speed: METRE_PER_MINUTE,
+                speed: METER_PER_MINUTE,
                 speed_name: "m/min",
                 speed_key: "m_min",
             },

@@ -1,4 +1,4 @@
-//! `virtual_axes psec campaign`: the set-points that an axis is identified from.
+//! `virtual_axes psec campaign`: the setpoints that an axis is identified from.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ pub struct Arguments {
     /// `ros2 topic pub` takes.
     #[arg(long, value_name = "FILE.csv|FILE.mcap|FILE.yaml")]
     out: PathBuf,
-    /// A shipped machine or a machine file, whose limits and sampling period the set-points are for.
+    /// A shipped machine or a machine file, whose limits and sampling period the setpoints are for.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
     /// A parameter, as in `x.limits.jerk_m_s3=20`; can be given several times.

@@ -15,10 +15,10 @@ use crate::interrupt;
 /// Which file.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A machine file (a ROS 2 parameter file), a scenario, or set-points (CSV, MCAP, YAML); or what is
+    /// A machine file (a ROS 2 parameter file), a scenario, or setpoints (CSV, MCAP, YAML); or what is
     /// shipped, by its name.
     file: PathBuf,
-    /// The machine that a scenario or set-points are for.
+    /// The machine that a scenario or setpoints are for.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
 }
@@ -38,7 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let config = Parameters::load(&arguments.machine)?.machine_config()?;
     let input = Input::open(&name, None)?;
     let program = input.program(&config, None)?;
-    let kind = if program.is_some() { "scenario" } else { "set-points" };
+    let kind = if program.is_some() { "scenario" } else { "setpoints" };
     let trial = Trial {
         machine: &config,
         program: program.clone(),

@@ -29,7 +29,7 @@ enum Group {
     Friction,
     /// Weight, or tilting torque and phase.
     Gravity,
-    /// VFFW and TFFW, where their set-points were not recorded.
+    /// VFFW and TFFW, where their setpoints were not recorded.
     Feedforward,
 }
 

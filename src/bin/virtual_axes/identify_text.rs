@@ -1,7 +1,7 @@
 //! What `virtual_axes identify` prints.
 
 use virtual_axes_core::config::AxisKind;
-use virtual_axes_core::units::{DEGREE, MILLIMETRE, MILLISECOND, MILLISECOND_NS};
+use virtual_axes_core::units::{DEGREE, MILLIMETER, MILLISECOND, MILLISECOND_NS};
 use virtual_axes_identify::identify::{
     Agreement, Comparison, Deviation, Friction, FrictionLaw, Gravity, GravitySource, Identification,
     Identified, LawFit, Level, Parameter, Regression,
@@ -22,7 +22,7 @@ const SAME_SPEED: f64 = 0.03;
 /// Unit of an axis's velocities for people and for programs, and its value in SI.
 pub fn velocity_scale(kind: AxisKind) -> (&'static str, f64) {
     match kind {
-        AxisKind::Linear => ("mm/s", MILLIMETRE),
+        AxisKind::Linear => ("mm/s", MILLIMETER),
         AxisKind::Rotary => ("deg/s", DEGREE),
     }
 }
@@ -323,7 +323,7 @@ fn regression(name: &str, found: Option<&Regression>) -> Option<String> {
     let found = found?;
     let [low, high] = [found.delay.0, found.delay.1].map(|delay| digits(delay / MILLISECOND, 3));
     Some(format!(
-        "{name}: {} ± {}, R² {:.6}, {low} … {high} ms behind the set-points",
+        "{name}: {} ± {}, R² {:.6}, {low} … {high} ms behind the setpoints",
         digits(found.value, 5),
         digits(found.error, 2),
         found.determination

@@ -1,4 +1,4 @@
-//! What a command is given to run: a scenario or a file of set-points.
+//! What a command is given to run: a scenario or a file of setpoints.
 
 use std::cell::RefCell;
 use std::error::Error;
@@ -15,7 +15,7 @@ use virtual_axes_core::trajectory::Request;
 use virtual_axes_core::trial::{GridSource, ProgramSource, Setpoints, SourceError};
 use virtual_axes_io::files::{self, FileKind, PsecCsv, Trajectories, read_psec_yaml};
 
-/// A scenario or set-points.
+/// A scenario or setpoints.
 #[derive(Debug)]
 pub struct Input {
     name: String,
@@ -83,7 +83,7 @@ impl Input {
         }
     }
 
-    /// The set-points; `program` is what [`Self::program`] gave.
+    /// The setpoints; `program` is what [`Self::program`] gave.
     pub fn setpoints(
         &self,
         machine: &MachineConfig,
@@ -135,7 +135,7 @@ fn content_of(file: files::Input, topic: Option<&str>) -> Result<Content, Box<dy
         FileKind::PsecYaml => {
             let requests = read_psec_yaml(file.text().unwrap_or_default(), &name)?;
             if requests.iter().all(|request| request.points() == 0) {
-                return Err(format!("{name}: there is no set-point: no trajectory has points").into());
+                return Err(format!("{name}: there is no setpoint: no trajectory has points").into());
             }
             Content::Yaml(requests)
         }
@@ -146,7 +146,7 @@ fn content_of(file: files::Input, topic: Option<&str>) -> Result<Content, Box<dy
     })
 }
 
-/// Set-points of a file, row by row.
+/// Setpoints of a file, row by row.
 struct CsvSource<R>(PsecCsv<R>);
 
 impl<R: Read> GridSource for CsvSource<R> {

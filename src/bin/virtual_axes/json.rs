@@ -6,11 +6,11 @@ use serde_json::{Map, Value, json};
 use virtual_axes_core::trial::{
     AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
 };
-use virtual_axes_core::units::{DEGREE, MILLIMETRE};
+use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
 use crate::input::Input;
 use crate::run::Run;
-use crate::table::{MICROMETRE, MILLIDEGREE, scale};
+use crate::table::{MICROMETER, MILLIDEGREE, scale};
 
 /// The object of a command's runs.
 pub fn object(input: &Input, machine: &str, runs: &[Run]) -> Value {
@@ -73,12 +73,12 @@ fn contour(figures: &Figures) -> Value {
         json!({
             "reference": match contour.reference {
                 Reference::Path => "path",
-                Reference::Setpoints => "set-points",
+                Reference::Setpoints => "setpoints",
             },
-            "max": contour.max / MICROMETRE,
-            "rms": contour.rms / MICROMETRE,
-            "max_within_ends": contour.max_within_ends / MICROMETRE,
-            "rms_within_ends": contour.rms_within_ends / MICROMETRE,
+            "max": contour.max / MICROMETER,
+            "rms": contour.rms / MICROMETER,
+            "max_within_ends": contour.max_within_ends / MICROMETER,
+            "rms_within_ends": contour.rms_within_ends / MICROMETER,
         })
     })
 }
@@ -95,21 +95,21 @@ fn circle(circle: &CircleFigures) -> Value {
         "move": circle.index,
         "plane": circle.plane,
         "direction": if circle.counterclockwise { "counterclockwise" } else { "clockwise" },
-        "radius_mm": circle.radius / MILLIMETRE,
+        "radius_mm": circle.radius / MILLIMETER,
         "radial_deviation_um": {
-            "mean": circle.mean / MICROMETRE,
-            "min": circle.min / MICROMETRE,
-            "max": circle.max / MICROMETRE,
+            "mean": circle.mean / MICROMETER,
+            "min": circle.min / MICROMETER,
+            "max": circle.max / MICROMETER,
         },
-        "circular_deviation_um": circle.circular_deviation.map(|g| g / MICROMETRE),
+        "circular_deviation_um": circle.circular_deviation.map(|g| g / MICROMETER),
     })
 }
 
 fn bidirectional(pair: &BidirectionalFigures) -> Value {
     json!({
         "moves": pair.moves,
-        "circular_deviation_um": pair.circular_deviation / MICROMETRE,
-        "mean_radial_deviation_um": pair.mean_radial_deviation / MICROMETRE,
+        "circular_deviation_um": pair.circular_deviation / MICROMETER,
+        "mean_radial_deviation_um": pair.mean_radial_deviation / MICROMETER,
     })
 }
 
@@ -117,6 +117,6 @@ fn corner(corner: &CornerFigures) -> Value {
     json!({
         "move": corner.index,
         "turn_deg": corner.turn / DEGREE,
-        "max_contour_error_um": corner.max_contour_error / MICROMETRE,
+        "max_contour_error_um": corner.max_contour_error / MICROMETER,
     })
 }

@@ -54,9 +54,9 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run a scenario or set-points through a machine and print its errors.
+    /// Run a scenario or setpoints through a machine and print its errors.
     Run(run::Arguments),
-    /// Write set-points to a file: those of a scenario, or of a campaign to identify an axis.
+    /// Write setpoints to a file: those of a scenario, or of a campaign to identify an axis.
     Psec(psec::Arguments),
     /// Design position controllers: polynomials, closed-loop poles and stability margins.
     Design(design::Arguments),
@@ -66,7 +66,7 @@ enum Command {
     Robustness(Box<robustness::Arguments>),
     /// Find the parameters of an axis from recordings of it, and write a machine file with them.
     Identify(Box<identify::Arguments>),
-    /// Check a file: a machine, a scenario, or set-points.
+    /// Check a file: a machine, a scenario, or setpoints.
     Check(check::Arguments),
     /// Print the URDF of a machine, for robot_state_publisher and RViz.
     Urdf(urdf::Arguments),

@@ -8,7 +8,7 @@ use virtual_axes_core::kinematics::Kinematics;
 
 use crate::subject::MachineChoice;
 
-/// Furthest position from 0, m or rad: with more, its figures would have no digits left for micrometres.
+/// Furthest position from 0, m or rad: with more, its figures would have no digits left for micrometers.
 const FURTHEST: f64 = 1e6;
 
 /// Which machine, and where its joints are.

@@ -1,4 +1,4 @@
-//! `virtual_axes psec`: set-points as a file.
+//! `virtual_axes psec`: setpoints as a file.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ enum Kind {
     Campaign(campaign::Arguments),
 }
 
-/// Which set-points, and where to.
+/// Which setpoints, and where to.
 #[derive(Debug, clap::Args)]
 struct OfScenario {
     /// A shipped scenario or a scenario file.

@@ -111,7 +111,7 @@ pub fn read(
     Ok(Recorded { signals, feedforward, findings })
 }
 
-/// What would show the feedforward that acted on the set-points, if that is not there.
+/// What would show the feedforward that acted on the setpoints, if that is not there.
 fn unseen_feedforward(signals: &Signals) -> Option<&'static str> {
     let acts = |channel: &[f64]| channel.iter().any(|value| *value != 0.0);
     signals.spans.iter().filter(|span| span.psec.is_some()).find_map(|span| {

@@ -16,7 +16,7 @@ use crate::interrupt;
 /// What stands in a cell that has no value.
 const NONE: &str = "–";
 
-/// Reads the set-points of `input` into memory.
+/// Reads the setpoints of `input` into memory.
 pub fn course(input: &Input, machine: &MachineConfig, feed: Option<f64>) -> Result<Course, Box<dyn Error>> {
     let program = input.program(machine, feed)?;
     let setpoints = input.setpoints(machine, program.as_ref())?;

@@ -1,4 +1,4 @@
-//! What the commands that run something are given: set-points and a machine.
+//! What the commands that run something are given: setpoints and a machine.
 
 use std::error::Error;
 use std::path::Path;
@@ -39,7 +39,7 @@ impl MachineChoice {
 /// What is run, and on which machine.
 #[derive(Debug, clap::Args)]
 pub struct Subject {
-    /// A shipped scenario, a scenario file, or a file of set-points: CSV (`time,x,y,…` in s, m, rad),
+    /// A shipped scenario, a scenario file, or a file of setpoints: CSV (`time,x,y,…` in s, m, rad),
     /// MCAP with a JointTrajectory, or the YAML that `ros2 topic pub` takes.
     #[arg(value_name = "SCENARIO|FILE")]
     input: String,
@@ -68,7 +68,7 @@ impl Subject {
         must_not_replace(output, Path::new(&self.machine))
     }
 
-    /// The set-points.
+    /// The setpoints.
     pub fn input(&self) -> Result<Input, Box<dyn Error>> {
         Input::open(&self.input, self.topic.as_deref())
     }

@@ -2,11 +2,11 @@
 
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::trial::{AxisFigures, Figures, Reference};
-use virtual_axes_core::units::{DEGREE, MILLIMETRE};
+use virtual_axes_core::units::{DEGREE, MILLIMETER};
 use virtual_axes_report::report::{Column, Table};
 
-/// Metres in a micrometre.
-pub const MICROMETRE: f64 = 1e-6;
+/// Meters in a micrometer.
+pub const MICROMETER: f64 = 1e-6;
 /// Radians in a thousandth of a degree.
 pub const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 
@@ -16,7 +16,7 @@ pub const NO_CONTOUR: &str = "no linear joint is named x, y or z";
 /// Unit of an axis's errors for people and for programs, and its value in SI.
 pub fn scale(kind: AxisKind) -> (&'static str, &'static str, f64) {
     match kind {
-        AxisKind::Linear => ("µm", "um", MICROMETRE),
+        AxisKind::Linear => ("µm", "um", MICROMETER),
         AxisKind::Rotary => ("mdeg", "mdeg", MILLIDEGREE),
     }
 }
@@ -67,7 +67,7 @@ pub fn axes(figures: &Figures) -> Table {
         ("unit", ""),
         ("tracking error max", ""),
         ("RMS", ""),
-        ("synchronised max", ""),
+        ("synchronized max", ""),
         ("RMS", ""),
         ("peak current", "A"),
         ("saturated", "s"),
@@ -129,7 +129,7 @@ pub fn more(figures: &Figures) -> impl Iterator<Item = String> {
 /// Whether the largest and the RMS contour error differ, in print, without what overshoots the path's
 /// ends.
 pub fn overshoots(figures: &Figures) -> [bool; 2] {
-    let differ = |a: f64, b: f64| signed(a / MICROMETRE) != signed(b / MICROMETRE);
+    let differ = |a: f64, b: f64| signed(a / MICROMETER) != signed(b / MICROMETER);
     figures
         .contour
         .map_or([false; 2], |c| [differ(c.max, c.max_within_ends), differ(c.rms, c.rms_within_ends)])
@@ -145,16 +145,16 @@ pub fn path(figures: &Figures, ends: [bool; 2]) -> Table {
     if let Some(contour) = &figures.contour {
         let reference = match contour.reference {
             Reference::Path => "",
-            Reference::Setpoints => " (from the polyline of the set-points)",
+            Reference::Setpoints => " (from the polyline of the setpoints)",
         };
         let parts = [
             ("contour error, max", contour.max, contour.max_within_ends, ends[0]),
             ("contour error, RMS", contour.rms, contour.rms_within_ends, ends[1]),
         ];
         for (name, whole, within_ends, differ) in parts {
-            add(format!("{name}{reference}"), whole, "µm", MICROMETRE);
+            add(format!("{name}{reference}"), whole, "µm", MICROMETER);
             if differ {
-                add(format!("{name}, without overshoot of the path's ends"), within_ends, "µm", MICROMETRE);
+                add(format!("{name}, without overshoot of the path's ends"), within_ends, "µm", MICROMETER);
             }
         }
     }
@@ -167,23 +167,23 @@ pub fn path(figures: &Figures, ends: [bool; 2]) -> Table {
     for circle in &figures.circles {
         let plane = circle.plane.join("–");
         let direction = if circle.counterclockwise { "counterclockwise" } else { "clockwise" };
-        let name = format!("circle R {} mm in {plane}, {direction}", millimetres(circle.radius));
-        add(format!("{name}: radial deviation, mean"), circle.mean, "µm", MICROMETRE);
-        add(format!("{name}: radial deviation, min"), circle.min, "µm", MICROMETRE);
-        add(format!("{name}: radial deviation, max"), circle.max, "µm", MICROMETRE);
+        let name = format!("circle R {} mm in {plane}, {direction}", millimeters(circle.radius));
+        add(format!("{name}: radial deviation, mean"), circle.mean, "µm", MICROMETER);
+        add(format!("{name}: radial deviation, min"), circle.min, "µm", MICROMETER);
+        add(format!("{name}: radial deviation, max"), circle.max, "µm", MICROMETER);
         if let Some(deviation) = circle.circular_deviation {
-            add(format!("{name}: circular deviation G"), deviation, "µm", MICROMETRE);
+            add(format!("{name}: circular deviation G"), deviation, "µm", MICROMETER);
         }
     }
     for pair in &figures.bidirectional {
-        add("both directions: circular deviation G(b)".to_owned(), pair.circular_deviation, "µm", MICROMETRE);
+        add("both directions: circular deviation G(b)".to_owned(), pair.circular_deviation, "µm", MICROMETER);
         let mean = pair.mean_radial_deviation;
-        add("both directions: mean radial deviation D".to_owned(), mean, "µm", MICROMETRE);
+        add("both directions: mean radial deviation D".to_owned(), mean, "µm", MICROMETER);
     }
     for corner in &figures.corners {
         let name =
             format!("corner behind move {}, {:.0}°: contour error, max", corner.index, corner.turn / DEGREE);
-        add(name, corner.max_contour_error, "µm", MICROMETRE);
+        add(name, corner.max_contour_error, "µm", MICROMETER);
     }
     table
 }
@@ -194,7 +194,7 @@ fn signed(value: f64) -> String {
     if text == "-0.0" { "0.0".to_owned() } else { text }
 }
 
-fn millimetres(value: f64) -> String {
+fn millimeters(value: f64) -> String {
     // To a µm, so that 0.15 m is 150 and not 150.00000000000003.
-    format!("{}", (value / MILLIMETRE * 1e3).round() / 1e3)
+    format!("{}", (value / MILLIMETER * 1e3).round() / 1e3)
 }

@@ -41,7 +41,7 @@ pub struct Feedback {
 }
 
 impl Feedback {
-    /// Publishes what is due at a frame; `velocities` are those of the set-points, one per axis.
+    /// Publishes what is due at a frame; `velocities` are those of the setpoints, one per axis.
     pub async fn frame(&self, frame: &Frame, velocities: &[f64]) {
         if frame.instant % self.every != 0 {
             return;

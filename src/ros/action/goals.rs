@@ -150,7 +150,7 @@ impl Goals {
         }
     }
 
-    /// Somebody wants goals cancelled: the response, and the motions to call off.
+    /// Somebody wants goals canceled: the response, and the motions to call off.
     pub fn cancel(&mut self, request: &CancelGoalRequest) -> (CancelGoalResponse, Vec<MotionId>) {
         let asked = &request.goal_info;
         let time = i64::from(asked.stamp.sec) * SECOND_NS + i64::from(asked.stamp.nanosec);
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn cancelling_tells_the_motions_once() {
+    fn canceling_tells_the_motions_once() {
         let mut goals = Goals::default();
         for number in [1, 2] {
             goals.accept(id(number), SECOND_NS);

@@ -41,7 +41,7 @@ pub(super) fn aborted(text: String) -> FollowJointTrajectoryResult {
 pub(super) fn ended(outcome: &Outcome, text: String) -> (State, FollowJointTrajectoryResult) {
     match outcome {
         Outcome::Completed => (State::Succeeded, result(ErrorCode::Successful, text)),
-        Outcome::Cancelled => (State::Canceled, result(ErrorCode::Successful, text)),
+        Outcome::Canceled => (State::Canceled, result(ErrorCode::Successful, text)),
         Outcome::PathTolerance(_) => (State::Aborted, result(ErrorCode::PathToleranceViolated, text)),
         Outcome::GoalTolerance(_) => (State::Aborted, result(ErrorCode::GoalToleranceViolated, text)),
         Outcome::Displaced { .. } | Outcome::Stopped | Outcome::Aborted(_) => (State::Aborted, aborted(text)),

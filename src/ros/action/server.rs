@@ -296,7 +296,7 @@ impl Task<'_> {
     async fn cancel(&mut self, request: RmwRequestId, message: &CancelGoalRequest, place: Place) {
         let (response, motions) = self.goals.cancel(message);
         if !motions.is_empty() {
-            info!("goals to be cancelled: {}", motions.len());
+            info!("goals to be canceled: {}", motions.len());
         }
         for motion in motions {
             // What came of it is told by the motion's end.

@@ -11,7 +11,7 @@ use virtual_axes_core::units::Nanoseconds;
 pub struct Health {
     /// Time of the last position instant, ns.
     pub time: Nanoseconds,
-    /// Whether a trajectory or a stop moves the set-points.
+    /// Whether a trajectory or a stop moves the setpoints.
     pub moving: bool,
     /// Whether something is asked of the axes.
     pub busy: bool,
@@ -29,7 +29,7 @@ pub struct Health {
     pub total_lateness: f64,
     /// The clock that it keeps step with.
     pub clock: ClockHealth,
-    /// How the stream of set-points fares.
+    /// How the stream of setpoints fares.
     pub stream: StreamHealth,
     /// Periods with an axis at a limit, and with friction beyond its fitted range, per axis.
     pub axes: Vec<AxisHealth>,

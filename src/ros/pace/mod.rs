@@ -55,7 +55,7 @@ pub enum Command {
         /// How long, ns.
         hold: Nanoseconds,
     },
-    /// Take the set-points of a stream over, where no trajectory moves.
+    /// Take the setpoints of a stream over, where no trajectory moves.
     Stream(Arc<Setpoints>),
     /// Take changed parameters over.
     Adopt(Arc<MachineParameters>),
@@ -116,7 +116,7 @@ pub struct Channels {
 ///
 /// A thread of its own would have to be woken each time, which takes longer than what it does.
 pub struct Turns {
-    /// What hears set-points and loads, before each instant: they take effect at one anyway.
+    /// What hears setpoints and loads, before each instant: they take effect at one anyway.
     pub heard: BoxFuture<'static, ()>,
     /// What takes the frames, after each instant.
     pub published: BoxFuture<'static, ()>,

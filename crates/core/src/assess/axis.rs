@@ -15,9 +15,9 @@ pub struct AxisReport {
     pub rms_synchronized_tracking_error: f64,
     /// Largest |i| at any tick, A.
     pub peak_current: f64,
-    /// Time with speed, current or voltage set-point at its limit, s.
+    /// Time with speed, current or voltage setpoint at its limit, s.
     pub saturation_time: f64,
-    /// Control activity: RMS of the change of the current set-point from one position instant to the
+    /// Control activity: RMS of the change of the current setpoint from one position instant to the
     /// next, A.
     pub control_activity: f64,
 }
@@ -29,7 +29,7 @@ pub struct AxisAssessor {
     square_tracking: f64,
     square_synchronized: f64,
     square_activity: f64,
-    /// Set-point of the current at the last position instant, A.
+    /// Setpoint of the current at the last position instant, A.
     current_setpoint: f64,
     instants: u64,
     saturated_ticks: u64,

@@ -11,22 +11,22 @@ const SECTORS: usize = 36;
 
 /// Collects the points of a circular path in one direction, in memory that does not grow (200 kB).
 ///
-/// Of a circular path with a nominal centre and radius R, positive is outside:
+/// Of a circular path with a nominal center and radius R, positive is outside:
 ///
-/// - radial deviation F: distance of a point from the nominal centre less R; here its mean, least and
-///   largest value. (The standard also lets the centre be found by least squares. A simulation knows
-///   its centre, so that it does not have to.)
+/// - radial deviation F: distance of a point from the nominal center less R; here its mean, least and
+///   largest value. (The standard also lets the center be found by least squares. A simulation knows
+///   its center, so that it does not have to.)
 /// - circular deviation G: radial separation of two concentric circles that hold the path between
-///   them, evaluated as the range of the radius about the centre of the least-squares circle. It
-///   contains neither an error of the radius nor one of the centre.
+///   them, evaluated as the range of the radius about the center of the least-squares circle. It
+///   contains neither an error of the radius nor one of the center.
 /// - bi-directional circular deviation G(b): the same for two paths together, one clockwise, one
 ///   counterclockwise.
 /// - mean bi-directional radial deviation D: radius of the least-squares circle of both paths, less R.
 ///
 /// # Least squares
 ///
-/// The circle is Kåsa's: it minimises the sum of (d² − ρ²)², d the distance of a point from the
-/// centre sought, ρ the radius sought. With coordinates in units of R about the nominal centre
+/// The circle is Kåsa's: it minimizes the sum of (d² − ρ²)², d the distance of a point from the
+/// center sought, ρ the radius sought. With coordinates in units of R about the nominal center
 /// and q = (u² + v² − 1)/2 this is linear,
 ///
 /// ```text
@@ -34,21 +34,21 @@ const SECTORS: usize = 36;
 /// ```
 ///
 /// and needs nothing but running sums. On points of a true circle it is exact, however far its
-/// centre is off. Where the form is off by f, its centre differs from the one that minimises the sum
+/// center is off. Where the form is off by f, its center differs from the one that minimizes the sum
 /// of (d − ρ)² by less than f²/R (17 nm for f = 50 µm, R = 150 mm); its radius, which is a root mean
 /// square, is brought to the mean distance by the variance of the residuals, exact to f³/R².
 ///
 /// # A second pass in bounded memory
 ///
-/// G asks for the extremes about a centre that is known only at the end. The polar angle is cut
+/// G asks for the extremes about a center that is known only at the end. The polar angle is cut
 /// into 3600 bins, each of which keeps its innermost and its outermost point as seen from the
-/// nominal centre; the distances of these points from the least-squares centre are exact. Inside a
-/// bin of width w the offset e of that centre shifts two points by amounts that differ by less than
+/// nominal center; the distances of these points from the least-squares center are exact. Inside a
+/// bin of width w the offset e of that center shifts two points by amounts that differ by less than
 /// |e| w, so that G is never too large and too small by less than 2 |e| w (for e = 10 µm by 35 nm; for
 /// a smooth path by far less, since it is flat where it is extreme).
 #[derive(Debug, Clone)]
 pub struct CircleAssessor {
-    centre: [f64; 2],
+    center: [f64; 2],
     radius: f64,
     sums: Sums,
     /// Least and largest radial deviation, m.
@@ -65,17 +65,17 @@ pub struct CircleReport {
     pub min: f64,
     /// Largest radial deviation, Fmax.
     pub max: f64,
-    /// What needs a full circle; none for an arc, whose centre the points do not determine well.
+    /// What needs a full circle; none for an arc, whose center the points do not determine well.
     pub full: Option<FullCircle>,
 }
 
 /// Figures of a full circle, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FullCircle {
-    /// G: range of the radius about the centre of the least-squares circle.
+    /// G: range of the radius about the center of the least-squares circle.
     pub circular_deviation: f64,
-    /// That centre, seen from the nominal one.
-    pub centre: [f64; 2],
+    /// That center, seen from the nominal one.
+    pub center: [f64; 2],
     /// Radius of the least-squares circle less the nominal one.
     pub radius_deviation: f64,
 }
@@ -90,11 +90,11 @@ pub struct BidirectionalReport {
 }
 
 impl CircleAssessor {
-    /// No point yet of a circle with nominal `centre` and `radius`, m; the radius is positive.
-    pub fn new(centre: [f64; 2], radius: f64) -> Self {
+    /// No point yet of a circle with nominal `center` and `radius`, m; the radius is positive.
+    pub fn new(center: [f64; 2], radius: f64) -> Self {
         debug_assert!(radius > 0.0, "a circle has a radius");
         Self {
-            centre,
+            center,
             radius,
             sums: Sums::default(),
             range: [f64::INFINITY, f64::NEG_INFINITY],
@@ -102,9 +102,9 @@ impl CircleAssessor {
         }
     }
 
-    /// Nominal centre, m.
-    pub fn centre(&self) -> [f64; 2] {
-        self.centre
+    /// Nominal center, m.
+    pub fn center(&self) -> [f64; 2] {
+        self.center
     }
 
     /// Nominal radius, m.
@@ -114,7 +114,7 @@ impl CircleAssessor {
 
     /// Adds a point of the path, m; returns its radial deviation, m, positive outside.
     pub fn push(&mut self, x: f64, y: f64) -> f64 {
-        let (x, y) = (x - self.centre[0], y - self.centre[1]);
+        let (x, y) = (x - self.center[0], y - self.center[1]);
         let deviation = (x * x + y * y).sqrt() - self.radius;
         self.sums.add(x / self.radius, y / self.radius, deviation / self.radius);
         self.range = [self.range[0].min(deviation), self.range[1].max(deviation)];
@@ -128,10 +128,10 @@ impl CircleAssessor {
     pub fn report(&self) -> Option<CircleReport> {
         let sums = self.sums.means()?;
         let full = self.is_full().then(|| Fit::new(&sums)).flatten().map(|fit| {
-            let centre = fit.centre.map(|offset| offset * self.radius);
+            let center = fit.center.map(|offset| offset * self.radius);
             FullCircle {
-                circular_deviation: self.range_about(centre).width(),
-                centre,
+                circular_deviation: self.range_about(center).width(),
+                center,
                 radius_deviation: fit.radius_deviation * self.radius,
             }
         });
@@ -144,7 +144,7 @@ impl CircleAssessor {
         self.bins.chunks(BINS / SECTORS).all(|sector| sector.iter().any(|bin| bin.points.is_some()))
     }
 
-    /// Least and largest distance from `centre`, which is seen from the nominal one.
+    /// Least and largest distance from `center`, which is seen from the nominal one.
     fn range_about(&self, [x, y]: [f64; 2]) -> Range {
         let points = self.bins.iter().filter_map(|bin| bin.points).flatten();
         points.fold(Range::EMPTY, |range, point| range.with((point.place[0] - x).hypot(point.place[1] - y)))
@@ -153,26 +153,26 @@ impl CircleAssessor {
 
 /// Figures of one circle run in both directions; each counts the same, however many points it has.
 ///
-/// None unless both paths are full circles about the same nominal centre with the same radius.
+/// None unless both paths are full circles about the same nominal center with the same radius.
 pub fn bidirectional(
     clockwise: &CircleAssessor,
     counterclockwise: &CircleAssessor,
 ) -> Option<BidirectionalReport> {
     let paths = [clockwise, counterclockwise];
-    let same = clockwise.centre == counterclockwise.centre && clockwise.radius == counterclockwise.radius;
+    let same = clockwise.center == counterclockwise.center && clockwise.radius == counterclockwise.radius;
     if !same || !paths.iter().all(|path| path.is_full()) {
         return None;
     }
     let fit = Fit::new(&clockwise.sums.means()?.plus(&counterclockwise.sums.means()?).means()?)?;
-    let centre = fit.centre.map(|offset| offset * clockwise.radius);
-    let range = paths.map(|path| path.range_about(centre));
+    let center = fit.center.map(|offset| offset * clockwise.radius);
+    let range = paths.map(|path| path.range_about(center));
     Some(BidirectionalReport {
         circular_deviation: range[0].with(range[1].min).with(range[1].max).width(),
         mean_radial_deviation: fit.radius_deviation * clockwise.radius,
     })
 }
 
-/// A point seen from the nominal centre, m.
+/// A point seen from the nominal center, m.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     place: [f64; 2],
@@ -217,7 +217,7 @@ impl Range {
     }
 }
 
-/// Sums over points (u, v), in units of the radius about the nominal centre.
+/// Sums over points (u, v), in units of the radius about the nominal center.
 #[derive(Debug, Clone, Copy)]
 struct Sums {
     count: f64,
@@ -274,7 +274,7 @@ impl Sums {
 
 /// The least-squares circle, in units of the nominal radius.
 struct Fit {
-    centre: [f64; 2],
+    center: [f64; 2],
     radius_deviation: f64,
 }
 
@@ -288,7 +288,7 @@ impl Fit {
         let variance = (means.square - solution.dot(&means.right)).max(0.0);
         // d² = ρ² + 2 ε gives a mean d of ρ − ⟨ε²⟩/(2 ρ³).
         let radius_deviation = excess / (radius + 1.0) - variance / (2.0 * radius.powi(3));
-        radius_deviation.is_finite().then_some(Self { centre: [x, y], radius_deviation })
+        radius_deviation.is_finite().then_some(Self { center: [x, y], radius_deviation })
     }
 }
 

@@ -1,14 +1,14 @@
-//! Distance from the simulated point to the path of its set-points.
+//! Distance from the simulated point to the path of its setpoints.
 
-/// Set-points that are remembered: how far the axes may lag behind before the oldest is forgotten.
+/// Setpoints that are remembered: how far the axes may lag behind before the oldest is forgotten.
 pub(super) const CAPACITY: usize = 512;
 /// Segments looked at behind the nearest one so far, for a point that swings back.
 const LOOK_BACK: u64 = 8;
 
-/// Contour error along a path that becomes known set-point by set-point.
+/// Contour error along a path that becomes known setpoint by setpoint.
 ///
-/// The path is the polyline through the set-points of the linear axes. The nearest point is sought
-/// from a few segments behind the last nearest one up to the newest set-point, which may be one that
+/// The path is the polyline through the setpoints of the linear axes. The nearest point is sought
+/// from a few segments behind the last nearest one up to the newest setpoint, which may be one that
 /// is commanded later, so that a path that crosses itself is followed in order.
 #[derive(Debug, Clone)]
 pub struct ContourTracker {
@@ -17,7 +17,7 @@ pub struct ContourTracker {
     ring: Box<[f64]>,
     count: u64,
     nearest: u64,
-    /// The first of the set-points that are where the newest is.
+    /// The first of the setpoints that are where the newest is.
     still: u64,
 }
 
@@ -33,7 +33,7 @@ impl ContourTracker {
         }
     }
 
-    /// Adds a set-point, m per axis.
+    /// Adds a setpoint, m per axis.
     pub fn push(&mut self, point: impl Iterator<Item = f64>) {
         let start = (self.count % CAPACITY as u64) as usize * self.dimension;
         for (place, value) in self.ring[start..start + self.dimension].iter_mut().zip(point) {
@@ -50,18 +50,18 @@ impl ContourTracker {
         &self.ring[start..start + self.dimension]
     }
 
-    /// Set-points that have been added.
+    /// Setpoints that have been added.
     pub(super) fn count(&self) -> u64 {
         self.count
     }
 
-    /// Distance of `position` from the path, m; zero before the first set-point.
+    /// Distance of `position` from the path, m; zero before the first setpoint.
     pub fn distance(&mut self, position: &[f64]) -> f64 {
         self.nearest(position).map_or(0.0, |(_, foot)| foot.square_distance.sqrt())
     }
 
-    /// The segment nearest to `position`, by the set-point that it starts at, and the foot on it;
-    /// none before the first set-point.
+    /// The segment nearest to `position`, by the setpoint that it starts at, and the foot on it;
+    /// none before the first setpoint.
     pub(super) fn nearest(&mut self, position: &[f64]) -> Option<(u64, Foot)> {
         if self.count == 0 {
             return None;

@@ -11,7 +11,7 @@ use super::axis::{AxisAssessor, AxisReport, root_mean};
 pub struct MotionReport {
     /// Of each axis that took part, in the order of the assessor's axes.
     pub axes: Vec<AxisReport>,
-    /// Largest distance from the path of the set-points at any tick, m; none without a linear axis.
+    /// Largest distance from the path of the setpoints at any tick, m; none without a linear axis.
     pub max_contour_error: Option<f64>,
     /// RMS of that distance, m.
     pub rms_contour_error: Option<f64>,
@@ -25,7 +25,7 @@ pub struct MotionAssessor {
     /// Places of the linear ones among them.
     linear: Vec<usize>,
     contour: ContourTracker,
-    /// Position periods that the path is known ahead of the set-point, and whether it is yet.
+    /// Position periods that the path is known ahead of the setpoint, and whether it is yet.
     horizon: u32,
     looked_ahead: bool,
     position: Vec<f64>,
@@ -37,7 +37,7 @@ pub struct MotionAssessor {
 
 impl MotionAssessor {
     /// An assessor of the axes at `places` of a machine whose axes are of `kinds`, with ticks of
-    /// `tick` seconds; the path is looked at `horizon` position periods ahead of the set-point.
+    /// `tick` seconds; the path is looked at `horizon` position periods ahead of the setpoint.
     pub fn new(places: &[usize], kinds: &[AxisKind], tick: f64, horizon: u32) -> Self {
         let linear: Vec<usize> =
             places.iter().copied().filter(|&p| kinds.get(p) == Some(&AxisKind::Linear)).collect();
@@ -55,7 +55,7 @@ impl MotionAssessor {
         }
     }
 
-    /// Learns the path before a position instant: `psec` gives the set-point of an axis, by its place,
+    /// Learns the path before a position instant: `psec` gives the setpoint of an axis, by its place,
     /// so many periods after that instant. An axis that overshoots a corner is nearest to what comes
     /// behind it.
     pub fn look_ahead(&mut self, psec: impl Fn(usize, u32) -> f64) {

@@ -27,7 +27,7 @@ pub(super) enum Shape {
     Segment { from: Vector3<f64>, slope: Vector3<f64>, axis: Vector3<f64> },
     /// In the plane of two unit vectors: angle from the first at s = 0, and per unit of s.
     Circle {
-        centre: Vector3<f64>,
+        center: Vector3<f64>,
         plane: [Vector3<f64>; 3],
         radius: f64,
         start: f64,
@@ -201,7 +201,7 @@ fn linear_map(path: &Path, block: usize, room: &mut Room) -> LinearMap {
         let column = if path.frame() == Frame::Workpiece {
             unit
         } else {
-            // The map is linear: one metre on either side of 0 shows it best.
+            // The map is linear: one meter on either side of 0 shows it best.
             let mut tip = |value: f64| {
                 coordinates.fill(0.0);
                 for table in [Role::A, Role::C].into_iter().filter_map(|role| kinematics.role(role)) {
@@ -239,17 +239,17 @@ fn closed_form(path: &Path, block: usize, map: &LinearMap, room: &mut Room) -> O
     if !units || !block.keeps(others) {
         return None;
     }
-    let spoke = [0, 1].map(|i| block.start()[circle.plane[i]] - circle.centre[i]);
-    let centre = if path.frame() == Frame::Workpiece {
+    let spoke = [0, 1].map(|i| block.start()[circle.plane[i]] - circle.center[i]);
+    let center = if path.frame() == Frame::Workpiece {
         from - vectors[0] * spoke[0] - vectors[1] * spoke[1]
     } else {
         room.joints.copy_from_slice(block.start());
         for i in 0..2 {
-            room.joints[circle.plane[i]] = circle.centre[i];
+            room.joints[circle.plane[i]] = circle.center[i];
         }
         path.kinematics().forward(&room.joints).tip
     };
     let plane = [vectors[0], vectors[1], vectors[0].cross(&vectors[1])];
     let (start, turn) = (spoke[1].atan2(spoke[0]), circle.sweep / block.length());
-    Some(Shape::Circle { centre, plane, radius: circle.radius, start, turn, axis })
+    Some(Shape::Circle { center, plane, radius: circle.radius, start, turn, axis })
 }

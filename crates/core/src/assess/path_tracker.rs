@@ -23,7 +23,7 @@ const SAME: f64 = 1e-12;
 /// Blocks looked at in one call; of more, some around the last nearest point and some spread out.
 const MAX_BLOCKS: usize = 16;
 /// Of these, those around the last nearest point, on either side.
-const NEIGHBOURS: usize = 3;
+const NEIGHBORS: usize = 3;
 /// Steps from block to block towards a nearer one, in one call.
 const MAX_WALK: usize = 64;
 /// Samples of a curve looked at in one call.
@@ -38,7 +38,7 @@ const QUADRATIC_REACH: f64 = 3e-4;
 /// radius there is no nearest point to find.
 const MIN_DENOMINATOR: f64 = 0.2;
 /// Arm that makes an angle comparable with a distance, m: where the tip stands still while the axis
-/// turns, the orientation must tell that place from its neighbours.
+/// turns, the orientation must tell that place from its neighbors.
 const ARM: f64 = 0.1;
 
 /// The point of a path that is nearest to a pose of the tool.
@@ -194,10 +194,10 @@ impl PathTracker {
             }
         } else {
             let here = self.block.clamp(first, last);
-            for block in here.saturating_sub(NEIGHBOURS).max(first)..=(here + NEIGHBOURS).min(last) {
+            for block in here.saturating_sub(NEIGHBORS).max(first)..=(here + NEIGHBORS).min(last) {
                 self.try_block(pose, window, block, &mut best);
             }
-            let spread = MAX_BLOCKS - 2 * NEIGHBOURS - 1;
+            let spread = MAX_BLOCKS - 2 * NEIGHBORS - 1;
             for i in 0..spread {
                 self.try_block(pose, window, first + (count - 1) * i / (spread - 1), &mut best);
             }
@@ -284,14 +284,14 @@ impl PathTracker {
                 let point = from + slope * s;
                 self.candidate(block, s, point, (pose.tip - point).norm())
             }
-            Shape::Circle { centre, plane, radius, start, turn, .. } => {
-                let (centre, plane, radius, turn) = (*centre, *plane, *radius, *turn);
-                let ([x, y, z], off) = from_axis(pose.tip, centre, &plane);
+            Shape::Circle { center, plane, radius, start, turn, .. } => {
+                let (center, plane, radius, turn) = (*center, *plane, *radius, *turn);
+                let ([x, y, z], off) = from_axis(pose.tip, center, &plane);
                 let angle = ((y.atan2(x) - start) * turn.signum()).rem_euclid(TAU);
                 let ahead = self.furthest - SLACK - self.path.start_of(block);
                 match passage(angle / turn.abs(), TAU / turn.abs(), low, high, ahead) {
                     Some(s) if off > 0.0 => {
-                        let point = centre + (plane[0] * x + plane[1] * y) * (radius / off);
+                        let point = center + (plane[0] * x + plane[1] * y) * (radius / off);
                         self.candidate(block, s, point, from_circle(off, z, radius))
                     }
                     _ => self.nearer_end(pose, block, low, high),

@@ -25,7 +25,7 @@ pub struct AxisTrace {
     pub name: String,
     /// Linear: m, m/s; rotary: rad, rad/s.
     pub kind: AxisKind,
-    /// Whether the axis was given set-points that move.
+    /// Whether the axis was given setpoints that move.
     pub moves: bool,
     /// PSEC, m or rad.
     pub psec: Vec<f64>,
@@ -39,7 +39,7 @@ pub struct AxisTrace {
     pub velocity: Vec<f64>,
     /// SMC, A, where it is largest in the position period.
     pub current: Vec<f64>,
-    /// Set-point of the current loop, A.
+    /// Setpoint of the current loop, A.
     pub current_setpoint: Vec<f64>,
     /// Part of the current that friction takes, A.
     pub friction_current: Vec<f64>,
@@ -72,7 +72,7 @@ pub struct CircleTrace {
     pub radius: f64,
     /// Whether it turns from the first axis towards the second (counterclockwise).
     pub counterclockwise: bool,
-    /// Polar angle about the nominal centre, rad, growing or falling over several turns.
+    /// Polar angle about the nominal center, rad, growing or falling over several turns.
     pub angle: Vec<f64>,
     /// Radial deviation, m, positive outside.
     pub deviation: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Nearest point on the path that the set-points describe, where no geometry is known.
+//! Nearest point on the path that the setpoints describe, where no geometry is known.
 
 use nalgebra::Vector3;
 
@@ -7,10 +7,10 @@ use crate::kinematics::ToolPose;
 use super::contour::{CAPACITY, ContourTracker};
 use super::path_tracker::Nearest;
 
-/// Length below which two set-points do not tell a direction, m.
+/// Length below which two setpoints do not tell a direction, m.
 const SHORTEST: f64 = 1e-12;
 
-/// Follows the tool along the polyline through its set-points in the workpiece frame.
+/// Follows the tool along the polyline through its setpoints in the workpiece frame.
 ///
 /// The chord of a circle runs inside of it, by `(v·Tsp)²/(8R)`: 1.9 µm on the paper's ballbar.
 /// Where the path itself is known, [`PathTracker`](super::PathTracker) measures against that.
@@ -23,7 +23,7 @@ pub struct SetpointTracker {
 }
 
 impl SetpointTracker {
-    /// Before the first set-point, which is at `start`.
+    /// Before the first setpoint, which is at `start`.
     pub fn new(start: ToolPose) -> Self {
         let mut tracker = SetpointTracker {
             contour: ContourTracker::new(3),
@@ -42,7 +42,7 @@ impl SetpointTracker {
         self.contour.count().saturating_sub(1)
     }
 
-    /// Adds the tool's pose of a set-point.
+    /// Adds the tool's pose of a setpoint.
     pub fn push(&mut self, pose: ToolPose) {
         let step = pose.tip - self.poses[Self::place(self.newest())].tip;
         if step.norm() > SHORTEST {

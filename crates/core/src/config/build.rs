@@ -14,7 +14,7 @@ use super::machine::{
 use super::parameters::Parameters;
 use super::value::Value;
 use crate::units::{
-    DEGREE, METRE_PER_MINUTE, MICROSECOND_NS, MILLIHENRY, MILLIMETRE, MILLISECOND, MILLISECOND_NS,
+    DEGREE, METER_PER_MINUTE, MICROSECOND_NS, MILLIHENRY, MILLIMETER, MILLISECOND, MILLISECOND_NS,
     POSITION_GAIN, REVOLUTION, RPM,
 };
 
@@ -44,7 +44,7 @@ impl Parameters {
     }
 
     fn kinematics_config(&self) -> Result<KinematicsConfig, ConfigError> {
-        let distance = |name: &str| Ok(self.number(&format!("kinematics.{name}_mm"))? * MILLIMETRE);
+        let distance = |name: &str| Ok(self.number(&format!("kinematics.{name}_mm"))? * MILLIMETER);
         Ok(KinematicsConfig {
             tool_length: distance("tool_length")?,
             pivot_a: [distance("pivot_a_y")?, distance("pivot_a_z")?],
@@ -208,7 +208,7 @@ impl Axis<'_> {
         let direct = self.set.flag(&self.key("transmission.direct"));
         Ok(match self.joint.axis {
             _ if direct => 1.0,
-            AxisKind::Linear => self.scaled("transmission.screw_lead_mm", MILLIMETRE)? / TAU,
+            AxisKind::Linear => self.scaled("transmission.screw_lead_mm", MILLIMETER)? / TAU,
             AxisKind::Rotary => 1.0 / self.number("transmission.gear_ratio")?,
         })
     }
@@ -218,7 +218,7 @@ impl Axis<'_> {
         let torque = self.by_motor("motor.torque_constant_nm_a", "motor.force_constant_n_a");
         let emf = self.by_motor("motor.emf_constant_v_s_rad", "motor.emf_constant_v_s_m");
         let (speed, speed_unit) =
-            self.by_motor(("motor.max_speed_rpm", RPM), ("motor.max_speed_m_min", METRE_PER_MINUTE));
+            self.by_motor(("motor.max_speed_rpm", RPM), ("motor.max_speed_m_min", METER_PER_MINUTE));
         Ok(MotorConfig {
             inertia: self.number(inertia)?,
             torque_constant: self.number(torque)?,
@@ -236,11 +236,11 @@ impl Axis<'_> {
         let end = |suffix, unit, none: f64| self.scaled(suffix, unit).unwrap_or(none);
         Ok(match self.joint.axis {
             AxisKind::Linear => LimitsConfig {
-                velocity: self.scaled("limits.velocity_m_min", METRE_PER_MINUTE)?,
+                velocity: self.scaled("limits.velocity_m_min", METER_PER_MINUTE)?,
                 acceleration: self.number("limits.acceleration_m_s2")?,
                 jerk: self.number("limits.jerk_m_s3")?,
-                stroke_min: end("limits.stroke_min_mm", MILLIMETRE, f64::NEG_INFINITY),
-                stroke_max: end("limits.stroke_max_mm", MILLIMETRE, f64::INFINITY),
+                stroke_min: end("limits.stroke_min_mm", MILLIMETER, f64::NEG_INFINITY),
+                stroke_max: end("limits.stroke_max_mm", MILLIMETER, f64::INFINITY),
             },
             AxisKind::Rotary => LimitsConfig {
                 velocity: self.scaled("limits.velocity_rpm", RPM)?,

@@ -54,7 +54,7 @@ pub struct KinematicsConfig {
     pub workpiece: [f64; 3],
 }
 
-/// Whether an axis counts in metres or in radians.
+/// Whether an axis counts in meters or in radians.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AxisKind {
     /// Position in m.
@@ -107,11 +107,11 @@ pub struct MotorConfig {
     pub resistance: f64,
     /// L, H.
     pub inductance: f64,
-    /// Limit of the current set-point, A.
+    /// Limit of the current setpoint, A.
     pub max_current: f64,
     /// Limit of the voltage, V.
     pub max_voltage: f64,
-    /// Limit of the velocity set-point, rad/s (m/s).
+    /// Limit of the velocity setpoint, rad/s (m/s).
     pub max_speed: f64,
 }
 
@@ -211,7 +211,7 @@ pub struct FeedforwardConfig {
     pub friction: f64,
 }
 
-/// Delays of the set-point, ns, before rounding to a tick.
+/// Delays of the setpoint, ns, before rounding to a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DelaysConfig {
     /// α, before the position comparator.
@@ -301,7 +301,7 @@ impl AxisConfig {
         self.kind
     }
 
-    /// α, the delay of the set-point before the position comparator, ns (Prévost fig. 3).
+    /// α, the delay of the setpoint before the position comparator, ns (Prévost fig. 3).
     pub fn alpha(&self) -> Nanoseconds {
         self.delays.alpha
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::check::to_ns;
 use super::parameters::Parameters;
 use super::value::Value;
-use crate::units::{DEGREE, MILLIMETRE, Nanoseconds, SECOND_NS};
+use crate::units::{DEGREE, MILLIMETER, Nanoseconds, SECOND_NS};
 
 /// A megabyte, bytes.
 const MEGABYTE: u64 = 1_000_000;
@@ -138,7 +138,7 @@ impl Parameters {
         let column = |what: &str| {
             let tolerance = |joint: &String| {
                 let key = |unit: &str| format!("{joint}.tolerances.{what}_{unit}");
-                let linear = positive(&key("mm")).map(|value| value * MILLIMETRE);
+                let linear = positive(&key("mm")).map(|value| value * MILLIMETER);
                 linear.or_else(|| positive(&key("deg")).map(|value| value * DEGREE))
             };
             match self.get("joints") {

@@ -88,7 +88,7 @@ pub(super) const NODE: &[Definition] = &[
     qos_reliability("qos.psec.reliability", "reliable"),
     qos_durability("qos.psec.durability", "volatile"),
     qos_depth("qos.psec.depth", 64),
-    // As ros2_control's topic-based hardware publishes; it sends the last set-point of a move once.
+    // As ros2_control's topic-based hardware publishes; it sends the last setpoint of a move once.
     qos_reliability("qos.psec_stream.reliability", "reliable"),
     qos_durability("qos.psec_stream.durability", "volatile"),
     qos_depth("qos.psec_stream.depth", 10),

@@ -1,7 +1,7 @@
 //! The schema: one table of parameters from which the check of files, the typed configuration,
 //! the ROS descriptors and the table of the README are derived.
 //!
-//! Equation numbers are those of Prévost (Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling
+//! Equation numbers are those of Prévost (Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modeling
 //! for the simulation of tool path tracking in multi-axis High Speed Machining*).
 
 use super::definition::DefaultValue::{Flag, Integer, Number, Text};
@@ -14,16 +14,16 @@ use super::node_schema::NODE;
 const PERIOD_MS: (f64, f64) = (1e-3, 50.0);
 /// The same range in µs.
 const PERIOD_US: (f64, f64) = (1.0, 50e3);
-/// Longest delay of a set-point, ms.
+/// Longest delay of a setpoint, ms.
 const DELAY_MS: f64 = 100.0;
-/// Largest distance between two points of a machine, mm; the largest gantries have some tens of metres.
+/// Largest distance between two points of a machine, mm; the largest gantries have some tens of meters.
 const DISTANCE_MM: f64 = 1e5;
 /// Largest current, A, of a motor and of its friction.
 const CURRENT: f64 = 1e4;
 /// Exponents of the friction law, min/m or min/rev: the fall after breakaway can be steep, a rise
 /// steeper than e^V has no bearing that makes it.
 const FRICTION_EXPONENT: (f64, f64) = (-100.0, 1.0);
-/// Longest horizon of predictive control, and furthest set-point that T may read, position periods.
+/// Longest horizon of predictive control, and furthest setpoint that T may read, position periods.
 pub const MAX_HORIZON: i64 = 200;
 /// Smallest and largest factor of a plant that deviates.
 const DEVIATION: (f64, f64) = (0.1, 10.0);
@@ -65,7 +65,7 @@ const fn polynomial(key: &'static str, unit: &'static str, max_len: usize) -> De
     Definition::new(key, unit, Kind::NumberList { min_len: 1, max_len }).of_axis().optional().live()
 }
 
-/// A delay of the set-point, live.
+/// A delay of the setpoint, live.
 const fn delay(key: &'static str) -> Definition {
     Definition::number(key, "ms", 0.0, DELAY_MS).of_axis().default(Number(0.0)).live()
 }
@@ -132,7 +132,7 @@ const MACHINE: &[Definition] = &[
     // Axis and transmission.
     Definition::new("type", "", Kind::Choice(&["linear", "rotary"]))
         .of_axis()
-        .is("Whether the axis counts in metres or in radians."),
+        .is("Whether the axis counts in meters or in radians."),
     Definition::number("transmission.screw_lead_mm", "mm", 1e-3, 1e3)
         .on(Linear)
         .optional()
@@ -172,7 +172,7 @@ const MACHINE: &[Definition] = &[
         .is("L, winding inductance (Prévost eq. 1)."),
     Definition::number("motor.max_current_a", "A", POSITIVE, CURRENT)
         .of_axis()
-        .is("imax, limit of the current set-point."),
+        .is("imax, limit of the current setpoint."),
     Definition::number("motor.max_voltage_v", "V", POSITIVE, 1e5)
         .of_axis()
         .is("umax, limit of the motor voltage."),
@@ -289,11 +289,11 @@ const MACHINE: &[Definition] = &[
         .of_axis()
         .default(Number(0.0))
         .live()
-        .is("Weight of the friction compensation: the friction torque at the set-point's velocity; 0 is off."),
-    delay("delays.alpha_ms").is("α, delay of the set-point before the position comparator (Prévost fig. 3)."),
+        .is("Weight of the friction compensation: the friction torque at the setpoint's velocity; 0 is off."),
+    delay("delays.alpha_ms").is("α, delay of the setpoint before the position comparator (Prévost fig. 3)."),
     delay("delays.beta_ms").is("β, delay of the velocity feedforward (Prévost fig. 3)."),
     delay("delays.gamma_ms").is("γ, delay of the torque feedforward (Prévost fig. 3)."),
-    delay("delays.friction_ms").is("Shift of the friction compensation behind the set-point."),
+    delay("delays.friction_ms").is("Shift of the friction compensation behind the setpoint."),
     // What the controllers do not know.
     deviation("deviation.inertia").is("Inertia of the plant, relative to the one that controllers are designed for."),
     deviation("deviation.friction").is("Friction of the plant, relative to the one that is compensated."),
@@ -307,16 +307,16 @@ const MACHINE: &[Definition] = &[
         .is("Vmax, largest velocity of the axis that a trajectory may ask for."),
     Definition::number("limits.acceleration_m_s2", "m/s²", 1e-6, 1e5)
         .on(Linear)
-        .is("Amax, acceleration of a controlled stop; set-points are not checked against it."),
+        .is("Amax, acceleration of a controlled stop; setpoints are not checked against it."),
     Definition::number("limits.acceleration_rev_s2", "rev/s²", 1e-6, 1e5)
         .on(Rotary)
-        .is("Amax, acceleration of a controlled stop; set-points are not checked against it."),
+        .is("Amax, acceleration of a controlled stop; setpoints are not checked against it."),
     Definition::number("limits.jerk_m_s3", "m/s³", 1e-6, 1e7)
         .on(Linear)
-        .is("Jmax, jerk of a controlled stop; set-points are not checked against it."),
+        .is("Jmax, jerk of a controlled stop; setpoints are not checked against it."),
     Definition::number("limits.jerk_rev_s3", "rev/s³", 1e-6, 1e7)
         .on(Rotary)
-        .is("Jmax, jerk of a controlled stop; set-points are not checked against it."),
+        .is("Jmax, jerk of a controlled stop; setpoints are not checked against it."),
     Definition::number("limits.stroke_min_mm", "mm", -1e6, 0.0)
         .on(Linear)
         .optional()
@@ -333,7 +333,7 @@ const MACHINE: &[Definition] = &[
         .on(Rotary)
         .optional()
         .is("Upper end of the stroke; none when left out. Home is 0."),
-    // Default tolerances of action goals, on the synchronised tracking error.
+    // Default tolerances of action goals, on the synchronized tracking error.
     tolerance("tolerances.path_mm", "mm", TOLERANCE_MM)
         .on(Linear)
         .is("Largest error on the way of an action goal that names none; 0 is any."),

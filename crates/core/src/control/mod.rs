@@ -1,8 +1,8 @@
 //! Controllers of one feed drive. Knows no plant.
 //!
 //! (Prévost fig. 3) Three nested loops, position → velocity → current, with velocity and torque
-//! feedforward of the delayed set-point; the outer one can be any linear controller that reads
-//! set-points ahead (Prévost eq. 9).
+//! feedforward of the delayed setpoint; the outer one can be any linear controller that reads
+//! setpoints ahead (Prévost eq. 9).
 
 mod pi;
 mod position;

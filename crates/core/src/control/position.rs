@@ -1,4 +1,4 @@
-//! Position controllers: set-points and position in, velocity set-point out.
+//! Position controllers: setpoints and position in, velocity setpoint out.
 
 use super::rst::{MAX_COEFFICIENTS, Rst};
 use super::transfer::{Transfer, TransferState};
@@ -25,11 +25,11 @@ enum Law {
 
 /// The proportional law with velocity feedforward that takes over from an RST controller
 ///
-/// - where the set-point has stood still for a while over the whole horizon, until motion comes into it:
+/// - where the setpoint has stood still for a while over the whole horizon, until motion comes into it:
 ///   integral action on top of that of the velocity loop hunts against Coulomb friction for ever, while a
 ///   proportional law lets the axis creep to where it should be, and friction keeps it there;
 /// - where the motor's current has been at its limit, until it has not been there for a while: a linear law
-///   that is faster than the motor can accelerate swings about its set-point for ever.
+///   that is faster than the motor can accelerate swings about its setpoint for ever.
 ///
 /// ```text
 /// Ω* = Kp (θ*(k) − θ(k)) + (θ*(k+1) − θ*(k)) / Tsp      0 where friction has stopped the axis close enough
@@ -56,7 +56,7 @@ pub struct PositionState {
     angles: Past,
     /// Ω*(k − 1), Ω*(k − 2), …: as limited, with the velocity feedforward.
     commands: Past,
-    /// Position instants since which the set-point has stood still over the whole horizon of this controller.
+    /// Position instants since which the setpoint has stood still over the whole horizon of this controller.
     still: u32,
     /// Position instants since the motor's current was at its limit.
     unlimited: u32,
@@ -145,7 +145,7 @@ impl PositionController {
         PositionController { law: Law::Rst(rst), guard, transfer }
     }
 
-    /// The furthest set-point that the controller reads, position periods ahead of the delayed one.
+    /// The furthest setpoint that the controller reads, position periods ahead of the delayed one.
     pub fn preview(&self) -> i64 {
         match &self.law {
             Law::Proportional { .. } => 0,
@@ -154,7 +154,7 @@ impl PositionController {
         }
     }
 
-    /// The oldest set-point that the controller reads, position periods behind the delayed one.
+    /// The oldest setpoint that the controller reads, position periods behind the delayed one.
     pub fn lookback(&self) -> i64 {
         match &self.law {
             Law::Proportional { .. } => 0,

@@ -5,7 +5,7 @@ use crate::units::Told;
 
 /// Most coefficients of R and of S.
 pub const MAX_COEFFICIENTS: usize = RST_TERMS;
-/// Furthest set-point that T may read, in position periods ahead (and, of its first, behind).
+/// Furthest setpoint that T may read, in position periods ahead (and, of its first, behind).
 pub const MAX_PREVIEW: i64 = MAX_HORIZON;
 /// Largest coefficient, relative to s₀: as large as a gain may be.
 const MAX_COEFFICIENT: f64 = 1e9;
@@ -50,8 +50,8 @@ pub enum RstError {
     /// S cannot be solved for Ω*(k).
     #[error("s[0] = 0; it must not be zero, since Ω* is divided by it")]
     LeadingZero,
-    /// T reads set-points too far ahead or behind.
-    #[error("t reads set-points {first} … {last} periods ahead; it may read -{max} … {max}", max = MAX_PREVIEW)]
+    /// T reads setpoints too far ahead or behind.
+    #[error("t reads setpoints {first} … {last} periods ahead; it may read -{max} … {max}", max = MAX_PREVIEW)]
     Preview {
         /// Exponent of the first coefficient.
         first: i64,
@@ -81,7 +81,7 @@ pub enum RstError {
 /// ```
 ///
 /// R and S are in rising powers of q⁻¹, T in rising powers of q from `q^t_first` on: a T with positive
-/// powers reads set-points ahead. Units of the motor: θ and θ* in rad, Ω* in rad/s; S is scaled so that
+/// powers reads setpoints ahead. Units of the motor: θ and θ* in rad, Ω* in rad/s; S is scaled so that
 /// s₀ = 1, then R and T are in s⁻¹.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rst {
@@ -154,12 +154,12 @@ impl Rst {
         self.t_first
     }
 
-    /// The furthest set-point that T reads, position periods ahead; not below 0.
+    /// The furthest setpoint that T reads, position periods ahead; not below 0.
     pub fn preview(&self) -> i64 {
         (self.t_first + self.t.len() as i64 - 1).max(0)
     }
 
-    /// The oldest set-point that T reads, position periods back; not below 0.
+    /// The oldest setpoint that T reads, position periods back; not below 0.
     pub fn lookback(&self) -> i64 {
         (-self.t_first).max(0)
     }

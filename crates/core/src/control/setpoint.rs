@@ -1,9 +1,9 @@
-//! The staircase of position set-points: delays and derivatives.
+//! The staircase of position setpoints: delays and derivatives.
 
 use crate::config::{DelaysConfig, FeedforwardConfig};
 use crate::units::Nanoseconds;
 
-/// Delays of the set-point in ticks.
+/// Delays of the setpoint in ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Delays {
     /// α, before the position comparator.
@@ -53,48 +53,48 @@ impl Shift {
         self.ticks
     }
 
-    /// Index of the set-point that it shows in position period k from [`step`](Self::step) on; before, it
+    /// Index of the setpoint that it shows in position period k from [`step`](Self::step) on; before, it
     /// is the one before.
     #[inline]
     pub fn index(self, k: i64) -> i64 {
         k - self.periods
     }
 
-    /// Index of the set-point that it shows at the first tick of position period k.
+    /// Index of the setpoint that it shows at the first tick of position period k.
     #[inline]
     pub fn index_at_instant(self, k: i64) -> i64 {
         self.index(k) - i64::from(self.ticks > 0)
     }
 }
 
-/// How far from the present one set-points are read.
+/// How far from the present one setpoints are read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Reach {
     /// The longest delay, ticks.
     pub delay: u64,
-    /// Set-points behind the delay.
+    /// Setpoints behind the delay.
     pub lookback: usize,
-    /// Set-points ahead of the present one.
+    /// Setpoints ahead of the present one.
     pub ahead: usize,
 }
 
 /// PSEC as the staircase that the drive sees: value k holds on [k·Tsp, (k+1)·Tsp).
 ///
-/// Before the first set-point PSEC has its first value; what is not known of the future yet is its last.
+/// Before the first setpoint PSEC has its first value; what is not known of the future yet is its last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetpointHistory {
-    /// Set-point k stands at k modulo half its length, and half its length behind that: set-points that
+    /// Setpoint k stands at k modulo half its length, and half its length behind that: setpoints that
     /// follow each other can be read as they stand, wherever they begin.
     ring: Box<[f64]>,
     ticks_per_setpoint: u64,
-    /// How many set-points have been pushed.
+    /// How many setpoints have been pushed.
     count: u64,
-    /// Set-points that stand in the ring behind those.
+    /// Setpoints that stand in the ring behind those.
     ahead: usize,
 }
 
 impl SetpointHistory {
-    /// A history in which set-points within `reach` can be read, and two more for the second derivative.
+    /// A history in which setpoints within `reach` can be read, and two more for the second derivative.
     pub fn new(initial: f64, ticks_per_setpoint: u64, reach: Reach) -> Self {
         SetpointHistory {
             ring: vec![initial; 2 * Self::length(ticks_per_setpoint, reach)].into_boxed_slice(),
@@ -104,7 +104,7 @@ impl SetpointHistory {
         }
     }
 
-    /// Set-points to hold: those that the delay spans, the present one, and two for the derivatives; a
+    /// Setpoints to hold: those that the delay spans, the present one, and two for the derivatives; a
     /// power of two, so that no division finds a place.
     fn length(ticks_per_setpoint: u64, reach: Reach) -> usize {
         let needed = reach.delay.div_ceil(ticks_per_setpoint) as usize + 3 + reach.lookback + reach.ahead;
@@ -115,7 +115,7 @@ impl SetpointHistory {
         k as usize & (self.ring.len() / 2 - 1)
     }
 
-    /// Makes room for another reach; set-points that are no longer known read as the oldest known one,
+    /// Makes room for another reach; setpoints that are no longer known read as the oldest known one,
     /// those ahead are known from the next period on.
     pub fn adopt(&mut self, reach: Reach) {
         let (length, old) = (Self::length(self.ticks_per_setpoint, reach), self.ring.len() / 2);
@@ -124,7 +124,7 @@ impl SetpointHistory {
             return;
         }
         let count = self.count as i64;
-        // Before the first set-point stands its value.
+        // Before the first setpoint stands its value.
         let oldest = count + ahead as i64 - old as i64;
         let mut grown = SetpointHistory {
             ring: vec![0.0; 2 * length].into_boxed_slice(),
@@ -138,7 +138,7 @@ impl SetpointHistory {
         *self = grown;
     }
 
-    /// Adds the set-point of the next position instant.
+    /// Adds the setpoint of the next position instant.
     #[inline]
     pub fn push(&mut self, psec: f64) {
         if self.count == 0 {
@@ -148,7 +148,7 @@ impl SetpointHistory {
         self.count += 1;
     }
 
-    /// The set-points behind the last one that was pushed, as they are known now.
+    /// The setpoints behind the last one that was pushed, as they are known now.
     #[inline]
     pub fn foresee(&mut self, ahead: &[f64]) {
         let mut last = self.at(self.present());
@@ -165,19 +165,19 @@ impl SetpointHistory {
         self.ring[place + self.ring.len() / 2] = psec;
     }
 
-    /// Index of the set-point of this position period; -1 before the first.
+    /// Index of the setpoint of this position period; -1 before the first.
     #[inline]
     pub fn present(&self) -> i64 {
         self.count as i64 - 1
     }
 
-    /// PSEC_k; the first value for k before the first set-point.
+    /// PSEC_k; the first value for k before the first setpoint.
     #[inline]
     pub fn at(&self, k: i64) -> f64 {
         self.ring[self.place(k)]
     }
 
-    /// `count` set-points from PSEC_k on, at most as many as the reach spans.
+    /// `count` setpoints from PSEC_k on, at most as many as the reach spans.
     #[inline]
     pub fn from(&self, k: i64, count: usize) -> &[f64] {
         &self.ring[self.place(k)..][..count]
@@ -205,13 +205,13 @@ impl Feedforward {
         }
     }
 
-    /// VFFWS of set-point k, rad/s of the motor.
+    /// VFFWS of setpoint k, rad/s of the motor.
     #[inline]
     pub fn velocity(&self, psec: &SetpointHistory, k: i64) -> f64 {
         self.velocity * (psec.at(k) - psec.at(k - 1))
     }
 
-    /// TFFWS of set-point k, N·m at the motor.
+    /// TFFWS of setpoint k, N·m at the motor.
     #[inline]
     pub fn torque(&self, psec: &SetpointHistory, k: i64) -> f64 {
         self.torque * ((psec.at(k) - psec.at(k - 1)) - (psec.at(k - 1) - psec.at(k - 2)))

@@ -10,7 +10,7 @@ pub const MAX_GAIN: f64 = 1e4;
 const MAX_INTEGRAL_TIME: f64 = 100.0;
 /// Longest time of a derivative part and of its filter, s.
 const MAX_DERIVATIVE_TIME: f64 = 1.0;
-/// Largest weight of the velocity feedforward; 1 feeds the set-point's velocity forward.
+/// Largest weight of the velocity feedforward; 1 feeds the setpoint's velocity forward.
 const MAX_FEEDFORWARD: f64 = 2.0;
 /// Longest position period, s.
 const MAX_PERIOD: f64 = 1.0;
@@ -20,7 +20,7 @@ const DIFFERENCE: [f64; 2] = [1.0, -1.0];
 /// A PID position controller with filtered derivative.
 ///
 /// The proportional and the integral part act on θ* − θ, the derivative part on −θ only: a corner of the
-/// path is no impulse to it, and what it lacks of the set-point's velocity is the feedforward's to give.
+/// path is no impulse to it, and what it lacks of the setpoint's velocity is the feedforward's to give.
 ///
 /// ```text
 /// I(k) = I(k−1) + Kp Tsp/Ti (θ* − θ)(k)         D(k) = ρ D(k−1) − Kp Td/(Tf + Tsp) (θ(k) − θ(k−1))
@@ -89,7 +89,7 @@ fn proportional_integral(gain: f64, integral_time: f64, period: f64) -> [f64; 2]
 }
 
 /// R, S and `t`, a polynomial in q⁻¹, with S w/Tsp (1 − q⁻¹) added to T: that feeds w times the
-/// set-point's velocity forward to Ω* and leaves T(1) as it is.
+/// setpoint's velocity forward to Ω* and leaves T(1) as it is.
 pub(super) fn with_feedforward(
     r: &[f64],
     s: &[f64],

@@ -56,7 +56,7 @@ impl GpcTuning {
     }
 }
 
-/// The controller that minimises the GPC criterion over the receding horizon (Prévost section 5, eq. 9).
+/// The controller that minimizes the GPC criterion over the receding horizon (Prévost section 5, eq. 9).
 ///
 /// ```text
 /// 1 = Eⱼ Δ A + q⁻ʲ Fⱼ      Eⱼ B = Gⱼ + q⁻ʲ Hⱼ      k = first row of (GᵀG + λI)⁻¹ Gᵀ,  j = N1 … N2

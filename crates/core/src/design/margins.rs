@@ -149,11 +149,11 @@ fn grid(model: &PredictionModel, rst: &Rst) -> Vec<f64> {
             if depth > NEAR * distance || pole.im < 0.0 || (pole.im == 0.0 && pole.re > 0.0) {
                 continue;
             }
-            let centre = pole.arg();
+            let center = pole.arg();
             let mut offset = depth.max(CLOSEST);
-            grid.push(centre);
+            grid.push(center);
             while offset < distance {
-                grid.extend([centre - offset, centre + offset]);
+                grid.extend([center - offset, center + offset]);
                 offset *= SPREAD;
             }
         }

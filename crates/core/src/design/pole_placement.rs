@@ -29,7 +29,7 @@ pub struct PolePlacement {
 
 /// The controller of least degree that gives the closed loop the wanted poles: A S + B R = Π (1 − pᵢ q⁻¹).
 ///
-/// T is R(1), so that set-points do not meet the zeros of R, and the feedforward.
+/// T is R(1), so that setpoints do not meet the zeros of R, and the feedforward.
 ///
 /// # Errors
 /// [`DesignError::OutOfRange`] for more poles than the model and the controller have,

@@ -16,7 +16,7 @@ const AHEAD: f64 = 1.0;
 /// what decays from it would leave the normal numbers.
 const NO_SIZE: f64 = 1e-40;
 
-/// Largest |x| of which [`sine`] finds the half turns, rad: beyond, neighbouring numbers are parts of a turn apart.
+/// Largest |x| of which [`sine`] finds the half turns, rad: beyond, neighboring numbers are parts of a turn apart.
 const FURTHEST_ANGLE: f64 = 1e15;
 
 /// The polynomial of degree 9 that is nearest to e^r for |r| ≤ ln 2/2; its largest error is 1.4e-14.

@@ -47,7 +47,7 @@ numbers! {
     #[derive(Debug, Clone, Copy, Default, PartialEq)]
     pub(crate) struct Expansion {
         /// That speed times the scale.
-        centre: N,
+        center: N,
         c0: N,
         c1: N,
         c2: N,
@@ -97,7 +97,7 @@ impl<N: Number> Pair<N> {
             (first, second) = (first * self.first_share, second * self.second_share);
         }
         let [c0, c1, c2, c3, c4, c5, c6, c7] = c;
-        Expansion { centre: v * self.scale, c0, c1, c2, c3, c4, c5, c6, c7 }
+        Expansion { center: v * self.scale, c0, c1, c2, c3, c4, c5, c6, c7 }
     }
 
     /// Where to expand next when `v` has left an expansion, at a `distance` from its middle.
@@ -110,7 +110,7 @@ impl<N: Number> Pair<N> {
     /// How far `v` is from the middle of an expansion.
     #[inline(always)]
     pub fn distance(&self, near: &Expansion<N>, v: N) -> N {
-        v.mul_add(self.scale, -near.centre)
+        v.mul_add(self.scale, -near.center)
     }
 }
 

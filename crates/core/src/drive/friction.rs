@@ -4,7 +4,7 @@ use super::elementary::Exponential;
 use super::expansion::{Expansion, Pair};
 use crate::config::{AxisKind, FrictionConfig};
 use crate::lanes::{Number, numbers};
-use crate::units::{METRE_PER_MINUTE, RPM};
+use crate::units::{METER_PER_MINUTE, RPM};
 
 /// Velocity up to which the law was fitted, m/min or rev/min (Prévost eq. 3).
 const FITTED_RANGE: f64 = 20.0;
@@ -33,7 +33,7 @@ impl Friction {
     /// whose motor has `torque_constant` Kt in N·m/A. (With another constant the bound is in its unit.)
     pub fn new(law: FrictionConfig, kind: AxisKind, transmission_ratio: f64, torque_constant: f64) -> Self {
         let unit = match kind {
-            AxisKind::Linear => METRE_PER_MINUTE,
+            AxisKind::Linear => METER_PER_MINUTE,
             AxisKind::Rotary => RPM,
         };
         // V per ω of the motor.
@@ -110,7 +110,7 @@ mod tests {
             .and_then(|p| p.machine_config())
             .expect("the embedded machine is valid");
         let with_friction = |axis: &AxisConfig| {
-            let unit = if axis.kind == AxisKind::Linear { METRE_PER_MINUTE } else { RPM };
+            let unit = if axis.kind == AxisKind::Linear { METER_PER_MINUTE } else { RPM };
             (axis.clone(), Friction::new(axis.friction, axis.kind, unit, 1.0))
         };
         config.axes().iter().map(with_friction).collect()
@@ -158,7 +158,7 @@ mod tests {
             for b in [0.02, 1.0, 0.0, -100.0] {
                 let law = FrictionConfig { a: 1.5, b, c: -0.5, d, i0: 1.0 };
                 for constant in [1e9, 1.0, 1e-9, 1e-25] {
-                    let friction = Friction::new(law, AxisKind::Linear, METRE_PER_MINUTE, constant);
+                    let friction = Friction::new(law, AxisKind::Linear, METER_PER_MINUTE, constant);
                     let fast =
                         (0..40_000).map(|k| 1e-3 * f64::from(k)).chain((0..200).map(|k| 2.9 * f64::from(k)));
                     for (v, found) in on_the_way(&friction, fast) {
@@ -181,7 +181,7 @@ mod tests {
             for (b, d) in [(1.0, 0.99), (1.0, -100.0), (-100.0, -100.0), (1e-300, -100.0)] {
                 let law = FrictionConfig { a, b, c, d, i0: 1.0 };
                 // Kt 10⁵ and a torque that changes the speed by 10⁹ in a tick.
-                let friction = Friction::new(law, AxisKind::Linear, METRE_PER_MINUTE, 1e14);
+                let friction = Friction::new(law, AxisKind::Linear, METER_PER_MINUTE, 1e14);
                 for speed in [1.0, 6.0, 7.1, 650.0, 1e5, 1e12, 1e300, f64::MAX] {
                     let whole = friction.bound(speed);
                     let (_, near) = on_the_way(&friction, [speed].into_iter()).next().expect("there is one");

@@ -45,7 +45,7 @@ numbers! {
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub(crate) struct Incline {
         /// That angle, rad.
-        centre: N,
+        center: N,
         c0: N,
         c1: N,
         c2: N,
@@ -95,7 +95,7 @@ impl<N: Number> Gravity<N> {
         let (along, across) = (self.tilt * sine(x), self.tilt * sine(x + x.constant(FRAC_PI_2)));
         let number = |value: f64| x.constant(value);
         Incline {
-            centre: angle,
+            center: angle,
             c0: along + self.weight,
             c1: across,
             c2: along * number(COSINE[1]),
@@ -123,7 +123,7 @@ impl<N: Number> Gravity<N> {
     /// How far the axis has turned from the middle of a polynomial, rad.
     #[inline(always)]
     fn turned(&self, near: &Incline<N>, angle: N) -> N {
-        (angle - near.centre) * self.turn
+        (angle - near.center) * self.turn
     }
 }
 

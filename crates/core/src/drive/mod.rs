@@ -26,13 +26,13 @@ pub use plant::{Plant, Torques};
 /// Why a plant cannot be built from its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum DriveError {
-    /// The zero-order-hold discretisation is not made of numbers.
+    /// The zero-order-hold discretization is not made of numbers.
     #[error(
         "the motor cannot be stepped over {period_s} s: the response of its speed to a torque over one \
          period is {speed_per_torque} (rad/s)/(N·m), which must be positive and finite; mend inertia, \
          motor.resistance_ohm and motor.inductance_mh"
     )]
-    Discretisation {
+    Discretization {
         /// Current-loop period, s.
         period_s: f64,
         /// Change of ω over one period per torque, (rad/s)/(N·m).

@@ -1,4 +1,4 @@
-//! The motor between two ticks, stepped without discretisation error.
+//! The motor between two ticks, stepped without discretization error.
 
 use std::f64::consts::TAU;
 
@@ -26,7 +26,7 @@ numbers! {
 }
 
 numbers! {
-    /// Zero-order-hold discretisation of Prévost eq. 1 over one tick.
+    /// Zero-order-hold discretization of Prévost eq. 1 over one tick.
     ///
     /// With voltage u and torque τ (everything but Kt·i) held,
     ///
@@ -50,7 +50,7 @@ numbers! {
 }
 
 numbers! {
-    /// One row of the discretised system: the weights of i, ω, u and τ.
+    /// One row of the discretized system: the weights of i, ω, u and τ.
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub(super) struct Row {
         current: N,
@@ -114,10 +114,10 @@ fn closed_form(m: &MotorConfig, response: &Response) -> [Row; 3] {
 }
 
 impl Motor {
-    /// Discretises the motor over `period` seconds.
+    /// Discretizes the motor over `period` seconds.
     ///
     /// # Errors
-    /// [`DriveError::Discretisation`] if the step is not finite; [`DriveError::Swings`] if it is so long that a
+    /// [`DriveError::Discretization`] if the step is not finite; [`DriveError::Swings`] if it is so long that a
     /// torque would turn the motor against its own direction within it (friction could not be resolved then).
     pub fn new(motor: &MotorConfig, period: f64) -> Result<Self, DriveError> {
         let damping = motor.resistance / motor.inductance;
@@ -128,7 +128,7 @@ impl Motor {
         let [current, speed, angle] = if slow { approximant(&system) } else { closed_form(motor, &response) };
         let torque_per_speed = 1.0 / speed.torque;
         if ![current, speed, angle].iter().all(Row::is_finite) || !torque_per_speed.is_finite() {
-            return Err(DriveError::Discretisation { period_s: period, speed_per_torque: speed.torque });
+            return Err(DriveError::Discretization { period_s: period, speed_per_torque: speed.torque });
         }
         if !response.keeps_direction {
             let frequency_hz = (stiffness - damping * damping / 4.0).max(0.0).sqrt() / TAU;

@@ -32,7 +32,7 @@ impl Plant {
     /// The plant of `axis`, with what it deviates by, stepped by `period` seconds.
     ///
     /// # Errors
-    /// [`DriveError`] if the motor cannot be discretised over the period.
+    /// [`DriveError`] if the motor cannot be discretized over the period.
     pub fn new(axis: &AxisConfig, period: f64) -> Result<Self, DriveError> {
         let (r, deviation) = (axis.transmission_ratio, &axis.deviation);
         let motor = Self::motor(axis);

@@ -172,7 +172,7 @@ impl Kinematics {
         ))
     }
 
-    /// Tool-centre-point programming: `coordinates` holds for each joint its value, but for x, y and z
+    /// Tool-center-point programming: `coordinates` holds for each joint its value, but for x, y and z
     /// the tip's coordinates in the workpiece frame, m; they are turned into joints in place. A and C
     /// are joints in both.
     ///

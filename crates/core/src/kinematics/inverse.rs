@@ -11,7 +11,7 @@ use super::error::KinematicsError;
 /// a unit vector, whose transverse part has no direction there. It also bounds by how much the tool
 /// axis is not the one asked for, rad.
 const SINGULAR_SINE: f64 = 1e-13;
-/// How far a tool axis may be from what a machine with fewer axes reaches, rad: a nanometre in a metre.
+/// How far a tool axis may be from what a machine with fewer axes reaches, rad: a nanometer in a meter.
 const ANGLE_TOLERANCE: f64 = 1e-9;
 /// How far a linear axis that does not exist may have to be from 0, m.
 const POSITION_TOLERANCE: f64 = 1e-9;

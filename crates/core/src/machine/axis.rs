@@ -36,12 +36,12 @@ pub struct AxisParameters {
 }
 
 impl AxisParameters {
-    /// The longest delay of a set-point, ticks.
+    /// The longest delay of a setpoint, ticks.
     pub fn longest_delay(&self) -> u64 {
         self.delays.longest()
     }
 
-    /// Set-points ahead of the present one that the position controller reads.
+    /// Setpoints ahead of the present one that the position controller reads.
     pub fn horizon(&self) -> usize {
         self.reach().ahead
     }
@@ -56,7 +56,7 @@ impl AxisParameters {
         }
     }
 
-    /// Discretises an axis and designs its position controller.
+    /// Discretizes an axis and designs its position controller.
     ///
     /// # Errors
     /// [`AxisError`].
@@ -174,7 +174,7 @@ impl Axis {
         self.load = load;
     }
 
-    /// The position instant: takes the set-point of the period that begins, and those behind it as far as
+    /// The position instant: takes the setpoint of the period that begins, and those behind it as far as
     /// they are known, and says what is asked of the inner loops until the next one.
     pub(super) fn control_position(
         &mut self,
@@ -219,7 +219,7 @@ impl Axis {
 
     /// The torque with which friction is compensated at an instant of the velocity loop, N·m.
     pub(super) fn compensation(&self, of: &FrictionCompensation, p: &AxisParameters, instant: usize) -> f64 {
-        // Before the first set-point there is nothing to compensate.
+        // Before the first setpoint there is nothing to compensate.
         let Ok(period) = u64::try_from(self.psec.present()) else { return 0.0 };
         of.torque(&self.psec, period * p.ticks_per_position + instant as u64 * p.ticks_per_velocity)
     }

@@ -245,7 +245,7 @@ mod tests {
         let config = Parameters::embedded_default().and_then(|p| p.machine_config()).expect("valid");
         for first in 0..5 {
             let places = Vec::from_iter(first..5);
-            let parameters = MachineParameters::of_axes(&config, &places).expect("can be discretised");
+            let parameters = MachineParameters::of_axes(&config, &places).expect("can be discretized");
             let loops: Vec<Loops> = parameters.axes.iter().map(|axis| axis.loops).collect();
             let timing = parameters.timing();
             let mut machine = Machine::new(Arc::new(parameters));

@@ -84,7 +84,7 @@ numbers! {
         pub voltage: N,
         pub friction: N,
         pub gravity: N,
-        /// 1 where a set-point was at its limit, else 0.
+        /// 1 where a setpoint was at its limit, else 0.
         pub saturated: N,
     }
 }
@@ -97,7 +97,7 @@ numbers! {
         pub peak_current: N,
         /// Largest |ω|, rad/s.
         pub peak_speed: N,
-        /// Ticks with speed, current or voltage set-point at its limit.
+        /// Ticks with speed, current or voltage setpoint at its limit.
         pub saturated_ticks: N,
     }
 }
@@ -296,7 +296,7 @@ impl<const L: usize> Block<L> {
 }
 
 impl<N: Number> Loops<N> {
-    /// The velocity loop: torque from the error of the speed, and i* from that. By how much the set-points
+    /// The velocity loop: torque from the error of the speed, and i* from that. By how much the setpoints
     /// of speed and current were over their limits comes back.
     #[inline(always)]
     fn control_velocity(&self, demand: &Demand<N>, state: &mut LoopsState<N>, instant: f64, more: N) -> N {
@@ -309,7 +309,7 @@ impl<N: Number> Loops<N> {
         excess + demand.velocity_excess.abs()
     }
 
-    /// The current loop: the voltage comes back, and where a set-point was at its limit. `excess` is that of the
+    /// The current loop: the voltage comes back, and where a setpoint was at its limit. `excess` is that of the
     /// outer loops.
     #[inline(always)]
     fn control_current(&self, state: &mut LoopsState<N>, excess: N) -> (N, N::Mask) {

@@ -1,11 +1,11 @@
-//! Compensation of friction at the velocity of the set-point.
+//! Compensation of friction at the velocity of the setpoint.
 
 use crate::config::{AxisConfig, Periods};
 use crate::control::SetpointHistory;
 use crate::drive::Friction;
 use crate::units::seconds;
 
-/// The friction torque that the set-point's velocity will meet, by the drive's own friction law.
+/// The friction torque that the setpoint's velocity will meet, by the drive's own friction law.
 ///
 /// ```text
 /// torque = weight · Kt i_f(V(t − shift))      V((k + ½) Tsp) = (PSEC_{k+1} − PSEC_k) / Tsp, linear between
@@ -17,7 +17,7 @@ use crate::units::seconds;
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrictionCompensation {
     friction: Friction,
-    /// Motor speed per set-point difference, rad/s per m or rad.
+    /// Motor speed per setpoint difference, rad/s per m or rad.
     speed_per_step: f64,
     weight: f64,
     /// Behind PSEC, ticks.
@@ -38,7 +38,7 @@ impl FrictionCompensation {
         })
     }
 
-    /// Set-points ahead of the present one that the velocity is taken from.
+    /// Setpoints ahead of the present one that the velocity is taken from.
     pub fn preview(&self) -> i64 {
         let (period, half) = (self.ticks_per_setpoint as i64, self.ticks_per_setpoint as i64 / 2);
         // At the last tick of a period, one and a half periods ahead of what is compensated.

@@ -8,7 +8,7 @@ use crate::units::{DEGREE, MILLISECOND_NS, Nanoseconds, seconds};
 use super::AxisError;
 use super::prediction::prediction_model;
 
-/// Standstill of the set-point after which an axis under a controller with integral action is held: a controller
+/// Standstill of the setpoint after which an axis under a controller with integral action is held: a controller
 /// with a bandwidth worth its name has finished a move by then.
 pub const REST_AFTER: Nanoseconds = 200 * MILLISECOND_NS;
 

@@ -55,7 +55,7 @@ pub enum AxisError {
     Design(#[from] DesignError),
 }
 
-/// Everything immutable about a machine, discretised and ready to run.
+/// Everything immutable about a machine, discretized and ready to run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MachineParameters {
     periods: Periods,
@@ -63,7 +63,7 @@ pub struct MachineParameters {
 }
 
 impl MachineParameters {
-    /// Discretises every axis of `config`.
+    /// Discretizes every axis of `config`.
     ///
     /// # Errors
     /// [`MachineError::Axis`] naming the axis that cannot be built.
@@ -71,7 +71,7 @@ impl MachineParameters {
         Self::of_axes(config, &Vec::from_iter(0..config.axes.len()))
     }
 
-    /// Discretises the axes of `config` at `places` only; places that there are not are left out.
+    /// Discretizes the axes of `config` at `places` only; places that there are not are left out.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -116,7 +116,7 @@ impl MachineParameters {
 pub struct Activity {
     /// Largest |i|, A.
     pub peak_current: f64,
-    /// Ticks with speed, current or voltage set-point at its limit.
+    /// Ticks with speed, current or voltage setpoint at its limit.
     pub saturated_ticks: u64,
     /// Whether the friction law was used beyond the range that it was fitted for.
     pub friction_extrapolated: bool,
@@ -176,7 +176,7 @@ impl Machine {
     /// Takes over changed gains, weights, delays or physics; states go on as they are.
     ///
     /// To be called between two position periods. Another reach of delays and preview makes a new history
-    /// of set-points, which is the only case that allocates.
+    /// of setpoints, which is the only case that allocates.
     ///
     /// # Errors
     /// [`MachineError::AnotherMachine`] if number of axes or periods differ; nothing is changed then.
@@ -232,12 +232,12 @@ impl Machine {
         self.parameters.periods
     }
 
-    /// The longest delay of a set-point on any axis, ticks.
+    /// The longest delay of a setpoint on any axis, ticks.
     pub fn longest_delay(&self) -> u64 {
         self.parameters.axes.iter().map(AxisParameters::longest_delay).max().unwrap_or(0)
     }
 
-    /// Set-points ahead of the present one that the position controllers read, the most of any axis.
+    /// Setpoints ahead of the present one that the position controllers read, the most of any axis.
     pub fn horizon(&self) -> usize {
         self.parameters.axes.iter().map(AxisParameters::horizon).max().unwrap_or(0)
     }
@@ -249,9 +249,9 @@ impl Machine {
         }
     }
 
-    /// One position period with the set-points `psec` (m or rad, one per axis).
+    /// One position period with the setpoints `psec` (m or rad, one per axis).
     ///
-    /// `ahead` holds the set-points of the next periods, as many for each axis, one axis behind the other;
+    /// `ahead` holds the setpoints of the next periods, as many for each axis, one axis behind the other;
     /// beyond them, up to the [`horizon`](Self::horizon), the last one is taken. With none the future is
     /// not known: controllers that read ahead find the present one.
     ///

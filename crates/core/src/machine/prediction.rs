@@ -28,7 +28,7 @@ const NEGLIGIBLE: f64 = 1e-12;
 /// whose Hankel singular values are negligible are left out.
 ///
 /// # Errors
-/// [`AxisError`] if the motor cannot be discretised, or nothing moves.
+/// [`AxisError`] if the motor cannot be discretized, or nothing moves.
 pub fn prediction_model(axis: &AxisConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
     model(axis, &axis.motor, periods)
 }
@@ -121,7 +121,7 @@ fn step_markov(transition: &SMatrix<f64, STATES, STATES>, input: &State, count: 
 }
 
 /// Denominator and numerator, in rising powers of q⁻¹, of the smallest system with these Markov
-/// parameters: the first is the feedthrough, the others are realised after Ho and Kalman from the singular
+/// parameters: the first is the feedthrough, the others are realized after Ho and Kalman from the singular
 /// values of their Hankel matrix. The numerator has one more q⁻¹, since the step ends a period later.
 fn minimal(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
     const SIZE: usize = VELOCITY_STATES;

@@ -5,9 +5,9 @@
 /// Axis quantities are in m or rad, motor quantities in rad and N·m (m and N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AxisSample {
-    /// PSEC, the set-point of this position period, m or rad.
+    /// PSEC, the setpoint of this position period, m or rad.
     pub psec: f64,
-    /// The set-point that the position controller was asked to follow, `PSEC_floor(k − α/Tsp)`, m or rad.
+    /// The setpoint that the position controller was asked to follow, `PSEC_floor(k − α/Tsp)`, m or rad.
     pub delayed_psec: f64,
     /// SP, m or rad.
     pub position: f64,
@@ -15,7 +15,7 @@ pub struct AxisSample {
     pub velocity: f64,
     /// SMC, A.
     pub current: f64,
-    /// Set-point of the current loop after its limit, A.
+    /// Setpoint of the current loop after its limit, A.
     pub current_setpoint: f64,
     /// Voltage after its limit, V.
     pub voltage: f64,
@@ -36,7 +36,7 @@ pub struct AxisSample {
     pub effort: f64,
     /// Name of the position controller that is active.
     pub controller: &'static str,
-    /// Whether speed, current or voltage set-point is at its limit.
+    /// Whether speed, current or voltage setpoint is at its limit.
     pub saturated: bool,
     /// Whether the friction law is used beyond the range that it was fitted for.
     pub friction_extrapolated: bool,

@@ -8,8 +8,8 @@ use crate::units::REVOLUTION;
 pub struct Circle {
     /// Places of the two coordinates.
     pub plane: [usize; 2],
-    /// Centre in these, m.
-    pub centre: [f64; 2],
+    /// Center in these, m.
+    pub center: [f64; 2],
     /// m.
     pub radius: f64,
     /// rad, positive from the first coordinate towards the second.
@@ -20,7 +20,7 @@ pub struct Circle {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Arc {
     pub circle: Circle,
-    /// From the centre to the start, m.
+    /// From the center to the start, m.
     pub spoke: [f64; 2],
     /// Angle per unit of length, rad/m.
     pub turn: f64,
@@ -29,7 +29,7 @@ pub(super) struct Arc {
 }
 
 impl Arc {
-    /// The spoke turned by what `s` metres turn it.
+    /// The spoke turned by what `s` meters turn it.
     fn spoke_at(&self, s: f64) -> [f64; 2] {
         turned(self.spoke, self.turn * s)
     }
@@ -40,7 +40,7 @@ impl Arc {
         }
         let spoke = self.spoke_at(s);
         for i in 0..2 {
-            out[self.circle.plane[i]] = self.circle.centre[i] + spoke[i];
+            out[self.circle.plane[i]] = self.circle.center[i] + spoke[i];
         }
     }
 

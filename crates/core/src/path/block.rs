@@ -62,18 +62,18 @@ impl Block {
         Ok(Self { shape, start: from.to_vec(), end: to.to_vec(), length, kind })
     }
 
-    /// An arc of a circle in the plane of the two linear coordinates `plane`, with its centre in these,
+    /// An arc of a circle in the plane of the two linear coordinates `plane`, with its center in these,
     /// m; `sweep` in rad, positive from the first towards the second, of any number of turns. `to`
     /// gives the other coordinates at the end, which are linear in s (a helix); its entries of the
     /// plane are ignored.
     ///
     /// # Errors
-    /// [`PathError`]: as for a line; a plane that is not two linear coordinates; a start at the centre;
+    /// [`PathError`]: as for a line; a plane that is not two linear coordinates; a start at the center;
     /// a sweep of 0.
     pub fn arc(
         from: &[f64],
         plane: [usize; 2],
-        centre: [f64; 2],
+        center: [f64; 2],
         sweep: f64,
         to: &[f64],
         kinds: &[AxisKind],
@@ -88,22 +88,22 @@ impl Block {
                 joints: kinds.len(),
             });
         }
-        check_finite("the centre", &centre)?;
+        check_finite("the center", &center)?;
         if !sweep.is_finite() || sweep == 0.0 {
             return Err(PathError::Sweep { sweep });
         }
         check_size("the end", to, kinds)?;
-        let spoke = [from[p] - centre[0], from[q] - centre[1]];
+        let spoke = [from[p] - center[0], from[q] - center[1]];
         let radius = spoke[0].hypot(spoke[1]);
         if radius == 0.0 {
-            return Err(PathError::Radius { centre });
+            return Err(PathError::Radius { center });
         }
         let mut end = to.to_vec();
         (end[p], end[q]) = if (sweep / REVOLUTION).fract() == 0.0 {
             (from[p], from[q])
         } else {
             let spoke = turned(spoke, sweep);
-            (centre[0] + spoke[0], centre[1] + spoke[1])
+            (center[0] + spoke[0], center[1] + spoke[1])
         };
         check_point("the end", &end, kinds)?;
         let mut steps: Vec<f64> = from.iter().zip(&end).map(|(from, to)| to - from).collect();
@@ -115,7 +115,7 @@ impl Block {
         if !(turn * turn * turn * radius).is_finite() || turn == 0.0 {
             return Err(PathError::Unmeasurable { length });
         }
-        let circle = Circle { plane, centre, radius, sweep };
+        let circle = Circle { plane, center, radius, sweep };
         let shape = Shape::Arc(Arc { circle, spoke, turn, slopes });
         Ok(Self { shape, start: from.to_vec(), end, length, kind })
     }

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::units::Told;
 
-/// Which derivative of a set-point a limit is about.
+/// Which derivative of a setpoint a limit is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// m/s or rad/s.
@@ -87,10 +87,10 @@ pub enum PathError {
         joints: usize,
     },
     /// An arc without a radius.
-    #[error("an arc that starts at its centre, {centre:?} m, has no radius")]
+    #[error("an arc that starts at its center, {center:?} m, has no radius")]
     Radius {
         /// m.
-        centre: [f64; 2],
+        center: [f64; 2],
     },
     /// An arc without a sweep.
     #[error("the sweep of an arc must be finite and not 0; found {sweep} rad")]
@@ -219,7 +219,7 @@ pub enum PlanError {
         /// s.
         found: f64,
     },
-    /// Sampled set-points that exceed a limit however slow the path is passed.
+    /// Sampled setpoints that exceed a limit however slow the path is passed.
     #[error(
         "move {index}, {} s: {quantity} of {joint} reaches {} {unit}/{}; allowed is {} {unit}/{}",
         Told(*time),

@@ -5,7 +5,7 @@ use super::profile::Limits;
 use crate::config::LimitsConfig;
 
 /// Largest turn of the direction that still counts as tangent, rad, with speeds measured in Vmax: more
-/// than coordinates rounded to a micrometre make of an arc of a centimetre.
+/// than coordinates rounded to a micrometer make of an arc of a centimeter.
 const TANGENT_TOLERANCE: f64 = 1e-4;
 /// Part of Jmax left to the jump of speed at a junction that is tangent but for rounding.
 const TURN_SHARE: f64 = 0.25;
@@ -19,7 +19,7 @@ pub(super) struct Junction {
     pub ratio: f64,
     /// Largest speed for its own sake; 0 is an exact stop.
     pub cap: f64,
-    /// Whether set-points jump in their speed there, as permitted.
+    /// Whether setpoints jump in their speed there, as permitted.
     pub corner: bool,
 }
 
@@ -32,7 +32,7 @@ impl Junction {
     /// The junction between joints with the derivatives `before` and `after`.
     ///
     /// Tangent continuous: the jump of acceleration of each joint, v² |Δq''|, is at most Jmax·Tsp; in
-    /// sampled set-points it is a jerk over a period. Where the direction turns, `corner` is the
+    /// sampled setpoints it is a jerk over a period. Where the direction turns, `corner` is the
     /// speed permitted, if any.
     pub fn new(
         before: &Derivatives,
@@ -151,7 +151,7 @@ pub(super) fn share_jerk(
             }
         }
     }
-    // No room at all: the set-points will be looked at.
+    // No room at all: the setpoints will be looked at.
     if best.3 > 0.0 {
         if best.0 < 1.0 {
             junction.cap = speed * best.0.sqrt();

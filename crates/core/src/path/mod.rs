@@ -1,4 +1,4 @@
-//! Geometric paths, and set-points along them at a limited feed.
+//! Geometric paths, and setpoints along them at a limited feed.
 //!
 //! A [`Block`] is one curve in programmed coordinates, by its arc length: a line, an arc, a cubic
 //! B-spline. A [`Path`] joins blocks without gaps and knows how its coordinates become joints. A

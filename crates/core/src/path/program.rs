@@ -50,7 +50,7 @@ pub struct Move {
     /// Largest speed along s, m/s or rad/s.
     pub feed: f64,
     /// Speed along s permitted at the end of this move if the direction turns there; none: exact stop.
-    /// Set-points jump in their velocity there, and at that instant no limit holds.
+    /// Setpoints jump in their velocity there, and at that instant no limit holds.
     pub corner: Option<f64>,
     /// Further limits.
     pub limits: PathLimits,
@@ -115,7 +115,7 @@ pub(super) struct Span {
 /// accelerations jump by Jmax·Tsp at most. Where the direction turns the path is left at rest, without
 /// a pause, unless [`Move::corner`] permits a speed.
 ///
-/// The set-points that a controller gets are samples, one per position period: it is their first,
+/// The setpoints that a controller gets are samples, one per position period: it is their first,
 /// second and third differences over the period, its square and its cube that keep the limits, to
 /// 10⁻⁶ relative; moves by a cosine law and corners passed at speed are excepted.
 #[derive(Debug, Clone, PartialEq)]
@@ -129,7 +129,7 @@ pub struct Program {
 
 impl Program {
     /// Plans the time law of `moves`, which begin after `rest` seconds, for joints with `limits` whose
-    /// set-points come every `period` nanoseconds.
+    /// setpoints come every `period` nanoseconds.
     ///
     /// Strokes are not looked at: that is the business of whoever moves the machine.
     ///

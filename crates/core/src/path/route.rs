@@ -19,7 +19,7 @@ pub enum Frame {
 
 /// A continuous path: blocks, the frame of their coordinates, and the kinematics of the machine.
 ///
-/// Its parameter is the progress u, the sum of the lengths of the blocks passed: metres and, in
+/// Its parameter is the progress u, the sum of the lengths of the blocks passed: meters and, in
 /// blocks that only turn, radians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {

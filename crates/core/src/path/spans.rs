@@ -15,7 +15,7 @@ const CELLS_OF_PIECE: usize = 4;
 const SAMPLES_OF_CELL: usize = 6;
 /// Largest turn of the tables, or of an arc, in one cell of a path of the tip, rad.
 const TURN_OF_CELL: f64 = 0.25;
-/// Most cells of a block, whatever its turns: what is missed then is found when set-points are checked.
+/// Most cells of a block, whatever its turns: what is missed then is found when setpoints are checked.
 const MAX_CELLS: usize = 2000;
 /// Merging two spans must not cost more than that part of their time.
 const MERGE_COST: f64 = 1.01;
@@ -76,7 +76,7 @@ fn one_span(curve: &JointCurve<'_>) -> Option<Cell> {
     }
     let circle = curve.block().circle().filter(|_| !curve.is_bent())?;
     let start = curve.block().start();
-    let [x, y] = [0, 1].map(|i| start[circle.plane[i]] - circle.centre[i]);
+    let [x, y] = [0, 1].map(|i| start[circle.plane[i]] - circle.center[i]);
     // Where the spoke points in multiples of the step, and from there on over one turn at most.
     let turns = (y.atan2(x) / ARC_STEP * circle.sweep.signum()).fract();
     let swept = circle.sweep.abs().min(REVOLUTION + ARC_STEP) / ARC_STEP;

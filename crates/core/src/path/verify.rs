@@ -1,4 +1,4 @@
-//! The promise of a program, looked at in its own set-points.
+//! The promise of a program, looked at in its own setpoints.
 
 use super::error::Quantity;
 use super::program::Program;
@@ -17,7 +17,7 @@ const ROUNDINGS: f64 = 16.0;
 const MAX_INSTANTS: u64 = 1_000_000;
 /// Least share.
 const MIN_SHARE: u64 = 64;
-/// Set-points that the highest difference needs.
+/// Setpoints that the highest difference needs.
 const WINDOW: usize = 4;
 
 /// What the verification must know of a span and of the junction after it.
@@ -54,7 +54,7 @@ pub(super) struct Finding {
     pub worst: Option<Excess>,
 }
 
-/// Looks at the set-points of `program`, `period` apart, wherever limits do not hold by construction:
+/// Looks at the setpoints of `program`, `period` apart, wherever limits do not hold by construction:
 /// three differences of each joint against its limits. What is blamed for an excess is a junction
 /// where acceleration jumps, or else the curves near it, or with `strict` everything near it. The
 /// memory needed is that of the spans, whatever the duration.
@@ -107,7 +107,7 @@ struct Verifier<'a> {
     joints: &'a [LimitsConfig],
     period: Nanoseconds,
     strict: bool,
-    /// Span and set-points of the last instants.
+    /// Span and setpoints of the last instants.
     window: [(usize, Vec<f64>); WINDOW],
     finding: Finding,
 }
@@ -116,7 +116,7 @@ impl Verifier<'_> {
     /// Looks at instants `from` to `to`, the latter excluded, with those before.
     fn look(&mut self, from: u64, to: u64) {
         for k in (from.saturating_sub(WINDOW as u64 - 1)..to).take_while(|_| from < to) {
-            // An instant that cannot be counted has no set-point.
+            // An instant that cannot be counted has no setpoint.
             let count = i64::try_from(k).ok().and_then(|k| k.checked_mul(self.period));
             let Some(t) = count.map(seconds) else { return };
             self.window.rotate_left(1);
@@ -124,7 +124,7 @@ impl Verifier<'_> {
             *span = self.program.span_at(t);
             self.program.psec(t, joints);
             if k == 0 {
-                // Before its first set-point the machine stands there.
+                // Before its first setpoint the machine stands there.
                 let first = self.window[WINDOW - 1].clone();
                 self.window.fill(first);
             }

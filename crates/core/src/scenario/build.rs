@@ -8,7 +8,7 @@ use crate::config::{AxisKind, MachineConfig, shortened};
 use crate::kinematics::Kinematics;
 use crate::path::{Block, Frame, Law, Move, PathError, PathLimits, Program};
 use crate::trajectory::JointLimits;
-use crate::units::{DEGREE, METRE_PER_MINUTE, REVOLUTION, RPM};
+use crate::units::{DEGREE, METER_PER_MINUTE, REVOLUTION, RPM};
 
 use super::coordinates::{coordinate, overlay};
 use super::error::ScenarioError;
@@ -87,7 +87,7 @@ impl Feeds {
             |entry: &&Spanned<Entry>| entry.value.feed_m_min.is_some() || entry.value.feed_rpm.is_some();
         let Some(feed) = replaced else {
             return Ok(Feeds {
-                linear: feed_of(name, "feed_m_min", file.feed_m_min, METRE_PER_MINUTE)?,
+                linear: feed_of(name, "feed_m_min", file.feed_m_min, METER_PER_MINUTE)?,
                 rotary: feed_of(name, "feed_rpm", file.feed_rpm, RPM)?,
             });
         };
@@ -99,7 +99,7 @@ impl Feeds {
             });
         }
         let Feeds { linear, rotary } = Feeds {
-            linear: file.feed_m_min.and(feed_of(name, "--feed", Some(Number(feed)), METRE_PER_MINUTE)?),
+            linear: file.feed_m_min.and(feed_of(name, "--feed", Some(Number(feed)), METER_PER_MINUTE)?),
             rotary: file.feed_rpm.and(feed_of(name, "--feed", Some(Number(feed)), RPM)?),
         };
         if linear.is_some() && rotary.is_some() {
@@ -173,7 +173,7 @@ impl Builder<'_> {
             return Err(value_error(&at, "ramp_s", ramp, &allowed));
         }
         let corner = match block.kind() {
-            AxisKind::Linear => feed_of(&at, "corner_m_min", entry.corner_m_min, METRE_PER_MINUTE)?,
+            AxisKind::Linear => feed_of(&at, "corner_m_min", entry.corner_m_min, METER_PER_MINUTE)?,
             AxisKind::Rotary => feed_of(&at, "corner_rpm", entry.corner_rpm, RPM)?,
         };
         block.point(block.length(), &mut self.point);
@@ -198,14 +198,14 @@ impl Builder<'_> {
     }
 
     fn arc(&self, arc: &ArcEntry, entry: &Entry, at: &str) -> Result<Block, ScenarioError> {
-        let mut centre = Vec::new();
+        let mut center = Vec::new();
         for (key, &Number(value)) in &arc.center {
-            centre.push(coordinate(key, value, &self.joints, at)?);
+            center.push(coordinate(key, value, &self.joints, at)?);
         }
         // The plane's first coordinate is the machine's first, whatever the order in the file.
-        centre.sort_by_key(|&(place, _)| place);
-        let [(first, u), (second, v)] = centre[..] else {
-            let reason = format!("center has {} coordinates; an arc has a center in two", centre.len());
+        center.sort_by_key(|&(place, _)| place);
+        let [(first, u), (second, v)] = center[..] else {
+            let reason = format!("center has {} coordinates; an arc has a center in two", center.len());
             return Err(ScenarioError::Move { at: at.to_owned(), reason });
         };
         if let Some(&place) = [first, second].iter().find(|&&place| self.kinds[place] == AxisKind::Rotary) {
@@ -248,7 +248,7 @@ impl Builder<'_> {
     /// Feed along a move whose length counts in `kind`.
     fn feed(&self, entry: &Entry, kind: AxisKind, at: &str) -> Result<f64, ScenarioError> {
         let (key, own, unit, default) = match kind {
-            AxisKind::Linear => ("feed_m_min", entry.feed_m_min, METRE_PER_MINUTE, self.feeds.linear),
+            AxisKind::Linear => ("feed_m_min", entry.feed_m_min, METER_PER_MINUTE, self.feeds.linear),
             AxisKind::Rotary => ("feed_rpm", entry.feed_rpm, RPM, self.feeds.rotary),
         };
         feed_of(at, key, own, unit)?.or(default).ok_or_else(|| ScenarioError::Move {

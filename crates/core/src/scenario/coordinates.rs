@@ -2,7 +2,7 @@
 
 use crate::config::{AxisKind, shortened};
 use crate::trajectory::JointLimits;
-use crate::units::{DEGREE, MILLIMETRE};
+use crate::units::{DEGREE, MILLIMETER};
 
 use super::error::ScenarioError;
 use super::file::{Number, Values};
@@ -13,7 +13,7 @@ const NEAR_ENOUGH: f64 = 0.7;
 /// Suffix of a coordinate's key, and its unit in SI.
 fn unit(kind: AxisKind) -> (&'static str, f64) {
     match kind {
-        AxisKind::Linear => ("mm", MILLIMETRE),
+        AxisKind::Linear => ("mm", MILLIMETER),
         AxisKind::Rotary => ("deg", DEGREE),
     }
 }

@@ -46,7 +46,7 @@ impl Simulation {
     }
 
     /// Calls a motion off: its joints come to rest within their limits, and it ends as
-    /// [`Outcome::Cancelled`] when they are commanded to rest. One that waits is discarded. `false` if
+    /// [`Outcome::Canceled`] when they are commanded to rest. One that waits is discarded. `false` if
     /// there is no such motion.
     pub fn cancel(&mut self, id: MotionId) -> bool {
         match self.motions.cancel(id) {
@@ -55,7 +55,7 @@ impl Simulation {
             Cancel::New => {
                 if self.timeline.cancel(id) != CallOff::Stopping {
                     // Nothing is left of it to be waited for.
-                    self.motions.end(id, Outcome::Cancelled, self.time_of(self.next - 1), &mut self.ends);
+                    self.motions.end(id, Outcome::Canceled, self.time_of(self.next - 1), &mut self.ends);
                 }
             }
         }
@@ -73,7 +73,7 @@ impl Simulation {
         self.grid.origin = time.saturating_sub(self.next.saturating_mul(self.grid.period));
     }
 
-    /// Sets one set-point of a stream, m or rad, for the next position instant; `false` while a
+    /// Sets one setpoint of a stream, m or rad, for the next position instant; `false` while a
     /// trajectory or a stop has the joint, and after a stop until the stream has paused. It is commanded
     /// [`stream_delay`](Self::stream_delay) later. A stream is no motion: it has no figures and no end.
     ///
@@ -97,7 +97,7 @@ impl Simulation {
         self.timeline.stream_sent(place, position, sent)
     }
 
-    /// Whether set-points come that are ignored after a stop.
+    /// Whether setpoints come that are ignored after a stop.
     pub fn is_stream_held_off(&self) -> bool {
         self.timeline.is_stream_held_off()
     }
@@ -112,7 +112,7 @@ impl Simulation {
         self.timeline.take_stream_end()
     }
 
-    /// Delay of streamed set-points that is in effect, ns: as many position periods as the controllers
+    /// Delay of streamed setpoints that is in effect, ns: as many position periods as the controllers
     /// look ahead. After [`adopt`](Self::adopt) it changes when the stream pauses, see
     /// [`set_stream_delay`](crate::trajectory::Timeline::set_stream_delay).
     pub fn stream_delay(&self) -> Nanoseconds {

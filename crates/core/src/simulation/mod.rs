@@ -27,15 +27,15 @@ use tolerance::Errors;
 const STANDSTILL: f64 = 1e-4;
 /// How long after the last motion the axes count as settling.
 const SETTLING: Nanoseconds = SECOND_NS;
-/// How far contour errors look ahead of the set-point: longer than an axis runs ahead of it.
+/// How far contour errors look ahead of the setpoint: longer than an axis runs ahead of it.
 const LOOK_AHEAD: Nanoseconds = 100 * MILLISECOND_NS;
-/// Most set-points that contour errors look ahead, well inside what they remember.
+/// Most setpoints that contour errors look ahead, well inside what they remember.
 const MOST_AHEAD: u32 = 128;
 
 /// Why there is no simulation of a machine.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimulationError {
-    /// An axis cannot be discretised.
+    /// An axis cannot be discretized.
     #[error(transparent)]
     Machine(#[from] MachineError),
     /// Number of joints or position period out of range.
@@ -52,7 +52,7 @@ pub enum SimulationError {
 pub struct Simulation {
     machine: Machine,
     timeline: Timeline,
-    /// Set-points of the next periods, as many for each axis.
+    /// Setpoints of the next periods, as many for each axis.
     ahead: Vec<f64>,
     grid: Grid,
     /// The position instant that the next step computes.
@@ -76,7 +76,7 @@ impl Simulation {
     /// trajectories checked against `joints` (see [`joints`]).
     ///
     /// # Errors
-    /// [`SimulationError`] if an axis cannot be discretised or there are too many joints.
+    /// [`SimulationError`] if an axis cannot be discretized or there are too many joints.
     pub fn new(
         config: &MachineConfig,
         joints: Vec<JointLimits>,
@@ -189,7 +189,7 @@ impl Simulation {
         self.awake
     }
 
-    /// A position period at rest: of a machine that has moved nothing the first set-point counts as the
+    /// A position period at rest: of a machine that has moved nothing the first setpoint counts as the
     /// one before it too, and a stream's first need not be where the machine stands.
     fn wake_at_rest(&mut self) {
         let rest: Vec<f64> = self.samples.iter().map(|sample| sample.psec).collect();
@@ -203,8 +203,8 @@ impl Simulation {
         for event in self.timeline.events() {
             match *event {
                 Event::Started(id) => self.motions.start(id),
-                Event::Ended(id) if self.motions.is_cancelled(id) => {
-                    self.motions.end(id, Outcome::Cancelled, now, &mut self.ends);
+                Event::Ended(id) if self.motions.is_canceled(id) => {
+                    self.motions.end(id, Outcome::Canceled, now, &mut self.ends);
                 }
                 Event::Ended(id) => self.motions.finish_at(id, k + delay),
                 Event::Displaced { id, by, .. } => {
@@ -217,14 +217,14 @@ impl Simulation {
         }
     }
 
-    /// Position periods until the last set-point has passed every delay.
+    /// Position periods until the last setpoint has passed every delay.
     fn longest_delay(&self) -> i64 {
         let tick = self.machine.periods().current;
         let delay = self.machine.longest_delay() as Nanoseconds * tick;
         delay.unsigned_abs().div_ceil(self.grid.period.unsigned_abs()) as i64
     }
 
-    /// The set-points that controllers read ahead, as they are known now.
+    /// The setpoints that controllers read ahead, as they are known now.
     fn look_ahead(&mut self) {
         let horizon = self.machine.horizon();
         self.ahead.clear();
@@ -285,19 +285,19 @@ impl Simulation {
         joint.limits.is_left_by(sample.position)
     }
 
-    /// Set-point of a joint `periods` instants after the next one, m or rad, by what is known now;
+    /// Setpoint of a joint `periods` instants after the next one, m or rad, by what is known now;
     /// none for a joint that there is not.
     pub fn psec_ahead(&self, joint: usize, periods: u32) -> Option<f64> {
         self.timeline.psec_ahead(joint, periods.saturating_add(1))
     }
 
-    /// Whether a trajectory or a stop moves the set-points.
+    /// Whether a trajectory or a stop moves the setpoints.
     pub fn is_moving(&self) -> bool {
         self.timeline.is_moving()
     }
 }
 
-/// Position periods that contour errors look ahead of the set-point.
+/// Position periods that contour errors look ahead of the setpoint.
 pub fn horizon(period: Nanoseconds) -> u32 {
     u32::try_from(LOOK_AHEAD / period.max(1)).unwrap_or(u32::MAX).clamp(1, MOST_AHEAD)
 }

@@ -11,7 +11,7 @@ use super::tolerance::{Errors, Tolerances, Violation, first_violation};
 /// How a motion ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
-    /// Its last set-point has passed the pure delay, and the axes are within its goal tolerances.
+    /// Its last setpoint has passed the pure delay, and the axes are within its goal tolerances.
     Completed,
     /// Another one took one or more of its axes over.
     Displaced {
@@ -21,7 +21,7 @@ pub enum Outcome {
     /// By a controlled stop.
     Stopped,
     /// Called off by whoever asked for it, and stopped.
-    Cancelled,
+    Canceled,
     /// It strayed further than its path tolerances allow, and is being stopped.
     PathTolerance(Violation),
     /// It was not within its goal tolerances in time.
@@ -93,11 +93,11 @@ struct Motion {
     /// Its figures; none where nobody reads them.
     assessor: Option<MotionAssessor>,
     running: bool,
-    /// The instant at which its last set-point has passed the delays.
+    /// The instant at which its last setpoint has passed the delays.
     finishes: Option<i64>,
     tolerances: Option<Tolerances>,
     /// It has been called off, and is being stopped.
-    cancelled: bool,
+    canceled: bool,
 }
 
 impl Motion {
@@ -105,9 +105,9 @@ impl Motion {
         let outcome = match outcome {
             // It was over for whoever asked for it before a successor or a stop came.
             Outcome::Completed | Outcome::Displaced { .. } | Outcome::Stopped | Outcome::Aborted(_)
-                if self.cancelled =>
+                if self.canceled =>
             {
-                Outcome::Cancelled
+                Outcome::Canceled
             }
             outcome => outcome,
         };
@@ -116,7 +116,7 @@ impl Motion {
     }
 }
 
-/// Accepted motions: waiting, running, or waiting for their last set-points to pass the delays.
+/// Accepted motions: waiting, running, or waiting for their last setpoints to pass the delays.
 #[derive(Debug, Clone)]
 pub(super) struct Motions {
     kinds: Vec<AxisKind>,
@@ -141,7 +141,7 @@ impl Motions {
             running: false,
             finishes: None,
             tolerances,
-            cancelled: false,
+            canceled: false,
         });
     }
 
@@ -163,7 +163,7 @@ impl Motions {
         }
     }
 
-    /// The last set-point of a motion has been commanded; it has passed the delays at instant `k`.
+    /// The last setpoint of a motion has been commanded; it has passed the delays at instant `k`.
     pub(super) fn finish_at(&mut self, id: MotionId, k: i64) {
         if let Some(motion) = self.find(id) {
             motion.finishes = Some(k);
@@ -173,11 +173,11 @@ impl Motions {
     /// Notes that a motion is called off.
     pub(super) fn cancel(&mut self, id: MotionId) -> Cancel {
         let Some(motion) = self.find(id) else { return Cancel::Unknown };
-        if std::mem::replace(&mut motion.cancelled, true) { Cancel::Known } else { Cancel::New }
+        if std::mem::replace(&mut motion.canceled, true) { Cancel::Known } else { Cancel::New }
     }
 
-    pub(super) fn is_cancelled(&self, id: MotionId) -> bool {
-        self.list.iter().any(|m| m.id == id && m.cancelled)
+    pub(super) fn is_canceled(&self, id: MotionId) -> bool {
+        self.list.iter().any(|m| m.id == id && m.canceled)
     }
 
     pub(super) fn end(
@@ -194,14 +194,14 @@ impl Motions {
 
     /// The first motion that strays from its path further than its tolerances allow.
     pub(super) fn strayed(&self, errors: &[Errors], period: Nanoseconds) -> Option<(MotionId, Violation)> {
-        let under_way = self.list.iter().filter(|m| m.running && !m.cancelled);
+        let under_way = self.list.iter().filter(|m| m.running && !m.canceled);
         under_way.filter_map(|m| Some((m, m.tolerances.as_ref()?))).find_map(|(motion, tolerances)| {
             let violation = first_violation(&motion.places, &tolerances.path, errors, period)?;
             Some((motion.id, violation))
         })
     }
 
-    /// Ends the motions whose last set-points have passed the delays at instant `k`, as soon as they are
+    /// Ends the motions whose last setpoints have passed the delays at instant `k`, as soon as they are
     /// within their goal tolerances, have no time left to get there, or lost an axis to a successor.
     pub(super) fn finish(&mut self, k: i64, errors: &[Errors], grid: Grid, ends: &mut Vec<MotionEnd>) {
         let mut place = 0;
@@ -216,12 +216,12 @@ impl Motions {
         }
     }
 
-    /// How a motion ends `late` instants after its set-points have passed the delays; none: not yet.
+    /// How a motion ends `late` instants after its setpoints have passed the delays; none: not yet.
     fn outcome_at_goal(&self, motion: &Motion, late: i64, errors: &[Errors], grid: Grid) -> Option<Outcome> {
         if late < 0 {
             return None;
         }
-        let Some(tolerances) = motion.tolerances.as_ref().filter(|_| !motion.cancelled) else {
+        let Some(tolerances) = motion.tolerances.as_ref().filter(|_| !motion.canceled) else {
             return Some(Outcome::Completed);
         };
         let Some(violation) = first_violation(&motion.places, &tolerances.goal, errors, grid.period) else {

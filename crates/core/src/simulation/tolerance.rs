@@ -1,6 +1,6 @@
 //! How far a motion may stray, as `control_msgs/FollowJointTrajectory` asks for it.
 //!
-//! With e the synchronised tracking error of an axis at position instant k, the errors are
+//! With e the synchronized tracking error of an axis at position instant k, the errors are
 //!
 //! ```text
 //! position e[k]    velocity (e[k] − e[k−1])/Tsp    acceleration (e[k] − 2 e[k−1] + e[k−2])/Tsp²
@@ -11,7 +11,7 @@ use crate::units::{Nanoseconds, seconds};
 
 /// Largest error of a joint that is allowed; none is any.
 ///
-/// Errors are against the set-points as they reach the position controller, so that the pure delay is
+/// Errors are against the setpoints as they reach the position controller, so that the pure delay is
 /// no error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tolerance {

@@ -1,7 +1,7 @@
-//! Which set-points of a stream are taken, joint by joint.
+//! Which setpoints of a stream are taken, joint by joint.
 //!
 //! A stream has to begin where the joint is: within Vmax·Tsp of what entered the look-ahead buffer last.
-//! From then on it drives the joint, and each set-point is judged against the one that was taken before:
+//! From then on it drives the joint, and each setpoint is judged against the one that was taken before:
 //! the joint must be able to come from there in the time between the two, and [`STREAM_JITTER`] more. A
 //! stream that pauses, or whose joint a trajectory or a stop takes, has to begin anew.
 
@@ -10,14 +10,14 @@ use super::rejection::{Code, Rejection};
 use super::stream::{pause, reach};
 use crate::units::{MILLISECOND_NS, Nanoseconds, Told, seconds};
 
-/// How much earlier than it was due a set-point may come: one sample of a sender of 50 Hz that was held
+/// How much earlier than it was due a setpoint may come: one sample of a sender of 50 Hz that was held
 /// up and comes together with the next.
 pub const STREAM_JITTER: Nanoseconds = 20 * MILLISECOND_NS;
 
-/// What is known of the set-points that came for one joint.
+/// What is known of the setpoints that came for one joint.
 #[derive(Debug, Default)]
 pub(super) struct Arrivals {
-    /// The set-point that was last taken, while the stream drives.
+    /// The setpoint that was last taken, while the stream drives.
     taken: Option<Taken>,
     /// The last one that came, whatever became of it.
     seen: Option<Seen>,
@@ -43,7 +43,7 @@ struct Seen {
     sent: Option<Nanoseconds>,
 }
 
-/// What becomes of a set-point that is in order.
+/// What becomes of a setpoint that is in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
     Taken,
@@ -65,7 +65,7 @@ pub(super) struct Place<'a> {
 }
 
 impl Arrivals {
-    /// What becomes of a set-point `position` (m or rad), sent at `sent` (ns) by the sender's clock.
+    /// What becomes of a setpoint `position` (m or rad), sent at `sent` (ns) by the sender's clock.
     ///
     /// # Errors
     /// [`Code::Jump`].
@@ -115,7 +115,7 @@ impl Arrivals {
         self.taken.is_some_and(|taken| k - taken.k <= pause(period))
     }
 
-    /// Whether set-points come and are ignored because of a stop.
+    /// Whether setpoints come and are ignored because of a stop.
     pub fn is_held_off(&self, k: i64, period: Nanoseconds) -> bool {
         self.held_off.is_some() && self.seen.is_some_and(|seen| k - seen.k <= pause(period))
     }
@@ -137,7 +137,7 @@ impl Arrivals {
     }
 }
 
-/// Time from `before` to a set-point that comes before instant `k`, ns; no more than a pause.
+/// Time from `before` to a setpoint that comes before instant `k`, ns; no more than a pause.
 fn time_between(before: Seen, k: i64, sent: Option<Nanoseconds>, period: Nanoseconds) -> Nanoseconds {
     let arrived = (k - before.k).saturating_mul(period);
     let sent = sent.zip(before.sent).map_or(0, |(sent, before)| sent.saturating_sub(before));
@@ -151,7 +151,7 @@ fn check_jump(limits: &JointLimits, from: f64, position: f64, allowed: f64) -> R
     }
     let (name, unit) = (&limits.name, limits.unit());
     let text = format!(
-        "{name}: {} {unit} is {} {unit} away from the set-point {} {unit} before it; \
+        "{name}: {} {unit} is {} {unit} away from the setpoint {} {unit} before it; \
          the axis comes {} {unit} in the time between at most",
         Told(position),
         Told(jump),

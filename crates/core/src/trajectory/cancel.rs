@@ -24,7 +24,7 @@ impl Timeline {
     /// for which it waits are left to what moves them now. What waits behind it for one of its joints
     /// is told to have been stopped by it: it was to begin where this one would have ended.
     ///
-    /// It is over already if there is no such motion, or its last set-point has been commanded.
+    /// It is over already if there is no such motion, or its last setpoint has been commanded.
     pub fn cancel(&mut self, id: MotionId) -> CallOff {
         let Some(slot) = self.motions.find(id) else { return CallOff::Over };
         let mut effect = CallOff::Discarded;

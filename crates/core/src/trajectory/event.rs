@@ -39,9 +39,9 @@ impl JointSet {
 /// after which nothing more is told about it, even if some of its joints go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Event {
-    /// Its first set-point was commanded.
+    /// Its first setpoint was commanded.
     Started(MotionId),
-    /// Its last set-point was commanded, or its successor took over at the end.
+    /// Its last setpoint was commanded, or its successor took over at the end.
     Ended(MotionId),
     /// Another trajectory took joints from it before its end.
     Displaced {

@@ -4,9 +4,9 @@ use super::rejection::{Code, Rejection};
 use crate::config::{AxisConfig, AxisKind, LimitsConfig};
 use crate::units::Told;
 
-/// Relative tolerance on speeds: rounding of set-points that sit exactly on the limit.
+/// Relative tolerance on speeds: rounding of setpoints that sit exactly on the limit.
 pub const SPEED_TOLERANCE: f64 = 1e-9;
-/// Tolerance on the stroke, m or rad: a nanometre of rounding is not a collision.
+/// Tolerance on the stroke, m or rad: a nanometer of rounding is not a collision.
 pub const STROKE_TOLERANCE: f64 = 1e-9;
 
 /// A joint of the machine as trajectories see it.
@@ -90,7 +90,7 @@ impl JointLimits {
         .numbers(speed, limit))
     }
 
-    /// Refuses a first set-point that is not within one period's reach of the one before it.
+    /// Refuses a first setpoint that is not within one period's reach of the one before it.
     ///
     /// # Errors
     /// [`Code::Jump`], with the distance and Vmax·Tsp in m or rad.
@@ -104,7 +104,7 @@ impl JointLimits {
         Err(Rejection::new(
             Code::Jump,
             format!(
-                "{}: starts at {} {unit}, {} {unit} away from the set-point {} {unit} before it; the axis \
+                "{}: starts at {} {unit}, {} {unit} away from the setpoint {} {unit} before it; the axis \
                  moves {} {unit} in a position period at most",
                 self.name,
                 Told(first),

@@ -1,9 +1,9 @@
-//! Trajectories: from requested points to one position set-point (PSEC) per period and joint.
+//! Trajectories: from requested points to one position setpoint (PSEC) per period and joint.
 //!
 //! A [`Request`] holds what was asked for. [`Trajectory::new`] checks it against the machine, on
 //! the side of whoever asks: that is where the work is. The [`Timeline`] belongs to the thread that
 //! moves the machine; it takes checked trajectories, looks at the junction with what is being
-//! commanded only, and hands out set-points, one position instant after another.
+//! commanded only, and hands out setpoints, one position instant after another.
 
 pub mod event;
 pub mod limits;

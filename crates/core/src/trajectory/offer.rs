@@ -24,7 +24,7 @@ pub struct Admission {
     pub start_k: i64,
     /// First instant that it commands: `start_k`, or the next one if that is over.
     pub join_k: i64,
-    /// Instant of its last set-point; of a stop, the first one at rest.
+    /// Instant of its last setpoint; of a stop, the first one at rest.
     pub end_k: i64,
     /// It started in the past and is joined on the way: worth a warning.
     pub joined_late: bool,

@@ -45,7 +45,7 @@ impl Trajectory {
     /// grid. Whether the axes are where it starts is seen by
     /// [`Timeline::offer`](super::Timeline::offer).
     ///
-    /// The grid is local: a start between two position periods is the later one, so set-points are
+    /// The grid is local: a start between two position periods is the later one, so setpoints are
     /// evaluated at multiples of Tsp from the start. Every grid instant is checked,
     /// `|PSEC_k − PSEC_{k−1}| / Tsp ≤ Vmax`, as long as a segment has no more of them than its
     /// share of a fixed budget (4 million instants per joint and trajectory, hours of motion). A

@@ -13,7 +13,7 @@ pub(super) struct Plan {
     pub slot: Option<usize>,
     /// First instant that it commands.
     pub join_k: i64,
-    /// Instant of its last set-point.
+    /// Instant of its last setpoint.
     pub end_k: i64,
     /// Start and end as asked for, in ns of the position grid (k·Tsp), not rounded to an instant.
     pub nominal_start: i128,

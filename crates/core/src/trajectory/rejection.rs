@@ -25,7 +25,7 @@ pub enum Code {
     NotFinite = 6,
     /// A position beyond the stroke.
     OutsideStroke = 7,
-    /// A first set-point further from the present one than the axis moves in one period.
+    /// A first setpoint further from the present one than the axis moves in one period.
     Jump = 8,
     /// A speed beyond that of the axis.
     Speed = 9,

@@ -31,11 +31,11 @@ impl State {
     }
 }
 
-/// A polynomial between two states that are `duration` apart, in normalised time s = t/h ∈ \[0, 1]:
+/// A polynomial between two states that are `duration` apart, in normalized time s = t/h ∈ \[0, 1]:
 ///
 /// `p(s) = p0 + c1 s + c2 s² + c3 s³ + c4 s⁴ + c5 s⁵`
 ///
-/// Normalised because a segment of a nanosecond and one of an hour are then equally well
+/// Normalized because a segment of a nanosecond and one of an hour are then equally well
 /// conditioned. The ends are returned bit for bit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {

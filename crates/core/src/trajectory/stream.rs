@@ -1,13 +1,13 @@
-//! Set-points that come one at a time, for joints that no trajectory moves.
+//! Setpoints that come one at a time, for joints that no trajectory moves.
 //!
-//! Nothing is known ahead of a stream, and a controller with a preview needs that. So each set-point
+//! Nothing is known ahead of a stream, and a controller with a preview needs that. So each setpoint
 //! waits in a look-ahead buffer of D position periods: what arrives before instant k is commanded at
 //! instant k + D, and until then [`Timeline::psec_ahead`] answers with it. When nothing arrives the
-//! last set-point holds, and goes on being pushed through the buffer.
+//! last setpoint holds, and goes on being pushed through the buffer.
 //!
-//! A sender has a clock and a rate of its own, and a network delays: two set-points can come in one
-//! period and none in the next. What enters the buffer therefore goes towards the newest set-point by
-//! Vmax·Tsp in each period at most, and which set-points are taken is judged against those before
+//! A sender has a clock and a rate of its own, and a network delays: two setpoints can come in one
+//! period and none in the next. What enters the buffer therefore goes towards the newest setpoint by
+//! Vmax·Tsp in each period at most, and which setpoints are taken is judged against those before
 //! them: see `arrivals`.
 
 use std::collections::VecDeque;
@@ -26,19 +26,19 @@ pub const MAX_STREAM_DELAY: u32 = 1024;
 /// How long nothing changes in a stream that has paused: more than a sender's jitter.
 pub const STREAM_PAUSE: Nanoseconds = 100 * MILLISECOND_NS;
 
-/// Set-points of one joint that have entered the buffer and are not commanded yet, the next one in
+/// Setpoints of one joint that have entered the buffer and are not commanded yet, the next one in
 /// front; as many as the delay has periods.
 #[derive(Debug, Default)]
 pub(super) struct LookAhead {
     buffer: VecDeque<f64>,
-    /// What had entered when the newest set-point was taken, m or rad.
+    /// What had entered when the newest setpoint was taken, m or rad.
     from: f64,
     /// Instants since then.
     since: i64,
 }
 
-/// What enters `instants` after a set-point `newest` was taken, when `from` had entered before it:
-/// the set-point, or what is on the way to it at `reach` (m or rad) a period.
+/// What enters `instants` after a setpoint `newest` was taken, when `from` had entered before it:
+/// the setpoint, or what is on the way to it at `reach` (m or rad) a period.
 fn approach(from: f64, newest: f64, instants: i64, reach: f64) -> f64 {
     let way = newest - from;
     let instants = instants as f64;
@@ -54,7 +54,7 @@ fn approach(from: f64, newest: f64, instants: i64, reach: f64) -> f64 {
 pub struct StreamCounts {
     /// How often it broke off in motion: nothing came for [`STREAM_PAUSE`].
     pub gaps: u64,
-    /// Position periods in which a joint went towards its set-point at Vmax and was not there yet.
+    /// Position periods in which a joint went towards its setpoint at Vmax and was not there yet.
     pub limited: u64,
 }
 
@@ -78,9 +78,9 @@ pub(super) struct Stream {
     delay: usize,
     /// D as it was set last, for when the stream has paused.
     wanted: usize,
-    /// The instant at which a set-point last entered a buffer that differs from the one before it.
+    /// The instant at which a setpoint last entered a buffer that differs from the one before it.
     moved_k: Option<i64>,
-    /// The instant before which a set-point was last taken.
+    /// The instant before which a setpoint was last taken.
     pub(super) taken_k: Option<i64>,
     pub(super) counts: StreamCounts,
     /// What ended it, and the joints that were taken, until that is asked for.
@@ -98,7 +98,7 @@ impl LookAhead {
         self.buffer.back().copied().unwrap_or(state.position)
     }
 
-    /// Goes towards another set-point from the next instant on.
+    /// Goes towards another setpoint from the next instant on.
     pub fn turn(&mut self, state: State) {
         (self.from, self.since) = (self.entered(state), 0);
     }
@@ -153,7 +153,7 @@ fn between(before: f64, position: f64, period: Nanoseconds) -> State {
 }
 
 impl Stream {
-    /// Notes whether the set-points that entered at instant `k` differ from those before them.
+    /// Notes whether the setpoints that entered at instant `k` differ from those before them.
     pub fn note(&mut self, k: i64, moved: bool) {
         if moved {
             self.moved_k = Some(k);
@@ -162,7 +162,7 @@ impl Stream {
 }
 
 impl Timeline {
-    /// Sets one set-point of a stream, m or rad: `true` if it is taken; `false` while a trajectory or a
+    /// Sets one setpoint of a stream, m or rad: `true` if it is taken; `false` while a trajectory or a
     /// stop moves the joint or waits for it, and after a stop until the stream has paused: until nothing
     /// has changed in it for [`STREAM_PAUSE`].
     ///
@@ -174,7 +174,7 @@ impl Timeline {
     /// # Errors
     /// [`Code::UnknownJoint`], [`Code::NotFinite`], [`Code::OutsideStroke`]. [`Code::Jump`] if a stream
     /// begins further than one period's reach from what entered last, or goes on further from its last
-    /// set-point than the joint comes in the time between, [`STREAM_JITTER`] more. What was taken
+    /// setpoint than the joint comes in the time between, [`STREAM_JITTER`] more. What was taken
     /// remains as it is then.
     ///
     /// [`STREAM_JITTER`]: super::STREAM_JITTER
@@ -182,7 +182,7 @@ impl Timeline {
         self.stream_sent(joint, position, None)
     }
 
-    /// Likewise, `sent` (ns) by the sender's clock: the time between two set-points is that by this
+    /// Likewise, `sent` (ns) by the sender's clock: the time between two setpoints is that by this
     /// clock, if it is longer than that between their arrivals.
     ///
     /// # Errors
@@ -219,9 +219,9 @@ impl Timeline {
         }
     }
 
-    /// Sets the delay of streamed set-points, position periods, at most [`MAX_STREAM_DELAY`].
+    /// Sets the delay of streamed setpoints, position periods, at most [`MAX_STREAM_DELAY`].
     ///
-    /// It takes effect when no joint's streamed set-points have changed for the present delay and
+    /// It takes effect when no joint's streamed setpoints have changed for the present delay and
     /// [`STREAM_PAUSE`] more, when it moves nothing; with no stream that is at once. A stream that
     /// does not pause keeps the delay that it has.
     pub fn set_stream_delay(&mut self, periods: u32) {
@@ -235,23 +235,23 @@ impl Timeline {
         self.settle_stream_delay();
     }
 
-    /// Delay of streamed set-points that is in effect, position periods.
+    /// Delay of streamed setpoints that is in effect, position periods.
     pub fn stream_delay(&self) -> u32 {
         self.stream.delay as u32
     }
 
-    /// Whether a stream drives: whether one of its set-points was taken within [`STREAM_PAUSE`], or
+    /// Whether a stream drives: whether one of its setpoints was taken within [`STREAM_PAUSE`], or
     /// is still to be commanded.
     pub fn is_streaming(&self) -> bool {
         !self.has_passed(self.stream.taken_k, self.pause())
     }
 
-    /// Whether streamed set-points moved a joint at the last instant, or will by what has arrived.
+    /// Whether streamed setpoints moved a joint at the last instant, or will by what has arrived.
     pub fn is_stream_moving(&self) -> bool {
         !self.has_passed(self.stream.moved_k, 1)
     }
 
-    /// Whether set-points come for a joint that are ignored after a stop.
+    /// Whether setpoints come for a joint that are ignored after a stop.
     pub fn is_stream_held_off(&self) -> bool {
         self.tracks.iter().any(|track| track.arrivals.is_held_off(self.next_k, self.period))
     }
@@ -281,7 +281,7 @@ impl Timeline {
         }
     }
 
-    /// Counts what is worth telling about the set-points that entered at instant `k`; `limited` if one
+    /// Counts what is worth telling about the setpoints that entered at instant `k`; `limited` if one
     /// has not entered yet.
     pub(super) fn count_stream(&mut self, k: i64, limited: bool) {
         let mut broke_off = false;

@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 /// Most trajectories that wait for one joint.
 pub const MAX_WAITING: usize = 1024;
 
-/// Position set-points of all joints, one position instant after another.
+/// Position setpoints of all joints, one position instant after another.
 ///
 /// Each joint has a queue of plans, ordered by the instant from which they command it. A plan says
 /// where its joint is at any instant, so the timeline can look ahead, and a new trajectory is
@@ -46,9 +46,9 @@ pub struct Timeline {
 pub(super) struct Track {
     pub queue: VecDeque<Plan>,
     pub state: State,
-    /// Streamed set-points between the last commanded one and the one that the joint holds.
+    /// Streamed setpoints between the last commanded one and the one that the joint holds.
     pub ahead: LookAhead,
-    /// The streamed set-points that came.
+    /// The streamed setpoints that came.
     pub arrivals: Arrivals,
 }
 
@@ -112,13 +112,13 @@ impl Timeline {
 
     /// Commands the next position instant and returns its index k; see [`Timeline::psec`] and
     /// [`Timeline::events`].
-    // An iterator could not lend the set-points.
+    // An iterator could not lend the setpoints.
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> i64 {
         let (k, period) = (self.next_k, self.period);
         self.events.clear();
         self.events.append(&mut self.pending);
-        // A set-point that was taken comes with the delay that it was foreseen with.
+        // A setpoint that was taken comes with the delay that it was foreseen with.
         if self.stream.taken_k != Some(k) {
             self.settle_stream_delay();
         }
@@ -164,7 +164,7 @@ impl Timeline {
         k
     }
 
-    /// Set-points of the last commanded instant, m or rad, one per joint.
+    /// Setpoints of the last commanded instant, m or rad, one per joint.
     pub fn psec(&self) -> &[f64] {
         &self.psec
     }
@@ -194,7 +194,7 @@ impl Timeline {
         self.tracks.get(joint).map(|track| track.state)
     }
 
-    /// Set-point of `joint` `periods` instants after the last commanded one, m or rad, by what is
+    /// Setpoint of `joint` `periods` instants after the last commanded one, m or rad, by what is
     /// known now; the last one of all beyond it. `None` for a joint that there is not.
     pub fn psec_ahead(&self, joint: usize, periods: u32) -> Option<f64> {
         (joint < self.tracks.len()).then(|| {

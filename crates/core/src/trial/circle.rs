@@ -58,7 +58,7 @@ impl Circles {
                 angle: Vec::new(),
                 deviation: Vec::new(),
             };
-            let assessor = CircleAssessor::new(circle.centre, circle.radius);
+            let assessor = CircleAssessor::new(circle.center, circle.radius);
             Some(Steady { index, window, circle, assessor, trace })
         };
         let list = circles.by_ref().filter_map(steady).take(MOST).collect();
@@ -137,7 +137,7 @@ impl Steady {
     fn push(&mut self, u: f64, v: f64, record: bool) {
         let deviation = self.assessor.push(u, v);
         if record && self.trace.angle.len() < TRACE {
-            let [cu, cv] = self.circle.centre;
+            let [cu, cv] = self.circle.center;
             let angle = (v - cv).atan2(u - cu);
             let angle = match self.trace.angle.last() {
                 Some(last) => last + (angle - last + PI).rem_euclid(2.0 * PI) - PI,
@@ -153,7 +153,7 @@ impl Steady {
         a.plane == b.plane
             && (a.sweep > 0.0) != (b.sweep > 0.0)
             && (a.radius - b.radius).abs() < SAME
-            && (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1]) < SAME
+            && (a.center[0] - b.center[0]).hypot(a.center[1] - b.center[1]) < SAME
     }
 }
 

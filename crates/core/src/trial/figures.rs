@@ -26,14 +26,14 @@ pub struct Figures {
     pub more_corners: usize,
 }
 
-/// Figures of one axis, from the first set-point until the last one has passed the delays.
+/// Figures of one axis, from the first setpoint until the last one has passed the delays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisFigures {
     /// Joint.
     pub name: String,
     /// Linear or rotary.
     pub kind: AxisKind,
-    /// Whether its set-points moved.
+    /// Whether its setpoints moved.
     pub moves: bool,
     /// Errors, current, saturation.
     pub report: AxisReport,
@@ -48,7 +48,7 @@ pub struct AxisFigures {
 pub enum Reference {
     /// The continuous geometric path.
     Path,
-    /// The polyline through the set-points.
+    /// The polyline through the setpoints.
     Setpoints,
 }
 

@@ -1,6 +1,6 @@
-//! One trial, offline: set-points through the simulation, its figures and its recording.
+//! One trial, offline: setpoints through the simulation, its figures and its recording.
 //!
-//! The trial gives the [`Simulation`] its set-points piece by piece and
+//! The trial gives the [`Simulation`] its setpoints piece by piece and
 //! looks at every tick, so that its memory does not grow with its length.
 
 mod circle;
@@ -36,13 +36,13 @@ use observer::{Measures, Observer};
 use period::Period;
 use supply::Supply;
 
-/// What is to be run, besides the set-points.
+/// What is to be run, besides the setpoints.
 #[derive(Debug, Clone)]
 pub struct Trial<'a> {
     /// The machine.
     pub machine: &'a MachineConfig,
-    /// Path and law of time that the set-points come from, if these are known: contour errors are
-    /// measured against the path then, otherwise against the polyline through the set-points.
+    /// Path and law of time that the setpoints come from, if these are known: contour errors are
+    /// measured against the path then, otherwise against the polyline through the setpoints.
     pub program: Option<Arc<Program>>,
     /// Accept trajectories whose last point has a velocity.
     pub allow_nonzero_end_velocity: bool,
@@ -74,7 +74,7 @@ pub struct Tick<'a> {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrialError {
-    /// The set-points cannot be read, or are wrong.
+    /// The setpoints cannot be read, or are wrong.
     #[error(transparent)]
     Source(SourceError),
     /// The machine cannot do what is asked.
@@ -95,7 +95,7 @@ pub enum TrialError {
 
 /// Runs `setpoints` until the axes have settled, and shows every position instant to `watch`.
 ///
-/// The machine starts at rest at the first set-point; a trajectory whose first point is later than 0
+/// The machine starts at rest at the first setpoint; a trajectory whose first point is later than 0
 /// is approached from home.
 ///
 /// # Errors
@@ -163,7 +163,7 @@ fn run_by(
     Ok(observer.finish())
 }
 
-/// The trial's machine at rest where the set-points begin, those, and that place, m or rad.
+/// The trial's machine at rest where the setpoints begin, those, and that place, m or rad.
 fn begin<'a>(
     trial: &Trial<'_>,
     setpoints: Setpoints<'a>,

@@ -67,7 +67,7 @@ pub(super) struct Observer<'a> {
     /// Position instants at which an axis had left its stroke.
     outside: Vec<u64>,
     start: Vec<f64>,
-    /// Room for set-points to come.
+    /// Room for setpoints to come.
     ahead: Vec<f64>,
     looked_ahead: bool,
     /// Where the tool was in the position period, and by how much it was off.
@@ -236,7 +236,7 @@ impl<'a> Observer<'a> {
         axes.zip(&self.moves).any(|(axis, &moves)| moves && axis.kind() == AxisKind::Rotary)
     }
 
-    /// Learns, before a position instant, where the set-points go, if they are what the tool is
+    /// Learns, before a position instant, where the setpoints go, if they are what the tool is
     /// followed along.
     pub(super) fn look_ahead(&mut self, simulation: &Simulation) {
         let Some(Tracker::Setpoints(tracker)) = &mut self.tracker else { return };

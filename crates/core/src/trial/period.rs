@@ -5,7 +5,7 @@ use crate::machine::Machine;
 use crate::path::Program;
 use crate::units::{Nanoseconds, seconds};
 
-/// How far ahead of the set-point the nearest point of a path is sought, m or rad: an axis that
+/// How far ahead of the setpoint the nearest point of a path is sought, m or rad: an axis that
 /// overshoots a corner is nearest to what comes behind it.
 const AHEAD: f64 = 5e-3;
 
@@ -13,7 +13,7 @@ const AHEAD: f64 = 5e-3;
 #[derive(Debug)]
 pub(super) struct Period {
     periods: Periods,
-    /// Whether set-points are under way.
+    /// Whether setpoints are under way.
     pub moving: bool,
     /// Its ticks, s.
     pub times: Vec<f64>,

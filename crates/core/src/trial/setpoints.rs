@@ -1,4 +1,4 @@
-//! Where the set-points of a trial come from.
+//! Where the setpoints of a trial come from.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -7,10 +7,10 @@ use crate::path::Program;
 use crate::trajectory::{JointLimits, Rejection, Request};
 use crate::units::{Nanoseconds, seconds};
 
-/// What a source of set-points says when it fails; the text names the file and the place in it.
+/// What a source of setpoints says when it fails; the text names the file and the place in it.
 pub type SourceError = Box<dyn Error + Send + Sync>;
 
-/// Set-points on the position grid, one instant after the other.
+/// Setpoints on the position grid, one instant after the other.
 pub trait GridSource {
     /// Places in the machine of the joints that it moves, in the order of its rows.
     fn joints(&self) -> &[usize];
@@ -26,7 +26,7 @@ pub trait GridSource {
 /// Trajectories with the times at which they arrive, ns, in order.
 pub type Requests<'a> = dyn Iterator<Item = Result<(Nanoseconds, Request), SourceError>> + 'a;
 
-/// Set-points of a trial.
+/// Setpoints of a trial.
 pub enum Setpoints<'a> {
     /// One after the other on the grid, from k = 0.
     Grid(Box<dyn GridSource + 'a>),
@@ -34,7 +34,7 @@ pub enum Setpoints<'a> {
     Requests(Box<Requests<'a>>),
 }
 
-/// Set-points of a planned path, computed and checked when they are asked for.
+/// Setpoints of a planned path, computed and checked when they are asked for.
 #[derive(Debug, Clone)]
 pub struct ProgramSource {
     name: String,
@@ -45,7 +45,7 @@ pub struct ProgramSource {
     next: i64,
 }
 
-/// A set-point that the machine cannot reach.
+/// A setpoint that the machine cannot reach.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{name}: move {index}, at {time} s: {rejection}")]
 pub struct UnreachableError {

@@ -1,4 +1,4 @@
-//! Hands set-points to the simulation as trajectories, shortly before they are due.
+//! Hands setpoints to the simulation as trajectories, shortly before they are due.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::units::{Nanoseconds, SECOND_NS, seconds};
 use super::setpoints::{GridSource, Requests, Setpoints};
 use super::{Trial, TrialError};
 
-/// Set-points of one trajectory of a grid: few enough to cost no memory, many enough to cost no time.
+/// Setpoints of one trajectory of a grid: few enough to cost no memory, many enough to cost no time.
 const CHUNK: usize = 512;
 /// Instants before its start at which a chunk is handed over: more than any controller looks ahead.
 const LEAD: i64 = 256;
@@ -82,7 +82,7 @@ impl<'a> Supply<'a> {
         })
     }
 
-    /// Where the first set-points are at time 0, m or rad for each joint; none if they are later.
+    /// Where the first setpoints are at time 0, m or rad for each joint; none if they are later.
     pub(super) fn start(&self) -> Option<&[f64]> {
         self.start.as_deref()
     }

@@ -15,7 +15,7 @@ use super::{Trial, TrialError, begin};
 
 /// Variants of the trial's machine that are run as one.
 ///
-/// The set-points are worked out once, by the trial's machine itself; the axes of the variants are lanes of
+/// The setpoints are worked out once, by the trial's machine itself; the axes of the variants are lanes of
 /// one machine, so that a vector of the processor holds the same axis of several variants.
 struct Together<'a> {
     /// Places of the axes that the variants have their own of.

@@ -24,7 +24,7 @@ fn the_check_vector_of_the_model_page() {
     assert_eq!(rst.t_first(), 1);
 }
 
-/// What is known at instant k: θ and Ω* before it, newest first, and the set-points from k + 1 on.
+/// What is known at instant k: θ and Ω* before it, newest first, and the setpoints from k + 1 on.
 #[derive(Debug)]
 struct Situation {
     angles: Vec<f64>,
@@ -58,7 +58,7 @@ impl Situation {
         angles[present..].to_vec()
     }
 
-    /// The first increment of Ω* that minimises Σ (θ* − θ)² + λ Σ ΔΩ*² over the horizons: least
+    /// The first increment of Ω* that minimizes Σ (θ* − θ)² + λ Σ ΔΩ*² over the horizons: least
     /// squares of the criterion's residuals, whose derivatives are the responses to one increment at a
     /// time. λ_rel is resolved with the same responses.
     fn first_increment(&self, model: &PredictionModel, tuning: &GpcTuning) -> f64 {
@@ -130,7 +130,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_first_increment_minimises_the_criterion(
+    fn the_first_increment_minimizes_the_criterion(
         model in models(),
         tuning in tunings(),
         situation in situations(),
@@ -150,7 +150,7 @@ proptest! {
 }
 
 #[test]
-fn the_first_increment_minimises_the_criterion_on_every_axis() {
+fn the_first_increment_minimizes_the_criterion_on_every_axis() {
     let wave = |count: usize, rate: f64| (0..count).map(|i| (rate * i as f64).sin()).collect();
     let situation = Situation { angles: wave(12, 0.3), speeds: wave(12, 2.0), setpoints: wave(30, 0.7) };
     for (name, model) in axes() {

@@ -11,7 +11,7 @@ use virtual_axes_verification::fixtures::common::*;
 const MACHINES: [&str; 2] = ["mikron_ucp710", "linear_motor_center"];
 const DEFAULT: &str = MACHINES[0];
 const GPC: &str = "position_loop.controller=gpc";
-const MICROMETRE: f64 = 1e-6;
+const MICROMETER: f64 = 1e-6;
 
 /// The default machine under predictive control with this tuning.
 fn tuned(n1: usize, n2: usize, nu: usize, lambda_rel: f64) -> MachineConfig {
@@ -89,7 +89,7 @@ fn the_prediction_model_is_the_simulation_without_friction() {
     }
 }
 
-/// Metres or radians of the axis per radian (or metre) of its motor, from the machine files' text.
+/// Meters or radians of the axis per radian (or meter) of its motor, from the machine files' text.
 fn transmission(machine: &str, axis: &str) -> f64 {
     match (machine, axis) {
         ("mikron_ucp710", "a") => 1.0 / 180.0,
@@ -116,7 +116,7 @@ fn the_prediction_model_leaves_out_no_state_that_counts() {
 fn ballbar(machine: &MachineConfig) -> [f64; 3] {
     let figures = figures("ballbar", machine);
     let circle = figures.circles.first().expect("a circle");
-    [circle.mean, circle.min, circle.max].map(|v| v / MICROMETRE)
+    [circle.mean, circle.min, circle.max].map(|v| v / MICROMETER)
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn corners_land_on_the_model_pages_numbers() {
     ];
     for (scenario, lambda_rel, wanted) in rows {
         let figures = figures(scenario, &tuned(1, 8, 6, lambda_rel));
-        let corner = figures.corners.first().expect("a corner").max_contour_error / MICROMETRE;
+        let corner = figures.corners.first().expect("a corner").max_contour_error / MICROMETER;
         assert_near(&format!("{scenario} with {lambda_rel}, µm"), corner, wanted, 0.01 * wanted + 0.05);
     }
 }

@@ -1,7 +1,7 @@
 //! Predictive control beyond its linear range: at rest against friction, and with the motor at its limits.
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig};
-use virtual_axes_core::units::{DEGREE, METRE_PER_MINUTE, RPM, seconds};
+use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, RPM, seconds};
 use virtual_axes_verification::fixtures::common::*;
 
 const MACHINES: [&str; 2] = ["mikron_ucp710", "linear_motor_center"];
@@ -23,7 +23,7 @@ fn periods_in(config: &MachineConfig, time: f64) -> i64 {
 fn line(axis: &AxisConfig) -> Profile {
     let limits = axis.limits();
     let (length, velocity) = match axis.kind() {
-        AxisKind::Linear => (0.1, 10.0 * METRE_PER_MINUTE),
+        AxisKind::Linear => (0.1, 10.0 * METER_PER_MINUTE),
         AxisKind::Rotary => (90.0 * DEGREE, 5.0 * RPM),
     };
     // Where the velocity is reached before the acceleration is, less of that.
@@ -73,12 +73,12 @@ fn comes_to_rest(name: &str, config: &MachineConfig, place: usize, friction: &st
             }
         });
     }
-    // A nanometre (or its like in rad) and a milliampere: hunting has micrometres and amperes.
+    // A nanometer (or its like in rad) and a milliampere: hunting has micrometers and amperes.
     assert!(range[1] - range[0] < 1e-9, "{name} {} {friction} moves: {range:?}", axis.name());
     assert!(range[3] - range[2] < 1e-3, "{name} {} {friction}: current {range:?}", axis.name());
 }
 
-/// Where the axis is, relative to the set-point, over the last of six seconds; and whether it saturated.
+/// Where the axis is, relative to the setpoint, over the last of six seconds; and whether it saturated.
 fn after(
     config: &MachineConfig,
     place: usize,
@@ -133,7 +133,7 @@ fn a_step_and_a_load_in_motion_are_recovered_from() {
                     AxisKind::Linear => (0.02, 0.1),
                     AxisKind::Rotary => (0.2, 1.0),
                 };
-                // A set-point that never stands still: what holds an axis at rest is no help.
+                // A setpoint that never stands still: what holds an axis at rest is no help.
                 let sine = |k: i64| amplitude * (1.0 - (3.0 * k as f64 * period).cos());
                 let undisturbed = after(&config, place, sine, |_| 0.0);
                 assert!(!undisturbed.1, "{name} {}: the sine alone saturates", axis.name());

@@ -23,7 +23,7 @@ fn parameters_of(changes: &[&str]) -> Arc<MachineParameters> {
     Arc::new(MachineParameters::new(&configured(MACHINE, changes)).expect("a machine"))
 }
 
-/// One position period of the ballbar trial, with the set-points that are read ahead.
+/// One position period of the ballbar trial, with the setpoints that are read ahead.
 fn advance(machine: &mut Machine, ballbar: &Ballbar, k: i64, observe: impl FnMut(&Machine)) {
     let psec = |k: i64| ballbar.psec(k as f64 * TSP);
     let horizon = machine.horizon() as i64;

@@ -81,7 +81,7 @@ fn assert_state(n: usize, s: &MotorState, exact: &ClosedForm, scale: (f64, f64, 
 
 #[test]
 fn motor_at_constant_voltage() {
-    let motor = Motor::new(&MOTOR, TICK).expect("can be discretised");
+    let motor = Motor::new(&MOTOR, TICK).expect("can be discretized");
     let (voltage, torque) = (60.0, -3.0);
     let exact = ClosedForm::new(&MOTOR, voltage, torque, 0.0, 0.0);
     let mut s = MotorState::default();
@@ -96,7 +96,7 @@ fn decay_under_constant_friction_until_the_step_before_it_stops() {
     let friction_current = 1.2;
     let friction = [friction_current, 0.0, 0.0, 0.0, friction_current];
     let config = parameters(&friction_of_x(friction)).machine_config().expect("valid");
-    let plant = Plant::new(&config.axes()[0], TICK).expect("can be discretised");
+    let plant = Plant::new(&config.axes()[0], TICK).expect("can be discretized");
 
     let speed = 1.5;
     let exact = ClosedForm::new(&MOTOR, 0.0, -2.64 * friction_current, 0.0, speed);
@@ -134,8 +134,8 @@ const TH: usize = 2;
 const IV: usize = 3; // integral of the velocity PI
 const II: usize = 4; // integral of the current PI
 const U: usize = 5; // voltage, held
-const IS: usize = 6; // current set-point, held
-const WS: usize = 7; // velocity set-point, held
+const IS: usize = 6; // current setpoint, held
+const WS: usize = 7; // velocity setpoint, held
 const REF: usize = 8; // what the outermost loop is asked for
 const N: usize = 9;
 type State = SVector<f64, N>;
@@ -187,7 +187,7 @@ fn velocity_map() -> Map {
 
 #[test]
 fn current_loop_step() {
-    let motor = Motor::new(&MOTOR, TICK).expect("can be discretised");
+    let motor = Motor::new(&MOTOR, TICK).expect("can be discretized");
     let config = virtual_axes_core::config::PiConfig { gain: KI, integral_time: TI };
     let pi = Pi::new(&config, TICK, 1.0, MOTOR.max_voltage);
     let (mut s, mut memory) = (MotorState::default(), PiState::default());

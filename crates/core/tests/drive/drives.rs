@@ -58,7 +58,7 @@ fn single_axis(direct: bool) -> Machine {
 "
     );
     let config = Parameters::from_yaml(&yaml, "test").and_then(|p| p.machine_config()).expect("valid");
-    Machine::new(Arc::new(MachineParameters::new(&config).expect("can be discretised")))
+    Machine::new(Arc::new(MachineParameters::new(&config).expect("can be discretized")))
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn a_step_of_100_mm_saturates_and_is_recovered_from() {
         });
     }
     assert!(saturated > 10, "the step is too small");
-    // A set-point without its wind-up comes to rest where it was sent.
+    // A setpoint without its wind-up comes to rest where it was sent.
     assert_near("position, m", m.axis(X).sample().position, 0.1, 2e-6);
     assert_near("velocity, m/s", m.axis(X).sample().velocity, 0.0, 1e-9);
 }
@@ -135,7 +135,7 @@ fn gains_changed_at_rest_move_nothing() {
     }
     let changes = [("z.velocity_loop.gain", 3.0), ("z.position_loop.gain", 1.0), ("z.delays.alpha_ms", 40.0)];
     let config = parameters(&changes).machine_config().expect("valid");
-    m.adopt(Arc::new(MachineParameters::new(&config).expect("can be discretised"))).expect("same machine");
+    m.adopt(Arc::new(MachineParameters::new(&config).expect("can be discretized"))).expect("same machine");
     for _ in 0..100 {
         m.advance(&[0.0; 5], &[]);
     }
@@ -148,7 +148,7 @@ fn parameters_of_another_machine_are_not_adopted() {
     let other = single_axis(false);
     let before = m.clone();
     let config = parameters(&[("periods.position_ms", 3.0)]).machine_config().expect("valid");
-    let parameters = Arc::new(MachineParameters::new(&config).expect("can be discretised"));
+    let parameters = Arc::new(MachineParameters::new(&config).expect("can be discretized"));
     assert!(m.adopt(parameters).is_err());
     assert_eq!(m, before);
     assert_eq!(other.axis_count(), 1);

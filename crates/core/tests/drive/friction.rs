@@ -9,7 +9,7 @@ const X: usize = 0;
 
 fn plant(friction: [f64; 5]) -> Plant {
     let config = parameters(&friction_of_x(friction)).machine_config().expect("valid");
-    Plant::new(&config.axes()[X], TICK).expect("can be discretised")
+    Plant::new(&config.axes()[X], TICK).expect("can be discretized")
 }
 
 /// Friction of the default X axis ([P] Appendix 2).
@@ -59,7 +59,7 @@ proptest! {
 #[test]
 fn friction_beyond_the_fitted_range_is_said() {
     let plant = plant(LAW);
-    let at = |metres_per_minute: f64| metres_per_minute / 60.0 / RATIO;
+    let at = |meters_per_minute: f64| meters_per_minute / 60.0 / RATIO;
     assert!(!plant.friction_is_extrapolated(at(19.99)));
     assert!(plant.friction_is_extrapolated(at(-20.01)));
 }

@@ -16,10 +16,10 @@ use virtual_axes_verification::fixtures::common::{
 const PERIODS: usize = 300;
 
 fn parameters(config: &MachineConfig) -> Arc<MachineParameters> {
-    Arc::new(MachineParameters::new(config).expect("can be discretised"))
+    Arc::new(MachineParameters::new(config).expect("can be discretized"))
 }
 
-/// Set-points that reach limits, reverse and stand still, of each axis another.
+/// Setpoints that reach limits, reverse and stand still, of each axis another.
 fn psec(axis: usize, k: usize) -> f64 {
     let t = TSP * k.min(PERIODS / 2) as f64;
     let size = if axis < 3 { 0.02 } else { 0.3 };

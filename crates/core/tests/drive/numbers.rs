@@ -256,7 +256,7 @@ fn machine_with(changes: &[(String, f64)]) -> Result<Machine, String> {
 /// Ticks for which a machine is run, at least one position period.
 const TICKS: usize = 1000;
 
-/// Runs set-points that jump, creep and reverse against loads; everything that can be seen must be a number.
+/// Runs setpoints that jump, creep and reverse against loads; everything that can be seen must be a number.
 fn run_hard(machine: &mut Machine, what: &dyn Fn() -> String) {
     let periods = (TICKS / machine.ticks_per_period()).clamp(2, 200);
     for k in 0..periods {

@@ -1,6 +1,6 @@
 //! The C loop of benches/peers: it keeps the numbers of the model's page, and the library agrees with it.
 //!
-//! It shares nothing with the library: its parameters are a table of its own, its motor is discretised by a series.
+//! It shares nothing with the library: its parameters are a table of its own, its motor is discretized by a series.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -14,7 +14,7 @@ use virtual_axes_core::assess::{AxisAssessor, AxisReport};
 use virtual_axes_core::units::{DEGREE, REVOLUTION, RPM, seconds};
 use virtual_axes_verification::fixtures::common::*;
 
-const MICROMETRE: f64 = 1e-6;
+const MICROMETER: f64 = 1e-6;
 const JOINTS: [&str; AXES] = ["x", "y", "z", "a", "c"];
 /// m or rad. The order of operations alone leaves less than 1e-14; friction that is off by 1e-12 A less than this.
 const ROUNDING: f64 = 1e-12;
@@ -37,7 +37,7 @@ fn peers(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../benches/peers").join(file)
 }
 
-/// Set-points of some joints on the position grid.
+/// Setpoints of some joints on the position grid.
 struct Setpoints {
     name: &'static str,
     joints: Vec<&'static str>,
@@ -59,7 +59,7 @@ impl Setpoints {
         }
     }
 
-    /// What the program says of these set-points when it is told `input`.
+    /// What the program says of these setpoints when it is told `input`.
     fn run(&self, input: &str, arguments: &[&str]) -> String {
         let mut text = self.joints.join(" ") + "\n";
         for row in &self.rows {
@@ -106,9 +106,9 @@ fn the_c_loop_keeps_the_lines_and_rotations_of_the_models_page() {
     let line = |acceleration| Profile::new(0.200, 10.0 * M_MIN, acceleration, 50.0);
     let turn = Profile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
     for (joint, profile, unit, error, current) in [
-        ("x", line(2.5), MICROMETRE, 218.9, 14.40),
-        ("y", line(2.5), MICROMETRE, 230.5, 12.40),
-        ("z", line(2.1), MICROMETRE, 102.7, 11.50),
+        ("x", line(2.5), MICROMETER, 218.9, 14.40),
+        ("y", line(2.5), MICROMETER, 230.5, 12.40),
+        ("z", line(2.1), MICROMETER, 102.7, 11.50),
         ("c", turn, 1e-3 * DEGREE, 35.4, 1.76),
         ("a", turn, 1e-3 * DEGREE, 35.0, 2.37),
     ] {
@@ -129,7 +129,7 @@ fn the_c_loop_keeps_the_ballbar_of_the_models_page() {
     let [first, last] = [window.start, window.end].map(|t| ((t / TSP).round() as u32).to_string());
     let figures = setpoints.figures(&["--circle", "0.15", &first, &last]);
     for (key, wanted, tolerance) in [("mean", 49.0, 0.2), ("min", 47.7, 1.0), ("max", 68.6, 1.0)] {
-        assert_near(key, figure(&figures, &format!("/circle/{key}")) / MICROMETRE, wanted, tolerance);
+        assert_near(key, figure(&figures, &format!("/circle/{key}")) / MICROMETER, wanted, tolerance);
     }
 }
 

@@ -49,7 +49,7 @@ fn next_end(bench: &mut Bench) -> Option<MotionEnd> {
     panic!("nothing ends");
 }
 
-/// Set-points of X over the next instants.
+/// Setpoints of X over the next instants.
 fn setpoints(bench: &mut Bench, count: usize) -> Vec<f64> {
     let step = |_| {
         bench.simulation.step();
@@ -58,7 +58,7 @@ fn setpoints(bench: &mut Bench, count: usize) -> Vec<f64> {
     (0..count).map(step).collect()
 }
 
-/// Set-points come to rest within Amax and Jmax, as differences over a period show them.
+/// Setpoints come to rest within Amax and Jmax, as differences over a period show them.
 fn assert_controlled_stop(psec: &[f64]) {
     let tsp = seconds(TSP);
     let differences = |v: &[f64]| v.windows(2).map(|w| (w[1] - w[0]) / tsp).collect::<Vec<_>>();
@@ -163,7 +163,7 @@ fn a_motion_that_is_called_off_stops_within_the_limits() {
     assert!(bench.simulation.cancel(A) && bench.simulation.cancel(A), "twice is as once");
     assert!(bench.simulation.take_ends().next().is_none(), "it is not at rest yet");
     let end = next_end(&mut bench).expect("it ends");
-    assert_eq!((end.id, end.outcome), (A, Outcome::Cancelled));
+    assert_eq!((end.id, end.outcome), (A, Outcome::Canceled));
     let rest = bench.simulation.samples()[X].psec;
     let mut again = Bench::new(NONE, 0);
     again.simulation.offer(A, line(&again, Start::Now)).expect("accepted");
@@ -171,7 +171,7 @@ fn a_motion_that_is_called_off_stops_within_the_limits() {
     again.simulation.cancel(A);
     let psec = setpoints(&mut again, 150);
     assert_controlled_stop(&psec);
-    assert_eq!(*psec.last().expect("set-points"), rest, "its end is the first instant at rest");
+    assert_eq!(*psec.last().expect("setpoints"), rest, "its end is the first instant at rest");
     assert!(!bench.simulation.cancel(A), "it is over");
 }
 
@@ -193,7 +193,7 @@ fn one_that_waits_is_called_off_without_a_trace_in_what_moves() {
     assert_eq!(found, expected);
     let mut ends: Vec<_> = bench.simulation.take_ends().map(|end| (end.id, end.outcome)).collect();
     ends.sort_by_key(|(id, _)| *id);
-    assert_eq!(ends, [(A, Outcome::Completed), (B, Outcome::Cancelled), (MotionId(3), Outcome::Stopped)]);
+    assert_eq!(ends, [(A, Outcome::Completed), (B, Outcome::Canceled), (MotionId(3), Outcome::Stopped)]);
 }
 
 #[test]
@@ -203,11 +203,11 @@ fn one_whose_set_points_are_over_is_called_off_at_once() {
     setpoints(&mut bench, 200);
     assert!(bench.simulation.cancel(A));
     let ends: Vec<_> = bench.simulation.take_ends().map(|end| end.outcome).collect();
-    assert_eq!(ends, [Outcome::Cancelled]);
+    assert_eq!(ends, [Outcome::Canceled]);
 }
 
 #[test]
-fn a_successor_of_what_is_being_called_off_leaves_it_cancelled() {
+fn a_successor_of_what_is_being_called_off_leaves_it_canceled() {
     let mut bench = Bench::new(NONE, 0);
     bench.simulation.offer(A, line(&bench, Start::Now)).expect("accepted");
     setpoints(&mut bench, 50);
@@ -216,7 +216,7 @@ fn a_successor_of_what_is_being_called_off_leaves_it_cancelled() {
     let back = bench.trajectory(Start::Now, &["x"], &[(SECOND_NS, &[0.0])]);
     bench.simulation.offer(B, back).expect("accepted");
     let end = next_end(&mut bench).expect("it ends");
-    assert_eq!((end.id, end.outcome), (A, Outcome::Cancelled));
+    assert_eq!((end.id, end.outcome), (A, Outcome::Canceled));
     let end = next_end(&mut bench).expect("it ends");
     assert_eq!((end.id, end.outcome), (B, Outcome::Completed));
 }
@@ -231,7 +231,7 @@ fn calling_one_of_two_off_leaves_the_other_joints_alone() {
     setpoints(&mut bench, 40);
     bench.simulation.cancel(A);
     let ends: Vec<_> = std::iter::from_fn(|| next_end(&mut bench)).map(|e| (e.id, e.outcome)).collect();
-    assert_eq!(ends, [(A, Outcome::Cancelled), (B, Outcome::Completed)]);
+    assert_eq!(ends, [(A, Outcome::Canceled), (B, Outcome::Completed)]);
     assert_eq!(bench.simulation.samples()[2].psec, 0.05);
 }
 
@@ -257,7 +257,7 @@ fn a_clock_that_jumps_ends_motions_and_brings_axes_to_rest() {
         assert!(next_end(&mut bench).is_none());
         // It takes trajectories by the new time.
         let start = bench.simulation.time_of(bench.simulation.next_instant() + 10);
-        let x = *psec.last().expect("set-points");
+        let x = *psec.last().expect("setpoints");
         let on = bench.trajectory(Start::At(start), &["x"], &[(0, &[x]), (SECOND_NS, &[0.0])]);
         let admission = bench.simulation.offer(B, on).expect("accepted");
         assert_eq!(admission.start_k, bench.simulation.next_instant() + 10);

@@ -40,7 +40,7 @@ fn the_report_of_the_ballbar_has_the_reference_numbers() {
     let end = &ends[0];
     assert_eq!((end.outcome, end.places.as_slice()), (Outcome::Completed, &[0, 1][..]));
     let x = end.report.axes[0];
-    // Three millimetres at 15 m/min: the pure delay of two position periods.
+    // Three millimeters at 15 m/min: the pure delay of two position periods.
     assert_near("X tracking error, m", x.max_tracking_error, 0.003, 0.0002);
     assert!(x.saturation_time == 0.0 && x.peak_current > 2.0);
     // 49 µm outside the circle in steady motion, against the polyline through its points.

@@ -1,4 +1,4 @@
-//! Streamed set-points: the look-ahead buffer, who has the joint, and the delay while it changes.
+//! Streamed setpoints: the look-ahead buffer, who has the joint, and the delay while it changes.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ fn delayed(periods: u32) -> Timeline {
     t
 }
 
-/// Streams one set-point per instant to `joint`; what is commanded at each.
+/// Streams one setpoint per instant to `joint`; what is commanded at each.
 fn stream(t: &mut Timeline, joint: usize, positions: &[f64]) -> Vec<f64> {
     let command = |&position: &f64| {
         assert_eq!(t.stream(joint, position), Ok(true));
@@ -121,7 +121,7 @@ fn a_stream_goes_on_within_what_the_joint_comes_in_the_time_between() {
     assert_eq!(run(&mut t, 0, 11).0[10], newest, "the refused ones changed nothing");
 }
 
-/// One set-point late, the next on time: the second of them is two periods' reach away.
+/// One setpoint late, the next on time: the second of them is two periods' reach away.
 #[test]
 fn of_two_in_one_period_the_second_is_approached_at_vmax() {
     for delay in [0, 14] {
@@ -143,7 +143,7 @@ fn of_two_in_one_period_the_second_is_approached_at_vmax() {
     }
 }
 
-/// A sender of 100 Hz at nine tenths of Vmax: fewer set-points than periods, each out of one period's
+/// A sender of 100 Hz at nine tenths of Vmax: fewer setpoints than periods, each out of one period's
 /// reach.
 #[test]
 fn a_sender_slower_than_the_position_period_is_followed_at_vmax_at_most() {
@@ -479,7 +479,7 @@ fn given(config: &MachineConfig, positions: &[f64]) -> Arc<Trajectory> {
 }
 
 /// The delay is what makes it so for a controller that looks ahead, whose T reads up to N2 = 14 periods
-/// beyond the set-point that α = 1.5 periods, in whole ones 2, hold back.
+/// beyond the setpoint that α = 1.5 periods, in whole ones 2, hold back.
 #[test]
 fn a_streamed_path_is_followed_bit_for_bit_as_the_same_path_in_a_trajectory() {
     for (controller, delay) in [("cascade", 0), ("gpc", 12)] {
@@ -554,7 +554,7 @@ fn a_stream_wakes_the_axes_when_it_moves_them_and_asks_for_no_haste() {
 #[test]
 fn a_set_point_comes_with_the_delay_that_it_was_foreseen_with() {
     for (before, after) in [(20, 0), (3, 14)] {
-        // The stream has paused by the instant at which a set-point and the change of delay meet.
+        // The stream has paused by the instant at which a setpoint and the change of delay meet.
         for early in 0..4 {
             let mut t = delayed(before);
             stream(&mut t, 0, &[0.001]);

@@ -146,7 +146,7 @@ fn centuries_cost_no_more_than_the_budget() {
     }
     let begin = std::time::Instant::now();
     assert!(check(r, false).is_ok());
-    assert!(begin.elapsed().as_secs() < 20, "unoptimised, and still");
+    assert!(begin.elapsed().as_secs() < 20, "unoptimized, and still");
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn a_long_segment_that_leaves_the_stroke_is_seen_by_its_samples() {
     let hour = 3_600_000_000_000;
     let mut r = Request::new(Start::Now, vec!["x".into()]);
     let row = |positions, velocities| Row { positions, velocities, ..Row::default() };
-    // A share of 64 instants each; the second segment overshoots by metres.
+    // A share of 64 instants each; the second segment overshoots by meters.
     for i in 0..70_000 {
         let velocity: &[f64] = if i == 1 { &[0.01] } else { &[0.0] };
         r.push(i * hour, row(&[0.0], velocity)).unwrap();

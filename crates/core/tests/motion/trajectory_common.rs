@@ -79,7 +79,7 @@ pub fn offer(timeline: &mut Timeline, id: u64, trajectory: &Arc<Trajectory>) -> 
     timeline.offer(MotionId(id), Arc::clone(trajectory), ORIGIN)
 }
 
-/// Steps `count` instants; set-points of `joint` and all events with their instants.
+/// Steps `count` instants; setpoints of `joint` and all events with their instants.
 pub fn run(timeline: &mut Timeline, joint: usize, count: usize) -> (Vec<f64>, Vec<(i64, Event)>) {
     let (mut psec, mut events) = (Vec::new(), Vec::new());
     for _ in 0..count {

@@ -181,7 +181,7 @@ proptest! {
         }
     }
 
-    /// The limits are those of the sampled set-points: a difference quotient is a mean of the
+    /// The limits are those of the sampled setpoints: a difference quotient is a mean of the
     /// derivative over the periods that it spans. They hold from the instant before the stop on;
     /// what was commanded earlier is the trajectory's own affair.
     #[test]

@@ -386,7 +386,7 @@ fn a_start_beyond_the_count_of_periods_is_refused() {
     assert_eq!(rejection.code, Code::InvalidTime);
 }
 
-/// Sampled limits of a stop: differences of the set-points are means of the derivatives over the
+/// Sampled limits of a stop: differences of the setpoints are means of the derivatives over the
 /// periods that they span, so they obey the same limits as those.
 fn within_limits(psec: &[f64]) {
     let d = |k: usize| psec[k + 1] - psec[k];

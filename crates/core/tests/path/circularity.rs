@@ -3,7 +3,7 @@
 use virtual_axes_core::assess::{CircleAssessor, bidirectional};
 use virtual_axes_verification::fixtures::common::{Ballbar, assert_near, machine, run};
 
-const MICROMETRE: f64 = 1e-6;
+const MICROMETER: f64 = 1e-6;
 
 /// The steady part of the paper's ballbar; the other direction has Y mirrored.
 fn ballbar(counterclockwise: bool) -> CircleAssessor {
@@ -30,20 +30,20 @@ fn the_ballbar_has_the_radial_deviations_of_the_reference() {
     let paths = [false, true].map(ballbar);
     for path in &paths {
         let report = path.report().expect("points");
-        assert_near("mean", report.mean / MICROMETRE, 49.0, 0.2);
-        assert_near("Fmin", report.min / MICROMETRE, 47.7, 1.0);
-        assert_near("Fmax", report.max / MICROMETRE, 68.6, 1.0);
+        assert_near("mean", report.mean / MICROMETER, 49.0, 0.2);
+        assert_near("Fmin", report.min / MICROMETER, 47.7, 1.0);
+        assert_near("Fmax", report.max / MICROMETER, 68.6, 1.0);
         let full = report.full.expect("a full circle");
-        // The centre is where it should be to a few µm, so that G differs from Fmax − Fmin by that.
-        let offset = full.centre[0].hypot(full.centre[1]);
+        // The center is where it should be to a few µm, so that G differs from Fmax − Fmin by that.
+        let offset = full.center[0].hypot(full.center[1]);
         assert!((full.circular_deviation - (report.max - report.min)).abs() <= 2.0 * offset);
     }
     let both = bidirectional(&paths[0], &paths[1]).expect("two circles");
-    assert_near("D", both.mean_radial_deviation / MICROMETRE, 49.0, 0.2);
+    assert_near("D", both.mean_radial_deviation / MICROMETER, 49.0, 0.2);
     for path in &paths {
         let full = path.report().and_then(|report| report.full).expect("a full circle");
-        // Both lie in the ring of the two; about centres that differ by their offsets.
-        let offset = full.centre[0].hypot(full.centre[1]);
+        // Both lie in the ring of the two; about centers that differ by their offsets.
+        let offset = full.center[0].hypot(full.center[1]);
         assert!(both.circular_deviation >= full.circular_deviation - 2.0 * offset);
     }
 }

@@ -262,7 +262,7 @@ fn what_is_no_block_is_refused_with_its_values() {
     ));
     let far = [1e308, -1e308, 1e308, 0.0, 0.0];
     assert!(matches!(Block::line(&HOME.map(|_| -1e308), &far, kinds), Err(PathError::Unmeasurable { .. })));
-    let arc = |plane, centre, sweep| Block::arc(&HOME, plane, centre, sweep, &HOME, kinds).unwrap_err();
+    let arc = |plane, center, sweep| Block::arc(&HOME, plane, center, sweep, &HOME, kinds).unwrap_err();
     assert!(matches!(arc([0, 0], [1.0, 0.0], 1.0), PathError::Plane { first: 1, second: 1, .. }));
     assert!(matches!(arc([0, 3], [1.0, 0.0], 1.0), PathError::Plane { second: 4, .. }));
     assert!(matches!(arc([0, 9], [1.0, 0.0], 1.0), PathError::Plane { second: 10, .. }));

@@ -1,4 +1,4 @@
-//! The default machine as paths see it, and differences of set-points over the position period.
+//! The default machine as paths see it, and differences of setpoints over the position period.
 
 use virtual_axes_core::config::{AxisKind, Parameters};
 use virtual_axes_core::kinematics::Kinematics;
@@ -36,11 +36,11 @@ pub fn line(from: [f64; 5], to: [f64; 5]) -> Block {
 }
 
 /// An arc in X–Y.
-pub fn arc(from: [f64; 5], centre: [f64; 2], sweep: f64, to: [f64; 5]) -> Block {
-    Block::arc(&from, [0, 1], centre, sweep, &to, &KINDS).expect("an arc")
+pub fn arc(from: [f64; 5], center: [f64; 2], sweep: f64, to: [f64; 5]) -> Block {
+    Block::arc(&from, [0, 1], center, sweep, &to, &KINDS).expect("an arc")
 }
 
-/// Set-points at time `t`.
+/// Setpoints at time `t`.
 pub fn psec(program: &Program, t: f64) -> [f64; 5] {
     let mut joints = [0.0; 5];
     program.psec(t, &mut joints);

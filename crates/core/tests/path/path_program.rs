@@ -10,7 +10,7 @@ use virtual_axes_verification::fixtures::common::{Ballbar, M_MIN, Profile};
 
 const HOME: [f64; 5] = [0.0; 5];
 
-/// Set-points at instants against `wanted`, m or rad.
+/// Setpoints at instants against `wanted`, m or rad.
 #[track_caller]
 fn assert_joint(program: &Program, joint: usize, tolerance: f64, wanted: impl Fn(f64) -> f64) {
     let last = (program.duration() / TSP).ceil() as usize + 2;
@@ -99,12 +99,12 @@ fn two_speeds_on_one_line_meet_at_the_slower_one_at_the_border() {
 fn contour_b(turned: f64) -> Vec<Move> {
     let (s, c) = turned.sin_cos();
     let at = |x: f64, y: f64| [c * x - s * y, s * x + c * y, 0.0, 0.0, 0.0];
-    let centre = |x: f64, y: f64| [at(x, y)[0], at(x, y)[1]];
+    let center = |x: f64, y: f64| [at(x, y)[0], at(x, y)[1]];
     let corners = [at(0.0, 0.0), at(0.06, 0.0), at(0.06, 0.03), at(0.0, 0.03)];
     let first = line(corners[0], corners[1]);
-    let half = arc(corners[1], centre(0.06, 0.015), PI, corners[2]);
+    let half = arc(corners[1], center(0.06, 0.015), PI, corners[2]);
     let back = Block::line(half.end(), &corners[3], &KINDS).expect("a line");
-    let last = Block::arc(back.end(), [0, 1], centre(0.0, 0.015), PI, &HOME, &KINDS).expect("an arc");
+    let last = Block::arc(back.end(), [0, 1], center(0.0, 0.015), PI, &HOME, &KINDS).expect("an arc");
     [first, half, back, last].map(|block| Move::new(block, 10.0 * M_MIN)).to_vec()
 }
 
@@ -274,8 +274,8 @@ fn a_spline_that_nearly_turns_back_is_passed_slowly() {
 fn the_tip_of_the_tool_follows_its_path_while_the_tables_turn() {
     let a = [0.02, 0.0, 0.0, 0.0, 0.0];
     let b = [0.05, 0.01, 0.0, 30.0 * DEGREE, 60.0 * DEGREE];
-    let centre = [0.05, 0.03];
-    let half = arc(b, centre, PI, [0.0, 0.0, 0.01, 10.0 * DEGREE, 90.0 * DEGREE]);
+    let center = [0.05, 0.03];
+    let half = arc(b, center, PI, [0.0, 0.0, 0.01, 10.0 * DEGREE, 90.0 * DEGREE]);
     let mut end = [0.0; 5];
     end.copy_from_slice(half.end());
     let moves =
@@ -283,13 +283,13 @@ fn the_tip_of_the_tool_follows_its_path_while_the_tables_turn() {
     let program = plan(Frame::Workpiece, moves.to_vec()).expect("planned");
     println!("{} s", program.duration());
     assert_within_limits(&program);
-    // On the arc the tip is on a helix round its centre.
+    // On the arc the tip is on a helix round its center.
     let kinematics = kinematics(&[]);
     let span = program.span(2);
     for i in 0..=1000 {
         let t = span.start + (span.end - span.start) * f64::from(i) / 1000.0;
         let tip = kinematics.forward(&psec(&program, t)).tip;
-        assert!(((tip.x - centre[0]).hypot(tip.y - centre[1]) - 0.02).abs() < 1e-14);
+        assert!(((tip.x - center[0]).hypot(tip.y - center[1]) - 0.02).abs() < 1e-14);
     }
     // An axis is at work at its limit: near the fastest.
     let used = use_of_limits(&program).concat().into_iter().fold(0.0, f64::max);
@@ -380,10 +380,10 @@ fn blocks(pieces: &[Piece], tangent: bool) -> Vec<Block> {
                 } else {
                     *angle
                 };
-                let centre = [at[0] - radius * angle.cos(), at[1] - radius * angle.sin()];
+                let center = [at[0] - radius * angle.cos(), at[1] - radius * angle.sin()];
                 let flat = if tangent { 0.0 } else { 0.02 * rest[0] };
                 let to = [0.0, 0.0, at[2] + flat, at[3] + rest[1], at[4] + rest[2]];
-                arc(at, centre, *sweep, to)
+                arc(at, center, *sweep, to)
             }
             Piece::Spline(steps) => {
                 let mut point = at;
@@ -524,6 +524,6 @@ fn a_hundred_thousand_blocks_are_planned_in_seconds() {
         for i in 0..100_000 {
             sum += psec(&program, program.duration() * f64::from(i) * 1e-5)[0];
         }
-        println!("{what}: {:?} per set-point ({sum})", begun.elapsed() / 100_000);
+        println!("{what}: {:?} per setpoint ({sum})", begun.elapsed() / 100_000);
     }
 }

@@ -8,7 +8,7 @@ const Y: usize = 1;
 const Z: usize = 2;
 const A: usize = 3;
 const C: usize = 4;
-const MICROMETRE: f64 = 1e-6;
+const MICROMETER: f64 = 1e-6;
 
 const NO_FEEDFORWARD: &[(&str, f64)] = &[
     ("x.feedforward.velocity", 0.0),
@@ -36,11 +36,11 @@ fn ballbar(changes: &[(&str, f64)]) -> (f64, f64, f64) {
             }
         },
     );
-    (sum / count / MICROMETRE, min / MICROMETRE, max / MICROMETRE)
+    (sum / count / MICROMETER, min / MICROMETER, max / MICROMETER)
 }
 
 #[test]
-fn ballbar_with_feedforward_runs_49_micrometres_outside() {
+fn ballbar_with_feedforward_runs_49_micrometers_outside() {
     let (mean, min, max) = ballbar(&[]);
     assert_near("mean", mean, 49.0, 0.2);
     assert_near("min", min, 47.7, 1.0);
@@ -48,7 +48,7 @@ fn ballbar_with_feedforward_runs_49_micrometres_outside() {
 }
 
 #[test]
-fn ballbar_without_feedforward_runs_283_micrometres_inside() {
+fn ballbar_without_feedforward_runs_283_micrometers_inside() {
     let (mean, min, max) = ballbar(NO_FEEDFORWARD);
     assert_near("mean", mean, -283.1, 0.2);
     assert_near("min", min, -284.4, 1.0);
@@ -76,7 +76,7 @@ fn corner(turn: f64) -> f64 {
             worst = worst.max(from_leg(x, y, 0.0, (1.0, 0.0)).min(from_leg(x, y, LEG, (cos, sin))));
         }
     });
-    worst / MICROMETRE
+    worst / MICROMETER
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn corners_are_rounded_by_the_cascade() {
     assert_near("45°", corner(45.0 * DEGREE), 103.7, 1.037);
 }
 
-/// Largest synchronised tracking error at position instants (m or rad), and largest current (A).
+/// Largest synchronized tracking error at position instants (m or rad), and largest current (A).
 fn move_one(axis: usize, profile: Profile, changes: &[(&str, f64)]) -> (f64, f64) {
     let (mut error, mut current): (f64, f64) = (0.0, 0.0);
     let psec = |t: f64| {
@@ -117,7 +117,7 @@ fn line(acceleration: f64) -> Profile {
 #[test]
 fn line_in_x() {
     let (error, current) = move_one(X, line(2.5), &[]);
-    assert_one_percent("X error, µm", error / MICROMETRE, 218.9);
+    assert_one_percent("X error, µm", error / MICROMETER, 218.9);
     assert_one_percent("X current, A", current, 14.40);
 }
 
@@ -130,14 +130,14 @@ fn line_in_x_for_each_feedforward() {
         (NO_FEEDFORWARD, 6666.7),
     ] {
         let (error, _) = move_one(X, line(2.5), changes);
-        assert_one_percent(&format!("{changes:?} error, µm"), error / MICROMETRE, wanted);
+        assert_one_percent(&format!("{changes:?} error, µm"), error / MICROMETER, wanted);
     }
 }
 
 #[test]
 fn line_in_y() {
     let (error, current) = move_one(Y, line(2.5), &[]);
-    assert_one_percent("Y error, µm", error / MICROMETRE, 230.5);
+    assert_one_percent("Y error, µm", error / MICROMETER, 230.5);
     assert_one_percent("Y current, A", current, 12.40);
 }
 
@@ -145,7 +145,7 @@ fn line_in_y() {
 fn line_in_z_starts_with_the_current_that_holds_the_weight() {
     assert_one_percent("Z current at rest, A", machine(&[]).axis(Z).sample().current, 0.482);
     let (error, current) = move_one(Z, line(2.1), &[]);
-    assert_one_percent("Z error, µm", error / MICROMETRE, 102.7);
+    assert_one_percent("Z error, µm", error / MICROMETER, 102.7);
     assert_one_percent("Z current, A", current, 11.50);
 }
 

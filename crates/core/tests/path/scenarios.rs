@@ -1,4 +1,4 @@
-//! The shipped scenarios: their set-points, and the errors that the trial measures on them.
+//! The shipped scenarios: their setpoints, and the errors that the trial measures on them.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ const Y: usize = 1;
 const Z: usize = 2;
 const A: usize = 3;
 const C: usize = 4;
-const MICROMETRE: f64 = 1e-6;
+const MICROMETER: f64 = 1e-6;
 const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 /// Rest before the first move of the lines, rotations and corners, s.
 const REST: f64 = 0.504;
@@ -38,7 +38,7 @@ const NO_FEEDFORWARD: &[(&str, f64)] = &[
     ("y.feedforward.torque_kg_m2", 0.0),
 ];
 
-/// Asserts that a scenario asks for the positions `wanted(t)`, to a picometre.
+/// Asserts that a scenario asks for the positions `wanted(t)`, to a picometer.
 #[track_caller]
 fn assert_setpoints(name: &str, duration: f64, wanted: impl Fn(f64) -> [f64; AXES]) {
     let program = program(name, &config(&[]));
@@ -143,12 +143,12 @@ fn ballbar_figures() {
         let circles = figures("ballbar", changes).circles;
         assert_eq!(circles.len(), 1);
         let circle = &circles[0];
-        assert_near("mean, µm", circle.mean / MICROMETRE, mean, 0.2);
-        assert_near("min, µm", circle.min / MICROMETRE, min, 1.0);
-        assert_near("max, µm", circle.max / MICROMETRE, max, 1.0);
-        // G is the range about the centre of the least-squares circle, here near the nominal one.
+        assert_near("mean, µm", circle.mean / MICROMETER, mean, 0.2);
+        assert_near("min, µm", circle.min / MICROMETER, min, 1.0);
+        assert_near("max, µm", circle.max / MICROMETER, max, 1.0);
+        // G is the range about the center of the least-squares circle, here near the nominal one.
         let deviation = circle.circular_deviation.expect("two turns");
-        assert_near("G, µm", deviation / MICROMETRE, (circle.max - circle.min) / MICROMETRE, 1.0);
+        assert_near("G, µm", deviation / MICROMETER, (circle.max - circle.min) / MICROMETER, 1.0);
     }
 }
 
@@ -157,17 +157,17 @@ fn both_directions_of_a_circle_are_told_together() {
     let both = figures("ballbar-both", &[]);
     let [first, second] = &both.circles[..] else { panic!("{} circles", both.circles.len()) };
     assert!(first.counterclockwise && !second.counterclockwise);
-    assert_near("counterclockwise, mean, µm", first.mean / MICROMETRE, 49.0, 0.2);
+    assert_near("counterclockwise, mean, µm", first.mean / MICROMETER, 49.0, 0.2);
     let [pair] = &both.bidirectional[..] else { panic!("{} pairs", both.bidirectional.len()) };
     // The mean of both directions' means, and a range that holds that of each.
     let mean = (first.mean + second.mean) / 2.0;
-    assert_near("D, µm", pair.mean_radial_deviation / MICROMETRE, mean / MICROMETRE, 0.1);
-    // The common centre is not quite that of each direction, but near.
+    assert_near("D, µm", pair.mean_radial_deviation / MICROMETER, mean / MICROMETER, 0.1);
+    // The common center is not quite that of each direction, but near.
     for circle in [first, second] {
-        assert!(pair.circular_deviation > circle.circular_deviation.expect("two turns") - MICROMETRE);
+        assert!(pair.circular_deviation > circle.circular_deviation.expect("two turns") - MICROMETER);
     }
     let range = first.max.max(second.max) - first.min.min(second.min);
-    assert_near("G(b), µm", pair.circular_deviation / MICROMETRE, range / MICROMETRE, 1.0);
+    assert_near("G(b), µm", pair.circular_deviation / MICROMETER, range / MICROMETER, 1.0);
 }
 
 #[test]
@@ -176,16 +176,16 @@ fn corner_figures() {
         let corners = figures(name, &[]).corners;
         assert_eq!(corners.len(), 1, "{corners:?}");
         assert_near("turn, °", corners[0].turn / DEGREE, turn, 1e-9);
-        assert_near(name, corners[0].max_contour_error / MICROMETRE, wanted, wanted / 100.0);
+        assert_near(name, corners[0].max_contour_error / MICROMETER, wanted, wanted / 100.0);
     }
 }
 
 #[test]
 fn line_and_rotation_figures() {
     let trials = [
-        ("x-constant", X, MICROMETRE, 218.9, 14.40),
-        ("y-constant", Y, MICROMETRE, 230.5, 12.40),
-        ("z-constant", Z, MICROMETRE, 102.7, 11.50),
+        ("x-constant", X, MICROMETER, 218.9, 14.40),
+        ("y-constant", Y, MICROMETER, 230.5, 12.40),
+        ("z-constant", Z, MICROMETER, 102.7, 11.50),
         ("c-constant", C, MILLIDEGREE, 35.4, 1.76),
         ("a-constant", A, MILLIDEGREE, 35.0, 2.37),
     ];
@@ -199,7 +199,7 @@ fn line_and_rotation_figures() {
     }
 }
 
-/// Tracking and synchronised error of X at position instants in the middle of x-constant, m.
+/// Tracking and synchronized error of X at position instants in the middle of x-constant, m.
 fn steady_errors(changes: &[(&str, f64)]) -> (f64, f64) {
     let mut errors = (f64::NAN, f64::NAN);
     watch("x-constant", changes, |tick| {
@@ -217,23 +217,23 @@ fn steady_errors(changes: &[(&str, f64)]) -> (f64, f64) {
 fn without_feedforward_a_steady_axis_lags_by_speed_over_gain_and_the_delay() {
     let speed = 10.0 * M_MIN;
     let (tracking, synchronized) = steady_errors(NO_FEEDFORWARD);
-    // Kp = 1.5 (m/min)/mm = 25 s⁻¹; the comparator reads the set-point of two periods ago.
-    assert_near("synchronised, µm", synchronized / MICROMETRE, speed / 25.0 / MICROMETRE, 1e-3);
-    assert_near("tracking, µm", tracking / MICROMETRE, (speed / 25.0 + speed * 2.0 * TSP) / MICROMETRE, 1e-3);
+    // Kp = 1.5 (m/min)/mm = 25 s⁻¹; the comparator reads the setpoint of two periods ago.
+    assert_near("synchronized, µm", synchronized / MICROMETER, speed / 25.0 / MICROMETER, 1e-3);
+    assert_near("tracking, µm", tracking / MICROMETER, (speed / 25.0 + speed * 2.0 * TSP) / MICROMETER, 1e-3);
 }
 
 #[test]
 fn with_feedforward_a_steady_axis_lags_by_the_delay_only() {
     let (tracking, synchronized) = steady_errors(&[]);
-    assert_near("synchronised, µm", synchronized / MICROMETRE, 0.0, 1e-3);
-    assert_near("tracking, µm", tracking / MICROMETRE, 10.0 * M_MIN * 2.0 * TSP / MICROMETRE, 1e-3);
+    assert_near("synchronized, µm", synchronized / MICROMETER, 0.0, 1e-3);
+    assert_near("tracking, µm", tracking / MICROMETER, 10.0 * M_MIN * 2.0 * TSP / MICROMETER, 1e-3);
 }
 
 #[test]
 fn overshoot_of_the_ends_is_told_apart() {
     // A line has no contour error but its overshoot.
     let contour = figures("x-constant", &[]).contour.expect("X is linear");
-    assert!(contour.max > 10.0 * MICROMETRE, "{contour:?}");
+    assert!(contour.max > 10.0 * MICROMETER, "{contour:?}");
     assert!(contour.max_within_ends < 1e-15, "{contour:?}");
 }
 

@@ -1,4 +1,4 @@
-//! The set-points of an identification campaign: what an axis is to be moved through.
+//! The setpoints of an identification campaign: what an axis is to be moved through.
 //!
 //! A campaign has up to three parts ([`FeedforwardMode`]). `off` excites everything that the steps of the paper need with the
 //! feedforward off: a slow start, legs there and back at constant speeds (Prévost eq. 3), standstills approached
@@ -32,24 +32,24 @@ const LONGEST: f64 = 3600.0;
 /// What limits a campaign besides the axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Options {
-    /// Where the set-points have to stay, m or rad; none: the stroke.
+    /// Where the setpoints have to stay, m or rad; none: the stroke.
     pub range: Option<[f64; 2]>,
     /// Highest speed, m/s or rad/s; none: 20 m/min or 20 rev/min, or what the axis has.
     pub max_feed: Option<f64>,
 }
 
-/// A part within the set-points of a campaign.
+/// A part within the setpoints of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     /// Which part.
     pub part: FeedforwardMode,
-    /// Its set-points in [`Campaign::psec`].
+    /// Its setpoints in [`Campaign::psec`].
     pub rows: Range<usize>,
     /// Speeds of its legs, m/s or rad/s, rising.
     pub speeds: Vec<f64>,
 }
 
-/// The set-points of one axis, part after part.
+/// The setpoints of one axis, part after part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Campaign {
     period: Nanoseconds,
@@ -62,10 +62,10 @@ pub struct Campaign {
 impl Campaign {
     /// Plans `parts`, one after the other with 3 s of standstill between them, for the axis at `place`, from 0.
     ///
-    /// Speeds reach up to 20 m/min (rev/min), 95 % of Vmax or of the motor's speed, or `options.max_feed`; set-points
+    /// Speeds reach up to 20 m/min (rev/min), 95 % of Vmax or of the motor's speed, or `options.max_feed`; setpoints
     /// stay 5 % of the range (the stroke, or `options.range`) away from its ends, and within Amax and Jmax. Start and
     /// end of each part are at home, 0, if that is within the range, otherwise at the place nearest to it that the
-    /// set-points may have.
+    /// setpoints may have.
     ///
     /// # Errors
     /// [`CampaignError`]: no such axis; a range outside the stroke, or too short; a feed that the axis does not have.
@@ -107,7 +107,7 @@ impl Campaign {
         Ok(campaign)
     }
 
-    /// The set-points, m or rad, one per position period, from time 0 on.
+    /// The setpoints, m or rad, one per position period, from time 0 on.
     pub fn psec(&self) -> &[f64] {
         &self.psec
     }
@@ -117,7 +117,7 @@ impl Campaign {
         &self.runs
     }
 
-    /// First and last set-point of `run`, s.
+    /// First and last setpoint of `run`, s.
     pub fn times(&self, run: &Run) -> [f64; 2] {
         let time = |row: usize| seconds(row as Nanoseconds * self.period);
         [time(run.rows.start), time(run.rows.end.saturating_sub(1))]

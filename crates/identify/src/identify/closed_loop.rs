@@ -1,4 +1,4 @@
-//! The whole axis, simulated on the set-points of a recording.
+//! The whole axis, simulated on the setpoints of a recording.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -144,7 +144,7 @@ fn parts(
     };
     let mut found: Vec<(FeedforwardMode, Range<usize>)> = Vec::new();
     for (from, to) in moves(&setpoints.values, instants) {
-        // Delays keep the feedforward acting for a while behind the set-points.
+        // Delays keep the feedforward acting for a while behind the setpoints.
         let to = (to + instants).min(count);
         let mode = match (acts(Some(velocity), from, to), acts(span.torque_feedforward.as_ref(), from, to)) {
             (false, _) => FeedforwardMode::Off,

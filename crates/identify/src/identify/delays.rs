@@ -157,7 +157,7 @@ pub(super) fn delay(
     // Residuals that are alike from sample to sample count less than their number.
     let limit = least * (1.0 + NOISE * inflation(at_minimum.as_slice()) / count) + count * f64::EPSILON;
 
-    // The accepted neighbourhood of the best, part by part; several are tried at once.
+    // The accepted neighborhood of the best, part by part; several are tried at once.
     let mut reach = |step: i64| {
         let mut end = at_best;
         loop {

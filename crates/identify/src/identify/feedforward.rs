@@ -20,9 +20,9 @@ pub struct Regression {
     pub error: f64,
     /// R².
     pub determination: f64,
-    /// Delay of the recorded set-point behind the derivative: above the first, up to the second, s.
+    /// Delay of the recorded setpoint behind the derivative: above the first, up to the second, s.
     pub delay: (f64, f64),
-    /// Derivative of PSEC at the motor (rad/s, rad/s²) and the recorded set-point, pairs.
+    /// Derivative of PSEC at the motor (rad/s, rad/s²) and the recorded setpoint, pairs.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -87,7 +87,7 @@ fn regression<'a>(
             let derivatives: Vec<f64> = setpoints.values.windows(3).map(&derivative).collect();
             let at = |i: usize| {
                 let instant = ((i as f64 * signals.period - setpoints.first) / tsp + 1e-9).floor();
-                // The first derivative is that of the third set-point.
+                // The first derivative is that of the third setpoint.
                 let place = instant - 2.0;
                 if place < 0.0 { 0.0 } else { derivatives.get(place as usize).copied().unwrap_or(0.0) }
             };

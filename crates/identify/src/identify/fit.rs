@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 /// Part of its range within which a value lies at a bound.
 const AT_BOUND: f64 = 1e-3;
-/// How much work an optimisation is worth.
+/// How much work an optimization is worth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Effort {
     /// Formulas: central differences, to the last digits.
@@ -72,10 +72,10 @@ impl Minimum {
     }
 }
 
-/// Minimises the sum of squares of `residuals` within bounds; none if they cannot be computed at the start.
+/// Minimizes the sum of squares of `residuals` within bounds; none if they cannot be computed at the start.
 ///
 /// Levenberg and Marquardt's method on z with `x = low + (high − low)(1 + sin z)/2`, which keeps the bounds.
-pub(super) fn minimise(
+pub(super) fn minimize(
     parameters: &[Bounded],
     effort: Effort,
     residuals: impl Fn(&[f64]) -> Option<DVector<f64>> + Sync,
@@ -230,13 +230,13 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     sound.then(|| scaled.try_inverse()).flatten().map(|inverse| &scale * inverse * &scale)
 }
 
-/// Coefficient of determination R² of `(measured, modelled)` pairs; NaN if nothing varies.
+/// Coefficient of determination R² of `(measured, modeled)` pairs; NaN if nothing varies.
 pub(super) fn determination(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
     let count = pairs.clone().count() as f64;
     let mean = pairs.clone().map(|(measured, _)| measured).sum::<f64>() / count;
     let (mut left, mut total) = (0.0, 0.0);
-    for (measured, modelled) in pairs {
-        left += (measured - modelled) * (measured - modelled);
+    for (measured, modeled) in pairs {
+        left += (measured - modeled) * (measured - modeled);
         total += (measured - mean) * (measured - mean);
     }
     1.0 - left / total
@@ -300,11 +300,11 @@ mod tests {
             ))
         };
         let bounded = |start, low, high| Bounded { start, low, high, step: 1e-5 };
-        let free = minimise(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -5.0, 5.0)], Effort::Formula, residuals)
+        let free = minimize(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -5.0, 5.0)], Effort::Formula, residuals)
             .expect("a minimum");
         assert!((free.values[0] - 3.0).abs() < 1e-6 && (free.values[1] + 0.7).abs() < 1e-6);
         assert_eq!(free.at_bound, [false, false]);
-        let held = minimise(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -0.2, 5.0)], Effort::Formula, residuals)
+        let held = minimize(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -0.2, 5.0)], Effort::Formula, residuals)
             .expect("a minimum");
         assert_eq!(held.at_bound, [false, true]);
         assert!(held.values[1] >= -0.2);

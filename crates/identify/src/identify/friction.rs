@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::fit::{Bounded, Effort, Minimum, determination, linear, minimise};
+use super::fit::{Bounded, Effort, Minimum, determination, linear, minimize};
 use super::gravity::Level;
 use crate::recording::Finding;
 use virtual_axes_core::config::{AxisConfig, AxisKind, FrictionConfig};
-use virtual_axes_core::units::{METRE_PER_MINUTE, RPM};
+use virtual_axes_core::units::{METER_PER_MINUTE, RPM};
 
 /// Speeds that a law of four parameters asks for: two more than it has parameters.
 pub const SPEEDS_OF_DOUBLE_EXPONENTIAL: usize = 6;
@@ -76,7 +76,7 @@ pub struct Friction {
 /// Unit of V, m/s or rad/s.
 pub(super) fn speed_unit(axis: &AxisConfig) -> f64 {
     match axis.kind() {
-        AxisKind::Linear => METRE_PER_MINUTE,
+        AxisKind::Linear => METER_PER_MINUTE,
         AxisKind::Rotary => RPM,
     }
 }
@@ -259,7 +259,7 @@ fn from(points: &[Point], b: f64, d: f64, most: f64) -> Option<Minimum> {
         bounded(sum, low, high),
         bounded(d, FAST.0, FAST.1),
     ];
-    let mut fit = minimise(&parameters, Effort::Formula, |x| {
+    let mut fit = minimize(&parameters, Effort::Formula, |x| {
         let [a, b, sum, d] = *x else { return None };
         let law = FrictionConfig { a, b, c: sum - a, d, i0: sum };
         let left = points.iter().map(|&(v, measured)| current(&law, v) - measured);

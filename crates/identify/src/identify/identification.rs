@@ -39,7 +39,7 @@ pub struct Refine {
     pub friction: bool,
     /// W, or k and φ, where there is a gravity.
     pub gravity: bool,
-    /// VFFW and TFFW, where their set-points were not recorded.
+    /// VFFW and TFFW, where their setpoints were not recorded.
     pub feedforward: bool,
 }
 

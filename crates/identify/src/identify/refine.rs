@@ -5,7 +5,7 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector};
 
 use super::closed_loop::{Experiment, Simulated, simulate_all};
-use super::fit::{Bounded, Effort, Minimum, minimise};
+use super::fit::{Bounded, Effort, Minimum, minimize};
 use super::friction::FrictionLaw;
 use virtual_axes_core::config::{AxisConfig, AxisKind, FrictionConfig, Periods};
 
@@ -280,7 +280,7 @@ pub fn refine(
                 Bounded { start, low, high, step: STEP * parameter.scale(axis) }
             })
             .collect();
-        let found = minimise(&bounded, Effort::Simulation, |values| {
+        let found = minimize(&bounded, Effort::Simulation, |values| {
             let moved = with(&present, parameters, values, held);
             let simulated = simulate_all(&moved, periods, experiments).ok()?;
             let mut residuals: Vec<f64> =

@@ -1,4 +1,4 @@
-//! The grid of position set-points under a recording.
+//! The grid of position setpoints under a recording.
 
 use crate::recording::Span;
 

@@ -167,7 +167,7 @@ impl<'a> Steps<'a> {
             self.found.findings.push(Finding::missing(
                 "no-setpoints",
                 why_no_experiments(self.inputs, self.periods),
-                "record the position set-points (PSEC) from standstill on, at every position instant or a whole \
+                "record the position setpoints (PSEC) from standstill on, at every position instant or a whole \
                  fraction of the position period",
             ));
             return;

@@ -20,7 +20,7 @@ const DISAGREEING: f64 = 0.05;
 /// Deviation of the position beyond which a model is not the axis: twice what the paper saw, m and rad.
 const DEVIATING: f64 = 20e-6;
 const DEVIATING_ANGLE: f64 = 20e-3 * DEGREE;
-/// Part of the position period beyond which a sampling period hides what a drive does between set-points.
+/// Part of the position period beyond which a sampling period hides what a drive does between setpoints.
 const COARSE: f64 = 0.34;
 /// Part by which eq. 5 can differ from the refined inertia before it is told.
 const UNSEEN: f64 = 0.03;
@@ -193,7 +193,7 @@ fn tell_inertia(inputs: &[Input<'_>], tsp: f64, found: &mut Identification) {
     }
     let values: Vec<String> = parts.iter().map(|(value, name)| format!("{value:.4} ({name})")).collect();
     let what = format!(
-        "the current swings with each set-point, and a recording sampled no faster sees it at one phase: eq. 5 gives \
+        "the current swings with each setpoint, and a recording sampled no faster sees it at one phase: eq. 5 gives \
          an inertia of {}",
         values.join(", ")
     );

@@ -43,7 +43,7 @@ pub struct InverseDynamics {
     /// Deviation of the current, A.
     pub current: Deviation,
     /// Number of the span, and the current that the model asks for at each of its samples, A.
-    pub modelled: Vec<(usize, Vec<f64>)>,
+    pub modeled: Vec<(usize, Vec<f64>)>,
 }
 
 /// How an axis agrees with a recording.
@@ -136,7 +136,7 @@ fn compare(experiment: &Experiment, simulated: &Simulated, segments: &[Segment])
 fn inverse_dynamics(signals: &Signals, segments: &[Segment], axis: &AxisConfig) -> Option<InverseDynamics> {
     let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, speed_unit(axis));
     let gravity = Gravity::new(&axis.gravity, r);
-    let mut modelled = Vec::new();
+    let mut modeled = Vec::new();
     let mut pairs = Vec::new();
     for (number, span) in signals.spans.iter().enumerate() {
         let Some(recorded) = &span.current else { continue };
@@ -155,9 +155,9 @@ fn inverse_dynamics(signals: &Signals, segments: &[Segment], axis: &AxisConfig) 
             })
             .collect();
         pairs.extend(recorded.iter().copied().zip(currents.iter().copied()).filter(|(r, _)| !r.is_nan()));
-        modelled.push((number, currents));
+        modeled.push((number, currents));
     }
     let current = deviation(pairs.iter().map(|(r, m)| m - r))?;
     let determination = determination(pairs.iter().copied());
-    Some(InverseDynamics { determination, current, modelled })
+    Some(InverseDynamics { determination, current, modeled })
 }

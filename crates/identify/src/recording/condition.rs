@@ -209,11 +209,11 @@ fn current_lag(
         }
         return Ok(found);
     }
-    // Sampled about as slowly as the set-points come, the current shows their ripple, which looks like a lag.
+    // Sampled about as slowly as the setpoints come, the current shows their ripple, which looks like a lag.
     if period > COARSEST * seconds(periods.position) {
         return Ok(0.0);
     }
-    // A filter of its own, so that the ripple at the position period is not matched with its neighbour.
+    // A filter of its own, so that the ripple at the position period is not matched with its neighbor.
     let filter = Gaussian::new(lag::cutoff(periods).min(cutoff), period);
     let long = parts.iter().filter(|part| part.piece.len() > 2 * filter.radius());
     let smooth: Vec<Part> = long.map(|part| Part::new(part.piece.clone(), &filter)).collect();

@@ -77,11 +77,11 @@ impl Gaussian {
     pub fn apply(&self, signal: &[f64]) -> Filtered {
         let (padded, radius) = (self.extended(signal), self.radius());
         let mut out = Filtered::default();
-        for centre in radius..radius + signal.len() {
-            let middle = padded[centre];
+        for center in radius..radius + signal.len() {
+            let middle = padded[center];
             let (mut value, mut first, mut second) = (0.0, 0.0, 0.0);
             for k in 1..=radius {
-                let (before, after) = (padded[centre - k], padded[centre + k]);
+                let (before, after) = (padded[center - k], padded[center + k]);
                 let bend = (before - middle) + (after - middle);
                 value += self.value[k - 1] * bend;
                 first += self.first[k - 1] * (after - before);
@@ -155,9 +155,9 @@ mod tests {
             let w = TAU * cutoff;
             let filter = Gaussian::new(cutoff, PERIOD);
             // Two quadratures at one sample give the magnitude whatever the phase.
-            let centre = 200;
-            let sine = filter.apply(&sampled(|t| (w * t).sin())).value[centre];
-            let cosine = filter.apply(&sampled(|t| (w * t).cos())).value[centre];
+            let center = 200;
+            let sine = filter.apply(&sampled(|t| (w * t).sin())).value[center];
+            let cosine = filter.apply(&sampled(|t| (w * t).cos())).value[center];
             let power = sine * sine + cosine * cosine;
             assert!((power - 0.5).abs() < 2e-3, "{cutoff} Hz passes {power}");
         }

@@ -12,7 +12,7 @@ use virtual_axes_core::units::seconds;
 /// Lags that are tried, s: what buses and filters of oscilloscopes have been seen to do, with reserve.
 pub(super) const LOWEST_LAG: f64 = -0.010;
 pub(super) const HIGHEST_LAG: f64 = 0.020;
-/// Cut-off of the filter for the scan, times the position period: the set-point's staircase makes a ripple at
+/// Cut-off of the filter for the scan, times the position period: the setpoint's staircase makes a ripple at
 /// that period, whose crests look like lags that are a period apart; a two-hundredth of it passes.
 const CUTOFF_PERIOD: f64 = 0.25;
 /// Step of the scan, s; the parabola through three of them finds the top to a hundredth of it.

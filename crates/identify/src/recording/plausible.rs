@@ -9,7 +9,7 @@ use super::order::{median, quantile};
 use super::regression::{Regression, correlation};
 use super::spans::{CURRENT, POSITION, PSEC, VELOCITY};
 use virtual_axes_core::config::{AxisConfig, AxisKind};
-use virtual_axes_core::units::{DEGREE, MILLIMETRE, MINUTE, RPM};
+use virtual_axes_core::units::{DEGREE, MILLIMETER, MINUTE, RPM};
 
 /// Strokes that a recording may cover: a machine file to begin with can be of a smaller machine.
 const STROKES: f64 = 3.0;
@@ -120,7 +120,7 @@ impl<'a> Look<'a> {
     /// The unit that makes numbers too large when it is taken for the SI unit.
     fn large_unit(&self) -> (&'static str, f64) {
         match self.axis.kind {
-            AxisKind::Linear => ("mm", MILLIMETRE),
+            AxisKind::Linear => ("mm", MILLIMETER),
             AxisKind::Rotary => ("deg", DEGREE),
         }
     }
@@ -135,7 +135,7 @@ impl<'a> Look<'a> {
         (0..self.velocity.len()).filter(move |&n| self.velocity[n].abs() > threshold)
     }
 
-    /// Factor and correlation (not centred) of the recorded velocity with the position's derivative.
+    /// Factor and correlation (not centerd) of the recorded velocity with the position's derivative.
     fn velocity_relation(&self) -> Option<(f64, f64)> {
         let (recorded, _) = self.recorded.as_ref()?;
         let (mut cross, mut own, mut other) = (0.0, 0.0, 0.0);
@@ -232,11 +232,11 @@ impl<'a> Look<'a> {
         let velocity = |unit: &str| format!("the velocity looks like {unit}: velocity=COLUMN[{unit}]");
         match self.axis.kind {
             AxisKind::Linear => known.extend([
-                (1.0 / MILLIMETRE, velocity("mm/s")),
+                (1.0 / MILLIMETER, velocity("mm/s")),
                 (MINUTE, velocity("m/min")),
-                (MINUTE / MILLIMETRE, velocity("mm/min")),
-                (MILLIMETRE, "the position looks like mm: position=COLUMN[mm]".to_owned()),
-                (MILLIMETRE * MINUTE, "the position looks like mm, the velocity like m/min".to_owned()),
+                (MINUTE / MILLIMETER, velocity("mm/min")),
+                (MILLIMETER, "the position looks like mm: position=COLUMN[mm]".to_owned()),
+                (MILLIMETER * MINUTE, "the position looks like mm, the velocity like m/min".to_owned()),
             ]),
             AxisKind::Rotary => known.extend([
                 (1.0 / DEGREE, velocity("deg/s")),

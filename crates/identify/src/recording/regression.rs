@@ -1,4 +1,4 @@
-//! How well the motion explains the current: least squares on centred, scaled columns.
+//! How well the motion explains the current: least squares on centerd, scaled columns.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -51,11 +51,11 @@ impl Regression {
     /// Explains `values`, as many as each column has.
     pub fn fit(&self, values: &[f64]) -> Fit {
         let mean = mean(values);
-        let centred: Vec<f64> = values.iter().map(|y| y - mean).collect();
+        let centerd: Vec<f64> = values.iter().map(|y| y - mean).collect();
         let products =
-            DVector::from_iterator(self.columns.len(), self.columns.iter().map(|x| dot(x, &centred)));
+            DVector::from_iterator(self.columns.len(), self.columns.iter().map(|x| dot(x, &centerd)));
         let solution = &self.inverse * &products;
-        let total = dot(&centred, &centred);
+        let total = dot(&centerd, &centerd);
         let r2 = if total > 0.0 { solution.dot(&products) / total } else { 0.0 };
         let coefficients = solution.iter().zip(&self.scales).map(|(c, scale)| c / scale).collect();
         Fit { coefficients, r2 }

@@ -33,7 +33,7 @@ const FROZEN: usize = 2;
 const MOSTLY_FROZEN: f64 = 0.05;
 /// Part of a period within which a sample is at a multiple of it, and keeps its value.
 const AT: f64 = 1e-3;
-/// Weights of two interpolations between the neighbours that differ less tell nothing about jitter.
+/// Weights of two interpolations between the neighbors that differ less tell nothing about jitter.
 const TELLING: f64 = 0.05;
 /// Fewest samples that tell something about jitter.
 const FEWEST_TELLING: usize = 20;
@@ -98,7 +98,7 @@ pub(super) fn channels(raw: &RawRecording) -> [Option<&Vec<f64>>; CHANNELS] {
 /// Whether the position is smoother over the stamps than over the grid: then the samples were taken when they
 /// are stamped, and not evenly.
 pub(super) fn stamped_smoother(placed: &Placed, position: &[f64]) -> bool {
-    // Travel, and the distance from the straight line between the neighbours: over the grid, over the stamps.
+    // Travel, and the distance from the straight line between the neighbors: over the grid, over the stamps.
     let mut triples: Vec<(f64, f64, f64)> = Vec::new();
     for block in &placed.blocks {
         for n in 1..block.rows.len().saturating_sub(1) {

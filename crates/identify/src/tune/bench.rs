@@ -112,7 +112,7 @@ impl<'a> Bench<'a> {
         self.parameters
     }
 
-    /// What is minimised.
+    /// What is minimized.
     pub fn cost(&self) -> &Cost {
         self.cost
     }

@@ -174,7 +174,7 @@ fn descend_all(
         .collect()
 }
 
-/// Minimises from `start` on; margins and saturation are constraints.
+/// Minimizes from `start` on; margins and saturation are constraints.
 fn descend(
     bench: &Bench<'_>,
     limits: &MarginLimits,

@@ -5,10 +5,10 @@ use std::str::FromStr;
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::trial::{AxisFigures, Figures};
-use virtual_axes_core::units::{DEGREE, MILLIMETRE, Told};
+use virtual_axes_core::units::{DEGREE, MILLIMETER, Told};
 
 /// m in µm.
-const MICROMETRE: f64 = 1e-3 * MILLIMETRE;
+const MICROMETER: f64 = 1e-3 * MILLIMETER;
 /// rad in mdeg.
 const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 
@@ -19,9 +19,9 @@ pub enum Term {
     Contour,
     /// RMS contour error, µm; where there is no contour to be off, as [`Term::Rms`].
     ContourRms,
-    /// Largest synchronised tracking error of any axis, µm or mdeg.
+    /// Largest synchronized tracking error of any axis, µm or mdeg.
     Tracking,
-    /// RMS synchronised tracking error of the worst axis, µm or mdeg.
+    /// RMS synchronized tracking error of the worst axis, µm or mdeg.
     Rms,
     /// Largest current of any axis, part of its limit.
     Current,
@@ -67,12 +67,12 @@ impl Term {
             figures.axes.iter().filter(|axis| axis.moves).map(value).fold(0.0, f64::max)
         };
         let unit = |axis: &AxisFigures| match axis.kind {
-            AxisKind::Linear => MICROMETRE,
+            AxisKind::Linear => MICROMETER,
             AxisKind::Rotary => MILLIDEGREE,
         };
         match (self, figures.contour.filter(|_| has_contour(figures))) {
-            (Term::Contour, Some(contour)) => contour.max / MICROMETRE,
-            (Term::ContourRms, Some(contour)) => contour.rms / MICROMETRE,
+            (Term::Contour, Some(contour)) => contour.max / MICROMETER,
+            (Term::ContourRms, Some(contour)) => contour.rms / MICROMETER,
             (Term::Contour | Term::Tracking, _) => {
                 worst(&|axis| axis.report.max_synchronized_tracking_error / unit(axis))
             }

@@ -1,4 +1,4 @@
-//! A path that is run many times: its set-points, read once.
+//! A path that is run many times: its setpoints, read once.
 
 use std::io;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use virtual_axes_core::trial::{
 };
 use virtual_axes_core::units::Nanoseconds;
 
-/// Set-points in memory, with the path behind them if it is known. They serve machines of the same joints,
+/// Setpoints in memory, with the path behind them if it is known. They serve machines of the same joints,
 /// strokes and periods, whatever their controllers.
 #[derive(Debug, Clone)]
 pub struct Course {
@@ -32,7 +32,7 @@ impl Course {
     /// Reads `setpoints` to their end; `go_on` is asked at every row.
     ///
     /// # Errors
-    /// Those of the set-points, and of `go_on`.
+    /// Those of the setpoints, and of `go_on`.
     pub fn read(
         name: &str,
         program: Option<Arc<Program>>,

@@ -17,11 +17,11 @@ pub const GRID_LAMBDA: [f64; 12] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e
 
 /// Largest N2 that the search goes to.
 const MAX_N2: usize = 60;
-/// Tunings whose neighbours are looked at in each round.
-const CENTRES: usize = 4;
-/// Steps of N1, N2 and Nu to a neighbour.
+/// Tunings whose neighbors are looked at in each round.
+const CENTERS: usize = 4;
+/// Steps of N1, N2 and Nu to a neighbor.
 const STEPS: [isize; 4] = [-4, -1, 1, 4];
-/// First factor of λ_rel to a neighbour: less than half a step of the grid.
+/// First factor of λ_rel to a neighbor: less than half a step of the grid.
 const FIRST_FACTOR: f64 = 1.4;
 /// The search ends when λ_rel is known to this.
 const LAST_FACTOR: f64 = 1.02;
@@ -63,7 +63,7 @@ fn remembered(candidates: Vec<Candidate>) -> Vec<Candidate> {
 /// The predictive controller, alike on each axis that moves, that costs least on the bench's path.
 ///
 /// Of the grid and the machine's own preset every design that keeps `limits` is run; then, round by round,
-/// the neighbours of the best few, also beyond the grid and between its λ_rel.
+/// the neighbors of the best few, also beyond the grid and between its λ_rel.
 ///
 /// # Errors
 /// [`TuneError`], also if no tuning keeps the limits.
@@ -102,8 +102,8 @@ pub fn tune_gpc_from(
         let Some(best) = tried.first().map(|best| best.cost) else { break };
         let around: Vec<Tuning> = tried
             .iter()
-            .take(CENTRES)
-            .flat_map(|centre| neighbours(&centre.tuning, factor))
+            .take(CENTERS)
+            .flat_map(|center| neighbors(&center.tuning, factor))
             .filter(|tuning| key(tuning).is_some_and(|key| seen.insert(key)))
             .collect();
         designs += around.len();
@@ -158,8 +158,8 @@ pub(super) fn preset(bench: &Bench<'_>) -> Option<Tuning> {
 }
 
 /// What lies about a tuning.
-fn neighbours(centre: &Tuning, factor: f64) -> Vec<Tuning> {
-    let Tuning::Gpc { n1, n2, nu, lambda_rel } = *centre else { return Vec::new() };
+fn neighbors(center: &Tuning, factor: f64) -> Vec<Tuning> {
+    let Tuning::Gpc { n1, n2, nu, lambda_rel } = *center else { return Vec::new() };
     let mut around = Vec::new();
     for lambda in [lambda_rel / factor, lambda_rel * factor] {
         around.push(Tuning::Gpc { n1, n2, nu, lambda_rel: rounded(lambda, DIGITS) });

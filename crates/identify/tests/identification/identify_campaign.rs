@@ -1,9 +1,9 @@
-//! Set-points of a campaign: within all limits, and with everything in them that identification needs.
+//! Setpoints of a campaign: within all limits, and with everything in them that identification needs.
 
 use proptest::prelude::*;
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::trajectory::JointLimits;
-use virtual_axes_core::units::{DEGREE, MILLIMETRE, RPM, seconds};
+use virtual_axes_core::units::{DEGREE, MILLIMETER, RPM, seconds};
 use virtual_axes_identify::identify::FeedforwardMode;
 use virtual_axes_identify::identify::campaign::{Campaign, CampaignError, Options};
 use virtual_axes_verification::fixtures::common::{M_MIN, TSP, parameters};
@@ -11,7 +11,7 @@ use virtual_axes_verification::fixtures::recordings::{Disturbance, feedforward, 
 
 const MACHINES: [&str; 2] = ["mikron_ucp710", "linear_motor_center"];
 const AXES: [&str; 5] = ["x", "y", "z", "a", "c"];
-/// Part of a limit that differences of set-points may exceed it by, as every path of this crate.
+/// Part of a limit that differences of setpoints may exceed it by, as every path of this crate.
 const TOLERANCE: f64 = 1e-6;
 
 fn shipped(machine: &str) -> MachineConfig {
@@ -23,7 +23,7 @@ fn plan(machine: &MachineConfig, axis: &str, parts: &[FeedforwardMode], options:
         .unwrap_or_else(|error| panic!("{} {axis}: {error}", machine.name()))
 }
 
-/// Largest first, second and third difference over the period and its powers; at rest before the first set-point.
+/// Largest first, second and third difference over the period and its powers; at rest before the first setpoint.
 fn differences(campaign: &Campaign) -> [f64; 3] {
     let psec = campaign.psec();
     let period = seconds(campaign.period());
@@ -125,7 +125,7 @@ proptest! {
         ];
         // 20 mm of lead.
         let top = 0.95 * velocity.min(motor * 0.020) * M_MIN;
-        let stroke = [stroke.0 * MILLIMETRE, stroke.1 * MILLIMETRE];
+        let stroke = [stroke.0 * MILLIMETER, stroke.1 * MILLIMETER];
         any_axis("x", &changes, stroke, range, feed, top)?;
     }
 
@@ -195,15 +195,15 @@ fn any_axis(
 #[test]
 fn the_range_that_a_refusal_tells_is_long_enough() {
     let config = shipped(MACHINES[0]);
-    let planned = |millimetres: f64| {
-        let range = Some([0.0, millimetres * MILLIMETRE]);
+    let planned = |millimeters: f64| {
+        let range = Some([0.0, millimeters * MILLIMETER]);
         Campaign::plan(&config, 0, &[FeedforwardMode::Off], &Options { range, max_feed: None })
     };
     let Err(CampaignError::TooShort { found, needed, .. }) = planned(100.0) else { panic!("100 mm do") };
     assert_eq!(found, 100.0);
     // v/a + a/j for both ramps, 8/Kp + α to settle (Kp 25 1/s) and 0.4 s at 20 m/min, in nine tenths.
     let speed = 20.0 * M_MIN;
-    let wanted = (speed * (speed / 2.5 + 2.5 / 50.0) + speed * (8.0 / 25.0 + 0.009 + 0.4)) / 0.9 / MILLIMETRE;
+    let wanted = (speed * (speed / 2.5 + 2.5 / 50.0) + speed * (8.0 / 25.0 + 0.009 + 0.4)) / 0.9 / MILLIMETER;
     assert!(needed >= wanted && needed < wanted + 0.1, "{needed} {wanted}");
     assert!(planned(needed).is_ok());
     assert!(planned(needed - 0.2).is_err());
@@ -231,7 +231,7 @@ fn ranges_and_feeds_that_an_axis_does_not_have_are_refused() {
     assert!(matches!(error, CampaignError::TooLong { part: "off", .. }), "{error}");
 }
 
-/// Velocity set-point, m/s or rad/s, before each row.
+/// Velocity setpoint, m/s or rad/s, before each row.
 fn velocities(psec: &[f64], period: f64) -> Vec<f64> {
     std::iter::once(0.0).chain(psec.windows(2).map(|pair| (pair[1] - pair[0]) / period)).collect()
 }
@@ -365,7 +365,7 @@ fn legs_of_the_long_part_settle_at_twelve_speeds_in_both_directions() {
     let recording = record(&machine, "x", campaign.psec(), &Disturbance::default());
     let current = recording.current.expect("recorded");
     let velocity = velocities(recording.psec.as_deref().expect("recorded"), TSP);
-    // 8/Kp + α, by when 0.03 % of a step of the set-point are left.
+    // 8/Kp + α, by when 0.03 % of a step of the setpoint are left.
     let settling = ((8.0 / 25.0 + 0.009) / TSP) as usize;
     for &speed in &campaign.runs()[0].speeds {
         for direction in [1.0, -1.0] {

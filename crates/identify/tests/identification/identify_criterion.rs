@@ -11,7 +11,7 @@ use virtual_axes_verification::fixtures::recordings::{
     Disturbance, ignorant, place, record, record_campaign, stribeck, truth,
 };
 
-const MICROMETRE: f64 = 1e-6;
+const MICROMETER: f64 = 1e-6;
 const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 
 fn hidden(machine: &MachineConfig, axis: &str, seed: u64) -> Disturbance {
@@ -81,25 +81,25 @@ impl Trial {
 }
 
 #[test]
-fn a_line_deviates_by_less_than_4_micrometres_at_constant_velocity_and_6_elsewhere() {
+fn a_line_deviates_by_less_than_4_micrometers_at_constant_velocity_and_6_elsewhere() {
     let x = Trial::of("x", 1);
     for scenario in ["x-constant", "x-there-and-back"] {
         let (constant, elsewhere) = x.deviations(scenario);
-        println!("{scenario}: {:.2}, {:.2} µm", constant / MICROMETRE, elsewhere / MICROMETRE);
-        assert!(constant > 0.0 && constant <= 4.0 * MICROMETRE);
-        assert!(elsewhere <= 6.0 * MICROMETRE);
+        println!("{scenario}: {:.2}, {:.2} µm", constant / MICROMETER, elsewhere / MICROMETER);
+        assert!(constant > 0.0 && constant <= 4.0 * MICROMETER);
+        assert!(elsewhere <= 6.0 * MICROMETER);
     }
     spline(&x);
 }
 
 fn spline(trial: &Trial) {
     let (constant, elsewhere) = trial.deviations("bspline-3d");
-    println!("bspline {}: {:.2}, {:.2} µm", trial.axis, constant / MICROMETRE, elsewhere / MICROMETRE);
-    assert!(constant.max(elsewhere) <= 12.0 * MICROMETRE);
+    println!("bspline {}: {:.2}, {:.2} µm", trial.axis, constant / MICROMETER, elsewhere / MICROMETER);
+    assert!(constant.max(elsewhere) <= 12.0 * MICROMETER);
 }
 
 #[test]
-fn the_other_axes_of_the_spline_deviate_by_less_than_12_micrometres() {
+fn the_other_axes_of_the_spline_deviate_by_less_than_12_micrometers() {
     for (axis, seed) in [("y", 2), ("z", 3)] {
         spline(&Trial::of(axis, seed));
     }

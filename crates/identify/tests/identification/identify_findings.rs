@@ -151,7 +151,7 @@ fn a_recording_that_begins_in_motion_has_no_closed_loop() {
     let whole = legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true);
     let mut raw = recorded(&truth(), &whole, &clean());
     let psec = raw.psec.clone().expect("PSEC is recorded");
-    // From a set-point in motion to the last one in motion, without the rests between: none is as long as 0.1 s.
+    // From a setpoint in motion to the last one in motion, without the rests between: none is as long as 0.1 s.
     let moving: Vec<usize> = (1..psec.len()).filter(|&k| psec[k] != psec[k - 1]).collect();
     let pick = |channel: &Option<Vec<f64>>| channel.as_ref().map(|c| moving.iter().map(|&k| c[k]).collect());
     (raw.psec, raw.position, raw.current) = (pick(&raw.psec), pick(&raw.position), pick(&raw.current));

@@ -61,7 +61,7 @@ fn a_clean_recording_has_the_set_points_at_their_instants() {
     for (k, time) in clean.time.iter().enumerate() {
         assert!((time - k as f64 * TSP).abs() < 1e-12);
     }
-    // α = 9 ms and Kp = 25 1/s with VFFW = 1: position follows two periods later, but for micrometres.
+    // α = 9 ms and Kp = 25 1/s with VFFW = 1: position follows two periods later, but for micrometers.
     let lag = position(&clean).iter().skip(2).zip(&psec).map(|(position, psec)| (position - psec).abs());
     assert!(lag.fold(0.0, f64::max) < 100e-6);
 }

@@ -186,7 +186,7 @@ fn x_and_y_come_back_and_their_ballbar_is_that_of_the_truth() {
 fn ballbar(machine: &MachineConfig) -> [f64; 3] {
     let figures = virtual_axes_verification::fixtures::common::watch_scenario("ballbar", machine, |_| {});
     let circle = &figures.circles[0];
-    [circle.mean, circle.min, circle.max].map(|metres| metres * 1e6)
+    [circle.mean, circle.min, circle.max].map(|meters| meters * 1e6)
 }
 
 #[test]

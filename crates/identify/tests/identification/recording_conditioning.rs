@@ -64,7 +64,7 @@ fn noise(n: usize) -> f64 {
     ((mixed ^ (mixed >> 32)) % 2_000_001) as f64 / 1e6 - 1.0
 }
 
-/// The motion sampled every `period`, position in micrometres.
+/// The motion sampled every `period`, position in micrometers.
 fn sampled(period: f64, samples: usize) -> RawRecording {
     let time: Vec<f64> = (0..samples).map(|n| n as f64 * period).collect();
     let of = |f: &dyn Fn(f64) -> f64| Some(time.iter().map(|&t| f(t)).collect::<Vec<f64>>());
@@ -251,7 +251,7 @@ fn frozen_values_are_cut_out() {
 }
 
 #[test]
-fn a_slow_quantised_motion_and_a_stop_are_not_frozen() {
+fn a_slow_quantized_motion_and_a_stop_are_not_frozen() {
     let mut raw = recording();
     // 0.3 µm per sample, then at rest, then on.
     let slow = |n: usize| (n.min(4000) as f64 + n.max(5000) as f64) * 0.3e-6;

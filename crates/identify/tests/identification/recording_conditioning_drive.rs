@@ -14,7 +14,7 @@ const ACCELERATION: f64 = 0.6;
 const REST: usize = 50;
 const AVERAGED: usize = 9;
 
-/// Velocities of the set-point, one for each position period.
+/// Velocities of the setpoint, one for each position period.
 fn velocities(limits: &LimitsConfig) -> Vec<f64> {
     let mut trapezoids = vec![0.0; REST];
     for speed in SPEEDS {

@@ -18,7 +18,7 @@ use virtual_axes_verification::fixtures::tune_common::{
     CIRCLE, CORNER, THERE_AND_BACK, course, machine, program, setpoints,
 };
 
-const MICROMETRE: f64 = 1e-6;
+const MICROMETER: f64 = 1e-6;
 
 fn set(parameters: &mut Parameters, key: &str, value: Value) {
     parameters.set(key, value, &Source::named("test")).expect(key);
@@ -41,7 +41,7 @@ fn with_gpc(parameters: &Parameters, joints: &[&str], tuning: (i64, i64, i64, f6
     tuned.machine_config().expect("a machine")
 }
 
-/// Largest synchronised tracking error of the first axis, µm; none where a limit is reached.
+/// Largest synchronized tracking error of the first axis, µm; none where a limit is reached.
 fn tracking_error(config: &MachineConfig, scenario: &str) -> Option<f64> {
     let program = program(scenario, config);
     let trial = Trial {
@@ -52,7 +52,7 @@ fn tracking_error(config: &MachineConfig, scenario: &str) -> Option<f64> {
     };
     let outcome = trial::run(&trial, setpoints(&program, config), |_| Ok(())).expect("a run");
     let report = outcome.figures.axes[0].report;
-    (report.saturation_time == 0.0).then_some(report.max_synchronized_tracking_error / MICROMETRE)
+    (report.saturation_time == 0.0).then_some(report.max_synchronized_tracking_error / MICROMETER)
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn the_tuning_is_as_good_as_any_of_the_grid_by_brute_force() {
     let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
     let found = tune_gpc(&bench, &MarginLimits::default()).expect("a tuning");
     assert!(found.best.cost <= best, "{} found, {best} on the grid", found.best.cost);
-    // One axis has no contour: the cost is its largest synchronised tracking error.
+    // One axis has no contour: the cost is its largest synchronized tracking error.
     let Tuning::Gpc { n1, n2, nu, lambda_rel } = found.best.tuning else { panic!("{}", found.best.tuning) };
     let again = with_gpc(&parameters, &["x"], (n1 as i64, n2 as i64, nu as i64, lambda_rel));
     assert_eq!(tracking_error(&again, THERE_AND_BACK), Some(found.best.cost));
@@ -196,7 +196,7 @@ fn a_path_without_motion_has_nothing_to_tune() {
     let rows = Rows { left: 100 };
     let setpoints = trial::Setpoints::Grid(Box::new(rows));
     let course =
-        virtual_axes_identify::tune::Course::read("still", None, setpoints, || Ok(())).expect("set-points");
+        virtual_axes_identify::tune::Course::read("still", None, setpoints, || Ok(())).expect("setpoints");
     let error = Bench::new(&parameters, &course, &cost, &Unwatched).map(|_| ()).expect_err("nothing moves");
     assert!(matches!(error, TuneError::NothingMoves), "{error}");
 }
@@ -287,7 +287,7 @@ fn contrasts_are_better_here_and_worse_there() {
 fn circle_cost(parameters: &Parameters, circle: &virtual_axes_identify::tune::Course) -> f64 {
     let config = parameters.machine_config().expect("a machine");
     let outcome = circle.run(&config, false, false, |_| Ok(())).expect("a run");
-    outcome.figures.contour.expect("a contour").max / MICROMETRE
+    outcome.figures.contour.expect("a contour").max / MICROMETER
 }
 
 #[test]
@@ -296,7 +296,7 @@ fn costs_are_read_and_refused_by_name() {
     assert_eq!(cost.terms(), [(Term::Contour, 1.0), (Term::Rms, 0.5), (Term::Current, 1.0)]);
     assert_eq!(cost.to_string(), "contour,rms=0.5,current");
     for (text, message) in [
-        ("colour", "unknown term colour; there are contour, contour-rms, tracking, rms, current, activity"),
+        ("color", "unknown term color; there are contour, contour-rms, tracking, rms, current, activity"),
         ("", "unknown term ; there are contour, contour-rms, tracking, rms, current, activity"),
         ("rms=-1", "rms=-1: the weight must be a number from 0 to 1e9"),
         ("rms=inf", "rms=inf: the weight must be a number from 0 to 1e9"),
@@ -317,13 +317,13 @@ fn a_cost_is_the_weighted_sum_of_figures() {
     let figures = course.run(&config, false, false, |_| Ok(())).expect("a run").figures;
     let of = |text: &str| text.parse::<Cost>().expect("a cost").of(&figures, &config);
     let contour = figures.contour.expect("a contour");
-    assert_eq!(of("contour"), contour.max / MICROMETRE);
-    assert_eq!(of("contour-rms"), contour.rms / MICROMETRE);
+    assert_eq!(of("contour"), contour.max / MICROMETER);
+    assert_eq!(of("contour-rms"), contour.rms / MICROMETER);
     let worst = |value: fn(&virtual_axes_core::assess::AxisReport) -> f64| {
         f64::max(value(&figures.axes[0].report), value(&figures.axes[1].report))
     };
-    assert_eq!(of("tracking"), worst(|r| r.max_synchronized_tracking_error) / MICROMETRE);
-    assert_eq!(of("rms"), worst(|r| r.rms_synchronized_tracking_error) / MICROMETRE);
+    assert_eq!(of("tracking"), worst(|r| r.max_synchronized_tracking_error) / MICROMETER);
+    assert_eq!(of("rms"), worst(|r| r.rms_synchronized_tracking_error) / MICROMETER);
     assert_eq!(of("activity"), worst(|r| r.control_activity));
     // The motors of X and Y have 54 A.
     assert_eq!(of("current"), worst(|r| r.peak_current) / 54.0);

@@ -14,9 +14,9 @@ use super::{shortened, yaml};
 /// What a file can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
-    /// Set-points as CSV.
+    /// Setpoints as CSV.
     PsecCsv,
-    /// Set-points as YAML, a `JointTrajectory`.
+    /// Setpoints as YAML, a `JointTrajectory`.
     PsecYaml,
     /// A recording.
     Mcap,
@@ -29,8 +29,8 @@ pub enum FileKind {
 impl fmt::Display for FileKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            FileKind::PsecCsv => "set-points as CSV",
-            FileKind::PsecYaml => "set-points as YAML",
+            FileKind::PsecCsv => "setpoints as CSV",
+            FileKind::PsecYaml => "setpoints as YAML",
             FileKind::Mcap => "an MCAP recording",
             FileKind::Machine => "a machine file",
             FileKind::Scenario => "a scenario",
@@ -39,7 +39,7 @@ impl fmt::Display for FileKind {
 }
 
 /// What there is, for messages.
-const KNOWN: &str = "there are set-points as CSV (the first line is `time,x,…`), as YAML (a mapping with \
+const KNOWN: &str = "there are setpoints as CSV (the first line is `time,x,…`), as YAML (a mapping with \
                      joint_names and points) and as MCAP recordings, machine files (ros__parameters) and \
                      scenarios (a mapping with moves)";
 

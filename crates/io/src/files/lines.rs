@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read};
 
 use memchr::memchr;
 
-/// Longest line, bytes: far more than a set-point of any machine needs.
+/// Longest line, bytes: far more than a setpoint of any machine needs.
 const LONGEST: usize = 1 << 16;
 /// Bytes that are held: reading has few calls then, and stays within a processor's cache.
 const HELD: usize = 4 * LONGEST;

@@ -13,7 +13,7 @@ use super::{cdr, shortened};
 
 /// The encoding of messages that is read.
 const ENCODING: &str = "cdr";
-/// Longest record, bytes: hours of set-points in one message. In a compressed chunk a damaged length asks for
+/// Longest record, bytes: hours of setpoints in one message. In a compressed chunk a damaged length asks for
 /// no more memory.
 const LONGEST_RECORD: usize = 256 << 20;
 /// Opcode and length before a record.

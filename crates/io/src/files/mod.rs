@@ -1,9 +1,9 @@
-//! Files: set-points, traces and recordings, in and out.
+//! Files: setpoints, traces and recordings, in and out.
 //!
 //! What a file is, is told by its content ([`Input`]) when it is read and by its extension when it is
-//! written. Set-points come from CSV ([`PsecCsv`], a stream), YAML ([`read_psec_yaml`]) and MCAP
+//! written. Setpoints come from CSV ([`PsecCsv`], a stream), YAML ([`read_psec_yaml`]) and MCAP
 //! recordings ([`Trajectories`]); what was recorded of an axis from CSV and MCAP ([`read_recording`]).
-//! Traces ([`TraceWriter`]) and set-points ([`PsecWriter`]) go into [`OutputFile`]s, which stand under their
+//! Traces ([`TraceWriter`]) and setpoints ([`PsecWriter`]) go into [`OutputFile`]s, which stand under their
 //! names only when they are whole; what the node records ([`BoundedRecording`]) can be read from the start.
 
 mod cdr;

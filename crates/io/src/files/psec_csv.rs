@@ -35,7 +35,7 @@ struct Point {
 /// a straight line from where they stand, at home (0) unless [`starting_at`](Self::starting_at) says
 /// otherwise. The last instant is the first that is not before the last row.
 ///
-/// Each row is checked when it is read, each set-point before it is given: strokes, and speeds from
+/// Each row is checked when it is read, each setpoint before it is given: strokes, and speeds from
 /// instant to instant, the first from where the axes stand.
 #[derive(Debug)]
 pub struct PsecCsv<R> {

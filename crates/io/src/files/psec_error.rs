@@ -1,11 +1,11 @@
-//! Why set-points from CSV cannot be used.
+//! Why setpoints from CSV cannot be used.
 
 use super::nearest_name;
 use super::psec_csv::{LONGEST, TIME};
 use virtual_axes_core::trajectory::Rejection;
 use virtual_axes_core::units::Told;
 
-/// Why a file of set-points cannot be used; each names file and line.
+/// Why a file of setpoints cannot be used; each names file and line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PsecError {
     /// The file cannot be read, or is not text.
@@ -91,7 +91,7 @@ pub enum PsecError {
         rejection: Rejection,
     },
     /// There is no point.
-    #[error("{at}: there is no set-point below the header")]
+    #[error("{at}: there is no setpoint below the header")]
     Empty {
         /// The file.
         at: String,

@@ -1,4 +1,4 @@
-//! Set-points out: CSV, YAML as `ros2 topic pub` takes it, MCAP.
+//! Setpoints out: CSV, YAML as `ros2 topic pub` takes it, MCAP.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -17,9 +17,9 @@ use virtual_axes_core::units::{Nanoseconds, seconds};
 /// Topic of the trajectory in a recording.
 const TOPIC: &str = "/psec";
 
-/// Set-points that are being written. Dropped before [`finish`](Self::finish), they leave no file behind.
+/// Setpoints that are being written. Dropped before [`finish`](Self::finish), they leave no file behind.
 pub trait PsecWriter {
-    /// Adds the set-points (m or rad, one per joint) of an instant, `time` ns from the start.
+    /// Adds the setpoints (m or rad, one per joint) of an instant, `time` ns from the start.
     ///
     /// # Errors
     /// Those of the output.
@@ -32,7 +32,7 @@ pub trait PsecWriter {
     fn finish(self: Box<Self>) -> io::Result<()>;
 }
 
-/// Begins set-points of `joints` in the format that the extension of `path` names: `.csv`, `.yaml` or
+/// Begins setpoints of `joints` in the format that the extension of `path` names: `.csv`, `.yaml` or
 /// `.mcap`. A device or a pipe without an extension gets CSV.
 ///
 /// # Errors
@@ -63,7 +63,7 @@ impl<W: Write> PsecCsvOut<W> {
         Ok(PsecCsvOut { output, row: Vec::new() })
     }
 
-    /// Adds the set-points (m or rad) of an instant, ns from the start.
+    /// Adds the setpoints (m or rad) of an instant, ns from the start.
     ///
     /// # Errors
     /// Those of the output.
@@ -110,7 +110,7 @@ impl<W: Write> PsecYamlOut<W> {
         Ok(PsecYamlOut { output, empty: true, row: Vec::new() })
     }
 
-    /// Adds the set-points (m or rad) of an instant, ns from the start.
+    /// Adds the setpoints (m or rad) of an instant, ns from the start.
     ///
     /// # Errors
     /// Those of the output; a time beyond the 32-bit seconds of a message.
@@ -162,7 +162,7 @@ impl<W: Write> PsecMcapOut<W> {
         Ok(PsecMcapOut { recording, topic, message })
     }
 
-    /// Adds the set-points (m or rad) of an instant, ns from the start.
+    /// Adds the setpoints (m or rad) of an instant, ns from the start.
     ///
     /// # Errors
     /// A time beyond the 32-bit seconds of a message.

@@ -19,7 +19,7 @@ use virtual_axes_core::trajectory::{Rejection, Request};
 /// What `ros2 topic echo` prints in place of what it leaves out.
 const LEFT_OUT: &str = "'...'";
 
-/// Why YAML is not set-points; each names the file, and the line where there is one.
+/// Why YAML is not setpoints; each names the file, and the line where there is one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TrajectoryYamlError {
     /// Not YAML, or not a message.

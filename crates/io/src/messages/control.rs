@@ -116,7 +116,7 @@ pub struct JointTrajectoryControllerState {
     pub header: Header,
     /// Joints of the points below.
     pub joint_names: Vec<String>,
-    /// The set-point.
+    /// The setpoint.
     pub reference: JointTrajectoryPoint,
     /// What is measured.
     pub feedback: JointTrajectoryPoint,

@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e4;
 /// Radius of the bearings of A, m.
 const BEARING_RADIUS: f64 = 0.07;
 
-/// Name and colour (red, green, blue, opacity) of what a part is painted with.
+/// Name and color (red, green, blue, opacity) of what a part is painted with.
 pub(super) type Material = (&'static str, [f64; 4]);
 
 pub(super) const CASTING: Material = ("casting", [0.45, 0.48, 0.50, 1.0]);

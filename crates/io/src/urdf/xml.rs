@@ -39,10 +39,10 @@ fn document(xml: &mut Xml, model: &Model) -> io::Result<()> {
     xml.write_event(Event::Decl(BytesDecl::new("1.0", None, None)))?;
     xml.write_event(Event::Comment(BytesText::new(REMARK)))?;
     xml.create_element("robot").with_attribute(("name", model.name.as_str())).write_inner_content(|xml| {
-        for (name, colour) in MATERIALS {
-            let colour = numbers(&colour);
+        for (name, color) in MATERIALS {
+            let color = numbers(&color);
             xml.create_element("material").with_attribute(("name", name)).write_inner_content(|xml| {
-                xml.create_element("color").with_attribute(("rgba", colour.as_str())).write_empty()?;
+                xml.create_element("color").with_attribute(("rgba", color.as_str())).write_empty()?;
                 Ok(())
             })?;
         }

@@ -1,4 +1,4 @@
-//! Set-points from recordings, and traces as recordings.
+//! Setpoints from recordings, and traces as recordings.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

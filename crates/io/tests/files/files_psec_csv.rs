@@ -1,4 +1,4 @@
-//! Set-points as CSV: a stream on the position grid.
+//! Setpoints as CSV: a stream on the position grid.
 
 use std::io::{self, Read};
 use std::sync::Arc;
@@ -176,8 +176,8 @@ fn faults_name_file_line_and_column() {
     assert_eq!(error("time;x\n0;0\n"), format!("p.csv:1: the header is \"time;x\"; {header}"));
     assert_eq!(error("time,x,q\n0,0,0\n"), "p.csv:1: there is no joint \"q\"; there are x, y, z, a, c");
     assert_eq!(error("time,x,x\n0,0,0\n"), "p.csv:1: joint x has two columns");
-    assert_eq!(error("time,x\n"), "p.csv: there is no set-point below the header");
-    assert_eq!(error("\n\ntime,x\n\n  \n"), "p.csv: there is no set-point below the header");
+    assert_eq!(error("time,x\n"), "p.csv: there is no setpoint below the header");
+    assert_eq!(error("\n\ntime,x\n\n  \n"), "p.csv: there is no setpoint below the header");
     assert_eq!(error("time,x\n0,0\n0.006,NaN\n"), "p.csv:3: x is \"NaN\", must be a finite number");
     assert_eq!(error("time,x\n0,0\n0.006,inf\n"), "p.csv:3: x is \"inf\", must be a finite number");
     assert_eq!(error("time,x\n0,0\n0.006,1e999\n"), "p.csv:3: x is \"1e999\", must be a finite number");

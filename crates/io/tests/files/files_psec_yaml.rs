@@ -1,4 +1,4 @@
-//! Set-points as YAML, as `ros2 topic pub` takes it; and what a file is.
+//! Setpoints as YAML, as `ros2 topic pub` takes it; and what a file is.
 
 use virtual_axes_core::trajectory::{Request, Start};
 use virtual_axes_core::units::SECOND_NS;
@@ -178,8 +178,8 @@ fn what_a_file_is_is_told_by_its_content() {
 fn what_is_not_known_is_said_with_what_is() {
     let folder = Folder::new("unknown");
     for (bytes, words) in [
-        (b"".as_slice(), "f: it is empty; there are set-points as CSV"),
-        (b"t,x\n0,0\n", "f: its first line is \"t,x\"; there are set-points as CSV"),
+        (b"".as_slice(), "f: it is empty; there are setpoints as CSV"),
+        (b"t,x\n0,0\n", "f: its first line is \"t,x\"; there are setpoints as CSV"),
         (b"foo: 1\nbar: [2]\n", "f: it is a mapping of foo, bar; there are"),
         (b"- 1\n", "f: its first line is \"- 1\"; there are"),
         (b"\x89PNG\r\n\x1a\n\0\0\0", "f: it is not text; there are"),

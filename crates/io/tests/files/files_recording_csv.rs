@@ -370,7 +370,7 @@ fn columns_that_are_not_found_are_told_with_those_there_are() {
          y.current; the nearest is y.position; time and position are needed: name a column by \
          CHANNEL=COLUMN[UNIT]"
     );
-    // Set-points, not a recording.
+    // Setpoints, not a recording.
     let message = error("time,x,y\n0,0,0\n", &[]);
     assert!(message.contains("there are time, x, y; the nearest is x"), "{message}");
     assert!(error("t,position\n0,0\n", &[]).starts_with("r.csv:1: there is no column \"time\" for time;"));
@@ -513,10 +513,10 @@ fn a_file_of_another_kind_is_told() {
     };
     let end = ", not a recording (CSV with a column of time and one of positions, or MCAP)";
     let psec = "joint_names: [x]\npoints:\n- {positions: [0.0], time_from_start: {sec: 1}}\n";
-    assert_eq!(said("p.yaml", psec, &[]), format!("p.yaml: it is set-points as YAML{end}"));
+    assert_eq!(said("p.yaml", psec, &[]), format!("p.yaml: it is setpoints as YAML{end}"));
     assert_eq!(
         said("p.yaml", psec, &["time=#1", "position=#2"]),
-        format!("p.yaml: it is set-points as YAML{end}")
+        format!("p.yaml: it is setpoints as YAML{end}")
     );
     let scenario = include_str!("../../../../config/scenarios/ballbar.yaml");
     assert_eq!(said("s.yaml", scenario, &[]), format!("s.yaml: it is a scenario{end}"));

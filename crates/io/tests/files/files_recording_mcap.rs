@@ -256,7 +256,7 @@ fn without_currents_the_effort_gives_them_and_that_is_said() {
     assert_eq!(codes(&findings), ["current-of-effort"]);
     let (found, findings) = read(&[row(0, 0.0), row(1, 0.0)]).expect("good");
     assert_eq!((found.current, codes(&findings)), (None, vec!["no-current"]));
-    // Set-points and outputs of the drive from one topic, the effort from another.
+    // Setpoints and outputs of the drive from one topic, the effort from another.
     let drive = |k: u64| ("/d", DRIVES, k * MS, drives(1_000 * MS + k * MS, [1.0, 2.0, 3.0, 4.0, 5.0]));
     let (found, findings) = read(&[drive(0), row(0, 1000.0), drive(1), row(1, -500.0)]).expect("good");
     assert_values(found.current, &[amperes, -0.5 * amperes]);

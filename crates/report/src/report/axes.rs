@@ -49,9 +49,9 @@ pub(super) fn sections(page: &mut Page) {
         let lines = series(page, |t| &t.tracking_error);
         error_strip(page, &of, time, tracking, lines);
         let note = "PSEC delayed by α − SP, what the controller is asked to follow";
-        let synchronised = Strip { title: "Synchronised tracking error", note, ..tracking };
+        let synchronized = Strip { title: "Synchronized tracking error", note, ..tracking };
         let lines = series(page, |t| &t.synchronized_tracking_error);
-        error_strip(page, &of, time, synchronised, lines);
+        error_strip(page, &of, time, synchronized, lines);
         currents(page, axis, time);
         page.html.close_section();
     }
@@ -64,7 +64,7 @@ pub(super) fn sections(page: &mut Page) {
     }
 }
 
-/// An axis that stands still, and how far it is from its set-point at most.
+/// An axis that stands still, and how far it is from its setpoint at most.
 fn held(axis: &Axis, explained: bool) -> String {
     let errors = axis.traces.iter().flat_map(|(_, _, t)| t.tracking_error.iter().copied());
     let error = Unit::error(axis.traces[0].2.kind).show(Extent::of(errors).map_or(0.0, |e| e.peak()));
@@ -92,14 +92,14 @@ pub(super) fn axis_name(name: &str) -> String {
     if name.chars().count() == 1 { capital(name) } else { name.to_owned() }
 }
 
-/// Set-points as a pale band, positions on it.
+/// Setpoints as a pale band, positions on it.
 fn position(page: &mut Page, axis: &Axis, time: Extent) {
     let mut series: Vec<Series> = Vec::new();
     for &(_, time, trace) in &axis.traces {
         let class = "setpoint".to_owned();
-        // Runs of the same motion have one set-point.
+        // Runs of the same motion have one setpoint.
         if !series.iter().any(|s| s.time == time && s.values == trace.psec) {
-            series.push(Series { label: "set-point (PSEC)".to_owned(), class, time, values: &trace.psec });
+            series.push(Series { label: "setpoint (PSEC)".to_owned(), class, time, values: &trace.psec });
         }
     }
     let setpoints = series.len();
@@ -111,9 +111,9 @@ fn position(page: &mut Page, axis: &Axis, time: Extent) {
     let mut legend = legend(&series);
     legend.drain(1..setpoints.max(1));
     let unit = Unit::position(axis.traces[0].2.kind);
-    let caption = Caption { title: "Set-point and position".to_owned(), note: String::new(), legend };
+    let caption = Caption { title: "Setpoint and position".to_owned(), note: String::new(), legend };
     let plot = TimePlot { quantity: "Position", unit, from_zero: false, time, series, at_least: None };
-    let title = format!("{} axis: set-point and position", axis.name);
+    let title = format!("{} axis: setpoint and position", axis.name);
     page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
 }
 
@@ -137,7 +137,7 @@ fn currents(page: &mut Page, axis: &Axis, time: Extent) {
             values: signal(trace),
         };
         let mut series = vec![
-            line("set-point", "setpoint".to_owned(), |t| &t.current_setpoint),
+            line("setpoint", "setpoint".to_owned(), |t| &t.current_setpoint),
             line("motor current (SMC)", format!("line solid {}", run_class(run)), |t| &t.current),
         ];
         let (taking, none): (Vec<_>, Vec<_>) =

@@ -6,7 +6,7 @@ use super::unit::Unit;
 
 /// A picture of pairs of values; all axes are linear.
 ///
-/// Values are in SI and are labelled in the unit of their axis; a [`Unit`] of size 1 shows them as
+/// Values are in SI and are labeled in the unit of their axis; a [`Unit`] of size 1 shows them as
 /// given. What is not finite, or beyond ±1e12 of the unit, is not drawn, and breaks a line. Long series are
 /// thinned to what can be seen, peaks and lonely points kept.
 ///
@@ -17,7 +17,7 @@ use super::unit::Unit;
 /// let time = [0.0, 0.1, 0.2, 0.3];
 /// let measured = Series::over("measured", SeriesStyle::Measured, &time, &[0.0, 1e-6, 2e-6, 1e-6]);
 /// let simulated = Series::over("simulated", SeriesStyle::Simulated, &time, &[0.0, 2e-6, 2e-6, 0.0]);
-/// let deviation = Panel::new(ChartAxis::new("Deviation", Unit::MICROMETRE), vec![measured, simulated]);
+/// let deviation = Panel::new(ChartAxis::new("Deviation", Unit::MICROMETER), vec![measured, simulated]);
 /// let current = Series::over("measured", SeriesStyle::Measured, &time, &[0.0, 4.0, 1.5, 1.5]);
 /// let current = Panel {
 ///     lines: vec![Guide::new(1.5, "friction")],
@@ -68,7 +68,7 @@ pub struct Panel {
 pub struct ChartAxis {
     /// The quantity, without its unit.
     pub quantity: String,
-    /// In which it is labelled; values are in SI.
+    /// In which it is labeled; values are in SI.
     pub unit: Unit,
     /// What is shown of it.
     pub range: AxisRange,
@@ -110,12 +110,12 @@ pub enum SeriesStyle {
     Measured,
     /// The second, dashed: what a model says.
     Simulated,
-    /// One of six lines that differ in colour and dash, by its number; measured and simulated are the
+    /// One of six lines that differ in color and dash, by its number; measured and simulated are the
     /// first two of them.
     Line(usize),
     /// A staircase in one of the six styles: each value holds until the next x.
     Steps(usize),
-    /// Points of a group, by its number: colour and shape differ. Thousands are drawn small.
+    /// Points of a group, by its number: color and shape differ. Thousands are drawn small.
     Points(usize),
 }
 

@@ -56,7 +56,7 @@ pub enum NoticeLevel {
 }
 
 impl NoticeLevel {
-    /// Style, and what stands before the text, so that colour is not all that tells it.
+    /// Style, and what stands before the text, so that color is not all that tells it.
     fn style(self) -> (&'static str, &'static str) {
         match self {
             NoticeLevel::Note => ("note", "Note"),

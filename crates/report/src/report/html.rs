@@ -6,7 +6,7 @@ use super::marks::Mark;
 use super::svg::Svg;
 use super::text::Text;
 
-/// Colours for light, dark and paper, and the layout.
+/// Colors for light, dark and paper, and the layout.
 const STYLE: &str = include_str!("style.css");
 /// Nothing is loaded and no script runs, whatever text a page brings along.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";

@@ -1,4 +1,4 @@
-//! Marks of points: groups differ in shape as well as in colour.
+//! Marks of points: groups differ in shape as well as in color.
 
 use super::thin::Point;
 

@@ -1,7 +1,7 @@
 //! A report: one self-contained HTML page with tables and plots of one or several runs.
 //!
 //! The page holds its style and its pictures (SVG), no script, and loads nothing from elsewhere.
-//! Colours are the style's, for light and dark screens and for paper; lines differ by dash as well.
+//! Colors are the style's, for light and dark screens and for paper; lines differ by dash as well.
 //! The same input gives the same bytes. Signals are thinned to what can be seen, peaks kept, so that
 //! the size of the page does not grow with the length of a run.
 

@@ -151,8 +151,8 @@ impl PathPlot<'_> {
 
     /// The picture; `title` says what it shows.
     pub(super) fn draw(&self, id: &str, title: &str) -> String {
-        let [across, up] = self.range.map(|e| e.in_unit(&Unit::MILLIMETRE).with_margin(MARGIN));
-        let least = Unit::MILLIMETRE.least_range;
+        let [across, up] = self.range.map(|e| e.in_unit(&Unit::MILLIMETER).with_margin(MARGIN));
+        let least = Unit::MILLIMETER.least_range;
         let width = across.span().max(up.span() / ASPECT[1]).max(least);
         let aspect = (up.span() / width).clamp(ASPECT[0], ASPECT[1]);
         // One scale for both: what is longer than its share gives the other more room.
@@ -176,7 +176,7 @@ impl PathPlot<'_> {
         svg.text("label", [(LEFT + RIGHT) / 2.0, bottom + BELOW - 7.0], Anchor::Middle, &first);
         svg.upward_text("label", [14.0, (TOP + bottom) / 2.0], &second);
 
-        let place = |p: Point| [x(p[0] / Unit::MILLIMETRE.size), y(p[1] / Unit::MILLIMETRE.size)];
+        let place = |p: Point| [x(p[0] / Unit::MILLIMETER.size), y(p[1] / Unit::MILLIMETER.size)];
         let points: Vec<(Point, Point)> =
             self.view.points(self.tool, self.magnification).map(|(r, p)| (place(r), place(p))).collect();
         let kept = steps(points.len(), |i, j, within| {
@@ -191,7 +191,7 @@ impl PathPlot<'_> {
         if let Some((start, _)) = points.first() {
             svg.circle("start", *start, 4.0);
         }
-        let error = Unit::MICROMETRE.show(self.view.error(self.tool));
+        let error = Unit::MICROMETER.show(self.view.error(self.tool));
         let description = format!(
             "{} path of the tool, its error magnified {} times; the largest in this plane is {error}.",
             self.view.name(),

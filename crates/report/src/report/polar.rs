@@ -12,13 +12,13 @@ use super::unit::Unit;
 
 /// Pixels at natural size.
 const SIZE: f64 = 460.0;
-const CENTRE: f64 = SIZE / 2.0;
+const CENTER: f64 = SIZE / 2.0;
 /// Radii of the least and the largest deviation.
 const INNER: f64 = 56.0;
 const OUTER: f64 = 200.0;
 /// Rings beside the smallest, about.
 const RINGS: f64 = 4.0;
-/// Where the rings are labelled: between two spokes, and steep so that the labels stand apart.
+/// Where the rings are labeled: between two spokes, and steep so that the labels stand apart.
 const LABEL_ANGLE: f64 = 3.0 * FRAC_PI_8;
 /// A smaller range, µm, is drawn as large.
 const LEAST_RANGE: f64 = 1.0;
@@ -44,7 +44,7 @@ pub(super) fn range<'a>(circles: impl IntoIterator<Item = &'a CircleTrace>) -> E
 
 impl PolarPlot<'_> {
     fn scale(&self) -> Scale {
-        Scale::outward(self.range.in_unit(&Unit::MICROMETRE), LEAST_RANGE, RINGS)
+        Scale::outward(self.range.in_unit(&Unit::MICROMETER), LEAST_RANGE, RINGS)
     }
 
     /// What the figure must say: how far the rings are apart.
@@ -56,15 +56,15 @@ impl PolarPlot<'_> {
     pub(super) fn draw(&self, id: &str, title: &str) -> String {
         let scale = self.scale();
         let radius = scale.onto(INNER, OUTER);
-        let at = |r: f64, angle: f64| [CENTRE + r * angle.cos(), CENTRE - r * angle.sin()];
+        let at = |r: f64, angle: f64| [CENTER + r * angle.cos(), CENTER - r * angle.sin()];
         let mut svg = Svg::new(SIZE, SIZE);
-        svg.circle("area", [CENTRE, CENTRE], OUTER);
+        svg.circle("area", [CENTER, CENTER], OUTER);
         for eighth in 0..8 {
             let angle = f64::from(eighth) * FRAC_PI_4;
             svg.line("grid", at(INNER, angle), at(OUTER, angle));
         }
         for (value, _) in scale.ticks() {
-            svg.circle(if value == 0.0 { "nominal" } else { "ring" }, [CENTRE, CENTRE], radius(value));
+            svg.circle(if value == 0.0 { "nominal" } else { "ring" }, [CENTER, CENTER], radius(value));
         }
         let [first, second] = self.plane();
         let axes = [(format!("+{first}"), 0.0), (format!("+{second}"), 0.5)];
@@ -79,7 +79,7 @@ impl PolarPlot<'_> {
                 let drawable = |i: &usize| is_drawable(circle.angle[*i]) && is_drawable(circle.deviation[*i]);
                 let points: Vec<_> = (0..length)
                     .filter(drawable)
-                    .map(|i| at(radius(circle.deviation[i] / Unit::MICROMETRE.size), circle.angle[i]))
+                    .map(|i| at(radius(circle.deviation[i] / Unit::MICROMETER.size), circle.angle[i]))
                     .collect();
                 let kept = steps(points.len(), |i, j, within| {
                     (points[i][0] - points[j][0]).hypot(points[i][1] - points[j][1]) < within
@@ -106,7 +106,7 @@ impl PolarPlot<'_> {
         let ranges = self.circles.iter().filter_map(|c| {
             let Extent { min, max } = Extent::of(c.deviation.iter().copied())?;
             let direction = DIRECTIONS[usize::from(!c.counterclockwise)].0;
-            Some(format!("{direction} from {} to {}", Unit::MICROMETRE.show(min), Unit::MICROMETRE.show(max)))
+            Some(format!("{direction} from {} to {}", Unit::MICROMETER.show(min), Unit::MICROMETER.show(max)))
         });
         format!("Radial deviation, positive outside: {}.", ranges.collect::<Vec<_>>().join("; "))
     }

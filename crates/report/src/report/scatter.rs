@@ -57,7 +57,7 @@ pub enum PointStyle {
     Dots,
     /// A staircase: each point holds until the next one.
     Steps,
-    /// A large one in the colour of a run, by its place in the report.
+    /// A large one in the color of a run, by its place in the report.
     Run(usize),
 }
 

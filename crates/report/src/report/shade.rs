@@ -12,7 +12,7 @@ const NEAR: f64 = 0.5;
 /// An interval is at least so broad, pixels.
 const LEAST_WIDTH: f64 = 1.0;
 /// Where the edge of an interval of x runs, pixels below the top of the area: its dash tells the
-/// classes apart where colours do not.
+/// classes apart where colors do not.
 const EDGE: f64 = 2.0;
 
 /// The ends of an interval in the unit of its axis, in order; they can be infinite.

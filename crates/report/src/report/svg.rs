@@ -1,4 +1,4 @@
-//! Pictures as SVG text: shapes carry classes only, so that the page's style gives them colours for
+//! Pictures as SVG text: shapes carry classes only, so that the page's style gives them colors for
 //! light, dark and paper.
 
 use std::fmt::{self, Display, Write as _};
@@ -119,7 +119,7 @@ impl Svg {
         let [width, height] = [width, height].map(Pixel::of);
         let (title, description) = (Text(title), Text(description));
         format!(
-            "<svg role=\"img\" viewBox=\"0 0 {width} {height}\" aria-labelledby=\"{id}-t {id}-d\">\
+            "<svg role=\"img\" viewBox=\"0 0 {width} {height}\" aria-labeledby=\"{id}-t {id}-d\">\
              <title id=\"{id}-t\">{title}</title><desc id=\"{id}-d\">{description}</desc>{body}</svg>\n"
         )
     }

@@ -2,7 +2,7 @@
 //!
 //! A signal over time keeps the smallest and the largest value of each column of pixels, so that no
 //! peak is lost. After that, and for curves in a plane, a point that lies on the line between its
-//! neighbours is dropped.
+//! neighbors is dropped.
 
 use super::scale::is_drawable;
 

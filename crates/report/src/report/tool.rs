@@ -39,7 +39,7 @@ pub(super) fn sections(page: &mut Page) {
     }
     if let Some(time) = time(page) {
         let note = "distance of the tool tip from the path";
-        errors(page, time, ["Contour error", note], Unit::MICROMETRE, &tools, |t| &t.contour_error);
+        errors(page, time, ["Contour error", note], Unit::MICROMETER, &tools, |t| &t.contour_error);
         if tools.iter().any(|(_, t)| peak(&t.orientation_error) > NO_ORIENTATION_ERROR) {
             let note = "angle between the tool axis and that of the path";
             errors(page, time, ["Orientation error", note], Unit::MILLIDEGREE, &tools, |t| {
@@ -156,7 +156,7 @@ fn polar_plots(page: &mut Page, circle: &Circles) {
         .fold(None, |all, i| Extent::join(all, Some(ranges[i])));
     let [first, second] = circle.plane.clone().map(|name| axis_name(&name));
     let name =
-        format!("{first}–{second} circle, R {}\u{a0}mm", rounded(circle.radius / Unit::MILLIMETRE.size));
+        format!("{first}–{second} circle, R {}\u{a0}mm", rounded(circle.radius / Unit::MILLIMETER.size));
     for (i, (run, list)) in circle.runs.iter().enumerate() {
         let own = ranges[i];
         let range = if small.contains(&i) { own } else { common.unwrap_or(own) };

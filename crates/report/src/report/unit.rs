@@ -1,14 +1,14 @@
-//! Units in which pictures are labelled.
+//! Units in which pictures are labeled.
 
 use virtual_axes_core::config::AxisKind;
-use virtual_axes_core::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, RPM};
+use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, RPM};
 
 use super::text;
 
 /// Sizes and least ranges lie between this and its inverse, so that no scale overflows.
 const SMALLEST: f64 = 1e-18;
 
-/// A unit in which an axis of a picture is labelled; the values that are drawn are in SI.
+/// A unit in which an axis of a picture is labeled; the values that are drawn are in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     /// As written.
@@ -24,16 +24,16 @@ impl Unit {
     pub const SECOND: Unit = Unit::new("s", 1.0, 1e-3);
     /// Milliseconds.
     pub const MILLISECOND: Unit = Unit::new("ms", 1e-3, 1e-3);
-    /// Millimetres.
-    pub const MILLIMETRE: Unit = Unit::new("mm", MILLIMETRE, 1e-3);
-    /// Micrometres.
-    pub const MICROMETRE: Unit = Unit::new("µm", MILLIMETRE * 1e-3, 0.1);
+    /// Millimeters.
+    pub const MILLIMETER: Unit = Unit::new("mm", MILLIMETER, 1e-3);
+    /// Micrometers.
+    pub const MICROMETER: Unit = Unit::new("µm", MILLIMETER * 1e-3, 0.1);
     /// Degrees.
     pub const DEGREE: Unit = Unit::new("°", DEGREE, 1e-3);
     /// Thousandths of a degree.
     pub const MILLIDEGREE: Unit = Unit::new("mdeg", DEGREE * 1e-3, 0.1);
-    /// Metres per minute.
-    pub const METRE_PER_MINUTE: Unit = Unit::new("m/min", METRE_PER_MINUTE, 0.01);
+    /// Meters per minute.
+    pub const METER_PER_MINUTE: Unit = Unit::new("m/min", METER_PER_MINUTE, 0.01);
     /// Revolutions per minute.
     pub const RPM: Unit = Unit::new("rpm", RPM, 0.01);
     /// Amperes.
@@ -57,7 +57,7 @@ impl Unit {
     /// Of positions.
     pub fn position(kind: AxisKind) -> Unit {
         match kind {
-            AxisKind::Linear => Unit::MILLIMETRE,
+            AxisKind::Linear => Unit::MILLIMETER,
             AxisKind::Rotary => Unit::DEGREE,
         }
     }
@@ -65,7 +65,7 @@ impl Unit {
     /// Of errors.
     pub fn error(kind: AxisKind) -> Unit {
         match kind {
-            AxisKind::Linear => Unit::MICROMETRE,
+            AxisKind::Linear => Unit::MICROMETER,
             AxisKind::Rotary => Unit::MILLIDEGREE,
         }
     }
@@ -73,7 +73,7 @@ impl Unit {
     /// Of velocities.
     pub fn velocity(kind: AxisKind) -> Unit {
         match kind {
-            AxisKind::Linear => Unit::METRE_PER_MINUTE,
+            AxisKind::Linear => Unit::METER_PER_MINUTE,
             AxisKind::Rotary => Unit::RPM,
         }
     }

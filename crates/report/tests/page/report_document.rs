@@ -113,7 +113,7 @@ fn values_stand_where_the_units_say() {
     // 2…4 ms over −30…30 µm, with round ticks at the corners of the area.
     let series =
         vec![Series::new("a", SeriesStyle::Measured, vec![[2e-3, -3e-5], [3e-3, 1.5e-5], [4e-3, 3e-5]])];
-    let y = axis("Deviation", Unit::MICROMETRE).within(-3e-5, 3e-5);
+    let y = axis("Deviation", Unit::MICROMETER).within(-3e-5, 3e-5);
     let page = page_of(vec![Chart::new("One", axis("Time", Unit::MILLISECOND), vec![Panel::new(y, series)])]);
     let picture = picture(&page, "One");
     assert!(picture.contains(">Time (ms)</text>") && picture.contains(">Deviation (µm)</text>"));
@@ -141,7 +141,7 @@ fn every_chart_says_what_and_in_which_unit() {
         assert_eq!(picture.matches("<text class=\"label\"").count(), labels);
         assert!(picture.contains("<title") && !between(picture, "<desc", "</desc>")[0].is_empty());
         let ids = between(picture, " id=\"", "\"");
-        assert_eq!(between(picture, "aria-labelledby=\"", "\""), [ids.join(" ")]);
+        assert_eq!(between(picture, "aria-labeledby=\"", "\""), [ids.join(" ")]);
     }
     for unit in ["(m/min)", "(A)", "(kg)", "(m/s²)", "(ms)", "(µm²)", "(µm)", "Time (s)"] {
         assert!(page.contains(&format!("{unit}</text>")), "{unit} is nowhere");
@@ -222,7 +222,7 @@ fn not_a_number_breaks_a_line_and_a_staircase() {
 }
 
 #[test]
-fn lines_and_points_differ_by_more_than_colour() {
+fn lines_and_points_differ_by_more_than_color() {
     let page = page(&Document::default());
     let dash = |number: usize| {
         between(&page, &format!(".line.run-{number} {{"), "}")
@@ -254,7 +254,7 @@ fn a_single_sample_among_many_is_seen() {
     let time: Vec<f64> = (0..LONG).map(|i| i as f64 * 1e-3).collect();
     for style in [SeriesStyle::Measured, SeriesStyle::Steps(0)] {
         let panel =
-            Panel::new(axis("Deviation", Unit::MICROMETRE), vec![Series::over("a", style, &time, &values)]);
+            Panel::new(axis("Deviation", Unit::MICROMETER), vec![Series::over("a", style, &time, &values)]);
         let page = page_of(vec![Chart::new("Spike", axis("Time", Unit::SECOND), vec![panel])]);
         let picture = picture(&page, "Spike");
         let [left, _, width, height] = area(picture);

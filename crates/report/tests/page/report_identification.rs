@@ -323,7 +323,7 @@ fn a_recording_without_setpoints_is_compared_by_inverse_dynamics() {
     assert!(text(blind).contains("has no PSEC"), "{}", text(blind));
     let picture = chart(blind, "blind: current by inverse dynamics");
     let measured = series(picture, "Current", "measured");
-    assert_eq!(measured.points.len(), series(picture, "Current", "modelled").points.len());
+    assert_eq!(measured.points.len(), series(picture, "Current", "modeled").points.len());
     assert_eq!(blind.tables.len(), 2);
 }
 
@@ -342,10 +342,10 @@ fn what_is_missing_is_told() {
     assert_eq!(headings(&document), SECTIONS);
     for (heading, wanted) in [
         ("Gravity", "record the motor current"),
-        ("Delays", "record the position set-points"),
+        ("Delays", "record the position setpoints"),
         ("What was found", "no parameter"),
         ("What was found", "record the motor current"),
-        ("What was found", "record the position set-points"),
+        ("What was found", "record the position setpoints"),
         ("Gravity", "not identified"),
         ("Friction law", "No friction law"),
         ("Equivalent inertia", "not identified"),

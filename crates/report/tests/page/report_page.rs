@@ -266,7 +266,7 @@ fn runs_are_compared_at_one_scale() {
     }
     // 64 µm beside 9980 µm would be a straight line: it is shown once more.
     let errors =
-        pictures(&page).iter().filter(|p| p.contains(">X axis: synchronised tracking error<")).count();
+        pictures(&page).iter().filter(|p| p.contains(">X axis: synchronized tracking error<")).count();
     assert_eq!(errors, 2);
     assert_eq!(pictures(&page).iter().filter(|p| p.contains(">X axis: velocity<")).count(), 1);
     assert!(page.contains("Z (largest tracking error") && page.contains("stand still."));
@@ -283,10 +283,10 @@ fn the_circle_is_drawn_where_its_deviation_is() {
         .map(|ring| between(ring, "r=\"", "\"").pop().and_then(|r| r.parse().ok()).expect("a radius"))
         .collect();
     assert_eq!(radii.len(), 5);
-    let per_micrometre = (radii[4] - radii[0]) / 80.0;
+    let per_micrometer = (radii[4] - radii[0]) / 80.0;
     let line = points(between(polar, "<path class=\"line run-1 ccw\" d=\"", "\"")[0]);
-    let centre = 230.0;
-    let deviation = |p: &[f64; 2]| ((p[0] - centre).hypot(p[1] - centre) - radii[0]) / per_micrometre;
+    let center = 230.0;
+    let deviation = |p: &[f64; 2]| ((p[0] - center).hypot(p[1] - center) - radii[0]) / per_micrometer;
     let (low, high) = line.iter().map(deviation).fold((f64::MAX, f64::MIN), |(l, h), d| (l.min(d), h.max(d)));
     // The extremes of the reference trial, and what a line of tenths of a pixel can show.
     assert!((low - 47.7).abs() < 1.0 && (high - 68.6).abs() < 1.0, "{low:.1}…{high:.1} µm");
@@ -309,9 +309,9 @@ fn the_error_of_a_path_is_magnified_as_the_caption_says() {
     let line = |before: &str| points(between(path, before, "\"")[0]);
     let (reference, tip) =
         (line("<path class=\"reference\" d=\""), line("<path class=\"line solid run-1\" d=\""));
-    let per_millimetre = (reference[reference.len() - 1][0] - reference[0][0]) / 100.0;
+    let per_millimeter = (reference[reference.len() - 1][0] - reference[0][0]) / 100.0;
     // Up on the page is towards smaller coordinates; 200 × 50 µm.
-    let shown = (reference[0][1] - tip[0][1]) / per_millimetre;
+    let shown = (reference[0][1] - tip[0][1]) / per_millimeter;
     assert!((shown - 10.0).abs() < 0.1, "{shown} mm");
 }
 

@@ -5,7 +5,7 @@ use super::fault::Check;
 use virtual_axes_core::config::{AxisConfig, AxisKind, FrictionConfig};
 use virtual_axes_core::drive::Plant;
 use virtual_axes_core::machine::AxisSample;
-use virtual_axes_core::units::{METRE_PER_MINUTE, RPM};
+use virtual_axes_core::units::{METER_PER_MINUTE, RPM};
 
 /// Rounding of a balance, relative to the sum of its terms by their sizes: some hundred operations, and entries of
 /// matrix exponentials.
@@ -51,7 +51,7 @@ impl DriveWatch {
     /// The drive of `axis` over ticks of `tick` s, with its `energy`.
     pub fn new(axis: &AxisConfig, tick: f64, energy: &DriveEnergy) -> Self {
         let unit = match axis.kind {
-            AxisKind::Linear => METRE_PER_MINUTE,
+            AxisKind::Linear => METER_PER_MINUTE,
             AxisKind::Rotary => RPM,
         };
         DriveWatch {
@@ -79,7 +79,7 @@ impl DriveWatch {
         (self.dissipated, self.returned, self.supplied, self.imbalance) = (0.0, 0.0, 0.0, 0.0);
     }
 
-    /// Whether a set-point is at its limit.
+    /// Whether a setpoint is at its limit.
     pub fn is_at_limit(&self, s: &AxisSample) -> bool {
         s.velocity_setpoint.abs() == self.max_speed
             || s.current_setpoint.abs() == self.max_current

@@ -15,7 +15,7 @@ pub enum Check {
     Reported,
     /// The figures of a position period are those of its ticks.
     Counted,
-    /// Set-points go no faster than the axis may.
+    /// Setpoints go no faster than the axis may.
     SetpointSpeed,
     /// Friction has the sign of the speed at the end of the tick: it stops, it does not reverse.
     FrictionSign,
@@ -27,9 +27,9 @@ pub enum Check {
     Position,
     /// The energy changes by what goes in.
     Energy,
-    /// The synchronised tracking error is within what the impulse responses bound it to.
+    /// The synchronized tracking error is within what the impulse responses bound it to.
     Bound,
-    /// The synchronised tracking error is what the impulse responses make of set-points and torques.
+    /// The synchronized tracking error is what the impulse responses make of setpoints and torques.
     Superposition,
     /// Each accepted trajectory ends once.
     Ended,
@@ -42,10 +42,10 @@ impl Check {
     pub fn text(self) -> &'static str {
         match self {
             Check::Finite => "a signal is not finite",
-            Check::Limits => "a set-point is beyond its limit",
+            Check::Limits => "a setpoint is beyond its limit",
             Check::Reported => "a limit is not reported, or reported where there is none",
             Check::Counted => "the figures of a period are not those of its ticks",
-            Check::SetpointSpeed => "the set-point goes faster than the axis may",
+            Check::SetpointSpeed => "the setpoint goes faster than the axis may",
             Check::FrictionSign => "friction drives the axis",
             Check::FrictionLaw => "friction is not what its law says",
             Check::FrictionWork => "friction gives energy",

@@ -83,7 +83,7 @@ impl Law {
             }
             Law::Gpc => vec![controller("gpc")],
             Law::Rst => {
-                // The axis's own proportional gain, spread over two instants each of position and set-point.
+                // The axis's own proportional gain, spread over two instants each of position and setpoint.
                 let gain = axis.position_loop.gain;
                 let list = |values: &[f64]| Value::DoubleList(values.to_vec());
                 vec![
@@ -117,7 +117,7 @@ pub struct Theory {
     pub energy: DriveEnergy,
     /// Its responses.
     pub response: Response,
-    /// Set-points ahead of the present one that its controller reads.
+    /// Setpoints ahead of the present one that its controller reads.
     pub ahead: usize,
     /// Whether its controller has a guard.
     pub guarded: bool,

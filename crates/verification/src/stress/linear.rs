@@ -84,7 +84,7 @@ impl LinearAxis {
         })
     }
 
-    /// Set-points ahead of the present one that the controller reads.
+    /// Setpoints ahead of the present one that the controller reads.
     pub fn ahead(&self) -> usize {
         let delay = -(-self.alpha).div_euclid(self.ticks as i64);
         (self.law.preview() - delay).max(0) as usize
@@ -95,13 +95,13 @@ impl LinearAxis {
         self.law.has_integral_action()
     }
 
-    /// The synchronised tracking error at the first `periods` position instants, m or rad, from rest at 0 under
-    /// set-points `psec(k)`, m or rad.
+    /// The synchronized tracking error at the first `periods` position instants, m or rad, from rest at 0 under
+    /// setpoints `psec(k)`, m or rad.
     pub fn errors(&self, periods: usize, psec: impl Fn(i64) -> f64) -> Vec<f64> {
         self.run([0.0; STATES], periods, psec, |_| 0.0, |_| 0.0).0
     }
 
-    /// Likewise without set-points, from a state that came of nothing that the position controller has seen.
+    /// Likewise without setpoints, from a state that came of nothing that the position controller has seen.
     pub fn free(&self, state: State, periods: usize) -> Vec<f64> {
         self.run(state, periods, |_| 0.0, |_| 0.0, |_| 0.0).0
     }

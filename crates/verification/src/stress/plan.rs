@@ -10,7 +10,7 @@ use virtual_axes_core::units::Nanoseconds;
 /// Kinds of trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// From rest to rest within velocity, acceleration and jerk, a set-point in each position period.
+    /// From rest to rest within velocity, acceleration and jerk, a setpoint in each position period.
     Move,
     /// Several points with velocities: cubic polynomials.
     Cubic,
@@ -18,7 +18,7 @@ pub enum Kind {
     Quintic,
     /// A random walk within velocity and acceleration.
     Walk,
-    /// Streamed set-points whose velocity goes in steps.
+    /// Streamed setpoints whose velocity goes in steps.
     Stream,
     /// A random walk that is stopped on its way.
     Stop,
@@ -121,7 +121,7 @@ impl Plan {
         let moving = FEWEST + random.below(unit * 5 / 4);
         let horizon = variant.axes.iter().map(|axis| axis.ahead).max().unwrap_or(0);
         let settling = 3 + random.below(unit / 2) + if kind == Kind::Stream { horizon } else { 0 };
-        // What a move is rounded up to, and what its set-points are delayed by.
+        // What a move is rounded up to, and what its setpoints are delayed by.
         let periods = (moving + settling + 4).min(variant.longest());
         let sharper = if random.chance(SHARP) { random.between(1.0, SHARPER) } else { 1.0 };
         let count = variant.joints.len();
@@ -211,7 +211,7 @@ fn times(random: &mut Random, duration: Nanoseconds) -> Vec<Nanoseconds> {
     times
 }
 
-/// A set-point of each column in each position period.
+/// A setpoint of each column in each position period.
 fn gridded(mut request: Request, columns: &[Vec<f64>], period: Nanoseconds) -> Result<Request, Rejection> {
     let points = columns.iter().map(Vec::len).max().unwrap_or(0);
     let mut positions = vec![0.0; columns.len()];

@@ -1,7 +1,7 @@
 //! What bounds the error of an axis: the impulse responses of its linear loop, and their absolute sums.
 //!
-//! As long as no limit acts, an axis is linear in its set-points and in the torques that it meets. With e the
-//! synchronised tracking error at position instants, Δ the difference of set-points and d the torque on the motor,
+//! As long as no limit acts, an axis is linear in its setpoints and in the torques that it meets. With e the
+//! synchronized tracking error at position instants, Δ the difference of setpoints and d the torque on the motor,
 //!
 //! ```text
 //! e(k) = Σⱼ h(j, k) Δ(j) + Σₙ g(k·N − n) d(n) + Σₘ q(k·M − m) c(m)
@@ -10,17 +10,17 @@
 //! where n counts ticks, N to a position period, and m instants of the velocity loop, M to a period, at which a
 //! friction compensation adds c. h depends on k − j alone but for the first j, whose motion the controller cannot see
 //! before the beginning. So |e| ≤ ‖h‖₁ max|Δ| + ‖g‖₁ max|d| + ‖q‖₁ max|c|, and likewise with the second and third
-//! differences of the set-points and the once and twice summed h.
+//! differences of the setpoints and the once and twice summed h.
 
 use super::linear::{LinearAxis, STATES, State};
 
-/// Differences of the set-points that there is a bound by.
+/// Differences of the setpoints that there is a bound by.
 pub const ORDERS: usize = 3;
 
 /// Responses of one axis over a number of position periods.
 #[derive(Debug, Clone)]
 pub struct Response {
-    /// h(j, ·) of the first set-points; the last one of these holds for all that follow, shifted.
+    /// h(j, ·) of the first setpoints; the last one of these holds for all that follow, shifted.
     setpoint: Vec<Vec<f64>>,
     /// g, the largest lag first: ticks since the torque.
     torque: Vec<f64>,
@@ -118,7 +118,7 @@ impl Response {
         sums
     }
 
-    /// What bounds |e| up to instant `k`, from the largest `differences` of the set-points (first, second, third),
+    /// What bounds |e| up to instant `k`, from the largest `differences` of the setpoints (first, second, third),
     /// the largest torque and the largest feedforward.
     pub fn bound(&self, k: usize, differences: [f64; ORDERS], torque: f64, feedforward: f64) -> f64 {
         let by_setpoint = self.setpoint_norms[k].iter().zip(differences).map(|(norm, most)| norm * most);

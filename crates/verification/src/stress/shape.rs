@@ -1,4 +1,4 @@
-//! Set-points of one axis at random, within its limits by construction.
+//! Setpoints of one axis at random, within its limits by construction.
 
 use super::random::Random;
 use virtual_axes_core::config::LimitsConfig;

@@ -19,7 +19,7 @@ pub struct AxisFigures {
     pub limited_ticks: u64,
     /// Largest |i|, A.
     pub peak_current: f64,
-    /// Largest synchronised tracking error at a position instant, m or rad.
+    /// Largest synchronized tracking error at a position instant, m or rad.
     pub error: f64,
     /// Its bound, m or rad; none where the loop was not linear: a limit acted, or the guard.
     pub bound: Option<f64>,
@@ -149,7 +149,7 @@ impl AxisWatch {
         self.of_period.0
     }
 
-    /// The end of the trajectory. `foreseen`: the set-points came as they could be foreseen; `loaded`: the axis met a
+    /// The end of the trajectory. `foreseen`: the setpoints came as they could be foreseen; `loaded`: the axis met a
     /// load.
     pub fn finish(
         &self,

@@ -135,7 +135,7 @@ fn energy_from_nowhere_is_found() {
 
 #[test]
 fn an_error_that_theory_does_not_know_is_found() {
-    // A nanometre.
+    // A nanometer.
     assert_found(Check::Superposition, |_, _, s| s.delayed_psec += 1e-9);
     assert_found(Check::Bound, |_, _, s| s.delayed_psec += 0.1);
 }

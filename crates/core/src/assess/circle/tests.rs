@@ -2,14 +2,14 @@
 
 use super::*;
 
-const CENTRE: [f64; 2] = [-0.15, 0.02];
+const CENTER: [f64; 2] = [-0.15, 0.02];
 const R: f64 = 0.15;
 /// Width of a bin, rad: a tenth of a degree, as documented.
 const WIDTH: f64 = TAU / 3600.0;
 /// Rounding of distances of 0.15 m, m.
 const ROUNDING: f64 = 1e-15;
 
-/// Points of `turns` turns with a radius about a displaced centre, by the angle about that centre.
+/// Points of `turns` turns with a radius about a displaced center, by the angle about that center.
 fn points(turns: f64, offset: [f64; 2], radius: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
     const PER_TURN: f64 = 20_000.0;
     let count = (turns.abs() * PER_TURN).ceil() as u32;
@@ -17,13 +17,13 @@ fn points(turns: f64, offset: [f64; 2], radius: impl Fn(f64) -> f64) -> Vec<[f64
         let angle = turns.signum() * TAU * f64::from(k) / PER_TURN;
         let (sin, cos) = angle.sin_cos();
         let r = radius(angle);
-        [CENTRE[0] + offset[0] + r * cos, CENTRE[1] + offset[1] + r * sin]
+        [CENTER[0] + offset[0] + r * cos, CENTER[1] + offset[1] + r * sin]
     };
     (0..count).map(point).collect()
 }
 
 fn assessor(points: &[[f64; 2]]) -> CircleAssessor {
-    let mut assessor = CircleAssessor::new(CENTRE, R);
+    let mut assessor = CircleAssessor::new(CENTER, R);
     for [x, y] in points {
         assessor.push(*x, *y);
     }
@@ -40,9 +40,9 @@ fn assert_near(what: &str, value: f64, wanted: f64, tolerance: f64) {
     assert!((value - wanted).abs() <= tolerance, "{what}: {value:e}, wanted {wanted:e} ± {tolerance:e}");
 }
 
-/// The circle that minimises the sum of (d − ρ)², by Gauss and Newton, and the range of d about it.
+/// The circle that minimizes the sum of (d − ρ)², by Gauss and Newton, and the range of d about it.
 fn geometric_fit(points: &[[f64; 2]]) -> (f64, f64) {
-    let mut circle = Vector3::new(CENTRE[0], CENTRE[1], R);
+    let mut circle = Vector3::new(CENTER[0], CENTER[1], R);
     for _ in 0..20 {
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         for [x, y] in points {
@@ -89,22 +89,22 @@ fn a_displaced_circle_has_radial_deviation_of_its_offset_and_no_circular_deviati
         assert_near("Fmin", report.min, -e, 1e-7 * e + ROUNDING);
         assert_near("Fmax", report.max, e, 1e-7 * e + ROUNDING);
         assert_near("G", full.circular_deviation, 0.0, ROUNDING);
-        assert_near("x", full.centre[0], offset[0], ROUNDING);
-        assert_near("y", full.centre[1], offset[1], ROUNDING);
+        assert_near("x", full.center[0], offset[0], ROUNDING);
+        assert_near("y", full.center[1], offset[1], ROUNDING);
         assert_near("radius", full.radius_deviation, 0.0, ROUNDING);
     }
 }
 
 #[test]
-fn part_of_a_turn_that_is_run_twice_does_not_draw_the_centre() {
+fn part_of_a_turn_that_is_run_twice_does_not_draw_the_center() {
     let (_, full) = report(&points(1.37, [3e-4, 4e-4], |_| R + 1e-4));
-    assert_near("x", full.centre[0], 3e-4, ROUNDING);
-    assert_near("y", full.centre[1], 4e-4, ROUNDING);
+    assert_near("x", full.center[0], 3e-4, ROUNDING);
+    assert_near("y", full.center[1], 4e-4, ROUNDING);
     assert_near("radius", full.radius_deviation, 1e-4, ROUNDING);
     assert_near("G", full.circular_deviation, 0.0, ROUNDING);
 }
 
-/// An ellipse, its half axes R + h and R − h, by its eccentric angle; its centre by symmetry. It is turned
+/// An ellipse, its half axes R + h and R − h, by its eccentric angle; its center by symmetry. It is turned
 /// so that its vertices lie in the middle of a bin: on the edge of one the bins would cost nothing.
 fn ellipse(h: f64, offset: [f64; 2]) -> Vec<[f64; 2]> {
     let (sin_turn, cos_turn) = (50.5 * WIDTH).sin_cos();
@@ -112,8 +112,8 @@ fn ellipse(h: f64, offset: [f64; 2]) -> Vec<[f64; 2]> {
         let (sin, cos) = (TAU * f64::from(k) / 20_000.0).sin_cos();
         let (x, y) = ((R + h) * cos, (R - h) * sin);
         [
-            CENTRE[0] + offset[0] + cos_turn * x - sin_turn * y,
-            CENTRE[1] + offset[1] + sin_turn * x + cos_turn * y,
+            CENTER[0] + offset[0] + cos_turn * x - sin_turn * y,
+            CENTER[1] + offset[1] + sin_turn * x + cos_turn * y,
         ]
     };
     (0..20_000).map(point).collect()
@@ -139,7 +139,7 @@ fn a_displaced_ellipse_has_the_same_circular_deviation_within_the_width_of_a_bin
         let lost = 2.0 * h - full.circular_deviation;
         // Smooth, so the bin costs its square: a deviation h cos 2φ is 2 h w² lower a bin aside.
         assert!((-ROUNDING..=2.0 * (2.0 * h * WIDTH.powi(2))).contains(&lost), "{lost:e}");
-        assert_near("x", full.centre[0], offset[0], 1e-12);
+        assert_near("x", full.center[0], offset[0], 1e-12);
     }
 }
 
@@ -157,8 +157,8 @@ fn spikes_agree_with_a_fit_that_sees_all_points() {
         let points = with_spikes(offset);
         let (_, full) = report(&points);
         let (radius, range) = geometric_fit(&points);
-        let e = full.centre[0].hypot(full.centre[1]);
-        // Spikes on a few degrees draw the two kinds of centre apart by far less than f²/R.
+        let e = full.center[0].hypot(full.center[1]);
+        // Spikes on a few degrees draw the two kinds of center apart by far less than f²/R.
         let form = 1e-10;
         assert_near("radius", full.radius_deviation, radius, 1e-11);
         let lost = range - full.circular_deviation;
@@ -207,7 +207,7 @@ fn an_arc_has_radial_deviations_only() {
 #[test]
 fn circles_that_are_not_the_same_are_not_compared() {
     let circle = assessor(&points(1.0, [0.0; 2], |_| R));
-    let mut other = CircleAssessor::new(CENTRE, R + 1e-3);
+    let mut other = CircleAssessor::new(CENTER, R + 1e-3);
     for [x, y] in points(-1.0, [0.0; 2], |_| R) {
         other.push(x, y);
     }
@@ -216,7 +216,7 @@ fn circles_that_are_not_the_same_are_not_compared() {
 
 #[test]
 fn no_point_no_figure() {
-    assert_eq!(CircleAssessor::new(CENTRE, R).report(), None);
+    assert_eq!(CircleAssessor::new(CENTER, R).report(), None);
 }
 
 #[test]

@@ -75,10 +75,10 @@ pub(super) fn from_line(tip: Vector3<f64>, from: Vector3<f64>, slope: Vector3<f6
 #[inline(always)]
 pub(super) fn from_axis(
     tip: Vector3<f64>,
-    centre: Vector3<f64>,
+    center: Vector3<f64>,
     plane: &[Vector3<f64>; 3],
 ) -> ([f64; 3], f64) {
-    let out = tip - centre;
+    let out = tip - center;
     let [x, y, z] = plane.map(|vector| vector.dot(&out));
     ([x, y, z], (x * x + y * y).sqrt())
 }
@@ -160,11 +160,11 @@ impl PathTracker {
                 tips(poses).all(|tip| from_line(tip, *from, *slope) > length + CLEAR)
             }
             // The begin of what is searched is further off than the end, less than a quarter of a turn before.
-            Shape::Circle { centre, plane, radius, turn, .. } if BACK * turn.abs() < 1.0 && length > BACK => {
+            Shape::Circle { center, plane, radius, turn, .. } if BACK * turn.abs() < 1.0 && length > BACK => {
                 let (least, direction) = (FORWARDS * radius * radius, turn.signum());
-                let ([x0, y0, _], _) = from_axis(first.point, *centre, plane);
+                let ([x0, y0, _], _) = from_axis(first.point, *center, plane);
                 tips(poses).all(|tip| {
-                    let ([x, y, _], _) = from_axis(tip, *centre, plane);
+                    let ([x, y, _], _) = from_axis(tip, *center, plane);
                     (x0 * y - y0 * x) * direction > least && x0 * x + y0 * y > 0.0
                 })
             }
@@ -238,10 +238,10 @@ impl PathTracker {
     /// and none is behind its end if the last one is not behind the end that the first one had. As less than a
     /// turn is searched there is one passage only for each.
     fn follow_circle(&mut self, poses: &Poses, reach: Reach, distances: &mut Vec<f64>) -> bool {
-        let Shape::Circle { centre, plane, radius, turn, .. } = &self.shapes[reach.block] else {
+        let Shape::Circle { center, plane, radius, turn, .. } = &self.shapes[reach.block] else {
             return false;
         };
-        let (centre, plane, radius, turn) = (*centre, *plane, *radius, *turn);
+        let (center, plane, radius, turn) = (*center, *plane, *radius, *turn);
         let first = self.s;
         let one_turn = reach.high[1] - reach.low < TAU / turn.abs() - CLEAR;
         if !(one_turn && first > reach.low + CLEAR && first < reach.high[0] - CLEAR) {
@@ -253,7 +253,7 @@ impl PathTracker {
         distances.resize(poses.len(), 0.0);
         let places = xs.iter_mut().zip(ys.iter_mut()).zip(&mut *distances);
         for (((x_out, y_out), distance), tip) in places.zip(tips(poses)) {
-            let ([x, y, z], off) = from_axis(tip, centre, &plane);
+            let ([x, y, z], off) = from_axis(tip, center, &plane);
             (*x_out, *y_out) = (x, y);
             *distance = from_circle(off, z, radius);
         }

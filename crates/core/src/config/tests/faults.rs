@@ -56,8 +56,8 @@ fn misspelt_joints_is_not_reported_as_missing() {
 
 #[test]
 fn key_like_no_other_gets_no_misleading_advice() {
-    let text = mikron_with("    periods:", "    colour: red\n    periods:");
-    assert_refused(&text, "colour", "my.yaml:{line}: unknown parameter colour");
+    let text = mikron_with("    periods:", "    color: red\n    periods:");
+    assert_refused(&text, "color", "my.yaml:{line}: unknown parameter color");
 }
 
 #[test]

@@ -189,7 +189,7 @@ fn mikron_has_every_value_of_the_model() {
 }
 
 #[test]
-fn linear_motors_count_in_metres_and_newtons() {
+fn linear_motors_count_in_meters_and_newtons() {
     let machine = machine("linear_motor_center");
     let x = &machine.axes()[0];
     assert_eq!((x.kind, x.transmission_ratio), (AxisKind::Linear, 1.0));

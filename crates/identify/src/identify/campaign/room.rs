@@ -1,11 +1,11 @@
 //! What a campaign has: places, speeds, time to settle.
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, LimitsConfig, MachineConfig};
-use virtual_axes_core::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, REVOLUTION, RPM, seconds};
+use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, REVOLUTION, RPM, seconds};
 
 use super::{CampaignError, Options};
 
-/// Part of the range at each of its ends that set-points stay away from: room for what the axis overshoots.
+/// Part of the range at each of its ends that setpoints stay away from: room for what the axis overshoots.
 const MARGIN: f64 = 0.05;
 /// Part of Vmax and of the motor's speed that is used: the rest is for the controller.
 pub(super) const SPEED_RESERVE: f64 = 0.95;
@@ -38,7 +38,7 @@ pub(super) struct Units {
 impl Units {
     pub fn of(axis: &AxisConfig) -> Self {
         match axis.kind {
-            AxisKind::Linear => Units { length: ("mm", MILLIMETRE), speed: ("m/min", METRE_PER_MINUTE) },
+            AxisKind::Linear => Units { length: ("mm", MILLIMETER), speed: ("m/min", METER_PER_MINUTE) },
             AxisKind::Rotary => Units { length: ("deg", DEGREE), speed: ("rpm", RPM) },
         }
     }

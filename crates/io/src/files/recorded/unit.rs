@@ -4,14 +4,14 @@ use std::fmt;
 
 use crate::files::shortened;
 use virtual_axes_core::config::{AxisConfig, AxisKind};
-use virtual_axes_core::units::{DEGREE, METRE_PER_MINUTE, MILLIMETRE, MILLISECOND, MINUTE, RPM};
+use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, MILLISECOND, MINUTE, RPM};
 
 /// What is recorded of an axis, as in [`RawRecording`](virtual_axes_identify::recording::RawRecording).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Channel {
     /// Stamps.
     Time,
-    /// Set-point at the entrance of the controller.
+    /// Setpoint at the entrance of the controller.
     Psec,
     /// Actual position.
     Position,
@@ -82,7 +82,7 @@ impl Channel {
         match self {
             Channel::Time => vec![("s", 1.0), ("ms", MILLISECOND), ("us", MICRO), ("ns", NANO)],
             Channel::Psec | Channel::Position if linear => {
-                vec![("m", 1.0), ("mm", MILLIMETRE), ("um", MICRO)]
+                vec![("m", 1.0), ("mm", MILLIMETER), ("um", MICRO)]
             }
             Channel::Psec | Channel::Position => {
                 vec![("rad", 1.0), ("deg", DEGREE), ("mdeg", DEGREE * MILLI)]
@@ -117,7 +117,7 @@ const NANO: f64 = 1e-9;
 
 /// Speeds of a linear axis in m/s.
 const LINEAR_SPEEDS: [(&str, f64); 4] =
-    [("m/s", 1.0), ("mm/s", MILLIMETRE), ("m/min", METRE_PER_MINUTE), ("mm/min", MILLIMETRE / MINUTE)];
+    [("m/s", 1.0), ("mm/s", MILLIMETER), ("m/min", METER_PER_MINUTE), ("mm/min", MILLIMETER / MINUTE)];
 /// Speeds of a rotary axis in rad/s.
 const ANGULAR_SPEEDS: [(&str, f64); 4] =
     [("rad/s", 1.0), ("deg/s", DEGREE), ("deg/min", DEGREE / MINUTE), ("rpm", RPM)];

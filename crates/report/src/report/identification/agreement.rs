@@ -9,7 +9,7 @@ use super::super::unit::Unit;
 use super::recordings::{bands, of_one, over_time};
 use super::words::{columns, determination, optional, with_unit};
 use super::{IdentificationCheck, IdentificationPage, Step};
-use virtual_axes_core::units::{MILLIMETRE, seconds};
+use virtual_axes_core::units::{MILLIMETER, seconds};
 use virtual_axes_identify::identify::{
     Agreement, Comparison, Deviation, Experiment, Input, SegmentKind, Simulated,
 };
@@ -25,13 +25,13 @@ const MOVING: f64 = 0.005;
 /// Rest that is shown about a move, part of it.
 const ABOUT: f64 = 0.2;
 /// Tracking errors are shown as errors up to here, then as positions, m or rad.
-const LARGE_ERROR: f64 = MILLIMETRE;
+const LARGE_ERROR: f64 = MILLIMETER;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let mut section = page.step("Measured against simulated", Step::Agreement);
     let pairs: Vec<(&Input, &Agreement)> = page.inputs.iter().zip(&page.identification.agreements).collect();
     section.paragraphs.push(
-        "The axis as it was found, in closed loop on the recorded set-points (Prévost fig. 6). Deviations are simulated \
+        "The axis as it was found, in closed loop on the recorded setpoints (Prévost fig. 6). Deviations are simulated \
          minus measured."
             .to_owned(),
     );
@@ -257,16 +257,16 @@ fn largest_of(panels: &[Panel]) -> f64 {
 /// Measured current against the one of inverse dynamics.
 fn inverse_chart(page: &IdentificationPage, input: &Input, agreement: &Agreement) -> Option<Chart> {
     let (signals, inverse) = (input.signals, agreement.inverse.as_ref()?);
-    let mut modelled = Vec::new();
+    let mut modeled = Vec::new();
     let mut deviation = Vec::new();
-    for (number, currents) in &inverse.modelled {
+    for (number, currents) in &inverse.modeled {
         let Some(span) = signals.spans.get(*number) else { continue };
         let time = |i: usize| span.start + i as f64 * signals.period;
-        modelled.extend(currents.iter().enumerate().map(|(i, current)| [time(i), *current]));
-        modelled.push([span.start, f64::NAN]);
+        modeled.extend(currents.iter().enumerate().map(|(i, current)| [time(i), *current]));
+        modeled.push([span.start, f64::NAN]);
         let recorded = span.current.iter().flatten();
         let pairs = currents.iter().zip(recorded).enumerate();
-        deviation.extend(pairs.map(|(i, (modelled, recorded))| [time(i), modelled - recorded]));
+        deviation.extend(pairs.map(|(i, (modeled, recorded))| [time(i), modeled - recorded]));
         deviation.push([span.start, f64::NAN]);
     }
     let measured = over_time(signals, &|span| span.current.clone());
@@ -280,7 +280,7 @@ fn inverse_chart(page: &IdentificationPage, input: &Input, agreement: &Agreement
             ChartAxis::new("Current", Unit::AMPERE),
             vec![
                 Series::new("measured", SeriesStyle::Measured, measured),
-                Series::new("modelled", SeriesStyle::Simulated, modelled),
+                Series::new("modeled", SeriesStyle::Simulated, modeled),
             ],
         ),
         Panel::new(

@@ -116,7 +116,7 @@ impl IdentificationPage<'_> {
         self.axis().kind()
     }
 
-    /// Whether what moves is a mass: no screw turns a millimetre into radians.
+    /// Whether what moves is a mass: no screw turns a millimeter into radians.
     fn has_linear_motor(&self) -> bool {
         self.kind() == AxisKind::Linear && self.axis().transmission_ratio == 1.0
     }

@@ -8,8 +8,8 @@ use virtual_axes_report::report::{
 };
 
 const KILOGRAM: Unit = Unit::new("kg", 1.0, 1e-3);
-/// m/s in a metre per minute.
-const METRE_PER_MINUTE: f64 = 1.0 / 60.0;
+/// m/s in a meter per minute.
+const METER_PER_MINUTE: f64 = 1.0 / 60.0;
 
 /// An axis of a chart.
 pub fn axis(quantity: &str, unit: Unit) -> ChartAxis {
@@ -30,7 +30,7 @@ pub fn noise(length: usize, seed: u64) -> Vec<f64> {
 
 /// A law of friction, A over m/s.
 fn friction(velocity: f64) -> f64 {
-    let v = velocity.abs() / METRE_PER_MINUTE;
+    let v = velocity.abs() / METER_PER_MINUTE;
     velocity.signum() * (2.4 + 1.6 * (-v / 0.8).exp() + 0.12 * v)
 }
 
@@ -39,12 +39,12 @@ fn friction_law() -> Chart {
         0.05, 0.1, 0.2, 0.5, 0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.0,
         20.0,
     ];
-    let both = speeds.iter().flat_map(|v| [-v, *v]).map(|v| v * METRE_PER_MINUTE);
+    let both = speeds.iter().flat_map(|v| [-v, *v]).map(|v| v * METER_PER_MINUTE);
     let scatter = noise(2 * speeds.len(), 5);
     let measured: Vec<[f64; 2]> = both.zip(&scatter).map(|(v, n)| [v, friction(v) + 0.15 * n]).collect();
     let (fast, slow): (Vec<_>, Vec<_>) = measured.into_iter().partition(|p| p[0] > 0.0);
     let errors = vec![0.2; speeds.len()];
-    let curve = |sign: f64| (1..=400).map(move |i| sign * f64::from(i) * 0.05 * METRE_PER_MINUTE);
+    let curve = |sign: f64| (1..=400).map(move |i| sign * f64::from(i) * 0.05 * METER_PER_MINUTE);
     let fitted: Vec<[f64; 2]> = curve(-1.0)
         .collect::<Vec<_>>()
         .into_iter()
@@ -65,7 +65,7 @@ fn friction_law() -> Chart {
         )
     };
     let note = "R² 0.998, bars: standard deviation".to_owned();
-    Chart { note, ..Chart::new("Friction law", axis("Velocity", Unit::METRE_PER_MINUTE), vec![panel]) }
+    Chart { note, ..Chart::new("Friction law", axis("Velocity", Unit::METER_PER_MINUTE), vec![panel]) }
 }
 
 fn inertia() -> Chart {
@@ -155,8 +155,8 @@ pub fn validation(length: usize) -> Chart {
             "Measured and simulated",
             axis("Time", Unit::SECOND),
             vec![
-                panel("Deviation", Unit::MICROMETRE, &deviation, 0.9),
-                panel("Velocity", Unit::METRE_PER_MINUTE, &velocity, 1.02),
+                panel("Deviation", Unit::MICROMETER, &deviation, 0.9),
+                panel("Velocity", Unit::METER_PER_MINUTE, &velocity, 1.02),
                 panel("Current", Unit::AMPERE, &current, 0.85),
             ],
         )

@@ -186,7 +186,7 @@ pub fn five_axes(every: u64) -> Recording {
 /// Figures of the axes that move, as on a terminal.
 pub fn figures(recording: &Recording) -> Table {
     let peak = |values: &[f64]| values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    let columns = [("axis", ""), ("largest synchronised error", "µm, mdeg"), ("peak current", "A")];
+    let columns = [("axis", ""), ("largest synchronized error", "µm, mdeg"), ("peak current", "A")];
     let rows = recording.axes.iter().filter(|a| a.moves).map(|a| {
         let unit = if a.kind == AxisKind::Linear { 1e6 } else { 180e3 / std::f64::consts::PI };
         let error = peak(&a.synchronized_tracking_error) * unit;
