@@ -24,7 +24,7 @@ PAGE = ROOT / "docs" / "reproduction.md"
 
 HEAD = """# The paper, figure by figure
 
-Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modeling for the simulation of tool path tracking in
+Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling for the simulation of tool path tracking in
 multi-axis High Speed Machining*. Its figures compare measurements with a simulation; what it prints of
 them stands in the second column. The third is what this package's model is specified to have, the last
 what `virtual_axes` makes of it, by the command above each table. Add `--report page.html` to a command

@@ -1,7 +1,7 @@
 //! The schema: one table of parameters from which the check of files, the typed configuration,
 //! the ROS descriptors and the table of the README are derived.
 //!
-//! Equation numbers are those of Prévost (Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modeling
+//! Equation numbers are those of Prévost (Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling
 //! for the simulation of tool path tracking in multi-axis High Speed Machining*).
 
 use super::definition::DefaultValue::{Flag, Integer, Number, Text};
