@@ -29,8 +29,14 @@ while [ $# -gt 0 ]; do
 done
 command -v cargo >/dev/null || { echo "demo: needs cargo, Rust's build tool (https://rustup.rs)" >&2; exit 1; }
 
-"$root/tools/setup.sh"
+# The set-up mostly waits for the network and for single processes; cargo builds beside it.
+mkdir -p "$root/.build/logs"
+"$root/tools/setup.sh" >"$root/.build/logs/demo-setup.log" 2>&1 </dev/null &
+setup=$!
+trap 'kill -TERM "$setup" 2>/dev/null || true' EXIT
 (cd "$root" && cargo build --release --locked --bins)
+wait "$setup" || { cat "$root/.build/logs/demo-setup.log" >&2; exit 1; }
+trap - EXIT
 # shellcheck source=/dev/null
 source "$root/.build/env.sh"
 
@@ -38,7 +44,7 @@ source "$root/.build/env.sh"
 export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 unset ROS_STATIC_PEERS ROS_LOCALHOST_ONLY
 
-# demo.py stops the node however it ends; this shell only makes sure that it is told to.
+# demo.py stops the node on every exit; this shell forwards signals to it.
 python "$root/test_py/demo.py" "${options[@]}" &
 demo=$!
 trap 'kill -TERM "$demo" 2>/dev/null || true; wait "$demo" || true' EXIT
