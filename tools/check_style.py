@@ -37,7 +37,8 @@ PERSONS = (
 BANNED = re.compile(rf"\b(?:{PERSONS})\b", re.IGNORECASE)
 BRITISH = re.compile(
     r"\b\w*(?:metres?|centred?|centres|colours?|coloured|neighbours?|behaviours?|licence|cancelled|cancelling|"
-    r"labelled|modelled|(?<!Feed drive )modelling|(?:synchron|discret|minim|maxim|normal|serial|optim|initial|linear|quant|parametr|"
+    r"labelled|modelled|(?<!Feed drive )modelling|"
+    r"(?:synchron|discret|minim|maxim|normal|serial|optim|initial|linear|quant|parametr|"
     r"recogn|organ|summar|util|stabil|visual|vector|general|special)is(?:e[ds]?|ing|ation)s?)\b",
     re.IGNORECASE,
 )
@@ -103,7 +104,7 @@ def documentation(file: str, lines: list[str]) -> Iterator[Violation]:
             continue
         function = FUNCTION.match(line) if number <= shipped else None
         if opening and function and not VERB.match(opening[1]):
-            yield Violation(file, opening[0], f"no third-person verb opens the documentation of {function[4]}()", opening[1])
+            yield Violation(file, opening[0], f"no third-person verb opens the docs of {function[4]}()", opening[1])
         opening = None
 
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""The crates that this package is built of: versions, licenses, sources; docs/dependencies.md is their table.
+"""Checks the crates of the workspace and the fuzz targets; writes their table in docs/dependencies.md.
 
     tools/dependencies.py               fails if the table is out of date, a license is not in deny.toml's list,
-                                        or a crate does not come from the registry
+                                        a crate does not come from the registry, or a member of the workspace
+                                        depends on what its layer excludes
     tools/dependencies.py --write       writes the table
     tools/dependencies.py --advisories  asks cargo-audit or cargo-deny, where one of them is installed
 
-What cargo says of the lock file is the source, of the node's as of the fuzz targets'.
+The source is `cargo metadata` of both lock files.
 """
 
 from __future__ import annotations
@@ -26,12 +27,20 @@ ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "docs" / "dependencies.md"
 BEGIN, END = "<!-- crates -->\n", "<!-- /crates -->\n"
 PLATFORMS = ("x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu")
+FILES_AND_NETWORK = {"clap", "mcap", "rustdds", "ros2-client", "tokio"}
+LAYERS: dict[str, set[str]] = {
+    "virtual_axes_core": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml", "serde_json"},
+    "virtual_axes_identify": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml"},
+    "virtual_axes_io": FILES_AND_NETWORK - {"mcap"},
+    "virtual_axes_report": FILES_AND_NETWORK,
+}
+"""Crates that a member of the workspace must not depend on, directly or through others."""
 REGISTRY = "registry+https://github.com/rust-lang/crates.io-index"
 PROGRAMS, SECURITY, TESTS, FUZZ = "programs", "feature security", "tests and benchmarks", "fuzz targets"
 
 
 def metadata(manifest: Path, *features: str) -> dict[str, Any]:
-    """What cargo knows of a package, by its lock file, on all platforms together."""
+    """Returns cargo's metadata of a package by its lock file, for all platforms together."""
     words = ["cargo", "metadata", "--locked", "--format-version", "1"]
     words += [word for platform in PLATFORMS for word in ("--filter-platform", platform)]
     done = subprocess.run([*words, "--manifest-path", manifest, *features], capture_output=True, text=True)
@@ -41,9 +50,9 @@ def metadata(manifest: Path, *features: str) -> dict[str, Any]:
 
 
 def reached(known: dict[str, Any], with_tests: bool) -> set[str]:
-    """Ids of the packages that the first one needs, and of those they need."""
+    """Returns the ids of packages that the programs depend on; with tests, all members of the workspace."""
     nodes = {node["id"]: node for node in known["resolve"]["nodes"]}
-    found, left = set(), [known["resolve"]["root"]]
+    found, left = set(), list(known["workspace_members"] if with_tests else [known["resolve"]["root"]])
     while left:
         package = left.pop()
         if package in found:
@@ -57,7 +66,7 @@ def reached(known: dict[str, Any], with_tests: bool) -> set[str]:
 
 
 def is_allowed(expression: str, allowed: set[str]) -> bool:
-    """Whether an SPDX expression can be met by the licenses of the list; an exception only gives more."""
+    """Returns true if licenses of the list satisfy an SPDX expression."""
     expression = re.sub(r"\s+WITH\s+[\w.-]+", "", expression.replace("/", " OR "))
     known = {"OR": "or", "AND": "and"}
     words = re.sub(r"[\w.+-]+", lambda word: known.get(word[0], str(word[0] in allowed)), expression)
@@ -70,13 +79,13 @@ def is_allowed(expression: str, allowed: set[str]) -> bool:
 
 
 def clarified(rules: dict[str, Any], package: dict[str, Any]) -> str:
-    """A package's license, as it says itself or as somebody has read its files."""
+    """Returns the license of a package from its manifest or from the clarifications in deny.toml."""
     said = {rule["crate"]: rule["expression"] for rule in rules.get("clarify", [])}
     return package["license"] or said.get(package["name"], "not stated")
 
 
 def crates(rules: dict[str, Any]) -> list[tuple[str, str, str, str, str | None]]:
-    """Name, version, license, what needs it, source; by name."""
+    """Returns name, version, license, dependent and source of each crate, sorted by name."""
     own = ROOT / "Cargo.toml"
     default, secured, fuzz = metadata(own), metadata(own, "--all-features"), metadata(ROOT / "fuzz" / "Cargo.toml")
     where: dict[tuple[str, str], str] = {}
@@ -101,8 +110,21 @@ def crates(rules: dict[str, Any]) -> list[tuple[str, str, str, str, str | None]]
     return rows
 
 
+def layer_faults() -> list[str]:
+    """Returns the dependencies of members of the workspace that their layers exclude."""
+    faults = []
+    for member, excluded in LAYERS.items():
+        words = ["cargo", "tree", "--locked", "-p", member, "-e", "normal", "--prefix", "none", "--format", "{p}"]
+        tree = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
+        if tree.returncode:
+            raise SystemExit(f"dependencies: {tree.stderr.strip()}")
+        needed = {line.split()[0] for line in tree.stdout.splitlines()}
+        faults += [f"{member} depends on {name}" for name in sorted(needed & excluded)]
+    return faults
+
+
 def advisories() -> int:
-    """Ask who knows the advisories, with all that they say."""
+    """Runs cargo-audit or cargo-deny and returns its status."""
     for program, words in (("cargo-audit", ["audit"]), ("cargo-deny", ["deny", "check"])):
         if shutil.which(program):
             return subprocess.run(["cargo", *words], cwd=ROOT).returncode
@@ -111,7 +133,7 @@ def advisories() -> int:
 
 
 def main() -> int:
-    """Take the command line."""
+    """Runs the checks that the command line selects."""
     words = options.parser(__doc__)
     words.add_argument("--write", action="store_true")
     words.add_argument("--advisories", action="store_true")
@@ -127,6 +149,9 @@ def main() -> int:
             faults.append(f"{name} {version}: license {license}")
         if source != REGISTRY:
             faults.append(f"{name} {version}: from {source}")
+    layers = layer_faults()
+    for fault in layers:
+        print(f"dependencies: {fault}, which LAYERS of tools/dependencies.py excludes", file=sys.stderr)
     for fault in faults:
         print(f"dependencies: {fault}, which deny.toml does not allow", file=sys.stderr)
     head = "| crate | version | license | needed by |\n|---|---|---|---|\n"
@@ -140,7 +165,7 @@ def main() -> int:
         faults.append("table")
         print("dependencies: docs/dependencies.md is out of date: tools/dependencies.py --write", file=sys.stderr)
     print(f"{len(rows)} crates, {sum(what == PROGRAMS for *_, what, _ in rows)} of them in the programs")
-    return bool(faults)
+    return bool(faults or layers)
 
 
 if __name__ == "__main__":
