@@ -9,7 +9,7 @@ pub mod control;
 pub mod design;
 pub mod drive;
 pub mod kinematics;
-pub mod lanes;
+pub mod simd;
 pub mod machine;
 pub mod path;
 pub mod scenario;

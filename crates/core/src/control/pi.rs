@@ -1,7 +1,7 @@
 //! PI controller with feedforward, output limit and anti-windup.
 
 use crate::config::PiConfig;
-use crate::lanes::{Number, limited, numbers};
+use crate::simd::{Number, limited, numbers};
 
 numbers! {
     /// A sampled PI controller whose integral is in units of its output.

@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_1_PI, LN_2, LOG2_E, PI};
 
-use crate::lanes::{Number, limited, numbers};
+use crate::simd::{Number, limited, numbers};
 
 /// 1.5·2⁵²: a number that is added to it is rounded to an integer, which then stands in its lowest bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;

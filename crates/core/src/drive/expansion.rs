@@ -4,7 +4,7 @@
 //! short polynomial, `e^{b(v+δ)} = e^{bv} e^{bδ}`, and both exponentials of the law make one polynomial in δ.
 
 use super::elementary::{Exponential, MAX_EXPONENT};
-use crate::lanes::{Number, limited, numbers};
+use crate::simd::{Number, limited, numbers};
 
 /// Largest |x| for which [`POWERS`] is e^x.
 const REACH: f64 = 0.125;

@@ -3,7 +3,7 @@
 use super::elementary::Exponential;
 use super::expansion::{Expansion, Pair};
 use crate::config::{AxisKind, FrictionConfig};
-use crate::lanes::{Number, numbers};
+use crate::simd::{Number, numbers};
 use crate::units::{METER_PER_MINUTE, RPM};
 
 /// Velocity up to which the law was fitted, m/min or rev/min (Prévost eq. 3).

@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::elementary::sine;
 use crate::config::GravityConfig;
-use crate::lanes::{Number, numbers};
+use crate::simd::{Number, numbers};
 
 /// Largest |x| for which the polynomials are sine and cosine, rad.
 const REACH: f64 = 1.0 / 128.0;

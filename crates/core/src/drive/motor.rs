@@ -7,7 +7,7 @@ use nalgebra::SMatrix;
 use super::DriveError;
 use super::response::Response;
 use crate::config::MotorConfig;
-use crate::lanes::{Number, limited, numbers};
+use crate::simd::{Number, limited, numbers};
 
 /// Largest entry of the system matrix times the tick with which a motor is slow: no interval is halved.
 const SLOW: f64 = 0.5;

@@ -2,7 +2,7 @@
 
 use super::{DriveError, Friction, Gravity, Incline, Motor, MotorState};
 use crate::config::{AxisConfig, MotorConfig};
-use crate::lanes::{Number, numbers};
+use crate::simd::{Number, numbers};
 
 /// Torques that acted over a tick, N·m at the motor (N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -9,7 +9,7 @@ use pulp::Simd;
 
 use crate::control::{Pi, PiState};
 use crate::drive::{Expansion, Incline, MotorState, Plant};
-use crate::lanes::{Fetch, Number, Twice, Vector, numbers};
+use crate::simd::{Fetch, Number, Twice, Vector, numbers};
 
 numbers! {
     /// What an axis is, inside its position loop.

@@ -18,18 +18,18 @@ macro_rules! numbers {
             /// The same of another kind: what `of` makes of each number.
             #[inline(always)]
             pub(crate) fn each<'a, M>(&'a self, of: &mut impl FnMut(&'a N) -> M) -> $name<M> {
-                $name { $($field: $crate::lanes::numbers!(@each ($type $($number)?), self.$field, of),)* }
+                $name { $($field: $crate::simd::numbers!(@each ($type $($number)?), self.$field, of),)* }
             }
 
             /// Acts on each number and its place in `others`.
             #[inline(always)]
             pub(crate) fn zip<M>(&self, others: &mut $name<M>, act: &mut impl FnMut(&N, &mut M)) {
-                $($crate::lanes::numbers!(@zip ($type $($number)?), self.$field, others.$field, act);)*
+                $($crate::simd::numbers!(@zip ($type $($number)?), self.$field, others.$field, act);)*
             }
         }
 
         #[allow(dead_code, reason = "each structure is used in its own way")]
-        impl<N: $crate::lanes::Number> $name<N> {
+        impl<N: $crate::simd::Number> $name<N> {
             /// `other` where the mask holds, else itself.
             #[inline(always)]
             pub(crate) fn or(&self, mut other: Self, mask: N::Mask) -> Self {
@@ -62,7 +62,7 @@ macro_rules! numbers {
 
             /// The lanes at `place`, counted in as many as `N` are.
             #[inline(always)]
-            pub(crate) fn fetch<S: pulp::Simd, N: $crate::lanes::Fetch<S>>(
+            pub(crate) fn fetch<S: pulp::Simd, N: $crate::simd::Fetch<S>>(
                 &self,
                 simd: S,
                 place: usize,
@@ -72,7 +72,7 @@ macro_rules! numbers {
 
             /// Puts them there.
             #[inline(always)]
-            pub(crate) fn put<S: pulp::Simd, N: $crate::lanes::Fetch<S>>(
+            pub(crate) fn put<S: pulp::Simd, N: $crate::simd::Fetch<S>>(
                 &mut self,
                 place: usize,
                 value: &$name<N>,
