@@ -37,11 +37,11 @@ pub const MICROSECOND_NS: Nanoseconds = 1_000;
 /// A value as messages tell it: with twelve significant digits at most, which leaves out what rounding adds,
 /// and with a power of ten where it is large or small.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Told(pub f64);
+pub struct Rounded(pub f64);
 
-impl fmt::Display for Told {
+impl fmt::Display for Rounded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Told(value) = *self;
+        let Rounded(value) = *self;
         let size = value.abs();
         let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
         match size == 0.0 || !size.is_finite() || (1e-5..1e12).contains(&size) {
@@ -72,7 +72,7 @@ mod tests {
             (f64::NAN, "NaN"),
             (f64::INFINITY, "inf"),
         ] {
-            assert_eq!(Told(value).to_string(), told);
+            assert_eq!(Rounded(value).to_string(), told);
         }
     }
 }

@@ -1,68 +1,68 @@
-//! Numbers of several axes side by side, so that one instruction acts on many of them.
+//! SIMD arithmetic over axes: several axes per instruction, one axis per lane.
 //!
-//! What is reckoned in every tick is written once, over a [`Number`]: an `f64`, or a [`Vector`] that holds
-//! those of several axes. A structure of numbers is declared by the macro `numbers`: `Motor` is that of one axis,
-//! `Motor<[f64; L]>` are those of `L` axes as they stand in memory, `Motor<Vector<S>>` those of a few of them
-//! as they are reckoned with. Each operation gives the same bits in all three.
+//! The code of a current cycle is written once, generic over [`SimdReal`]: an `f64` for one axis, or a [`Vector`]
+//! with one lane per axis. The macro `soa_struct` declares structure-of-arrays types: `Motor` holds one axis,
+//! `Motor<[f64; L]>` holds `L` axes in memory, `Motor<Vector<S>>` holds the lanes of one SIMD register. Each
+//! operation gives bit-identical results in all three.
 
-mod numbers;
-mod twice;
+mod soa;
+mod unroll;
 mod vector;
 
 use std::fmt::Debug;
 use std::ops::{Add, Mul, Neg, Sub};
 
-pub(crate) use numbers::numbers;
-pub use twice::Twice;
-pub use vector::{Fetch, Vector};
+pub(crate) use soa::soa_struct;
+pub use unroll::Unroll2;
+pub use vector::{SimdLoad, Vector};
 
-/// What the recurrence of an axis is reckoned in.
-pub trait Number:
+/// Real number type of the drive model: scalar or SIMD vector.
+pub trait SimdReal:
     Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// Where a comparison holds.
+    /// Result of a comparison, per lane.
     type Mask: Copy;
 
-    /// A constant.
-    fn constant(self, value: f64) -> Self;
+    /// Returns `value` in all lanes. `self` only supplies the instruction set.
+    fn splat(self, value: f64) -> Self;
 
-    /// `self · factor + addend`, rounded once.
+    /// Returns `self · factor + addend` with one rounding.
     fn mul_add(self, factor: Self, addend: Self) -> Self;
 
-    /// |self|.
+    /// Returns the absolute value.
     fn abs(self) -> Self;
 
-    /// `self` where it is smaller, else `other`: also where one of the two is not a number.
+    /// Returns `self` where it is smaller than `other`, else `other`, including where one of them is NaN.
     fn min(self, other: Self) -> Self;
 
-    /// `self` where it is larger, else `other`: also where one of the two is not a number.
+    /// Returns `self` where it is larger than `other`, else `other`, including where one of them is NaN.
     fn max(self, other: Self) -> Self;
 
-    /// Where `self` is smaller.
-    fn less(self, other: Self) -> Self::Mask;
+    /// Compares lanes: `self < other`.
+    fn simd_lt(self, other: Self) -> Self::Mask;
 
-    /// Where `self` is smaller or equal.
-    fn at_most(self, other: Self) -> Self::Mask;
+    /// Compares lanes: `self ≤ other`.
+    fn simd_le(self, other: Self) -> Self::Mask;
 
-    /// `self` where the mask holds, else `other`.
+    /// Returns `self` where `mask` holds, else `other`.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
 
-    /// Whether it is larger than `limit` anywhere.
-    fn exceeds(self, limit: f64) -> bool;
+    /// Returns true if any lane is larger than `limit`.
+    fn any_gt(self, limit: f64) -> bool;
 
-    /// `self · 2^k`, where `integer` is 1.5·2⁵² + k: k stands in its lowest bits. The product must be a normal
-    /// number.
+    /// Returns `self · 2^k` for `integer` = 1.5·2⁵² + k, which has k in its lowest bits. The product must be a
+    /// normal number.
     fn times_power_of_two(self, integer: Self) -> Self;
 }
 
-/// Bits of the fraction of an f64.
+/// Number of fraction bits of an f64.
 const FRACTION_BITS: u32 = 52;
 
-impl Number for f64 {
+impl SimdReal for f64 {
     type Mask = bool;
 
     #[inline(always)]
-    fn constant(self, value: f64) -> f64 {
+    fn splat(self, value: f64) -> f64 {
         value
     }
 
@@ -87,12 +87,12 @@ impl Number for f64 {
     }
 
     #[inline(always)]
-    fn less(self, other: f64) -> bool {
+    fn simd_lt(self, other: f64) -> bool {
         self < other
     }
 
     #[inline(always)]
-    fn at_most(self, other: f64) -> bool {
+    fn simd_le(self, other: f64) -> bool {
         self <= other
     }
 
@@ -102,20 +102,20 @@ impl Number for f64 {
     }
 
     #[inline(always)]
-    fn exceeds(self, limit: f64) -> bool {
+    fn any_gt(self, limit: f64) -> bool {
         self > limit
     }
 
     #[inline(always)]
     fn times_power_of_two(self, integer: f64) -> f64 {
-        // k is added to the exponent.
+        // Adds k to the exponent field.
         f64::from_bits(self.to_bits().wrapping_add(integer.to_bits() << FRACTION_BITS))
     }
 }
 
-/// `value` within ±`limit`; NaN stays what it is.
+/// Clamps `value` to ±`limit`; NaN stays NaN.
 #[inline(always)]
-pub fn limited<N: Number>(value: N, limit: N) -> N {
+pub fn clamp_abs<N: SimdReal>(value: N, limit: N) -> N {
     (-limit).max(limit.min(value))
 }
 
@@ -125,52 +125,52 @@ mod tests {
 
     use super::*;
 
-    /// Values whose minimum, maximum and bounds have rules of their own.
-    const ODD: [f64; 8] = [0.0, -0.0, 1.5, -2.5, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-320];
+    /// Values with special rules in comparison, minimum and maximum.
+    const SPECIAL: [f64; 8] = [0.0, -0.0, 1.5, -2.5, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-320];
 
-    fn all<N: Number>(a: N, b: N) -> [N; 11] {
-        let (chosen, kept) = (a.select(a.less(b), b + b), a.select(a.at_most(b), b + b));
+    fn all_operations<N: SimdReal>(a: N, b: N) -> [N; 11] {
+        let (below, not_above) = (a.select(a.simd_lt(b), b + b), a.select(a.simd_le(b), b + b));
         let product = a.mul_add(b, -a);
-        let power = (a + a.constant(3.0)).times_power_of_two(a.constant(6_755_399_441_055_734.0));
-        [a + b, a - b, a * b, product, a.abs(), a.min(b), a.max(b), chosen, kept, limited(a, b), power]
+        let power = (a + a.splat(3.0)).times_power_of_two(a.splat(6_755_399_441_055_734.0));
+        [a + b, a - b, a * b, product, a.abs(), a.min(b), a.max(b), below, not_above, clamp_abs(a, b), power]
     }
 
-    struct Everything;
+    struct CompareWithScalar;
 
-    impl WithSimd for Everything {
+    impl WithSimd for CompareWithScalar {
         type Output = ();
 
         fn with_simd<S: Simd>(self, simd: S) {
-            for turn in 0..ODD.len() {
-                let mut turned = ODD;
+            for turn in 0..SPECIAL.len() {
+                let mut turned = SPECIAL;
                 turned.rotate_left(turn);
-                for place in 0..ODD.len() / Vector::<S>::LANES {
-                    let (a, b) = (Vector::fetch(simd, &ODD, place), Vector::fetch(simd, &turned, place));
-                    for (k, found) in all(a, b).into_iter().enumerate() {
+                for index in 0..SPECIAL.len() / Vector::<S>::LANES {
+                    let (a, b) = (Vector::load(simd, &SPECIAL, index), Vector::load(simd, &turned, index));
+                    for (k, found) in all_operations(a, b).into_iter().enumerate() {
                         let mut row = [0.0; 8];
-                        found.put(&mut row, place);
-                        for lane in (place * Vector::<S>::LANES..).take(Vector::<S>::LANES) {
-                            let single = all(ODD[lane], turned[lane])[k];
+                        found.store(&mut row, index);
+                        for lane in (index * Vector::<S>::LANES..).take(Vector::<S>::LANES) {
+                            let single = all_operations(SPECIAL[lane], turned[lane])[k];
                             let same = row[lane].to_bits() == single.to_bits()
                                 || row[lane].is_nan() && single.is_nan();
                             assert!(same, "{k}: {} and not {single}", row[lane]);
                         }
                     }
-                    let above = (0..Vector::<S>::LANES).any(|k| ODD[place * Vector::<S>::LANES + k] > 1.0);
-                    assert_eq!(a.exceeds(1.0), above);
+                    let above = (0..Vector::<S>::LANES).any(|k| SPECIAL[index * Vector::<S>::LANES + k] > 1.0);
+                    assert_eq!(a.any_gt(1.0), above);
                 }
             }
         }
     }
 
     #[test]
-    fn vectors_reckon_as_single_numbers_do() {
-        Arch::new().dispatch(Everything);
-        // A processor that has vectors of eight has those of four, too.
+    fn vector_operations_are_bit_identical_to_scalar_operations() {
+        Arch::new().dispatch(CompareWithScalar);
+        // A processor with 8-lane vectors also has 4-lane vectors.
         #[cfg(target_arch = "x86_64")]
         if let Some(four) = pulp::x86::V3::try_new() {
-            Simd::vectorize(four, Everything);
+            Simd::vectorize(four, CompareWithScalar);
         }
-        Arch::Scalar.dispatch(Everything);
+        Arch::Scalar.dispatch(CompareWithScalar);
     }
 }

@@ -1,15 +1,15 @@
-//! As many numbers as the processor reckons with at a time.
+//! SIMD vector of f64 with the width of the selected instruction set.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
 use pulp::Simd;
 
-use super::Number;
+use super::SimdReal;
 
-/// Numbers in the largest vector that there is.
+/// Lanes of the widest supported vector.
 const MAX_LANES: usize = 8;
 
-/// As many numbers as a register of the processor holds; none of them lies across two lines of its cache.
+/// SIMD register of f64. The alignment keeps a value within one cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub struct Vector<S: Simd> {
@@ -17,31 +17,32 @@ pub struct Vector<S: Simd> {
     value: S::f64s,
 }
 
-/// Numbers that stand side by side in memory.
-pub trait Fetch<S: Simd>: Number {
-    /// How many they are.
+/// Value that is loaded from and stored to arrays with one element per axis.
+pub trait SimdLoad<S: Simd>: SimdReal {
+    /// Number of f64 lanes of a value.
     const LANES: usize;
 
-    /// Those at `place` of a row, counted in as many; zeros beyond its end.
-    fn fetch<const L: usize>(simd: S, row: &[f64; L], place: usize) -> Self;
+    /// Loads the `LANES` elements that start at element `index · LANES` of `row`; zeros beyond its end.
+    fn load<const L: usize>(simd: S, row: &[f64; L], index: usize) -> Self;
 
-    /// Puts them there; nowhere beyond the end.
-    fn put<const L: usize>(self, row: &mut [f64; L], place: usize);
+    /// Stores into the `LANES` elements that start at element `index · LANES` of `row`; does nothing beyond its
+    /// end.
+    fn store<const L: usize>(self, row: &mut [f64; L], index: usize);
 }
 
-impl<S: Simd> Fetch<S> for Vector<S> {
+impl<S: Simd> SimdLoad<S> for Vector<S> {
     const LANES: usize = S::F64_LANES;
 
     #[inline(always)]
-    fn fetch<const L: usize>(simd: S, row: &[f64; L], place: usize) -> Self {
+    fn load<const L: usize>(simd: S, row: &[f64; L], index: usize) -> Self {
         let (vectors, _) = S::as_simd_f64s(row);
-        Vector { simd, value: vectors.get(place).copied().unwrap_or(simd.splat_f64s(0.0)) }
+        Vector { simd, value: vectors.get(index).copied().unwrap_or(simd.splat_f64s(0.0)) }
     }
 
     #[inline(always)]
-    fn put<const L: usize>(self, row: &mut [f64; L], place: usize) {
+    fn store<const L: usize>(self, row: &mut [f64; L], index: usize) {
         let (vectors, _) = S::as_mut_simd_f64s(row);
-        if let Some(vector) = vectors.get_mut(place) {
+        if let Some(vector) = vectors.get_mut(index) {
             *vector = self.value;
         }
     }
@@ -90,11 +91,11 @@ impl<S: Simd> Neg for Vector<S> {
     }
 }
 
-impl<S: Simd> Number for Vector<S> {
+impl<S: Simd> SimdReal for Vector<S> {
     type Mask = S::m64s;
 
     #[inline(always)]
-    fn constant(self, value: f64) -> Self {
+    fn splat(self, value: f64) -> Self {
         self.with(self.simd.splat_f64s(value))
     }
 
@@ -110,9 +111,9 @@ impl<S: Simd> Number for Vector<S> {
 
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        // Vectors of x86 do just this; a single number is compared, since `f64::min` has other rules.
+        // x86 vectors follow these NaN and zero rules; the scalar fallback compares, since `f64::min` differs.
         if S::IS_SCALAR {
-            return self.select(self.less(other), other);
+            return self.select(self.simd_lt(other), other);
         }
         self.with(self.simd.min_f64s(self.value, other.value))
     }
@@ -120,18 +121,18 @@ impl<S: Simd> Number for Vector<S> {
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         if S::IS_SCALAR {
-            return self.select(other.less(self), other);
+            return self.select(other.simd_lt(self), other);
         }
         self.with(self.simd.max_f64s(self.value, other.value))
     }
 
     #[inline(always)]
-    fn less(self, other: Self) -> S::m64s {
+    fn simd_lt(self, other: Self) -> S::m64s {
         self.simd.less_than_f64s(self.value, other.value)
     }
 
     #[inline(always)]
-    fn at_most(self, other: Self) -> Self::Mask {
+    fn simd_le(self, other: Self) -> Self::Mask {
         self.simd.less_than_or_equal_f64s(self.value, other.value)
     }
 
@@ -141,19 +142,19 @@ impl<S: Simd> Number for Vector<S> {
     }
 
     #[inline(always)]
-    fn exceeds(self, limit: f64) -> bool {
-        let above = self.constant(limit).less(self);
+    fn any_gt(self, limit: f64) -> bool {
+        let above = self.splat(limit).simd_lt(self);
         self.simd.first_true_m64s(above) < Self::LANES
     }
 
     #[inline(always)]
     fn times_power_of_two(self, integer: Self) -> Self {
         let (mut powers, mut integers) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
-        self.put(&mut powers, 0);
-        integer.put(&mut integers, 0);
+        self.store(&mut powers, 0);
+        integer.store(&mut integers, 0);
         for (power, integer) in powers.iter_mut().zip(integers) {
             *power = power.times_power_of_two(integer);
         }
-        Self::fetch(self.simd, &powers, 0)
+        Self::load(self.simd, &powers, 0)
     }
 }
