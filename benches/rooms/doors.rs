@@ -17,10 +17,10 @@ use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectory;
 use virtual_axes_io::messages::{self, DriveStates, MotorCurrents, Sampled};
 use virtual_axes_io::urdf::urdf;
-use virtual_axes_report::report::{Report, ReportRun};
+use virtual_axes_report::{Report, ReportRun};
 
 use crate::{Group, bench, shipped, swing};
-use virtual_axes_verification::fixtures::common::{program, setpoints};
+use virtual_axes_verification::fixtures::machines::{program, setpoints};
 
 /// The four bytes before a message's own.
 const CDR_HEADER: usize = 4;

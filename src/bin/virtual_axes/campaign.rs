@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
 use virtual_axes_identify::identify::FeedforwardMode;
-use virtual_axes_identify::identify::campaign::{Campaign, Options, Run};
+use virtual_axes_identify::identify::campaign::{Campaign, CampaignOptions, CampaignRun};
 use virtual_axes_io::files::psec_writer;
-use virtual_axes_report::report::{Column, Table};
+use virtual_axes_report::{TableColumn, Table};
 
 use crate::axis::{self, Units};
 use crate::input::must_not_replace;
@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let config = parameters.machine_config()?;
     let place = axis::place(&config, &arguments.axis)?;
     let units = Units::of(config.axes()[place].kind());
-    let options = Options {
+    let options = CampaignOptions {
         range: arguments.range.map(|range| range.map(|value| value * units.length)),
         max_feed: arguments.max_feed.map(|feed| feed * units.speed),
     };
@@ -113,13 +113,13 @@ fn told_speed(speed: f64) -> String {
 }
 
 impl Told<'_> {
-    fn settings(&self, run: &Run) -> Vec<String> {
+    fn settings(&self, run: &CampaignRun) -> Vec<String> {
         let assignments = run.part.assignments(self.parameters, self.axis);
         assignments.iter().map(|assignment| format!("{}={}", assignment.key, assignment.value)).collect()
     }
 
     fn text(&self) -> String {
-        let column = |name: &str, unit: &str| Column::new(name, unit);
+        let column = |name: &str, unit: &str| TableColumn::new(name, unit);
         let columns = vec![
             column("part", ""),
             column("from", "s"),

@@ -6,11 +6,11 @@ use nalgebra::Complex;
 use virtual_axes_core::config::{AxisConfig, DEFAULT_MACHINE, Parameters, Periods, Value};
 use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{
-    DesignError, GpcTuning, MAX_GAIN, Margins, Pid, PolePlacement, PredictionModel, Weight, accept, gpc,
-    margins, p, pi, pid, pole_pair, pole_placement, poles,
+    DesignError, GpcTuning, MAX_GAIN, Margins, PidTuning, PolePlacement, PredictionModel, ControlWeight, require_stable, gpc,
+    margins, p_controller, pi_controller, pid_controller, pole_pair, pole_placement, poles,
 };
 use virtual_axes_core::machine::prediction_model;
-use virtual_axes_core::units::{MILLISECOND, POSITION_GAIN, Told};
+use virtual_axes_core::units::{MILLISECOND, POSITION_GAIN, Rounded};
 
 use crate::{design_output, variant};
 
@@ -197,7 +197,7 @@ fn one(
     let model = prediction_model(axis, periods)?;
     let preset = Preset { parameters, axis: axis.name() };
     let (rst, tuning) = controller(method, &preset, &model)?;
-    let rst = accept(&model, rst, force).map_err(|error| format!("{error}; --force accepts it"))?;
+    let rst = require_stable(&model, rst, force).map_err(|error| format!("{error}; --force accepts it"))?;
     let (poles, margins) = (poles(&model, &rst)?, margins(&model, &rst));
     Ok(Design { axis: axis.name().to_owned(), tuning, model, rst, poles, margins })
 }
@@ -220,8 +220,8 @@ fn controller(
                 weight: preset.weight(*lambda_rel, *lambda)?,
             };
             let weight = match tuning.weight {
-                Weight::Absolute(lambda) => ("lambda", lambda),
-                Weight::Relative(lambda_rel) => ("lambda_rel", lambda_rel),
+                ControlWeight::Absolute(lambda) => ("lambda", lambda),
+                ControlWeight::Relative(lambda_rel) => ("lambda_rel", lambda_rel),
             };
             let horizons = [("n1", tuning.n1), ("n2", tuning.n2), ("nu", tuning.nu)];
             let horizons = horizons.map(|(name, periods)| (name, periods as f64));
@@ -229,12 +229,12 @@ fn controller(
         }
         Method::P { proportional, .. } => {
             let (gain, feedforward, tuning) = preset.proportional(proportional)?;
-            (p(gain, feedforward, period)?, tuning)
+            (p_controller(gain, feedforward, period)?, tuning)
         }
         Method::Pi { proportional, integral_time_ms, .. } => {
             let (gain, feedforward, mut tuning) = preset.proportional(proportional)?;
             tuning.push(("integral_time_ms", *integral_time_ms));
-            (pi(gain, integral_time_ms * MILLISECOND, feedforward, period)?, tuning)
+            (pi_controller(gain, integral_time_ms * MILLISECOND, feedforward, period)?, tuning)
         }
         Method::Pid { proportional, integral_time_ms, derivative_time_ms, filter_time_ms, .. } => {
             let (gain, velocity_feedforward, mut tuning) = preset.proportional(proportional)?;
@@ -243,14 +243,14 @@ fn controller(
                 ("derivative_time_ms", *derivative_time_ms),
                 ("filter_time_ms", *filter_time_ms),
             ]);
-            let pid_tuning = Pid {
+            let pid_tuning = PidTuning {
                 gain,
                 integral_time: integral_time_ms * MILLISECOND,
                 derivative_time: derivative_time_ms * MILLISECOND,
                 filter_time: filter_time_ms * MILLISECOND,
                 velocity_feedforward,
             };
-            (pid(&pid_tuning, period)?, tuning)
+            (pid_controller(&pid_tuning, period)?, tuning)
         }
         Method::Poles { bandwidth, damping, pole, integrator, feedforward, .. } => {
             let mut poles = Vec::new();
@@ -303,10 +303,10 @@ impl Preset<'_> {
     }
 
     /// λ of the machine file goes before its λ_rel, as in the axis.
-    fn weight(&self, lambda_rel: Option<f64>, lambda: Option<f64>) -> Result<Weight, Box<dyn Error>> {
+    fn weight(&self, lambda_rel: Option<f64>, lambda: Option<f64>) -> Result<ControlWeight, Box<dyn Error>> {
         Ok(match (lambda_rel, lambda, self.get("position_loop.gpc.lambda")) {
-            (_, Some(lambda), _) | (None, None, Some(Value::Double(lambda))) => Weight::Absolute(lambda),
-            _ => Weight::Relative(self.number(lambda_rel, "position_loop.gpc.lambda_rel")?),
+            (_, Some(lambda), _) | (None, None, Some(Value::Double(lambda))) => ControlWeight::Absolute(lambda),
+            _ => ControlWeight::Relative(self.number(lambda_rel, "position_loop.gpc.lambda_rel")?),
         })
     }
 
@@ -314,7 +314,7 @@ impl Preset<'_> {
     fn proportional(&self, given: &Proportional) -> Result<Gains, Box<dyn Error>> {
         let gain = self.number(given.gain, "position_loop.gain")?;
         if given.gain.is_some() && !(gain >= LEAST_GAIN && gain * POSITION_GAIN <= MAX_GAIN) {
-            let (gain, most) = (Told(gain), MAX_GAIN / POSITION_GAIN);
+            let (gain, most) = (Rounded(gain), MAX_GAIN / POSITION_GAIN);
             return Err(format!(
                 "--gain: {gain} must be at least {LEAST_GAIN:e} and at most {most:.0} (m/min)/mm or (1000 °/min)/°"
             )

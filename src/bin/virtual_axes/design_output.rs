@@ -4,7 +4,7 @@ use nalgebra::Complex;
 use serde_json::{Map, Value, json};
 use virtual_axes_core::design::Margins;
 use virtual_axes_core::units::{DEGREE, MILLISECOND};
-use virtual_axes_report::report::{Column, Table};
+use virtual_axes_report::{TableColumn, Table};
 
 use crate::design::Design;
 use crate::table;
@@ -45,10 +45,10 @@ fn one(method: &str, design: &Design) -> String {
 
 fn poles_table(design: &Design) -> Table {
     let columns = [
-        Column::new("closed-loop pole", ""),
-        Column::new("modulus", ""),
-        Column::new("natural frequency", "rad/s"),
-        Column::new("damping", ""),
+        TableColumn::new("closed-loop pole", ""),
+        TableColumn::new("modulus", ""),
+        TableColumn::new("natural frequency", "rad/s"),
+        TableColumn::new("damping", ""),
     ];
     let mut rows = Vec::new();
     for pole in design.poles.iter().filter(|pole| !is_delay(**pole)) {
@@ -84,12 +84,12 @@ fn continuous(pole: Complex<f64>, period: f64) -> (f64, f64) {
 /// Margins of all axes, with the worst of several.
 fn margins_table(designs: &[Design]) -> Table {
     let columns = [
-        Column::new("margins of", ""),
-        Column::new("modulus", ""),
-        Column::new("phase", "°"),
-        Column::new("gain", "×"),
-        Column::new("gain downwards", "×"),
-        Column::new("delay", "ms"),
+        TableColumn::new("margins of", ""),
+        TableColumn::new("modulus", ""),
+        TableColumn::new("phase", "°"),
+        TableColumn::new("gain", "×"),
+        TableColumn::new("gain downwards", "×"),
+        TableColumn::new("delay", "ms"),
     ];
     let mut rows: Vec<Vec<String>> = designs
         .iter()

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use virtual_axes_core::config::{AxisConfig, DEFAULT_MACHINE, Kind, MachineConfig, Parameters, Periods};
 use virtual_axes_core::units::MILLISECOND_NS;
 use virtual_axes_identify::identify::{
-    Agreement, Breakaway, Identification, Identified, Input, Options, Refine,
+    Agreement, Breakaway, Identification, IdentifiedValue, IdentificationInput, IdentificationOptions, RefinementScope,
 };
 use virtual_axes_identify::recording::{Finding, Severity};
 use virtual_axes_io::files::OutputFile;
-use virtual_axes_report::report::{IdentificationCheck, IdentificationPage};
+use virtual_axes_report::{ValidationRecording, IdentificationPage};
 
 use crate::campaign::PartName;
 use crate::input::must_not_replace;
@@ -109,7 +109,7 @@ pub struct Found {
     /// What came out.
     pub identification: Identification,
     /// The same as parameters of the machine file.
-    pub values: Vec<Identified>,
+    pub values: Vec<IdentifiedValue>,
     /// Other recordings.
     pub validations: Vec<Validation>,
     /// All that must be said, the worst first.
@@ -165,13 +165,13 @@ fn check_outputs(arguments: &Arguments) -> Result<(), String> {
 
 /// Writes the page; it stands under its name only when it is whole.
 fn write_report(path: &Path, found: &Found, periods: Periods) -> io::Result<()> {
-    let inputs: Vec<Input<'_>> = found.recordings.iter().map(Recorded::input).collect();
+    let inputs: Vec<IdentificationInput<'_>> = found.recordings.iter().map(Recorded::input).collect();
     let findings: Vec<Vec<Finding>> = found.recordings.iter().map(|r| r.findings.clone()).collect();
-    fn check(validation: &Validation) -> IdentificationCheck<'_> {
+    fn check(validation: &Validation) -> ValidationRecording<'_> {
         let Validation { recorded, agreement } = validation;
-        IdentificationCheck { input: recorded.input(), findings: &recorded.findings, agreement }
+        ValidationRecording { input: recorded.input(), findings: &recorded.findings, agreement }
     }
-    let validations: Vec<IdentificationCheck<'_>> = found.validations.iter().map(check).collect();
+    let validations: Vec<ValidationRecording<'_>> = found.validations.iter().map(check).collect();
     let page = IdentificationPage {
         machine: &found.machine,
         periods,
@@ -215,9 +215,9 @@ fn find(
     let others: Vec<Recorded> = others.collect::<Result<_, _>>()?;
 
     spinner.now(format!("identifying {}", axis.name()))?;
-    let inputs: Vec<Input<'_>> = recordings.iter().map(Recorded::input).collect();
+    let inputs: Vec<IdentificationInput<'_>> = recordings.iter().map(Recorded::input).collect();
     let i0 = if arguments.free_i0 { Breakaway::Freed } else { Breakaway::Held };
-    let options = Options { i0, refine: refine(arguments) };
+    let options = IdentificationOptions { i0, refine: refine(arguments) };
     let identification = virtual_axes_identify::identify::identify(&inputs, axis, &periods, &options);
     let of_files = recordings.iter().chain(&others).flat_map(|recorded| &recorded.findings);
     // A file can be given twice.
@@ -250,7 +250,7 @@ fn find(
 }
 
 /// Whether a value says more than that any is as good.
-fn tells(value: &Identified, parameters: &Parameters, periods: &Periods) -> bool {
+fn tells(value: &IdentifiedValue, parameters: &Parameters, periods: &Periods) -> bool {
     let Some([low, high]) = value.interval else { return true };
     // Delays are tried in steps of a period, which need not end at the longest one.
     let step = periods.position as f64 / MILLISECOND_NS as f64;
@@ -290,16 +290,16 @@ fn machine_text(arguments: &Arguments, found: &Found, identified: &Parameters) -
         head.push_str(&format!("\n{}", identify_text::finding(finding)));
     }
     identified
-        .to_yaml(&head, |key| found.values.iter().find(|value| value.key == key).map(Identified::comment))
+        .to_yaml(&head, |key| found.values.iter().find(|value| value.key == key).map(IdentifiedValue::comment))
 }
 
 /// What the refinement moves.
-fn refine(arguments: &Arguments) -> Refine {
+fn refine(arguments: &Arguments) -> RefinementScope {
     let of = |group: Group| arguments.refine.contains(&group);
     match (arguments.no_refine, arguments.refine.is_empty()) {
-        (true, _) => Refine::NONE,
-        (false, true) => Refine::ALL,
-        (false, false) => Refine {
+        (true, _) => RefinementScope::NONE,
+        (false, true) => RefinementScope::ALL,
+        (false, false) => RefinementScope {
             inertia: of(Group::Inertia),
             friction: of(Group::Friction),
             gravity: of(Group::Gravity),

@@ -5,8 +5,8 @@
 use serde_json::{Value, json};
 use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS};
 use virtual_axes_identify::identify::{
-    Agreement, Comparison, DelayFit, Deviation, Friction, FrictionLaw, Gravity, GravityCurrent,
-    GravitySource, Identified, LawFit, Level, Refinement, Regression,
+    Agreement, ExperimentComparison, DelayFit, ResidualStatistics, FrictionFit, FrictionLaw, GravityFit, GravityCurrent,
+    GravitySource, IdentifiedValue, LawFit, SteadyCurrent, Refinement, FeedforwardRegression,
 };
 use virtual_axes_identify::recording::Finding;
 
@@ -76,7 +76,7 @@ fn recording(recorded: &Recorded, agreement: Option<&Agreement>) -> Value {
     })
 }
 
-fn value(value: &Identified) -> Value {
+fn value(value: &IdentifiedValue) -> Value {
     json!({
         "key": value.key,
         "value": value.value,
@@ -119,8 +119,8 @@ fn law(law: &LawFit) -> Value {
 fn inertia(found: &Found) -> Value {
     let Some(inertia) = &found.identification.inertia else { return Value::Null };
     let refined = found.identification.refinement.as_ref().and_then(|refinement| {
-        let of = |r: &&virtual_axes_identify::identify::Refined| {
-            r.parameter == virtual_axes_identify::identify::Parameter::Inertia
+        let of = |r: &&virtual_axes_identify::identify::RefinedValue| {
+            r.parameter == virtual_axes_identify::identify::RefinedParameter::Inertia
         };
         refinement.parameters.iter().find(of)
     });
@@ -136,7 +136,7 @@ fn inertia(found: &Found) -> Value {
     })
 }
 
-fn gravity(gravity: &Gravity) -> Value {
+fn gravity(gravity: &GravityFit) -> Value {
     let current =
         |c: &GravityCurrent| json!({ "constant_a": c.constant, "sine_a": c.sine, "cosine_a": c.cosine });
     let with_error = |scale: f64| move |(value, error): (f64, f64)| json!({ "value": value / scale, "error": error / scale });
@@ -157,7 +157,7 @@ fn gravity(gravity: &Gravity) -> Value {
     })
 }
 
-fn regression(found: &Regression) -> Value {
+fn regression(found: &FeedforwardRegression) -> Value {
     json!({
         "value": found.value,
         "error": found.error,
@@ -166,7 +166,7 @@ fn regression(found: &Regression) -> Value {
     })
 }
 
-fn deviation(found: Option<Deviation>, scale: f64) -> Value {
+fn deviation(found: Option<ResidualStatistics>, scale: f64) -> Value {
     found.map_or(Value::Null, |d| json!({ "max": d.max / scale, "rms": d.rms / scale }))
 }
 
@@ -185,9 +185,9 @@ impl Scales {
         Scales { position: table::scale(kind).2, velocity, velocity_name, units: Units::of(kind) }
     }
 
-    fn friction(&self, friction: &Friction, levels: &[Level]) -> Value {
+    fn friction(&self, friction: &FrictionFit, levels: &[SteadyCurrent]) -> Value {
         let mut object = law(&friction.law);
-        let level = |level: &Level| {
+        let level = |level: &SteadyCurrent| {
             json!({
                 "speed": level.velocity / self.units.speed,
                 "friction_a": level.friction,
@@ -237,7 +237,7 @@ impl Scales {
     }
 
     fn agreement(&self, recorded: &Recorded, agreement: &Agreement) -> Value {
-        let part = |(mode, comparison): (&str, &Comparison)| {
+        let part = |(mode, comparison): (&str, &ExperimentComparison)| {
             json!({
                 "feedforward": mode,
                 "constant_velocity": deviation(comparison.constant_velocity, self.position),

@@ -3,11 +3,11 @@
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::{DEGREE, MILLIMETER, MILLISECOND, MILLISECOND_NS};
 use virtual_axes_identify::identify::{
-    Agreement, Comparison, Deviation, Friction, FrictionLaw, Gravity, GravitySource, Identification,
-    Identified, LawFit, Level, Parameter, Regression,
+    Agreement, ExperimentComparison, ResidualStatistics, FrictionFit, FrictionLaw, GravityFit, GravitySource, Identification,
+    IdentifiedValue, LawFit, SteadyCurrent, RefinedParameter, FeedforwardRegression,
 };
 use virtual_axes_identify::recording::{Finding, Severity};
-use virtual_axes_report::report::{Column, Table};
+use virtual_axes_report::{TableColumn, Table};
 
 use crate::axis::Units;
 use crate::identify::Found;
@@ -52,14 +52,14 @@ pub fn modes(recorded: &Recorded, agreement: &Agreement) -> Vec<&'static str> {
 }
 
 /// Levels by speed, towards plus and towards minus.
-pub fn by_speed(levels: &[Level]) -> Vec<[Option<&Level>; 2]> {
-    let mut sorted: Vec<&Level> = levels.iter().collect();
+pub fn by_speed(levels: &[SteadyCurrent]) -> Vec<[Option<&SteadyCurrent>; 2]> {
+    let mut sorted: Vec<&SteadyCurrent> = levels.iter().collect();
     sorted.sort_by(|a, b| a.velocity.abs().total_cmp(&b.velocity.abs()));
-    let mut found: Vec<[Option<&Level>; 2]> = Vec::new();
+    let mut found: Vec<[Option<&SteadyCurrent>; 2]> = Vec::new();
     for level in sorted {
         let (side, other) = if level.velocity > 0.0 { (0, 1) } else { (1, 0) };
         let near =
-            |other: &Level| level.velocity.abs() - other.velocity.abs() < SAME_SPEED * other.velocity.abs();
+            |other: &SteadyCurrent| level.velocity.abs() - other.velocity.abs() < SAME_SPEED * other.velocity.abs();
         match found.last_mut() {
             Some(pair) if pair[side].is_none() && pair[other].is_some_and(near) => pair[side] = Some(level),
             _ => {
@@ -73,7 +73,7 @@ pub fn by_speed(levels: &[Level]) -> Vec<[Option<&Level>; 2]> {
 }
 
 fn table_of(columns: &[(&str, &str)]) -> Table {
-    let columns = columns.iter().map(|&(name, unit)| Column::new(name, unit)).collect();
+    let columns = columns.iter().map(|&(name, unit)| TableColumn::new(name, unit)).collect();
     Table { columns, ..Table::default() }
 }
 
@@ -145,7 +145,7 @@ fn recordings(found: &Found) -> Table {
     table
 }
 
-fn values(values: &[Identified]) -> Table {
+fn values(values: &[IdentifiedValue]) -> Table {
     let columns = [("parameter", ""), ("value", ""), ("unit", ""), ("±", ""), ("before", ""), ("from", "")];
     let mut table = table_of(&columns);
     for value in values {
@@ -211,7 +211,7 @@ fn steps(found: &Found) -> Vec<String> {
     parts
 }
 
-fn friction(friction: &Friction, levels: &[Level], units: Units) -> String {
+fn friction(friction: &FrictionFit, levels: &[SteadyCurrent], units: Units) -> String {
     let law = &friction.law;
     let speeds = by_speed(levels);
     let name = match law.law {
@@ -268,12 +268,12 @@ fn friction(friction: &Friction, levels: &[Level], units: Units) -> String {
 }
 
 /// Of the directions that there are, m/s or rad/s.
-fn mean_speed(pair: &[Option<&Level>; 2]) -> Option<f64> {
+fn mean_speed(pair: &[Option<&SteadyCurrent>; 2]) -> Option<f64> {
     let speeds: Vec<f64> = pair.iter().flatten().map(|level| level.velocity.abs()).collect();
     (!speeds.is_empty()).then(|| speeds.iter().sum::<f64>() / speeds.len() as f64)
 }
 
-fn gravity(gravity: &Gravity) -> String {
+fn gravity(gravity: &GravityFit) -> String {
     let source = source(gravity.source);
     let part = |value: f64, error: f64| format!("{} ± {} A", digits(value, 4), digits(error, 2));
     let (current, error) = (&gravity.current, &gravity.error);
@@ -313,13 +313,13 @@ fn inertia(identification: &Identification) -> Option<String> {
         text.push_str(&format!("; {} by eq. 5 on the simulated axis", digits(replayed, 5)));
     }
     let refined = identification.refinement.as_ref().map(|refinement| refinement.parameters.iter());
-    if let Some(refined) = refined.and_then(|mut all| all.find(|r| r.parameter == Parameter::Inertia)) {
+    if let Some(refined) = refined.and_then(|mut all| all.find(|r| r.parameter == RefinedParameter::Inertia)) {
         text.push_str(&format!("; refined {} ± {}", digits(refined.value, 5), digits(refined.error, 2)));
     }
     Some(text)
 }
 
-fn regression(name: &str, found: Option<&Regression>) -> Option<String> {
+fn regression(name: &str, found: Option<&FeedforwardRegression>) -> Option<String> {
     let found = found?;
     let [low, high] = [found.delay.0, found.delay.1].map(|delay| digits(delay / MILLISECOND, 3));
     Some(format!(
@@ -331,7 +331,7 @@ fn regression(name: &str, found: Option<&Regression>) -> Option<String> {
 }
 
 /// The largest of a figure over the parts of a recording.
-pub fn worst(agreement: &Agreement, of: impl Fn(&Comparison) -> Option<f64>) -> Option<f64> {
+pub fn worst(agreement: &Agreement, of: impl Fn(&ExperimentComparison) -> Option<f64>) -> Option<f64> {
     agreement.comparisons.iter().filter_map(of).reduce(f64::max)
 }
 
@@ -351,7 +351,7 @@ fn agreement(found: &Found) -> Table {
     let identified = identified.map(|(recorded, agreement)| (recorded.signals.name.clone(), agreement));
     let validated = found.validations.iter().map(|v| (validation(&v.recorded), &v.agreement));
     for (name, agreement) in identified.chain(validated) {
-        let max = |deviation: &Option<Deviation>| deviation.map(|d| d.max);
+        let max = |deviation: &Option<ResidualStatistics>| deviation.map(|d| d.max);
         let in_unit = |value: Option<f64>, unit: f64| or_none(value, |value| format!("{:.1}", value / unit));
         let inverse = agreement.inverse.as_ref();
         let simulated = agreement.comparisons.iter().filter_map(|c| c.current_determination).reduce(f64::min);

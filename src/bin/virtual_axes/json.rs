@@ -53,12 +53,12 @@ fn axis(axis: &AxisFigures) -> Value {
         "unit": unit,
         "moves": axis.moves,
         "tracking_error": {
-            "max": report.max_tracking_error / scale,
-            "rms": report.rms_tracking_error / scale,
+            "max": report.max_following_error / scale,
+            "rms": report.rms_following_error / scale,
         },
         "synchronized_tracking_error": {
-            "max": report.max_synchronized_tracking_error / scale,
-            "rms": report.rms_synchronized_tracking_error / scale,
+            "max": report.max_delay_compensated_following_error / scale,
+            "rms": report.rms_delay_compensated_following_error / scale,
         },
         "peak_current_a": report.peak_current,
         "saturation_s": report.saturation_time,

@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use virtual_axes_identify::tune::Watch;
+use virtual_axes_identify::tune::Progress;
 
 use crate::interrupt;
 
@@ -98,7 +98,7 @@ impl Runs {
     }
 }
 
-impl Watch for Runs {
+impl Progress for Runs {
     fn begin(&self, part: &'static str, runs: usize) {
         self.bar.set_position(0);
         self.bar.set_length(runs as u64);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::MILLISECOND;
-use virtual_axes_identify::identify::{FeedforwardMode, Input};
+use virtual_axes_identify::identify::{FeedforwardMode, IdentificationInput};
 use virtual_axes_identify::recording::{Conditioning, Finding, Signals, condition};
 use virtual_axes_io::files::{Columns, RecordingOptions, read_recording};
 
@@ -71,8 +71,8 @@ pub struct Recorded {
 
 impl Recorded {
     /// As the library takes it.
-    pub fn input(&self) -> Input<'_> {
-        Input { signals: &self.signals, feedforward: self.feedforward }
+    pub fn input(&self) -> IdentificationInput<'_> {
+        IdentificationInput { signals: &self.signals, feedforward: self.feedforward }
     }
 
     /// From the first sample to the last, s.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use virtual_axes_core::assess::Recording;
 use virtual_axes_io::files::OutputFile;
-use virtual_axes_report::report::{Report, ReportRun, Scatter};
+use virtual_axes_report::{Report, ReportRun, Scatter};
 
 use crate::input::Input;
 use crate::run::Run;

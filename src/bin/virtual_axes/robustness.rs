@@ -4,8 +4,8 @@ use std::error::Error;
 
 use serde_json::{Value, json};
 use virtual_axes_core::config::MachineConfig;
-use virtual_axes_identify::tune::{Cost, Deviated, Deviation, Robustness, robustness};
-use virtual_axes_report::report::Table;
+use virtual_axes_identify::tune::{Cost, DeviatingRun, PlantDeviation, Robustness, robustness};
+use virtual_axes_report::Table;
 
 use crate::progress::Runs;
 use crate::search::{columns, course, named, object, row};
@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let found = found.map_err(|error| named(&input, error))?;
     let controller = variant::controller_name(&parameters);
     if arguments.json {
-        let plain = |one: &Deviated| json_of(one, &config);
+        let plain = |one: &DeviatingRun| json_of(one, &config);
         let object = json!({
             "input": input.name(),
             "description": input.description(),
@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
 
 fn rows(arguments: &Arguments, config: &MachineConfig, found: &Robustness) -> Table {
     let cells =
-        |name: String, one: &Deviated| row(name, one.cost, one.margins.as_ref(), &one.figures, config);
+        |name: String, one: &DeviatingRun| row(name, one.cost, one.margins.as_ref(), &one.figures, config);
     let nominal = cells("nominal".to_owned(), &found.nominal);
     let single = found.single.iter().map(|one| cells(name(&one.deviation), one));
     let worst = cells(format!("worst together: {}", name(&found.worst.deviation)), &found.worst);
@@ -82,7 +82,7 @@ fn rows(arguments: &Arguments, config: &MachineConfig, found: &Robustness) -> Ta
 }
 
 /// "inertia × 0.7, friction × 1.3"
-fn name(deviation: &Deviation) -> String {
+fn name(deviation: &PlantDeviation) -> String {
     let factors =
         [("inertia", deviation.inertia), ("friction", deviation.friction), ("Kt", deviation.torque_constant)];
     let told = factors.iter().filter(|(_, factor)| *factor != 1.0);
@@ -90,7 +90,7 @@ fn name(deviation: &Deviation) -> String {
     if told.is_empty() { "nominal".to_owned() } else { told.join(", ") }
 }
 
-fn json_of(one: &Deviated, config: &MachineConfig) -> Value {
+fn json_of(one: &DeviatingRun, config: &MachineConfig) -> Value {
     let deviation = json!({
         "inertia": one.deviation.inertia,
         "friction": one.deviation.friction,

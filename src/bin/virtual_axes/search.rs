@@ -7,8 +7,8 @@ use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::design::Margins;
 use virtual_axes_core::trial::Figures;
 use virtual_axes_core::units::{DEGREE, MILLISECOND};
-use virtual_axes_identify::tune::{Candidate, Cost, Course, Term, TuneError, Tuning};
-use virtual_axes_report::report::Column;
+use virtual_axes_identify::tune::{TuningCandidate, Cost, Workload, CostTerm, TuneError, Tuning};
+use virtual_axes_report::TableColumn;
 
 use crate::input::Input;
 use crate::interrupt;
@@ -17,10 +17,10 @@ use crate::interrupt;
 const NONE: &str = "–";
 
 /// Reads the setpoints of `input` into memory.
-pub fn course(input: &Input, machine: &MachineConfig, feed: Option<f64>) -> Result<Course, Box<dyn Error>> {
+pub fn course(input: &Input, machine: &MachineConfig, feed: Option<f64>) -> Result<Workload, Box<dyn Error>> {
     let program = input.program(machine, feed)?;
     let setpoints = input.setpoints(machine, program.as_ref())?;
-    Course::read(input.name(), program.clone(), setpoints, interrupt::check)
+    Workload::read(input.name(), program.clone(), setpoints, interrupt::check)
         .map_err(|error| -> Box<dyn Error> { error })
 }
 
@@ -33,8 +33,8 @@ pub fn named(input: &Input, error: TuneError) -> Box<dyn Error> {
 }
 
 /// Heads of the columns that say how a tuning does on a path with `figures`.
-pub fn columns(first: &str, cost: &Cost, figures: &Figures) -> Vec<Column> {
-    let rms = Term::ContourRms.unit(figures);
+pub fn columns(first: &str, cost: &Cost, figures: &Figures) -> Vec<TableColumn> {
+    let rms = CostTerm::ContourRms.unit(figures);
     let columns = [
         (first, ""),
         ("cost", cost.unit(figures)),
@@ -46,7 +46,7 @@ pub fn columns(first: &str, cost: &Cost, figures: &Figures) -> Vec<Column> {
         ("activity", "A"),
         ("saturated", "s"),
     ];
-    columns.map(|(name, unit)| Column::new(name, unit)).to_vec()
+    columns.map(|(name, unit)| TableColumn::new(name, unit)).to_vec()
 }
 
 /// Their cells.
@@ -64,12 +64,12 @@ pub fn row(
     vec![
         name,
         format!("{cost:.2}"),
-        format!("{:.2}", Term::ContourRms.of(figures, machine)),
+        format!("{:.2}", CostTerm::ContourRms.of(figures, machine)),
         margin(|m| m.modulus, 3),
         margin(|m| m.delay / MILLISECOND, 2),
         margin(|m| m.phase / DEGREE, 1),
-        format!("{:.3}", Term::Current.of(figures, machine)),
-        format!("{:.3}", Term::Activity.of(figures, machine)),
+        format!("{:.3}", CostTerm::Current.of(figures, machine)),
+        format!("{:.3}", CostTerm::Activity.of(figures, machine)),
         format!("{:.3}", saturation(figures)),
     ]
 }
@@ -100,14 +100,14 @@ pub fn object(
         })
     });
     object.insert("margins".to_owned(), margins);
-    let terms = Term::ALL.map(|term| (term.name().replace('-', "_"), json!(term.of(figures, machine))));
+    let terms = CostTerm::ALL.map(|term| (term.name().replace('-', "_"), json!(term.of(figures, machine))));
     object.insert("terms".to_owned(), Value::Object(terms.into_iter().collect()));
     object.insert("saturation_s".to_owned(), json!(saturation(figures)));
     object
 }
 
 /// A tuning that was run, as JSON.
-pub fn candidate(candidate: &Candidate, machine: &MachineConfig) -> Map<String, Value> {
+pub fn candidate(candidate: &TuningCandidate, machine: &MachineConfig) -> Map<String, Value> {
     let what = vec![("tuning", tuning(&candidate.tuning))];
     object(what, candidate.cost, candidate.margins.as_ref(), &candidate.figures, machine)
 }

@@ -3,7 +3,7 @@
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::trial::{AxisFigures, Figures, Reference};
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
-use virtual_axes_report::report::{Column, Table};
+use virtual_axes_report::{TableColumn, Table};
 
 /// Meters in a micrometer.
 pub const MICROMETER: f64 = 1e-6;
@@ -48,7 +48,7 @@ pub fn aligned(table: &Table, left: &[usize]) -> String {
     text
 }
 
-fn heading(column: &Column) -> String {
+fn heading(column: &TableColumn) -> String {
     match column.unit.as_str() {
         "" => column.name.clone(),
         unit => format!("{}, {unit}", column.name),
@@ -56,7 +56,7 @@ fn heading(column: &Column) -> String {
 }
 
 fn table(caption: &str, columns: &[(&str, &str)]) -> Table {
-    let columns = columns.iter().map(|&(name, unit)| Column::new(name, unit)).collect();
+    let columns = columns.iter().map(|&(name, unit)| TableColumn::new(name, unit)).collect();
     Table { caption: caption.to_owned(), columns, rows: Vec::new() }
 }
 
@@ -79,10 +79,10 @@ pub fn axes(figures: &Figures) -> Table {
         let (unit, _, scale) = scale(axis.kind);
         let r = &axis.report;
         let errors = [
-            r.max_tracking_error,
-            r.rms_tracking_error,
-            r.max_synchronized_tracking_error,
-            r.rms_synchronized_tracking_error,
+            r.max_following_error,
+            r.rms_following_error,
+            r.max_delay_compensated_following_error,
+            r.rms_delay_compensated_following_error,
         ];
         let mut row = vec![axis.name.clone(), unit.to_owned()];
         row.extend(errors.iter().map(|error| format!("{:.1}", error / scale)));

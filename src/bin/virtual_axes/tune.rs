@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::tune::{
-    Bench, Candidate, Contrast, Cost, Course, MarginLimits, Search, TuneError, Tuning, contrast, fine_grid,
+    TuningProblem, TuningCandidate, Contrast, Cost, Workload, MarginLimits, SearchResult, TuneError, Tuning, contrast, fine_grid,
     tune_cascade, tune_gpc, tune_gpc_from,
 };
 
@@ -98,17 +98,17 @@ pub struct Elsewhere {
     /// Of the path.
     pub name: String,
     /// The machine as it is, there.
-    pub present: Candidate,
+    pub present: TuningCandidate,
     /// The tuning, there.
-    pub tuned: Candidate,
+    pub tuned: TuningCandidate,
 }
 
 /// What the command has found.
 pub struct Found {
     /// The tuning, on the path.
-    pub best: Candidate,
+    pub best: TuningCandidate,
     /// What the pictures show: every tuning that was run and keeps the limits, the cheapest first.
-    pub search: Option<Search>,
+    pub search: Option<SearchResult>,
     /// Tunings that are better here and worse on the other path, the worst first.
     pub contrasts: Vec<Contrast>,
     /// The other paths.
@@ -141,7 +141,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let limits = limits(arguments);
 
     let progress = Runs::new();
-    let found = Bench::new(&parameters, &path, &arguments.cost, &progress)
+    let found = TuningProblem::new(&parameters, &path, &arguments.cost, &progress)
         .and_then(|bench| Ok((search(arguments, tunable, &bench, &paths, &limits)?, bench)));
     progress.finish();
     let (found, bench) = found.map_err(|error| named(&input, error))?;
@@ -216,8 +216,8 @@ fn check_outputs(arguments: &Arguments, input: &Input) -> Result<(), Box<dyn Err
 fn search(
     arguments: &Arguments,
     tunable: Tunable,
-    bench: &Bench<'_>,
-    paths: &[Course],
+    bench: &TuningProblem<'_>,
+    paths: &[Workload],
     limits: &MarginLimits,
 ) -> Result<Option<Found>, TuneError> {
     if let (true, [path]) = (arguments.contrast, paths) {
@@ -251,7 +251,7 @@ fn search(
 fn write_machine(
     path: &Path,
     arguments: &Arguments,
-    bench: &Bench<'_>,
+    bench: &TuningProblem<'_>,
     found: &Found,
 ) -> Result<(), Box<dyn Error>> {
     let best = &found.best;
@@ -283,7 +283,7 @@ fn write_machine(
 }
 
 /// The machine as it is and the tuning that was found on a path, with recordings.
-fn recorded(course: &Course, bench: &Bench<'_>, found: &Found) -> Result<[Run; 2], TuneError> {
+fn recorded(course: &Workload, bench: &TuningProblem<'_>, found: &Found) -> Result<[Run; 2], TuneError> {
     let run = |tuning: &Tuning| -> Result<Run, TuneError> {
         // Of the axes that are tuned.
         let controller = match tuning {

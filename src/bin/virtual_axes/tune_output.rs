@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value, json};
 use virtual_axes_core::units::MILLISECOND;
-use virtual_axes_identify::tune::{Bench, Candidate, MarginLimits, Term, Tuning, front};
-use virtual_axes_report::report::{Column, PointGroup, PointStyle, Scatter, Table};
+use virtual_axes_identify::tune::{TuningProblem, TuningCandidate, MarginLimits, CostTerm, Tuning, front};
+use virtual_axes_report::{TableColumn, PointGroup, PointStyle, Scatter, Table};
 
 use crate::input::Input;
 use crate::search::{candidate, columns, row};
@@ -16,16 +16,16 @@ const ROWS: usize = 12;
 /// would press the others to its edge.
 const PICTURED: f64 = 2.0;
 
-fn modulus(candidate: &Candidate) -> f64 {
+fn modulus(candidate: &TuningCandidate) -> f64 {
     candidate.margins.map_or(f64::NAN, |margins| margins.modulus)
 }
 
 /// The cheapest tuning for each modulus margin.
-fn pareto(found: &Found) -> Vec<&Candidate> {
+fn pareto(found: &Found) -> Vec<&TuningCandidate> {
     found.search.as_ref().map_or_else(Vec::new, |search| front(&search.tried, modulus))
 }
 
-fn candidate_row(name: String, candidate: &Candidate, bench: &Bench<'_>) -> Vec<String> {
+fn candidate_row(name: String, candidate: &TuningCandidate, bench: &TuningProblem<'_>) -> Vec<String> {
     row(name, candidate.cost, candidate.margins.as_ref(), &candidate.figures, bench.config())
 }
 
@@ -38,7 +38,7 @@ fn thinned<T>(all: &[T]) -> Vec<&T> {
 }
 
 /// The result as tables.
-pub fn text(bench: &Bench<'_>, found: &Found) -> String {
+pub fn text(bench: &TuningProblem<'_>, found: &Found) -> String {
     let columns = |first: &str| columns(first, bench.cost(), &bench.present().figures);
     let mut tunings = Table { columns: columns("tuning"), ..Table::default() };
     tunings.rows.push(candidate_row("as it is".to_owned(), bench.present(), bench));
@@ -81,8 +81,8 @@ pub fn text(bench: &Bench<'_>, found: &Found) -> String {
 }
 
 /// The parameters that the tuning sets, before and behind.
-fn values(bench: &Bench<'_>, tuning: &Tuning) -> Table {
-    let columns = ["parameter", "as it is", "tuned"].map(|name| Column::new(name, ""));
+fn values(bench: &TuningProblem<'_>, tuning: &Tuning) -> Table {
+    let columns = ["parameter", "as it is", "tuned"].map(|name| TableColumn::new(name, ""));
     let row = |(key, value): (String, virtual_axes_core::config::Value)| {
         let before = bench.parameters().get(&key).map_or("–".to_owned(), |value| value.to_string());
         vec![key, before, value.to_string()]
@@ -91,7 +91,7 @@ fn values(bench: &Bench<'_>, tuning: &Tuning) -> Table {
     Table { columns: columns.to_vec(), rows: values.into_iter().map(row).collect(), ..Table::default() }
 }
 
-fn contrasts(bench: &Bench<'_>, found: &Found) -> Table {
+fn contrasts(bench: &TuningProblem<'_>, found: &Found) -> Table {
     let other = found.elsewhere.first().map_or("", |path| path.name.as_str());
     let columns = [
         ("tuning", ""),
@@ -100,8 +100,8 @@ fn contrasts(bench: &Bench<'_>, found: &Found) -> Table {
         ("modulus margin", ""),
         ("delay margin", "ms"),
     ];
-    let columns = columns.map(|(name, unit)| Column::new(name, unit)).to_vec();
-    let cells = |name: String, better: &Candidate, worse: &Candidate| {
+    let columns = columns.map(|(name, unit)| TableColumn::new(name, unit)).to_vec();
+    let cells = |name: String, better: &TuningCandidate, worse: &TuningCandidate| {
         let margins = candidate_row(name.clone(), better, bench);
         let margin = |place: usize| margins.get(place).cloned().unwrap_or_default();
         vec![name, format!("{:.2}", better.cost), format!("{:.2}", worse.cost), margin(3), margin(4)]
@@ -114,9 +114,9 @@ fn contrasts(bench: &Bench<'_>, found: &Found) -> Table {
 }
 
 /// Where the tuning is better than the machine as it is, and where it is worse.
-fn elsewhere(bench: &Bench<'_>, found: &Found) -> Table {
+fn elsewhere(bench: &TuningProblem<'_>, found: &Found) -> Table {
     let columns = [("path", ""), ("as it is", ""), ("tuned", ""), ("unit", ""), ("the tuned one is", "")];
-    let row = |name: &str, present: &Candidate, tuned: &Candidate| {
+    let row = |name: &str, present: &TuningCandidate, tuned: &TuningCandidate| {
         let verdict = match tuned.cost.total_cmp(&present.cost) {
             std::cmp::Ordering::Less => "better",
             std::cmp::Ordering::Equal => "as good",
@@ -134,7 +134,7 @@ fn elsewhere(bench: &Bench<'_>, found: &Found) -> Table {
     let first = row(bench.course().name(), bench.present(), &found.best);
     let others = found.elsewhere.iter().map(|path| row(&path.name, &path.present, &path.tuned));
     Table {
-        columns: columns.map(|(name, unit)| Column::new(name, unit)).to_vec(),
+        columns: columns.map(|(name, unit)| TableColumn::new(name, unit)).to_vec(),
         rows: std::iter::once(first).chain(others).collect(),
         ..Table::default()
     }
@@ -146,15 +146,15 @@ pub fn object(
     tunable: Tunable,
     limits: &MarginLimits,
     seed: u64,
-    bench: &Bench<'_>,
+    bench: &TuningProblem<'_>,
     found: &Found,
 ) -> Value {
-    let with_figures = |one: &Candidate| {
+    let with_figures = |one: &TuningCandidate| {
         let mut object = candidate(one, bench.config());
         object.insert("figures".to_owned(), json::figures(&one.figures).into());
         Value::Object(object)
     };
-    let plain = |one: &Candidate| Value::Object(candidate(one, bench.config()));
+    let plain = |one: &TuningCandidate| Value::Object(candidate(one, bench.config()));
     let mut object = Map::new();
     let mut add = |name: &str, value: Value| object.insert(name.to_owned(), value);
     add("input", json!(input.name()));
@@ -186,7 +186,7 @@ pub fn object(
 }
 
 /// Cost against modulus margin and against control activity, or on one path against another.
-pub fn scatters(bench: &Bench<'_>, found: &Found) -> Vec<Scatter> {
+pub fn scatters(bench: &TuningProblem<'_>, found: &Found) -> Vec<Scatter> {
     let unit = bench.cost().unit(&bench.present().figures);
     let quantity = |unit: &str| if unit.is_empty() { String::new() } else { format!(" ({unit})") };
     let cost = format!("Cost: {}{}", bench.cost(), quantity(unit));
@@ -206,9 +206,9 @@ pub fn scatters(bench: &Bench<'_>, found: &Found) -> Vec<Scatter> {
         }];
     }
     let Some(search) = &found.search else { return Vec::new() };
-    let activity = |c: &Candidate| Term::Activity.of(&c.figures, bench.config());
-    let less_activity = |c: &Candidate| -activity(c);
-    type Measure<'a> = &'a dyn Fn(&Candidate) -> f64;
+    let activity = |c: &TuningCandidate| CostTerm::Activity.of(&c.figures, bench.config());
+    let less_activity = |c: &TuningCandidate| -activity(c);
+    type Measure<'a> = &'a dyn Fn(&TuningCandidate) -> f64;
     let pictures: [(&str, &str, Measure, Measure); 2] = [
         ("Cost against modulus margin", "Modulus margin", &modulus, &modulus),
         ("Cost against control activity", "Control activity (A)", &activity, &less_activity),
@@ -216,7 +216,7 @@ pub fn scatters(bench: &Bench<'_>, found: &Found) -> Vec<Scatter> {
     let scatter = |(title, y, measure, merit): (&str, &str, Measure, Measure)| {
         let front = front(&search.tried, merit);
         let dearest = PICTURED * search.best.cost.max(bench.present().cost);
-        let point = |c: &Candidate| [c.cost, measure(c)];
+        let point = |c: &TuningCandidate| [c.cost, measure(c)];
         let shown = search.tried.iter().filter(|c| c.cost <= dearest);
         let front = front.into_iter().filter(|c| c.cost <= dearest);
         Scatter {

@@ -2,7 +2,7 @@
 
 use crate::report_common::{between, picture, points, report_run};
 use virtual_axes_core::assess::{Recording, ToolTrace};
-use virtual_axes_report::report::{Report, ReportRun};
+use virtual_axes_report::{Report, ReportRun};
 
 const STEPS: u32 = 720;
 const TURNS: f64 = 2.0;

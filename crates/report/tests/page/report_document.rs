@@ -3,9 +3,9 @@
 use crate::report_common::charts::{axis, example, noise, validation};
 use crate::report_common::{between, picture, pictures, points};
 use proptest::prelude::*;
-use virtual_axes_report::report::{
-    Band, BandClass, Chart, ChartAxis, Column, Document, Guide, Notice, NoticeLevel, Panel, Section, Series,
-    SeriesStyle, Table, Unit,
+use virtual_axes_report::{
+    Band, BandClass, Chart, ChartAxis, ChartSeries, DisplayUnit, Document, Guide, Notice, NoticeLevel, Panel,
+    Section, SeriesStyle, Table, TableColumn,
 };
 
 fn page(document: &Document) -> String {
@@ -79,17 +79,23 @@ fn text_from_users_is_inert() {
         let panel = Panel {
             bands: vec![Band::interval(evil, 0.0, 1.0)],
             lines: vec![Guide::new(0.5, evil)],
-            ..Panel::new(axis(evil, Unit::AMPERE), vec![Series::new(evil, SeriesStyle::Points(0), points)])
+            ..Panel::new(
+                axis(evil, DisplayUnit::AMPERE),
+                vec![ChartSeries::new(evil, SeriesStyle::Points(0), points)],
+            )
         };
         Chart {
             note: text(),
             bands: vec![Band::interval(evil, 0.0, 1.0)],
             lines: vec![Guide::new(0.5, evil)],
-            ..Chart::new(evil, axis(evil, Unit::SECOND), vec![panel])
+            ..Chart::new(evil, axis(evil, DisplayUnit::SECOND), vec![panel])
         }
     };
-    let table =
-        Table { caption: text(), columns: vec![Column::new(evil, evil); 2], rows: vec![vec![text(); 2]] };
+    let table = Table {
+        caption: text(),
+        columns: vec![TableColumn::new(evil, evil); 2],
+        rows: vec![vec![text(); 2]],
+    };
     let page = page(&Document {
         title: text(),
         description: text(),
@@ -112,9 +118,10 @@ fn text_from_users_is_inert() {
 fn values_stand_where_the_units_say() {
     // 2…4 ms over −30…30 µm, with round ticks at the corners of the area.
     let series =
-        vec![Series::new("a", SeriesStyle::Measured, vec![[2e-3, -3e-5], [3e-3, 1.5e-5], [4e-3, 3e-5]])];
-    let y = axis("Deviation", Unit::MICROMETER).within(-3e-5, 3e-5);
-    let page = page_of(vec![Chart::new("One", axis("Time", Unit::MILLISECOND), vec![Panel::new(y, series)])]);
+        vec![ChartSeries::new("a", SeriesStyle::Measured, vec![[2e-3, -3e-5], [3e-3, 1.5e-5], [4e-3, 3e-5]])];
+    let y = axis("Deviation", DisplayUnit::MICROMETER).within(-3e-5, 3e-5);
+    let page =
+        page_of(vec![Chart::new("One", axis("Time", DisplayUnit::MILLISECOND), vec![Panel::new(y, series)])]);
     let picture = picture(&page, "One");
     assert!(picture.contains(">Time (ms)</text>") && picture.contains(">Deviation (µm)</text>"));
     let [left, top, width, height] = area(picture);
@@ -176,11 +183,14 @@ fn panels_stand_in_line_with_their_bands() {
 
 #[test]
 fn an_error_bar_has_its_length() {
-    let series = Series::new("a", SeriesStyle::Points(0), vec![[0.0, 1.0], [1.0, 3.0]])
+    let series = ChartSeries::new("a", SeriesStyle::Points(0), vec![[0.0, 1.0], [1.0, 3.0]])
         .with_errors(vec![0.5, f64::NAN]);
-    let y = axis("Current", Unit::AMPERE).within(0.0, 4.0);
-    let page =
-        page_of(vec![Chart::new("Bars", axis("Time", Unit::SECOND), vec![Panel::new(y, vec![series])])]);
+    let y = axis("Current", DisplayUnit::AMPERE).within(0.0, 4.0);
+    let page = page_of(vec![Chart::new(
+        "Bars",
+        axis("Time", DisplayUnit::SECOND),
+        vec![Panel::new(y, vec![series])],
+    )]);
     let picture = picture(&page, "Bars");
     let [_, top, _, height] = area(picture);
     let bar = points(between(picture, "<path class=\"error run-1\" d=\"", "\"")[0]);
@@ -195,18 +205,22 @@ fn an_error_bar_has_its_length() {
 fn what_lies_outside_is_told_and_not_drawn() {
     let values = [1.0, 2.0, 90.0, 1.5, -80.0, 1.0];
     let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
-    let y = axis("Current", Unit::AMPERE).within(0.0, 4.0);
-    let series = vec![Series::over("a", SeriesStyle::Measured, &time, &values)];
-    let page = page_of(vec![Chart::new("Part", axis("Time", Unit::SECOND), vec![Panel::new(y, series)])]);
+    let y = axis("Current", DisplayUnit::AMPERE).within(0.0, 4.0);
+    let series = vec![ChartSeries::from_xy("a", SeriesStyle::Measured, &time, &values)];
+    let page =
+        page_of(vec![Chart::new("Part", axis("Time", DisplayUnit::SECOND), vec![Panel::new(y, series)])]);
     assert!(page.contains("<span class=\"note\">2 values lie outside the picture</span>"));
     let picture = picture(&page, "Part");
     let line = between(picture, "<path class=\"line run-1\" d=\"", "\"")[0];
     assert_eq!(line.matches('M').count(), 3, "{line}");
     // A window of time is no loss, and the range of values is that of the window.
-    let series = vec![Series::over("a", SeriesStyle::Measured, &time, &values)];
-    let window = axis("Time", Unit::SECOND).within(2.5, 3.5);
-    let page =
-        page_of(vec![Chart::new("Window", window, vec![Panel::new(axis("Current", Unit::AMPERE), series)])]);
+    let series = vec![ChartSeries::from_xy("a", SeriesStyle::Measured, &time, &values)];
+    let window = axis("Time", DisplayUnit::SECOND).within(2.5, 3.5);
+    let page = page_of(vec![Chart::new(
+        "Window",
+        window,
+        vec![Panel::new(axis("Current", DisplayUnit::AMPERE), series)],
+    )]);
     assert!(!page.contains("outside") && !page.contains(">80</text>"));
 }
 
@@ -214,8 +228,9 @@ fn what_lies_outside_is_told_and_not_drawn() {
 fn not_a_number_breaks_a_line_and_a_staircase() {
     let points = vec![[0.0, 1.0], [1.0, 2.0], [2.0, f64::NAN], [3.0, 1.0], [4.0, 2.0]];
     for (style, parts) in [(SeriesStyle::Measured, 2), (SeriesStyle::Steps(0), 2)] {
-        let panel = Panel::new(axis("v", Unit::NONE), vec![Series::new("a", style, points.clone())]);
-        let page = page_of(vec![Chart::new("Gap", axis("x", Unit::NONE), vec![panel])]);
+        let panel =
+            Panel::new(axis("v", DisplayUnit::NONE), vec![ChartSeries::new("a", style, points.clone())]);
+        let page = page_of(vec![Chart::new("Gap", axis("x", DisplayUnit::NONE), vec![panel])]);
         let line = between(picture(&page, "Gap"), "<path class=\"line run-1\" d=\"", "\"")[0];
         assert_eq!(line.matches('M').count(), parts, "{style:?}: {line}");
     }
@@ -234,9 +249,10 @@ fn lines_and_points_differ_by_more_than_color() {
     for (i, one) in dashes.iter().enumerate() {
         assert!(!dashes[..i].contains(one), "lines {} are dashed as others: {one}", i + 1);
     }
-    let series = (0..4).map(|g| Series::new(format!("g{g}"), SeriesStyle::Points(g), vec![[g as f64, 1.0]]));
-    let panel = Panel::new(axis("v", Unit::NONE), series.collect());
-    let page = page_of(vec![Chart::new("Groups", axis("x", Unit::NONE), vec![panel])]);
+    let series =
+        (0..4).map(|g| ChartSeries::new(format!("g{g}"), SeriesStyle::Points(g), vec![[g as f64, 1.0]]));
+    let panel = Panel::new(axis("v", DisplayUnit::NONE), series.collect());
+    let page = page_of(vec![Chart::new("Groups", axis("x", DisplayUnit::NONE), vec![panel])]);
     for shape in ["round", "square", "cross", "plus"] {
         assert_eq!(
             page.matches(&format!("class=\"points {shape} ")).count(),
@@ -253,9 +269,11 @@ fn a_single_sample_among_many_is_seen() {
     values[34_567] = 3e-6;
     let time: Vec<f64> = (0..LONG).map(|i| i as f64 * 1e-3).collect();
     for style in [SeriesStyle::Measured, SeriesStyle::Steps(0)] {
-        let panel =
-            Panel::new(axis("Deviation", Unit::MICROMETER), vec![Series::over("a", style, &time, &values)]);
-        let page = page_of(vec![Chart::new("Spike", axis("Time", Unit::SECOND), vec![panel])]);
+        let panel = Panel::new(
+            axis("Deviation", DisplayUnit::MICROMETER),
+            vec![ChartSeries::from_xy("a", style, &time, &values)],
+        );
+        let page = page_of(vec![Chart::new("Spike", axis("Time", DisplayUnit::SECOND), vec![panel])]);
         let picture = picture(&page, "Spike");
         let [left, _, width, height] = area(picture);
         let line = points(between(picture, "<path class=\"line run-1\" d=\"", "\"")[0]);
@@ -278,11 +296,11 @@ fn long_series_make_no_large_page() {
         [SeriesStyle::Measured, SeriesStyle::Steps(1), SeriesStyle::Points(0), SeriesStyle::Points(2)];
     for style in styles {
         for (name, x, y) in [("over time", &sorted, &y), ("anywhere", &x, &y), ("with gaps", &x, &gaps)] {
-            let series = Series::over("a", style, x, y).with_errors(vec![0.1; LONG]);
-            let bare = Series { errors: Vec::new(), ..series.clone() };
+            let series = ChartSeries::from_xy("a", style, x, y).with_errors(vec![0.1; LONG]);
+            let bare = ChartSeries { errors: Vec::new(), ..series.clone() };
             let length = |series| {
-                let panel = Panel::new(axis("v", Unit::NONE), vec![series]);
-                page_of(vec![Chart::new("Noise", axis("x", Unit::NONE), vec![panel])]).len()
+                let panel = Panel::new(axis("v", DisplayUnit::NONE), vec![series]);
+                page_of(vec![Chart::new("Noise", axis("x", DisplayUnit::NONE), vec![panel])]).len()
             };
             let (bare, barred) = (length(bare), length(series));
             println!("{style:?} {name}: {bare} bytes, {barred} with error bars");
@@ -292,7 +310,11 @@ fn long_series_make_no_large_page() {
     let bands = (0..LONG).map(|i| Band::new(BandClass::Static, i as f64, i as f64 + 0.3)).collect();
     let chart = Chart {
         bands,
-        ..Chart::new("Bands", axis("x", Unit::NONE), vec![Panel::new(axis("v", Unit::NONE), Vec::new())])
+        ..Chart::new(
+            "Bands",
+            axis("x", DisplayUnit::NONE),
+            vec![Panel::new(axis("v", DisplayUnit::NONE), Vec::new())],
+        )
     };
     assert!(page_of(vec![chart]).len() < MOST_BYTES_PER_SERIES);
 }
@@ -301,12 +323,12 @@ fn long_series_make_no_large_page() {
 fn what_is_empty_breaks_nothing() {
     let empty = page(&Document::default());
     assert_well_formed(&empty);
-    let panel = |series| Panel::new(axis("v", Unit::AMPERE), series);
-    let none = Series::new("nothing", SeriesStyle::Measured, Vec::new());
+    let panel = |series| Panel::new(axis("v", DisplayUnit::AMPERE), series);
+    let none = ChartSeries::new("nothing", SeriesStyle::Measured, Vec::new());
     let page = page_of(vec![
-        Chart::new("No panels", axis("x", Unit::SECOND), Vec::new()),
-        Chart::new("No series", axis("x", Unit::SECOND), vec![panel(Vec::new())]),
-        Chart::new("No points", axis("x", Unit::SECOND), vec![panel(vec![none])]),
+        Chart::new("No panels", axis("x", DisplayUnit::SECOND), Vec::new()),
+        Chart::new("No series", axis("x", DisplayUnit::SECOND), vec![panel(Vec::new())]),
+        Chart::new("No points", axis("x", DisplayUnit::SECOND), vec![panel(vec![none])]),
     ]);
     assert_well_formed(&page);
     assert_eq!(page.matches(">no values</text>").count(), 2);
@@ -344,7 +366,7 @@ fn any_style() -> impl Strategy<Value = SeriesStyle> {
 
 fn any_axis() -> impl Strategy<Value = ChartAxis> {
     (any_value(), any_value(), any_value(), any_value(), 0..3).prop_map(|(size, least, from, to, range)| {
-        let axis = ChartAxis::new("q", Unit::new("u", size, least));
+        let axis = ChartAxis::new("q", DisplayUnit::new("u", size, least));
         match range {
             0 => axis,
             1 => axis.with_zero(),
@@ -353,10 +375,10 @@ fn any_axis() -> impl Strategy<Value = ChartAxis> {
     })
 }
 
-fn any_series() -> impl Strategy<Value = Series> {
+fn any_series() -> impl Strategy<Value = ChartSeries> {
     let points = prop::collection::vec(prop::array::uniform2(any_value()), 0..20);
     (any_style(), points, prop::collection::vec(any_value(), 0..25))
-        .prop_map(|(style, points, errors)| Series::new("s", style, points).with_errors(errors))
+        .prop_map(|(style, points, errors)| ChartSeries::new("s", style, points).with_errors(errors))
 }
 
 fn any_panel() -> impl Strategy<Value = Panel> {

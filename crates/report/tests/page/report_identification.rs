@@ -3,15 +3,16 @@
 use std::sync::LazyLock;
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig, Parameters};
-use virtual_axes_identify::identify::campaign::Options as Course;
+use virtual_axes_identify::identify::campaign::CampaignOptions as Course;
 use virtual_axes_identify::identify::{
-    Agreement, FeedforwardMode, Identification, Identified, Input, Options, Refine, identify, validate,
+    Agreement, FeedforwardMode, Identification, IdentificationInput, IdentificationOptions, IdentifiedValue,
+    RefinementScope, identify, validate,
 };
 use virtual_axes_identify::recording::{Conditioning, Finding, RawRecording, Signals, condition};
-use virtual_axes_report::report::{
-    Chart, Document, IdentificationCheck, IdentificationPage, Section, Series, Table,
+use virtual_axes_report::{
+    Chart, ChartSeries, Document, IdentificationPage, Section, Table, ValidationRecording,
 };
-use virtual_axes_verification::fixtures::common::{M_MIN, TSP, parameters};
+use virtual_axes_verification::fixtures::machines::{M_MIN, TSP, parameters};
 use virtual_axes_verification::fixtures::recordings::{Disturbance, place, record_campaign};
 
 /// Headings of the sections, in their order.
@@ -62,27 +63,30 @@ impl Bench {
         &self.machine.axes()[place(&self.machine, &self.axis)]
     }
 
-    fn inputs(&self) -> Vec<Input<'_>> {
-        self.recordings.iter().map(|(mode, signals)| Input { signals, feedforward: Some(*mode) }).collect()
+    fn inputs(&self) -> Vec<IdentificationInput<'_>> {
+        self.recordings
+            .iter()
+            .map(|(mode, signals)| IdentificationInput { signals, feedforward: Some(*mode) })
+            .collect()
     }
 
-    fn identify(&self, refine: bool) -> (Identification, Vec<Identified>) {
-        let refine = if refine { Refine::ALL } else { Refine::NONE };
-        let options = Options { refine, ..Options::default() };
+    fn identify(&self, refine: bool) -> (Identification, Vec<IdentifiedValue>) {
+        let refine = if refine { RefinementScope::ALL } else { RefinementScope::NONE };
+        let options = IdentificationOptions { refine, ..IdentificationOptions::default() };
         let found = identify(&self.inputs(), self.config(), &self.machine.periods(), &options);
         let values = found.values(&self.parameters, &self.axis);
         (found, values)
     }
 
-    fn document(&self, found: &Identification, values: &[Identified]) -> Document {
+    fn document(&self, found: &Identification, values: &[IdentifiedValue]) -> Document {
         self.checked(found, values, &[])
     }
 
     fn checked(
         &self,
         identification: &Identification,
-        values: &[Identified],
-        validations: &[IdentificationCheck<'_>],
+        values: &[IdentifiedValue],
+        validations: &[ValidationRecording<'_>],
     ) -> Document {
         let page = IdentificationPage {
             machine: self.machine.name(),
@@ -102,7 +106,7 @@ impl Bench {
 struct Whole {
     bench: Bench,
     found: Identification,
-    values: Vec<Identified>,
+    values: Vec<IdentifiedValue>,
     blind: Signals,
     validations: Vec<Agreement>,
 }
@@ -120,7 +124,7 @@ static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
     blind.name = "blind".to_owned();
     blind.spans.iter_mut().for_each(|span| span.psec = None);
     let check = |signals| {
-        let input = Input { signals, feedforward: Some(FeedforwardMode::Velocity) };
+        let input = IdentificationInput { signals, feedforward: Some(FeedforwardMode::Velocity) };
         validate(&input, found.axis(), &bench.machine.periods()).expect("it can be simulated")
     };
     let validations = vec![check(&bench.recordings[1].1), check(&blind)];
@@ -130,11 +134,11 @@ static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
 impl Whole {
     fn document(&self) -> Document {
         let signals = [&self.bench.recordings[1].1, &self.blind];
-        let checks: Vec<IdentificationCheck> = signals
+        let checks: Vec<ValidationRecording> = signals
             .iter()
             .zip(&self.validations)
-            .map(|(signals, agreement)| IdentificationCheck {
-                input: Input { signals, feedforward: Some(FeedforwardMode::Velocity) },
+            .map(|(signals, agreement)| ValidationRecording {
+                input: IdentificationInput { signals, feedforward: Some(FeedforwardMode::Velocity) },
                 findings: &[],
                 agreement,
             })
@@ -179,7 +183,7 @@ fn chart<'a>(section: &'a Section, title: &str) -> &'a Chart {
     found.unwrap_or_else(|| panic!("no chart {title}"))
 }
 
-fn series<'a>(chart: &'a Chart, quantity: &str, label: &str) -> &'a Series {
+fn series<'a>(chart: &'a Chart, quantity: &str, label: &str) -> &'a ChartSeries {
     let panel = chart.panels.iter().find(|panel| panel.y.quantity == quantity);
     let panel = panel.unwrap_or_else(|| panic!("no panel {quantity}"));
     panel.series.iter().find(|s| s.label == label).unwrap_or_else(|| panic!("no series {label}"))

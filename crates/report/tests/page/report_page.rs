@@ -7,7 +7,7 @@ use crate::report_common::{
 };
 use virtual_axes_core::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
 use virtual_axes_core::config::AxisKind;
-use virtual_axes_report::report::{Column, Report, ReportRun, Table};
+use virtual_axes_report::{Report, ReportRun, Table, TableColumn};
 
 static BALLBAR: LazyLock<[Recording; 2]> =
     LazyLock::new(|| [ballbar(&[], PERIOD, false), ballbar(&NO_FEEDFORWARD, PERIOD, false)]);
@@ -32,8 +32,8 @@ fn run_of(values: &[f64]) -> Recording {
     let x = AxisTrace {
         psec: values.to_vec(),
         position: values.to_vec(),
-        tracking_error: values.to_vec(),
-        synchronized_tracking_error: values.to_vec(),
+        following_error: values.to_vec(),
+        delay_compensated_following_error: values.to_vec(),
         velocity: values.to_vec(),
         current: values.to_vec(),
         current_setpoint: values.to_vec(),
@@ -80,7 +80,7 @@ fn names_from_users_are_inert() {
     recording.axes.push(standing);
     let table = Table {
         caption: evil.to_owned(),
-        columns: vec![Column::new(evil, evil); 2],
+        columns: vec![TableColumn::new(evil, evil); 2],
         rows: vec![vec![evil.to_owned(); 2]],
     };
     let run = || ReportRun {
@@ -221,8 +221,8 @@ fn a_long_run_makes_no_large_page() {
         recording.axes.push(AxisTrace {
             psec: signal(0),
             position: signal(1),
-            tracking_error: signal(2),
-            synchronized_tracking_error: signal(3),
+            following_error: signal(2),
+            delay_compensated_following_error: signal(3),
             velocity: signal(4),
             current: signal(5),
             current_setpoint: signal(6),

@@ -1,6 +1,6 @@
 //! Pictures of a search in a report.
 
-use virtual_axes_report::report::{PointGroup, PointStyle, Report, Scatter};
+use virtual_axes_report::{PointGroup, PointStyle, Report, Scatter};
 
 fn page(scatters: &[Scatter]) -> String {
     let mut bytes = Vec::new();

@@ -2,17 +2,17 @@
 
 use std::f64::consts::PI;
 
-use virtual_axes_report::report::{
-    Band, BandClass, Chart, ChartAxis, Column, Document, Guide, Notice, NoticeLevel, Panel, Section, Series,
-    SeriesStyle, Table, Unit,
+use virtual_axes_report::{
+    Band, BandClass, Chart, ChartAxis, ChartSeries, DisplayUnit, Document, Guide, Notice, NoticeLevel, Panel,
+    Section, SeriesStyle, Table, TableColumn,
 };
 
-const KILOGRAM: Unit = Unit::new("kg", 1.0, 1e-3);
+const KILOGRAM: DisplayUnit = DisplayUnit::new("kg", 1.0, 1e-3);
 /// m/s in a meter per minute.
 const METER_PER_MINUTE: f64 = 1.0 / 60.0;
 
 /// An axis of a chart.
-pub fn axis(quantity: &str, unit: Unit) -> ChartAxis {
+pub fn axis(quantity: &str, unit: DisplayUnit) -> ChartAxis {
     ChartAxis::new(quantity, unit)
 }
 
@@ -56,16 +56,17 @@ fn friction_law() -> Chart {
     let panel = Panel {
         lines: vec![Guide::new(4.0, "i0 = 4.00 A")],
         ..Panel::new(
-            axis("Current", Unit::AMPERE),
+            axis("Current", DisplayUnit::AMPERE),
             vec![
-                Series::new("measured, forward", SeriesStyle::Points(0), fast).with_errors(errors.clone()),
-                Series::new("measured, backward", SeriesStyle::Points(1), slow).with_errors(errors),
-                Series::new("fitted law", SeriesStyle::Simulated, fitted),
+                ChartSeries::new("measured, forward", SeriesStyle::Points(0), fast)
+                    .with_errors(errors.clone()),
+                ChartSeries::new("measured, backward", SeriesStyle::Points(1), slow).with_errors(errors),
+                ChartSeries::new("fitted law", SeriesStyle::Simulated, fitted),
             ],
         )
     };
     let note = "R² 0.998, bars: standard deviation".to_owned();
-    Chart { note, ..Chart::new("Friction law", axis("Velocity", Unit::METER_PER_MINUTE), vec![panel]) }
+    Chart { note, ..Chart::new("Friction law", axis("Velocity", DisplayUnit::METER_PER_MINUTE), vec![panel]) }
 }
 
 fn inertia() -> Chart {
@@ -79,23 +80,23 @@ fn inertia() -> Chart {
         lines: vec![Guide::new(95.1, "robust mean 95.1 kg")],
         ..Panel::new(
             axis("Equivalent inertia", KILOGRAM).within(80.0, 110.0),
-            vec![Series::new("instants", SeriesStyle::Points(0), dots.collect())],
+            vec![ChartSeries::new("instants", SeriesStyle::Points(0), dots.collect())],
         )
     };
-    Chart::new("Equivalent inertia", axis("Time", Unit::SECOND), vec![panel])
+    Chart::new("Equivalent inertia", axis("Time", DisplayUnit::SECOND), vec![panel])
 }
 
 fn regression() -> Chart {
     let acceleration: Vec<f64> = noise(4000, 21).iter().map(|n| 3.0 * n).collect();
     let current: Vec<f64> = acceleration.iter().zip(noise(4000, 8)).map(|(a, n)| 5.2 * a + 0.8 * n).collect();
     let panel = Panel::new(
-        axis("Feedforward current", Unit::AMPERE),
+        axis("Feedforward current", DisplayUnit::AMPERE),
         vec![
-            Series::over("recorded", SeriesStyle::Points(0), &acceleration, &current),
-            Series::new("regression", SeriesStyle::Simulated, vec![[-3.0, -15.6], [3.0, 15.6]]),
+            ChartSeries::from_xy("recorded", SeriesStyle::Points(0), &acceleration, &current),
+            ChartSeries::new("regression", SeriesStyle::Simulated, vec![[-3.0, -15.6], [3.0, 15.6]]),
         ],
     );
-    let unit = Unit::new("m/s²", 1.0, 1e-3);
+    let unit = DisplayUnit::new("m/s²", 1.0, 1e-3);
     Chart {
         note: "R² 0.994".to_owned(),
         ..Chart::new("Torque feedforward", axis("Acceleration", unit), vec![panel])
@@ -105,17 +106,21 @@ fn regression() -> Chart {
 fn delay() -> Chart {
     let sums: Vec<[f64; 2]> =
         (0..=60).map(|i| f64::from(i) * 1e-4).map(|d| [d, 2e-10 + 8e-5 * (d - 2.4e-3).powi(2)]).collect();
-    let unit = Unit::new("µm²", 1e-12, 1.0);
+    let unit = DisplayUnit::new("µm²", 1e-12, 1.0);
     let series = vec![
-        Series::new("simulated against recorded", SeriesStyle::Measured, sums.clone()),
-        Series::new("at the comparator", SeriesStyle::Steps(2), sums.iter().step_by(10).copied().collect()),
+        ChartSeries::new("simulated against recorded", SeriesStyle::Measured, sums.clone()),
+        ChartSeries::new(
+            "at the comparator",
+            SeriesStyle::Steps(2),
+            sums.iter().step_by(10).copied().collect(),
+        ),
     ];
     Chart {
         bands: vec![Band::interval("accepted", 1.8e-3, 3.0e-3)],
         lines: vec![Guide::new(2.4e-3, "2.4 ms")],
         ..Chart::new(
             "Delay α",
-            axis("Delay", Unit::MILLISECOND),
+            axis("Delay", DisplayUnit::MILLISECOND),
             vec![Panel::new(axis("Sum of squares", unit).with_zero(), series)],
         )
     }
@@ -135,8 +140,8 @@ pub fn validation(length: usize) -> Chart {
         Panel::new(
             axis(quantity, unit),
             vec![
-                Series::over("measured", SeriesStyle::Measured, &time, values),
-                Series::over("simulated", SeriesStyle::Simulated, &time, &simulated),
+                ChartSeries::from_xy("measured", SeriesStyle::Measured, &time, values),
+                ChartSeries::from_xy("simulated", SeriesStyle::Simulated, &time, &simulated),
             ],
         )
     };
@@ -153,11 +158,11 @@ pub fn validation(length: usize) -> Chart {
         bands: bands.filter(|band| band.from >= 0.0).collect(),
         ..Chart::new(
             "Measured and simulated",
-            axis("Time", Unit::SECOND),
+            axis("Time", DisplayUnit::SECOND),
             vec![
-                panel("Deviation", Unit::MICROMETER, &deviation, 0.9),
-                panel("Velocity", Unit::METER_PER_MINUTE, &velocity, 1.02),
-                panel("Current", Unit::AMPERE, &current, 0.85),
+                panel("Deviation", DisplayUnit::MICROMETER, &deviation, 0.9),
+                panel("Velocity", DisplayUnit::METER_PER_MINUTE, &velocity, 1.02),
+                panel("Current", DisplayUnit::AMPERE, &current, 0.85),
             ],
         )
     }
@@ -168,9 +173,9 @@ pub fn example() -> Document {
     let table = Table {
         caption: "Parameters".to_owned(),
         columns: vec![
-            Column::new("parameter", ""),
-            Column::new("value", "kg"),
-            Column::new("± (95 %)", "kg"),
+            TableColumn::new("parameter", ""),
+            TableColumn::new("value", "kg"),
+            TableColumn::new("± (95 %)", "kg"),
         ],
         rows: vec![vec!["inertia".to_owned(), "95.1".to_owned(), "-0.4".to_owned()]],
     };

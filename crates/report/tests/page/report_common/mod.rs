@@ -4,9 +4,9 @@ pub mod charts;
 
 use virtual_axes_core::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
 use virtual_axes_core::config::AxisKind;
-use virtual_axes_report::report::{Column, ReportRun, Table};
+use virtual_axes_report::{ReportRun, Table, TableColumn};
 
-use virtual_axes_verification::fixtures::common::{self, AXES, Ballbar, machine};
+use virtual_axes_verification::fixtures::machines::{self, AXES, Ballbar, machine};
 
 /// Names and kinds of the default machine's axes.
 const JOINTS: [(&str, AxisKind); AXES] = [
@@ -39,8 +39,8 @@ pub fn empty_axis(name: &str, kind: AxisKind) -> AxisTrace {
         moves: true,
         psec: none(),
         position: none(),
-        tracking_error: none(),
-        synchronized_tracking_error: none(),
+        following_error: none(),
+        delay_compensated_following_error: none(),
         velocity: none(),
         current: none(),
         current_setpoint: none(),
@@ -62,7 +62,7 @@ pub fn record(
     let mut axes = JOINTS.map(|(name, kind)| empty_axis(name, kind)).to_vec();
     let mut tool = ToolTrace::default();
     let mut recording = Recording::default();
-    common::run(&mut machine, duration, psec, |time, machine| {
+    machines::run(&mut machine, duration, psec, |time, machine| {
         if !machine.tick().is_multiple_of(every) {
             return;
         }
@@ -72,8 +72,8 @@ pub fn record(
             let s = machine.axis(i).sample();
             axis.psec.push(s.psec);
             axis.position.push(s.position);
-            axis.tracking_error.push(s.tracking_error());
-            axis.synchronized_tracking_error.push(s.synchronized_tracking_error());
+            axis.following_error.push(s.following_error());
+            axis.delay_compensated_following_error.push(s.delay_compensated_following_error());
             axis.velocity.push(s.velocity);
             axis.current.push(s.current);
             axis.current_setpoint.push(s.current_setpoint);
@@ -177,7 +177,7 @@ pub fn five_axes(every: u64) -> Recording {
     };
     let mut recording = record(&[], duration, psec, nearest_on(psec, duration), every);
     if let Some(tool) = &mut recording.tool {
-        let c = &recording.axes[4].synchronized_tracking_error;
+        let c = &recording.axes[4].delay_compensated_following_error;
         tool.orientation_error = c.iter().map(|e| e.abs()).collect();
     }
     recording
@@ -189,12 +189,12 @@ pub fn figures(recording: &Recording) -> Table {
     let columns = [("axis", ""), ("largest synchronized error", "µm, mdeg"), ("peak current", "A")];
     let rows = recording.axes.iter().filter(|a| a.moves).map(|a| {
         let unit = if a.kind == AxisKind::Linear { 1e6 } else { 180e3 / std::f64::consts::PI };
-        let error = peak(&a.synchronized_tracking_error) * unit;
+        let error = peak(&a.delay_compensated_following_error) * unit;
         vec![a.name.clone(), format!("{error:.1}"), format!("{:.2}", peak(&a.current))]
     });
     Table {
         caption: "Axes".to_owned(),
-        columns: columns.map(|(name, unit)| Column::new(name, unit)).to_vec(),
+        columns: columns.map(|(name, unit)| TableColumn::new(name, unit)).to_vec(),
         rows: rows.collect(),
     }
 }

@@ -1,0 +1,300 @@
+//! Measured against simulated (Prévost figs. 6 and 7).
+
+use std::ops::Range;
+
+use super::super::chart::{Band, Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
+use super::super::document::Section;
+use super::super::table::Table;
+use super::super::unit::DisplayUnit;
+use super::format::{columns, determination, optional, with_unit};
+use super::recordings::{bands, of_one, over_time};
+use super::{IdentificationPage, Step, ValidationRecording};
+use virtual_axes_core::units::{MILLIMETER, seconds};
+use virtual_axes_identify::identify::{
+    Agreement, Comparison, Deviation, Experiment, Input, SegmentKind, Simulated,
+};
+
+/// A picture of more than this, s, hides the details: one move of it is shown once more.
+const LONG: f64 = 12.0;
+/// The longest move that is shown so, s.
+const LONGEST_MOVE: f64 = 6.0;
+/// Moves at least this part of the highest speed are fast.
+const FAST: f64 = 0.7;
+/// A move begins and ends at this part of the highest speed.
+const MOVING: f64 = 0.005;
+/// Rest that is shown about a move, part of it.
+const ABOUT: f64 = 0.2;
+/// Tracking errors are shown as errors up to here, then as positions, m or rad.
+const LARGE_ERROR: f64 = MILLIMETER;
+
+pub(super) fn section(page: &IdentificationPage) -> Section {
+    let mut section = page.step("Measured against simulated", Step::Agreement);
+    let pairs: Vec<(&Input, &Agreement)> = page.inputs.iter().zip(&page.identification.agreements).collect();
+    section.paragraphs.push(
+        "The axis as it was found, in closed loop on the recorded setpoints (Prévost fig. 6). Deviations are simulated \
+         minus measured."
+            .to_owned(),
+    );
+    fill(page, &mut section, &pairs);
+    section
+}
+
+/// A recording that the axis was not identified from.
+pub(super) fn validation(page: &IdentificationPage, check: &ValidationRecording) -> Section {
+    let mut section = of_one(&check.input, check.findings, check.agreement);
+    section.heading = format!("Validation on {}", check.input.signals.name);
+    section.paragraphs.push("Nothing was identified from this recording.".to_owned());
+    fill(page, &mut section, &[(&check.input, check.agreement)]);
+    section
+}
+
+fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Input, &Agreement)]) {
+    for (input, agreement) in pairs {
+        if agreement.experiments.is_empty() {
+            let name = &input.signals.name;
+            section.paragraphs.push(match &agreement.inverse {
+                Some(_) => format!(
+                    "{name} has no PSEC that begins at rest: its current is compared with that of inverse dynamics; at \
+                     rest friction holds anything within ±i0."
+                ),
+                None => format!(
+                    "{name} has neither PSEC that begins at rest nor a current: there is nothing to compare."
+                ),
+            });
+        }
+    }
+    let rows: Vec<Vec<String>> = pairs.iter().flat_map(|(input, a)| rows(page, input, a)).collect();
+    if !rows.is_empty() {
+        section.tables.push(table(page, rows));
+    }
+    let inverse: Vec<Vec<String>> = pairs.iter().filter_map(|(input, a)| inverse_row(input, a)).collect();
+    if !inverse.is_empty() {
+        section.paragraphs.push(
+            "Inverse dynamics is the current that the recorded motion asks for (Prévost eqs. 1 and 3), without a \
+             simulation: what swings between two samples, and what the filter of the acceleration takes, is not in it."
+                .to_owned(),
+        );
+        let heads = [("recording", ""), ("largest", "A"), ("RMS", "A"), ("R²", "")];
+        section.tables.push(Table {
+            caption: "Current by inverse dynamics minus measured".to_owned(),
+            columns: columns(heads),
+            rows: inverse,
+        });
+    }
+    for (input, agreement) in pairs {
+        let count = agreement.experiments.len();
+        for (i, (experiment, simulated)) in agreement.experiments.iter().zip(&agreement.simulated).enumerate()
+        {
+            let name = name(input, experiment, i, count);
+            let run = Run { page, input, agreement, experiment, simulated };
+            section.charts.extend(run.charts(&name));
+        }
+        if agreement.experiments.is_empty() {
+            section.charts.extend(inverse_chart(page, input, agreement));
+        }
+    }
+}
+
+/// A part of a recording by name; numbered where there are several.
+fn name(input: &Input, experiment: &Experiment, i: usize, count: usize) -> String {
+    let (name, mode) = (&input.signals.name, experiment.mode.name());
+    let part = if count > 1 { format!(", part {}", i + 1) } else { String::new() };
+    format!("{name}{part}, feedforward {mode}")
+}
+
+fn rows(page: &IdentificationPage, input: &Input, agreement: &Agreement) -> Vec<Vec<String>> {
+    let (error, velocity) = (page.error_unit(), page.velocity_unit());
+    let count = agreement.experiments.len();
+    let pairs = agreement.experiments.iter().zip(&agreement.comparisons).enumerate();
+    pairs
+        .map(|(i, (experiment, comparison))| {
+            let Comparison { constant_velocity, elsewhere, velocity: v, current, current_determination } =
+                comparison;
+            let mut row = vec![name(input, experiment, i, count)];
+            let mut put = |deviation: &Option<Deviation>, unit: &DisplayUnit| {
+                row.push(optional(deviation.map(|d| d.max), unit, 3));
+                row.push(optional(deviation.map(|d| d.rms), unit, 3));
+            };
+            put(constant_velocity, &error);
+            put(elsewhere, &error);
+            put(v, &velocity);
+            put(current, &DisplayUnit::AMPERE);
+            row.push(current_determination.map_or_else(String::new, determination));
+            row
+        })
+        .collect()
+}
+
+fn table(page: &IdentificationPage, rows: Vec<Vec<String>>) -> Table {
+    let (error, velocity) = (page.error_unit().symbol, page.velocity_unit().symbol);
+    let heads = [
+        ("part", ""),
+        ("position at constant velocity: largest", error),
+        ("RMS", error),
+        ("elsewhere: largest", error),
+        ("RMS", error),
+        ("velocity: largest", velocity),
+        ("RMS", velocity),
+        ("current: largest", "A"),
+        ("RMS", "A"),
+        ("R² of the current", ""),
+    ];
+    Table { caption: "Simulated minus measured".to_owned(), columns: columns(heads), rows }
+}
+
+fn inverse_row(input: &Input, agreement: &Agreement) -> Option<Vec<String>> {
+    let inverse = agreement.inverse.as_ref()?;
+    let of = |value: f64| optional(Some(value), &DisplayUnit::AMPERE, 3);
+    Some(vec![
+        input.signals.name.clone(),
+        of(inverse.current.max),
+        of(inverse.current.rms),
+        determination(inverse.determination),
+    ])
+}
+
+/// A simulated part of a recording.
+struct Run<'a> {
+    page: &'a IdentificationPage<'a>,
+    input: &'a Input<'a>,
+    agreement: &'a Agreement,
+    experiment: &'a Experiment,
+    simulated: &'a Simulated,
+}
+
+impl Run<'_> {
+    /// The whole, and a move of it where it is long.
+    fn charts(&self, name: &str) -> Vec<Chart> {
+        let count = self.experiment.position.len();
+        let mut charts = vec![self.chart(name.to_owned(), 0..count)];
+        if count as f64 * self.experiment.period() > LONG
+            && let Some(window) = self.fast_move()
+        {
+            charts.push(self.chart(format!("{name}: a fast move"), window));
+        }
+        charts
+    }
+
+    /// Of the fast moves the one whose velocity is constant longest, with the rest about it.
+    fn fast_move(&self) -> Option<Range<usize>> {
+        let (velocity, period) = (&self.experiment.velocity, self.experiment.period());
+        let top = velocity.iter().map(|v| v.abs()).filter(|v| v.is_finite()).fold(0.0, f64::max);
+        let longest = (LONGEST_MOVE / period) as usize;
+        let segments = self.agreement.segments.iter().filter(|segment| {
+            segment.kind == SegmentKind::ConstantVelocity
+                && segment.span == self.experiment.span
+                && segment.velocity.abs() >= FAST * top
+                && segment.samples.start >= self.experiment.sample
+                && segment.samples.len() < longest
+        });
+        let inside = match segments.max_by_key(|segment| segment.samples.len()) {
+            Some(segment) => segment.samples.start - self.experiment.sample,
+            // None is constant for long enough: where it is fastest.
+            None => velocity.iter().position(|v| v.abs() >= top)?,
+        };
+        let way = velocity.get(inside)?.signum();
+        let is_moving = |v: &f64| *v * way > MOVING * top;
+        let before = velocity.get(..inside)?.iter().rev().take_while(|v| is_moving(v)).count();
+        let after = velocity.get(inside..)?.iter().take_while(|v| is_moving(v)).count();
+        let about = (ABOUT * (before + after) as f64) as usize;
+        let begin = inside.saturating_sub((before + about).min(longest));
+        Some(begin..(inside + (after + about).min(longest)).min(velocity.len()))
+    }
+
+    fn chart(&self, title: String, window: Range<usize>) -> Chart {
+        let Run { page, experiment: e, simulated: s, .. } = self;
+        let time = |i: usize| e.start + i as f64 * e.period();
+        let (from, to) = (time(window.start), time(window.end));
+        let series = |label: &str, style, value: &dyn Fn(usize) -> f64| {
+            ChartSeries::new(label, style, window.clone().map(|i| [time(i), value(i)]).collect())
+        };
+        let at = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(f64::NAN);
+        let both =
+            |quantity: &str, unit, measured: &dyn Fn(usize) -> f64, simulated: &dyn Fn(usize) -> f64| {
+                let lines = vec![
+                    series("measured", SeriesStyle::Measured, measured),
+                    series("simulated", SeriesStyle::Simulated, simulated),
+                ];
+                Panel::new(ChartAxis::new(quantity, unit), lines)
+            };
+        let deviation = |i: usize| at(&s.position, i) - at(&e.position, i);
+        let deviation = vec![series("", SeriesStyle::Line(0), &deviation)];
+        let tsp = seconds(page.periods.position);
+        let tracking = |position: &[f64], i: usize| e.psec_at(i, tsp) - at(position, i);
+        let largest = window.clone().map(|i| tracking(&e.position, i).abs()).fold(0.0, f64::max);
+        let unit = if largest > LARGE_ERROR { page.position_unit() } else { page.error_unit() };
+        let mut panels = vec![
+            Panel::new(ChartAxis::new("Deviation", page.error_unit()), deviation),
+            both("Tracking error", unit, &|i| tracking(&e.position, i), &|i| tracking(&s.position, i)),
+            both("Velocity", page.velocity_unit(), &|i| at(&e.velocity, i), &|i| at(&s.velocity, i)),
+        ];
+        if let Some(current) = &e.current {
+            panels.push(both("Current", DisplayUnit::AMPERE, &|i| at(current, i), &|i| at(&s.current, i)));
+        }
+        let clipped = |band: Band| {
+            let (from, to) = (band.from.max(from), band.to.min(to));
+            (from < to).then_some(Band { from, to, ..band })
+        };
+        let bands = bands(self.input.signals, &self.agreement.segments).into_iter().filter_map(clipped);
+        let peak = largest_of(&panels);
+        Chart {
+            note: format!(
+                "deviation: simulated − measured position, up to {}",
+                with_unit(peak, &page.error_unit(), 3)
+            ),
+            bands: bands.collect(),
+            ..Chart::new(title, ChartAxis::new("Time", DisplayUnit::SECOND).within(from, to), panels)
+        }
+    }
+}
+
+/// Largest magnitude in the first panel.
+fn largest_of(panels: &[Panel]) -> f64 {
+    let points = panels.first().into_iter().flat_map(|panel| &panel.series).flat_map(|s| &s.points);
+    points.map(|point| point[1].abs()).filter(|d| d.is_finite()).fold(0.0, f64::max)
+}
+
+/// Measured current against the one of inverse dynamics.
+fn inverse_chart(page: &IdentificationPage, input: &Input, agreement: &Agreement) -> Option<Chart> {
+    let (signals, inverse) = (input.signals, agreement.inverse.as_ref()?);
+    let mut modeled = Vec::new();
+    let mut deviation = Vec::new();
+    for (number, currents) in &inverse.modeled {
+        let Some(span) = signals.spans.get(*number) else { continue };
+        let time = |i: usize| span.start + i as f64 * signals.period;
+        modeled.extend(currents.iter().enumerate().map(|(i, current)| [time(i), *current]));
+        modeled.push([span.start, f64::NAN]);
+        let recorded = span.current.iter().flatten();
+        let pairs = currents.iter().zip(recorded).enumerate();
+        deviation.extend(pairs.map(|(i, (modeled, recorded))| [time(i), modeled - recorded]));
+        deviation.push([span.start, f64::NAN]);
+    }
+    let measured = over_time(signals, &|span| span.current.clone());
+    let velocity = over_time(signals, &|span| Some(span.velocity.clone()));
+    let panels = vec![
+        Panel::new(
+            ChartAxis::new("Deviation", DisplayUnit::AMPERE),
+            vec![ChartSeries::new("", SeriesStyle::Line(0), deviation)],
+        ),
+        Panel::new(
+            ChartAxis::new("Current", DisplayUnit::AMPERE),
+            vec![
+                ChartSeries::new("measured", SeriesStyle::Measured, measured),
+                ChartSeries::new("modeled", SeriesStyle::Simulated, modeled),
+            ],
+        ),
+        Panel::new(
+            ChartAxis::new("Velocity", page.velocity_unit()),
+            vec![ChartSeries::new("", SeriesStyle::Measured, velocity)],
+        ),
+    ];
+    Some(Chart {
+        note: format!("R² {}", determination(inverse.determination)),
+        bands: bands(signals, &agreement.segments),
+        ..Chart::new(
+            format!("{}: current by inverse dynamics", signals.name),
+            ChartAxis::new("Time", DisplayUnit::SECOND),
+            panels,
+        )
+    })
+}

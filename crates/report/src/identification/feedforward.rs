@@ -1,0 +1,113 @@
+//! VFFW and TFFW: recorded feedforward over the derivatives of PSEC.
+
+use super::super::chart::{Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
+use super::super::document::Section;
+use super::super::scale::Extent;
+use super::super::unit::DisplayUnit;
+use super::format::{determination, digits, exact};
+use super::{IdentificationPage, Step};
+use virtual_axes_identify::identify::Regression;
+
+/// One of the two.
+struct Weight<'a> {
+    name: &'static str,
+    what: &'static str,
+    equation: u32,
+    found: Option<&'a Regression>,
+    /// DisplayUnit of the weight.
+    unit: &'static str,
+    /// Of the derivative, and of what is fed forward.
+    across: (&'static str, DisplayUnit),
+    up: (&'static str, DisplayUnit),
+    /// The weight of the axis as it was found.
+    value: f64,
+}
+
+pub(super) fn section(page: &IdentificationPage) -> Section {
+    let (found, weights) = (&page.identification.feedforward, page.axis().feedforward);
+    let mut section = page.step("Feedforward", Step::Feedforward);
+    let (speed, acceleration, torque) = if page.has_linear_motor() {
+        ("m/s", "m/s²", DisplayUnit::new("N", 1.0, 1e-3))
+    } else {
+        ("rad/s", "rad/s²", DisplayUnit::new("N·m", 1.0, 1e-3))
+    };
+    let unit = |symbol| DisplayUnit::new(symbol, 1.0, 1e-3);
+    let both = [
+        Weight {
+            name: "VFFW",
+            what: "Velocity feedforward",
+            equation: 6,
+            found: found.velocity.as_ref(),
+            unit: "",
+            across: ("dPSEC/dt at the motor", unit(speed)),
+            up: ("VFFWS", unit(speed)),
+            value: weights.velocity,
+        },
+        Weight {
+            name: "TFFW",
+            what: "Torque feedforward",
+            equation: 7,
+            found: found.torque.as_ref(),
+            unit: page.inertia_unit().symbol,
+            across: ("d²PSEC/dt² at the motor", unit(acceleration)),
+            up: ("TFFWS", torque),
+            value: weights.torque,
+        },
+    ];
+    section.paragraphs.push(
+        "The weights are the ratios of what was fed forward to the derivatives of PSEC by Euler's approximation \
+         (Prévost eqs. 6 to 8)."
+            .to_owned(),
+    );
+    section.paragraphs.extend(both.iter().map(|weight| weight.text(page)));
+    section.charts.extend(both.iter().filter_map(|w| w.found.map(|found| w.chart(found))));
+    section
+}
+
+impl Weight<'_> {
+    fn text(&self, page: &IdentificationPage) -> String {
+        let Weight { name, equation, unit, value, .. } = self;
+        let of = |value: f64| format!("{} {unit}", exact(value)).trim_end().to_owned();
+        let Some(found) = self.found else {
+            if *equation == 7 && page.identification.feedforward.no_torque {
+                return "TFFW = 0: TFFWS is 0 throughout with torque feedforward on.".to_owned();
+            }
+            let refined = page.identification.refinement.as_ref().is_some_and(|refinement| {
+                let own = format!("feedforward.{}", if *equation == 6 { "velocity" } else { "torque" });
+                refinement.parameters.iter().any(|refined| refined.parameter.to_string() == own)
+            });
+            return if refined {
+                format!("{name}: no recording has {name}S; the closed loop told {}.", of(*value))
+            } else {
+                format!(
+                    "{name} was not identified: no recording has {name}S other than 0. It stays {}.",
+                    of(*value)
+                )
+            };
+        };
+        let (low, high) = found.delay;
+        format!(
+            "{name} = {} ± {} (eq. {equation}), R² {}; {name}S comes {} … {} ms behind the derivative.",
+            digits(found.value, 5),
+            format!("{} {unit}", digits(found.error, 2)).trim_end(),
+            determination(found.determination),
+            exact(low * 1e3),
+            exact(high * 1e3)
+        )
+    }
+
+    fn chart(&self, found: &Regression) -> Chart {
+        let points = found.points.iter().map(|(x, y)| [*x, *y]).collect();
+        let line = Extent::of(found.points.iter().map(|point| point.0))
+            .map_or_else(Vec::new, |e| [e.min, e.max].map(|x| [x, found.value * x]).to_vec());
+        let series = vec![
+            ChartSeries::new("regression", SeriesStyle::Commanded, line),
+            ChartSeries::new("recorded", SeriesStyle::Points(0), points),
+        ];
+        let axis = |(quantity, unit): (&str, DisplayUnit)| ChartAxis::new(quantity, unit);
+        Chart {
+            note: format!("R² {}", determination(found.determination)),
+            ..Chart::new(self.what, axis(self.across), vec![Panel::new(axis(self.up), series)])
+        }
+    }
+}

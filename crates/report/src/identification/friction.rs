@@ -1,0 +1,173 @@
+//! The friction law against what was measured (Prévost fig. 5).
+
+use super::super::chart::{Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesStyle};
+use super::super::document::Section;
+use super::super::table::Table;
+use super::super::unit::DisplayUnit;
+use super::format::{columns, determination, digits, percent, plain};
+use super::{IdentificationPage, Step};
+use virtual_axes_core::config::FrictionConfig;
+use virtual_axes_core::drive;
+use virtual_axes_identify::identify::{Friction, FrictionLaw, LawFit, Level};
+
+/// Points of the law's line in either direction.
+const FINE: usize = 200;
+/// They lie denser towards standstill, where the law bends: place = part ^ this.
+const DENSER: i32 = 3;
+/// Difference of two laws, part of the current, that can be seen.
+const VISIBLE: f64 = 1e-3;
+
+pub(super) fn section(page: &IdentificationPage) -> Section {
+    let found = page.identification;
+    let mut section = page.step("Friction law", Step::Friction);
+    let Some(friction) = &found.friction else {
+        section.paragraphs.push(if found.refinement.is_some() {
+            format!(
+                "No law was fitted to currents of constant velocities. What the closed loop told is {}.",
+                in_words(page, &page.axis().friction)
+            )
+        } else {
+            "No friction law was identified; what the machine file says is kept.".to_owned()
+        });
+        return section;
+    };
+    let refined = refined(page, friction, &found.steady.levels);
+    section.paragraphs.push(text(page, friction));
+    if refined.is_some() {
+        let law = in_words(page, &page.axis().friction);
+        section.paragraphs.push(format!("The refinement on the closed loop moves it to {law}."));
+    }
+    section.tables.push(table(page, friction, &found.steady.levels));
+    section.charts.push(chart(page, friction, refined.as_ref(), &found.steady.levels));
+    section
+}
+
+fn text(page: &IdentificationPage, friction: &Friction) -> String {
+    let (law, unit) = (&friction.law, page.velocity_unit().symbol);
+    let r2 = determination(law.determination);
+    let mut text = match law.line() {
+        Some((level, slope)) => format!(
+            "A Coulomb level and a viscous slope are fitted, since the speeds do not bear the four parameters of \
+             Prévost eq. 3: i = {} A + {} A/({unit}) · V, R² {r2}.",
+            digits(level, 4),
+            digits(slope, 3)
+        ),
+        None => format!(
+            "The double exponential law of Prévost eq. 3 is fitted to both directions at once: {}, R² {r2}.",
+            in_words(page, &law.config)
+        ),
+    };
+    text += &format!(" i0 = {} A.", digits(law.config.i0, 4));
+    if friction.asymmetry.is_finite() {
+        text += &format!(
+            " The directions differ by up to {} % of the friction; the law is the same for both.",
+            percent(friction.asymmetry)
+        );
+    }
+    text
+}
+
+/// A law with its values.
+fn in_words(page: &IdentificationPage, law: &FrictionConfig) -> String {
+    let exponent = page.exponent_unit();
+    format!(
+        "i = a e^(bV) + c e^(dV) with a = {} A, b = {} {exponent}, c = {} A, d = {} {exponent}",
+        digits(law.a, 4),
+        digits(law.b, 4),
+        digits(law.c, 4),
+        digits(law.d, 4)
+    )
+}
+
+/// The law of the refined axis, if it can be told from the fitted one at the speeds that were measured.
+fn refined(page: &IdentificationPage, friction: &Friction, levels: &[Level]) -> Option<drive::Friction> {
+    // Of a motor that turns with the axis, whose torque is its current.
+    let law = |config| drive::Friction::new(config, page.kind(), 1.0, 1.0);
+    let (fitted, now) = (law(friction.law.config), law(page.axis().friction));
+    let differ = |level: &Level| {
+        let (fitted, now) = (fitted.bound(level.velocity), now.bound(level.velocity));
+        (now - fitted).abs() > VISIBLE * fitted
+    };
+    levels.iter().any(differ).then_some(now)
+}
+
+fn chart(
+    page: &IdentificationPage,
+    friction: &Friction,
+    refined: Option<&drive::Friction>,
+    levels: &[Level],
+) -> Chart {
+    let unit = page.velocity_unit();
+    let measured = |label: &str, group: usize, sign: f64| {
+        let of_it: Vec<&Level> = levels.iter().filter(|l| l.velocity.signum() == sign).collect();
+        let points = of_it.iter().map(|l| [l.velocity, l.friction]).collect();
+        ChartSeries::new(label, SeriesStyle::Points(group), points)
+            .with_errors(of_it.iter().map(|l| l.error).collect())
+    };
+    let top = levels.iter().map(|level| level.velocity.abs()).fold(0.0, f64::max);
+    let line = |law: &dyn Fn(f64) -> f64| -> Vec<[f64; 2]> {
+        let speed = |i: usize| top * (i as f64 / FINE as f64).powi(DENSER);
+        let minus = (1..=FINE).rev().map(|i| -speed(i));
+        let plus = (1..=FINE).map(speed);
+        // Standstill holds any current within ±i0: the line is broken there.
+        minus.map(|v| [v, law(v)]).chain([[0.0, f64::NAN]]).chain(plus.map(|v| [v, law(v)])).collect()
+    };
+    let mut series = vec![
+        measured("measured towards plus", 0, 1.0),
+        measured("measured towards minus", 1, -1.0),
+        ChartSeries::new("fitted law", SeriesStyle::Simulated, line(&|v| friction.law.at(v / unit.size))),
+    ];
+    if let Some(law) = refined {
+        let now = line(&|v: f64| law.bound(v).copysign(v));
+        series.push(ChartSeries::new("refined law", SeriesStyle::Line(2), now));
+    }
+    let i0 = friction.law.config.i0;
+    let kind = match friction.law.law {
+        FrictionLaw::DoubleExponential => "double exponential",
+        FrictionLaw::Linear => "linear",
+    };
+    let panel = Panel {
+        lines: vec![Guide::new(i0, format!("i0 = {} A", digits(i0, 4)))],
+        ..Panel::new(ChartAxis::new("Friction current", DisplayUnit::AMPERE), series)
+    };
+    Chart {
+        note: format!("{kind}, R² {}; bars: standard error", determination(friction.law.determination)),
+        ..Chart::new("Friction law", ChartAxis::new("Velocity", unit), vec![panel])
+    }
+}
+
+fn table(page: &IdentificationPage, friction: &Friction, levels: &[Level]) -> Table {
+    let unit = page.velocity_unit();
+    let row = |level: &Level| {
+        let v = level.velocity / unit.size;
+        let difference = |law: &LawFit| percent((law.at(v) - level.friction) / level.friction);
+        let own = friction.directions[usize::from(level.velocity < 0.0)].as_ref();
+        vec![
+            plain(level.velocity, &unit, 4),
+            digits(level.current, 4),
+            digits(level.friction, 4),
+            digits(level.error, 2),
+            digits(friction.law.at(v), 4),
+            difference(&friction.law),
+            own.map_or_else(String::new, |law| digits(law.at(v), 4)),
+            own.map_or_else(String::new, difference),
+            format!("{:.1}", level.duration),
+        ]
+    };
+    let heads = [
+        ("velocity", unit.symbol),
+        ("current", "A"),
+        ("of it friction", "A"),
+        ("±", "A"),
+        ("law", "A"),
+        ("law − friction", "%"),
+        ("law of the direction", "A"),
+        ("that − friction", "%"),
+        ("duration", "s"),
+    ];
+    Table {
+        caption: "Constant velocities".to_owned(),
+        columns: columns(heads),
+        rows: levels.iter().map(row).collect(),
+    }
+}

@@ -1,0 +1,143 @@
+//! Gravity: currents of standstills, and the law.
+
+use super::super::chart::{Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
+use super::super::document::Section;
+use super::super::scale::Extent;
+use super::super::table::Table;
+use super::super::unit::DisplayUnit;
+use super::format::{columns, digits};
+use super::{IdentificationPage, Step};
+use virtual_axes_core::config::AxisKind;
+use virtual_axes_core::units::DEGREE;
+use virtual_axes_identify::identify::{Gravity, GravityCurrent, GravitySource, Rest};
+
+/// Points of the law's line.
+const FINE: usize = 181;
+
+pub(super) fn section(page: &IdentificationPage) -> Section {
+    let found = page.identification;
+    let mut section = page.step("Gravity", Step::Gravity);
+    let Some(gravity) = &found.gravity else {
+        section.paragraphs.push(
+            "Gravity was not identified: no current at standstill and none at constant velocities in both \
+             directions. What the machine file says is kept."
+                .to_owned(),
+        );
+        return section;
+    };
+    let from = match gravity.source {
+        GravitySource::Motion => {
+            "constant velocities in both directions, where friction changes its sign and gravity does not"
+        }
+        GravitySource::Rest => {
+            "standstills, where friction changes its sign with the side from which the axis came"
+        }
+    };
+    section.paragraphs.push(format!(
+        "Nothing accelerates at constant velocity and at rest (Prévost eq. 2), so that the current is that of friction \
+         and gravity. Gravity is taken from {from}. {}",
+        sentence(page, gravity)
+    ));
+    if !found.steady.rests.is_empty() {
+        section.charts.push(chart(page, gravity, &found.steady.rests));
+    }
+    section.tables.push(table(page.kind(), gravity));
+    section
+}
+
+/// The gravity in the units of the machine file.
+fn sentence(page: &IdentificationPage, gravity: &Gravity) -> String {
+    let pair = |value: f64, error: f64| format!("{} ± {}", digits(value, 4), digits(error, 2));
+    if gravity.model == GravityCurrent::default() {
+        return "It is not significant: the model has none.".to_owned();
+    }
+    let mut parts = Vec::new();
+    if let Some((weight, error)) = gravity.weight {
+        parts.push(format!("W = {} N", pair(weight, error)));
+    }
+    if let Some((tilt, error)) = gravity.tilt {
+        parts.push(format!("k = {} N·m", pair(tilt, error)));
+    }
+    if let Some((phase, error)) = gravity.phase {
+        parts.push(format!("φ = {}°", pair(phase / DEGREE, error / DEGREE)));
+    }
+    let found = page.axis().gravity;
+    let refined = gravity.weight.is_some_and(|w| w.0 != found.weight)
+        || gravity.tilt.is_some_and(|k| k.0 != found.tilt);
+    let more = if !refined {
+        String::new()
+    } else if page.kind() == AxisKind::Linear {
+        format!("; refined on the closed loop W = {} N", digits(found.weight, 4))
+    } else {
+        format!(
+            "; refined on the closed loop k = {} N·m, φ = {}°",
+            digits(found.tilt, 4),
+            digits(found.phase / DEGREE, 4)
+        )
+    };
+    format!("This gives {}{more}.", parts.join(", "))
+}
+
+fn chart(page: &IdentificationPage, gravity: &Gravity, rests: &[Rest]) -> Chart {
+    let came = |label: &str, group: usize, sign: f64| {
+        let of_it = rests.iter().filter(|rest| rest.approach == sign);
+        ChartSeries::new(label, SeriesStyle::Points(group), of_it.map(|r| [r.position, r.current]).collect())
+    };
+    let mut series = vec![
+        came("came towards plus", 0, 1.0),
+        came("came towards minus", 1, -1.0),
+        came("had not moved", 2, 0.0),
+    ];
+    series.retain(|series| !series.points.is_empty());
+    let unit = page.position_unit();
+    let mut x = ChartAxis::new("Position", unit);
+    if let Some(extent) = Extent::of(rests.iter().map(|rest| rest.position)) {
+        if extent.span() < unit.size {
+            // One place: its digits are no scale.
+            x = x.within(extent.middle() - unit.size, extent.middle() + unit.size);
+        }
+        let place = |i: usize| extent.min + extent.span() * i as f64 / (FINE - 1) as f64;
+        let law = |law: &GravityCurrent| (0..FINE).map(|i| [place(i), law.at(place(i))]).collect();
+        series.push(ChartSeries::new("gravity of the model", SeriesStyle::Simulated, law(&gravity.model)));
+        if let Some((at_rest, _)) = &gravity.at_rest {
+            series.push(ChartSeries::new("from standstills alone", SeriesStyle::Line(2), law(at_rest)));
+        }
+    }
+    Chart {
+        note: "friction holds up to ±i0 of it on either side".to_owned(),
+        ..Chart::new(
+            "Current at standstill",
+            x,
+            vec![Panel::new(ChartAxis::new("Current", DisplayUnit::AMPERE), series)],
+        )
+    }
+}
+
+fn table(kind: AxisKind, gravity: &Gravity) -> Table {
+    let part = |name: &str, of: fn(&GravityCurrent) -> f64| {
+        let pair = |pair: Option<(&GravityCurrent, &GravityCurrent)>| {
+            pair.map_or_else(
+                || [String::new(), String::new()],
+                |(value, error)| [digits(of(value), 4), digits(of(error), 2)],
+            )
+        };
+        let own = Some((&gravity.current, &gravity.error));
+        let (motion, rest) = match gravity.source {
+            GravitySource::Motion => (own, gravity.at_rest.as_ref().map(|(value, error)| (value, error))),
+            GravitySource::Rest => (None, own),
+        };
+        let mut row = vec![name.to_owned()];
+        row.extend(pair(motion));
+        row.extend(pair(rest));
+        row.push(digits(of(&gravity.model), 4));
+        row
+    };
+    let mut rows = vec![part("constant", |g| g.constant)];
+    if kind == AxisKind::Rotary {
+        rows.push(part("factor of sin q", |g| g.sine));
+        rows.push(part("factor of cos q", |g| g.cosine));
+    }
+    let heads =
+        [("current", ""), ("in motion", "A"), ("±", "A"), ("at rest", "A"), ("±", "A"), ("model", "A")];
+    Table { caption: "Gravity as motor current".to_owned(), columns: columns(heads), rows }
+}

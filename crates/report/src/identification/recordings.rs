@@ -1,0 +1,132 @@
+//! The recordings: what they hold, and what the axis does when (Prévost fig. 4).
+
+use super::super::chart::{Band, BandClass, Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
+use super::super::document::Section;
+use super::super::table::Table;
+use super::super::unit::DisplayUnit;
+use super::format::{columns, digits, exact};
+use super::{IdentificationPage, modes, notices};
+use virtual_axes_identify::identify::{Agreement, Input, Segment, SegmentKind};
+use virtual_axes_identify::recording::{Finding, Signals, Span};
+
+pub(super) fn section(page: &IdentificationPage) -> Section {
+    let pairs: Vec<(&Input, Option<&Agreement>)> = page
+        .inputs
+        .iter()
+        .enumerate()
+        .map(|(number, input)| (input, page.identification.agreements.get(number)))
+        .collect();
+    let findings = page.findings.iter().take(page.inputs.len()).flatten();
+    let text = "Velocity and acceleration are derivatives of the position behind a filter without phase; its \
+                cut-off is where it passes half the power. Shades tell what the axis does (Prévost fig. 4); what is \
+                neither long enough nor steady enough is left out.";
+    Section {
+        paragraphs: vec![text.to_owned()],
+        notices: findings.map(notices::notice).collect(),
+        tables: vec![table(&pairs)],
+        charts: pairs.iter().map(|(input, agreement)| chart(page, input.signals, *agreement)).collect(),
+        ..Section::new("Recordings")
+    }
+}
+
+/// Notices and the table of one recording.
+pub(super) fn of_one(input: &Input, findings: &[Finding], agreement: &Agreement) -> Section {
+    Section {
+        notices: findings.iter().map(notices::notice).collect(),
+        tables: vec![table(&[(input, Some(agreement))])],
+        ..Section::default()
+    }
+}
+
+fn table(pairs: &[(&Input, Option<&Agreement>)]) -> Table {
+    let heads = [
+        ("recording", ""),
+        ("samples", ""),
+        ("period", "ms"),
+        ("cut-off", "Hz"),
+        ("lag of the current, taken back", "ms"),
+        ("spans", ""),
+        ("feedforward", ""),
+        ("static", "s"),
+        ("constant velocity", "s"),
+        ("accelerating", "s"),
+    ];
+    Table {
+        caption: "What was recorded".to_owned(),
+        columns: columns(heads),
+        rows: pairs.iter().map(|(input, agreement)| row(input, *agreement)).collect(),
+    }
+}
+
+fn row(input: &Input, agreement: Option<&Agreement>) -> Vec<String> {
+    let signals = input.signals;
+    let samples: usize = signals.spans.iter().map(|span| span.position.len()).sum();
+    let duration = |kind: SegmentKind| {
+        let segments = agreement.map_or(&[][..], |a| &a.segments).iter().filter(|s| s.kind == kind);
+        let count: usize = segments.map(|s| s.samples.len()).sum();
+        format!("{:.1}", count as f64 * signals.period)
+    };
+    vec![
+        signals.name.clone(),
+        samples.to_string(),
+        exact(signals.period * 1e3),
+        digits(signals.cutoff, 3),
+        digits(signals.current_lag * 1e3, 3),
+        signals.spans.len().to_string(),
+        agreement.map_or_else(|| "–".to_owned(), |agreement| modes(agreement, input)),
+        duration(SegmentKind::Static),
+        duration(SegmentKind::ConstantVelocity),
+        duration(SegmentKind::Accelerating),
+    ]
+}
+
+/// Velocity and current over time.
+fn chart(page: &IdentificationPage, signals: &Signals, agreement: Option<&Agreement>) -> Chart {
+    let line = |label: &str, style, channel: &dyn Fn(&Span) -> Option<Vec<f64>>| {
+        ChartSeries::new(label, style, over_time(signals, channel))
+    };
+    let velocity = vec![line("", SeriesStyle::Measured, &|span| Some(span.velocity.clone()))];
+    let mut panels = vec![Panel::new(ChartAxis::new("Velocity", page.velocity_unit()), velocity)];
+    if signals.spans.iter().any(|span| span.current.is_some()) {
+        let current = vec![
+            line("current as recorded", SeriesStyle::Commanded, &|span| span.current.clone()),
+            line("current behind the filter", SeriesStyle::Measured, &|span| span.smooth_current.clone()),
+        ];
+        panels.push(Panel::new(ChartAxis::new("Current", DisplayUnit::AMPERE), current));
+    }
+    Chart {
+        bands: agreement.map_or_else(Vec::new, |agreement| bands(signals, &agreement.segments)),
+        ..Chart::new(
+            format!("Recording {}", signals.name),
+            ChartAxis::new("Time", DisplayUnit::SECOND),
+            panels,
+        )
+    }
+}
+
+/// A channel over time, broken between spans.
+pub(super) fn over_time(signals: &Signals, channel: &dyn Fn(&Span) -> Option<Vec<f64>>) -> Vec<[f64; 2]> {
+    let mut points = Vec::new();
+    for span in &signals.spans {
+        let values = channel(span).unwrap_or_default();
+        let time = |i: usize| span.start + i as f64 * signals.period;
+        points.extend(values.into_iter().enumerate().map(|(i, value)| [time(i), value]));
+        points.push([span.start, f64::NAN]);
+    }
+    points
+}
+
+/// What the axis does when, in the time of the recording.
+pub(super) fn bands(signals: &Signals, segments: &[Segment]) -> Vec<Band> {
+    let band = |segment: &Segment| {
+        let span = signals.spans.get(segment.span)?;
+        let time = |i: usize| span.start + i as f64 * signals.period;
+        let class = match segment.kind {
+            SegmentKind::Static => BandClass::Static,
+            SegmentKind::ConstantVelocity => BandClass::ConstantVelocity,
+            SegmentKind::Accelerating => BandClass::Accelerating,
+        };
+        Some(Band::new(class, time(segment.samples.start), time(segment.samples.end)))
+    };
+    segments.iter().filter_map(band).collect()
+}

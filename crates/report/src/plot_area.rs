@@ -1,0 +1,66 @@
+//! The area of a picture with two linear axes: grid, ticks, labels.
+
+use super::decimate::PixelPoint;
+use super::scale::Scale;
+use super::svg::{Anchor, Svg};
+
+/// Room that ticks and label take below the area, pixels.
+pub(super) const BELOW: f64 = 44.0;
+/// How far a tick's text stands from the area, left and below; its baseline is below its middle.
+const TICK_LEFT: f64 = 9.0;
+const TICK_BELOW: f64 = 20.5;
+const TEXT_MIDDLE: f64 = 4.5;
+/// Places of the labels: below the area, and from the left of the picture.
+const LABEL_BELOW: f64 = BELOW - 6.0;
+const LABEL_LEFT: f64 = 14.0;
+
+/// An area in which pairs of values are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PlotArea {
+    pub left: f64,
+    pub right: f64,
+    pub top: f64,
+    pub bottom: f64,
+    pub horizontal: Scale,
+    pub vertical: Scale,
+}
+
+impl PlotArea {
+    /// Takes values to pixels, across.
+    pub(super) fn x(&self) -> impl Fn(f64) -> f64 + Copy {
+        self.horizontal.onto(self.left, self.right)
+    }
+
+    /// Takes values to pixels, downwards.
+    pub(super) fn y(&self) -> impl Fn(f64) -> f64 + Copy {
+        self.vertical.onto(self.bottom, self.top)
+    }
+
+    /// Where a pair of values is drawn.
+    pub(super) fn place(&self, [x, y]: [f64; 2]) -> PixelPoint {
+        [self.x()(x), self.y()(y)]
+    }
+
+    /// The area, a grid with its ticks, and what stands along the axes; without a label for x its
+    /// ticks have no text. `zero` says of which axes 0 is a line that matters.
+    pub(super) fn draw(&self, svg: &mut Svg, x_label: Option<&str>, y_label: &str, zero: [bool; 2]) {
+        let PlotArea { left, right, top, bottom, .. } = *self;
+        let (x, y) = (self.x(), self.y());
+        let class = |value: f64, zero: bool| if zero && value == 0.0 { "zero" } else { "grid" };
+        svg.rectangle("area", [left, top], [right, bottom]);
+        for (value, label) in self.vertical.ticks() {
+            svg.line(class(value, zero[1]), [left, y(value)], [right, y(value)]);
+            svg.text("tick", [left - TICK_LEFT, y(value) + TEXT_MIDDLE], Anchor::End, &label);
+        }
+        for (value, label) in self.horizontal.ticks() {
+            svg.line(class(value, zero[0]), [x(value), top], [x(value), bottom]);
+            if x_label.is_some() {
+                svg.text("tick", [x(value), bottom + TICK_BELOW], Anchor::Middle, &label);
+            }
+        }
+        if let Some(label) = x_label {
+            svg.text("label", [right, bottom + LABEL_BELOW], Anchor::End, label);
+        }
+        svg.upward_text("label", [LABEL_LEFT, (top + bottom) / 2.0], y_label);
+    }
+}

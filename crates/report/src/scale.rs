@@ -1,0 +1,225 @@
+//! Extents of signals and round ticks.
+
+use super::text;
+use super::unit::DisplayUnit;
+
+/// Beyond this a value is no measurement of a machine (SI): it is left out like NaN, so that no
+/// difference of two values overflows.
+const LARGEST: f64 = 1e12;
+
+/// Whether a value can be drawn.
+pub(super) fn is_drawable(value: f64) -> bool {
+    value.abs() <= LARGEST
+}
+
+/// The smallest and the largest of some values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Extent {
+    pub min: f64,
+    pub max: f64,
+}
+
+impl Extent {
+    /// Of the drawable ones among `values`; none if there is none.
+    pub(super) fn of(values: impl IntoIterator<Item = f64>) -> Option<Extent> {
+        values.into_iter().filter(|v| is_drawable(*v)).fold(None, |extent, value| {
+            Some(extent.map_or(Extent { min: value, max: value }, |e: Extent| e.including(value)))
+        })
+    }
+
+    /// Widened to hold `value` as well.
+    pub(super) fn including(self, value: f64) -> Extent {
+        Extent { min: self.min.min(value), max: self.max.max(value) }
+    }
+
+    /// Both.
+    pub(super) fn join(a: Option<Extent>, b: Option<Extent>) -> Option<Extent> {
+        match (a, b) {
+            (Some(a), Some(b)) => Some(a.including(b.min).including(b.max)),
+            (one, other) => one.or(other),
+        }
+    }
+
+    /// max − min.
+    pub(super) fn span(&self) -> f64 {
+        self.max - self.min
+    }
+
+    /// Half way.
+    pub(super) fn middle(&self) -> f64 {
+        self.min + self.span() / 2.0
+    }
+
+    /// Largest magnitude.
+    pub(super) fn peak(&self) -> f64 {
+        self.min.abs().max(self.max.abs())
+    }
+
+    /// Widened about its middle to at least `span`.
+    pub(super) fn at_least(self, span: f64) -> Extent {
+        if self.span() >= span {
+            return self;
+        }
+        let middle = self.middle();
+        Extent { min: middle - span / 2.0, max: middle + span / 2.0 }
+    }
+
+    /// Widened at both ends by a part of its span.
+    pub(super) fn with_margin(self, part: f64) -> Extent {
+        let margin = part * self.span();
+        Extent { min: self.min - margin, max: self.max + margin }
+    }
+
+    /// In a unit instead of SI.
+    pub(super) fn in_unit(self, unit: &DisplayUnit) -> Extent {
+        Extent { min: self.min / unit.size, max: self.max / unit.size }
+    }
+}
+
+/// 1, 2 or 5 times a power of ten.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RoundNumber {
+    mantissa: f64,
+    exponent: i32,
+}
+
+impl RoundNumber {
+    /// The smallest that is not below `value` (> 0).
+    pub(super) fn up(value: f64) -> RoundNumber {
+        let exponent = value.log10().floor() as i32;
+        // What log10 loses of a power of ten must not make the step ten times as large.
+        let exact = value / 10f64.powi(exponent) * (1.0 - 1e-9);
+        match [1.0, 2.0, 5.0].into_iter().find(|m| exact <= *m) {
+            Some(mantissa) => RoundNumber { mantissa, exponent },
+            None => RoundNumber { mantissa: 1.0, exponent: exponent + 1 },
+        }
+    }
+
+    /// The largest that is not above `value` (> 0).
+    pub(super) fn down(value: f64) -> RoundNumber {
+        let exponent = value.log10().floor() as i32;
+        let exact = value / 10f64.powi(exponent) * (1.0 + 1e-9);
+        let mantissa = [5.0, 2.0, 1.0].into_iter().find(|m| exact >= *m).unwrap_or(1.0);
+        RoundNumber { mantissa, exponent }
+    }
+
+    /// The number.
+    pub(super) fn value(&self) -> f64 {
+        self.times(1.0)
+    }
+
+    /// `count` of it; exactly rounded, also where the power of ten is no binary number.
+    fn times(&self, count: f64) -> f64 {
+        match self.exponent {
+            0.. => count * self.mantissa * 10f64.powi(self.exponent),
+            _ => count * self.mantissa / 10f64.powi(-self.exponent),
+        }
+    }
+
+    /// Decimals that its multiples need.
+    pub(super) fn decimals(&self) -> usize {
+        (-self.exponent).max(0) as usize
+    }
+}
+
+/// A range with round ticks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scale {
+    pub extent: Extent,
+    step: RoundNumber,
+}
+
+impl Scale {
+    /// Exactly `extent`, with about `count` ticks inside.
+    pub(super) fn within(extent: Extent, least_range: f64, count: f64) -> Scale {
+        // A range below the resolution of its numbers would have the same tick many times.
+        let extent = extent.at_least(least_range.max(extent.peak() * 1e-9));
+        Scale { extent, step: RoundNumber::up(extent.span() / count) }
+    }
+
+    /// `extent` widened to end on ticks.
+    pub(super) fn outward(extent: Extent, least_range: f64, count: f64) -> Scale {
+        let Scale { extent, step } = Scale::within(extent, least_range, count);
+        // A signal that overshoots a tick by rounding only does not need another one.
+        let slack = 1e-6;
+        let min = step.times((extent.min / step.value() + slack).floor());
+        let max = step.times((extent.max / step.value() - slack).ceil());
+        Scale { extent: Extent { min, max }, step }
+    }
+
+    /// Distance of two ticks.
+    pub(super) fn step(&self) -> f64 {
+        self.step.value()
+    }
+
+    /// Values of the ticks and their labels.
+    pub(super) fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
+        let step = self.step;
+        let first = (self.extent.min / step.value() - 1e-6).ceil();
+        let count = ((self.extent.max / step.value() + 1e-6).floor() - first).max(0.0) as u32;
+        (0..=count).map(move |i| {
+            let value = step.times(first + f64::from(i));
+            (value, text::number(value, step.decimals()))
+        })
+    }
+
+    /// Takes this range to `from`…`to`, in pixels.
+    pub(super) fn onto(&self, from: f64, to: f64) -> impl Fn(f64) -> f64 + Copy {
+        let Extent { min, .. } = self.extent;
+        let per_unit = (to - from) / self.extent.span();
+        move |value| from + (value - min) * per_unit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn labels(min: f64, max: f64, count: f64) -> Vec<String> {
+        Scale::outward(Extent { min, max }, 1e-9, count).ticks().map(|(_, label)| label).collect()
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        assert_eq!(labels(-0.283, 0.049, 4.0), ["−0.3", "−0.2", "−0.1", "0.0", "0.1"]);
+        assert_eq!(
+            labels(0.0, 9500.0, 5.0),
+            ["0", "2\u{202f}000", "4\u{202f}000", "6\u{202f}000", "8\u{202f}000", "10\u{202f}000"]
+        );
+        assert_eq!(labels(0.0, 10.0, 10.0).len(), 11);
+        assert_eq!(labels(0.0, 0.3, 3.0), ["0.0", "0.1", "0.2", "0.3"]);
+    }
+
+    #[test]
+    fn a_constant_has_a_range() {
+        let scale = Scale::outward(Extent { min: 5.0, max: 5.0 }, 0.1, 5.0);
+        assert!(scale.extent.span() >= 0.1 && scale.ticks().count() >= 2);
+        let scale = Scale::outward(Extent { min: LARGEST, max: LARGEST }, 0.1, 5.0);
+        assert!(scale.ticks().count() >= 2);
+    }
+
+    #[test]
+    fn magnifications_are_round() {
+        assert_eq!(RoundNumber::down(437.0).value(), 200.0);
+        assert_eq!(RoundNumber::down(1000.0).value(), 1000.0);
+        assert_eq!(RoundNumber::down(999.0).value(), 500.0);
+        assert_eq!(RoundNumber::up(0.1).value(), 0.1);
+        assert_eq!(RoundNumber::up(0.11).value(), 0.2);
+    }
+
+    proptest! {
+        #[test]
+        fn ticks_are_few_different_and_span_the_values(a in -1e12..1e12f64, exponent in -15..12, count in 2.0..12.0f64) {
+            let extent = Extent::of([a, a + 10f64.powi(exponent)]).expect("drawable");
+            let scale = Scale::outward(extent, 1e-6, count);
+            let ticks: Vec<_> = scale.ticks().collect();
+            prop_assert!(ticks.len() >= 2 && ticks.len() as f64 <= count + 3.0, "{} ticks", ticks.len());
+            let slack = scale.step() * 1e-5;
+            prop_assert!(scale.extent.min <= extent.min + slack && extent.max <= scale.extent.max + slack);
+            for pair in ticks.windows(2) {
+                prop_assert!(pair[0].0 < pair[1].0 && pair[0].1 != pair[1].1, "{pair:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Shaded intervals of a chart.
+
+use super::chart::{Band, BandClass, ChartAxis};
+use super::decimate::PixelPoint;
+use super::plot_area::PlotArea;
+use super::scale::Extent;
+use super::svg::Svg;
+use super::text::number;
+
+/// Intervals nearer to each other than this, pixels, are drawn as one.
+const NEAR: f64 = 0.5;
+/// An interval is at least so broad, pixels.
+const LEAST_WIDTH: f64 = 1.0;
+/// Where the edge of an interval of x runs, pixels below the top of the area: its dash tells the
+/// classes apart where colors do not.
+const EDGE: f64 = 2.0;
+
+/// The ends of an interval in the unit of its axis, in order; they can be infinite.
+fn ends(band: &Band, axis: &ChartAxis) -> Option<[f64; 2]> {
+    let [from, to] = [band.from, band.to].map(|v| v / axis.unit.size);
+    (!from.is_nan() && !to.is_nan()).then(|| [from.min(to), from.max(to)])
+}
+
+/// Kinds of bands in the order in which they first stand.
+fn kinds(bands: &[Band]) -> Vec<(BandClass, &str)> {
+    let mut kinds: Vec<(BandClass, &str)> = Vec::new();
+    for band in bands {
+        if !kinds.contains(&(band.class, &band.label)) {
+            kinds.push((band.class, &band.label));
+        }
+    }
+    kinds
+}
+
+/// Shades intervals of x, or of y if `upward`.
+pub(super) fn shade(svg: &mut Svg, frame: &PlotArea, bands: &[Band], axis: &ChartAxis, upward: bool) {
+    let scale = if upward { frame.vertical } else { frame.horizontal };
+    let Extent { min, max } = scale.extent;
+    let pixel = |value: f64| if upward { frame.y()(value) } else { frame.x()(value) };
+    for kind in kinds(bands) {
+        let mut parts: Vec<[f64; 2]> = bands
+            .iter()
+            .filter(|band| (band.class, band.label.as_str()) == kind)
+            .filter_map(|band| ends(band, axis))
+            .filter(|[from, to]| *from <= max && *to >= min)
+            .map(|ends| {
+                let [a, b] = ends.map(|end| pixel(end.clamp(min, max)));
+                [a.min(b), a.max(b).max(a.min(b) + LEAST_WIDTH)]
+            })
+            .collect();
+        parts.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let mut joined: Vec<[f64; 2]> = Vec::new();
+        for [from, to] in parts {
+            match joined.last_mut() {
+                Some([_, end]) if from <= *end + NEAR => *end = end.max(to),
+                _ => joined.push([from, to]),
+            }
+        }
+        let corners = |[from, to]: &[f64; 2]| -> Vec<PixelPoint> {
+            let ([left, right], [top, bottom]) = if upward {
+                ([frame.left, frame.right], [*from, *to])
+            } else {
+                ([*from, *to], [frame.top, frame.bottom])
+            };
+            vec![[left, top], [right, top], [right, bottom], [left, bottom], [left, top]]
+        };
+        let class = kind.0.name();
+        svg.path(&format!("band {class}"), &joined.iter().map(corners).collect::<Vec<_>>());
+        if !upward {
+            let edges: Vec<Vec<PixelPoint>> = joined
+                .iter()
+                .map(|[from, to]| vec![[*from, frame.top + EDGE], [*to, frame.top + EDGE]])
+                .collect();
+            svg.path(&format!("edge {class}"), &edges);
+        }
+    }
+}
+
+/// Bands in words: an interval by its ends, of others how many there are.
+pub(super) fn told(bands: &[Band], axis: &ChartAxis) -> Vec<String> {
+    kinds(bands)
+        .into_iter()
+        .map(|kind| {
+            let mut alike = bands.iter().filter(|band| (band.class, band.label.as_str()) == kind);
+            match (alike.next().and_then(|band| ends(band, axis)), alike.count()) {
+                (Some([from, to]), 0) => {
+                    let [from, to] = [from, to].map(|end| end_in_words(end, axis));
+                    format!("{} from {from} to {to}", kind.1)
+                }
+                (_, more) => format!("{} {} times", kind.1, number(more as f64 + 1.0, 0)),
+            }
+        })
+        .collect()
+}
+
+fn end_in_words(end: f64, axis: &ChartAxis) -> String {
+    let value = end * axis.unit.size;
+    match axis.shown(value) {
+        Some(_) => axis.unit.show(value),
+        None => "beyond the picture".to_owned(),
+    }
+}

@@ -1,0 +1,69 @@
+//! Figures of signals over time: the runs on each other, in one picture.
+
+use super::html::{Caption, run_class};
+use super::page::Page;
+use super::scale::Extent;
+use super::time_plot::{TimePlot, TimeSeries};
+use super::unit::DisplayUnit;
+
+/// A run whose error is smaller than the largest by this factor is a straight line beside it.
+pub(super) const COMPARABLE: f64 = 8.0;
+
+/// What a strip shows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Strip {
+    pub title: &'static str,
+    /// What must be said about it; can be empty.
+    pub note: &'static str,
+    /// Along the vertical axis.
+    pub quantity: &'static str,
+    pub unit: DisplayUnit,
+}
+
+/// Time that the runs take, s, the same for all strips of a page.
+pub(super) fn time(page: &Page) -> Option<Extent> {
+    Extent::of(page.runs.iter().flat_map(|run| run.recording.time.iter().copied()))
+}
+
+/// A run's signal, in the run's style.
+pub(super) fn run_series<'a>(page: &Page, run: usize, time: &'a [f64], values: &'a [f64]) -> TimeSeries<'a> {
+    let label = page.runs.get(run).map_or("", |run| run.title).to_owned();
+    TimeSeries { label, class: format!("line {}", run_class(run)), time, values }
+}
+
+/// Styles and names of lines.
+pub(super) fn legend(series: &[TimeSeries]) -> Vec<(String, String)> {
+    series.iter().map(|s| (s.class.clone(), s.label.clone())).collect()
+}
+
+/// Largest magnitude of what can be drawn.
+pub(super) fn peak(values: &[f64]) -> f64 {
+    Extent::of(values.iter().copied()).map_or(0.0, |e| e.peak())
+}
+
+/// Places of the values that are much smaller than the largest.
+pub(super) fn smaller(peaks: &[f64]) -> Vec<usize> {
+    let largest = peaks.iter().copied().fold(0.0, f64::max);
+    (0..peaks.len()).filter(|&i| peaks[i] * COMPARABLE < largest).collect()
+}
+
+/// A signal of all runs; `of` says what it is of, and can be empty.
+pub(super) fn strip(page: &mut Page, of: &str, time: Extent, strip: Strip, series: Vec<TimeSeries>) {
+    let Strip { title, note, quantity, unit } = strip;
+    let legend = if page.is_comparison() { legend(&series) } else { Vec::new() };
+    let caption = Caption { title: title.to_owned(), note: note.to_owned(), legend };
+    let plot = TimePlot { quantity, unit, from_zero: true, time, series, at_least: None };
+    let title = if of.is_empty() { title.to_owned() } else { format!("{of}: {}", title.to_lowercase()) };
+    page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
+}
+
+/// An error of all runs; those that are much smaller than the largest once more on their own scale.
+pub(super) fn error_strip(page: &mut Page, of: &str, time: Extent, whole: Strip, series: Vec<TimeSeries>) {
+    let small = smaller(&series.iter().map(|s| peak(s.values)).collect::<Vec<_>>());
+    let small: Vec<TimeSeries> = small.into_iter().map(|i| series[i].clone()).collect();
+    strip(page, of, time, whole, series);
+    if !small.is_empty() {
+        let detail = Strip { note: "enlarged: without the runs of larger error", ..whole };
+        strip(page, of, time, detail, small);
+    }
+}
