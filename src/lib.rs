@@ -3,6 +3,6 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
-pub mod door;
+pub mod ingress;
 #[cfg(feature = "ros")]
 pub mod ros;

@@ -4,7 +4,7 @@ mod command;
 mod command_campaign;
 mod command_common;
 mod command_design;
-mod door_properties;
+mod ingress_properties;
 mod files_output;
 mod identify_command;
 mod readme;

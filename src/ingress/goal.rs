@@ -6,7 +6,7 @@ use super::Checks;
 use virtual_axes_core::config::GoalDefaults;
 use virtual_axes_core::simulation::{Tolerance, Tolerances};
 use virtual_axes_core::trajectory::{Code, JointLimits, Rejection, Trajectory};
-use virtual_axes_core::units::{Nanoseconds, SECOND_NS, Told};
+use virtual_axes_core::units::{Nanoseconds, SECOND_NS, Rounded};
 use virtual_axes_io::messages::builtin_interfaces::msg::Duration;
 use virtual_axes_io::messages::{FollowJointTrajectoryGoal, JointTolerance};
 
@@ -84,7 +84,7 @@ fn tolerances(
                 NONE => Ok(None),
                 value if value > 0.0 && value.is_finite() => Ok(Some(value)),
                 value => {
-                    let told = Told(value);
+                    let told = Rounded(value);
                     let text = format!("{what} is {told}; it must be positive, 0 (default) or -1 (none)");
                     Err(wrong(text).numbers(value, 0.0))
                 }

@@ -63,7 +63,7 @@ impl NodeFqn {
     /// The name breaks a rule of ROS names.
     ///
     /// ```
-    /// use virtual_axes::door::names::NodeFqn;
+    /// use virtual_axes::ingress::names::NodeFqn;
     ///
     /// let node = NodeFqn::new("/cell", "mill").unwrap();
     /// assert_eq!(node.expand("psec").unwrap(), "/cell/psec");

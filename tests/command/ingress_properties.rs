@@ -4,8 +4,8 @@ use std::sync::{Arc, LazyLock};
 
 use byteorder::{BigEndian, LittleEndian};
 use proptest::prelude::*;
-use virtual_axes::door::parameters::{LiveNodeParameters, ParameterValue, Settings};
-use virtual_axes::door::{Checks, GoalChecks, Order, Setpoints, loads};
+use virtual_axes::ingress::parameters::{LiveNodeParameters, ParameterValue, Settings};
+use virtual_axes::ingress::{Checks, GoalChecks, Order, Setpoints, loads};
 use virtual_axes_core::config::{Kind, Parameters};
 use virtual_axes_core::simulation::{self, Simulation};
 use virtual_axes_core::trajectory::{JointLimits, MotionId};

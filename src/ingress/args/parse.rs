@@ -22,7 +22,7 @@ impl Command {
     /// The first argument that cannot be used; also a `default_name` that is no node name.
     ///
     /// ```
-    /// use virtual_axes::door::args::Command;
+    /// use virtual_axes::ingress::args::Command;
     ///
     /// let arguments = ["--ros-args", "-r", "__ns:=/cell", "-r", "psec:=/setpoints"];
     /// let Command::Run(args) = Command::parse(arguments, "mill").unwrap() else { panic!() };

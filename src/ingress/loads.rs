@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::shortened;
 use virtual_axes_core::simulation::MAX_LOAD;
-use virtual_axes_core::units::Told;
+use virtual_axes_core::units::Rounded;
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
 /// The loads of a message: place of the axis in `joints` and load, N or N·m.
@@ -29,7 +29,7 @@ pub fn loads(message: &JointState, joints: &[String]) -> Result<Vec<(usize, f64)
                 return Err(format!("joint {name} is named twice"));
             }
             if load.is_nan() || load.abs() > MAX_LOAD {
-                return Err(format!("joint {name}: effort is {}, must lie in ±{MAX_LOAD}", Told(load)));
+                return Err(format!("joint {name}: effort is {}, must lie in ±{MAX_LOAD}", Rounded(load)));
             }
             Ok((place, load))
         })
