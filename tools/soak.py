@@ -226,7 +226,7 @@ class Traffic:
     def invalid(self) -> None:
         """Refused for one reason or another."""
         names, to, duration = self._way()
-        bad = self.chance.choice(["joint", "nan", "size", "times", "stroke", "past"])
+        bad = self.chance.choice(["joint", "nan", "size", "times", "travel", "past"])
         rows, times, stamp = [to, to], [duration, duration + 1], None
         if bad == "joint":
             names = [f"q{self.chance.randrange(1000)}", *names[1:]]
@@ -234,7 +234,7 @@ class Traffic:
             rows = [to, [math.nan] * len(to)]
         elif bad == "times":
             times = [2.0, 1.0]
-        elif bad == "stroke":
+        elif bad == "travel":
             names, rows = ["x"], [[9.0], [9.0]]
         elif bad == "past":
             stamp = 1

@@ -1,7 +1,7 @@
-//! Units of CNC documentation, and time as an integer.
+//! Unit conversion factors, integer time in nanoseconds, and rounding of numbers in messages.
 //!
-//! Everything inside the library is SI; machine files use the units of CNC documentation
-//! (Prévost Appendix 2). The factors below are the only place where the two meet.
+//! The library computes in SI units; machine files use the units of CNC documentation (Prévost Appendix 2). All
+//! conversions use the factors of this module.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt;
@@ -22,10 +22,10 @@ pub const REVOLUTION: f64 = TAU;
 pub const DEGREE: f64 = PI / 180.0;
 /// Meters per second in a meter per minute.
 pub const METER_PER_MINUTE: f64 = 1.0 / MINUTE;
-/// Position-loop gain, s⁻¹, in one (m/min)/mm, and in one (1000 °/min)/°: both are 1000/60 s⁻¹.
+/// Position-loop gain of one (m/min)/mm or one (1000 °/min)/°, s⁻¹: both are 1000/60 s⁻¹.
 pub const POSITION_GAIN: f64 = 1000.0 / MINUTE;
 
-/// Nanoseconds: the integer in which ROS stamps, trajectory times and periods are counted.
+/// Time or duration as an integer number of nanoseconds: ROS stamps, trajectory times and periods.
 pub type Nanoseconds = i64;
 /// Nanoseconds in a second.
 pub const SECOND_NS: Nanoseconds = 1_000_000_000;
@@ -34,8 +34,14 @@ pub const MILLISECOND_NS: Nanoseconds = 1_000_000;
 /// Nanoseconds in a microsecond.
 pub const MICROSECOND_NS: Nanoseconds = 1_000;
 
-/// A value as messages tell it: with twelve significant digits at most, which leaves out what rounding adds,
-/// and with a power of ten where it is large or small.
+/// Number in a message: displays at most six significant digits, in scientific notation if very large or small.
+///
+/// ```
+/// use virtual_axes_core::units::Rounded;
+///
+/// assert_eq!(Rounded(0.1 + 0.2).to_string(), "0.3");
+/// assert_eq!(Rounded(2.0e-7 / 3.0).to_string(), "6.66667e-8");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounded(pub f64);
 
@@ -43,7 +49,7 @@ impl fmt::Display for Rounded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Rounded(value) = *self;
         let size = value.abs();
-        let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
+        let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
         match size == 0.0 || !size.is_finite() || (1e-5..1e12).contains(&size) {
             true => write!(f, "{rounded}"),
             false => write!(f, "{rounded:e}"),
@@ -51,7 +57,7 @@ impl fmt::Display for Rounded {
     }
 }
 
-/// Seconds in `ns` nanoseconds.
+/// Converts nanoseconds to seconds.
 pub fn seconds(ns: Nanoseconds) -> f64 {
     ns as f64 / SECOND_NS as f64
 }
@@ -61,18 +67,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_told_without_what_rounding_adds() {
-        for (value, told) in [
+    fn rounded_displays_at_most_six_significant_digits() {
+        for (value, text) in [
             (1000.0000000000001, "1000"),
             (0.1 + 0.2, "0.3"),
-            (-0.355_000_000_1, "-0.3550000001"),
+            (-0.355_000_000_1, "-0.355"),
+            (1234.567_8, "1234.57"),
             (2e-7, "2e-7"),
             (1e300, "1e300"),
             (0.0, "0"),
             (f64::NAN, "NaN"),
             (f64::INFINITY, "inf"),
         ] {
-            assert_eq!(Rounded(value).to_string(), told);
+            assert_eq!(Rounded(value).to_string(), text);
         }
     }
 }

@@ -239,15 +239,15 @@ impl Axis<'_> {
                 velocity: self.scaled("limits.velocity_m_min", METER_PER_MINUTE)?,
                 acceleration: self.number("limits.acceleration_m_s2")?,
                 jerk: self.number("limits.jerk_m_s3")?,
-                stroke_min: end("limits.stroke_min_mm", MILLIMETER, f64::NEG_INFINITY),
-                stroke_max: end("limits.stroke_max_mm", MILLIMETER, f64::INFINITY),
+                travel_min: end("limits.travel_min_mm", MILLIMETER, f64::NEG_INFINITY),
+                travel_max: end("limits.travel_max_mm", MILLIMETER, f64::INFINITY),
             },
             AxisKind::Rotary => LimitsConfig {
                 velocity: self.scaled("limits.velocity_rpm", RPM)?,
                 acceleration: self.scaled("limits.acceleration_rev_s2", REVOLUTION)?,
                 jerk: self.scaled("limits.jerk_rev_s3", REVOLUTION)?,
-                stroke_min: end("limits.stroke_min_deg", DEGREE, f64::NEG_INFINITY),
-                stroke_max: end("limits.stroke_max_deg", DEGREE, f64::INFINITY),
+                travel_min: end("limits.travel_min_deg", DEGREE, f64::NEG_INFINITY),
+                travel_max: end("limits.travel_max_deg", DEGREE, f64::INFINITY),
             },
         })
     }

@@ -55,7 +55,7 @@ pub(super) fn check(
     for joint in &layout.joints {
         set.check_transmission(joint, origin)?;
         set.check_friction(joint)?;
-        set.check_stroke(joint)?;
+        set.check_travel_limits(joint)?;
         set.check_horizons(joint)?;
         set.check_polynomials(joint)?;
     }
@@ -321,13 +321,13 @@ impl Set<'_> {
     }
 
     /// The ranges of the schema keep home, 0, within the stroke; this keeps the stroke open.
-    fn check_stroke(&self, joint: &Joint) -> Result<(), ConfigError> {
+    fn check_travel_limits(&self, joint: &Joint) -> Result<(), ConfigError> {
         let unit = match joint.axis {
             AxisKind::Linear => "mm",
             AxisKind::Rotary => "deg",
         };
-        let min_key = format!("{}.limits.stroke_min_{unit}", joint.name);
-        let max_key = format!("{}.limits.stroke_max_{unit}", joint.name);
+        let min_key = format!("{}.limits.travel_min_{unit}", joint.name);
+        let max_key = format!("{}.limits.travel_max_{unit}", joint.name);
         match (self.number(&min_key), self.number(&max_key)) {
             (Some(min), Some(max)) if min >= max => {
                 Err(self.refused(&[&min_key, &max_key], format!("leave a stroke: {min_key} < {max_key}")))

@@ -245,15 +245,15 @@ pub struct LimitsConfig {
     /// Jmax, m/s³ or rad/s³.
     pub jerk: f64,
     /// Lower end of the stroke, m or rad; −∞ where there is none.
-    pub stroke_min: f64,
+    pub travel_min: f64,
     /// Upper end of the stroke, m or rad; +∞ where there is none.
-    pub stroke_max: f64,
+    pub travel_max: f64,
 }
 
 impl LimitsConfig {
-    /// Whether an axis at `position`, m or rad, has left its stroke by more than it may overshoot: 1 mm or 1 mrad.
+    /// Whether an axis at `position`, m or rad, has left its travel limits by more than it may overshoot: 1 mm or 1 mrad.
     pub fn is_left_by(&self, position: f64) -> bool {
-        !(self.stroke_min - OVERSHOOT..=self.stroke_max + OVERSHOOT).contains(&position)
+        !(self.travel_min - OVERSHOOT..=self.travel_max + OVERSHOOT).contains(&position)
     }
 }
 

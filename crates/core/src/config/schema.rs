@@ -317,22 +317,22 @@ const MACHINE: &[Definition] = &[
     Definition::number("limits.jerk_rev_s3", "rev/s³", 1e-6, 1e7)
         .on(Rotary)
         .is("Jmax, jerk of a controlled stop; setpoints are not checked against it."),
-    Definition::number("limits.stroke_min_mm", "mm", -1e6, 0.0)
+    Definition::number("limits.travel_min_mm", "mm", -1e6, 0.0)
         .on(Linear)
         .optional()
-        .is("Lower end of the stroke; none when left out. Home is 0."),
-    Definition::number("limits.stroke_max_mm", "mm", 0.0, 1e6)
+        .is("Lower travel limit; unlimited if omitted. Home is 0."),
+    Definition::number("limits.travel_max_mm", "mm", 0.0, 1e6)
         .on(Linear)
         .optional()
-        .is("Upper end of the stroke; none when left out. Home is 0."),
-    Definition::number("limits.stroke_min_deg", "°", -1e6, 0.0)
+        .is("Upper travel limit; unlimited if omitted. Home is 0."),
+    Definition::number("limits.travel_min_deg", "°", -1e6, 0.0)
         .on(Rotary)
         .optional()
-        .is("Lower end of the stroke; none when left out. Home is 0."),
-    Definition::number("limits.stroke_max_deg", "°", 0.0, 1e6)
+        .is("Lower travel limit; unlimited if omitted. Home is 0."),
+    Definition::number("limits.travel_max_deg", "°", 0.0, 1e6)
         .on(Rotary)
         .optional()
-        .is("Upper end of the stroke; none when left out. Home is 0."),
+        .is("Upper travel limit; unlimited if omitted. Home is 0."),
     // Default tolerances of action goals, on the synchronized tracking error.
     tolerance("tolerances.path_mm", "mm", TOLERANCE_MM)
         .on(Linear)

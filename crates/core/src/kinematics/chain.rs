@@ -103,7 +103,7 @@ impl Kinematics {
             places,
             joints: axes.len(),
             stroke_a: stroke_a
-                .map_or([f64::NEG_INFINITY, f64::INFINITY], |limits| [limits.stroke_min, limits.stroke_max]),
+                .map_or([f64::NEG_INFINITY, f64::INFINITY], |limits| [limits.travel_min, limits.travel_max]),
         }
     }
 

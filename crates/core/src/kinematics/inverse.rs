@@ -15,14 +15,14 @@ const SINGULAR_SINE: f64 = 1e-13;
 const ANGLE_TOLERANCE: f64 = 1e-9;
 /// How far a linear axis that does not exist may have to be from 0, m.
 const POSITION_TOLERANCE: f64 = 1e-9;
-/// Rounding that does not put A outside its stroke, rad.
-const STROKE_TOLERANCE: f64 = 1e-9;
+/// Rounding that does not put A outside its travel limits, rad.
+const TRAVEL_TOLERANCE: f64 = 1e-9;
 
 impl Kinematics {
     /// Joints that bring the tool to the pose, into `out`: m or rad, one value for each joint.
     ///
     /// Of the solutions (a, c) and (−a, c + 180°) and their turns it is the one nearest to `near`, by
-    /// the sum of the squares; one inside the stroke of A goes before one outside it. No other stroke
+    /// the sum of the squares; one inside the travel limits of A goes before one outside it. No other stroke
     /// is looked at. Where C is free (A = 0), it keeps its value of `near`. Joints without a role keep
     /// theirs. The length of the pose's axis does not matter.
     ///
@@ -86,14 +86,14 @@ impl Kinematics {
         let (a, c) = (across.atan2(axis.z), axis.x.atan2(-axis.y));
         let solutions =
             [[a, c], [-a, c + PI]].map(|[a, c]| [nearest_turn(a, near_a), nearest_turn(c, near_c)]);
-        let rank = |[a, c]: [f64; 2]| (self.outside_stroke(a), (a - near_a).powi(2) + (c - near_c).powi(2));
+        let rank = |[a, c]: [f64; 2]| (self.outside_travel_limits(a), (a - near_a).powi(2) + (c - near_c).powi(2));
         let second_is_better = rank(solutions[1]) < rank(solutions[0]);
         Ok(solutions[usize::from(second_is_better)])
     }
 
-    fn outside_stroke(&self, a: f64) -> bool {
+    fn outside_travel_limits(&self, a: f64) -> bool {
         let [min, max] = self.stroke_a;
-        a < min - STROKE_TOLERANCE || a > max + STROKE_TOLERANCE
+        a < min - TRAVEL_TOLERANCE || a > max + TRAVEL_TOLERANCE
     }
 
     /// Angle between two directions, rad, 0 to π; exact to rounding at every angle, also where the

@@ -23,7 +23,7 @@
 //!
 //! (a, c) and (−a, c + 180°) give the same axis, and so does each turn of C.
 //! [`Kinematics::inverse`] takes the solution nearest to the joints it is given, after those that the
-//! stroke of A excludes.
+//! travel limits of A excludes.
 //!
 //! At A = 0 (and 180°) the axis of C is parallel to the tool axis: C turns the workpiece about the
 //! tool, and every C gives the same tool axis. There C keeps the value that it was given, so a path

@@ -156,7 +156,8 @@ mod tests {
                             assert!(same, "{k}: {} and not {single}", row[lane]);
                         }
                     }
-                    let above = (0..Vector::<S>::LANES).any(|k| SPECIAL[index * Vector::<S>::LANES + k] > 1.0);
+                    let above =
+                        (0..Vector::<S>::LANES).any(|k| SPECIAL[index * Vector::<S>::LANES + k] > 1.0);
                     assert_eq!(a.any_gt(1.0), above);
                 }
             }

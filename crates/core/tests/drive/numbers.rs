@@ -298,7 +298,7 @@ fn edges() -> Vec<(String, f64, f64)> {
     let is_meant = |(key, ..): &(String, f64, f64)| {
         ["x.", "a.", "c.", "periods."].iter().any(|start| key.starts_with(start))
             && !key.contains("tolerances")
-            && !key.contains("stroke")
+            && !key.contains("travel")
             && !key.contains("direct")
     };
     let edges: Vec<_> = parameters.definitions().filter_map(number).filter(is_meant).collect();

@@ -246,24 +246,24 @@ fn periods_that_do_not_fit_into_one_another() {
 }
 
 #[test]
-fn home_outside_the_stroke() {
-    let text = mikron_with("stroke_min_mm: -355.0", "stroke_min_mm: 5.0");
+fn home_outside_the_travel_limits() {
+    let text = mikron_with("travel_min_mm: -355.0", "travel_min_mm: 5.0");
     assert_refused(
         &text,
-        "stroke_min_mm: 5.0",
-        "my.yaml:{line}: x.limits.stroke_min_mm = 5: must lie in -1e6 … 0 mm",
+        "travel_min_mm: 5.0",
+        "my.yaml:{line}: x.limits.travel_min_mm = 5: must lie in -1e6 … 0 mm",
     );
 }
 
 #[test]
 fn stroke_without_length() {
-    let text = mikron_with("stroke_min_mm: -355.0", "stroke_min_mm: 0.0")
-        .replace("stroke_max_mm: 355.0", "stroke_max_mm: 0");
+    let text = mikron_with("travel_min_mm: -355.0", "travel_min_mm: 0.0")
+        .replace("travel_max_mm: 355.0", "travel_max_mm: 0");
     assert_refused(
         &text,
-        "stroke_max_mm: 0",
-        "my.yaml:{line}: x.limits.stroke_max_mm = 0: must leave a stroke: x.limits.stroke_min_mm < \
-         x.limits.stroke_max_mm",
+        "travel_max_mm: 0",
+        "my.yaml:{line}: x.limits.travel_max_mm = 0: must leave a stroke: x.limits.travel_min_mm < \
+         x.limits.travel_max_mm",
     );
 }
 

@@ -163,8 +163,8 @@ impl Column {
             ("Vmax", axis.limits.velocity, self.limits[0]),
             ("Amax", axis.limits.acceleration, self.limits[1]),
             ("Jmax", axis.limits.jerk, self.limits[2]),
-            ("stroke min", axis.limits.stroke_min, self.stroke.0),
-            ("stroke max", axis.limits.stroke_max, self.stroke.1),
+            ("stroke min", axis.limits.travel_min, self.stroke.0),
+            ("stroke max", axis.limits.travel_max, self.stroke.1),
         ];
         for (what, actual, expected) in pairs {
             assert_near(actual, expected, &format!("{} {what}", self.name));

@@ -202,7 +202,7 @@ fn defaults_are_listed_and_optional_parameters_are_not() {
     let listed: Vec<(String, Value)> = parameters.iter().collect();
     assert!(listed.contains(&("publish_rate".to_owned(), Value::Double(0.0))));
     assert!(listed.contains(&("x.gravity.weight_n".to_owned(), Value::Double(0.0))));
-    assert!(!listed.iter().any(|(key, _)| key == "c.limits.stroke_min_deg"));
+    assert!(!listed.iter().any(|(key, _)| key == "c.limits.travel_min_deg"));
     assert_eq!(parameters.source("publish_rate"), None);
     assert_eq!(listed[0].0, "machine");
     let unit = parameters.definition("a.position_loop.gain").map(|definition| definition.unit);
