@@ -123,6 +123,15 @@ def types(root: Path) -> Iterator[Violation]:
                 found.setdefault(match[1], (file, number))
 
 
+def paths(root: Path) -> Iterator[Violation]:
+    """Yields files and folders that ARCHITECTURE.md names and that do not exist."""
+    page = root / "ARCHITECTURE.md"
+    for number, line in enumerate(page.read_text().splitlines() if page.exists() else [], 1):
+        for name in re.findall(r"`((?:crates|src|tools|tests|docs|benches|test_py|fuzz)/[\w./]+)`", line):
+            if not (root / name).exists():
+                yield Violation(page.name, number, f"{name} does not exist", line)
+
+
 def check(root: Path) -> list[Violation]:
     """Returns all violations below a folder."""
     violations: list[Violation] = []
@@ -132,7 +141,7 @@ def check(root: Path) -> list[Violation]:
         violations += words(file, lines)
         if path.suffix == ".rs" and not is_allowed(file, "*"):
             violations += documentation(file, lines)
-    return violations + list(types(root))
+    return violations + list(types(root)) + list(paths(root))
 
 
 def main() -> int:
