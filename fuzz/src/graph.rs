@@ -6,11 +6,11 @@ use std::sync::Arc;
 use byteorder::{BigEndian, LittleEndian};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use virtual_axes::door::parameters::{
+use virtual_axes::ingress::parameters::{
     LiveNodeParameters, Settings, check_count, descriptor_to_wire, list, parameter_from_wire, result_to_wire,
     type_number, value_to_wire,
 };
-use virtual_axes::door::{Candidate, Checks, GoalChecks, Order, Setpoints, loads, select};
+use virtual_axes::ingress::{Candidate, Checks, GoalChecks, Order, Setpoints, loads, select};
 use virtual_axes_io::messages::action_msgs::srv::CancelGoalRequest;
 use virtual_axes_io::messages::rcl_interfaces::srv::{
     DescribeParametersRequest, GetParameterTypesRequest, GetParametersRequest, ListParametersRequest,

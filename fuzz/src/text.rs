@@ -1,7 +1,7 @@
 //! Texts: machine files, parameters, scenarios, arguments.
 
 use virtual_axes_core::config::{Parameters, Source};
-use virtual_axes::door::args::Command;
+use virtual_axes::ingress::args::Command;
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::scenario::Scenario;
 

@@ -1,10 +1,10 @@
-//! ROS messages to typed values and back, by the conversions of [`virtual_axes_io::messages`], [`crate::door`] and
+//! ROS messages to typed values and back, by the conversions of [`virtual_axes_io::messages`], [`crate::ingress`] and
 //! those that only the node needs.
 
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 
 use super::pace::Frame;
-pub use crate::door::loads;
+pub use crate::ingress::loads;
 use virtual_axes_io::messages::{DriveStates, MotorCurrents, Sampled};
 pub use virtual_axes_io::messages::{header, stamp};
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use tokio::sync::mpsc;
 
 use super::pace::Command;
-pub use crate::door::parameters::LiveNodeParameters;
-use crate::door::parameters::{Descriptor, ParameterHost, ParameterValue, Settings};
+pub use crate::ingress::parameters::LiveNodeParameters;
+use crate::ingress::parameters::{Descriptor, ParameterHost, ParameterValue, Settings};
 use virtual_axes_core::config::Parameters;
 
 /// Checks what is set against the schema, and hands it to the simulation as a command.

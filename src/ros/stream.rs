@@ -3,7 +3,7 @@
 use tracing::warn;
 
 use super::throttle::Throttle;
-pub use crate::door::{Order, Setpoints};
+pub use crate::ingress::{Order, Setpoints};
 use virtual_axes_core::simulation::Simulation;
 use virtual_axes_core::trajectory::{Code, Rejection, StreamCounts};
 use virtual_axes_core::units::Nanoseconds;

@@ -9,7 +9,7 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
-use virtual_axes::door::args::{ArgsError, Command, ParameterSource, RosArgs};
+use virtual_axes::ingress::args::{ArgsError, Command, ParameterSource, RosArgs};
 use virtual_axes::ros::environment::Environment;
 use virtual_axes::ros::node;
 use virtual_axes::ros::security::Security;

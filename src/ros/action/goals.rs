@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use ros2_client::service::RmwRequestId;
 
 use super::{GoalId, uuid};
-use crate::door::{Candidate, select};
+use crate::ingress::{Candidate, select};
 use virtual_axes_core::trajectory::MotionId;
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 use virtual_axes_io::messages::action_msgs::msg::{GoalInfo, GoalStatus, GoalStatusArray};
