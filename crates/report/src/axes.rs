@@ -1,4 +1,4 @@
-//! Sections of the axes: positions, errors, velocities, currents.
+//! Sections of the axes: plots of position, following error, velocity and current.
 
 use virtual_axes_core::assess::AxisTrace;
 
@@ -10,27 +10,27 @@ use super::text::{capital, listed};
 use super::time_plot::{TimePlot, TimeSeries};
 use super::unit::DisplayUnit;
 
-/// A part of the current below this is none, A.
-const NO_CURRENT: f64 = 1e-3;
+/// Peak below which a component of the current is not plotted, A.
+const NEGLIGIBLE_CURRENT: f64 = 1e-3;
 
-/// Signals of an axis over time.
+/// Accessor of one signal of an axis.
 type Signal = fn(&AxisTrace) -> &[f64];
 
-/// One axis in the runs that have it.
+/// An axis with its traces in all runs that contain it.
 struct Axis<'a> {
     name: String,
-    /// Number of the run, its times, its signals.
+    /// Index of the run, sample times in s, signals.
     traces: Vec<(usize, &'a [f64], &'a AxisTrace)>,
 }
 
-/// A section for each axis that moves in any run, a sentence about the others.
+/// Writes a section for each axis that moves in any run, and a sentence about the stationary axes.
 pub(super) fn sections(page: &mut Page) {
     let axes = axes(page);
     let Some(time) = time(page) else {
         page.html.paragraph("Nothing was recorded.");
         return;
     };
-    let (moving, standing): (Vec<_>, Vec<_>) =
+    let (moving, at_rest): (Vec<_>, Vec<_>) =
         axes.into_iter().partition(|axis| axis.traces.iter().any(|(_, _, trace)| trace.moves));
     for axis in &moving {
         page.html.open_section("axis", &format!("{} axis", axis.name));
@@ -44,35 +44,37 @@ pub(super) fn sections(page: &mut Page) {
             Strip { title: "Velocity", note: "", quantity: "Velocity", unit: DisplayUnit::velocity(kind) };
         let lines = series(page, |t| &t.velocity);
         strip(page, &of, time, velocity, lines);
-        let note = "PSEC − SP, with the pure delay";
-        let tracking =
-            Strip { title: "Tracking error", note, quantity: "Error", unit: DisplayUnit::error(kind) };
+        let note = "PSEC − SP, including the delay α";
+        let following =
+            Strip { title: "Following error", note, quantity: "Error", unit: DisplayUnit::error(kind) };
         let lines = series(page, |t| &t.following_error);
-        error_strip(page, &of, time, tracking, lines);
-        let note = "PSEC delayed by α − SP, what the controller is asked to follow";
-        let synchronized = Strip { title: "Synchronized tracking error", note, ..tracking };
+        error_strip(page, &of, time, following, lines);
+        let note = "PSEC delayed by α − SP";
+        let compensated = Strip { title: "Delay-compensated following error", note, ..following };
         let lines = series(page, |t| &t.delay_compensated_following_error);
-        error_strip(page, &of, time, synchronized, lines);
+        error_strip(page, &of, time, compensated, lines);
         currents(page, axis, time);
         page.html.close_section();
     }
-    if !standing.is_empty() {
-        let held: Vec<String> = standing.iter().enumerate().map(|(i, axis)| held(axis, i == 0)).collect();
-        let verb = if held.len() == 1 { "stands" } else { "stand" };
-        page.html.open_section("standing", "Axes that stand still");
-        page.html.paragraph(&format!("{} {verb} still.", listed(&held)));
+    if !at_rest.is_empty() {
+        let names: Vec<String> =
+            at_rest.iter().enumerate().map(|(i, axis)| stationary(axis, i == 0)).collect();
+        let verb = if names.len() == 1 { "is" } else { "are" };
+        page.html.open_section("standing", "Stationary axes");
+        page.html.paragraph(&format!("{} {verb} stationary.", listed(&names)));
         page.html.close_section();
     }
 }
 
-/// An axis that stands still, and how far it is from its setpoint at most.
-fn held(axis: &Axis, explained: bool) -> String {
+/// Returns the name of a stationary axis with its largest following error.
+fn stationary(axis: &Axis, explained: bool) -> String {
     let errors = axis.traces.iter().flat_map(|(_, _, t)| t.following_error.iter().copied());
-    let error = DisplayUnit::error(axis.traces[0].2.kind).show(Extent::of(errors).map_or(0.0, |e| e.peak()));
-    format!("{} ({}{error})", axis.name, if explained { "largest tracking error " } else { "" })
+    let error =
+        DisplayUnit::error(axis.traces[0].2.kind).format(Extent::of(errors).map_or(0.0, |e| e.peak()));
+    format!("{} ({}{error})", axis.name, if explained { "largest following error " } else { "" })
 }
 
-/// Every axis by name, in the order in which the runs have them.
+/// Collects the axes of all runs by name and kind, in order of first occurrence.
 fn axes<'a>(page: &Page<'a>) -> Vec<Axis<'a>> {
     let mut axes: Vec<Axis> = Vec::new();
     let is_same = |a: &AxisTrace, b: &AxisTrace| a.name == b.name && a.kind == b.kind;
@@ -88,17 +90,17 @@ fn axes<'a>(page: &Page<'a>) -> Vec<Axis<'a>> {
     axes
 }
 
-/// A joint's name as machinists write it: one letter is a capital.
+/// Returns a joint name in the notation of machine axes: a single letter becomes a capital.
 pub(super) fn axis_name(name: &str) -> String {
     if name.chars().count() == 1 { capital(name) } else { name.to_owned() }
 }
 
-/// Setpoints as a pale band, positions on it.
+/// Plots setpoints as a pale band and positions above it.
 fn position(page: &mut Page, axis: &Axis, time: Extent) {
     let mut series: Vec<TimeSeries> = Vec::new();
     for &(_, time, trace) in &axis.traces {
         let class = "setpoint".to_owned();
-        // Runs of the same motion have one setpoint.
+        // Runs of the same motion share one setpoint line.
         if !series.iter().any(|s| s.time == time && s.values == trace.psec) {
             series.push(TimeSeries { label: "setpoint (PSEC)".to_owned(), class, time, values: &trace.psec });
         }
@@ -118,7 +120,7 @@ fn position(page: &mut Page, axis: &Axis, time: Extent) {
     page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
 }
 
-/// The current of each run with its parts, all at one scale.
+/// Plots the current of each run with its components, all runs at one scale.
 fn currents(page: &mut Page, axis: &Axis, time: Extent) {
     let parts: [(&str, &str, Signal); 3] = [
         ("friction", "part friction", |t| &t.friction_current),
@@ -141,14 +143,15 @@ fn currents(page: &mut Page, axis: &Axis, time: Extent) {
             line("setpoint", "setpoint".to_owned(), |t| &t.current_setpoint),
             line("motor current (SMC)", format!("line solid {}", run_class(run)), |t| &t.current),
         ];
-        let (taking, none): (Vec<_>, Vec<_>) =
-            parts.into_iter().partition(|(_, _, signal)| peak(signal(trace)) > NO_CURRENT);
-        series.extend(taking.into_iter().map(|(label, class, signal)| line(label, class.to_owned(), signal)));
-        let none: Vec<String> = none.into_iter().map(|(label, ..)| label.to_owned()).collect();
-        let note = match none.as_slice() {
+        let (plotted, negligible): (Vec<_>, Vec<_>) =
+            parts.into_iter().partition(|(_, _, signal)| peak(signal(trace)) > NEGLIGIBLE_CURRENT);
+        series
+            .extend(plotted.into_iter().map(|(label, class, signal)| line(label, class.to_owned(), signal)));
+        let negligible: Vec<String> = negligible.into_iter().map(|(label, ..)| label.to_owned()).collect();
+        let note = match negligible.as_slice() {
             [] => String::new(),
-            [one] => format!("{one} takes none"),
-            several => format!("{} take none", listed(several)),
+            [one] => format!("{one} component is negligible"),
+            several => format!("{} components are negligible", listed(several)),
         };
         let caption = Caption { title: page.caption_for_run("Current", run), note, legend: legend(&series) };
         let plot = TimePlot {
@@ -159,7 +162,7 @@ fn currents(page: &mut Page, axis: &Axis, time: Extent) {
             series,
             at_least: range,
         };
-        let title = page.caption_for_run(&format!("{} axis: current and its parts", axis.name), run);
+        let title = page.caption_for_run(&format!("{} axis: current and its components", axis.name), run);
         page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
     }
 }

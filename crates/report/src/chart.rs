@@ -1,18 +1,18 @@
-//! What a chart shows: pairs of values, on one or several areas with a common x axis.
+//! Contents of a chart: pairs of values in one or several panels with a common x axis.
 
 use super::html::run_class;
-use super::markers::Mark;
+use super::markers::Marker;
 use super::unit::DisplayUnit;
 
-/// A picture of pairs of values; all axes are linear.
+/// A plot of pairs of values on linear axes.
 ///
-/// Values are in SI and are labeled in the unit of their axis; a [`DisplayUnit`] of size 1 shows them as
-/// given. What is not finite, or beyond ±1e12 of the unit, is not drawn, and breaks a line. Long series are
-/// thinned to what can be seen, peaks and lonely points kept.
+/// Values are in SI units and are labeled in the unit of their axis; a [`DisplayUnit`] of size 1 shows them
+/// unchanged. Values that are not finite, or beyond ±1e12 of the unit, are omitted and break a line. Long series
+/// are decimated to the resolution of the plot; peaks and isolated points are kept.
 ///
 /// ```
-/// use virtual_axes::report::{Band, BandClass, Chart, ChartAxis, Document, Guide, Panel};
-/// use virtual_axes::report::{Section, ChartSeries, SeriesStyle, DisplayUnit};
+/// use virtual_axes_report::{Band, BandClass, Chart, ChartAxis, Document, Guide, Panel};
+/// use virtual_axes_report::{Section, ChartSeries, SeriesStyle, DisplayUnit};
 ///
 /// let time = [0.0, 0.1, 0.2, 0.3];
 /// let measured = ChartSeries::from_xy("measured", SeriesStyle::Measured, &time, &[0.0, 1e-6, 2e-6, 1e-6]);
@@ -36,126 +36,123 @@ use super::unit::DisplayUnit;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// What it shows.
+    /// Title above the plot.
     pub title: String,
-    /// What must be said about it; can be empty.
+    /// Remark behind the title; can be empty.
     pub note: String,
-    /// Across, the same for all panels.
+    /// Horizontal axis, common to all panels.
     pub x: ChartAxis,
-    /// Areas below each other.
+    /// Panels from top to bottom.
     pub panels: Vec<Panel>,
-    /// Intervals of x, shaded in all panels.
+    /// Intervals of x that are shaded in all panels.
     pub bands: Vec<Band>,
-    /// Values of x, marked by an upright line in all panels.
+    /// Values of x that are marked by a vertical line in all panels.
     pub lines: Vec<Guide>,
 }
 
-/// One area of a chart.
+/// One panel of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Upwards.
+    /// Vertical axis.
     pub y: ChartAxis,
-    /// Drawn in this order.
+    /// Series in drawing order.
     pub series: Vec<ChartSeries>,
-    /// Intervals of y, shaded.
+    /// Intervals of y that are shaded.
     pub bands: Vec<Band>,
-    /// Values of y, marked by a level line.
+    /// Values of y that are marked by a horizontal line.
     pub lines: Vec<Guide>,
 }
 
-/// What stands along an axis.
+/// Label, unit and range of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChartAxis {
-    /// The quantity, without its unit.
+    /// Quantity, without its unit.
     pub quantity: String,
-    /// In which it is labeled; values are in SI.
+    /// Unit of the tick labels; values are in SI units.
     pub unit: DisplayUnit,
-    /// What is shown of it.
+    /// Range that is shown.
     pub range: AxisRange,
 }
 
-/// What is shown of an axis.
+/// Range of an axis that is shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AxisRange {
-    /// All values, bands and lines.
+    /// Range of all values, bands and lines.
     All,
-    /// The same with zero.
+    /// Range of all values, bands and lines, extended to zero.
     WithZero,
-    /// From a value to a larger one, SI, and no more: a line is broken where it lies outside, and the
-    /// chart says how many values lie above or below. A range of x is a window: what lies beside it
-    /// does not count, nor for the range of y.
+    /// Fixed range from a value to a larger one, SI units. Lines are broken outside of it, and the chart states how
+    /// many values lie above or below. Points outside a fixed range of x are ignored, also for the range of y.
     Within(f64, f64),
 }
 
-/// Pairs of values that are drawn alike.
+/// Pairs of values with one style.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChartSeries {
-    /// As in the legend, where series of the same label and style stand once; empty: not in it.
+    /// Label in the legend. Series with equal label and style share one entry; an empty label has no entry.
     pub label: String,
-    /// How they are drawn.
+    /// Drawing style.
     pub style: SeriesStyle,
-    /// x and y, SI.
+    /// Values of x and y, SI units.
     pub points: Vec<[f64; 2]>,
-    /// How far the error bar of each point reaches up and down, SI; what is missing or not positive
-    /// has none.
+    /// Half length of the error bar of each point, SI units. A missing or non-positive entry draws no bar.
     pub errors: Vec<f64>,
 }
 
-/// How a series is drawn.
+/// Drawing style of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SeriesStyle {
-    /// A pale, broad line: what was asked for.
+    /// Pale, broad line for commanded values.
     Commanded,
-    /// The first of the lines.
+    /// First line style.
     Measured,
-    /// The second, dashed: what a model says.
+    /// Second line style, dashed, for values of a model.
     Simulated,
-    /// One of six lines that differ in color and dash, by its number; measured and simulated are the
-    /// first two of them.
+    /// Line style by index. Six styles differ in color and dash pattern; `Measured` and `Simulated` are the first two.
     Line(usize),
-    /// A staircase in one of the six styles: each value holds until the next x.
+    /// Step plot in a line style by index: each value is held until the next x.
     Steps(usize),
-    /// Points of a group, by its number: color and shape differ. Thousands are drawn small.
+    /// Markers by index of the group, in different colors and shapes. More than 300 points have small markers.
     Points(usize),
 }
 
 /// A shaded interval.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Band {
-    /// How it is drawn.
+    /// Meaning of the interval, which selects its style.
     pub class: BandClass,
-    /// As in the legend, where bands of the same label and class stand once; empty: not in it.
+    /// Label in the legend. Bands with equal label and class share one entry; an empty label has no entry.
     pub label: String,
-    /// Where it begins, SI; can be infinite.
+    /// Lower end, SI units; can be infinite.
     pub from: f64,
-    /// Where it ends.
+    /// Upper end, SI units; can be infinite.
     pub to: f64,
 }
 
-/// What a shaded interval is.
+/// Meaning of a shaded interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BandClass {
-    /// The axis stands still.
+    /// Axis at standstill.
     Static,
-    /// It moves at constant velocity.
+    /// Motion at constant velocity.
     ConstantVelocity,
-    /// It accelerates or brakes.
+    /// Acceleration or deceleration.
     Accelerating,
-    /// Values that are accepted, or the spread of values.
+    /// Accepted values, or the spread of values.
     Interval,
 }
 
-/// A value that is marked by a line.
+/// A value that is marked by a line across the panel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guide {
-    /// SI.
+    /// Marked value, SI units.
     pub at: f64,
-    /// What stands at the line; can be empty.
+    /// Label at the line; can be empty.
     pub label: String,
 }
 
 impl Chart {
-    /// A chart of series only.
+    /// Creates a chart without note, bands and lines.
     pub fn new(title: impl Into<String>, x: ChartAxis, panels: Vec<Panel>) -> Self {
         let title = title.into();
         Chart { title, note: String::new(), x, panels, bands: Vec::new(), lines: Vec::new() }
@@ -163,79 +160,81 @@ impl Chart {
 }
 
 impl Panel {
-    /// A panel of series only.
+    /// Creates a panel without bands and lines.
     pub fn new(y: ChartAxis, series: Vec<ChartSeries>) -> Self {
         Panel { y, series, bands: Vec::new(), lines: Vec::new() }
     }
 }
 
 impl ChartAxis {
-    /// An axis that shows all values.
+    /// Creates an axis that shows all values.
     pub fn new(quantity: impl Into<String>, unit: DisplayUnit) -> Self {
         ChartAxis { quantity: quantity.into(), unit, range: AxisRange::All }
     }
 
-    /// The same with zero in its range.
+    /// Extends the range to zero.
     pub fn with_zero(self) -> Self {
         ChartAxis { range: AxisRange::WithZero, ..self }
     }
 
-    /// The same with no more than from one value to another, SI.
+    /// Fixes the range, SI units.
     pub fn within(self, from: f64, to: f64) -> Self {
         ChartAxis { range: AxisRange::Within(from, to), ..self }
     }
 }
 
 impl ChartSeries {
-    /// A series without error bars; x and y of each point, SI.
+    /// Creates a series without error bars from x and y of each point, SI units.
     pub fn new(label: impl Into<String>, style: SeriesStyle, points: Vec<[f64; 2]>) -> Self {
         ChartSeries { label: label.into(), style, points, errors: Vec::new() }
     }
 
-    /// The same from two lists; what one has more than the other is left out.
+    /// Creates a series without error bars from two lists, SI units. Surplus elements of the longer list are ignored.
     pub fn from_xy(label: impl Into<String>, style: SeriesStyle, x: &[f64], y: &[f64]) -> Self {
         ChartSeries::new(label, style, x.iter().zip(y).map(|(&x, &y)| [x, y]).collect())
     }
 
-    /// With how far the error bar of each point reaches up and down, SI.
+    /// Sets the half length of the error bar of each point, SI units.
     pub fn with_errors(self, errors: Vec<f64>) -> Self {
         ChartSeries { errors, ..self }
     }
 }
 
 impl SeriesStyle {
-    /// As in the page's style.
+    /// Returns the CSS class.
     pub(super) fn class(self) -> String {
-        let number = self.number();
+        let index = self.index();
         match self {
             SeriesStyle::Commanded => "setpoint".to_owned(),
-            SeriesStyle::Points(_) => format!("points {} {}", Mark::of(number).name(), run_class(number)),
-            _ => format!("line {}", run_class(number)),
+            SeriesStyle::Points(_) => {
+                format!("points {} {}", Marker::for_group(index).name(), run_class(index))
+            }
+            _ => format!("line {}", run_class(index)),
         }
     }
 
-    /// Of its error bars.
+    /// Returns the CSS class of the error bars.
     pub(super) fn error_class(self) -> String {
-        format!("error {}", run_class(self.number()))
+        format!("error {}", run_class(self.index()))
     }
 
-    /// Its place among the styles.
-    fn number(self) -> usize {
+    /// Returns the index among the line or marker styles.
+    fn index(self) -> usize {
         match self {
             SeriesStyle::Commanded | SeriesStyle::Measured => 0,
             SeriesStyle::Simulated => 1,
-            SeriesStyle::Line(number) | SeriesStyle::Steps(number) | SeriesStyle::Points(number) => number,
+            SeriesStyle::Line(index) | SeriesStyle::Steps(index) | SeriesStyle::Points(index) => index,
         }
     }
 
-    /// Whether it is no line.
+    /// Returns true for markers, false for lines.
     pub(super) fn is_points(self) -> bool {
         matches!(self, SeriesStyle::Points(_))
     }
 }
 
 impl Band {
-    /// A band under the name of its class.
+    /// Creates a band that is labeled with the name of its class.
     pub fn new(class: BandClass, from: f64, to: f64) -> Self {
         let label = match class {
             BandClass::Static => "static",
@@ -246,14 +245,14 @@ impl Band {
         Band { class, label: label.to_owned(), from, to }
     }
 
-    /// An interval under a name of its own.
+    /// Creates an interval with its own label.
     pub fn interval(label: impl Into<String>, from: f64, to: f64) -> Self {
         Band { class: BandClass::Interval, label: label.into(), from, to }
     }
 }
 
 impl BandClass {
-    /// As in the page's style.
+    /// Returns the CSS class.
     pub(super) fn name(self) -> &'static str {
         match self {
             BandClass::Static => "static",
@@ -265,7 +264,7 @@ impl BandClass {
 }
 
 impl Guide {
-    /// A marked value, SI.
+    /// Creates a marked value, SI units.
     pub fn new(at: f64, label: impl Into<String>) -> Self {
         Guide { at, label: label.into() }
     }

@@ -1,55 +1,54 @@
-//! How a chart is drawn.
+//! Drawing of charts as SVG: panels, series, error bars, bands, guides, legend and text description.
 
 use super::chart::{AxisRange, Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesStyle};
-use super::decimate::{PixelPoint, dots, line, staircase};
+use super::decimate::{PixelPoint, line, separate_points, step_corners};
 use super::html::{Caption, Html};
-use super::markers::Mark;
+use super::markers::Marker;
 use super::plot_area::{BELOW, PlotArea};
 use super::scale::{Extent, Scale, is_drawable};
-use super::shade::{shade, told};
+use super::shade::{band_descriptions, shade};
 use super::svg::{Anchor, Svg};
 use super::text::number;
 
-/// Pixels at natural size; the page scales the picture to its width.
+/// Size in pixels; the page scales the plot to its width.
 const WIDTH: f64 = 920.0;
 const LEFT: f64 = 78.0;
 const RIGHT: f64 = WIDTH - 16.0;
 const TOP: f64 = 8.0;
-/// Heights of an area that stands alone and of one of several, and what is between these.
+/// Height of a single panel, height of one of several panels, and gap between panels, pixels.
 const HEIGHT_ALONE: f64 = 330.0;
 const HEIGHT: f64 = 154.0;
 const GAP: f64 = 16.0;
-/// Pixels from tick to tick, about: a label across, a line of text upwards; a low area has them near
-/// each other, since less than three say nothing.
+/// Approximate distance between ticks, pixels. Low panels have closer ticks, so that they have at least three.
 const X_TICKS: f64 = 90.0;
 const Y_TICKS_ALONE: f64 = 36.0;
 const Y_TICKS: f64 = 28.0;
-/// Room at the ends of the range, part of it: lines may end at the side, points must not be cut.
+/// Margin at the ends of the range, as a fraction of it. Lines may end at the side, markers must not be cut.
 const X_MARGIN: f64 = 0.03;
 const Y_MARGIN: f64 = 0.06;
-/// More points than this are drawn small.
+/// Number of points above which markers are small.
 const MANY: usize = 300;
-/// Size of the marks of many points.
+/// Relative size of small markers.
 const SMALL: f64 = 0.5;
-/// Half the width of an error bar's ends, pixels.
+/// Half the width of the end caps of an error bar, pixels.
 const CAP: f64 = 3.5;
-/// What rounding may put beyond the end of a range, part of it.
+/// Tolerance for rounding at the ends of a range, as a fraction of it.
 const SLACK: f64 = 1e-9;
-/// Distance of a guide's label from its line and from the area's edge, and height of its text, pixels.
+/// Distance of a guide's label from its line and from the edge of the panel, and height of its text, pixels.
 const LABEL_GAP: f64 = 5.0;
 const TEXT_HEIGHT: f64 = 15.0;
-/// Room that a label takes, pixels.
-const LABEL_ROOM: f64 = 160.0;
-/// Labels of upright guides stand in so many rows, so that near ones do not cover each other.
+/// Width reserved for a label, pixels.
+const LABEL_WIDTH: f64 = 160.0;
+/// Number of rows for labels of vertical guides, so that labels of close guides do not overlap.
 const LABEL_ROWS: usize = 3;
 
 impl ChartAxis {
-    /// A value in the unit of the axis, if it can be drawn.
+    /// Converts a value to the unit of the axis; returns `None` if it cannot be drawn.
     pub(super) fn shown(&self, value: f64) -> Option<f64> {
         Some(value / self.unit.size).filter(|v| is_drawable(*v))
     }
 
-    /// The scale of an axis for some values, SI.
+    /// Returns the scale of the axis for `values`, SI units.
     fn scale(&self, values: impl Iterator<Item = f64>, margin: f64, steps: f64) -> Scale {
         let least = self.unit.least_range;
         let fixed = match self.range {
@@ -67,12 +66,12 @@ impl ChartAxis {
 }
 
 impl ChartSeries {
-    /// The error bar of a point, SI.
-    fn error(&self, place: usize) -> Option<f64> {
-        self.errors.get(place).copied().filter(|e| *e > 0.0 && e.is_finite())
+    /// Returns the half length of the error bar of a point, SI units.
+    fn error(&self, index: usize) -> Option<f64> {
+        self.errors.get(index).copied().filter(|e| *e > 0.0 && e.is_finite())
     }
 
-    /// Values of y with the ends of the error bars, SI, of the points whose x (SI) is shown.
+    /// Returns y and the ends of the error bars of the points whose x is shown, SI units.
     fn heights(&self, is_shown: impl Fn(f64) -> bool) -> impl Iterator<Item = f64> {
         let points = self.points.iter().enumerate().filter(move |(_, point)| is_shown(point[0]));
         points.flat_map(|(i, &[_, y])| {
@@ -82,28 +81,28 @@ impl ChartSeries {
     }
 }
 
-/// Whether a value lies in a range, but for rounding.
+/// Returns true if a value lies in a range, within the rounding tolerance.
 fn holds(extent: &Extent, value: f64) -> bool {
     let slack = SLACK * extent.span();
     (extent.min - slack..=extent.max + slack).contains(&value)
 }
 
 impl Chart {
-    /// Its figure on a page.
-    pub(super) fn put(&self, html: &mut Html) {
-        let frames = self.frames();
-        let outside: usize = frames.iter().map(|(panel, frame)| self.outside(panel, frame)).sum();
+    /// Appends the chart to a page.
+    pub(super) fn append_to(&self, html: &mut Html) {
+        let areas = self.areas();
+        let outside: usize = areas.iter().map(|(panel, area)| self.count_outside(panel, area)).sum();
         let mut notes: Vec<String> = Some(self.note.clone()).filter(|n| !n.is_empty()).into_iter().collect();
         if outside > 0 {
             let verb = if outside == 1 { "value lies" } else { "values lie" };
-            notes.push(format!("{} {verb} outside the picture", number(outside as f64, 0)));
+            notes.push(format!("{} {verb} outside the plot", number(outside as f64, 0)));
         }
         let caption = Caption { title: self.title.clone(), note: notes.join("; "), legend: self.legend() };
-        html.figure("strip", &caption, &self.title, |id, title| self.draw(&frames, id, title));
+        html.figure("strip", &caption, &self.title, |id, title| self.draw(&areas, id, title));
     }
 
-    /// Where each panel is drawn.
-    fn frames(&self) -> Vec<(&Panel, PlotArea)> {
+    /// Returns each panel with its plot area.
+    fn areas(&self) -> Vec<(&Panel, PlotArea)> {
         let series = || self.panels.iter().flat_map(|panel| &panel.series);
         let across = series().flat_map(|s| s.points.iter().map(|p| p[0]));
         let marked = self.bands.iter().flat_map(|b| [b.from, b.to]).chain(self.lines.iter().map(|g| g.at));
@@ -111,7 +110,7 @@ impl Chart {
         let horizontal = self.x.scale(across.chain(marked), margin, (RIGHT - LEFT) / X_TICKS);
         let (height, ticks) =
             if self.panels.len() > 1 { (HEIGHT, Y_TICKS) } else { (HEIGHT_ALONE, Y_TICKS_ALONE) };
-        let frame = |(i, panel): (usize, &Panel)| {
+        let area = |(i, panel): (usize, &Panel)| {
             let top = TOP + i as f64 * (height + GAP);
             let marked =
                 panel.bands.iter().flat_map(|b| [b.from, b.to]).chain(panel.lines.iter().map(|g| g.at));
@@ -120,28 +119,26 @@ impl Chart {
             let vertical = panel.y.scale(upwards, Y_MARGIN, height / ticks);
             PlotArea { left: LEFT, right: RIGHT, top, bottom: top + height, horizontal, vertical }
         };
-        self.panels.iter().enumerate().map(|one| (one.1, frame(one))).collect()
+        self.panels.iter().enumerate().map(|one| (one.1, area(one))).collect()
     }
 
-    /// A pair of values in the units of the axes, if both can be drawn.
+    /// Converts a pair of values to the units of the axes; returns `None` if one of them cannot be drawn.
     fn shown(&self, panel: &Panel, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         Some([self.x.shown(x)?, panel.y.shown(y)?])
     }
 
-    /// Where a pair of values is drawn; nowhere if it lies outside.
-    fn place(&self, panel: &Panel, frame: &PlotArea, point: [f64; 2]) -> Option<PixelPoint> {
+    /// Converts a pair of values to pixels; returns `None` if it lies outside the plot area.
+    fn to_pixels(&self, panel: &Panel, area: &PlotArea, point: [f64; 2]) -> Option<PixelPoint> {
         let shown = self.shown(panel, point)?;
-        let is_inside = holds(&frame.horizontal.extent, shown[0]) && holds(&frame.vertical.extent, shown[1]);
-        is_inside.then(|| frame.place(shown))
+        let is_inside = holds(&area.horizontal.extent, shown[0]) && holds(&area.vertical.extent, shown[1]);
+        is_inside.then(|| area.to_pixels(shown))
     }
 
-    /// Number of pairs that lie above or below the area.
-    fn outside(&self, panel: &Panel, frame: &PlotArea) -> usize {
+    /// Counts the pairs that lie above or below the plot area.
+    fn count_outside(&self, panel: &Panel, area: &PlotArea) -> usize {
         let points = panel.series.iter().flat_map(|series| &series.points);
         let shown = points.filter_map(|point| self.shown(panel, *point));
-        shown
-            .filter(|[x, y]| holds(&frame.horizontal.extent, *x) && !holds(&frame.vertical.extent, *y))
-            .count()
+        shown.filter(|[x, y]| holds(&area.horizontal.extent, *x) && !holds(&area.vertical.extent, *y)).count()
     }
 
     fn legend(&self) -> Vec<(String, String)> {
@@ -158,55 +155,49 @@ impl Chart {
         legend
     }
 
-    fn draw(&self, frames: &[(&Panel, PlotArea)], id: &str, title: &str) -> String {
-        let bottom = frames.last().map_or(TOP, |(_, frame)| frame.bottom);
+    fn draw(&self, areas: &[(&Panel, PlotArea)], id: &str, title: &str) -> String {
+        let bottom = areas.last().map_or(TOP, |(_, area)| area.bottom);
         let mut svg = Svg::new(WIDTH, bottom + BELOW);
-        for (i, (panel, frame)) in frames.iter().enumerate() {
-            let label = (i + 1 == frames.len()).then(|| self.x.unit.label(&self.x.quantity));
-            // At the side of the area zero needs no line.
-            let zero = [frame.horizontal, frame.vertical].map(|scale| scale.extent.min < 0.0);
-            frame.draw(&mut svg, label.as_deref(), &panel.y.unit.label(&panel.y.quantity), zero);
-            shade(&mut svg, frame, &self.bands, &self.x, false);
-            shade(&mut svg, frame, &panel.bands, &panel.y, true);
+        for (i, (panel, area)) in areas.iter().enumerate() {
+            let label = (i + 1 == areas.len()).then(|| self.x.unit.label(&self.x.quantity));
+            // Zero at the edge of the panel needs no line.
+            let zero = [area.horizontal, area.vertical].map(|scale| scale.extent.min < 0.0);
+            area.draw(&mut svg, label.as_deref(), &panel.y.unit.label(&panel.y.quantity), zero);
+            shade(&mut svg, area, &self.bands, &self.x, false);
+            shade(&mut svg, area, &panel.bands, &panel.y, true);
             let drawn: Vec<PixelPoint> =
-                panel.series.iter().flat_map(|series| self.series(&mut svg, panel, frame, series)).collect();
+                panel.series.iter().flat_map(|series| self.series(&mut svg, panel, area, series)).collect();
             if drawn.is_empty() {
-                let middle = frame.bottom - (frame.bottom - frame.top) / 2.0;
+                let middle = area.bottom - (area.bottom - area.top) / 2.0;
                 svg.text("tick", [(LEFT + RIGHT) / 2.0, middle], Anchor::Middle, "no values");
             }
-            self.upright(&mut svg, frame);
-            panel.level(&mut svg, frame, &drawn);
+            self.draw_vertical_guides(&mut svg, area);
+            panel.draw_horizontal_guides(&mut svg, area, &drawn);
         }
         svg.finish(id, title, &self.description())
     }
 
-    /// Draws a series; the points that it goes through.
-    fn series(
-        &self,
-        svg: &mut Svg,
-        panel: &Panel,
-        frame: &PlotArea,
-        series: &ChartSeries,
-    ) -> Vec<PixelPoint> {
+    /// Draws a series and returns its points in pixels.
+    fn series(&self, svg: &mut Svg, panel: &Panel, area: &PlotArea, series: &ChartSeries) -> Vec<PixelPoint> {
         let points: Vec<Option<PixelPoint>> =
-            series.points.iter().map(|point| self.place(panel, frame, *point)).collect();
-        self.error_bars(svg, panel, frame, series, &points);
+            series.points.iter().map(|point| self.to_pixels(panel, area, *point)).collect();
+        self.error_bars(svg, panel, area, series, &points);
         let class = series.style.class();
         match series.style {
             SeriesStyle::Points(group) => {
-                let places: Vec<PixelPoint> = points.iter().copied().flatten().collect();
-                let kept = dots(&places);
+                let markers: Vec<PixelPoint> = points.iter().copied().flatten().collect();
+                let kept = separate_points(&markers);
                 let (class, size) =
                     if kept.len() > MANY { (format!("{class} many"), SMALL) } else { (class, 1.0) };
-                let mark = Mark::of(group);
-                let strokes: Vec<_> = kept.into_iter().flat_map(|i| mark.strokes(places[i], size)).collect();
+                let mark = Marker::for_group(group);
+                let strokes: Vec<_> = kept.into_iter().flat_map(|i| mark.strokes(markers[i], size)).collect();
                 svg.path(&class, &strokes);
             }
             style => {
                 let corners =
-                    if let SeriesStyle::Steps(_) = style { staircase(&points) } else { points.clone() };
+                    if let SeriesStyle::Steps(_) = style { step_corners(&points) } else { points.clone() };
                 let parts = line(&corners);
-                // Among many points a line is seen by the room about it.
+                // A casing keeps the line visible among many markers.
                 let hides = |other: &ChartSeries| other.style.is_points() && other.points.len() > MANY;
                 if panel.series.iter().any(hides) {
                     svg.path("casing", &parts);
@@ -221,23 +212,23 @@ impl Chart {
         &self,
         svg: &mut Svg,
         panel: &Panel,
-        frame: &PlotArea,
+        area: &PlotArea,
         series: &ChartSeries,
         points: &[Option<PixelPoint>],
     ) {
-        let Extent { min, max } = frame.vertical.extent;
+        let Extent { min, max } = area.vertical.extent;
         let bars: Vec<(PixelPoint, [f64; 2])> = points
             .iter()
             .enumerate()
             .filter_map(|(i, point)| {
-                let (place, error) = ((*point)?, series.error(i)?);
-                let end = |y: f64| Some(frame.y()(panel.y.shown(y)?.clamp(min, max)));
+                let (pixel, error) = ((*point)?, series.error(i)?);
+                let end = |y: f64| Some(area.y()(panel.y.shown(y)?.clamp(min, max)));
                 let y = series.points[i][1];
-                Some((place, [end(y - error)?, end(y + error)?]))
+                Some((pixel, [end(y - error)?, end(y + error)?]))
             })
             .collect();
-        let places: Vec<PixelPoint> = bars.iter().map(|(place, _)| *place).collect();
-        let strokes: Vec<Vec<PixelPoint>> = dots(&places)
+        let middles: Vec<PixelPoint> = bars.iter().map(|(middle, _)| *middle).collect();
+        let strokes: Vec<Vec<PixelPoint>> = separate_points(&middles)
             .into_iter()
             .flat_map(|i| {
                 let ([x, _], [low, high]) = bars[i];
@@ -248,14 +239,14 @@ impl Chart {
         svg.path(&series.style.error_class(), &strokes);
     }
 
-    /// Marked values of x.
-    fn upright(&self, svg: &mut Svg, frame: &PlotArea) {
-        let marked = guides(&self.lines, &self.x, &frame.horizontal);
+    /// Draws the marked values of x.
+    fn draw_vertical_guides(&self, svg: &mut Svg, area: &PlotArea) {
+        let marked = guides(&self.lines, &self.x, &area.horizontal);
         for (i, (value, label)) in marked.enumerate() {
-            let x = frame.x()(value);
-            svg.line("guide", [x, frame.top], [x, frame.bottom]);
-            let y = frame.top + TEXT_HEIGHT * (1 + i % LABEL_ROWS) as f64;
-            if x - frame.left > LABEL_ROOM {
+            let x = area.x()(value);
+            svg.line("guide", [x, area.top], [x, area.bottom]);
+            let y = area.top + TEXT_HEIGHT * (1 + i % LABEL_ROWS) as f64;
+            if x - area.left > LABEL_WIDTH {
                 svg.text("tick halo", [x - LABEL_GAP, y], Anchor::End, label);
             } else {
                 svg.text("tick halo", [x + LABEL_GAP, y], Anchor::Start, label);
@@ -263,9 +254,9 @@ impl Chart {
         }
     }
 
-    /// In words: the range of each series, and what is marked.
+    /// Returns the text alternative: the range of each series, bands and marked values.
     fn description(&self) -> String {
-        let mut told_of: Vec<String> = Vec::new();
+        let mut sentences: Vec<String> = Vec::new();
         for panel in &self.panels {
             let y = &panel.y;
             let mut parts: Vec<String> = panel
@@ -281,27 +272,27 @@ impl Chart {
                     };
                     match Extent::of(heights) {
                         Some(Extent { min, max }) => {
-                            let [min, max] = [min, max].map(|v| y.unit.show(v * y.unit.size));
+                            let [min, max] = [min, max].map(|v| y.unit.format(v * y.unit.size));
                             format!("{}{count} from {min} to {max}", series.label)
                         }
                         None => format!("{}: no values", series.label),
                     }
                 })
                 .collect();
-            parts.extend(panel.lines.iter().filter_map(|guide| guide.told(y)));
-            parts.extend(told(&panel.bands, y));
-            told_of.push(format!("{} over {}: {}.", y.quantity, self.x.quantity, parts.join("; ")));
+            parts.extend(panel.lines.iter().filter_map(|guide| guide.description(y)));
+            parts.extend(band_descriptions(&panel.bands, y));
+            sentences.push(format!("{} over {}: {}.", y.quantity, self.x.quantity, parts.join("; ")));
         }
-        let marked: Vec<String> = self.lines.iter().filter_map(|guide| guide.told(&self.x)).collect();
-        let marked: Vec<String> = marked.into_iter().chain(told(&self.bands, &self.x)).collect();
+        let marked: Vec<String> = self.lines.iter().filter_map(|guide| guide.description(&self.x)).collect();
+        let marked: Vec<String> = marked.into_iter().chain(band_descriptions(&self.bands, &self.x)).collect();
         if !marked.is_empty() {
-            told_of.push(format!("{}: {}.", self.x.quantity, marked.join("; ")));
+            sentences.push(format!("{}: {}.", self.x.quantity, marked.join("; ")));
         }
-        told_of.join(" ")
+        sentences.join(" ")
     }
 }
 
-/// Marked values inside a range, in the unit of their axis, with their labels.
+/// Returns the marked values inside a range, in the unit of their axis, with their labels.
 fn guides<'a>(
     lines: &'a [Guide],
     axis: &'a ChartAxis,
@@ -312,34 +303,34 @@ fn guides<'a>(
 }
 
 impl Guide {
-    /// "mean at 95.1 kg".
-    fn told(&self, axis: &ChartAxis) -> Option<String> {
+    /// Returns a text such as "mean at 95.1 kg".
+    fn description(&self, axis: &ChartAxis) -> Option<String> {
         axis.shown(self.at)
-            .map(|_| format!("{} at {}", self.label, axis.unit.show(self.at)).trim().to_owned())
+            .map(|_| format!("{} at {}", self.label, axis.unit.format(self.at)).trim().to_owned())
     }
 }
 
 impl Panel {
-    /// Marked values of y; the label stands at the side where fewer points are drawn.
-    fn level(&self, svg: &mut Svg, frame: &PlotArea, drawn: &[PixelPoint]) {
-        let mut taken: Vec<(bool, f64)> = Vec::new();
-        for (value, label) in guides(&self.lines, &self.y, &frame.vertical) {
-            let y = frame.y()(value);
-            svg.line("guide", [frame.left, y], [frame.right, y]);
-            let is_at_top = y - frame.top < TEXT_HEIGHT + LABEL_GAP;
+    /// Draws the marked values of y; each label is at the side with fewer points.
+    fn draw_horizontal_guides(&self, svg: &mut Svg, area: &PlotArea, drawn: &[PixelPoint]) {
+        let mut occupied: Vec<(bool, f64)> = Vec::new();
+        for (value, label) in guides(&self.lines, &self.y, &area.vertical) {
+            let y = area.y()(value);
+            svg.line("guide", [area.left, y], [area.right, y]);
+            let is_at_top = y - area.top < TEXT_HEIGHT + LABEL_GAP;
             let base = if is_at_top { y + TEXT_HEIGHT } else { y - LABEL_GAP };
             let near = || drawn.iter().filter(|p| (base - TEXT_HEIGHT..=base).contains(&p[1]));
-            let at_left = near().filter(|p| p[0] < frame.left + LABEL_ROOM).count();
-            let at_right = near().filter(|p| p[0] > frame.right - LABEL_ROOM).count();
+            let at_left = near().filter(|p| p[0] < area.left + LABEL_WIDTH).count();
+            let at_right = near().filter(|p| p[0] > area.right - LABEL_WIDTH).count();
             let covers = |is_left: bool| {
-                taken.iter().any(|(left, other)| *left == is_left && (other - base).abs() < TEXT_HEIGHT)
+                occupied.iter().any(|(left, other)| *left == is_left && (other - base).abs() < TEXT_HEIGHT)
             };
             let is_left = if covers(false) != covers(true) { covers(false) } else { at_left < at_right };
-            taken.push((is_left, base));
+            occupied.push((is_left, base));
             let (x, anchor) = if is_left {
-                (frame.left + LABEL_GAP, Anchor::Start)
+                (area.left + LABEL_GAP, Anchor::Start)
             } else {
-                (frame.right - LABEL_GAP, Anchor::End)
+                (area.right - LABEL_GAP, Anchor::End)
             };
             svg.text("tick halo", [x, base], anchor, label);
         }

@@ -1,28 +1,27 @@
-//! Lines with no more points than can be seen.
+//! Decimation of lines and markers to the resolution of a plot.
 //!
-//! A signal over time keeps the smallest and the largest value of each column of pixels, so that no
-//! peak is lost. After that, and for curves in a plane, a point that lies on the line between its
-//! neighbors is dropped.
+//! A signal over time keeps the smallest and the largest value of each pixel column, so that no peak is lost.
+//! Then, and for curves in a plane, points on the line between their neighbors are dropped (Ramer–Douglas–Peucker).
 
 use super::scale::is_drawable;
 
 /// A point in pixels.
 pub(super) type PixelPoint = [f64; 2];
 
-/// How far a dropped point may lie from the line that is drawn, pixels.
+/// Largest distance of a dropped point from the drawn line, pixels.
 const TOLERANCE: f64 = 0.08;
-/// Steps of a curve below this are not seen, pixels.
+/// Distance below which points of a curve are indistinguishable, pixels.
 const SHORTEST_STEP: f64 = 0.25;
-/// Points of a curve at most; beyond, steps are made longer, up to the longest that keeps its shape,
-/// and of what is then still too much only every so many is kept.
+/// Maximum number of points of a curve. If a curve has more, the step is doubled up to `LONGEST_STEP`, which
+/// preserves the shape; if it still has more, every n-th point is kept.
 const MOST_POINTS: usize = 6000;
 const LONGEST_STEP: f64 = 4.0;
-/// Single points at most; beyond, those that are near others are left out.
-const MOST_DOTS: usize = 9000;
+/// Maximum number of markers; if there are more, markers close to others are dropped.
+const MOST_MARKERS: usize = 9000;
 
-/// The line through points, in the parts between those that cannot be drawn.
+/// Returns the decimated line through points, split at points that cannot be drawn.
 ///
-/// Where it never goes back it keeps the extremes of each column of pixels, else it is a curve.
+/// If x never decreases, the extremes of each pixel column are kept; otherwise the line is decimated as a curve.
 pub(super) fn line(points: &[Option<PixelPoint>]) -> Vec<Vec<PixelPoint>> {
     let known = || points.iter().flatten();
     if known().zip(known().skip(1)).all(|(a, b)| a[0] <= b[0]) {
@@ -30,7 +29,7 @@ pub(super) fn line(points: &[Option<PixelPoint>]) -> Vec<Vec<PixelPoint>> {
         let parts = extremes(&heights, |i| points[i].map_or(0, |p| p[0] as i64));
         return parts.into_iter().map(|part| part.into_iter().filter_map(|i| points[i]).collect()).collect();
     }
-    // Each with the number of points before it that cannot be drawn.
+    // Each point with the number of preceding points that cannot be drawn.
     let mut gaps = 0;
     let mut curve: Vec<(usize, PixelPoint)> = Vec::with_capacity(points.len());
     for point in points {
@@ -44,16 +43,16 @@ pub(super) fn line(points: &[Option<PixelPoint>]) -> Vec<Vec<PixelPoint>> {
     kept.chunk_by(|a, b| a.0 == b.0).map(|part| part.iter().map(|(_, point)| *point).collect()).collect()
 }
 
-/// Places of the points that can be told from those before them, in order. Where there are many,
-/// one is kept of those that are near each other, so that a lonely one is never lost.
-pub(super) fn dots(points: &[PixelPoint]) -> Vec<usize> {
+/// Returns the indices of distinguishable points, in order. Among many points one of each cluster is kept, so
+/// that isolated points are never lost.
+pub(super) fn separate_points(points: &[PixelPoint]) -> Vec<usize> {
     let mut cell = 1.0;
     loop {
         let mut cells: Vec<([i64; 2], usize)> =
             points.iter().enumerate().map(|(i, p)| (p.map(|v| (v / cell).round() as i64), i)).collect();
         cells.sort_unstable();
         cells.dedup_by_key(|(cell, _)| *cell);
-        if cells.len() <= MOST_DOTS || cell > 1e4 {
+        if cells.len() <= MOST_MARKERS || cell > 1e4 {
             let mut kept: Vec<usize> = cells.into_iter().map(|(_, i)| i).collect();
             kept.sort_unstable();
             return kept;
@@ -62,8 +61,8 @@ pub(super) fn dots(points: &[PixelPoint]) -> Vec<usize> {
     }
 }
 
-/// The corners of a staircase: each value holds until the next one.
-pub(super) fn staircase(points: &[Option<PixelPoint>]) -> Vec<Option<PixelPoint>> {
+/// Returns the corners of a step plot: each value is held until the next x.
+pub(super) fn step_corners(points: &[Option<PixelPoint>]) -> Vec<Option<PixelPoint>> {
     let mut corners: Vec<Option<PixelPoint>> = Vec::with_capacity(2 * points.len());
     for point in points {
         if let (Some([x, _]), Some(Some([_, before]))) = (point, corners.last()) {
@@ -74,18 +73,18 @@ pub(super) fn staircase(points: &[Option<PixelPoint>]) -> Vec<Option<PixelPoint>
     corners
 }
 
-/// Distance of two points.
+/// Returns the distance of two points, pixels.
 fn apart(a: PixelPoint, b: PixelPoint) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// Places of the smallest and the largest value in each column, in order; one list for each part
-/// between values that cannot be drawn.
+/// Returns the indices of the smallest and the largest value in each pixel column, in order, as one list for each
+/// part between values that cannot be drawn.
 ///
-/// `column(i)` is the column of sample i, not falling. A gap inside a column is not seen, and closed.
+/// `column(i)` is the column of sample i and does not decrease. A gap within a column is invisible and is closed.
 fn extremes(values: &[f64], column: impl Fn(usize) -> i64) -> Vec<Vec<usize>> {
     let mut parts: Vec<Vec<usize>> = Vec::new();
-    // TableColumn, smallest, largest.
+    // Column, index of its smallest value, index of its largest value.
     let mut open: Option<(i64, usize, usize)> = None;
     let mut gap = true;
     let mut previous = 0;
@@ -120,18 +119,18 @@ fn extremes(values: &[f64], column: impl Fn(usize) -> i64) -> Vec<Vec<usize>> {
     parts
 }
 
-/// Ends a column: its extremes after its first sample, and its last.
+/// Appends the extremes and the last sample of a column.
 fn close(parts: &mut [Vec<usize>], open: Option<(i64, usize, usize)>, last: usize) {
     let (Some((_, low, high)), Some(part)) = (open, parts.last_mut()) else { return };
-    for place in [low.min(high), low.max(high), last] {
-        if part.last().is_none_or(|&l| l < place) {
-            part.push(place);
+    for index in [low.min(high), low.max(high), last] {
+        if part.last().is_none_or(|&l| l < index) {
+            part.push(index);
         }
     }
 }
 
-/// Places of the points of a curve that differ visibly from the one before; `same` says whether the
-/// curve's points i and j look the same within so many pixels.
+/// Returns the indices of the points of a curve that differ visibly from the previous one. `same(i, j, distance)`
+/// returns true if points i and j are closer than `distance` pixels.
 pub(super) fn steps(length: usize, same: impl Fn(usize, usize, f64) -> bool) -> Vec<usize> {
     let mut within = SHORTEST_STEP;
     loop {
@@ -153,7 +152,7 @@ pub(super) fn steps(length: usize, same: impl Fn(usize, usize, f64) -> bool) -> 
     }
 }
 
-/// The line without points that lie on it (Ramer, Douglas and Peucker).
+/// Removes points that lie on the line (Ramer–Douglas–Peucker).
 pub(super) fn simplified(points: &[PixelPoint]) -> Vec<PixelPoint> {
     let Some(last) = points.len().checked_sub(1).filter(|&last| last > 1) else { return points.to_vec() };
     let mut kept = vec![false; points.len()];
@@ -174,7 +173,7 @@ pub(super) fn simplified(points: &[PixelPoint]) -> Vec<PixelPoint> {
     points.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(point, _)| *point).collect()
 }
 
-/// Distance of `p` from the line between `a` and `b`.
+/// Returns the distance of `p` from the line segment between `a` and `b`, pixels.
 fn distance(p: PixelPoint, a: PixelPoint, b: PixelPoint) -> f64 {
     let (along, off) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
     let length = along[0] * along[0] + along[1] * along[1];
@@ -190,7 +189,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_extremes_of_every_column_survive(
+        fn the_extremes_of_every_column_are_kept(
             values in prop::collection::vec(-1e3..1e3f64, 1..400), per_column in 1usize..50
         ) {
             let parts = extremes(&values, |i| (i / per_column) as i64);
@@ -217,7 +216,7 @@ mod tests {
         }
 
         #[test]
-        fn whatever_cannot_be_drawn_makes_few_parts(
+        fn undrawable_values_split_a_line_into_few_parts(
             values in prop::collection::vec(prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(1.0)], 0..400)
         ) {
             let parts = extremes(&values, |i| (i / 10) as i64);
@@ -232,25 +231,25 @@ mod tests {
         assert_eq!(extremes(&values, |i| i as i64), [vec![0, 1], vec![4]]);
         let (a, b, c) = ([0.0, 1.0], [5.0, 2.0], [9.0, 1.0]);
         assert_eq!(line(&[Some(a), Some(b), None, Some(c), None]), [vec![a, b], vec![c]]);
-        // One that goes back as well.
+        // A curve whose x decreases.
         assert_eq!(line(&[Some(c), Some(b), None, None, Some(a)]), [vec![c, b], vec![a]]);
     }
 
     #[test]
-    fn a_staircase_goes_across_first_and_ends_at_a_gap() {
+    fn a_step_plot_is_horizontal_first_and_ends_at_a_gap() {
         let (a, b, c) = ([0.0, 1.0], [5.0, 2.0], [9.0, 1.0]);
-        let corners = staircase(&[Some(a), Some(b), None, Some(c)]);
+        let corners = step_corners(&[Some(a), Some(b), None, Some(c)]);
         assert_eq!(corners, [Some(a), Some([5.0, 1.0]), Some(b), None, Some(c)]);
     }
 
     #[test]
-    fn a_lonely_point_among_many_is_kept() {
+    fn an_isolated_point_among_many_is_kept() {
         let mut points: Vec<PixelPoint> =
             (0..200_000).map(|i| [f64::from(i % 500), f64::from(i / 500)]).collect();
         points.insert(123_456, [800.0, 700.0]);
-        let kept = dots(&points);
+        let kept = separate_points(&points);
         assert!(
-            kept.contains(&123_456) && kept.len() <= MOST_DOTS && kept.len() > MOST_DOTS / 3,
+            kept.contains(&123_456) && kept.len() <= MOST_MARKERS && kept.len() > MOST_MARKERS / 3,
             "{}",
             kept.len()
         );
@@ -261,7 +260,7 @@ mod tests {
     fn a_curve_has_a_bounded_number_of_points() {
         let kept = steps(100_000, |i, j, within| ((i as f64) - (j as f64)).abs() < within);
         assert!(kept.len() <= MOST_POINTS && kept.contains(&99_999));
-        // One that no step shortens without losing it.
+        // A curve that no step length decimates.
         let kept = steps(100_000, |_, _, _| false);
         assert!((MOST_POINTS / 2..=MOST_POINTS).contains(&kept.len()) && kept.contains(&99_999));
     }

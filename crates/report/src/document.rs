@@ -1,4 +1,4 @@
-//! A page of text, tables and charts, of no run in particular.
+//! A page of text, tables and charts.
 
 use std::io;
 
@@ -7,56 +7,56 @@ use super::html::Html;
 use super::table::{RunTable, Table, fact, names};
 use super::text::Text;
 
-/// A page of sections, as self-contained as a [`Report`](super::Report) and in the same style.
+/// A self-contained page of sections, in the style of a [`Report`](super::Report).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Document {
-    /// Heading, and title of the window.
+    /// Heading, and title of the browser window.
     pub title: String,
-    /// What it is about, in a sentence or two; can be empty.
+    /// Description in one or two sentences; can be empty.
     pub description: String,
-    /// Name and value; values under one name stand together.
+    /// Names and values. Values with equal names share a row.
     pub facts: Vec<(String, String)>,
-    /// In this order.
+    /// Sections in their order on the page.
     pub sections: Vec<Section>,
 }
 
-/// A part of a page; its pieces stand in the order of the fields, and each list can be empty.
+/// A part of a page. Its contents are in the order of the fields; each list can be empty.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Section {
-    /// What it is about.
+    /// Heading.
     pub heading: String,
-    /// Text.
+    /// Paragraphs of plain text.
     pub paragraphs: Vec<String>,
-    /// What the reader must not miss.
+    /// Highlighted notices.
     pub notices: Vec<Notice>,
-    /// Figures.
+    /// Tables.
     pub tables: Vec<Table>,
-    /// Pictures.
+    /// Charts.
     pub charts: Vec<Chart>,
 }
 
-/// Something that the reader must not miss.
+/// A highlighted remark.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Notice {
-    /// How much it matters.
+    /// Severity.
     pub level: NoticeLevel,
-    /// What is to be said.
+    /// Text of the notice.
     pub text: String,
 }
 
-/// How much a notice matters.
+/// Severity of a notice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum NoticeLevel {
-    /// Good to know.
+    /// Information.
     Note,
-    /// A result is less certain than it could be.
+    /// Result with reduced accuracy.
     Warning,
-    /// A result is not there.
+    /// Missing result.
     Missing,
 }
 
 impl NoticeLevel {
-    /// Style, and what stands before the text, so that color is not all that tells it.
+    /// Returns the CSS class and the word in front of the text, which distinguishes the levels without color.
     fn style(self) -> (&'static str, &'static str) {
         match self {
             NoticeLevel::Note => ("note", "Note"),
@@ -67,17 +67,18 @@ impl NoticeLevel {
 }
 
 impl Notice {
-    /// A notice.
+    /// Creates a notice.
     pub fn new(level: NoticeLevel, text: impl Into<String>) -> Self {
         Notice { level, text: text.into() }
     }
 }
 
 impl Document {
-    /// Writes the page, UTF-8; the same document gives the same bytes.
+    /// Writes the page in UTF-8. Equal documents give equal bytes.
     ///
     /// # Errors
-    /// Those of the output.
+    ///
+    /// Returns the error of `out` if it cannot be written.
     pub fn write(&self, out: &mut impl io::Write) -> io::Result<()> {
         out.write_all(self.page().as_bytes())
     }
@@ -87,33 +88,33 @@ impl Document {
         if !self.facts.is_empty() {
             let rows: Vec<_> =
                 names(&self.facts).into_iter().map(|name| (name, vec![fact(&self.facts, name)])).collect();
-            html.put(format_args!("<section class=\"facts\">\n"));
+            html.append(format_args!("<section class=\"facts\">\n"));
             html.facts(&[], &rows);
             html.close_section();
         }
-        self.sections.iter().for_each(|section| section.put(&mut html));
+        self.sections.iter().for_each(|section| section.append_to(&mut html));
         html.end()
     }
 }
 
 impl Section {
-    /// A section without content yet.
+    /// Creates an empty section.
     pub fn new(heading: impl Into<String>) -> Self {
         Section { heading: heading.into(), ..Section::default() }
     }
 
-    fn put(&self, html: &mut Html) {
+    fn append_to(&self, html: &mut Html) {
         html.open_section("part figures", &self.heading);
         self.paragraphs.iter().for_each(|text| html.paragraph(text));
         for Notice { level, text } in &self.notices {
             let (class, word) = level.style();
-            html.put(format_args!(
+            html.append(format_args!(
                 "<p class=\"notice {class}\"><strong>{word}</strong> {}</p>\n",
                 Text(text)
             ));
         }
         self.tables.iter().for_each(|table| html.table(&[RunTable { run: None, table }]));
-        self.charts.iter().for_each(|chart| chart.put(html));
+        self.charts.iter().for_each(|chart| chart.append_to(html));
         html.close_section();
     }
 }

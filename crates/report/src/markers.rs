@@ -1,59 +1,59 @@
-//! Marks of points: groups differ in shape as well as in color.
+//! Markerer shapes of point groups, which differ in shape as well as in color.
 
 use super::decimate::PixelPoint;
 
-/// How far the strokes of a cross reach from its middle, pixels.
-const REACH: f64 = 4.0;
-/// Half the side of a square, pixels; the page's style makes its stroke as broad.
+/// Half length of the strokes of a cross, pixels.
+const HALF_LENGTH: f64 = 4.0;
+/// Half the side of a square, pixels; the style sheet sets an equal stroke width.
 const HALF_SIDE: f64 = 3.0;
 
-/// The shape of a point, made of strokes.
+/// Shape of a marker, composed of strokes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mark {
-    /// A disc: a stroke of no length with round ends.
+pub(super) enum Marker {
+    /// Disc: a stroke of zero length with round ends.
     Round,
-    /// A stroke as long as it is broad: one of no length with square ends is not drawn on paper.
+    /// Square: a stroke as long as its width. Strokes of zero length with square ends are not printed.
     Square,
-    /// Two strokes, aslant.
+    /// Diagonal cross.
     Cross,
-    /// Two strokes, upright.
+    /// Upright cross.
     Plus,
 }
 
-impl Mark {
-    const ALL: [Mark; 4] = [Mark::Round, Mark::Square, Mark::Cross, Mark::Plus];
+impl Marker {
+    const ALL: [Marker; 4] = [Marker::Round, Marker::Square, Marker::Cross, Marker::Plus];
 
-    /// That of a group of points, by its number.
-    pub(super) fn of(group: usize) -> Mark {
-        Mark::ALL[group % Mark::ALL.len()]
+    /// Returns the shape of a group by its index.
+    pub(super) fn for_group(group: usize) -> Marker {
+        Marker::ALL[group % Marker::ALL.len()]
     }
 
-    /// Its name in the page's style.
+    /// Returns the CSS class.
     pub(super) fn name(self) -> &'static str {
         match self {
-            Mark::Round => "round",
-            Mark::Square => "square",
-            Mark::Cross => "cross",
-            Mark::Plus => "plus",
+            Marker::Round => "round",
+            Marker::Square => "square",
+            Marker::Cross => "cross",
+            Marker::Plus => "plus",
         }
     }
 
-    /// The one that a class names.
-    pub(super) fn of_class(class: &str) -> Mark {
-        let is_named = |mark: &Mark| class.split(' ').any(|word| word == mark.name());
-        Mark::ALL.into_iter().find(is_named).unwrap_or(Mark::Round)
+    /// Returns the shape that a CSS class names; a disc if it names none.
+    pub(super) fn from_class(class: &str) -> Marker {
+        let is_named = |mark: &Marker| class.split(' ').any(|word| word == mark.name());
+        Marker::ALL.into_iter().find(is_named).unwrap_or(Marker::Round)
     }
 
-    /// Its strokes about a point, at natural size or smaller.
+    /// Returns the strokes around a point, scaled by `size`.
     pub(super) fn strokes(self, [x, y]: PixelPoint, size: f64) -> Vec<Vec<PixelPoint>> {
-        let r = REACH * size;
-        // An arm aslant is as long as an upright one.
+        let r = HALF_LENGTH * size;
+        // Diagonal and upright strokes have equal lengths.
         let d = r * std::f64::consts::FRAC_1_SQRT_2;
         match self {
-            Mark::Round => vec![vec![[x, y]]],
-            Mark::Square => vec![vec![[x - HALF_SIDE * size, y], [x + HALF_SIDE * size, y]]],
-            Mark::Cross => vec![vec![[x - d, y - d], [x + d, y + d]], vec![[x - d, y + d], [x + d, y - d]]],
-            Mark::Plus => vec![vec![[x - r, y], [x + r, y]], vec![[x, y - r], [x, y + r]]],
+            Marker::Round => vec![vec![[x, y]]],
+            Marker::Square => vec![vec![[x - HALF_SIDE * size, y], [x + HALF_SIDE * size, y]]],
+            Marker::Cross => vec![vec![[x - d, y - d], [x + d, y + d]], vec![[x - d, y + d], [x + d, y - d]]],
+            Marker::Plus => vec![vec![[x - r, y], [x + r, y]], vec![[x, y - r], [x, y + r]]],
         }
     }
 }

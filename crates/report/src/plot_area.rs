@@ -1,20 +1,20 @@
-//! The area of a picture with two linear axes: grid, ticks, labels.
+//! Plot area with two linear axes: grid, ticks and labels.
 
 use super::decimate::PixelPoint;
 use super::scale::Scale;
 use super::svg::{Anchor, Svg};
 
-/// Room that ticks and label take below the area, pixels.
+/// Height of tick labels and axis label below the plot area, pixels.
 pub(super) const BELOW: f64 = 44.0;
-/// How far a tick's text stands from the area, left and below; its baseline is below its middle.
+/// Distances of tick labels from the plot area, left and below, and of a text's baseline from its middle, pixels.
 const TICK_LEFT: f64 = 9.0;
 const TICK_BELOW: f64 = 20.5;
 const TEXT_MIDDLE: f64 = 4.5;
-/// Places of the labels: below the area, and from the left of the picture.
+/// Distances of the axis labels, below the plot area and from the left edge of the plot, pixels.
 const LABEL_BELOW: f64 = BELOW - 6.0;
 const LABEL_LEFT: f64 = 14.0;
 
-/// An area in which pairs of values are drawn.
+/// Rectangle in which pairs of values are drawn, with the scale of each axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PlotArea {
     pub left: f64,
@@ -26,23 +26,23 @@ pub(super) struct PlotArea {
 }
 
 impl PlotArea {
-    /// Takes values to pixels, across.
+    /// Returns the function from values of x to pixels.
     pub(super) fn x(&self) -> impl Fn(f64) -> f64 + Copy {
         self.horizontal.onto(self.left, self.right)
     }
 
-    /// Takes values to pixels, downwards.
+    /// Returns the function from values of y to pixels.
     pub(super) fn y(&self) -> impl Fn(f64) -> f64 + Copy {
         self.vertical.onto(self.bottom, self.top)
     }
 
-    /// Where a pair of values is drawn.
-    pub(super) fn place(&self, [x, y]: [f64; 2]) -> PixelPoint {
+    /// Converts a pair of values to pixels.
+    pub(super) fn to_pixels(&self, [x, y]: [f64; 2]) -> PixelPoint {
         [self.x()(x), self.y()(y)]
     }
 
-    /// The area, a grid with its ticks, and what stands along the axes; without a label for x its
-    /// ticks have no text. `zero` says of which axes 0 is a line that matters.
+    /// Draws background, grid, ticks and axis labels. Without a label for x its ticks have no text. `zero` selects
+    /// the axes whose grid line at 0 is emphasized.
     pub(super) fn draw(&self, svg: &mut Svg, x_label: Option<&str>, y_label: &str, zero: [bool; 2]) {
         let PlotArea { left, right, top, bottom, .. } = *self;
         let (x, y) = (self.x(), self.y());

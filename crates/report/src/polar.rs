@@ -1,4 +1,4 @@
-//! Radial deviation on circles, magnified about the nominal radius, as a ballbar shows it.
+//! Polar plot of the radial deviation on circles, magnified about the nominal radius, like a ballbar plot.
 
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_8, PI};
 
@@ -10,33 +10,33 @@ use super::svg::{Anchor, Svg};
 use super::text::{capital, number};
 use super::unit::DisplayUnit;
 
-/// Pixels at natural size.
+/// Size in pixels.
 const SIZE: f64 = 460.0;
 const CENTER: f64 = SIZE / 2.0;
-/// Radii of the least and the largest deviation.
+/// Radii of the smallest and the largest deviation, pixels.
 const INNER: f64 = 56.0;
 const OUTER: f64 = 200.0;
-/// Rings beside the smallest, about.
+/// Approximate number of rings outside the innermost one.
 const RINGS: f64 = 4.0;
-/// Where the rings are labeled: between two spokes, and steep so that the labels stand apart.
+/// Angle of the ring labels: between two spokes, and steep so that labels do not overlap, rad.
 const LABEL_ANGLE: f64 = 3.0 * FRAC_PI_8;
-/// A smaller range, µm, is drawn as large.
+/// Smallest range of the plot, µm.
 const LEAST_RANGE: f64 = 1.0;
 
-/// Styles of the two directions.
+/// Labels and CSS classes of the two directions.
 pub(super) const DIRECTIONS: [(&str, &str); 2] = [("counterclockwise", "ccw"), ("clockwise", "cw")];
 
-/// Circles of one plane and radius, in both directions.
+/// Plot of circles of one plane and radius, in both directions.
 #[derive(Debug)]
 pub(super) struct PolarPlot<'a> {
     pub circles: Vec<&'a CircleTrace>,
-    /// Range of deviations to show, m.
+    /// Range of the deviation, m.
     pub range: Extent,
-    /// Style of the run.
+    /// CSS class of the run.
     pub class: String,
 }
 
-/// Range of the deviations of some circles and of the nominal radius, m.
+/// Returns the range of the deviations of circles, including 0, the nominal radius, m.
 pub(super) fn range<'a>(circles: impl IntoIterator<Item = &'a CircleTrace>) -> Extent {
     let deviations = circles.into_iter().flat_map(|c| c.deviation.iter().copied());
     Extent::of(deviations).unwrap_or(Extent { min: 0.0, max: 0.0 }).including(0.0)
@@ -47,12 +47,12 @@ impl PolarPlot<'_> {
         Scale::outward(self.range.in_unit(&DisplayUnit::MICROMETER), LEAST_RANGE, RINGS)
     }
 
-    /// What the figure must say: how far the rings are apart.
+    /// Returns the remark of the figure: the distance between rings.
     pub(super) fn note(&self) -> String {
-        format!("rings every {} µm, the heavy one is the nominal radius", number_of(self.scale().step()))
+        format!("rings every {} µm, the bold ring is the nominal radius", shortest(self.scale().step()))
     }
 
-    /// The picture; `title` says what it shows.
+    /// Draws the plot as SVG.
     pub(super) fn draw(&self, id: &str, title: &str) -> String {
         let scale = self.scale();
         let radius = scale.onto(INNER, OUTER);
@@ -88,7 +88,7 @@ impl PolarPlot<'_> {
                 svg.path(&format!("line {} {class}", self.class), &[line]);
             }
         }
-        // Over the lines, since they say how large these are.
+        // Ring labels are drawn above the lines.
         for (value, label) in scale.ticks() {
             let [x, y] = at(radius(value), LABEL_ANGLE);
             svg.text("tick halo", [x, y + 4.5], Anchor::Middle, &format!("{label}\u{202f}µm"));
@@ -101,23 +101,23 @@ impl PolarPlot<'_> {
         plane.map(|name| capital(&name))
     }
 
-    /// In words: the range of deviations of each direction.
+    /// Returns the text alternative: the range of deviations of each direction.
     fn description(&self) -> String {
         let ranges = self.circles.iter().filter_map(|c| {
             let Extent { min, max } = Extent::of(c.deviation.iter().copied())?;
             let direction = DIRECTIONS[usize::from(!c.counterclockwise)].0;
             Some(format!(
                 "{direction} from {} to {}",
-                DisplayUnit::MICROMETER.show(min),
-                DisplayUnit::MICROMETER.show(max)
+                DisplayUnit::MICROMETER.format(min),
+                DisplayUnit::MICROMETER.format(max)
             ))
         });
         format!("Radial deviation, positive outside: {}.", ranges.collect::<Vec<_>>().join("; "))
     }
 }
 
-/// A round number with the decimals it needs.
-fn number_of(value: f64) -> String {
+/// Formats a round number with as few decimals as possible.
+fn shortest(value: f64) -> String {
     let decimals = (0..6).find(|d| (value * 10f64.powi(*d)).fract().abs() < 1e-9).unwrap_or(6);
     number(value, decimals as usize)
 }

@@ -1,6 +1,6 @@
 //! Contents of a report that compares runs.
 
-use virtual_axes_core::assess::Recording;
+use virtual_axes_core::assess::SignalRecording;
 
 use super::table::Table;
 
@@ -25,5 +25,5 @@ pub struct ReportRun<'a> {
     /// Tables of figures. Tables with equal columns and equal first cells are compared row by row.
     pub tables: Vec<Table>,
     /// Signals to plot.
-    pub recording: &'a Recording,
+    pub recording: &'a SignalRecording,
 }

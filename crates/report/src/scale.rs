@@ -1,18 +1,18 @@
-//! Extents of signals and round ticks.
+//! Ranges of signals, and linear scales with round ticks.
 
 use super::text;
 use super::unit::DisplayUnit;
 
-/// Beyond this a value is no measurement of a machine (SI): it is left out like NaN, so that no
-/// difference of two values overflows.
+/// Largest magnitude of a value that is drawn, SI units. Larger values are omitted like NaN, so that differences
+/// cannot overflow.
 const LARGEST: f64 = 1e12;
 
-/// Whether a value can be drawn.
+/// Returns true if a value can be drawn.
 pub(super) fn is_drawable(value: f64) -> bool {
     value.abs() <= LARGEST
 }
 
-/// The smallest and the largest of some values.
+/// Range from the smallest to the largest value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Extent {
     pub min: f64,
@@ -20,19 +20,19 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Of the drawable ones among `values`; none if there is none.
+    /// Returns the range of the drawable values; `None` if there are none.
     pub(super) fn of(values: impl IntoIterator<Item = f64>) -> Option<Extent> {
         values.into_iter().filter(|v| is_drawable(*v)).fold(None, |extent, value| {
             Some(extent.map_or(Extent { min: value, max: value }, |e: Extent| e.including(value)))
         })
     }
 
-    /// Widened to hold `value` as well.
+    /// Returns the range extended to include `value`.
     pub(super) fn including(self, value: f64) -> Extent {
         Extent { min: self.min.min(value), max: self.max.max(value) }
     }
 
-    /// Both.
+    /// Returns the union of two ranges.
     pub(super) fn join(a: Option<Extent>, b: Option<Extent>) -> Option<Extent> {
         match (a, b) {
             (Some(a), Some(b)) => Some(a.including(b.min).including(b.max)),
@@ -40,22 +40,22 @@ impl Extent {
         }
     }
 
-    /// max − min.
+    /// Returns max − min.
     pub(super) fn span(&self) -> f64 {
         self.max - self.min
     }
 
-    /// Half way.
+    /// Returns the middle of the range.
     pub(super) fn middle(&self) -> f64 {
         self.min + self.span() / 2.0
     }
 
-    /// Largest magnitude.
+    /// Returns the largest magnitude.
     pub(super) fn peak(&self) -> f64 {
         self.min.abs().max(self.max.abs())
     }
 
-    /// Widened about its middle to at least `span`.
+    /// Returns the range widened around its middle to at least `span`.
     pub(super) fn at_least(self, span: f64) -> Extent {
         if self.span() >= span {
             return self;
@@ -64,19 +64,19 @@ impl Extent {
         Extent { min: middle - span / 2.0, max: middle + span / 2.0 }
     }
 
-    /// Widened at both ends by a part of its span.
-    pub(super) fn with_margin(self, part: f64) -> Extent {
-        let margin = part * self.span();
+    /// Returns the range widened at both ends by a fraction of its span.
+    pub(super) fn with_margin(self, fraction: f64) -> Extent {
+        let margin = fraction * self.span();
         Extent { min: self.min - margin, max: self.max + margin }
     }
 
-    /// In a unit instead of SI.
+    /// Converts the range from SI units to `unit`.
     pub(super) fn in_unit(self, unit: &DisplayUnit) -> Extent {
         Extent { min: self.min / unit.size, max: self.max / unit.size }
     }
 }
 
-/// 1, 2 or 5 times a power of ten.
+/// Number of the form 1, 2 or 5 times a power of ten.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RoundNumber {
     mantissa: f64,
@@ -84,10 +84,10 @@ pub(super) struct RoundNumber {
 }
 
 impl RoundNumber {
-    /// The smallest that is not below `value` (> 0).
+    /// Returns the smallest round number that is not below `value` (> 0).
     pub(super) fn up(value: f64) -> RoundNumber {
         let exponent = value.log10().floor() as i32;
-        // What log10 loses of a power of ten must not make the step ten times as large.
+        // A rounding error of log10 must not increase the step tenfold.
         let exact = value / 10f64.powi(exponent) * (1.0 - 1e-9);
         match [1.0, 2.0, 5.0].into_iter().find(|m| exact <= *m) {
             Some(mantissa) => RoundNumber { mantissa, exponent },
@@ -95,7 +95,7 @@ impl RoundNumber {
         }
     }
 
-    /// The largest that is not above `value` (> 0).
+    /// Returns the largest round number that is not above `value` (> 0).
     pub(super) fn down(value: f64) -> RoundNumber {
         let exponent = value.log10().floor() as i32;
         let exact = value / 10f64.powi(exponent) * (1.0 + 1e-9);
@@ -103,12 +103,12 @@ impl RoundNumber {
         RoundNumber { mantissa, exponent }
     }
 
-    /// The number.
+    /// Returns the value.
     pub(super) fn value(&self) -> f64 {
         self.times(1.0)
     }
 
-    /// `count` of it; exactly rounded, also where the power of ten is no binary number.
+    /// Returns `count` times the number, correctly rounded even for negative powers of ten.
     fn times(&self, count: f64) -> f64 {
         match self.exponent {
             0.. => count * self.mantissa * 10f64.powi(self.exponent),
@@ -116,13 +116,13 @@ impl RoundNumber {
         }
     }
 
-    /// Decimals that its multiples need.
+    /// Returns the number of decimals of its multiples.
     pub(super) fn decimals(&self) -> usize {
         (-self.exponent).max(0) as usize
     }
 }
 
-/// A range with round ticks.
+/// Linear scale with round ticks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
     pub extent: Extent,
@@ -130,29 +130,29 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Exactly `extent`, with about `count` ticks inside.
+    /// Creates a scale of exactly `extent`, with about `count` tick intervals.
     pub(super) fn within(extent: Extent, least_range: f64, count: f64) -> Scale {
-        // A range below the resolution of its numbers would have the same tick many times.
+        // A range below the resolution of f64 would have repeated ticks.
         let extent = extent.at_least(least_range.max(extent.peak() * 1e-9));
         Scale { extent, step: RoundNumber::up(extent.span() / count) }
     }
 
-    /// `extent` widened to end on ticks.
+    /// Creates a scale of `extent` widened to end on ticks.
     pub(super) fn outward(extent: Extent, least_range: f64, count: f64) -> Scale {
         let Scale { extent, step } = Scale::within(extent, least_range, count);
-        // A signal that overshoots a tick by rounding only does not need another one.
+        // A value beyond a tick by rounding only does not add another tick.
         let slack = 1e-6;
         let min = step.times((extent.min / step.value() + slack).floor());
         let max = step.times((extent.max / step.value() - slack).ceil());
         Scale { extent: Extent { min, max }, step }
     }
 
-    /// Distance of two ticks.
+    /// Returns the distance of two ticks.
     pub(super) fn step(&self) -> f64 {
         self.step.value()
     }
 
-    /// Values of the ticks and their labels.
+    /// Returns the values of the ticks and their labels.
     pub(super) fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
         let step = self.step;
         let first = (self.extent.min / step.value() - 1e-6).ceil();
@@ -163,7 +163,7 @@ impl Scale {
         })
     }
 
-    /// Takes this range to `from`…`to`, in pixels.
+    /// Returns the function that maps the range to `from` … `to`, pixels.
     pub(super) fn onto(&self, from: f64, to: f64) -> impl Fn(f64) -> f64 + Copy {
         let Extent { min, .. } = self.extent;
         let per_unit = (to - from) / self.extent.span();
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_has_a_range() {
+    fn a_constant_signal_has_a_nonzero_range() {
         let scale = Scale::outward(Extent { min: 5.0, max: 5.0 }, 0.1, 5.0);
         assert!(scale.extent.span() >= 0.1 && scale.ticks().count() >= 2);
         let scale = Scale::outward(Extent { min: LARGEST, max: LARGEST }, 0.1, 5.0);
@@ -210,7 +210,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn ticks_are_few_different_and_span_the_values(a in -1e12..1e12f64, exponent in -15..12, count in 2.0..12.0f64) {
+        fn ticks_are_few_distinct_and_span_the_values(a in -1e12..1e12f64, exponent in -15..12, count in 2.0..12.0f64) {
             let extent = Extent::of([a, a + 10f64.powi(exponent)]).expect("drawable");
             let scale = Scale::outward(extent, 1e-6, count);
             let ticks: Vec<_> = scale.ticks().collect();

@@ -1,63 +1,63 @@
-//! Points in a plane: what a search found, in two respects.
+//! Scatter plots of the results of a search, for example a Pareto front.
 
-use super::decimate::{dots, staircase};
+use super::decimate::{separate_points, step_corners};
 use super::html::{Caption, Html};
 use super::plot_area::{BELOW, PlotArea};
 use super::scale::{Extent, Scale, is_drawable};
 use super::svg::Svg;
 use super::text::rounded;
 
-/// Pixels at natural size; the page scales the picture to its width.
+/// Size in pixels; the page scales the plot to its width.
 const WIDTH: f64 = 920.0;
 const HEIGHT: f64 = 420.0;
 const LEFT: f64 = 78.0;
 const RIGHT: f64 = WIDTH - 16.0;
 const TOP: f64 = 8.0;
 const BOTTOM: f64 = HEIGHT - BELOW;
-/// Steps between ticks, about.
+/// Approximate number of tick intervals, horizontal and vertical.
 const STEPS: [f64; 2] = [9.0, 7.0];
-/// Room about the points, part of their range.
+/// Margin around the points, as a fraction of their range.
 const MARGIN: f64 = 0.05;
-/// A range smaller than this is drawn as large.
+/// Smallest range of an axis.
 const LEAST_RANGE: f64 = 1e-3;
-/// Radii of points and of marks.
+/// Radii of small points and of the markers of runs, pixels.
 const DOT: f64 = 2.2;
 const MARK: f64 = 6.0;
 
-/// A picture of points; its axes are linear.
+/// Scatter plot with linear axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scatter {
-    /// What it shows.
+    /// Title above the plot.
     pub title: String,
-    /// What must be said about it; can be empty.
+    /// Remark behind the title; can be empty.
     pub note: String,
-    /// Quantity with its unit, across.
+    /// Label of the horizontal axis with its unit.
     pub x: String,
-    /// Quantity with its unit, upwards.
+    /// Label of the vertical axis with its unit.
     pub y: String,
-    /// Drawn in this order.
+    /// Groups of points in drawing order.
     pub groups: Vec<PointGroup>,
 }
 
-/// Points that are drawn alike.
+/// Points with one style.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointGroup {
-    /// As in the legend.
+    /// Label in the legend.
     pub label: String,
-    /// How they are drawn.
+    /// Drawing style.
     pub style: PointStyle,
-    /// x and y, in the units of the axes; what is not finite is left out.
+    /// Values of x and y, in the units of the axes. Values that are not finite are omitted.
     pub points: Vec<[f64; 2]>,
 }
 
-/// How points are drawn.
+/// Drawing style of points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PointStyle {
-    /// Small, of no run in particular.
+    /// Small points of no particular run.
     Dots,
-    /// A staircase: each point holds until the next one.
+    /// Step plot: each value is held until the next x.
     Steps,
-    /// A large one in the color of a run, by its place in the report.
+    /// Large marker in the color of a run, by its index in the report.
     Run(usize),
 }
 
@@ -71,7 +71,7 @@ impl PointStyle {
     }
 }
 
-/// A section with the pictures, if there are any.
+/// Appends a section with the scatter plots, unless there are none.
 pub(super) fn section(html: &mut Html, scatters: &[Scatter]) {
     if scatters.is_empty() {
         return;
@@ -103,34 +103,34 @@ impl Scatter {
             Scale::within(extent, LEAST_RANGE, STEPS[axis])
         };
         let (horizontal, vertical) = (scale(0), scale(1));
-        let frame = PlotArea { left: LEFT, right: RIGHT, top: TOP, bottom: BOTTOM, horizontal, vertical };
+        let area = PlotArea { left: LEFT, right: RIGHT, top: TOP, bottom: BOTTOM, horizontal, vertical };
         let mut svg = Svg::new(WIDTH, HEIGHT);
-        frame.draw(&mut svg, Some(&self.x), &self.y, [false, false]);
+        area.draw(&mut svg, Some(&self.x), &self.y, [false, false]);
         for group in &self.groups {
             let class = group.style.class();
-            let places: Vec<[f64; 2]> = group.drawable().map(|point| frame.place(point)).collect();
+            let points: Vec<[f64; 2]> = group.drawable().map(|point| area.to_pixels(point)).collect();
             match group.style {
                 PointStyle::Dots => {
-                    dots(&places).into_iter().for_each(|i| svg.circle(&class, places[i], DOT));
+                    separate_points(&points).into_iter().for_each(|i| svg.circle(&class, points[i], DOT));
                 }
-                PointStyle::Run(_) => places.iter().for_each(|place| svg.circle(&class, *place, MARK)),
+                PointStyle::Run(_) => points.iter().for_each(|point| svg.circle(&class, *point, MARK)),
                 PointStyle::Steps => {
-                    let places: Vec<_> = places.into_iter().map(Some).collect();
-                    svg.path(&class, &[staircase(&places).into_iter().flatten().collect()]);
+                    let points: Vec<_> = points.into_iter().map(Some).collect();
+                    svg.path(&class, &[step_corners(&points).into_iter().flatten().collect()]);
                 }
             }
         }
         svg.finish(id, title, &self.description())
     }
 
-    /// In words: how many points there are, and where those of the runs lie.
+    /// Returns the text alternative: the number of points, and the coordinates of the runs.
     fn description(&self) -> String {
-        let told = self.groups.iter().map(|group| match (group.style, group.drawable().next()) {
+        let groups = self.groups.iter().map(|group| match (group.style, group.drawable().next()) {
             (PointStyle::Run(_), Some([x, y])) => {
                 format!("{} at {}, {}", group.label, rounded(x), rounded(y))
             }
             _ => format!("{}: {} points", group.label, group.drawable().count()),
         });
-        format!("{} over {}. {}.", self.y, self.x, told.collect::<Vec<_>>().join("; "))
+        format!("{} over {}. {}.", self.y, self.x, groups.collect::<Vec<_>>().join("; "))
     }
 }

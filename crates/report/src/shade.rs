@@ -7,21 +7,21 @@ use super::scale::Extent;
 use super::svg::Svg;
 use super::text::number;
 
-/// Intervals nearer to each other than this, pixels, are drawn as one.
-const NEAR: f64 = 0.5;
-/// An interval is at least so broad, pixels.
+/// Gap below which intervals are merged, pixels.
+const MERGE_GAP: f64 = 0.5;
+/// Smallest width of an interval, pixels.
 const LEAST_WIDTH: f64 = 1.0;
-/// Where the edge of an interval of x runs, pixels below the top of the area: its dash tells the
-/// classes apart where colors do not.
+/// Distance of the edge line of an interval of x from the top of the plot area, pixels. Its dash pattern
+/// distinguishes the classes without color.
 const EDGE: f64 = 2.0;
 
-/// The ends of an interval in the unit of its axis, in order; they can be infinite.
+/// Returns the ordered ends of an interval in the unit of its axis, which can be infinite; `None` for NaN.
 fn ends(band: &Band, axis: &ChartAxis) -> Option<[f64; 2]> {
     let [from, to] = [band.from, band.to].map(|v| v / axis.unit.size);
     (!from.is_nan() && !to.is_nan()).then(|| [from.min(to), from.max(to)])
 }
 
-/// Kinds of bands in the order in which they first stand.
+/// Returns the distinct classes and labels of bands, in order of first occurrence.
 fn kinds(bands: &[Band]) -> Vec<(BandClass, &str)> {
     let mut kinds: Vec<(BandClass, &str)> = Vec::new();
     for band in bands {
@@ -32,7 +32,7 @@ fn kinds(bands: &[Band]) -> Vec<(BandClass, &str)> {
     kinds
 }
 
-/// Shades intervals of x, or of y if `upward`.
+/// Shades intervals of x, or of y if `upward` is true.
 pub(super) fn shade(svg: &mut Svg, frame: &PlotArea, bands: &[Band], axis: &ChartAxis, upward: bool) {
     let scale = if upward { frame.vertical } else { frame.horizontal };
     let Extent { min, max } = scale.extent;
@@ -52,7 +52,7 @@ pub(super) fn shade(svg: &mut Svg, frame: &PlotArea, bands: &[Band], axis: &Char
         let mut joined: Vec<[f64; 2]> = Vec::new();
         for [from, to] in parts {
             match joined.last_mut() {
-                Some([_, end]) if from <= *end + NEAR => *end = end.max(to),
+                Some([_, end]) if from <= *end + MERGE_GAP => *end = end.max(to),
                 _ => joined.push([from, to]),
             }
         }
@@ -76,15 +76,15 @@ pub(super) fn shade(svg: &mut Svg, frame: &PlotArea, bands: &[Band], axis: &Char
     }
 }
 
-/// Bands in words: an interval by its ends, of others how many there are.
-pub(super) fn told(bands: &[Band], axis: &ChartAxis) -> Vec<String> {
+/// Returns the text alternative of bands: the ends of a single interval, or the number of intervals.
+pub(super) fn band_descriptions(bands: &[Band], axis: &ChartAxis) -> Vec<String> {
     kinds(bands)
         .into_iter()
         .map(|kind| {
-            let mut alike = bands.iter().filter(|band| (band.class, band.label.as_str()) == kind);
-            match (alike.next().and_then(|band| ends(band, axis)), alike.count()) {
+            let mut same = bands.iter().filter(|band| (band.class, band.label.as_str()) == kind);
+            match (same.next().and_then(|band| ends(band, axis)), same.count()) {
                 (Some([from, to]), 0) => {
-                    let [from, to] = [from, to].map(|end| end_in_words(end, axis));
+                    let [from, to] = [from, to].map(|end| describe_end(end, axis));
                     format!("{} from {from} to {to}", kind.1)
                 }
                 (_, more) => format!("{} {} times", kind.1, number(more as f64 + 1.0, 0)),
@@ -93,10 +93,10 @@ pub(super) fn told(bands: &[Band], axis: &ChartAxis) -> Vec<String> {
         .collect()
 }
 
-fn end_in_words(end: f64, axis: &ChartAxis) -> String {
+fn describe_end(end: f64, axis: &ChartAxis) -> String {
     let value = end * axis.unit.size;
     match axis.shown(value) {
-        Some(_) => axis.unit.show(value),
-        None => "beyond the picture".to_owned(),
+        Some(_) => axis.unit.format(value),
+        None => "beyond the plot".to_owned(),
     }
 }

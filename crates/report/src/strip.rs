@@ -1,4 +1,4 @@
-//! Figures of signals over time: the runs on each other, in one picture.
+//! Figures of signals over time, with all runs in one plot.
 
 use super::html::{Caption, run_class};
 use super::page::Page;
@@ -6,48 +6,48 @@ use super::scale::Extent;
 use super::time_plot::{TimePlot, TimeSeries};
 use super::unit::DisplayUnit;
 
-/// A run whose error is smaller than the largest by this factor is a straight line beside it.
+/// Ratio of errors above which the smaller one is invisible in the same plot and has a plot of its own.
 pub(super) const COMPARABLE: f64 = 8.0;
 
-/// What a strip shows.
+/// Title, labels and unit of a figure over time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Strip {
     pub title: &'static str,
-    /// What must be said about it; can be empty.
+    /// Remark behind the title; can be empty.
     pub note: &'static str,
-    /// Along the vertical axis.
+    /// Quantity of the vertical axis, without its unit.
     pub quantity: &'static str,
     pub unit: DisplayUnit,
 }
 
-/// Time that the runs take, s, the same for all strips of a page.
+/// Returns the range of time of all runs, s, which all figures of a page share.
 pub(super) fn time(page: &Page) -> Option<Extent> {
     Extent::of(page.runs.iter().flat_map(|run| run.recording.time.iter().copied()))
 }
 
-/// A run's signal, in the run's style.
+/// Returns a signal of a run as a series in the style of the run.
 pub(super) fn run_series<'a>(page: &Page, run: usize, time: &'a [f64], values: &'a [f64]) -> TimeSeries<'a> {
     let label = page.runs.get(run).map_or("", |run| run.title).to_owned();
     TimeSeries { label, class: format!("line {}", run_class(run)), time, values }
 }
 
-/// Styles and names of lines.
+/// Returns the CSS classes and labels of series.
 pub(super) fn legend(series: &[TimeSeries]) -> Vec<(String, String)> {
     series.iter().map(|s| (s.class.clone(), s.label.clone())).collect()
 }
 
-/// Largest magnitude of what can be drawn.
+/// Returns the largest magnitude of the drawable values.
 pub(super) fn peak(values: &[f64]) -> f64 {
     Extent::of(values.iter().copied()).map_or(0.0, |e| e.peak())
 }
 
-/// Places of the values that are much smaller than the largest.
+/// Returns the indices of the peaks that are much smaller than the largest.
 pub(super) fn smaller(peaks: &[f64]) -> Vec<usize> {
     let largest = peaks.iter().copied().fold(0.0, f64::max);
     (0..peaks.len()).filter(|&i| peaks[i] * COMPARABLE < largest).collect()
 }
 
-/// A signal of all runs; `of` says what it is of, and can be empty.
+/// Appends a figure of one signal of all runs. `of` is the object of the title, for example "X axis"; can be empty.
 pub(super) fn strip(page: &mut Page, of: &str, time: Extent, strip: Strip, series: Vec<TimeSeries>) {
     let Strip { title, note, quantity, unit } = strip;
     let legend = if page.is_comparison() { legend(&series) } else { Vec::new() };
@@ -57,13 +57,13 @@ pub(super) fn strip(page: &mut Page, of: &str, time: Extent, strip: Strip, serie
     page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
 }
 
-/// An error of all runs; those that are much smaller than the largest once more on their own scale.
+/// Appends a figure of one error of all runs, and a second one with only the runs of much smaller error.
 pub(super) fn error_strip(page: &mut Page, of: &str, time: Extent, whole: Strip, series: Vec<TimeSeries>) {
     let small = smaller(&series.iter().map(|s| peak(s.values)).collect::<Vec<_>>());
     let small: Vec<TimeSeries> = small.into_iter().map(|i| series[i].clone()).collect();
     strip(page, of, time, whole, series);
     if !small.is_empty() {
-        let detail = Strip { note: "enlarged: without the runs of larger error", ..whole };
+        let detail = Strip { note: "enlarged, without the runs of larger error", ..whole };
         strip(page, of, time, detail, small);
     }
 }

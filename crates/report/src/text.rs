@@ -1,8 +1,8 @@
-//! Text as it stands in the page: escaped, and numbers as a reader expects them.
+//! Text of a page: HTML escaping, and formatting of numbers and lists.
 
 use std::fmt::{self, Display, Write as _};
 
-/// Text from outside, so written that it is nothing but text in HTML and in quoted attributes.
+/// Untrusted text that is escaped for HTML content and quoted attributes when displayed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Text<'a>(pub &'a str);
 
@@ -16,7 +16,7 @@ impl Display for Text<'_> {
                 '"' => f.write_str("&quot;")?,
                 '\'' => f.write_str("&#39;")?,
                 '\n' | '\t' => f.write_char(' ')?,
-                // Not allowed in HTML.
+                // Control characters are not allowed in HTML.
                 c if c.is_control() => f.write_char(char::REPLACEMENT_CHARACTER)?,
                 c => f.write_char(c)?,
             }
@@ -25,22 +25,22 @@ impl Display for Text<'_> {
     }
 }
 
-/// Between groups of three digits.
+/// Separator between groups of three digits.
 const THIN_SPACE: char = '\u{202f}';
-/// The minus sign, as wide as the plus sign.
+/// Minus sign (U+2212), as wide as the plus sign.
 const MINUS: char = '−';
 
-/// A finite number with so many decimals, a true minus sign and thin spaces between thousands.
+/// Formats a finite number with a minus sign and thin spaces between groups of three digits.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let plain = format!("{:.decimals$}", value.abs());
     let (whole, fraction) = plain.split_once('.').map_or((plain.as_str(), None), |(w, f)| (w, Some(f)));
     let mut text = String::with_capacity(plain.len() + 4);
-    // What rounds to zero has no sign.
+    // Zero after rounding has no sign.
     if value < 0.0 && plain.bytes().any(|b| (b'1'..=b'9').contains(&b)) {
         text.push(MINUS);
     }
-    for (place, digit) in whole.chars().enumerate() {
-        if place > 0 && (whole.len() - place).is_multiple_of(3) {
+    for (index, digit) in whole.chars().enumerate() {
+        if index > 0 && (whole.len() - index).is_multiple_of(3) {
             text.push(THIN_SPACE);
         }
         text.push(digit);
@@ -52,7 +52,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     text
 }
 
-/// A number with about three significant digits.
+/// Formats a number with about three significant digits.
 pub(super) fn rounded(value: f64) -> String {
     let decimals = match value.abs() {
         v if v >= 100.0 => 0,
@@ -62,13 +62,13 @@ pub(super) fn rounded(value: f64) -> String {
     number(value, decimals)
 }
 
-/// Whether a table's cell is a number, which then stands to the right.
+/// Returns true if a table cell is a number, which is aligned to the right.
 pub(super) fn is_number(cell: &str) -> bool {
     let digits: String = cell.chars().filter(|c| !c.is_whitespace()).collect();
     digits.replacen(MINUS, "-", 1).parse::<f64>().is_ok()
 }
 
-/// A table's cell with a true minus sign before a number.
+/// Formats a table cell, with a minus sign (U+2212) in front of a negative number.
 pub(super) fn cell(text: &str) -> String {
     match text.trim().strip_prefix('-') {
         Some(rest) if is_number(rest) => format!("{MINUS}{rest}"),
@@ -76,7 +76,7 @@ pub(super) fn cell(text: &str) -> String {
     }
 }
 
-/// "a", "a and b", "a, b and c".
+/// Joins items as "a", "a and b", "a, b and c".
 pub(super) fn listed(items: &[String]) -> String {
     match items {
         [] => String::new(),
@@ -85,7 +85,7 @@ pub(super) fn listed(items: &[String]) -> String {
     }
 }
 
-/// With a capital first letter.
+/// Capitalizes the first letter.
 pub(super) fn capital(text: &str) -> String {
     let mut rest = text.chars();
     rest.next().map_or(String::new(), |first| first.to_uppercase().chain(rest).collect())
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_from_outside_is_inert() {
+    fn untrusted_text_is_escaped() {
         let text = Text("</title><script>alert('1')</script> \"&\"\u{0}").to_string();
         assert_eq!(
             text,
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_read_as_sentences() {
+    fn lists_are_joined_with_commas_and_and() {
         let names = ["Z".to_owned(), "A".to_owned(), "C".to_owned()];
         assert_eq!(listed(&names), "Z, A and C");
         assert_eq!(listed(&names[..1]), "Z");

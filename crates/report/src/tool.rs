@@ -1,4 +1,4 @@
-//! Sections of the tool: its path, contour and orientation errors, circles.
+//! Section of the tool: path, circles, contour error and orientation error.
 
 use virtual_axes_core::assess::{CircleTrace, ToolTrace};
 
@@ -13,14 +13,14 @@ use super::text::rounded;
 use super::time_plot::TimeSeries;
 use super::unit::DisplayUnit;
 
-/// Different circles that are drawn; the figures name them all.
+/// Maximum number of circles that are plotted; the table of figures contains all circles.
 const MOST_CIRCLES: usize = 6;
-/// Radii that differ by less belong to one circle, m.
+/// Difference of radii below which circles are equal, m.
 const SAME_RADIUS: f64 = 1e-6;
-/// A smaller orientation error is none, rad: 0.01 mdeg.
-const NO_ORIENTATION_ERROR: f64 = 1.7e-7;
+/// Orientation error below which it is not plotted, rad: 0.01 mdeg.
+const NEGLIGIBLE_ORIENTATION_ERROR: f64 = 1.7e-7;
 
-/// Path, circles, errors over time.
+/// Writes paths, circles, and errors over time.
 pub(super) fn sections(page: &mut Page) {
     let tools: Vec<(usize, &ToolTrace)> =
         page.runs.iter().enumerate().filter_map(|(i, run)| Some((i, run.recording.tool.as_ref()?))).collect();
@@ -30,17 +30,17 @@ pub(super) fn sections(page: &mut Page) {
         return;
     }
     page.html.open_section("tool", "Tool in the workpiece frame");
-    let has_path = pictures(page, &tools, drawn);
+    let has_path = paths_and_circles(page, &tools, drawn);
     if !tools.is_empty() && !has_path {
         page.html.paragraph("The path of the tool tip is a point.");
     }
     if !left_out.is_empty() {
-        page.html.paragraph(&format!("More circles, not drawn: {}.", left_out.len()));
+        page.html.paragraph(&format!("{} more circles are not plotted.", left_out.len()));
     }
     if let Some(time) = time(page) {
         let note = "distance of the tool tip from the path";
         errors(page, time, ["Contour error", note], DisplayUnit::MICROMETER, &tools, |t| &t.contour_error);
-        if tools.iter().any(|(_, t)| peak(&t.orientation_error) > NO_ORIENTATION_ERROR) {
+        if tools.iter().any(|(_, t)| peak(&t.orientation_error) > NEGLIGIBLE_ORIENTATION_ERROR) {
             let note = "angle between the tool axis and that of the path";
             errors(page, time, ["Orientation error", note], DisplayUnit::MILLIDEGREE, &tools, |t| {
                 &t.orientation_error
@@ -50,8 +50,9 @@ pub(super) fn sections(page: &mut Page) {
     page.html.close_section();
 }
 
-/// Paths and circles: those of one run side by side, else a row of runs for each; whether there is a path.
-fn pictures(page: &mut Page, tools: &[(usize, &ToolTrace)], circles: &[Circles]) -> bool {
+/// Writes paths and circles, side by side for a single run, otherwise a row of runs for each. Returns true if a
+/// path was plotted.
+fn paths_and_circles(page: &mut Page, tools: &[(usize, &ToolTrace)], circles: &[Circles]) -> bool {
     if !page.is_comparison() {
         page.html.open_row(1 + circles.len());
         let has_path = paths(page, tools);
@@ -70,7 +71,7 @@ fn pictures(page: &mut Page, tools: &[(usize, &ToolTrace)], circles: &[Circles])
     has_path
 }
 
-/// An error of all runs over time.
+/// Writes a figure of one error of all runs over time.
 fn errors(
     page: &mut Page,
     time: Extent,
@@ -90,11 +91,11 @@ fn errors(
     }
 }
 
-/// The path of each run at one scale; whether there is any.
+/// Writes the path of each run at one scale. Returns true if a path was plotted.
 fn paths(page: &mut Page, tools: &[(usize, &ToolTrace)]) -> bool {
     let traces: Vec<&ToolTrace> = tools.iter().map(|(_, tool)| *tool).collect();
-    let Some(view) = PathView::of(&traces) else { return false };
-    // An error that one magnification for all would hide has its own.
+    let Some(view) = PathView::from_traces(&traces) else { return false };
+    // A much smaller error has its own magnification.
     let peaks: Vec<f64> = traces.iter().map(|tool| view.error(tool)).collect();
     let largest = peaks.iter().copied().fold(0.0, f64::max);
     let magnification =
@@ -120,34 +121,34 @@ fn paths(page: &mut Page, tools: &[(usize, &ToolTrace)]) -> bool {
     !drawn.is_empty()
 }
 
-/// Circles of one plane and radius, and the runs that have them.
+/// Circles of one plane and radius, with the runs that contain them.
 struct Circles<'a> {
     plane: &'a [String; 2],
     radius: f64,
     runs: Vec<(usize, Vec<&'a CircleTrace>)>,
 }
 
-/// Every different circle of the runs, in their order.
+/// Collects the distinct circles of all runs, in order of first occurrence.
 fn circles<'a>(page: &Page<'a>) -> Vec<Circles<'a>> {
     let mut all: Vec<Circles> = Vec::new();
     for (i, run) in page.runs.iter().enumerate() {
         for circle in &run.recording.circles {
-            let is_it =
+            let is_same =
                 |c: &Circles| *c.plane == circle.plane && (c.radius - circle.radius).abs() < SAME_RADIUS;
-            let place = all.iter().position(is_it).unwrap_or_else(|| {
+            let index = all.iter().position(is_same).unwrap_or_else(|| {
                 all.push(Circles { plane: &circle.plane, radius: circle.radius, runs: Vec::new() });
                 all.len() - 1
             });
-            match all[place].runs.last_mut() {
+            match all[index].runs.last_mut() {
                 Some((run, list)) if *run == i => list.push(circle),
-                _ => all[place].runs.push((i, vec![circle])),
+                _ => all[index].runs.push((i, vec![circle])),
             }
         }
     }
     all
 }
 
-/// A circle in each run, at one scale where that shows all of them.
+/// Writes a polar plot for each run, at one scale unless the deviations differ too much.
 fn polar_plots(page: &mut Page, circle: &Circles) {
     let ranges: Vec<Extent> = circle.runs.iter().map(|(_, list)| range(list.iter().copied())).collect();
     let small = smaller(&ranges.iter().map(|r| r.span()).collect::<Vec<_>>());

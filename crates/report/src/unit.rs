@@ -1,21 +1,21 @@
-//! Units in which pictures are labeled.
+//! Display units of plots.
 
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, RPM};
 
 use super::text;
 
-/// Sizes and least ranges lie between this and its inverse, so that no scale overflows.
+/// Lower limit of sizes and smallest ranges; the upper limit is its inverse. Prevents overflow of scales.
 const SMALLEST: f64 = 1e-18;
 
-/// A unit in which an axis of a picture is labeled; the values that are drawn are in SI.
+/// Unit of the labels of a plot axis. Plotted values are in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DisplayUnit {
-    /// As written.
+    /// Symbol.
     pub(super) symbol: &'static str,
-    /// SI units in one of it.
+    /// Size in SI units.
     pub(super) size: f64,
-    /// A range smaller than this, in the unit, is drawn as large: noise must not look like a signal.
+    /// Smallest range of a plot axis, in the unit, so that noise does not look like a signal.
     pub(super) least_range: f64,
 }
 
@@ -30,7 +30,7 @@ impl DisplayUnit {
     pub const MICROMETER: DisplayUnit = DisplayUnit::new("µm", MILLIMETER * 1e-3, 0.1);
     /// Degrees.
     pub const DEGREE: DisplayUnit = DisplayUnit::new("°", DEGREE, 1e-3);
-    /// Thousandths of a degree.
+    /// Millidegrees.
     pub const MILLIDEGREE: DisplayUnit = DisplayUnit::new("mdeg", DEGREE * 1e-3, 0.1);
     /// Meters per minute.
     pub const METER_PER_MINUTE: DisplayUnit = DisplayUnit::new("m/min", METER_PER_MINUTE, 0.01);
@@ -38,13 +38,12 @@ impl DisplayUnit {
     pub const RPM: DisplayUnit = DisplayUnit::new("rpm", RPM, 0.01);
     /// Amperes.
     pub const AMPERE: DisplayUnit = DisplayUnit::new("A", 1.0, 0.1);
-    /// Of a pure number.
+    /// Dimensionless.
     pub const NONE: DisplayUnit = DisplayUnit::new("", 1.0, 1e-3);
 
-    /// A unit that is `size` SI units large; a range below `least_range`, in the unit, is drawn as
-    /// large as that. With a size of 1 values are drawn as given.
+    /// Creates a unit of `size` SI units. Plot axes show a range of at least `least_range`, in the unit.
     ///
-    /// Both are positive; what is not, or beyond 1e-18…1e18, is taken for the nearest that is.
+    /// Both are limited to 1e-18 … 1e18.
     pub const fn new(symbol: &'static str, size: f64, least_range: f64) -> DisplayUnit {
         let largest = 1.0 / SMALLEST;
         DisplayUnit {
@@ -54,7 +53,7 @@ impl DisplayUnit {
         }
     }
 
-    /// Of positions.
+    /// Returns the unit of positions.
     pub fn position(kind: AxisKind) -> DisplayUnit {
         match kind {
             AxisKind::Linear => DisplayUnit::MILLIMETER,
@@ -62,7 +61,7 @@ impl DisplayUnit {
         }
     }
 
-    /// Of errors.
+    /// Returns the unit of errors.
     pub fn error(kind: AxisKind) -> DisplayUnit {
         match kind {
             AxisKind::Linear => DisplayUnit::MICROMETER,
@@ -70,7 +69,7 @@ impl DisplayUnit {
         }
     }
 
-    /// Of velocities.
+    /// Returns the unit of velocities.
     pub fn velocity(kind: AxisKind) -> DisplayUnit {
         match kind {
             AxisKind::Linear => DisplayUnit::METER_PER_MINUTE,
@@ -78,13 +77,13 @@ impl DisplayUnit {
         }
     }
 
-    /// A value in SI, rounded, with the unit.
-    pub(super) fn show(&self, value: f64) -> String {
+    /// Formats a value in SI units, rounded, with the unit.
+    pub(super) fn format(&self, value: f64) -> String {
         let gap = if self.symbol.is_empty() { "" } else { "\u{a0}" };
         format!("{}{gap}{}", text::rounded(value / self.size), self.symbol)
     }
 
-    /// A quantity with the unit behind it, as it stands along an axis.
+    /// Returns the label of a plot axis: the quantity with the unit in parentheses.
     pub(super) fn label(&self, quantity: &str) -> String {
         if self.symbol.is_empty() { quantity.to_owned() } else { format!("{quantity} ({})", self.symbol) }
     }

@@ -149,7 +149,7 @@ fn inverse_row(input: &Input, agreement: &Agreement) -> Option<Vec<String>> {
         input.signals.name.clone(),
         of(inverse.current.max),
         of(inverse.current.rms),
-        determination(inverse.determination),
+        determination(inverse.r_squared),
     ])
 }
 
@@ -289,7 +289,7 @@ fn inverse_chart(page: &IdentificationPage, input: &Input, agreement: &Agreement
         ),
     ];
     Some(Chart {
-        note: format!("R² {}", determination(inverse.determination)),
+        note: format!("R² {}", determination(inverse.r_squared)),
         bands: bands(signals, &agreement.segments),
         ..Chart::new(
             format!("{}: current by inverse dynamics", signals.name),

@@ -85,7 +85,7 @@ fn chart(page: &IdentificationPage, fit: &DelayFit, near: bool) -> Chart {
     Chart {
         note: format!(
             "feedforward {}; of each part that acts alike the middle is tried",
-            fit.delay.mode().name()
+            fit.delay.feedforward_mode().name()
         ),
         bands: vec![Band::interval("accepted", low, high)],
         lines: vec![Guide::new(seconds(fit.value), format!("{name} = {} ms", ms(fit.value)))],
@@ -94,7 +94,7 @@ fn chart(page: &IdentificationPage, fit: &DelayFit, near: bool) -> Chart {
 }
 
 fn table(page: &IdentificationPage, fits: &[DelayFit]) -> Table {
-    let before = &page.identification.before.delays;
+    let before = &page.identification.initial.delays;
     let row = |fit: &DelayFit| {
         let old = match fit.delay {
             DelayParameter::Alpha => before.alpha,
@@ -104,13 +104,13 @@ fn table(page: &IdentificationPage, fits: &[DelayFit]) -> Table {
         let least = fit.profile.iter().map(|(_, rms)| *rms).fold(f64::INFINITY, f64::min);
         vec![
             letter(fit.delay).to_owned(),
-            fit.delay.mode().name().to_owned(),
+            fit.delay.feedforward_mode().name().to_owned(),
             ms(fit.interval.0),
             ms(fit.interval.1),
             ms(fit.value),
             ms(old),
             digits(least / page.error_unit().size, 3),
-            if fit.left { "left as it was" } else { "middle of the best" }.to_owned(),
+            if fit.is_unchanged { "left as it was" } else { "middle of the best" }.to_owned(),
         ]
     };
     let heads = [

@@ -69,7 +69,7 @@ impl Weight<'_> {
         let Weight { name, equation, unit, value, .. } = self;
         let of = |value: f64| format!("{} {unit}", exact(value)).trim_end().to_owned();
         let Some(found) = self.found else {
-            if *equation == 7 && page.identification.feedforward.no_torque {
+            if *equation == 7 && page.identification.feedforward.is_torque_zero {
                 return "TFFW = 0: TFFWS is 0 throughout with torque feedforward on.".to_owned();
             }
             let refined = page.identification.refinement.as_ref().is_some_and(|refinement| {

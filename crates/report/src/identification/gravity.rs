@@ -38,8 +38,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
          and gravity. Gravity is taken from {from}. {}",
         sentence(page, gravity)
     ));
-    if !found.steady.rests.is_empty() {
-        section.charts.push(chart(page, gravity, &found.steady.rests));
+    if !found.steady.standstills.is_empty() {
+        section.charts.push(chart(page, gravity, &found.steady.standstills));
     }
     section.tables.push(table(page.kind(), gravity));
     section

@@ -18,7 +18,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     };
     section.paragraphs.push(text(page, refinement));
     let pairs: Vec<String> = refinement
-        .correlated()
+        .correlated_pairs()
         .into_iter()
         .map(|(a, b, rho)| format!("{a} with {b} ({})", number(rho, 3)))
         .collect();

@@ -1,7 +1,7 @@
 //! Pages of several runs: paths that lie apart, long names.
 
 use crate::report_common::{between, picture, points, report_run};
-use virtual_axes_core::assess::{Recording, ToolTrace};
+use virtual_axes_core::assess::{SignalRecording, ToolTrace};
 use virtual_axes_report::{Report, ReportRun};
 
 const STEPS: u32 = 720;
@@ -16,7 +16,7 @@ fn page(runs: Vec<ReportRun>) -> String {
 }
 
 /// Two turns of radius 20 mm that rise 10 mm from `start`, 20 µm outside of the path.
-fn helix(start: [f64; 3]) -> Recording {
+fn helix(start: [f64; 3]) -> SignalRecording {
     let at = |i: u32, radius: f64| {
         let part = f64::from(i) / f64::from(STEPS);
         let (sin, cos) = (std::f64::consts::TAU * TURNS * part).sin_cos();
@@ -29,7 +29,7 @@ fn helix(start: [f64; 3]) -> Recording {
         orientation_error: Vec::new(),
     };
     let time = (0..=STEPS).map(|i| f64::from(i) * 1e-3).collect();
-    Recording { time, tool: Some(tool), ..Recording::default() }
+    SignalRecording { time, tool: Some(tool), ..SignalRecording::default() }
 }
 
 /// Width and height of a run's path in its picture, pixels.

@@ -148,7 +148,7 @@ fn every_chart_says_what_and_in_which_unit() {
         assert_eq!(picture.matches("<text class=\"label\"").count(), labels);
         assert!(picture.contains("<title") && !between(picture, "<desc", "</desc>")[0].is_empty());
         let ids = between(picture, " id=\"", "\"");
-        assert_eq!(between(picture, "aria-labeledby=\"", "\""), [ids.join(" ")]);
+        assert_eq!(between(picture, "aria-labelledby=\"", "\""), [ids.join(" ")]);
     }
     for unit in ["(m/min)", "(A)", "(kg)", "(m/s²)", "(ms)", "(µm²)", "(µm)", "Time (s)"] {
         assert!(page.contains(&format!("{unit}</text>")), "{unit} is nowhere");

@@ -13,7 +13,7 @@ use virtual_axes_report::{
     Chart, ChartSeries, Document, IdentificationPage, Section, Table, ValidationRecording,
 };
 use virtual_axes_verification::fixtures::machines::{M_MIN, TSP, parameters};
-use virtual_axes_verification::fixtures::recordings::{Disturbance, place, record_campaign};
+use virtual_axes_verification::fixtures::recordings::{Disturbance, axis_index, record_campaign};
 
 /// Headings of the sections, in their order.
 const SECTIONS: [&str; 9] = [
@@ -46,7 +46,7 @@ impl Bench {
         change: impl Fn(&mut RawRecording),
     ) -> Self {
         let machine = parameters.machine_config().expect("valid");
-        let config = &machine.axes()[place(&machine, axis)];
+        let config = &machine.axes()[axis_index(&machine, axis)];
         let disturbance = Disturbance::usual(config.kind(), 11);
         let (mut recordings, mut findings) = (Vec::new(), Vec::new());
         for (mode, mut raw) in record_campaign(&parameters, axis, parts, course, &disturbance) {
@@ -60,7 +60,7 @@ impl Bench {
     }
 
     fn config(&self) -> &AxisConfig {
-        &self.machine.axes()[place(&self.machine, &self.axis)]
+        &self.machine.axes()[axis_index(&self.machine, &self.axis)]
     }
 
     fn inputs(&self) -> Vec<IdentificationInput<'_>> {

@@ -5,11 +5,11 @@ use std::sync::LazyLock;
 use crate::report_common::{
     NO_FEEDFORWARD, PERIOD, ballbar, between, empty_axis, five_axes, picture, pictures, points, report_run,
 };
-use virtual_axes_core::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
+use virtual_axes_core::assess::{AxisTrace, CircleTrace, SignalRecording, ToolTrace};
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_report::{Report, ReportRun, Table, TableColumn};
 
-static BALLBAR: LazyLock<[Recording; 2]> =
+static BALLBAR: LazyLock<[SignalRecording; 2]> =
     LazyLock::new(|| [ballbar(&[], PERIOD, false), ballbar(&NO_FEEDFORWARD, PERIOD, false)]);
 
 fn page(title: &str, runs: Vec<ReportRun>) -> String {
@@ -28,7 +28,7 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
 }
 
 /// A run of one axis whose every signal is `values`.
-fn run_of(values: &[f64]) -> Recording {
+fn run_of(values: &[f64]) -> SignalRecording {
     let x = AxisTrace {
         psec: values.to_vec(),
         position: values.to_vec(),
@@ -54,7 +54,7 @@ fn run_of(values: &[f64]) -> Recording {
         deviation: values.to_vec(),
     };
     let time = (0..values.len()).map(|i| i as f64 * 0.006).collect();
-    Recording { time, axes: vec![x], tool: Some(tool), circles: vec![circle] }
+    SignalRecording { time, axes: vec![x], tool: Some(tool), circles: vec![circle] }
 }
 
 /// Noise in −1…1 (an xorshift generator).
@@ -157,7 +157,10 @@ fn no_signal_breaks_the_page() {
             assert!(most.unwrap_or(0) < 40, "{most:?} texts in a picture of {values:?}");
         }
     }
-    assert!(page("none", vec![report_run("empty", &Recording::default())]).contains("Nothing was recorded."));
+    assert!(
+        page("none", vec![report_run("empty", &SignalRecording::default())])
+            .contains("Nothing was recorded.")
+    );
     assert!(page("none", Vec::new()).contains("</html>"));
 }
 
@@ -214,7 +217,7 @@ fn a_long_run_makes_no_large_page() {
     const LONG: usize = 60_000;
     const MOST_BYTES: usize = 2_000_000;
     let mut recording =
-        Recording { time: (0..LONG).map(|i| i as f64 * 1e-3).collect(), ..Recording::default() };
+        SignalRecording { time: (0..LONG).map(|i| i as f64 * 1e-3).collect(), ..SignalRecording::default() };
     for (i, name) in ["x", "y", "z", "a", "c"].into_iter().enumerate() {
         let signal = |n: u64| noise(LONG, 1 + 100 * i as u64 + n);
         let axis = empty_axis(name, if i < 3 { AxisKind::Linear } else { AxisKind::Rotary });
@@ -298,10 +301,10 @@ fn the_error_of_a_path_is_magnified_as_the_caption_says() {
     let reference: Vec<[f64; 3]> = (0..=100).map(|i| [f64::from(i) * 1e-3, 0.0, 0.0]).collect();
     let position = reference.iter().map(|[x, ..]| [*x, 5e-5, 0.0]).collect();
     let contour_error = vec![5e-5; 101];
-    let recording = Recording {
+    let recording = SignalRecording {
         time: (0..=100).map(f64::from).collect(),
         tool: Some(ToolTrace { reference, position, contour_error, orientation_error: Vec::new() }),
-        ..Recording::default()
+        ..SignalRecording::default()
     };
     let page = page("line", vec![report_run("one", &recording)]);
     assert!(page.contains("<span class=\"note\">error × 200</span>"));

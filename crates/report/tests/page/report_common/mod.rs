@@ -2,7 +2,7 @@
 
 pub mod charts;
 
-use virtual_axes_core::assess::{AxisTrace, CircleTrace, Recording, ToolTrace};
+use virtual_axes_core::assess::{AxisTrace, CircleTrace, SignalRecording, ToolTrace};
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_report::{ReportRun, Table, TableColumn};
 
@@ -57,11 +57,11 @@ pub fn record(
     psec: impl Fn(f64) -> [f64; AXES],
     nearest: impl Fn([f64; 3]) -> [f64; 3],
     every: u64,
-) -> Recording {
+) -> SignalRecording {
     let mut machine = machine(changes);
     let mut axes = JOINTS.map(|(name, kind)| empty_axis(name, kind)).to_vec();
     let mut tool = ToolTrace::default();
-    let mut recording = Recording::default();
+    let mut recording = SignalRecording::default();
     machines::run(&mut machine, duration, psec, |time, machine| {
         if !machine.tick().is_multiple_of(every) {
             return;
@@ -100,7 +100,7 @@ pub fn record(
 }
 
 /// The ballbar trial, counterclockwise and, unless `one_way`, clockwise as well.
-pub fn ballbar(changes: &[(&str, f64)], every: u64, one_way: bool) -> Recording {
+pub fn ballbar(changes: &[(&str, f64)], every: u64, one_way: bool) -> SignalRecording {
     let trial = Ballbar::paper();
     let radius = trial.radius;
     let nearest = |tip: [f64; 3]| {
@@ -123,7 +123,7 @@ pub fn ballbar(changes: &[(&str, f64)], every: u64, one_way: bool) -> Recording 
 }
 
 /// The steady part.
-fn circle(recording: &Recording, trial: Ballbar, counterclockwise: bool) -> CircleTrace {
+fn circle(recording: &SignalRecording, trial: Ballbar, counterclockwise: bool) -> CircleTrace {
     let window = trial.window();
     let tool = recording.tool.as_ref().expect("it has a tool");
     let steady = recording.time.iter().zip(&tool.position).filter(|(t, _)| window.contains(t));
@@ -161,7 +161,7 @@ fn nearest_on(psec: impl Fn(f64) -> [f64; AXES], duration: f64) -> impl Fn([f64;
 }
 
 /// All five axes swing, each at its own tempo.
-pub fn five_axes(every: u64) -> Recording {
+pub fn five_axes(every: u64) -> SignalRecording {
     let amplitudes = [0.05, -0.03, 0.02, 0.4, 1.0];
     let duration = 7.5;
     let psec = |t: f64| {
@@ -184,7 +184,7 @@ pub fn five_axes(every: u64) -> Recording {
 }
 
 /// Figures of the axes that move, as on a terminal.
-pub fn figures(recording: &Recording) -> Table {
+pub fn figures(recording: &SignalRecording) -> Table {
     let peak = |values: &[f64]| values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     let columns = [("axis", ""), ("largest synchronized error", "µm, mdeg"), ("peak current", "A")];
     let rows = recording.axes.iter().filter(|a| a.moves).map(|a| {
@@ -200,7 +200,7 @@ pub fn figures(recording: &Recording) -> Table {
 }
 
 /// A run of a report with its figures.
-pub fn report_run<'a>(title: &'a str, recording: &'a Recording) -> ReportRun<'a> {
+pub fn report_run<'a>(title: &'a str, recording: &'a SignalRecording) -> ReportRun<'a> {
     let facts = [("machine", "mikron_ucp710"), ("controller", title)];
     let facts = facts.map(|(name, value)| (name.to_owned(), value.to_owned())).to_vec();
     ReportRun { title, facts, tables: vec![figures(recording)], recording }
