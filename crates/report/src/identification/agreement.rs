@@ -1,4 +1,4 @@
-//! Measured against simulated (Prévost figs. 6 and 7).
+//! Sections of the comparison of measured and simulated signals (Prévost figs. 6 and 7).
 
 use std::ops::Range;
 
@@ -7,31 +7,31 @@ use super::super::document::Section;
 use super::super::table::Table;
 use super::super::unit::DisplayUnit;
 use super::format::{columns, determination, optional, with_unit};
-use super::recordings::{bands, of_one, over_time};
+use super::recordings::{bands, over_time, single_recording};
 use super::{IdentificationPage, Step, ValidationRecording};
 use virtual_axes_core::units::{MILLIMETER, seconds};
 use virtual_axes_identify::identify::{
     Agreement, Comparison, Deviation, Experiment, Input, SegmentKind, Simulated,
 };
 
-/// A picture of more than this, s, hides the details: one move of it is shown once more.
+/// Duration above which one move has a plot of its own, s.
 const LONG: f64 = 12.0;
-/// The longest move that is shown so, s.
+/// Maximum duration of the move in its own plot, s.
 const LONGEST_MOVE: f64 = 6.0;
-/// Moves at least this part of the highest speed are fast.
+/// Smallest speed of a fast move, as a fraction of the highest speed.
 const FAST: f64 = 0.7;
-/// A move begins and ends at this part of the highest speed.
+/// Speed at which a move begins and ends, as a fraction of the highest speed.
 const MOVING: f64 = 0.005;
-/// Rest that is shown about a move, part of it.
-const ABOUT: f64 = 0.2;
-/// Tracking errors are shown as errors up to here, then as positions, m or rad.
+/// Margin of the plot around a move, as a fraction of it.
+const MOVE_MARGIN: f64 = 0.2;
+/// Following error above which it is plotted in the unit of positions, m or rad.
 const LARGE_ERROR: f64 = MILLIMETER;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let mut section = page.step("Measured against simulated", Step::Agreement);
+    let mut section = page.step("Measured and simulated", Step::Agreement);
     let pairs: Vec<(&Input, &Agreement)> = page.inputs.iter().zip(&page.identification.agreements).collect();
     section.paragraphs.push(
-        "The axis as it was found, in closed loop on the recorded setpoints (Prévost fig. 6). Deviations are simulated \
+        "Simulation of the identified axis in closed loop with the recorded setpoints (Prévost fig. 6). Deviations are simulated \
          minus measured."
             .to_owned(),
     );
@@ -39,11 +39,11 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     section
 }
 
-/// A recording that the axis was not identified from.
-pub(super) fn validation(page: &IdentificationPage, check: &ValidationRecording) -> Section {
-    let mut section = of_one(&check.input, check.findings, check.agreement);
+/// Creates the section of a validation recording.
+pub(super) fn validation_section(page: &IdentificationPage, check: &ValidationRecording) -> Section {
+    let mut section = single_recording(&check.input, check.findings, check.agreement);
     section.heading = format!("Validation on {}", check.input.signals.name);
-    section.paragraphs.push("Nothing was identified from this recording.".to_owned());
+    section.paragraphs.push("This recording was not used for the identification.".to_owned());
     fill(page, &mut section, &[(&check.input, check.agreement)]);
     section
 }
@@ -54,11 +54,11 @@ fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Input, &Agr
             let name = &input.signals.name;
             section.paragraphs.push(match &agreement.inverse {
                 Some(_) => format!(
-                    "{name} has no PSEC that begins at rest: its current is compared with that of inverse dynamics; at \
-                     rest friction holds anything within ±i0."
+                    "{name} has no PSEC that begins at rest: its current is compared with inverse dynamics. At \
+                     rest, static friction allows any current within ±i0."
                 ),
                 None => format!(
-                    "{name} has neither PSEC that begins at rest nor a current: there is nothing to compare."
+                    "{name} has neither PSEC that begins at rest nor a current: no comparison is possible."
                 ),
             });
         }
@@ -70,8 +70,8 @@ fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Input, &Agr
     let inverse: Vec<Vec<String>> = pairs.iter().filter_map(|(input, a)| inverse_row(input, a)).collect();
     if !inverse.is_empty() {
         section.paragraphs.push(
-            "Inverse dynamics is the current that the recorded motion asks for (Prévost eqs. 1 and 3), without a \
-             simulation: what swings between two samples, and what the filter of the acceleration takes, is not in it."
+            "Inverse dynamics is the current that is required for the recorded motion (Prévost eqs. 1 and 3), without a \
+             simulation. It does not contain oscillations between two samples or above the cut-off frequency of the filter."
                 .to_owned(),
         );
         let heads = [("recording", ""), ("largest", "A"), ("RMS", "A"), ("R²", "")];
@@ -95,7 +95,7 @@ fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Input, &Agr
     }
 }
 
-/// A part of a recording by name; numbered where there are several.
+/// Returns the name of a part of a recording, numbered if there are several parts.
 fn name(input: &Input, experiment: &Experiment, i: usize, count: usize) -> String {
     let (name, mode) = (&input.signals.name, experiment.mode.name());
     let part = if count > 1 { format!(", part {}", i + 1) } else { String::new() };
@@ -153,7 +153,7 @@ fn inverse_row(input: &Input, agreement: &Agreement) -> Option<Vec<String>> {
     ])
 }
 
-/// A simulated part of a recording.
+/// A part of a recording with its simulation.
 struct Run<'a> {
     page: &'a IdentificationPage<'a>,
     input: &'a Input<'a>,
@@ -163,7 +163,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// The whole, and a move of it where it is long.
+    /// Creates the plot of the part, and a plot of a fast move if the part is long.
     fn charts(&self, name: &str) -> Vec<Chart> {
         let count = self.experiment.position.len();
         let mut charts = vec![self.chart(name.to_owned(), 0..count)];
@@ -175,7 +175,7 @@ impl Run<'_> {
         charts
     }
 
-    /// Of the fast moves the one whose velocity is constant longest, with the rest about it.
+    /// Returns the samples of the fast move with the longest constant velocity, with a margin.
     fn fast_move(&self) -> Option<Range<usize>> {
         let (velocity, period) = (&self.experiment.velocity, self.experiment.period());
         let top = velocity.iter().map(|v| v.abs()).filter(|v| v.is_finite()).fold(0.0, f64::max);
@@ -189,16 +189,16 @@ impl Run<'_> {
         });
         let inside = match segments.max_by_key(|segment| segment.samples.len()) {
             Some(segment) => segment.samples.start - self.experiment.sample,
-            // None is constant for long enough: where it is fastest.
+            // Without a long constant velocity: the move with the highest speed.
             None => velocity.iter().position(|v| v.abs() >= top)?,
         };
-        let way = velocity.get(inside)?.signum();
-        let is_moving = |v: &f64| *v * way > MOVING * top;
+        let direction = velocity.get(inside)?.signum();
+        let is_moving = |v: &f64| *v * direction > MOVING * top;
         let before = velocity.get(..inside)?.iter().rev().take_while(|v| is_moving(v)).count();
         let after = velocity.get(inside..)?.iter().take_while(|v| is_moving(v)).count();
-        let about = (ABOUT * (before + after) as f64) as usize;
-        let begin = inside.saturating_sub((before + about).min(longest));
-        Some(begin..(inside + (after + about).min(longest)).min(velocity.len()))
+        let margin = (MOVE_MARGIN * (before + after) as f64) as usize;
+        let begin = inside.saturating_sub((before + margin).min(longest));
+        Some(begin..(inside + (after + margin).min(longest)).min(velocity.len()))
     }
 
     fn chart(&self, title: String, window: Range<usize>) -> Chart {
@@ -220,12 +220,12 @@ impl Run<'_> {
         let deviation = |i: usize| at(&s.position, i) - at(&e.position, i);
         let deviation = vec![series("", SeriesStyle::Line(0), &deviation)];
         let tsp = seconds(page.periods.position);
-        let tracking = |position: &[f64], i: usize| e.psec_at(i, tsp) - at(position, i);
-        let largest = window.clone().map(|i| tracking(&e.position, i).abs()).fold(0.0, f64::max);
+        let following = |position: &[f64], i: usize| e.psec_at(i, tsp) - at(position, i);
+        let largest = window.clone().map(|i| following(&e.position, i).abs()).fold(0.0, f64::max);
         let unit = if largest > LARGE_ERROR { page.position_unit() } else { page.error_unit() };
         let mut panels = vec![
             Panel::new(ChartAxis::new("Deviation", page.error_unit()), deviation),
-            both("Tracking error", unit, &|i| tracking(&e.position, i), &|i| tracking(&s.position, i)),
+            both("Following error", unit, &|i| following(&e.position, i), &|i| following(&s.position, i)),
             both("Velocity", page.velocity_unit(), &|i| at(&e.velocity, i), &|i| at(&s.velocity, i)),
         ];
         if let Some(current) = &e.current {
@@ -248,13 +248,13 @@ impl Run<'_> {
     }
 }
 
-/// Largest magnitude in the first panel.
+/// Returns the largest magnitude in the first panel.
 fn largest_of(panels: &[Panel]) -> f64 {
     let points = panels.first().into_iter().flat_map(|panel| &panel.series).flat_map(|s| &s.points);
     points.map(|point| point[1].abs()).filter(|d| d.is_finite()).fold(0.0, f64::max)
 }
 
-/// Measured current against the one of inverse dynamics.
+/// Creates the plot of measured current and current by inverse dynamics.
 fn inverse_chart(page: &IdentificationPage, input: &Input, agreement: &Agreement) -> Option<Chart> {
     let (signals, inverse) = (input.signals, agreement.inverse.as_ref()?);
     let mut modeled = Vec::new();

@@ -1,4 +1,4 @@
-//! α, β and γ: the deviation that each delay leaves.
+//! Section of the delays α, β and γ: deviation between simulation and recording over each delay.
 
 use super::super::chart::{Band, Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesStyle};
 use super::super::document::Section;
@@ -9,28 +9,30 @@ use super::{IdentificationPage, Step};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_identify::identify::{DelayFit, DelayParameter};
 
-/// A picture of the interval's surroundings is made where all delays span more than this times it.
+/// Ratio of the range of all tried delays to the accepted interval above which the interval has an enlarged plot.
 const WIDE: f64 = 10.0;
-/// What it shows on either side, in widths of the interval.
-const SURROUNDINGS: f64 = 2.0;
+/// Margin of the enlarged plot on each side, in widths of the interval.
+const ENLARGED_MARGIN: f64 = 2.0;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let fits = &page.identification.delays;
     let mut section = page.step("Delays", Step::Delays);
     section.paragraphs.push(
-        "α is sought without feedforward, β with velocity feedforward, γ with both, by least squares on simulated \
-         against recorded positions (Prévost section 3.5)."
+        "α is identified without feedforward, β with velocity feedforward, γ with both, by least squares of simulated \
+         minus recorded positions (Prévost section 3.5)."
             .to_owned(),
     );
     if fits.is_empty() {
-        section.paragraphs.push("No delay was identified; what the machine file says is kept.".to_owned());
+        section
+            .paragraphs
+            .push("No delay was identified; the values of the machine file are kept.".to_owned());
         return section;
     }
     section.paragraphs.push(format!(
-        "A delay acts at the instants of a loop only: α where the position comparator samples, every {} ms; β and γ \
-         where the velocity loop reads the feedforward, every {} ms. All delays of an interval, without its lower and \
-         with its upper end, move the axis alike: the recordings cannot tell which of them it is. A delay of the \
-         machine file that lies in its interval is left.",
+        "A delay is effective in steps of a loop cycle: α in position cycles of {} ms; β and γ \
+         in velocity cycles of {} ms. All delays of an interval, open below and closed \
+         above, give the same motion and cannot be distinguished by the recordings. A delay of the \
+         machine file that lies in its interval is kept.",
         ms(page.periods.position),
         ms(page.periods.velocity)
     ));
@@ -60,7 +62,7 @@ fn width(fit: &DelayFit) -> f64 {
     seconds(fit.interval.1 - fit.interval.0)
 }
 
-/// From the shortest to the longest delay that was tried, s.
+/// Returns the range of all tried delays, s.
 fn spread(fit: &DelayFit) -> f64 {
     let ends = fit.profile.first().zip(fit.profile.last());
     ends.map_or(0.0, |(first, last)| seconds(last.0 - first.0))
@@ -69,22 +71,22 @@ fn spread(fit: &DelayFit) -> f64 {
 fn chart(page: &IdentificationPage, fit: &DelayFit, near: bool) -> Chart {
     let name = letter(fit.delay);
     let (low, high) = (seconds(fit.interval.0), seconds(fit.interval.1));
-    let room = SURROUNDINGS * (high - low);
+    let margin = ENLARGED_MARGIN * (high - low);
     let all: Vec<[f64; 2]> = fit.profile.iter().map(|(delay, rms)| [seconds(*delay), *rms]).collect();
-    let is_shown = |x: f64| !near || (x >= low - room && x <= high + room);
+    let is_shown = |x: f64| !near || (x >= low - margin && x <= high + margin);
     let points: Vec<[f64; 2]> = all.into_iter().filter(|point| is_shown(point[0])).collect();
     let series = vec![
         ChartSeries::new("", SeriesStyle::Measured, points.clone()),
         ChartSeries::new("tried", SeriesStyle::Points(0), points),
     ];
     let x = ChartAxis::new(format!("Delay {name}"), DisplayUnit::MILLISECOND);
-    let x = if near { x.within((low - room).max(0.0), high + room) } else { x };
+    let x = if near { x.within((low - margin).max(0.0), high + margin) } else { x };
     let y = ChartAxis::new("RMS of the deviation", page.error_unit());
     let y = if near { y } else { y.with_zero() };
     let title = format!("Delay {name}{}", if near { ", near the interval" } else { "" });
     Chart {
         note: format!(
-            "feedforward {}; of each part that acts alike the middle is tried",
+            "feedforward {}; the middle of each interval of equal motion is tried",
             fit.delay.feedforward_mode().name()
         ),
         bands: vec![Band::interval("accepted", low, high)],
@@ -110,7 +112,7 @@ fn table(page: &IdentificationPage, fits: &[DelayFit]) -> Table {
             ms(fit.value),
             ms(old),
             digits(least / page.error_unit().size, 3),
-            if fit.is_unchanged { "left as it was" } else { "middle of the best" }.to_owned(),
+            if fit.is_unchanged { "unchanged" } else { "middle of the interval" }.to_owned(),
         ]
     };
     let heads = [
@@ -119,12 +121,12 @@ fn table(page: &IdentificationPage, fits: &[DelayFit]) -> Table {
         ("above", "ms"),
         ("up to", "ms"),
         ("value", "ms"),
-        ("before", "ms"),
+        ("initial", "ms"),
         ("least RMS", page.error_unit().symbol),
         ("choice", ""),
     ];
     Table {
-        caption: "Intervals that the data accept".to_owned(),
+        caption: "Accepted intervals".to_owned(),
         columns: columns(heads),
         rows: fits.iter().map(row).collect(),
     }

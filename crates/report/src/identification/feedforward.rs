@@ -1,4 +1,4 @@
-//! VFFW and TFFW: recorded feedforward over the derivatives of PSEC.
+//! Section of the feedforward weights VFFW and TFFW: recorded feedforward over the derivatives of PSEC.
 
 use super::super::chart::{Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
 use super::super::document::Section;
@@ -8,18 +8,19 @@ use super::format::{determination, digits, exact};
 use super::{IdentificationPage, Step};
 use virtual_axes_identify::identify::Regression;
 
-/// One of the two.
+/// Velocity or torque feedforward weight.
 struct Weight<'a> {
     name: &'static str,
-    what: &'static str,
+    title: &'static str,
     equation: u32,
     found: Option<&'a Regression>,
-    /// DisplayUnit of the weight.
+    /// Unit of the weight.
     unit: &'static str,
-    /// Of the derivative, and of what is fed forward.
-    across: (&'static str, DisplayUnit),
-    up: (&'static str, DisplayUnit),
-    /// The weight of the axis as it was found.
+    /// Quantity and unit of the derivative of PSEC.
+    x: (&'static str, DisplayUnit),
+    /// Quantity and unit of the feedforward signal.
+    y: (&'static str, DisplayUnit),
+    /// Weight of the identified axis.
     value: f64,
 }
 
@@ -35,27 +36,27 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let both = [
         Weight {
             name: "VFFW",
-            what: "Velocity feedforward",
+            title: "Velocity feedforward",
             equation: 6,
             found: found.velocity.as_ref(),
             unit: "",
-            across: ("dPSEC/dt at the motor", unit(speed)),
-            up: ("VFFWS", unit(speed)),
+            x: ("dPSEC/dt at the motor", unit(speed)),
+            y: ("VFFWS", unit(speed)),
             value: weights.velocity,
         },
         Weight {
             name: "TFFW",
-            what: "Torque feedforward",
+            title: "Torque feedforward",
             equation: 7,
             found: found.torque.as_ref(),
             unit: page.inertia_unit().symbol,
-            across: ("d²PSEC/dt² at the motor", unit(acceleration)),
-            up: ("TFFWS", torque),
+            x: ("d²PSEC/dt² at the motor", unit(acceleration)),
+            y: ("TFFWS", torque),
             value: weights.torque,
         },
     ];
     section.paragraphs.push(
-        "The weights are the ratios of what was fed forward to the derivatives of PSEC by Euler's approximation \
+        "The weights are the ratios of the feedforward signals to the backward differences of PSEC \
          (Prévost eqs. 6 to 8)."
             .to_owned(),
     );
@@ -77,7 +78,10 @@ impl Weight<'_> {
                 refinement.parameters.iter().any(|refined| refined.parameter.to_string() == own)
             });
             return if refined {
-                format!("{name}: no recording has {name}S; the closed loop told {}.", of(*value))
+                format!(
+                    "{name}: no recording has {name}S. The refinement in closed loop gives {}.",
+                    of(*value)
+                )
             } else {
                 format!(
                     "{name} was not identified: no recording has {name}S other than 0. It stays {}.",
@@ -87,7 +91,7 @@ impl Weight<'_> {
         };
         let (low, high) = found.delay;
         format!(
-            "{name} = {} ± {} (eq. {equation}), R² {}; {name}S comes {} … {} ms behind the derivative.",
+            "{name} = {} ± {} (eq. {equation}), R² {}; {name}S lags the derivative by {} … {} ms.",
             digits(found.value, 5),
             format!("{} {unit}", digits(found.error, 2)).trim_end(),
             determination(found.determination),
@@ -107,7 +111,7 @@ impl Weight<'_> {
         let axis = |(quantity, unit): (&str, DisplayUnit)| ChartAxis::new(quantity, unit);
         Chart {
             note: format!("R² {}", determination(found.determination)),
-            ..Chart::new(self.what, axis(self.across), vec![Panel::new(axis(self.up), series)])
+            ..Chart::new(self.title, axis(self.x), vec![Panel::new(axis(self.y), series)])
         }
     }
 }

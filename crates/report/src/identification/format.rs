@@ -1,4 +1,4 @@
-//! Numbers and units as they stand in text and tables.
+//! Formatting of numbers and units in text and tables.
 
 use super::super::table::TableColumn;
 use super::super::text::number;
@@ -6,16 +6,16 @@ use super::super::unit::DisplayUnit;
 use super::IdentificationPage;
 use virtual_axes_core::config::AxisKind;
 
-/// What is below this is written with a power of ten.
+/// Magnitude below which numbers have an exponent.
 const SMALL: f64 = 1e-4;
-/// What is not below this is.
+/// Magnitude from which numbers have an exponent.
 const LARGE: f64 = 1e7;
-/// Digits of what is exact.
+/// Significant digits of exact numbers.
 const EXACT: usize = 6;
-/// Most decimals of an R².
+/// Maximum number of decimals of R².
 const DETERMINATION: usize = 6;
 
-/// A number with so many significant digits; a dash where there is none.
+/// Formats a number with `count` significant digits; a dash if it is not finite.
 pub(super) fn digits(value: f64, count: usize) -> String {
     if !value.is_finite() {
         return "–".to_owned();
@@ -30,7 +30,7 @@ pub(super) fn digits(value: f64, count: usize) -> String {
     number(value, usize::try_from(count as i32 - before).unwrap_or(0))
 }
 
-/// The same without zeros at the end: for what is exact.
+/// Formats an exact number with up to six significant digits, without trailing zeros.
 pub(super) fn exact(value: f64) -> String {
     let text = digits(value, EXACT);
     if text.contains('.') && !text.contains('e') {
@@ -40,7 +40,7 @@ pub(super) fn exact(value: f64) -> String {
     }
 }
 
-/// A number in full, as in a machine file.
+/// Formats a number with full precision, like in a machine file.
 pub(super) fn full(value: f64) -> String {
     if !value.is_finite() {
         "–".to_owned()
@@ -51,27 +51,27 @@ pub(super) fn full(value: f64) -> String {
     }
 }
 
-/// A value in SI with so many digits, without its unit.
+/// Formats a value in SI units in `unit`, with `count` significant digits, without the symbol.
 pub(super) fn plain(value: f64, unit: &DisplayUnit, count: usize) -> String {
     digits(value / unit.size, count)
 }
 
-/// A value in SI with so many digits and its unit.
+/// Formats a value in SI units in `unit`, with `count` significant digits and the symbol.
 pub(super) fn with_unit(value: f64, unit: &DisplayUnit, count: usize) -> String {
     format!("{}\u{a0}{}", plain(value, unit, count), unit.symbol).trim_end().to_owned()
 }
 
-/// A value that may be missing.
+/// Formats an optional value; an empty string if it is missing.
 pub(super) fn optional(value: Option<f64>, unit: &DisplayUnit, count: usize) -> String {
     value.map_or_else(String::new, |value| plain(value, unit, count))
 }
 
-/// A difference in per cent, with one decimal.
+/// Formats a ratio in percent, with one decimal.
 pub(super) fn percent(part: f64) -> String {
     if part.is_finite() { number(100.0 * part, 1) } else { "–".to_owned() }
 }
 
-/// R²: four digits, or as many as tell it from 1.
+/// Formats R² with four decimals, or up to six if needed to distinguish it from 1.
 pub(super) fn determination(r2: f64) -> String {
     if !r2.is_finite() {
         return "–".to_owned();
@@ -80,12 +80,12 @@ pub(super) fn determination(r2: f64) -> String {
     number(r2, decimals)
 }
 
-/// "one recording", "3 recordings".
+/// Formats a count such as "one recording", "3 recordings".
 pub(super) fn counted(count: usize, what: &str) -> String {
     if count == 1 { format!("one {what}") } else { format!("{} {what}s", number(count as f64, 0)) }
 }
 
-/// Columns of a table: name and unit of each.
+/// Creates the columns of a table from names and units.
 pub(super) fn columns<const N: usize>(heads: [(&str, &str); N]) -> Vec<TableColumn> {
     heads.map(|(name, unit)| TableColumn::new(name, unit)).to_vec()
 }
@@ -103,13 +103,13 @@ impl IdentificationPage<'_> {
         DisplayUnit::velocity(self.kind())
     }
 
-    /// Of the equivalent inertia.
+    /// Returns the unit of the equivalent inertia.
     pub(super) fn inertia_unit(&self) -> DisplayUnit {
         let value = self.axis().motor.inertia.abs();
         DisplayUnit::new(if self.has_linear_motor() { "kg" } else { "kg·m²" }, 1.0, 1e-3 * value)
     }
 
-    /// Of the exponents of the friction law.
+    /// Returns the unit of the exponents of the friction law.
     pub(super) fn exponent_unit(&self) -> &'static str {
         match self.kind() {
             AxisKind::Linear => "min/m",
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_determination_near_one_is_told_from_it() {
+    fn r_squared_near_one_is_distinguished_from_one() {
         assert_eq!(determination(0.995), "0.9950");
         assert_eq!(determination(0.999_987), "0.99999");
         assert_eq!(determination(1.0), "1.000000");

@@ -1,4 +1,4 @@
-//! The friction law against what was measured (Prévost fig. 5).
+//! Section of friction: friction law and measured friction currents (Prévost fig. 5).
 
 use super::super::chart::{Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesStyle};
 use super::super::document::Section;
@@ -10,11 +10,11 @@ use virtual_axes_core::config::FrictionConfig;
 use virtual_axes_core::drive;
 use virtual_axes_identify::identify::{Friction, FrictionLaw, LawFit, Level};
 
-/// Points of the law's line in either direction.
-const FINE: usize = 200;
-/// They lie denser towards standstill, where the law bends: place = part ^ this.
-const DENSER: i32 = 3;
-/// Difference of two laws, part of the current, that can be seen.
+/// Number of points of the line of the law in each direction.
+const LINE_POINTS: usize = 200;
+/// Exponent of the spacing of the points, which are denser near standstill, where the law is curved.
+const SPACING_EXPONENT: i32 = 3;
+/// Smallest difference of two laws that is shown, as a fraction of the current.
 const VISIBLE: f64 = 1e-3;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
@@ -23,19 +23,19 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let Some(friction) = &found.friction else {
         section.paragraphs.push(if found.refinement.is_some() {
             format!(
-                "No law was fitted to currents of constant velocities. What the closed loop told is {}.",
-                in_words(page, &page.axis().friction)
+                "No law was fitted to currents at constant velocities. The refinement in closed loop gives {}.",
+                describe(page, &page.axis().friction)
             )
         } else {
-            "No friction law was identified; what the machine file says is kept.".to_owned()
+            "No friction law was identified; the values of the machine file are kept.".to_owned()
         });
         return section;
     };
     let refined = refined(page, friction, &found.steady.levels);
     section.paragraphs.push(text(page, friction));
     if refined.is_some() {
-        let law = in_words(page, &page.axis().friction);
-        section.paragraphs.push(format!("The refinement on the closed loop moves it to {law}."));
+        let law = describe(page, &page.axis().friction);
+        section.paragraphs.push(format!("The refinement in closed loop changes it to {law}."));
     }
     section.tables.push(table(page, friction, &found.steady.levels));
     section.charts.push(chart(page, friction, refined.as_ref(), &found.steady.levels));
@@ -47,14 +47,14 @@ fn text(page: &IdentificationPage, friction: &Friction) -> String {
     let r2 = determination(law.determination);
     let mut text = match law.line() {
         Some((level, slope)) => format!(
-            "A Coulomb level and a viscous slope are fitted, since the speeds do not bear the four parameters of \
+            "A Coulomb level and a viscous slope are fitted, because the speeds do not determine the four parameters of \
              Prévost eq. 3: i = {} A + {} A/({unit}) · V, R² {r2}.",
             digits(level, 4),
             digits(slope, 3)
         ),
         None => format!(
-            "The double exponential law of Prévost eq. 3 is fitted to both directions at once: {}, R² {r2}.",
-            in_words(page, &law.config)
+            "The double exponential law of Prévost eq. 3 is fitted to both directions jointly: {}, R² {r2}.",
+            describe(page, &law.config)
         ),
     };
     text += &format!(" i0 = {} A.", digits(law.config.i0, 4));
@@ -67,8 +67,8 @@ fn text(page: &IdentificationPage, friction: &Friction) -> String {
     text
 }
 
-/// A law with its values.
-fn in_words(page: &IdentificationPage, law: &FrictionConfig) -> String {
+/// Formats a friction law with its values.
+fn describe(page: &IdentificationPage, law: &FrictionConfig) -> String {
     let exponent = page.exponent_unit();
     format!(
         "i = a e^(bV) + c e^(dV) with a = {} A, b = {} {exponent}, c = {} A, d = {} {exponent}",
@@ -79,9 +79,9 @@ fn in_words(page: &IdentificationPage, law: &FrictionConfig) -> String {
     )
 }
 
-/// The law of the refined axis, if it can be told from the fitted one at the speeds that were measured.
+/// Returns the law of the refined axis if it differs visibly from the fitted one at the measured speeds.
 fn refined(page: &IdentificationPage, friction: &Friction, levels: &[Level]) -> Option<drive::Friction> {
-    // Of a motor that turns with the axis, whose torque is its current.
+    // Gear ratio 1 and torque constant 1: torque equals current.
     let law = |config| drive::Friction::new(config, page.kind(), 1.0, 1.0);
     let (fitted, now) = (law(friction.law.config), law(page.axis().friction));
     let differ = |level: &Level| {
@@ -106,15 +106,15 @@ fn chart(
     };
     let top = levels.iter().map(|level| level.velocity.abs()).fold(0.0, f64::max);
     let line = |law: &dyn Fn(f64) -> f64| -> Vec<[f64; 2]> {
-        let speed = |i: usize| top * (i as f64 / FINE as f64).powi(DENSER);
-        let minus = (1..=FINE).rev().map(|i| -speed(i));
-        let plus = (1..=FINE).map(speed);
-        // Standstill holds any current within ±i0: the line is broken there.
+        let speed = |i: usize| top * (i as f64 / LINE_POINTS as f64).powi(SPACING_EXPONENT);
+        let minus = (1..=LINE_POINTS).rev().map(|i| -speed(i));
+        let plus = (1..=LINE_POINTS).map(speed);
+        // At standstill any current within ±i0 is possible: the line has a gap.
         minus.map(|v| [v, law(v)]).chain([[0.0, f64::NAN]]).chain(plus.map(|v| [v, law(v)])).collect()
     };
     let mut series = vec![
-        measured("measured towards plus", 0, 1.0),
-        measured("measured towards minus", 1, -1.0),
+        measured("measured, positive direction", 0, 1.0),
+        measured("measured, negative direction", 1, -1.0),
         ChartSeries::new("fitted law", SeriesStyle::Simulated, line(&|v| friction.law.at(v / unit.size))),
     ];
     if let Some(law) = refined {
@@ -157,12 +157,12 @@ fn table(page: &IdentificationPage, friction: &Friction, levels: &[Level]) -> Ta
     let heads = [
         ("velocity", unit.symbol),
         ("current", "A"),
-        ("of it friction", "A"),
+        ("friction current", "A"),
         ("±", "A"),
         ("law", "A"),
         ("law − friction", "%"),
         ("law of the direction", "A"),
-        ("that − friction", "%"),
+        ("its deviation", "%"),
         ("duration", "s"),
     ];
     Table {

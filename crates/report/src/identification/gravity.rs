@@ -1,4 +1,4 @@
-//! Gravity: currents of standstills, and the law.
+//! Section of gravity: currents at standstill and the gravity model.
 
 use super::super::chart::{Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
 use super::super::document::Section;
@@ -11,31 +11,31 @@ use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::DEGREE;
 use virtual_axes_identify::identify::{Gravity, GravityCurrent, GravitySource, Rest};
 
-/// Points of the law's line.
-const FINE: usize = 181;
+/// Number of points of the line of the gravity model.
+const LINE_POINTS: usize = 181;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let found = page.identification;
     let mut section = page.step("Gravity", Step::Gravity);
     let Some(gravity) = &found.gravity else {
         section.paragraphs.push(
-            "Gravity was not identified: no current at standstill and none at constant velocities in both \
-             directions. What the machine file says is kept."
+            "Gravity was not identified: the recordings have no current at standstill, and none at constant velocities in both \
+             directions. The value of the machine file is kept."
                 .to_owned(),
         );
         return section;
     };
     let from = match gravity.source {
         GravitySource::Motion => {
-            "constant velocities in both directions, where friction changes its sign and gravity does not"
+            "constant velocities in both directions, at which friction changes its sign and gravity does not"
         }
         GravitySource::Rest => {
-            "standstills, where friction changes its sign with the side from which the axis came"
+            "standstills, at which friction changes its sign with the direction of approach"
         }
     };
     section.paragraphs.push(format!(
-        "Nothing accelerates at constant velocity and at rest (Prévost eq. 2), so that the current is that of friction \
-         and gravity. Gravity is taken from {from}. {}",
+        "At constant velocity and at rest the acceleration is zero (Prévost eq. 2), and the current is the sum of friction \
+         and gravity. Gravity is identified from {from}. {}",
         sentence(page, gravity)
     ));
     if !found.steady.standstills.is_empty() {
@@ -45,11 +45,11 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     section
 }
 
-/// The gravity in the units of the machine file.
+/// Returns a sentence with the gravity in the units of the machine file.
 fn sentence(page: &IdentificationPage, gravity: &Gravity) -> String {
     let pair = |value: f64, error: f64| format!("{} ± {}", digits(value, 4), digits(error, 2));
     if gravity.model == GravityCurrent::default() {
-        return "It is not significant: the model has none.".to_owned();
+        return "It is not significant; the model has no gravity.".to_owned();
     }
     let mut parts = Vec::new();
     if let Some((weight, error)) = gravity.weight {
@@ -67,10 +67,10 @@ fn sentence(page: &IdentificationPage, gravity: &Gravity) -> String {
     let more = if !refined {
         String::new()
     } else if page.kind() == AxisKind::Linear {
-        format!("; refined on the closed loop W = {} N", digits(found.weight, 4))
+        format!("; refined in closed loop W = {} N", digits(found.weight, 4))
     } else {
         format!(
-            "; refined on the closed loop k = {} N·m, φ = {}°",
+            "; refined in closed loop k = {} N·m, φ = {}°",
             digits(found.tilt, 4),
             digits(found.phase / DEGREE, 4)
         )
@@ -79,32 +79,33 @@ fn sentence(page: &IdentificationPage, gravity: &Gravity) -> String {
 }
 
 fn chart(page: &IdentificationPage, gravity: &Gravity, rests: &[Rest]) -> Chart {
-    let came = |label: &str, group: usize, sign: f64| {
+    let approached = |label: &str, group: usize, sign: f64| {
         let of_it = rests.iter().filter(|rest| rest.approach == sign);
         ChartSeries::new(label, SeriesStyle::Points(group), of_it.map(|r| [r.position, r.current]).collect())
     };
     let mut series = vec![
-        came("came towards plus", 0, 1.0),
-        came("came towards minus", 1, -1.0),
-        came("had not moved", 2, 0.0),
+        approached("approached in positive direction", 0, 1.0),
+        approached("approached in negative direction", 1, -1.0),
+        approached("no previous motion", 2, 0.0),
     ];
     series.retain(|series| !series.points.is_empty());
     let unit = page.position_unit();
     let mut x = ChartAxis::new("Position", unit);
     if let Some(extent) = Extent::of(rests.iter().map(|rest| rest.position)) {
         if extent.span() < unit.size {
-            // One place: its digits are no scale.
+            // A single position has no range of its own.
             x = x.within(extent.middle() - unit.size, extent.middle() + unit.size);
         }
-        let place = |i: usize| extent.min + extent.span() * i as f64 / (FINE - 1) as f64;
-        let law = |law: &GravityCurrent| (0..FINE).map(|i| [place(i), law.at(place(i))]).collect();
+        let position = |i: usize| extent.min + extent.span() * i as f64 / (LINE_POINTS - 1) as f64;
+        let law =
+            |law: &GravityCurrent| (0..LINE_POINTS).map(|i| [position(i), law.at(position(i))]).collect();
         series.push(ChartSeries::new("gravity of the model", SeriesStyle::Simulated, law(&gravity.model)));
         if let Some((at_rest, _)) = &gravity.at_rest {
-            series.push(ChartSeries::new("from standstills alone", SeriesStyle::Line(2), law(at_rest)));
+            series.push(ChartSeries::new("from standstills only", SeriesStyle::Line(2), law(at_rest)));
         }
     }
     Chart {
-        note: "friction holds up to ±i0 of it on either side".to_owned(),
+        note: "static friction can shift the current by up to ±i0".to_owned(),
         ..Chart::new(
             "Current at standstill",
             x,

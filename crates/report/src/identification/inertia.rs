@@ -1,4 +1,4 @@
-//! Equivalent inertia at the accelerating instants.
+//! Section of the equivalent inertia at accelerating samples.
 
 use super::super::chart::{Band, Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesStyle};
 use super::super::document::Section;
@@ -8,9 +8,9 @@ use super::format::{counted, digits, percent};
 use super::{IdentificationPage, Step};
 use virtual_axes_identify::identify::Inertia;
 
-/// Part of the instants, of the smallest and of the largest, that need not be seen.
+/// Fraction of the smallest and of the largest values that the plot may cut off.
 const OUTLIERS: f64 = 0.02;
-/// Room beyond a guide, part of the range.
+/// Margin of the plot range, as a fraction of it.
 const MARGIN: f64 = 0.06;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
@@ -19,32 +19,32 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let value = with_unit(page, page.axis().motor.inertia);
     let Some(inertia) = &found.inertia else {
         section.paragraphs.push(if found.refinement.is_some() {
-            format!("Eq. 5 asks for accelerations with their currents; the closed loop alone told {value}.")
+            format!("Prévost eq. 5 requires accelerations with currents, which were not recorded. The refinement in closed loop gives {value}.")
         } else {
-            "The inertia was not identified; what the machine file says is kept.".to_owned()
+            "The inertia was not identified; the value of the machine file is kept.".to_owned()
         });
         return section;
     };
     section.paragraphs.push(format!(
         "Jeq = (Kt i − C_friction − C_gravity) / (dω/dt) (Prévost eq. 5) at {} of {} gives {} ± {}, the mean without \
-         outliers; single instants spread by {}.",
-        counted(inertia.instants.len(), "instant"),
+         outliers. The standard deviation of single samples is {}.",
+        counted(inertia.instants.len(), "sample"),
         counted(inertia.accelerations, "acceleration"),
         with_unit(page, inertia.value),
         digits(inertia.error, 2),
         digits(inertia.spread, 2),
     ));
     if found.refinement.is_some() {
-        section.paragraphs.push(format!("The refinement on the closed loop gives {value}."));
+        section.paragraphs.push(format!("The refinement in closed loop gives {value}."));
     }
     if let Some(replayed) = found.replayed_inertia {
-        let off = replayed / page.axis().motor.inertia - 1.0;
+        let deviation = replayed / page.axis().motor.inertia - 1.0;
         section.paragraphs.push(format!(
-            "On the simulation of the axis as it was found, sampled as the recordings are, eq. 5 gives {}: {} % off the \
-             inertia that was simulated. So much the method misses here by itself, since the current swings between \
-             two samples; as far as it does the same on the recordings, the inertia of the closed loop counts.",
+            "Eq. 5 applied to the simulated axis, sampled like the recordings, gives {}, which deviates by {} % from the \
+             simulated inertia. This is the error of the method, because the current oscillates between \
+             two samples. The inertia refined in closed loop does not have this error.",
             with_unit(page, replayed),
-            percent(off)
+            percent(deviation)
         ));
     }
     section.charts.push(chart(page, inertia));
@@ -57,7 +57,7 @@ fn with_unit(page: &IdentificationPage, inertia: f64) -> String {
 
 fn chart(page: &IdentificationPage, inertia: &Inertia) -> Chart {
     let found = page.identification;
-    // Instants are numbered by the recordings that have a current.
+    // Samples are numbered by the recordings that have a current.
     let has_current = |signals: &virtual_axes_identify::recording::Signals| {
         signals.spans.iter().any(|s| s.current.is_some())
     };

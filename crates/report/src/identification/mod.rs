@@ -1,4 +1,4 @@
-//! The page of an identification: each step with its text, its figures and its picture (Prévost figs. 4 to 6).
+//! Page of an identification: text, tables and plots of each step (Prévost figs. 4 to 6).
 
 mod agreement;
 mod delays;
@@ -21,38 +21,38 @@ use super::document::{Document, Section};
 use format::exact;
 use notices::Step;
 
-/// What the page of an identification is made of.
+/// Contents of the page of an identification.
 #[derive(Debug, Clone, Copy)]
 pub struct IdentificationPage<'a> {
-    /// Name of the machine that the identification started from.
+    /// Name of the initial machine.
     pub machine: &'a str,
-    /// Sampling periods of its loops.
+    /// Sampling periods of the position, velocity and current loops.
     pub periods: Periods,
-    /// The recordings, as they were given to [`identify`](virtual_axes_identify::identify::identify).
+    /// Recordings, as passed to [`identify`](virtual_axes_identify::identify::identify).
     pub inputs: &'a [Input<'a>],
-    /// For each recording what reading and conditioning found; it can be shorter.
+    /// Findings of reading and conditioning of each recording; can be shorter than `inputs`.
     pub findings: &'a [Vec<Finding>],
-    /// What they told.
+    /// Result of the identification.
     pub identification: &'a Identification,
-    /// The same as parameters, from [`Identification::values`].
+    /// Identified parameters, from [`Identification::values`].
     pub values: &'a [IdentifiedValue],
-    /// Recordings that it was not identified from.
+    /// Recordings for validation, which were not used for the identification.
     pub validations: &'a [ValidationRecording<'a>],
 }
 
-/// A recording that an identified axis was validated on.
+/// A validation recording and its comparison with the simulation of the identified axis.
 #[derive(Debug, Clone, Copy)]
 pub struct ValidationRecording<'a> {
-    /// The recording, as it was given to [`validate`](virtual_axes_identify::identify::validate).
+    /// Recording, as passed to [`validate`](virtual_axes_identify::identify::validate).
     pub input: Input<'a>,
-    /// What reading and conditioning found.
+    /// Findings of reading and conditioning.
     pub findings: &'a [Finding],
-    /// How the axis agrees with it.
+    /// Deviations between simulation and recording.
     pub agreement: &'a Agreement,
 }
 
 impl IdentificationPage<'_> {
-    /// The page; the same identification gives the same document.
+    /// Creates the page. Equal identifications give equal documents.
     pub fn document(&self) -> Document {
         let mut sections = vec![
             summary::section(self),
@@ -65,13 +65,12 @@ impl IdentificationPage<'_> {
             refinement::section(self),
             agreement::section(self),
         ];
-        sections.extend(self.validations.iter().map(|check| agreement::validation(self, check)));
+        sections.extend(self.validations.iter().map(|check| agreement::validation_section(self, check)));
         Document {
             title: format!("Identification of the {} axis", self.axis().name()),
-            description:
-                "The steps of Prévost section 3, one after the other, and a refinement on the simulated \
+            description: "The steps of Prévost section 3, and a refinement in simulated \
                           closed loop."
-                    .to_owned(),
+                .to_owned(),
             facts: self.facts(),
             sections,
         }
@@ -89,7 +88,7 @@ impl IdentificationPage<'_> {
             ("machine".to_owned(), self.machine.to_owned()),
             ("axis".to_owned(), format!("{} ({kind})", self.axis().name())),
             (
-                "periods of position, velocity and current loop".to_owned(),
+                "sampling periods of position, velocity and current loop".to_owned(),
                 [position, velocity, current].map(ms).join(", "),
             ),
         ];
@@ -99,7 +98,7 @@ impl IdentificationPage<'_> {
         facts
     }
 
-    /// A section with what was found about its step.
+    /// Creates a section with the findings of its step.
     fn step(&self, heading: &str, step: Step) -> Section {
         let refined = self.identification.refinement.is_some();
         let about = |finding: &&Finding| Step::of(finding, refined).contains(&step);
@@ -107,7 +106,7 @@ impl IdentificationPage<'_> {
         Section { notices, ..Section::new(heading) }
     }
 
-    /// The axis as it was found.
+    /// Returns the identified axis.
     fn axis(&self) -> &AxisConfig {
         self.identification.axis()
     }
@@ -116,13 +115,13 @@ impl IdentificationPage<'_> {
         self.axis().kind()
     }
 
-    /// Whether what moves is a mass: no screw turns a millimeter into radians.
+    /// Returns true for a linear motor, whose inertia is a mass: the axis has no screw.
     fn has_linear_motor(&self) -> bool {
         self.kind() == AxisKind::Linear && self.axis().transmission_ratio == 1.0
     }
 }
 
-/// The modes of the parts of a recording, each once, in words.
+/// Returns the distinct feedforward modes of the parts of a recording, separated by commas.
 fn modes(agreement: &Agreement, input: &Input) -> String {
     let mut modes: Vec<FeedforwardMode> = agreement.experiments.iter().map(|e| e.mode).collect();
     modes.sort();

@@ -1,9 +1,9 @@
-//! Findings as notices, each where it belongs.
+//! Conversion of findings to notices, and assignment to the sections of the page.
 
 use super::super::document::{Notice, NoticeLevel};
 use virtual_axes_identify::recording::{Finding, Severity};
 
-/// To what a finding belongs.
+/// Identification step to which a finding belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Step {
     Whole,
@@ -17,7 +17,7 @@ pub(super) enum Step {
 }
 
 impl Step {
-    /// By the finding's code; what is not known is of the whole. `refined`: whether there is a refinement.
+    /// Returns the steps of a finding by its code; `Whole` for other codes. `refined` is true if there is a refinement.
     pub(super) fn of(finding: &Finding, refined: bool) -> &'static [Step] {
         match finding.code {
             "no-current" => &[Step::Gravity, Step::Friction, Step::Inertia],
@@ -32,7 +32,7 @@ impl Step {
             "unseen-delay" => &[Step::Delays],
             "at-bound" if !refined => &[Step::Friction],
             "at-bound" | "not-refined" => &[Step::Refinement],
-            // The text of the refinement names the pairs.
+            // The text of the refinement section lists the pairs.
             "correlated" => &[],
             "poor-current" => &[Step::Agreement],
             code if code.contains("gravity") || code.contains("static") => &[Step::Gravity],
@@ -41,7 +41,7 @@ impl Step {
     }
 }
 
-/// A finding with its remedy.
+/// Converts a finding with its remedy to a notice.
 pub(super) fn notice(finding: &Finding) -> Notice {
     let level = match finding.severity {
         Severity::Note => NoticeLevel::Note,

@@ -1,4 +1,5 @@
-//! The recordings: what they hold, and what the axis does when (Prévost fig. 4).
+//! Section of the recordings: contents, and segmentation into standstill, constant velocity and acceleration
+//! (Prévost fig. 4).
 
 use super::super::chart::{Band, BandClass, Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
 use super::super::document::Section;
@@ -17,9 +18,9 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         .map(|(number, input)| (input, page.identification.agreements.get(number)))
         .collect();
     let findings = page.findings.iter().take(page.inputs.len()).flatten();
-    let text = "Velocity and acceleration are derivatives of the position behind a filter without phase; its \
-                cut-off is where it passes half the power. Shades tell what the axis does (Prévost fig. 4); what is \
-                neither long enough nor steady enough is left out.";
+    let text = "Velocity and acceleration are derivatives of the position after a zero-phase low-pass filter; its \
+                cut-off frequency is at −3 dB. Shaded intervals are the segments of the motion (Prévost fig. 4); parts that are \
+                too short or not steady are not used.";
     Section {
         paragraphs: vec![text.to_owned()],
         notices: findings.map(notices::notice).collect(),
@@ -29,8 +30,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     }
 }
 
-/// Notices and the table of one recording.
-pub(super) fn of_one(input: &Input, findings: &[Finding], agreement: &Agreement) -> Section {
+/// Creates a section with the notices and the table of one recording.
+pub(super) fn single_recording(input: &Input, findings: &[Finding], agreement: &Agreement) -> Section {
     Section {
         notices: findings.iter().map(notices::notice).collect(),
         tables: vec![table(&[(input, Some(agreement))])],
@@ -44,7 +45,7 @@ fn table(pairs: &[(&Input, Option<&Agreement>)]) -> Table {
         ("samples", ""),
         ("period", "ms"),
         ("cut-off", "Hz"),
-        ("lag of the current, taken back", "ms"),
+        ("current lag, compensated", "ms"),
         ("spans", ""),
         ("feedforward", ""),
         ("static", "s"),
@@ -52,7 +53,7 @@ fn table(pairs: &[(&Input, Option<&Agreement>)]) -> Table {
         ("accelerating", "s"),
     ];
     Table {
-        caption: "What was recorded".to_owned(),
+        caption: "Recordings".to_owned(),
         columns: columns(heads),
         rows: pairs.iter().map(|(input, agreement)| row(input, *agreement)).collect(),
     }
@@ -80,7 +81,7 @@ fn row(input: &Input, agreement: Option<&Agreement>) -> Vec<String> {
     ]
 }
 
-/// Velocity and current over time.
+/// Creates the plot of velocity and current over time.
 fn chart(page: &IdentificationPage, signals: &Signals, agreement: Option<&Agreement>) -> Chart {
     let line = |label: &str, style, channel: &dyn Fn(&Span) -> Option<Vec<f64>>| {
         ChartSeries::new(label, style, over_time(signals, channel))
@@ -89,8 +90,8 @@ fn chart(page: &IdentificationPage, signals: &Signals, agreement: Option<&Agreem
     let mut panels = vec![Panel::new(ChartAxis::new("Velocity", page.velocity_unit()), velocity)];
     if signals.spans.iter().any(|span| span.current.is_some()) {
         let current = vec![
-            line("current as recorded", SeriesStyle::Commanded, &|span| span.current.clone()),
-            line("current behind the filter", SeriesStyle::Measured, &|span| span.smooth_current.clone()),
+            line("current, recorded", SeriesStyle::Commanded, &|span| span.current.clone()),
+            line("current, filtered", SeriesStyle::Measured, &|span| span.smooth_current.clone()),
         ];
         panels.push(Panel::new(ChartAxis::new("Current", DisplayUnit::AMPERE), current));
     }
@@ -104,7 +105,7 @@ fn chart(page: &IdentificationPage, signals: &Signals, agreement: Option<&Agreem
     }
 }
 
-/// A channel over time, broken between spans.
+/// Returns the points of a channel over time, with gaps between spans.
 pub(super) fn over_time(signals: &Signals, channel: &dyn Fn(&Span) -> Option<Vec<f64>>) -> Vec<[f64; 2]> {
     let mut points = Vec::new();
     for span in &signals.spans {
@@ -116,7 +117,7 @@ pub(super) fn over_time(signals: &Signals, channel: &dyn Fn(&Span) -> Option<Vec
     points
 }
 
-/// What the axis does when, in the time of the recording.
+/// Returns the segments of the motion as bands over the time of the recording.
 pub(super) fn bands(signals: &Signals, segments: &[Segment]) -> Vec<Band> {
     let band = |segment: &Segment| {
         let span = signals.spans.get(segment.span)?;

@@ -1,4 +1,4 @@
-//! The refinement: what it moved, and what it cannot tell apart.
+//! Section of the refinement in closed loop: changes of the parameters and their correlations.
 
 use super::super::document::Section;
 use super::super::table::{Table, TableColumn};
@@ -9,11 +9,11 @@ use super::{IdentificationPage, Step};
 use virtual_axes_identify::identify::{Parameter, Refined, Refinement};
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let mut section = page.step("Refinement on the closed loop", Step::Refinement);
+    let mut section = page.step("Refinement in closed loop", Step::Refinement);
     let Some(refinement) = &page.identification.refinement else {
         section
             .paragraphs
-            .push("There is none: the values are those of the steps, or of the machine file.".to_owned());
+            .push("The refinement was not run; the values are those of the preceding steps, or of the machine file.".to_owned());
         return section;
     };
     section.paragraphs.push(text(page, refinement));
@@ -23,14 +23,14 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         .map(|(a, b, rho)| format!("{a} with {b} ({})", number(rho, 3)))
         .collect();
     section.paragraphs.push(if pairs.is_empty() {
-        "No two of the parameters are hard to tell apart.".to_owned()
+        "No two parameters are strongly correlated.".to_owned()
     } else {
-        format!("Hard to tell apart, by their coefficient of correlation: {}. What they make together is told better than each of \
+        format!("Strongly correlated parameters, with their coefficient of correlation: {}. Their combined effect is more accurate than each of \
              them.", listed(&pairs))
     });
     let heads = [
         ("parameter", ""),
-        ("before", ""),
+        ("initial", ""),
         ("refined", ""),
         ("±", ""),
         ("unit", ""),
@@ -54,11 +54,11 @@ fn text(page: &IdentificationPage, refinement: &Refinement) -> String {
     let (before, after) = refinement.position;
     let current = refinement.current.map_or_else(String::new, |(before, after)| {
         let of = |value: f64| with_unit(value, &DisplayUnit::AMPERE, 3);
-        format!(", of the current from {} to {}", of(before), of(after))
+        format!(", the RMS of the current deviation from {} to {}", of(before), of(after))
     });
     format!(
-        "All parameters below are moved at once until the simulation of the whole axis comes nearest to the recorded \
-         positions{}, each deviation weighted by what is left of it. The RMS of the deviation of position goes from {} \
+        "All parameters below are adjusted jointly to minimize the deviation of the simulated axis from the recorded \
+         positions{}, weighted by the residuals. The RMS of the position deviation changes from {} \
          to {}{current}.",
         if refinement.current.is_some() { " and currents" } else { "" },
         of(before),
@@ -89,7 +89,7 @@ fn row(page: &IdentificationPage, refined: &Refined) -> Vec<String> {
     ]
 }
 
-/// The lower half of the matrix.
+/// Creates the lower triangle of the correlation matrix.
 fn correlations(refinement: &Refinement) -> Table {
     let names: Vec<String> = refinement.parameters.iter().map(|p| p.parameter.to_string()).collect();
     let mut heads = vec![TableColumn::new("", "")];

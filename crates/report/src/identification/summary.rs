@@ -1,7 +1,8 @@
-//! What was found: every value, and what must be said of the whole.
+//! Section with all identified values and general findings.
 
 use super::super::document::Section;
 use super::super::table::Table;
+use super::super::text::capital;
 use super::format::{columns, counted, digits, exact, full};
 use super::{IdentificationPage, Step, notices};
 use virtual_axes_identify::identify::IdentifiedValue;
@@ -10,23 +11,23 @@ use virtual_axes_identify::recording::Severity;
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let found = page.identification;
     let refined = found.refinement.is_some();
-    let mut told: Vec<_> = found
+    let mut general: Vec<_> = found
         .findings
         .iter()
         .filter(|f| f.severity > Severity::Note || Step::of(f, refined).contains(&Step::Whole))
         .collect();
-    // What is missing first.
-    told.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
-    let count = counted(page.values.len(), "parameter");
+    // Missing results come first.
+    general.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
+    let count = capital(&counted(page.values.len(), "parameter"));
     let text = if page.values.is_empty() {
-        "The recordings told no parameter of the axis.".to_owned()
+        "No parameter was identified from the recordings.".to_owned()
     } else {
         format!(
-            "The recordings told {count}. ± is the standard error; of a delay the data tell an interval, open below \
-             and closed above, in which all values move the axis alike."
+            "{count} identified from the recordings. ± is the standard error. The value of a delay lies in an interval, open \
+             below and closed above; all delays of the interval give the same motion."
         )
     };
-    let heads = [("parameter", ""), ("value", ""), ("±", ""), ("unit", ""), ("before", ""), ("source", "")];
+    let heads = [("parameter", ""), ("value", ""), ("±", ""), ("unit", ""), ("initial", ""), ("source", "")];
     let table = Table {
         caption: "Identified values".to_owned(),
         columns: columns(heads),
@@ -34,9 +35,9 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     };
     Section {
         paragraphs: vec![text],
-        notices: told.into_iter().map(notices::notice).collect(),
+        notices: general.into_iter().map(notices::notice).collect(),
         tables: vec![table],
-        ..Section::new("What was found")
+        ..Section::new("Identified parameters")
     }
 }
 
