@@ -1,11 +1,11 @@
-//! From checked parameters in CNC units to typed values in SI units.
+//! Conversion of checked parameters in CNC units to a [`MachineConfig`] in SI units.
 
 use std::f64::consts::TAU;
 
 use super::check::to_ns;
 use super::definition::MotorKind;
-use super::error::{ConfigError, Source};
-use super::layout::Joint;
+use super::error::{ConfigError, ValueSource};
+use super::layout::JointVariant;
 use super::machine::{
     AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GpcConfig,
     GravityConfig, KinematicsConfig, LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig,
@@ -19,11 +19,11 @@ use crate::units::{
 };
 
 impl Parameters {
-    /// The machine in SI units.
+    /// Returns the machine configuration in SI units.
     ///
     /// # Errors
     ///
-    /// [`ConfigError::Missing`], which the checks on the way in leave no room for.
+    /// [`ConfigError::Missing`] for a missing parameter, which cannot happen in a checked parameter set.
     pub fn machine_config(&self) -> Result<MachineConfig, ConfigError> {
         let period = |key, factor| Ok(to_ns(self.number(key)?, factor));
         Ok(MachineConfig {
@@ -38,7 +38,7 @@ impl Parameters {
                 .layout()
                 .joints
                 .iter()
-                .map(|joint| Axis { set: self, joint }.config())
+                .map(|joint| AxisParameters { set: self, joint }.config())
                 .collect::<Result<_, _>>()?,
         })
     }
@@ -62,7 +62,7 @@ impl Parameters {
 
     fn missing(&self, key: &str, wanted: &str) -> ConfigError {
         ConfigError::Missing {
-            at: Source::named("parameters"),
+            at: ValueSource::named("parameters"),
             key: key.to_owned(),
             wanted: wanted.to_owned(),
         }
@@ -80,13 +80,13 @@ impl Parameters {
     }
 }
 
-/// One axis of a set of parameters.
-struct Axis<'a> {
+/// Parameters of one axis.
+struct AxisParameters<'a> {
     set: &'a Parameters,
-    joint: &'a Joint,
+    joint: &'a JointVariant,
 }
 
-impl Axis<'_> {
+impl AxisParameters<'_> {
     fn key(&self, suffix: &str) -> String {
         format!("{}.{suffix}", self.joint.name)
     }
@@ -95,13 +95,12 @@ impl Axis<'_> {
         self.set.number(&self.key(suffix))
     }
 
-    /// The number times its unit's factor.
+    /// Returns the number multiplied by `factor`, its unit in SI units.
     fn scaled(&self, suffix: &str, factor: f64) -> Result<f64, ConfigError> {
         Ok(self.number(suffix)? * factor)
     }
 
-    /// 0 where the parameter does not apply: gravity acts on a linear axis in one way, on a rotary
-    /// one in another.
+    /// Returns the number, or 0 for a parameter that does not apply to this type of axis.
     fn or_zero(&self, suffix: &str) -> f64 {
         self.number(suffix).unwrap_or_default()
     }
@@ -196,14 +195,14 @@ impl Axis<'_> {
         }
     }
 
-    fn by_motor<T>(&self, rotating: T, linear: T) -> T {
+    fn by_motor<T>(&self, rotary: T, linear: T) -> T {
         match self.joint.motor {
-            MotorKind::Rotating => rotating,
+            MotorKind::Rotary => rotary,
             MotorKind::Linear => linear,
         }
     }
 
-    /// r: m or rad of the axis per rad (or m) of the motor.
+    /// Returns the transmission ratio r: axis travel (m or rad) per motor travel (rad or m).
     fn transmission_ratio(&self) -> Result<f64, ConfigError> {
         let direct = self.set.flag(&self.key("transmission.direct"));
         Ok(match self.joint.axis {
@@ -232,7 +231,7 @@ impl Axis<'_> {
     }
 
     fn limits(&self) -> Result<LimitsConfig, ConfigError> {
-        // A stroke that is left out is unlimited.
+        // An omitted travel limit is unlimited.
         let end = |suffix, unit, none: f64| self.scaled(suffix, unit).unwrap_or(none);
         Ok(match self.joint.axis {
             AxisKind::Linear => LimitsConfig {

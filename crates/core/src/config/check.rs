@@ -1,40 +1,41 @@
-//! The check of a whole set of parameters: each against the schema, then against one another.
+//! Validation of a parameter set: each value against the schema, then values against each other.
 
 use std::collections::{BTreeMap, HashSet};
 
 use super::definition::{MotorKind, Presence};
-use super::error::{ConfigError, Source, shortened};
-use super::layout::{Joint, Layout, plain_definition, refused_joint_name};
+use super::error::{ConfigError, ValueSource};
+use super::layout::{JointVariant, ParameterLayout, joint_name_violation, plain_definition};
 use super::machine::AxisKind;
 use super::value::{Value, number_text};
-use crate::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, SECOND_NS};
+use crate::text::shortened;
+use crate::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, Rounded, SECOND_NS};
 
-/// How much faster than the position periods `publish_rate` may be, so that 166.7 Hz fits 6 ms.
+/// Relative tolerance of `publish_rate` above the rate of position cycles: 166.7 Hz is accepted for 6 ms.
 const RATE_TOLERANCE: f64 = 1e-2;
 
-/// The keys that decide which others a joint has.
+/// Keys that determine the other keys of a joint.
 const TYPE: &str = "type";
 const DIRECT: &str = "transmission.direct";
 
-/// A value and where it was set.
+/// Value with its origin.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Entry {
+pub(super) struct ParameterEntry {
     pub value: Value,
-    pub source: Source,
+    pub source: ValueSource,
 }
 
-/// Values by full key.
-pub(super) type Entries = BTreeMap<String, Entry>;
+/// Values and origins by full key.
+pub(super) type Entries = BTreeMap<String, ParameterEntry>;
 
-/// Checks `entries`, of which `changed` (in order) are new and are looked at first; brings each
-/// value to the kind that its definition wants. `origin` is to blame for what is missing.
+/// Checks `entries` and converts each value to the type of its definition. The new keys `changed` are checked first, in
+/// order. Errors about missing keys name `origin`.
 pub(super) fn check(
     entries: &mut Entries,
     changed: &[String],
-    origin: &Source,
-) -> Result<Layout, ConfigError> {
+    origin: &ValueSource,
+) -> Result<ParameterLayout, ConfigError> {
     let layout = layout(entries, changed, origin)?;
-    // The new keys in their order, so that the first error in a file is the one reported.
+    // New keys in order: the first error in a file is reported.
     for key in changed {
         if let Some(entry) = entries.get_mut(key) {
             check_entry(&layout, key, entry)?;
@@ -45,10 +46,10 @@ pub(super) fn check(
     }
     for (key, definition) in layout.definitions() {
         if definition.presence == Presence::Required && !entries.contains_key(&key) {
-            return Err(missing(origin, &key, definition.wanted()));
+            return Err(missing(origin, &key, definition.description_with_range()));
         }
     }
-    let set = Set { entries, changed, layout: &layout };
+    let set = CrossChecks { entries, changed, layout: &layout };
     set.check_periods()?;
     set.check_publish_rate()?;
     set.check_clock()?;
@@ -62,34 +63,38 @@ pub(super) fn check(
     Ok(layout)
 }
 
-fn check_entry(layout: &Layout, key: &str, entry: &mut Entry) -> Result<(), ConfigError> {
+fn check_entry(layout: &ParameterLayout, key: &str, entry: &mut ParameterEntry) -> Result<(), ConfigError> {
     let definition = layout.find(key, &entry.source)?;
     entry.value = definition.checked(key, &entry.value, &entry.source)?;
     Ok(())
 }
 
-fn missing(at: &Source, key: &str, wanted: String) -> ConfigError {
+fn missing(at: &ValueSource, key: &str, wanted: String) -> ConfigError {
     ConfigError::Missing { at: at.clone(), key: key.to_owned(), wanted }
 }
 
-/// The joints with their types; refuses misspelt keys before it says that something is missing.
-fn layout(entries: &Entries, changed: &[String], origin: &Source) -> Result<Layout, ConfigError> {
+/// Returns the joints with their types. Misspelt keys are rejected before missing keys.
+fn layout(
+    entries: &Entries,
+    changed: &[String],
+    origin: &ValueSource,
+) -> Result<ParameterLayout, ConfigError> {
     let names = joint_names(entries)?;
-    let layout = Layout { joints: names.iter().map(|name| joint(entries, name)).collect() };
+    let layout = ParameterLayout { joints: names.iter().map(|name| joint(entries, name)).collect() };
     for key in changed {
         if let Some(entry) = entries.get(key)
-            // Without joints, keys with a dot cannot be told apart yet.
+            // Without `joints`, the prefix of a key with a dot is not known to be a joint name.
             && (!names.is_empty() || !key.contains('.'))
         {
             layout.check_name(key, &entry.source)?;
         }
     }
     if names.is_empty() {
-        let wanted = plain_definition("joints").map(|definition| definition.wanted());
+        let wanted = plain_definition("joints").map(|definition| definition.description_with_range());
         return Err(missing(origin, "joints", wanted.unwrap_or_default()));
     }
     for name in &names {
-        // What decides which keys apply is checked before the others are.
+        // Keys that determine the other keys are checked first.
         for (suffix, required) in [(TYPE, true), (DIRECT, false)] {
             let key = format!("{name}.{suffix}");
             let at = entries.get(&key).map_or(origin, |entry| &entry.source);
@@ -98,7 +103,7 @@ fn layout(entries: &Entries, changed: &[String], origin: &Source) -> Result<Layo
                 Some(entry) => {
                     definition.checked(&key, &entry.value, at)?;
                 }
-                None if required => return Err(missing(at, &key, definition.wanted())),
+                None if required => return Err(missing(at, &key, definition.description_with_range())),
                 None => {}
             }
         }
@@ -106,27 +111,27 @@ fn layout(entries: &Entries, changed: &[String], origin: &Source) -> Result<Layo
     Ok(layout)
 }
 
-/// The joint `name` as its keys describe it, taken for linear with a screw where they do not.
-fn joint(entries: &Entries, name: &str) -> Joint {
+/// Returns the types of the joint `name`; by default a linear axis with a rotary motor.
+fn joint(entries: &Entries, name: &str) -> JointVariant {
     let is = |suffix: &str, wanted: Value| {
         entries.get(&format!("{name}.{suffix}")).is_some_and(|entry| entry.value == wanted)
     };
     let rotary = is(TYPE, Value::Text("rotary".to_owned()));
     let direct = is(DIRECT, Value::Bool(true));
-    Joint {
+    JointVariant {
         name: name.to_owned(),
         axis: if rotary { AxisKind::Rotary } else { AxisKind::Linear },
-        motor: if direct && !rotary { MotorKind::Linear } else { MotorKind::Rotating },
+        motor: if direct && !rotary { MotorKind::Linear } else { MotorKind::Rotary },
     }
 }
 
-/// The value of `joints`, empty when there is none; every name is usable and stands once.
+/// Returns the value of `joints` after checking the names, or an empty list if `joints` is missing.
 pub(super) fn joint_names(entries: &Entries) -> Result<Vec<String>, ConfigError> {
     const KEY: &str = "joints";
     let (Some(entry), Some(definition)) = (entries.get(KEY), plain_definition(KEY)) else {
         return Ok(Vec::new());
     };
-    let refused = |allowed: String| ConfigError::NotAllowed {
+    let rejection = |allowed: String| ConfigError::NotAllowed {
         at: entry.source.clone(),
         key: KEY.to_owned(),
         value: entry.value.to_string(),
@@ -136,30 +141,30 @@ pub(super) fn joint_names(entries: &Entries) -> Result<Vec<String>, ConfigError>
         return Ok(Vec::new());
     };
     if names.is_empty() {
-        return Err(refused("hold at least one name".to_owned()));
+        return Err(rejection("contain at least one name".to_owned()));
     }
     let mut seen = HashSet::new();
     for name in &names {
-        if let Some(allowed) = refused_joint_name(name) {
-            return Err(refused(allowed));
+        if let Some(allowed) = joint_name_violation(name) {
+            return Err(rejection(allowed));
         }
         if !seen.insert(name) {
-            return Err(refused(format!("hold each name once, not {} twice", shortened(name))));
+            return Err(rejection(format!("contain each name once, found {} twice", shortened(name))));
         }
     }
     Ok(names)
 }
 
-/// Checks across keys, on values that are each valid.
-struct Set<'a> {
+/// Checks between parameters, after each value is checked.
+struct CrossChecks<'a> {
     entries: &'a Entries,
     changed: &'a [String],
-    layout: &'a Layout,
+    layout: &'a ParameterLayout,
 }
 
-impl Set<'_> {
-    /// Error on the one of `keys` that was set last, since it is the one the user has in hand.
-    fn refused(&self, keys: &[&str], allowed: String) -> ConfigError {
+impl CrossChecks<'_> {
+    /// Returns an error for the one of `keys` that was set last.
+    fn rejection(&self, keys: &[&str], allowed: String) -> ConfigError {
         let set = |key: &&&str| self.entries.contains_key(**key);
         let newest = keys.iter().filter(set).max_by_key(|key| {
             self.changed.iter().rposition(|changed| changed == **key).map_or(0, |position| position + 1)
@@ -172,11 +177,11 @@ impl Set<'_> {
                 value: entry.value.to_string(),
                 allowed,
             },
-            None => missing(&Source::named("parameters"), key, allowed),
+            None => missing(&ValueSource::named("parameters"), key, allowed),
         }
     }
 
-    /// The value of `key` or its default, as a number.
+    /// Returns the value or default of `key` as a number.
     fn number(&self, key: &str) -> Option<f64> {
         match self.value(key)? {
             Value::Double(number) => Some(number),
@@ -187,7 +192,7 @@ impl Set<'_> {
     fn value(&self, key: &str) -> Option<Value> {
         match self.entries.get(key) {
             Some(entry) => Some(entry.value.clone()),
-            None => self.layout.find(key, &Source::named("")).ok()?.default_value(),
+            None => self.layout.find(key, &ValueSource::named("")).ok()?.default_value(),
         }
     }
 
@@ -199,10 +204,10 @@ impl Set<'_> {
             if let (Some(long), Some(short)) = (period(i), period(i + 1))
                 && (short <= 0 || long < short || long % short != 0)
             {
-                return Err(self.refused(
+                return Err(self.rejection(
                     &[KEYS[i], KEYS[i + 1]],
                     format!(
-                        "keep {} an integer multiple of {}: they are {long} ns and {short} ns",
+                        "keep {} an integer multiple of {}, found {long} ns and {short} ns",
                         KEYS[i],
                         KEYS[i + 1]
                     ),
@@ -219,11 +224,11 @@ impl Set<'_> {
         };
         let most = SECOND_NS as f64 / (period * MILLISECOND_NS as f64);
         if rate > most * (1.0 + RATE_TOLERANCE) {
-            return Err(self.refused(
+            return Err(self.rejection(
                 &["publish_rate"],
                 format!(
-                    "be at most one per position period, {most:.2} Hz with \
-                     periods.position_ms = {}",
+                    "be at most {} Hz, one message per position cycle of {} ms",
+                    Rounded(most),
                     number_text(period)
                 ),
             ));
@@ -234,17 +239,16 @@ impl Set<'_> {
     fn check_clock(&self) -> Result<(), ConfigError> {
         let fast = self.value("time") == Some(Value::Text("fast".to_owned()));
         if fast && self.value("use_sim_time") == Some(Value::Bool(true)) {
-            return Err(self.refused(
+            return Err(self.rejection(
                 &["time", "use_sim_time"],
-                "leave the clock to one: time = fast publishes /clock, use_sim_time = true \
-                 follows it"
+                "not be combined: time = fast publishes /clock, use_sim_time = true subscribes to it"
                     .to_owned(),
             ));
         }
         Ok(())
     }
 
-    fn check_transmission(&self, joint: &Joint, origin: &Source) -> Result<(), ConfigError> {
+    fn check_transmission(&self, joint: &JointVariant, origin: &ValueSource) -> Result<(), ConfigError> {
         let drive = match joint.axis {
             AxisKind::Linear => "screw_lead_mm",
             AxisKind::Rotary => "gear_ratio",
@@ -254,27 +258,27 @@ impl Set<'_> {
         let direct = format!("{name}.transmission.direct");
         let is_direct = self.value(&direct) == Some(Value::Bool(true));
         match (is_direct, self.entries.contains_key(&drive)) {
-            (true, true) => Err(self.refused(
+            (true, true) => Err(self.rejection(
                 &[&drive, &direct],
-                format!("be the only transmission of {name}: {drive} and {direct} = true are given"),
+                format!("be the only transmission of {name}, found {drive} and {direct} = true"),
             )),
             (false, false) => Err(missing(
                 origin,
                 &format!("{name}.transmission"),
-                format!("one of {drive} and {direct} = true"),
+                format!("expected {drive} or {direct} = true"),
             )),
             _ => Ok(()),
         }
     }
 
-    fn check_friction(&self, joint: &Joint) -> Result<(), ConfigError> {
+    fn check_friction(&self, joint: &JointVariant) -> Result<(), ConfigError> {
         let a_key = format!("{}.friction.a", joint.name);
         let c_key = format!("{}.friction.c", joint.name);
         match (self.number(&a_key), self.number(&c_key)) {
-            (Some(a), Some(c)) if a + c < 0.0 => Err(self.refused(
+            (Some(a), Some(c)) if a + c < 0.0 => Err(self.rejection(
                 &[&a_key, &c_key],
                 format!(
-                    "keep a + c ≥ 0, since friction does not drive: a = {}, c = {}",
+                    "keep a + c ≥ 0, the friction at standstill, found a = {} and c = {}",
                     number_text(a),
                     number_text(c)
                 ),
@@ -283,7 +287,7 @@ impl Set<'_> {
         }
     }
 
-    fn check_horizons(&self, joint: &Joint) -> Result<(), ConfigError> {
+    fn check_horizons(&self, joint: &JointVariant) -> Result<(), ConfigError> {
         let key = |name: &str| format!("{}.position_loop.gpc.{name}", joint.name);
         let last = key("n2");
         let count = |key: &str| match self.value(key) {
@@ -294,14 +298,14 @@ impl Set<'_> {
             if let (Some(value), Some(most)) = (count(&first), count(&last))
                 && value > most
             {
-                let allowed = format!("keep {first} ≤ {last}: they are {value} and {most}");
-                return Err(self.refused(&[&first, &last], allowed));
+                let allowed = format!("keep {first} ≤ {last}, found {value} and {most}");
+                return Err(self.rejection(&[&first, &last], allowed));
             }
         }
         Ok(())
     }
 
-    fn check_polynomials(&self, joint: &Joint) -> Result<(), ConfigError> {
+    fn check_polynomials(&self, joint: &JointVariant) -> Result<(), ConfigError> {
         let controller = format!("{}.position_loop.controller", joint.name);
         let Some(entry) = self.entries.get(&controller).filter(|e| e.value == Value::Text("rst".to_owned()))
         else {
@@ -320,8 +324,8 @@ impl Set<'_> {
         Ok(())
     }
 
-    /// The ranges of the schema keep home, 0, within the stroke; this keeps the stroke open.
-    fn check_travel_limits(&self, joint: &Joint) -> Result<(), ConfigError> {
+    /// Checks that the travel limits differ. The ranges of the schema keep home, 0, within them.
+    fn check_travel_limits(&self, joint: &JointVariant) -> Result<(), ConfigError> {
         let unit = match joint.axis {
             AxisKind::Linear => "mm",
             AxisKind::Rotary => "deg",
@@ -330,14 +334,14 @@ impl Set<'_> {
         let max_key = format!("{}.limits.travel_max_{unit}", joint.name);
         match (self.number(&min_key), self.number(&max_key)) {
             (Some(min), Some(max)) if min >= max => {
-                Err(self.refused(&[&min_key, &max_key], format!("leave a stroke: {min_key} < {max_key}")))
+                Err(self.rejection(&[&min_key, &max_key], format!("keep {min_key} < {max_key}")))
             }
             _ => Ok(()),
         }
     }
 }
 
-/// `value` times `factor` to the nearest nanosecond.
+/// Converts `value` with the unit `factor` (ns) to nanoseconds, rounded.
 pub(super) fn to_ns(value: f64, factor: Nanoseconds) -> Nanoseconds {
     (value * factor as f64).round() as Nanoseconds
 }

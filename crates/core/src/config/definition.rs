@@ -1,53 +1,54 @@
-//! What is known about one parameter, and the check of a value against it.
+//! Definition of a parameter: type, range, default, owner and description, and the check of a value.
 
-use super::error::{ConfigError, Source, shortened};
+use super::error::{ConfigError, ValueSource};
 use super::machine::AxisKind;
 use super::value::{Value, number_text};
+use crate::text::shortened;
 
-/// Kind of a parameter's value, with what is allowed.
+/// Type of a parameter and its allowed values.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
-    /// A finite number in the closed range `min..=max`.
+pub enum ParameterKind {
+    /// Finite number in the closed range `min..=max`.
     Number {
-        /// Smallest allowed value.
+        /// Minimum.
         min: f64,
-        /// Largest allowed value.
+        /// Maximum.
         max: f64,
     },
-    /// An integer in the closed range `min..=max`.
+    /// Integer in the closed range `min..=max`.
     Integer {
-        /// Smallest allowed value.
+        /// Minimum.
         min: i64,
-        /// Largest allowed value.
+        /// Maximum.
         max: i64,
     },
-    /// `true` or `false`.
+    /// Boolean, `true` or `false`.
     Flag,
     /// Any text.
     Text,
-    /// One of these texts.
+    /// Choice among texts.
     Choice(&'static [&'static str]),
-    /// A list of texts.
+    /// List of texts.
     TextList,
-    /// A list of finite numbers.
+    /// List of finite numbers.
     NumberList {
-        /// Fewest numbers.
+        /// Minimum length.
         min_len: usize,
-        /// Most numbers.
+        /// Maximum length.
         max_len: usize,
     },
 }
 
-/// A default value that can stand in a constant.
+/// Default value in the constant schema table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DefaultValue {
-    /// For [`Kind::Number`].
+    /// Default of a [`ParameterKind::Number`].
     Number(f64),
-    /// For [`Kind::Integer`].
+    /// Default of a [`ParameterKind::Integer`].
     Integer(i64),
-    /// For [`Kind::Flag`].
+    /// Default of a [`ParameterKind::Flag`].
     Flag(bool),
-    /// For [`Kind::Text`] and [`Kind::Choice`].
+    /// Default of a [`ParameterKind::Text`] or [`ParameterKind::Choice`].
     Text(&'static str),
 }
 
@@ -62,88 +63,90 @@ impl From<DefaultValue> for Value {
     }
 }
 
-/// What happens when a parameter is left out.
+/// Handling of an omitted parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Presence {
-    /// The machine is refused.
+    /// The machine is rejected without it.
     Required,
-    /// It has no value; the description says what that means.
+    /// It has no value; the description states the effect.
     Optional,
-    /// It has this value.
+    /// It has this default.
     Default(DefaultValue),
 }
 
-/// To whom a parameter belongs.
+/// Owner of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
-    /// The machine; the key stands as it is.
+    /// Machine; the key has no prefix.
     Machine,
-    /// Each axis; the key stands behind the name of the joint and a dot.
+    /// Axis; the key is prefixed with the joint name and a dot.
     Axis,
-    /// The node; the key stands as it is.
+    /// Node; the key has no prefix.
     Node,
 }
 
-/// Kind of motor that drives an axis.
+/// Type of the motor of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MotorKind {
-    /// Torque, inertia, rad.
-    Rotating,
-    /// Force, mass, m: a linear axis with `transmission.direct`.
+    /// Rotary motor: torque, inertia, rad.
+    Rotary,
+    /// Linear motor: force, mass, m; on linear axes with `transmission.direct`.
     Linear,
 }
 
-/// One row of the schema.
+/// Definition of a parameter: one row of the schema.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Definition {
-    /// Key, for an axis without the name of the joint: `motor.inertia_kg_m2`.
+pub struct ParameterDefinition {
+    /// Key; for axis parameters without the joint name: `motor.inertia_kg_m2`.
     pub key: &'static str,
-    /// Unit as text; empty where there is none.
+    /// Unit, empty if dimensionless.
     pub unit: &'static str,
-    /// Kind and range.
-    pub kind: Kind,
-    /// Default, or whether it can be left out.
+    /// Type and range.
+    pub kind: ParameterKind,
+    /// Required, optional or default.
     pub presence: Presence,
-    /// Whether it can be set while the axes run.
-    pub live: bool,
-    /// Machine, axis or node.
+    /// True if settable at run time.
+    pub is_live: bool,
+    /// Owner.
     pub scope: Scope,
-    /// The kind of axis that has it; `None`: both.
+    /// Type of axis that has the parameter; `None` for both types.
     pub axis: Option<AxisKind>,
-    /// The kind of motor that has it; `None`: both.
+    /// Type of motor that has the parameter; `None` for both types.
     pub motor: Option<MotorKind>,
-    /// One sentence.
+    /// Description, one sentence.
     pub description: &'static str,
 }
 
-impl Definition {
-    /// What is allowed, as a verb phrase after "must": `lie in 1e-9 … 1e3 kg·m²`.
+impl ParameterDefinition {
+    /// Returns the allowed values as a verb phrase after "must": `lie in 1e-9 … 1e3 kg·m²`.
     pub fn allowed(&self) -> String {
         match self.kind {
-            Kind::Flag => "be true or false".to_owned(),
-            Kind::Text => "be a text".to_owned(),
-            Kind::TextList => "be a list of texts".to_owned(),
-            Kind::Choice(choices) => format!("be {}", choices.join(" or ")),
-            Kind::NumberList { min_len, max_len } => {
+            ParameterKind::Flag => "be true or false".to_owned(),
+            ParameterKind::Text => "be a text".to_owned(),
+            ParameterKind::TextList => "be a list of texts".to_owned(),
+            ParameterKind::Choice(choices) => format!("be {}", choices.join(" or ")),
+            ParameterKind::NumberList { min_len, max_len } => {
                 format!("be a list of {min_len} … {max_len} finite numbers")
             }
-            Kind::Number { .. } | Kind::Integer { .. } => format!("lie in {}", self.range()),
+            ParameterKind::Number { .. } | ParameterKind::Integer { .. } => {
+                format!("lie in {}", self.range())
+            }
         }
     }
 
-    /// The range with its unit, or the choices: `1e-9 … 1e3 kg·m²`, `real, fast`, `1 … 32 numbers in s⁻¹`.
+    /// Returns the range with its unit, or the choices: `1e-9 … 1e3 kg·m²`, `real, fast`, `1 … 32 numbers in s⁻¹`.
     pub fn range(&self) -> String {
         let (min, max) = match self.kind {
-            Kind::Number { min, max } => (number_text(min), number_text(max)),
-            Kind::Integer { min, max } => (min.to_string(), max.to_string()),
-            Kind::Flag => return "true, false".to_owned(),
-            Kind::Text => return "text".to_owned(),
-            Kind::TextList => return "list of texts".to_owned(),
-            Kind::Choice(choices) => return choices.join(", "),
-            Kind::NumberList { min_len, max_len } if self.unit.is_empty() => {
+            ParameterKind::Number { min, max } => (number_text(min), number_text(max)),
+            ParameterKind::Integer { min, max } => (min.to_string(), max.to_string()),
+            ParameterKind::Flag => return "true, false".to_owned(),
+            ParameterKind::Text => return "text".to_owned(),
+            ParameterKind::TextList => return "list of texts".to_owned(),
+            ParameterKind::Choice(choices) => return choices.join(", "),
+            ParameterKind::NumberList { min_len, max_len } if self.unit.is_empty() => {
                 return format!("{min_len} … {max_len} numbers");
             }
-            Kind::NumberList { min_len, max_len } => {
+            ParameterKind::NumberList { min_len, max_len } => {
                 return format!("{min_len} … {max_len} numbers in {}", self.unit);
             }
         };
@@ -154,7 +157,7 @@ impl Definition {
         }
     }
 
-    /// The default as a value.
+    /// Returns the default value.
     pub fn default_value(&self) -> Option<Value> {
         match self.presence {
             Presence::Default(value) => Some(value.into()),
@@ -162,57 +165,57 @@ impl Definition {
         }
     }
 
-    /// What a missing parameter would be: description, and unit where there is one.
-    pub(super) fn wanted(&self) -> String {
+    /// Returns description and range, for messages about a missing parameter.
+    pub(super) fn description_with_range(&self) -> String {
         format!("{} ({})", self.description.trim_end_matches('.'), self.range())
     }
 
-    /// Whether an axis of these kinds has the parameter.
+    /// Returns true if an axis of these types has the parameter.
     pub fn applies_to(&self, axis: AxisKind, motor: MotorKind) -> bool {
-        self.axis.is_none_or(|wanted| wanted == axis) && self.motor.is_none_or(|wanted| wanted == motor)
+        self.axis.is_none_or(|own| own == axis) && self.motor.is_none_or(|own| own == motor)
     }
 
-    /// `value` as this parameter holds it (an integer becomes a number where one is wanted).
+    /// Checks `value` and returns it in the type of this parameter: an integer for a number parameter becomes a number.
     ///
     /// # Errors
     ///
-    /// [`ConfigError::WrongKind`] and [`ConfigError::NotAllowed`], with `key` and `at`.
-    pub(super) fn checked(&self, key: &str, value: &Value, at: &Source) -> Result<Value, ConfigError> {
-        let kept = match (self.kind, value) {
-            (Kind::Number { min, max }, Value::Double(_) | Value::Integer(_)) => {
+    /// [`ConfigError::WrongType`] for a value of another type, [`ConfigError::NotAllowed`] for a value out of range.
+    pub(super) fn checked(&self, key: &str, value: &Value, at: &ValueSource) -> Result<Value, ConfigError> {
+        let checked = match (self.kind, value) {
+            (ParameterKind::Number { min, max }, Value::Double(_) | Value::Integer(_)) => {
                 let number = match value {
                     Value::Integer(integer) => *integer as f64,
                     Value::Double(number) => *number,
                     _ => f64::NAN,
                 };
-                // NaN lies in no range.
+                // NaN is in no range.
                 (min..=max).contains(&number).then_some(Value::Double(number))
             }
-            (Kind::Integer { min, max }, Value::Integer(integer)) => {
+            (ParameterKind::Integer { min, max }, Value::Integer(integer)) => {
                 (min..=max).contains(integer).then_some(Value::Integer(*integer))
             }
-            (Kind::Choice(choices), Value::Text(text)) => {
+            (ParameterKind::Choice(choices), Value::Text(text)) => {
                 choices.contains(&text.as_str()).then(|| value.clone())
             }
-            (Kind::NumberList { min_len, max_len }, list) if list.numbers().is_some() => list
+            (ParameterKind::NumberList { min_len, max_len }, list) if list.numbers().is_some() => list
                 .numbers()
                 .filter(|numbers| {
                     (min_len..=max_len).contains(&numbers.len()) && numbers.iter().all(|n| n.is_finite())
                 })
                 .map(Value::DoubleList),
-            (Kind::Flag, Value::Bool(_))
-            | (Kind::Text, Value::Text(_))
-            | (Kind::TextList, Value::TextList(_)) => Some(value.clone()),
+            (ParameterKind::Flag, Value::Bool(_))
+            | (ParameterKind::Text, Value::Text(_))
+            | (ParameterKind::TextList, Value::TextList(_)) => Some(value.clone()),
             _ => {
-                return Err(ConfigError::WrongKind {
+                return Err(ConfigError::WrongType {
                     at: at.clone(),
                     key: shortened(key),
                     found: value.described(),
-                    wanted: self.wanted_kind(),
+                    wanted: self.expected_type(),
                 });
             }
         };
-        kept.ok_or_else(|| ConfigError::NotAllowed {
+        checked.ok_or_else(|| ConfigError::NotAllowed {
             at: at.clone(),
             key: shortened(key),
             value: shortened(&value.to_string()),
@@ -220,30 +223,30 @@ impl Definition {
         })
     }
 
-    fn wanted_kind(&self) -> String {
+    fn expected_type(&self) -> String {
         match self.kind {
-            Kind::Number { .. } => "number".to_owned(),
-            Kind::Integer { .. } => "integer".to_owned(),
-            Kind::Flag => "true or false".to_owned(),
-            // A bare 12 or true is no text in YAML.
-            Kind::Text => "text (in quotation marks)".to_owned(),
-            Kind::Choice(choices) => choices.join(" or "),
-            Kind::TextList => "list of texts".to_owned(),
-            Kind::NumberList { .. } => "list of numbers".to_owned(),
+            ParameterKind::Number { .. } => "number".to_owned(),
+            ParameterKind::Integer { .. } => "integer".to_owned(),
+            ParameterKind::Flag => "true or false".to_owned(),
+            // Without quotation marks, 12 and true are not texts in YAML.
+            ParameterKind::Text => "text (in quotation marks)".to_owned(),
+            ParameterKind::Choice(choices) => choices.join(" or "),
+            ParameterKind::TextList => "list of texts".to_owned(),
+            ParameterKind::NumberList { .. } => "list of numbers".to_owned(),
         }
     }
 }
 
-/// Builders for the constant table: each returns the definition with one thing changed.
-impl Definition {
-    /// A required machine key that is not live.
-    pub(super) const fn new(key: &'static str, unit: &'static str, kind: Kind) -> Self {
+/// Builder methods for the constant schema table; each changes one property.
+impl ParameterDefinition {
+    /// Creates a required machine parameter that is not settable at run time.
+    pub(super) const fn new(key: &'static str, unit: &'static str, kind: ParameterKind) -> Self {
         Self {
             key,
             unit,
             kind,
             presence: Presence::Required,
-            live: false,
+            is_live: false,
             scope: Scope::Machine,
             axis: None,
             motor: None,
@@ -252,7 +255,7 @@ impl Definition {
     }
 
     pub(super) const fn number(key: &'static str, unit: &'static str, min: f64, max: f64) -> Self {
-        Self::new(key, unit, Kind::Number { min, max })
+        Self::new(key, unit, ParameterKind::Number { min, max })
     }
 
     pub(super) const fn of_axis(mut self) -> Self {
@@ -286,11 +289,11 @@ impl Definition {
     }
 
     pub(super) const fn live(mut self) -> Self {
-        self.live = true;
+        self.is_live = true;
         self
     }
 
-    pub(super) const fn is(mut self, description: &'static str) -> Self {
+    pub(super) const fn describe(mut self, description: &'static str) -> Self {
         self.description = description;
         self
     }

@@ -1,54 +1,54 @@
-//! What is wrong with a machine file or a parameter: where, which key, what was found, what is allowed.
+//! Errors of machine files and parameters, with position, key, value found and allowed range.
 
 use std::fmt;
 use std::sync::Arc;
 
 use thiserror::Error;
 
-/// Where a value comes from; the first words of an error message.
+use crate::text::nearest_hint;
+
+/// Origin of a value; error messages begin with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Source {
-    /// A parameter file, and the line in it where there is one.
+pub enum ValueSource {
+    /// Parameter file.
     File {
-        /// Name of the file as the user wrote it.
+        /// Path as given by the user.
         name: Arc<str>,
-        /// Line, counted from 1.
+        /// Line, from 1.
         line: Option<u64>,
     },
-    /// Anything else: an option of the command line, a service call.
+    /// Any other origin, such as a command line option or a service call.
     Named(Arc<str>),
 }
 
-impl Source {
-    /// A file as a whole.
+impl ValueSource {
+    /// Returns the source for a whole file.
     pub fn file(name: &str) -> Self {
         Self::File { name: name.into(), line: None }
     }
 
-    /// An option of the command line or a service, by its name.
+    /// Returns the source for a command line option or a service, by its name.
     pub fn named(name: &str) -> Self {
         Self::Named(name.into())
     }
 
-    /// The same file at `line`; what is not a file has no lines and stays as it is.
+    /// Returns the source with its line set to `line`, or to none if `line` is 0. Only files have lines.
     pub fn at_line(&self, line: u64) -> Self {
         match self {
-            Self::File { name, .. } => Self::File {
-                name: Arc::clone(name),
-                // The YAML reader says 0 where it does not know.
-                line: (line > 0).then_some(line),
-            },
+            Self::File { name, .. } => {
+                Self::File { name: Arc::clone(name), line: (line > 0).then_some(line) }
+            }
             Self::Named(_) => self.clone(),
         }
     }
 
-    /// The same source without its line.
+    /// Returns the source without its line.
     pub(super) fn whole(&self) -> Self {
         self.at_line(0)
     }
 }
 
-impl fmt::Display for Source {
+impl fmt::Display for ValueSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File { name, line: Some(line) } => write!(f, "{name}:{line}"),
@@ -58,138 +58,112 @@ impl fmt::Display for Source {
     }
 }
 
-/// A refused machine file or parameter; its text is one line for the user.
+/// Rejection of a machine file or a parameter. The text is one line.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// The file cannot be read, or is not text.
+    /// Unreadable file, or a file that is not UTF-8 text.
     #[error("{path}: cannot be read: {reason}")]
     Unreadable {
-        /// The file as the user wrote it.
+        /// Path as given by the user.
         path: String,
-        /// What the operating system says.
+        /// Error of the operating system.
         reason: String,
     },
-    /// No machine of that name is shipped.
-    #[error("no machine {name} is shipped; there are {known}")]
+    /// Name of no built-in machine.
+    #[error("unknown machine {name}; built-in machines: {known}")]
     UnknownMachine {
-        /// Name that was asked for.
+        /// Requested name.
         name: String,
-        /// The names that there are, with commas.
+        /// Names of the built-in machines, separated by commas.
         known: String,
     },
-    /// The text is not YAML, or a key stands twice in one mapping.
-    #[error("{at}: {message}")]
+    /// Invalid YAML, or a duplicate key in a mapping.
+    #[error("{at}: invalid YAML: {reason}")]
     Syntax {
-        /// Where.
-        at: Source,
-        /// What the YAML reader says.
-        message: String,
+        /// Position.
+        at: ValueSource,
+        /// Error of the YAML reader.
+        reason: String,
     },
-    /// Good YAML, but not a ROS 2 parameter file.
+    /// Valid YAML, but not a ROS 2 parameter file.
     #[error("{at}: not a ROS 2 parameter file: {reason}")]
     NotAParameterFile {
-        /// Where.
-        at: Source,
-        /// What is missing.
+        /// Position.
+        at: ValueSource,
+        /// Reason.
         reason: String,
     },
-    /// An assignment without `=`.
-    #[error("{at}: {text}: KEY=VALUE wanted")]
+    /// Assignment without `=`.
+    #[error("{at}: expected KEY=VALUE, found {text}")]
     NotAnAssignment {
-        /// Where.
-        at: Source,
-        /// What was found.
+        /// Position.
+        at: ValueSource,
+        /// Text found.
         text: String,
     },
-    /// One parameter stands twice, nested and flat.
-    #[error("{at}: {key} is set a second time; the first is {first}")]
+    /// Parameter that a section sets twice, nested and flat.
+    #[error("{at}: duplicate parameter {key}, first set at {first}")]
     Duplicate {
-        /// Where the second stands.
-        at: Source,
+        /// Position of the second value.
+        at: ValueSource,
         /// Full key.
         key: String,
-        /// Where the first stands.
-        first: Source,
+        /// Position of the first value.
+        first: ValueSource,
     },
-    /// No such parameter.
-    #[error("{at}: unknown parameter {key}{}", nearest_text(.nearest))]
+    /// Unknown parameter.
+    #[error("{at}: unknown parameter {key}{}", nearest_hint(.nearest))]
     UnknownKey {
-        /// Where.
-        at: Source,
-        /// Key as found.
+        /// Position.
+        at: ValueSource,
+        /// Key found.
         key: String,
-        /// The known key that looks most like it.
+        /// Most similar known key.
         nearest: Option<String>,
     },
-    /// The parameter exists, but not for this joint.
+    /// Parameter that this joint does not have.
     #[error("{at}: {key} does not apply: {reason}")]
     NotApplicable {
-        /// Where.
-        at: Source,
+        /// Position.
+        at: ValueSource,
         /// Full key.
         key: String,
-        /// Why, with the values that decide it.
+        /// Reason, with the values that decide it.
         reason: String,
     },
-    /// A required parameter is not there.
+    /// Missing required parameter.
     #[error("{at}: {key} is missing: {wanted}")]
     Missing {
-        /// File or setter.
-        at: Source,
+        /// Origin of the parameters.
+        at: ValueSource,
         /// Full key.
         key: String,
-        /// What it is, with its unit.
+        /// Description and range.
         wanted: String,
     },
-    /// A value of the wrong kind.
-    #[error("{at}: {key}: found {found}, {wanted} wanted")]
-    WrongKind {
-        /// Where.
-        at: Source,
+    /// Value of the wrong type.
+    #[error("{at}: {key}: found {found}, expected {wanted}")]
+    WrongType {
+        /// Position.
+        at: ValueSource,
         /// Full key.
         key: String,
-        /// Kind and value found.
+        /// Type and value found.
         found: String,
-        /// Kind wanted.
+        /// Expected type.
         wanted: String,
     },
-    /// A value outside its range, not one of the choices, or at odds with another parameter.
+    /// Value out of range, not among the choices, or inconsistent with another parameter.
     #[error("{at}: {key} = {value}: must {allowed}")]
     NotAllowed {
-        /// Where.
-        at: Source,
+        /// Position.
+        at: ValueSource,
         /// Full key.
         key: String,
-        /// Value found.
+        /// Value.
         value: String,
-        /// What is allowed, after "must".
+        /// Requirement, a verb phrase after "must".
         allowed: String,
     },
-}
-
-fn nearest_text(nearest: &Option<String>) -> String {
-    match nearest {
-        Some(key) => format!("; the nearest known one is {key}"),
-        None => String::new(),
-    }
-}
-
-/// Longest text from outside that a message repeats, characters.
-const QUOTED_LENGTH: usize = 120;
-
-/// `text` on one line, cut to a length that fits in a message.
-pub fn shortened(text: &str) -> String {
-    let mut out: String = text.chars().take(QUOTED_LENGTH).collect();
-    if out.len() < text.len() {
-        out.push('…');
-    }
-    out.replace(breaks_line, " ")
-}
-
-/// Whether a terminal or an editor would do more with `c` than to show it: control characters, line and paragraph
-/// separators, and what marks or turns the direction of writing.
-pub fn breaks_line(c: char) -> bool {
-    let marks = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}');
-    marks || c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

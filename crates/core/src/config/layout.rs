@@ -1,34 +1,31 @@
-//! Which parameters a machine with given joints has, and what an unknown key was meant to be.
+//! Parameters of a machine with given joints, and suggestions for unknown keys.
 
-use super::definition::{Definition, MotorKind, Scope};
-use super::error::{ConfigError, Source, shortened};
+use super::definition::{MotorKind, ParameterDefinition, Scope};
+use super::error::{ConfigError, ValueSource};
 use super::machine::AxisKind;
 use super::schema::DEFINITIONS;
+use crate::text::{nearest_name, shortened};
 
-/// First parts of names in ROS parameter files that are in no row of the schema, and no joint's either.
+/// Key prefixes of ROS parameter files that are not in the schema and that no joint may have as a name.
 const RESERVED: &[&str] = &["qos_overrides", "ros__parameters"];
-/// Similarity (Jaro-Winkler) below which a known key is no help.
-const NEAR_ENOUGH: f64 = 0.7;
-/// Longest key for which a similar one is looked up, characters.
-const KEY_LENGTH: usize = 120;
 
-/// One joint and what decides about its parameters.
+/// Joint with the axis and motor types that determine its parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Joint {
+pub(super) struct JointVariant {
     pub name: String,
     pub axis: AxisKind,
     pub motor: MotorKind,
 }
 
-/// The joints of a machine, in order.
+/// Joints of a machine, in order.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct Layout {
-    pub joints: Vec<Joint>,
+pub(super) struct ParameterLayout {
+    pub joints: Vec<JointVariant>,
 }
 
-impl Layout {
-    /// Every parameter of this machine with its full key: machine, axes, node.
-    pub fn definitions(&self) -> impl Iterator<Item = (String, &'static Definition)> + '_ {
+impl ParameterLayout {
+    /// Returns full keys and definitions of all parameters of this machine: machine, axes, node.
+    pub fn definitions(&self) -> impl Iterator<Item = (String, &'static ParameterDefinition)> + '_ {
         let plain = |scope: Scope| {
             DEFINITIONS
                 .iter()
@@ -43,8 +40,8 @@ impl Layout {
         plain(Scope::Machine).chain(axes).chain(plain(Scope::Node))
     }
 
-    /// The definition of the full key `key` on this machine.
-    pub fn find(&self, key: &str, at: &Source) -> Result<&'static Definition, ConfigError> {
+    /// Returns the definition of the full key `key` on this machine.
+    pub fn find(&self, key: &str, at: &ValueSource) -> Result<&'static ParameterDefinition, ConfigError> {
         if let Some(definition) = plain_definition(key) {
             return Ok(definition);
         }
@@ -62,15 +59,15 @@ impl Layout {
                 Some(definition) => ConfigError::NotApplicable {
                     at: at.clone(),
                     key: key.to_owned(),
-                    reason: joint.why_not(definition),
+                    reason: joint.exclusion_reason(definition),
                 },
                 None => self.unknown(key, at),
             }
         })
     }
 
-    /// Refuses a key that no machine with these joints, of whatever type, can have.
-    pub fn check_name(&self, key: &str, at: &Source) -> Result<(), ConfigError> {
+    /// Rejects a key that is unknown for machines with these joints, of any type.
+    pub fn check_name(&self, key: &str, at: &ValueSource) -> Result<(), ConfigError> {
         let known = plain_definition(key).is_some()
             || key.split_once('.').is_some_and(|(name, suffix)| {
                 self.joints.iter().any(|joint| joint.name == name)
@@ -97,26 +94,18 @@ impl Layout {
         format!("[{}]", names.join(", "))
     }
 
-    fn unknown(&self, key: &str, at: &Source) -> ConfigError {
-        let nearest = (key.chars().count() <= KEY_LENGTH)
-            .then(|| {
-                self.definitions()
-                    .map(|(known, _)| (strsim::damerau_levenshtein(key, &known), known))
-                    .min_by_key(|(distance, _)| *distance)
-            })
-            .flatten()
-            .filter(|(_, known)| strsim::jaro_winkler(key, known) >= NEAR_ENOUGH);
+    fn unknown(&self, key: &str, at: &ValueSource) -> ConfigError {
         ConfigError::UnknownKey {
             at: at.clone(),
             key: shortened(key),
-            nearest: nearest.map(|(_, known)| known),
+            nearest: nearest_name(key, self.definitions().map(|(known, _)| known)),
         }
     }
 }
 
-impl Joint {
-    /// Why this joint has no parameter `definition`.
-    fn why_not(&self, definition: &Definition) -> String {
+impl JointVariant {
+    /// Returns the reason why this joint does not have the parameter `definition`.
+    fn exclusion_reason(&self, definition: &ParameterDefinition) -> String {
         let name = &self.name;
         match (definition.axis, definition.motor) {
             (Some(AxisKind::Linear), _) if self.axis == AxisKind::Rotary => {
@@ -126,43 +115,43 @@ impl Joint {
                 format!("it is for rotary axes, and {name}.type = linear")
             }
             (_, Some(MotorKind::Linear)) => format!(
-                "it is for linear motors; {name} has a rotating one (a linear axis has a linear \
-                 motor where {name}.transmission.direct = true)"
+                "it is for linear motors, and {name} has a rotary motor (a linear axis has a linear motor if \
+                 {name}.transmission.direct = true)"
             ),
             _ => format!(
-                "it is for rotating motors, and {name}.transmission.direct = true makes {name} a \
-                 linear motor"
+                "it is for rotary motors, and {name} has a linear motor, since {name}.transmission.direct = \
+                 true"
             ),
         }
     }
 }
 
-/// Definitions that stand behind a joint's name.
-fn axis_definitions() -> impl Iterator<Item = &'static Definition> {
+/// Returns the definitions of axis parameters.
+fn axis_definitions() -> impl Iterator<Item = &'static ParameterDefinition> {
     DEFINITIONS.iter().filter(|definition| definition.scope == Scope::Axis)
 }
 
-/// The machine's or node's definition of that key.
-pub(super) fn plain_definition(key: &str) -> Option<&'static Definition> {
+/// Returns the definition of the machine or node parameter `key`.
+pub(super) fn plain_definition(key: &str) -> Option<&'static ParameterDefinition> {
     DEFINITIONS.iter().find(|definition| definition.scope != Scope::Axis && definition.key == key)
 }
 
-/// What `joints` must do for `name` to be in it, when it is not allowed.
-pub(super) fn refused_joint_name(name: &str) -> Option<String> {
+/// Returns the requirement that the joint name `name` violates, a verb phrase after "must".
+pub(super) fn joint_name_violation(name: &str) -> Option<String> {
     let mut characters = name.chars();
     let valid = characters.next().is_some_and(|c| c.is_ascii_alphabetic())
         && characters.all(|c| c.is_ascii_alphanumeric() || c == '_');
     if !valid {
         return Some(format!(
-            "hold names of letters, digits and _ that begin with a letter, not \"{}\"",
+            "contain names of letters, digits and _ that begin with a letter, found \"{}\"",
             shortened(name)
         ));
     }
-    let taken = DEFINITIONS
+    let is_reserved = DEFINITIONS
         .iter()
         .filter(|definition| definition.scope != Scope::Axis)
         .filter_map(|definition| definition.key.split('.').next())
         .chain(RESERVED.iter().copied())
-        .any(|taken| taken == name);
-    taken.then(|| format!("not hold {name}, the name of another parameter"))
+        .any(|reserved| reserved == name);
+    is_reserved.then(|| format!("not contain {name}, the name of a parameter"))
 }

@@ -1,21 +1,21 @@
-//! The schema as a table, for people and for the README.
+//! Parameter table as text and as Markdown for the README.
 
 use std::fmt::Write;
 
-use super::definition::{Definition, MotorKind, Presence, Scope};
+use super::definition::{MotorKind, ParameterDefinition, Presence, Scope};
 use super::machine::AxisKind;
 use super::schema::DEFINITIONS;
 
-/// Column headings of both tables.
+/// Column headings.
 const HEADINGS: [&str; 6] = ["key", "range", "default", "live", "for", "description"];
 
-/// Every parameter as a row: key (`<joint>` for the name of an axis), range with unit, default,
-/// whether it can be set while running, what has it, description.
+/// Returns a row per parameter: key (with `<joint>` for the joint name), range with unit, default, settable at run time,
+/// owner, description.
 pub fn rows() -> Vec<[String; 6]> {
     DEFINITIONS.iter().map(row).collect()
 }
 
-fn row(definition: &Definition) -> [String; 6] {
+fn row(definition: &ParameterDefinition) -> [String; 6] {
     let key = match definition.scope {
         Scope::Axis => format!("<joint>.{}", definition.key),
         Scope::Machine | Scope::Node => definition.key.to_owned(),
@@ -34,31 +34,31 @@ fn row(definition: &Definition) -> [String; 6] {
         (_, Some(AxisKind::Linear), _) => "linear axis",
         (_, Some(AxisKind::Rotary), _) => "rotary axis",
         (_, _, Some(MotorKind::Linear)) => "linear motor",
-        (_, _, Some(MotorKind::Rotating)) => "rotating motor",
+        (_, _, Some(MotorKind::Rotary)) => "rotary motor",
         (Scope::Axis, None, None) => "axis",
     };
     [
         key,
         definition.range(),
         default,
-        if definition.live { "yes" } else { "no" }.to_owned(),
+        if definition.is_live { "yes" } else { "no" }.to_owned(),
         owner.to_owned(),
         definition.description.to_owned(),
     ]
 }
 
-/// The table in Markdown.
+/// Returns the table in Markdown.
 pub fn markdown() -> String {
     let mut out = format!("| {} |\n", HEADINGS.join(" | "));
     let _ = writeln!(out, "|{}", "---|".repeat(HEADINGS.len()));
     for [key, range, default, live, owner, description] in rows() {
-        // Writing to a String cannot fail.
+        // Writing to a String is infallible.
         let _ = writeln!(out, "| `{key}` | {range} | {default} | {live} | {owner} | {description} |");
     }
     out
 }
 
-/// The table as aligned text.
+/// Returns the table as aligned text.
 pub fn text() -> String {
     let mut rows = rows();
     rows.insert(0, HEADINGS.map(str::to_owned));

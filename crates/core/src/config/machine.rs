@@ -1,14 +1,14 @@
-//! A machine as typed values in SI units.
+//! Machine configuration in SI units.
 //!
-//! The values come out of [`Parameters`](super::Parameters) only, which has checked each against
-//! the schema: a `MachineConfig` that exists is valid.
+//! [`Parameters::machine_config`](super::Parameters::machine_config) returns it, after the parameters were checked against
+//! the schema.
 
 use crate::units::Nanoseconds;
 
-/// How far an axis may overshoot its stroke before that is said, m or rad.
-const OVERSHOOT: f64 = 1e-3;
+/// Tolerance on the travel limits in warnings, m or rad.
+const OVERSHOOT_TOLERANCE: f64 = 1e-3;
 
-/// One machine: its axes and its sampling periods.
+/// Machine: axes, kinematics and sampling periods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MachineConfig {
     pub(crate) name: String,
@@ -17,66 +17,65 @@ pub struct MachineConfig {
     pub(crate) axes: Vec<AxisConfig>,
 }
 
-/// Sampling periods of the three loops; each is an integer multiple of the next (Prévost Appendix 2).
+/// Sampling periods of the three loops, each an integer multiple of the next (Prévost Appendix 2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Periods {
-    /// Tsp, position loop, ns.
+    /// Tsp, period of the position cycle, ns.
     pub position: Nanoseconds,
-    /// Tsv, velocity loop, ns.
+    /// Tsv, period of the velocity cycle, ns.
     pub velocity: Nanoseconds,
-    /// Tsi, current loop, ns: one tick of the simulation.
+    /// Tsi, period of the current cycle, ns.
     pub current: Nanoseconds,
 }
 
 impl Periods {
-    /// Ticks of the current loop in a position period.
+    /// Returns the number of current cycles per position cycle.
     pub fn ticks_per_position(&self) -> u64 {
         (self.position / self.current) as u64
     }
 
-    /// Ticks of the current loop in a velocity period.
+    /// Returns the number of current cycles per velocity cycle.
     pub fn ticks_per_velocity(&self) -> u64 {
         (self.velocity / self.current) as u64
     }
 }
 
-/// Where the parts of the chain workpiece–C–A–X/Y/Z–tool stand: coordinates in m of the machine frame
-/// with every axis at home.
+/// Geometry of the kinematic chain workpiece–C–A–X/Y/Z–tool: coordinates in the machine frame with every axis at home, m.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct KinematicsConfig {
-    /// From the point that X, Y and Z move, which is in the origin at home, down to the tool tip.
+    /// Tool length along −Z, m, from the point moved by X, Y and Z, which is the origin at home.
     pub tool_length: f64,
-    /// (Y, Z) of the line, parallel to X, about which A turns.
+    /// (Y, Z) of the rotation axis of A, which is parallel to X, m.
     pub pivot_a: [f64; 2],
-    /// (X, Y) of the line, parallel to Z while A is at 0, about which C turns.
+    /// (X, Y) of the rotation axis of C, which is parallel to Z while A is at 0, m.
     pub pivot_c: [f64; 2],
-    /// (X, Y, Z) of the workpiece frame's origin.
+    /// Origin of the workpiece frame, m.
     pub workpiece: [f64; 3],
 }
 
-/// Whether an axis counts in meters or in radians.
+/// Type of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AxisKind {
-    /// Position in m.
+    /// Linear axis, position in m.
     Linear,
-    /// Position in rad.
+    /// Rotary axis, position in rad.
     Rotary,
 }
 
-/// One axis, SI units; "motor" quantities are in rad and N·m, or in m and N for a linear motor.
+/// Axis in SI units. Motor quantities are in rad and N·m, or in m and N for a linear motor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisConfig {
-    /// Name of the joint, without prefix.
+    /// Joint name, without prefix.
     pub name: String,
-    /// Linear or rotary.
+    /// Axis type.
     pub kind: AxisKind,
-    /// r: m or rad of the axis per rad (or m) of the motor.
+    /// Transmission ratio r: axis travel (m or rad) per motor travel (rad or m).
     pub transmission_ratio: f64,
-    /// Motor.
+    /// Motor parameters.
     pub motor: MotorConfig,
     /// Friction law.
     pub friction: FrictionConfig,
-    /// Gravity.
+    /// Gravity load.
     pub gravity: GravityConfig,
     /// Position controller.
     pub position_loop: PositionLoopConfig,
@@ -88,104 +87,104 @@ pub struct AxisConfig {
     pub feedforward: FeedforwardConfig,
     /// Setpoint delays.
     pub delays: DelaysConfig,
-    /// Plant deviation from the model that the controllers are designed for.
+    /// Deviation of the plant from the model used in controller design.
     pub deviation: DeviationConfig,
-    /// Limits for trajectories.
+    /// Trajectory limits.
     pub limits: LimitsConfig,
 }
 
-/// A direct-current motor equivalent to the servo motor (Prévost eq. 1).
+/// Equivalent DC motor of the servo motor (Prévost eq. 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorConfig {
-    /// Jeq, kg·m² at the motor (kg for a linear motor).
+    /// Equivalent inertia Jeq at the motor, kg·m² (kg for a linear motor).
     pub inertia: f64,
-    /// Kt, N·m/A (N/A).
+    /// Torque constant Kt, N·m/A (N/A for a linear motor).
     pub torque_constant: f64,
-    /// Ke, V·s/rad (V·s/m).
+    /// Back-EMF constant Ke, V·s/rad (V·s/m for a linear motor).
     pub emf_constant: f64,
-    /// R, Ω.
+    /// Winding resistance R, Ω.
     pub resistance: f64,
-    /// L, H.
+    /// Winding inductance L, H.
     pub inductance: f64,
-    /// Limit of the current setpoint, A.
+    /// Current setpoint limit, A.
     pub max_current: f64,
-    /// Limit of the voltage, V.
+    /// Voltage limit, V.
     pub max_voltage: f64,
-    /// Limit of the velocity setpoint, rad/s (m/s).
+    /// Velocity setpoint limit, rad/s (m/s for a linear motor).
     pub max_speed: f64,
 }
 
-/// Double-exponential friction law (Prévost eq. 3); V is in m/min or rev/min of the axis.
+/// Double-exponential friction law a·exp(b·V) + c·exp(d·V) with V in m/min or rev/min of the axis (Prévost eq. 3).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionConfig {
-    /// a, A.
+    /// Amplitude a, A.
     pub a: f64,
-    /// b, min/m or min/rev.
+    /// Exponent b, min/m or min/rev.
     pub b: f64,
-    /// c, A.
+    /// Amplitude c, A.
     pub c: f64,
-    /// d, min/m or min/rev.
+    /// Exponent d, min/m or min/rev.
     pub d: f64,
-    /// i0, breakaway current, A.
+    /// Breakaway current i0, A.
     pub i0: f64,
 }
 
-/// C_gravity = r (weight + tilt sin(position + phase)).
+/// Gravity torque at the motor, r·(weight + tilt·sin(position + phase)).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GravityConfig {
-    /// W, N (N·m on a rotary axis).
+    /// Net weight W, N.
     pub weight: f64,
-    /// k, N·m.
+    /// Torque amplitude k of a tilting axis, N·m.
     pub tilt: f64,
-    /// φ, rad.
+    /// Phase φ of a tilting axis, rad.
     pub phase: f64,
 }
 
-/// Position controller.
+/// Position loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionLoopConfig {
-    /// Kp of the proportional law, s⁻¹: the cascade's, and that which holds the axis at rest.
+    /// Proportional gain Kp of the cascade and of the fallback controller at rest, s⁻¹.
     pub gain: f64,
-    /// Which controller.
+    /// Position controller.
     pub controller: PositionControllerConfig,
-    /// Whether an unstable closed loop is accepted.
+    /// True if an unstable closed loop is accepted.
     pub allow_unstable: bool,
 }
 
-/// The position controllers that there are.
+/// Type and parameters of a position controller.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PositionControllerConfig {
-    /// Proportional, with velocity and torque feedforward (Prévost fig. 3).
+    /// Proportional controller with velocity and torque feedforward (Prévost fig. 3).
     Cascade,
     /// Generalized predictive control in RST form (Prévost section 5).
     Gpc(GpcConfig),
-    /// Any linear controller, by its polynomials (Prévost eq. 9).
+    /// Linear controller given by its polynomials R, S and T (Prévost eq. 9).
     Rst(RstConfig),
 }
 
 /// Tuning of a generalized predictive controller (Prévost table 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GpcConfig {
-    /// N1, first period of the prediction horizon.
+    /// First period N1 of the prediction horizon.
     pub n1: usize,
-    /// N2, last period of the prediction horizon.
+    /// Last period N2 of the prediction horizon.
     pub n2: usize,
-    /// Nu, periods of the control horizon.
+    /// Length Nu of the control horizon, position periods.
     pub nu: usize,
-    /// λ / trace(GᵀG); not used where `lambda` is given.
+    /// Relative control weight λ / trace(GᵀG); unused if `lambda` is set.
     pub lambda_rel: f64,
-    /// λ, weight of the control increments.
+    /// Weight λ of the control increments, s².
     pub lambda: Option<f64>,
 }
 
-/// Polynomials of a linear position controller (Prévost eq. 9), motor units.
+/// Polynomials of an RST position controller in motor units (Prévost eq. 9).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RstConfig {
-    /// R, rising powers of q⁻¹, s⁻¹.
+    /// R in ascending powers of q⁻¹, s⁻¹.
     pub r: Vec<f64>,
-    /// S, rising powers of q⁻¹.
+    /// S in ascending powers of q⁻¹.
     pub s: Vec<f64>,
-    /// T, rising powers of q from `t_first` on, s⁻¹.
+    /// T in ascending powers of q, beginning with `t_first`, s⁻¹.
     pub t: Vec<f64>,
     /// Exponent of q of the first coefficient of T.
     pub t_first: i64,
@@ -194,71 +193,71 @@ pub struct RstConfig {
 /// Gain and integral time of a PI controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PiConfig {
-    /// Kv, N·m/(rad/s), or Ki, V/A.
+    /// Proportional gain: Kv, N·m/(rad/s), or Ki, V/A.
     pub gain: f64,
-    /// Tv or Ti, s.
+    /// Integral time Tv or Ti, s.
     pub integral_time: f64,
 }
 
-/// Weights of the feedforward (Prévost eqs. 6 and 7); zero is off.
+/// Feedforward weights (Prévost eqs. 6 and 7); 0 disables a term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeedforwardConfig {
-    /// VFFW, 1; the cascade's only.
+    /// Velocity feedforward weight VFFW of the cascade.
     pub velocity: f64,
-    /// TFFW, kg·m² at the motor (kg); the cascade's only.
+    /// Torque feedforward weight TFFW of the cascade, kg·m² at the motor (kg for a linear motor).
     pub torque: f64,
-    /// Weight of the friction compensation, 1; of every controller.
+    /// Weight of the friction compensation, for all position controllers.
     pub friction: f64,
 }
 
-/// Delays of the setpoint, ns, before rounding to a tick.
+/// Setpoint delays, before rounding to a multiple of the current period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DelaysConfig {
-    /// α, before the position comparator.
+    /// Delay α of the setpoint before the position comparator, ns.
     pub alpha: Nanoseconds,
-    /// β, behind the velocity feedforward.
+    /// Delay β of the velocity feedforward, ns.
     pub beta: Nanoseconds,
-    /// γ, behind the torque feedforward.
+    /// Delay γ of the torque feedforward, ns.
     pub gamma: Nanoseconds,
-    /// Shift of the friction compensation.
+    /// Delay of the friction compensation, ns.
     pub friction: Nanoseconds,
 }
 
-/// What the plant has that the controllers are not designed for, as factors; 1 is none.
+/// Factors on the plant parameters that controller design and compensation do not include; 1 is no deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviationConfig {
-    /// Of the inertia.
+    /// Factor on the inertia.
     pub inertia: f64,
-    /// Of the friction torque.
+    /// Factor on the friction torque.
     pub friction: f64,
-    /// Of the torque constant.
+    /// Factor on the torque constant.
     pub torque_constant: f64,
 }
 
-/// What trajectories may ask of an axis; m or rad, and seconds.
+/// Limits for trajectories of an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimitsConfig {
-    /// Vmax, m/s or rad/s.
+    /// Velocity limit Vmax, m/s or rad/s.
     pub velocity: f64,
-    /// Amax, m/s² or rad/s².
+    /// Acceleration limit Amax, m/s² or rad/s².
     pub acceleration: f64,
-    /// Jmax, m/s³ or rad/s³.
+    /// Jerk limit Jmax, m/s³ or rad/s³.
     pub jerk: f64,
-    /// Lower end of the stroke, m or rad; −∞ where there is none.
+    /// Lower travel limit, m or rad; −∞ if unlimited.
     pub travel_min: f64,
-    /// Upper end of the stroke, m or rad; +∞ where there is none.
+    /// Upper travel limit, m or rad; +∞ if unlimited.
     pub travel_max: f64,
 }
 
 impl LimitsConfig {
-    /// Whether an axis at `position`, m or rad, has left its travel limits by more than it may overshoot: 1 mm or 1 mrad.
-    pub fn is_left_by(&self, position: f64) -> bool {
-        !(self.travel_min - OVERSHOOT..=self.travel_max + OVERSHOOT).contains(&position)
+    /// Returns true if `position` (m or rad) is more than 1 mm or 1 mrad outside the travel limits.
+    pub fn is_outside_travel(&self, position: f64) -> bool {
+        !(self.travel_min - OVERSHOOT_TOLERANCE..=self.travel_max + OVERSHOOT_TOLERANCE).contains(&position)
     }
 }
 
 impl MachineConfig {
-    /// Returns an unnamed machine with a single axis and default kinematics. The values are not checked against the
+    /// Creates an unnamed machine with a single axis and default kinematics, without checking the values against the
     /// schema: a changed copy of a checked [`AxisConfig`] can be simulated.
     pub fn from_axis(axis: AxisConfig, periods: Periods) -> Self {
         MachineConfig {
@@ -269,49 +268,49 @@ impl MachineConfig {
         }
     }
 
-    /// Name of the machine.
+    /// Returns the name of the machine.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Sampling periods.
+    /// Returns the sampling periods.
     pub fn periods(&self) -> Periods {
         self.periods
     }
 
-    /// Pivots, tool length and workpiece frame.
+    /// Returns pivots, tool length and workpiece frame.
     pub fn kinematics(&self) -> &KinematicsConfig {
         &self.kinematics
     }
 
-    /// Axes, in the order of `joints`.
+    /// Returns the axes in the order of `joints`.
     pub fn axes(&self) -> &[AxisConfig] {
         &self.axes
     }
 }
 
 impl AxisConfig {
-    /// Name of the joint, without prefix.
+    /// Returns the joint name, without prefix.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Linear or rotary.
+    /// Returns the axis type.
     pub fn kind(&self) -> AxisKind {
         self.kind
     }
 
-    /// α, the delay of the setpoint before the position comparator, ns (Prévost fig. 3).
+    /// Returns the delay α of the setpoint before the position comparator, ns (Prévost fig. 3).
     pub fn alpha(&self) -> Nanoseconds {
         self.delays.alpha
     }
 
-    /// The most that the motor exerts at the axis, Kt·imax/r, N or N·m.
-    pub fn largest_effort(&self) -> f64 {
+    /// Returns the maximum motor force or torque at the axis, Kt·imax/r, N or N·m.
+    pub fn max_effort(&self) -> f64 {
         self.motor.torque_constant * self.motor.max_current / self.transmission_ratio
     }
 
-    /// Limits for trajectories.
+    /// Returns the trajectory limits.
     pub fn limits(&self) -> &LimitsConfig {
         &self.limits
     }

@@ -4,12 +4,12 @@
 //! [`MachineConfig`] and [`NodeConfig`] in SI units.
 //!
 //! ```
-//! use virtual_axes::config::{Parameters, Source};
+//! use virtual_axes_core::config::{Parameters, ValueSource};
 //!
 //! let mut parameters = Parameters::embedded_default()?;
-//! parameters.set_text("x.velocity_loop.gain=4.5", &Source::named("--set"))?;
+//! parameters.set_text("x.velocity_loop.gain=4.5", &ValueSource::named("--set"))?;
 //! assert_eq!(parameters.machine_config()?.axes()[0].name(), "x");
-//! # Ok::<(), virtual_axes::config::ConfigError>(())
+//! # Ok::<(), virtual_axes_core::config::ConfigError>(())
 //! ```
 
 mod build;
@@ -26,17 +26,16 @@ mod parameters;
 mod schema;
 mod value;
 mod writer;
-mod yaml;
+mod yaml_tree;
 
 #[cfg(test)]
 mod tests;
 
-pub use definition::{DefaultValue, Definition, Kind, MotorKind, Presence, Scope};
-pub use error::{ConfigError, Source};
-pub use error::{breaks_line, shortened};
+pub use definition::{DefaultValue, MotorKind, ParameterDefinition, ParameterKind, Presence, Scope};
+pub use error::{ConfigError, ValueSource};
 pub use machine::*;
 pub use node::{GoalDefaults, NodeConfig, QosConfig, TimeMode, ToolConfig};
 pub use parameter_file::{Assignment, parse_assignment};
-pub use parameters::{DEFAULT_MACHINE, Overlay, Parameters};
-pub use schema::{DEFINITIONS, MAX_HORIZON, RST_TERMS};
+pub use parameters::{DEFAULT_MACHINE, OverlayReport, Parameters};
+pub use schema::{DEFINITIONS, MAX_HORIZON, MAX_RST_TERMS};
 pub use value::Value;

@@ -1,4 +1,4 @@
-//! The parameters of the node itself, typed.
+//! Node configuration: clock, topics, recording and quality of service.
 
 use std::path::PathBuf;
 
@@ -7,91 +7,91 @@ use super::parameters::Parameters;
 use super::value::Value;
 use crate::units::{DEGREE, MILLIMETER, Nanoseconds, SECOND_NS};
 
-/// A megabyte, bytes.
+/// Bytes in a megabyte.
 const MEGABYTE: u64 = 1_000_000;
 
-/// What the node's clock follows.
+/// Time source of the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TimeMode {
-    /// Real time.
+    /// Wall-clock time.
     Real,
-    /// As fast as the machine and its subscribers can take it; publishes `/clock`.
+    /// Simulated time, as fast as the computer and the subscribers permit; the node publishes `/clock`.
     Fast,
-    /// `/clock` of somebody else (`use_sim_time`).
+    /// Time from the topic `/clock` (`use_sim_time`).
     SimTime,
 }
 
 /// Quality of service of a topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QosConfig {
-    /// Lost samples are sent again.
-    pub reliable: bool,
-    /// Late joiners get the last samples.
-    pub transient_local: bool,
-    /// Samples that are kept.
+    /// True for reliable, false for best effort.
+    pub is_reliable: bool,
+    /// True for transient local, false for volatile.
+    pub is_transient_local: bool,
+    /// Depth of the history (keep last).
     pub depth: usize,
 }
 
 /// Parameters of the node itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeConfig {
-    /// What the clock follows.
+    /// Time source.
     pub time: TimeMode,
-    /// Rate of `joint_states`, Hz; `None` is every position period.
+    /// Publication rate of `joint_states`, Hz; `None` publishes in every position cycle.
     pub publish_rate: Option<f64>,
-    /// Text before the joint names in messages.
+    /// Prefix of the joint names in messages.
     pub joint_prefix: String,
-    /// Time after which a load that is not renewed is zero again, ns.
+    /// Timeout after which an external load returns to zero, ns.
     pub load_timeout: Nanoseconds,
-    /// Largest number of points of a trajectory.
+    /// Maximum number of points of a trajectory.
     pub max_points: usize,
-    /// Whether a trajectory may end with a velocity.
+    /// True if the last point of a trajectory may have a nonzero velocity.
     pub allow_nonzero_velocity_at_trajectory_end: bool,
-    /// Rate of the action's feedback, Hz.
+    /// Rate of the action feedback, Hz.
     pub action_monitor_rate: f64,
-    /// What is published of the tool.
+    /// Tool pose and tool path topics.
     pub tool: ToolConfig,
-    /// The file that the topics are recorded in.
+    /// File for recording the topics; `None` disables recording.
     pub record: Option<PathBuf>,
-    /// The most that it may become, bytes.
+    /// Maximum size of the recording, bytes.
     pub record_max: u64,
 }
 
-/// Tolerances of action goals that name none themselves.
+/// Default tolerances of action goals.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct GoalDefaults {
-    /// Largest error of each axis on the way, m or rad; `None` is any.
+    /// Path tolerance of each axis, m or rad; `None` disables it.
     pub path: Vec<Option<f64>>,
-    /// Likewise at the end.
+    /// Goal tolerance of each axis, m or rad; `None` disables it.
     pub goal: Vec<Option<f64>>,
-    /// How much later than its end a goal may be reached, ns; `None` is any time.
+    /// Goal time tolerance, ns; `None` disables it.
     pub goal_time: Option<Nanoseconds>,
 }
 
-/// What the node publishes of the tool.
+/// Tool pose and tool path topics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToolConfig {
-    /// Frame that poses and paths are given in.
+    /// Frame id of tool poses and paths.
     pub frame: String,
-    /// Rate of the paths, Hz; `None` is never.
+    /// Publication rate of the tool paths, Hz; `None` disables them.
     pub path_rate: Option<f64>,
-    /// Most poses of a path.
+    /// Maximum number of poses of a tool path.
     pub path_length: usize,
 }
 
 impl Parameters {
-    /// Quality of service of a topic, by its own name: `psec`, `motor_currents`; `None` for one that
-    /// the schema does not have.
+    /// Returns the quality of service of a topic, such as `psec` or `motor_currents`; none for a topic that is not in the
+    /// schema.
     pub fn qos(&self, topic: &str) -> Option<QosConfig> {
         let Some(Value::Integer(depth)) = self.get(&format!("qos.{topic}.depth")) else { return None };
         Some(QosConfig {
-            reliable: self.text(&format!("qos.{topic}.reliability")) == "reliable",
-            transient_local: self.text(&format!("qos.{topic}.durability")) == "transient_local",
+            is_reliable: self.text(&format!("qos.{topic}.reliability")) == "reliable",
+            is_transient_local: self.text(&format!("qos.{topic}.durability")) == "transient_local",
             depth: usize::try_from(depth).unwrap_or(1),
         })
     }
 
-    /// The parameters of the node itself.
+    /// Returns the node configuration.
     pub fn node_config(&self) -> NodeConfig {
         let time = if self.flag("use_sim_time") {
             TimeMode::SimTime
@@ -100,7 +100,7 @@ impl Parameters {
         } else {
             TimeMode::Real
         };
-        // Each has a default, so that the fallbacks here are never used.
+        // All of these parameters have defaults; the fallbacks here are unused.
         let number = |key: &str| self.number(key).unwrap_or_default();
         let rate = number("publish_rate");
         let count = |key: &str| match self.get(key) {
@@ -131,9 +131,9 @@ impl Parameters {
         }
     }
 
-    /// Tolerances of action goals that name none themselves, for the axes in the order of `joints`.
+    /// Returns the default tolerances of action goals, for the axes in the order of `joints`.
     pub fn goal_defaults(&self) -> GoalDefaults {
-        // 0 and a key that an axis of this kind does not have are no tolerance.
+        // 0, or a key that does not apply to this type of axis, is no tolerance.
         let positive = |key: &str| self.number(key).ok().filter(|&value| value > 0.0);
         let column = |what: &str| {
             let tolerance = |joint: &String| {

@@ -1,94 +1,94 @@
-//! The part of the schema that is about the node: what it follows, publishes and takes in.
+//! Schema of the node parameters: clock, topics, action, recording and quality of service.
 
 use super::definition::DefaultValue::{Flag, Integer, Number, Text};
-use super::definition::{Definition, Kind};
+use super::definition::{ParameterDefinition, ParameterKind};
 
-/// Whether samples of a topic are repeated until they have arrived.
-const fn qos_reliability(key: &'static str, default: &'static str) -> Definition {
-    Definition::new(key, "", Kind::Choice(&["reliable", "best_effort"]))
+/// Defines the reliability QoS policy of a topic.
+const fn qos_reliability(key: &'static str, default: &'static str) -> ParameterDefinition {
+    ParameterDefinition::new(key, "", ParameterKind::Choice(&["reliable", "best_effort"]))
         .of_node()
         .default(Text(default))
-        .is("Whether lost samples of the topic are sent again.")
+        .describe("Reliability QoS policy of the topic.")
 }
 
-/// Whether a late joiner gets the last samples of a topic.
-const fn qos_durability(key: &'static str, default: &'static str) -> Definition {
-    Definition::new(key, "", Kind::Choice(&["volatile", "transient_local"]))
+/// Defines the durability QoS policy of a topic.
+const fn qos_durability(key: &'static str, default: &'static str) -> ParameterDefinition {
+    ParameterDefinition::new(key, "", ParameterKind::Choice(&["volatile", "transient_local"]))
         .of_node()
         .default(Text(default))
-        .is("Whether late joiners of the topic get its last samples.")
+        .describe("Durability QoS policy of the topic.")
 }
 
-/// How many samples of a topic are kept.
-const fn qos_depth(key: &'static str, default: i64) -> Definition {
-    Definition::new(key, "", Kind::Integer { min: 1, max: 100_000 })
+/// Defines the history depth of a topic.
+const fn qos_depth(key: &'static str, default: i64) -> ParameterDefinition {
+    ParameterDefinition::new(key, "", ParameterKind::Integer { min: 1, max: 100_000 })
         .of_node()
         .default(Integer(default))
-        .is("Samples of the topic that are kept (keep last).")
+        .describe("History depth of the topic (keep last).")
 }
 
-/// Parameters of the node.
-pub(super) const NODE: &[Definition] = &[
-    Definition::new("time", "", Kind::Choice(&["real", "fast"]))
+/// Definitions of the node parameters.
+pub(super) const NODE: &[ParameterDefinition] = &[
+    ParameterDefinition::new("time", "", ParameterKind::Choice(&["real", "fast"]))
         .of_node()
         .default(Text("real"))
-        .is("Pace of the simulation: real time, or as fast as it goes with its own /clock."),
-    Definition::number("publish_rate", "Hz", 0.0, 1e6)
+        .describe("Time source: wall clock, or simulated time as fast as possible, published on /clock."),
+    ParameterDefinition::number("publish_rate", "Hz", 0.0, 1e6)
         .of_node()
         .default(Number(0.0))
-        .is("Rate of joint_states, at most one per position period; 0 is every position period."),
-    Definition::new("joint_prefix", "", Kind::Text)
+        .describe("Publication rate of joint_states, at most one message per position cycle; 0 publishes in every position cycle."),
+    ParameterDefinition::new("joint_prefix", "", ParameterKind::Text)
         .of_node()
         .default(Text(""))
-        .is("Text before the joint names in messages."),
-    Definition::number("load_timeout", "s", 1e-3, 3600.0)
+        .describe("Prefix of the joint names in messages."),
+    ParameterDefinition::number("load_timeout", "s", 1e-3, 3600.0)
         .of_node()
         .default(Number(0.1))
-        .is("Time after which an external load that is not renewed is zero again."),
-    Definition::new("max_points", "", Kind::Integer { min: 1, max: 100_000_000 })
+        .describe("Timeout after which an external load returns to zero."),
+    ParameterDefinition::new("max_points", "", ParameterKind::Integer { min: 1, max: 100_000_000 })
         .of_node()
         .default(Integer(1_000_000))
-        .is("Largest number of points of a trajectory."),
-    Definition::new("allow_nonzero_velocity_at_trajectory_end", "", Kind::Flag)
+        .describe("Maximum number of points of a trajectory."),
+    ParameterDefinition::new("allow_nonzero_velocity_at_trajectory_end", "", ParameterKind::Flag)
         .of_node()
         .default(Flag(false))
         .live()
-        .is("Accept trajectories whose last point has a velocity."),
-    Definition::new("workpiece_frame", "", Kind::Text)
+        .describe("Accept trajectories with a nonzero velocity at the last point."),
+    ParameterDefinition::new("workpiece_frame", "", ParameterKind::Text)
         .of_node()
         .default(Text("workpiece"))
-        .is("Frame that tool poses and paths are given in."),
-    Definition::number("tool_path_rate", "Hz", 0.0, 100.0)
+        .describe("Frame id of tool poses and paths."),
+    ParameterDefinition::number("tool_path_rate", "Hz", 0.0, 100.0)
         .of_node()
         .default(Number(2.0))
-        .is("Rate of the paths of the tool tip while it moves; 0 is never."),
-    Definition::new("tool_path_length", "", Kind::Integer { min: 2, max: 100_000 })
+        .describe("Publication rate of the tool paths during motion; 0 disables them."),
+    ParameterDefinition::new("tool_path_length", "", ParameterKind::Integer { min: 2, max: 100_000 })
         .of_node()
         .default(Integer(2000))
-        .is("Largest number of poses of a path of the tool tip; the oldest are left out."),
-    Definition::number("action_monitor_rate", "Hz", 0.1, 1e6)
+        .describe("Maximum number of poses of a tool path; the oldest are removed."),
+    ParameterDefinition::number("action_monitor_rate", "Hz", 0.1, 1e6)
         .of_node()
         .default(Number(20.0))
-        .is("Rate of the action's feedback by the node's clock, at most one per position period."),
-    Definition::number("goal_time_tolerance", "s", 0.0, 1e6)
+        .describe("Rate of the action feedback in node time, at most one message per position cycle."),
+    ParameterDefinition::number("goal_time_tolerance", "s", 0.0, 1e6)
         .of_node()
         .default(Number(0.0))
         .live()
-        .is("Time behind its end in which an action goal that names none is to be reached; 0 is any."),
-    Definition::new("use_sim_time", "", Kind::Flag).of_node().default(Flag(false)).is("Follow /clock."),
-    Definition::new("record", "", Kind::Text)
+        .describe("Default goal time tolerance of action goals; 0 disables it."),
+    ParameterDefinition::new("use_sim_time", "", ParameterKind::Flag).of_node().default(Flag(false)).describe("Use the time of the topic /clock."),
+    ParameterDefinition::new("record", "", ParameterKind::Text)
         .of_node()
         .default(Text(""))
-        .is("MCAP file that all topics of the node are recorded in; it must not exist; empty is none."),
-    Definition::new("record_max_mb", "MB", Kind::Integer { min: 1, max: 1_000_000 })
+        .describe("MCAP file for recording all topics of the node; it must not exist; empty disables recording."),
+    ParameterDefinition::new("record_max_mb", "MB", ParameterKind::Integer { min: 1, max: 1_000_000 })
         .of_node()
         .default(Integer(1024))
-        .is("Size at which the recording is closed; the axes go on."),
+        .describe("Maximum size of the recording, which is closed there; the axes continue."),
     // Quality of service.
     qos_reliability("qos.psec.reliability", "reliable"),
     qos_durability("qos.psec.durability", "volatile"),
     qos_depth("qos.psec.depth", 64),
-    // As ros2_control's topic-based hardware publishes; it sends the last setpoint of a move once.
+    // Matches the publisher of ros2_control's topic-based hardware, which sends the last setpoint of a move only once.
     qos_reliability("qos.psec_stream.reliability", "reliable"),
     qos_durability("qos.psec_stream.durability", "volatile"),
     qos_depth("qos.psec_stream.depth", 10),

@@ -1,53 +1,58 @@
-//! ROS 2 parameter files: sections by node name, flattened to dotted keys.
+//! Parser of ROS 2 parameter files: sections by node name, flattened to dotted keys.
 
 use std::collections::HashMap;
 
 use serde_saphyr::Spanned;
 
-use super::error::{ConfigError, Source, shortened};
+use super::error::{ConfigError, ValueSource};
 use super::value::Value;
-use super::yaml::{Node, parse};
+use super::yaml_tree::{YamlNode, parse};
+use crate::text::shortened;
 
-/// The key under which a node's parameters stand.
+/// Key above the parameters of a node.
 const PARAMETERS_KEY: &str = "ros__parameters";
-/// How a parameter file begins, for messages.
-const BEGINNING: &str = "a file begins with `/**:`, below it `ros__parameters:`, below that the keys";
+/// Expected structure of a parameter file, for messages.
+const EXPECTED: &str = "expected `/**:`, nested in it `ros__parameters:`, nested in that the parameters";
 
-/// One parameter to set, and where that was asked for.
+/// Parameter to set, with the origin of its value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assignment {
     /// Full dotted key.
     pub key: String,
-    /// Value, not yet checked.
+    /// Unchecked value.
     pub value: Value,
-    /// Where it comes from.
-    pub source: Source,
+    /// Origin of the value.
+    pub source: ValueSource,
 }
 
-/// What a parameter file holds for one node.
+/// Parameters of a file for one node.
 pub(super) struct ParameterFile {
-    /// In the order of the file; a key can come again from a later section, which wins.
+    /// Parameters in the order of the file. A later section can set a key again and takes precedence.
     pub assignments: Vec<Assignment>,
-    /// Names of the sections that are for other nodes.
+    /// Names of the sections for other nodes.
     pub skipped: Vec<String>,
-    /// Number of sections that are for this node.
+    /// Number of sections for this node.
     pub matched: usize,
 }
 
-/// Reads the parameters that `text` holds for the node `node` (fully qualified, `/ns/name`).
-/// `None` stands for no node in particular: the only section, or those for any node.
-pub(super) fn read(text: &str, source: &Source, node: Option<&str>) -> Result<ParameterFile, ConfigError> {
+/// Reads the parameters of `text` for the node `node` (fully qualified, `/ns/name`). With `None`, reads the only section, or
+/// the sections that match a node `/virtual_axes`.
+pub(super) fn read(
+    text: &str,
+    source: &ValueSource,
+    node: Option<&str>,
+) -> Result<ParameterFile, ConfigError> {
     let root = parse(text, source)?;
-    let Node::Map(entries) = root.value else {
+    let YamlNode::Map(entries) = root.value else {
         return Err(not_a_parameter_file(
             &source.at_line(root.referenced.line()),
-            format!("it holds no mapping; {BEGINNING}"),
+            format!("not a mapping; {EXPECTED}"),
         ));
     };
     let mut sections = Vec::new();
     collect_sections(entries, "", source, &mut sections)?;
     if sections.is_empty() {
-        return Err(not_a_parameter_file(source, format!("it is empty; {BEGINNING}")));
+        return Err(not_a_parameter_file(source, format!("empty mapping; {EXPECTED}")));
     }
 
     let only = sections.len() == 1 && node.is_none();
@@ -63,15 +68,16 @@ pub(super) fn read(text: &str, source: &Source, node: Option<&str>) -> Result<Pa
     Ok(file)
 }
 
-/// The name under which a file is read that is for no node in particular.
+/// Node name for reading a file without a given node.
 const ANY_NODE: &str = "/virtual_axes";
 
-/// Reads `KEY=VALUE` (`KEY:=VALUE`), the value by the rules of YAML.
+/// Parses `KEY=VALUE` or `KEY:=VALUE`, with the value in YAML.
 ///
 /// # Errors
 ///
-/// [`ConfigError::NotAnAssignment`] and [`ConfigError::WrongKind`].
-pub fn parse_assignment(text: &str, source: &Source) -> Result<Assignment, ConfigError> {
+/// [`ConfigError::NotAnAssignment`] without key or `=`, [`ConfigError::Syntax`] for invalid YAML and
+/// [`ConfigError::WrongType`] for a value that is not of a ROS parameter type.
+pub fn parse_assignment(text: &str, source: &ValueSource) -> Result<Assignment, ConfigError> {
     let not_an_assignment = || ConfigError::NotAnAssignment { at: source.clone(), text: shortened(text) };
     let (key, value) = text.split_once('=').ok_or_else(not_an_assignment)?;
     let key = key.strip_suffix(':').unwrap_or(key).trim();
@@ -79,23 +85,23 @@ pub fn parse_assignment(text: &str, source: &Source) -> Result<Assignment, Confi
         return Err(not_an_assignment());
     }
     let value = if value.trim().is_empty() {
-        // YAML knows no empty text without quotation marks; on a command line it is plain.
+        // An empty text needs quotation marks in YAML, but not on a command line.
         Value::Text(String::new())
     } else {
         match parse(value, source)?.value {
-            Node::Scalar(value) => value,
+            YamlNode::Scalar(value) => value,
             other => return Err(no_value(source, key, &other)),
         }
     };
     Ok(Assignment { key: key.to_owned(), value, source: source.clone() })
 }
 
-fn not_a_parameter_file(at: &Source, reason: String) -> ConfigError {
+fn not_a_parameter_file(at: &ValueSource, reason: String) -> ConfigError {
     ConfigError::NotAParameterFile { at: at.clone(), reason }
 }
 
-fn no_value(at: &Source, key: &str, found: &Node) -> ConfigError {
-    ConfigError::WrongKind {
+fn no_value(at: &ValueSource, key: &str, found: &YamlNode) -> ConfigError {
+    ConfigError::WrongType {
         at: at.clone(),
         key: shortened(key),
         found: found.described().to_owned(),
@@ -103,32 +109,32 @@ fn no_value(at: &Source, key: &str, found: &Node) -> ConfigError {
     }
 }
 
-/// The parameters of one node, or of all whose name matches `path`.
+/// Parameters of the nodes whose names match `path`.
 struct Section {
     path: String,
     line: u64,
-    parameters: Spanned<Node>,
+    parameters: Spanned<YamlNode>,
 }
 
 impl Section {
-    fn flatten(self, source: &Source, out: &mut Vec<Assignment>) -> Result<(), ConfigError> {
+    fn flatten(self, source: &ValueSource, out: &mut Vec<Assignment>) -> Result<(), ConfigError> {
         let mut lines = HashMap::new();
         match self.parameters.value {
-            Node::Map(entries) => flatten(entries, "", source, &mut lines, out),
-            // A section whose parameters are all commented out.
-            Node::Null => Ok(()),
+            YamlNode::Map(entries) => flatten(entries, "", source, &mut lines, out),
+            // All parameters of the section are commented out.
+            YamlNode::Null => Ok(()),
             other => Err(not_a_parameter_file(
                 &source.at_line(self.line),
-                format!("`{PARAMETERS_KEY}` holds {}, not a mapping", other.described()),
+                format!("`{PARAMETERS_KEY}` contains {}, not a mapping", other.described()),
             )),
         }
     }
 }
 
 fn flatten(
-    entries: Vec<(Spanned<String>, Spanned<Node>)>,
+    entries: Vec<(Spanned<String>, Spanned<YamlNode>)>,
     prefix: &str,
-    source: &Source,
+    source: &ValueSource,
     lines: &mut HashMap<String, u64>,
     out: &mut Vec<Assignment>,
 ) -> Result<(), ConfigError> {
@@ -137,8 +143,8 @@ fn flatten(
         let at = source.at_line(line);
         let key = if prefix.is_empty() { name.value } else { format!("{prefix}.{}", name.value) };
         match node.value {
-            Node::Map(entries) => flatten(entries, &key, source, lines, out)?,
-            Node::Scalar(value) => {
+            YamlNode::Map(entries) => flatten(entries, &key, source, lines, out)?,
+            YamlNode::Scalar(value) => {
                 if let Some(first) = lines.insert(key.clone(), line) {
                     return Err(ConfigError::Duplicate {
                         at,
@@ -155,9 +161,9 @@ fn flatten(
 }
 
 fn collect_sections(
-    entries: Vec<(Spanned<String>, Spanned<Node>)>,
+    entries: Vec<(Spanned<String>, Spanned<YamlNode>)>,
     namespace: &str,
-    source: &Source,
+    source: &ValueSource,
     out: &mut Vec<Section>,
 ) -> Result<(), ConfigError> {
     for (name, node) in entries {
@@ -166,19 +172,19 @@ fn collect_sections(
             if namespace.is_empty() {
                 return Err(not_a_parameter_file(
                     &source.at_line(line),
-                    format!("`{PARAMETERS_KEY}` stands below no node; {BEGINNING}"),
+                    format!("no node name above `{PARAMETERS_KEY}`; {EXPECTED}"),
                 ));
             }
             out.push(Section { path: namespace.to_owned(), line, parameters: node });
             continue;
         }
-        let Node::Map(entries) = node.value else {
+        let YamlNode::Map(entries) = node.value else {
             return Err(not_a_parameter_file(
                 &source.at_line(line),
                 match namespace {
-                    "" => format!("no `{PARAMETERS_KEY}` below `{}`; {BEGINNING}", shortened(&name.value)),
+                    "" => format!("no `{PARAMETERS_KEY}` in `{}`; {EXPECTED}", shortened(&name.value)),
                     _ => format!(
-                        "`{}` stands below `{}`, not below `{PARAMETERS_KEY}`; {BEGINNING}",
+                        "`{}` is in `{}`, not in `{PARAMETERS_KEY}`; {EXPECTED}",
                         shortened(&name.value),
                         shortened(namespace)
                     ),
@@ -191,13 +197,13 @@ fn collect_sections(
     Ok(())
 }
 
-/// Whether `pattern` names `node` by the rules of ROS 2: `*` is one name, `**` any number of them.
+/// Returns true if `pattern` matches `node` by the rules of ROS 2: `*` matches one name, `**` any number of names.
 fn matches(pattern: &str, node: &str) -> bool {
     let parts = |text: &'_ str| -> Vec<String> {
         text.split('/').filter(|part| !part.is_empty()).map(str::to_owned).collect()
     };
     let names = parts(node);
-    // reached[i]: the pattern so far can have used up the first i names.
+    // reached[i]: the parts of the pattern so far can match the first i names.
     let mut reached = vec![false; names.len() + 1];
     reached[0] = true;
     for part in parts(pattern) {
@@ -219,7 +225,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn node_patterns_match_as_in_ros() {
+    fn node_patterns_match_by_the_rules_of_ros() {
         for (pattern, node, expected) in [
             ("/**", "/virtual_axes", true),
             ("/**", "/cell/mill/virtual_axes", true),

@@ -1,68 +1,69 @@
-//! A complete set of parameters, valid at any time, and the ways in which values come into it.
+//! Complete and valid parameter set, from machine files, parameter files and single values.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::check::{Entries, Entry, check, joint_names};
-use super::definition::{Definition, Scope};
-use super::error::{ConfigError, Source, shortened};
-use super::layout::{Layout, plain_definition};
+use super::check::{Entries, ParameterEntry, check, joint_names};
+use super::definition::{ParameterDefinition, Scope};
+use super::error::{ConfigError, ValueSource};
+use super::layout::{ParameterLayout, plain_definition};
 use super::parameter_file::{self, Assignment, parse_assignment};
 use super::value::Value;
+use crate::text::shortened;
 
-/// Shipped machines: name and parameter file, the default first.
+/// Built-in machines: name and parameter file, the default first.
 const BUILTIN: &[(&str, &str)] = &[
     ("mikron_ucp710", include_str!("../../config/mikron_ucp710.yaml")),
     ("linear_motor_center", include_str!("../../config/linear_motor_center.yaml")),
 ];
-/// Name of the machine that runs when none is given.
+/// Name of the default machine, the Mikron UCP 710.
 pub const DEFAULT_MACHINE: &str = "mikron_ucp710";
-/// Largest parameter file that is read; a machine takes about 10 kB.
+/// Maximum size of a parameter file, bytes; a machine file has about 10 kB.
 const MAX_FILE_BYTES: u64 = 4 << 20;
 
-/// Parameters of a machine and its node. Every value is checked against the schema, and all against
-/// one another: a `Parameters` that exists is valid.
+/// Parameters of a machine and its node. All values are checked against the schema and against each other, so that every
+/// `Parameters` value is valid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     entries: Entries,
-    layout: Layout,
+    layout: ParameterLayout,
 }
 
-/// What [`Parameters::overlay_yaml`] did.
+/// Result of [`Parameters::overlay_yaml`].
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Overlay {
-    /// Number of parameters that the file set.
+pub struct OverlayReport {
+    /// Number of parameters set by the file.
     pub parameters: usize,
-    /// Whether the file is a complete machine, which replaced the one before.
-    pub machine_replaced: bool,
-    /// Number of sections of the file that are for this node; with 0 nothing was set.
+    /// True if the file is a complete machine, which replaced the previous machine.
+    pub is_machine_replaced: bool,
+    /// Number of sections of the file for this node; with 0 no parameter was set.
     pub sections: usize,
-    /// Sections of the file that are for other nodes.
+    /// Names of the sections for other nodes.
     pub skipped: Vec<String>,
 }
 
-/// The names of the shipped machines, with commas.
-fn shipped() -> String {
+/// Returns the names of the built-in machines, separated by commas.
+fn builtin_name_list() -> String {
     Parameters::builtin_names().collect::<Vec<_>>().join(", ")
 }
 
 impl Parameters {
-    /// The machine that runs when none is given, the Mikron UCP 710.
+    /// Returns the default machine, the Mikron UCP 710.
     ///
     /// # Errors
     ///
-    /// None with the shipped file, as the tests show.
+    /// None: a test loads the embedded file.
     pub fn embedded_default() -> Result<Self, ConfigError> {
         Self::builtin(DEFAULT_MACHINE)
     }
 
-    /// Names of the shipped machines, the default first.
+    /// Returns the names of the built-in machines, the default first.
     pub fn builtin_names() -> impl Iterator<Item = &'static str> {
         BUILTIN.iter().map(|(name, _)| *name)
     }
 
-    /// A shipped machine by its name.
+    /// Returns the built-in machine `name`.
     ///
     /// # Errors
     ///
@@ -71,7 +72,7 @@ impl Parameters {
         Self::from_yaml(Self::builtin_text(name)?, &format!("{name}.yaml"))
     }
 
-    /// The file of a shipped machine.
+    /// Returns the machine file of the built-in machine `name`.
     ///
     /// # Errors
     ///
@@ -80,23 +81,23 @@ impl Parameters {
         let found = BUILTIN.iter().find(|(known, _)| *known == name);
         found
             .map(|(_, text)| *text)
-            .ok_or_else(|| ConfigError::UnknownMachine { name: shortened(name), known: shipped() })
+            .ok_or_else(|| ConfigError::UnknownMachine { name: shortened(name), known: builtin_name_list() })
     }
 
-    /// A machine file's content, complete in itself; `source` is its name in messages.
+    /// Parses a complete machine file; messages name it `source`.
     ///
-    /// Of a file with sections for several nodes, those count that fit a node `/virtual_axes`.
+    /// If the file has several sections, those that match a node `/virtual_axes` apply.
     ///
     /// # Errors
     ///
-    /// Any [`ConfigError`] but those of reading.
+    /// Any [`ConfigError`] except [`ConfigError::Unreadable`].
     pub fn from_yaml(text: &str, source: &str) -> Result<Self, ConfigError> {
-        let source = Source::file(source);
+        let source = ValueSource::file(source);
         let file = parameter_file::read(text, &source, None)?;
         Self::from_assignments(Entries::new(), file.assignments, &source)
     }
 
-    /// A complete machine file.
+    /// Loads a complete machine file.
     ///
     /// # Errors
     ///
@@ -106,7 +107,7 @@ impl Parameters {
         Self::from_yaml(&read_text(path)?, &path.to_string_lossy())
     }
 
-    /// A shipped machine if `machine` is the name of one, otherwise the machine file `machine`.
+    /// Loads the built-in machine `machine`, or the machine file `machine` if there is none.
     ///
     /// # Errors
     ///
@@ -119,32 +120,33 @@ impl Parameters {
             ConfigError::Unreadable { path, reason } if !Path::new(machine).exists() => {
                 ConfigError::Unreadable {
                     path,
-                    reason: format!("{reason}; machines that are shipped: {}", shipped()),
+                    reason: format!("{reason}; built-in machines: {}", builtin_name_list()),
                 }
             }
             other => other,
         })
     }
 
-    /// Sets what a ROS 2 parameter file holds for the node `node` (fully qualified, `/ns/name`;
-    /// `None`: for any node, or its only section). Sections match as in ROS 2 (`*`, `**`), later
-    /// ones win. A file that holds `machine` or `joints` is a complete machine and replaces the one
-    /// before; the node's own parameters stay.
+    /// Sets the parameters of a ROS 2 parameter file for the node `node` (fully qualified, `/ns/name`). With `None`, the
+    /// only section of the file applies, or the sections that match `/virtual_axes`.
+    ///
+    /// Sections match by the rules of ROS 2 (`*`, `**`); later sections take precedence. A file with `machine` or
+    /// `joints` is a complete machine and replaces the present machine; the parameters of the node remain.
     ///
     /// # Errors
     ///
-    /// Any [`ConfigError`] but those of reading; nothing is changed then.
+    /// Any [`ConfigError`] except [`ConfigError::Unreadable`]; `self` remains unchanged.
     pub fn overlay_yaml(
         &mut self,
         text: &str,
         source: &str,
         node: Option<&str>,
-    ) -> Result<Overlay, ConfigError> {
-        let source = Source::file(source);
+    ) -> Result<OverlayReport, ConfigError> {
+        let source = ValueSource::file(source);
         let file = parameter_file::read(text, &source, node)?;
-        let report = Overlay {
+        let report = OverlayReport {
             parameters: file.assignments.len(),
-            machine_replaced: file
+            is_machine_replaced: file
                 .assignments
                 .iter()
                 .any(|assignment| matches!(assignment.key.as_str(), "machine" | "joints")),
@@ -152,53 +154,53 @@ impl Parameters {
             skipped: file.skipped,
         };
         let mut base = self.entries.clone();
-        if report.machine_replaced {
+        if report.is_machine_replaced {
             base.retain(|key, _| {
                 plain_definition(key).is_some_and(|definition| definition.scope == Scope::Node)
             });
         }
         *self = Self::from_assignments(base, file.assignments, &source)
-            .map_err(|error| if report.machine_replaced { explain_replacement(error) } else { error })?;
+            .map_err(|error| if report.is_machine_replaced { explain_replacement(error) } else { error })?;
         Ok(report)
     }
 
-    /// [`overlay_yaml`](Self::overlay_yaml) of a file.
+    /// Sets the parameters of the file `path`, see [`overlay_yaml`](Self::overlay_yaml).
     ///
     /// # Errors
     ///
-    /// Any [`ConfigError`]; nothing is changed then.
+    /// Any [`ConfigError`]; `self` remains unchanged.
     pub fn overlay_file(
         &mut self,
         path: impl AsRef<Path>,
         node: Option<&str>,
-    ) -> Result<Overlay, ConfigError> {
+    ) -> Result<OverlayReport, ConfigError> {
         let path = path.as_ref();
         self.overlay_yaml(&read_text(path)?, &path.to_string_lossy(), node)
     }
 
-    /// Sets one parameter; an integer serves where a number is wanted.
+    /// Sets one parameter. An integer is accepted for a number.
     ///
     /// # Errors
     ///
-    /// Any [`ConfigError`] but those of reading; nothing is changed then.
-    pub fn set(&mut self, key: &str, value: Value, source: &Source) -> Result<(), ConfigError> {
+    /// Any [`ConfigError`] except [`ConfigError::Unreadable`]; `self` remains unchanged.
+    pub fn set(&mut self, key: &str, value: Value, source: &ValueSource) -> Result<(), ConfigError> {
         self.set_all(vec![Assignment { key: key.to_owned(), value, source: source.clone() }])
     }
 
-    /// Sets one parameter from `KEY=VALUE` or `KEY:=VALUE`, the value by the rules of YAML.
+    /// Sets one parameter from `KEY=VALUE` or `KEY:=VALUE`, with the value in YAML.
     ///
     /// # Errors
     ///
-    /// As [`set`](Self::set), and [`ConfigError::NotAnAssignment`].
-    pub fn set_text(&mut self, text: &str, source: &Source) -> Result<(), ConfigError> {
+    /// The errors of [`set`](Self::set), and [`ConfigError::NotAnAssignment`].
+    pub fn set_text(&mut self, text: &str, source: &ValueSource) -> Result<(), ConfigError> {
         self.set_all(vec![parse_assignment(text, source)?])
     }
 
-    /// Sets all of `assignments` or none; the later wins where two have the same key.
+    /// Sets all of `assignments`, or none on error. The last of several values for one key applies.
     ///
     /// # Errors
     ///
-    /// As [`set`](Self::set).
+    /// The errors of [`set`](Self::set).
     pub fn set_all(&mut self, assignments: Vec<Assignment>) -> Result<(), ConfigError> {
         let Some(first) = assignments.first() else {
             return Ok(());
@@ -208,12 +210,12 @@ impl Parameters {
         Ok(())
     }
 
-    /// Takes a value away, so that the parameter has its default or none; `source` is for messages.
+    /// Removes the value of a parameter, which returns to its default or to none; messages begin with `source`.
     ///
     /// # Errors
     ///
-    /// [`ConfigError::Missing`] if it is required; nothing is changed then.
-    pub fn unset(&mut self, key: &str, source: &Source) -> Result<(), ConfigError> {
+    /// [`ConfigError::Missing`] if the parameter is required; `self` remains unchanged.
+    pub fn unset(&mut self, key: &str, source: &ValueSource) -> Result<(), ConfigError> {
         let mut entries = self.entries.clone();
         if entries.remove(key).is_some() {
             let layout = check(&mut entries, &[], source)?;
@@ -225,24 +227,24 @@ impl Parameters {
     fn from_assignments(
         base: Entries,
         assignments: Vec<Assignment>,
-        origin: &Source,
+        origin: &ValueSource,
     ) -> Result<Self, ConfigError> {
-        Self::from_parts(base, &Layout::default(), assignments, origin)
+        Self::from_parts(base, &ParameterLayout::default(), assignments, origin)
     }
 
     fn from_parts(
         mut entries: Entries,
-        old: &Layout,
+        old: &ParameterLayout,
         assignments: Vec<Assignment>,
-        origin: &Source,
+        origin: &ValueSource,
     ) -> Result<Self, ConfigError> {
         let mut changed = Vec::with_capacity(assignments.len());
         for Assignment { key, value, source } in assignments {
             changed.push(key.clone());
-            entries.insert(key, Entry { value, source });
+            entries.insert(key, ParameterEntry { value, source });
         }
         if changed.iter().any(|key| key == "joints") {
-            // A joint that is left out takes its parameters with it.
+            // The parameters of removed joints are removed.
             let names = joint_names(&entries)?;
             let gone: Vec<&str> = old
                 .joints
@@ -259,8 +261,7 @@ impl Parameters {
         Ok(Self { entries, layout })
     }
 
-    /// The value of the parameter `key`, or its default; `None` if it has neither, or does not
-    /// exist.
+    /// Returns the value or the default of the parameter `key`, none if it has neither or is unknown.
     pub fn get(&self, key: &str) -> Option<Value> {
         match self.entries.get(key) {
             Some(entry) => Some(entry.value.clone()),
@@ -268,49 +269,48 @@ impl Parameters {
         }
     }
 
-    /// Where the value of `key` comes from; `None` for a default.
-    pub fn source(&self, key: &str) -> Option<&Source> {
+    /// Returns the origin of the value of `key`, none for a default.
+    pub fn source(&self, key: &str) -> Option<&ValueSource> {
         self.entries.get(key).map(|entry| &entry.source)
     }
 
-    /// The definition of the parameter with the full key `key` on this machine.
-    pub fn definition(&self, key: &str) -> Option<&'static Definition> {
-        self.layout.find(key, &Source::named("")).ok()
+    /// Returns the definition of the parameter with the full key `key` on this machine.
+    pub fn definition(&self, key: &str) -> Option<&'static ParameterDefinition> {
+        self.layout.find(key, &ValueSource::named("")).ok()
     }
 
-    /// Every parameter that this machine and its node can have, with its full key: machine, axes in
-    /// the order of `joints`, node.
-    pub fn definitions(&self) -> impl Iterator<Item = (String, &'static Definition)> + '_ {
+    /// Returns the full keys and definitions of all parameters of this machine and its node: machine, axes in the order of
+    /// `joints`, node.
+    pub fn definitions(&self) -> impl Iterator<Item = (String, &'static ParameterDefinition)> + '_ {
         self.layout.definitions()
     }
 
-    /// Every parameter that has a value, set or by default, in the order of
-    /// [`definitions`](Self::definitions).
+    /// Returns the parameters with a value or a default, in the order of [`definitions`](Self::definitions).
     pub fn iter(&self) -> impl Iterator<Item = (String, Value)> + '_ {
         self.definitions().filter_map(|(key, _)| self.get(&key).map(|value| (key, value)))
     }
 
-    pub(super) fn layout(&self) -> &Layout {
+    pub(super) fn layout(&self) -> &ParameterLayout {
         &self.layout
     }
 }
 
-/// Says why keys of the machine before are missing now.
+/// Adds to a missing key that the file replaces the whole machine.
 fn explain_replacement(error: ConfigError) -> ConfigError {
     match error {
         ConfigError::Missing { at, key, wanted } => ConfigError::Missing {
             at,
             key,
             wanted: format!(
-                "{wanted}; a file with `machine` or `joints` is a complete machine, leave both out \
-                 to change some parameters of the present one"
+                "{wanted}; a file with `machine` or `joints` must be a complete machine, omit both to change \
+                 parameters of the present machine"
             ),
         },
         other => other,
     }
 }
 
-/// The text of a file of sensible size.
+/// Reads a text file of limited size.
 fn read_text(path: &Path) -> Result<String, ConfigError> {
     let unreadable =
         |reason: String| ConfigError::Unreadable { path: path.to_string_lossy().into_owned(), reason };
@@ -319,10 +319,10 @@ fn read_text(path: &Path) -> Result<String, ConfigError> {
         .and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|error| unreadable(error.to_string()))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(unreadable(format!("it is larger than {MAX_FILE_BYTES} bytes")));
+        return Err(unreadable(format!("file is larger than {MAX_FILE_BYTES} bytes")));
     }
     String::from_utf8(bytes).map_err(|error| {
         let position = error.utf8_error().valid_up_to();
-        unreadable(format!("it is not UTF-8 text at byte {position}"))
+        unreadable(format!("invalid UTF-8 at byte {position}"))
     })
 }

@@ -1,349 +1,355 @@
-//! The schema: one table of parameters from which the check of files, the typed configuration,
-//! the ROS descriptors and the table of the README are derived.
+//! Parameter schema: the single table for validation, typed configuration, ROS descriptors and the README.
 //!
-//! Equation numbers are those of Prévost (Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling
-//! for the simulation of tool path tracking in multi-axis High Speed Machining*).
+//! Equation numbers refer to Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling for the simulation of tool path
+//! tracking in multi-axis High Speed Machining*.
 
 use super::definition::DefaultValue::{Flag, Integer, Number, Text};
-use super::definition::MotorKind::{Linear as LinearMotor, Rotating as RotatingMotor};
-use super::definition::{Definition, Kind};
+use super::definition::MotorKind::{Linear as LinearMotor, Rotary as RotaryMotor};
+use super::definition::{ParameterDefinition, ParameterKind};
 use super::machine::AxisKind::{Linear, Rotary};
 use super::node_schema::NODE;
 
-/// Shortest and longest sampling period, ms; the node's pacing knows nothing below 1 µs.
+/// Range of sampling periods, ms; the resolution of the pacing in the node is 1 µs.
 const PERIOD_MS: (f64, f64) = (1e-3, 50.0);
-/// The same range in µs.
+/// Range of sampling periods, µs.
 const PERIOD_US: (f64, f64) = (1.0, 50e3);
-/// Longest delay of a setpoint, ms.
-const DELAY_MS: f64 = 100.0;
-/// Largest distance between two points of a machine, mm; the largest gantries have some tens of meters.
-const DISTANCE_MM: f64 = 1e5;
-/// Largest current, A, of a motor and of its friction.
-const CURRENT: f64 = 1e4;
-/// Exponents of the friction law, min/m or min/rev: the fall after breakaway can be steep, a rise
-/// steeper than e^V has no bearing that makes it.
+/// Maximum setpoint delay, ms.
+const MAX_DELAY_MS: f64 = 100.0;
+/// Maximum distance in a machine, mm; the largest gantries have some tens of meters.
+const MAX_DISTANCE_MM: f64 = 1e5;
+/// Maximum current of a motor and of its friction, A.
+const MAX_CURRENT: f64 = 1e4;
+/// Range of the exponents of the friction law, min/m or min/rev. The decrease after breakaway can be steep; a rise
+/// steeper than e^V does not occur in bearings.
 const FRICTION_EXPONENT: (f64, f64) = (-100.0, 1.0);
-/// Longest horizon of predictive control, and furthest setpoint that T may read, position periods.
+/// Maximum horizon of predictive control and maximum preview of T, position periods.
 pub const MAX_HORIZON: i64 = 200;
-/// Smallest and largest factor of a plant that deviates.
+/// Range of the plant deviation factors.
 const DEVIATION: (f64, f64) = (0.1, 10.0);
-/// Smallest value of what is divided by, or what has no sense at zero.
+/// Minimum of divisors and of other positive quantities.
 const POSITIVE: f64 = 1e-9;
-/// Largest gain of a loop, in its unit.
-const GAIN: f64 = 1e9;
-/// Largest default tolerance of an action goal: any error is smaller.
-const TOLERANCE_MM: f64 = 1e6;
-/// Likewise.
-const TOLERANCE_DEG: f64 = 1e6;
-/// Shortest and longest integral time, ms; zero would divide by zero.
+/// Maximum loop gain, in its unit.
+const MAX_GAIN: f64 = 1e9;
+/// Maximum default tolerance of an action goal of a linear axis, mm.
+const MAX_TOLERANCE_MM: f64 = 1e6;
+/// Maximum default tolerance of an action goal of a rotary axis, °.
+const MAX_TOLERANCE_DEG: f64 = 1e6;
+/// Range of integral times, ms; 0 would cause a division by zero.
 const INTEGRAL_TIME_MS: (f64, f64) = (1e-3, 1e6);
-/// Most coefficients of R and of S; a design on a model of the drive's order has fewer than ten.
-pub const RST_TERMS: usize = 32;
+/// Maximum number of coefficients of R and of S; controllers of the order of the drive have fewer than ten.
+pub const MAX_RST_TERMS: usize = 32;
 
-/// A coefficient of the friction law, A.
-const fn friction_current(key: &'static str) -> Definition {
-    Definition::number(key, "A", -CURRENT, CURRENT).of_axis()
+/// Defines an amplitude of the friction law.
+const fn friction_current(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, "A", -MAX_CURRENT, MAX_CURRENT).of_axis()
 }
 
-/// An exponent of the friction law.
-const fn friction_exponent(key: &'static str, unit: &'static str) -> Definition {
-    Definition::number(key, unit, FRICTION_EXPONENT.0, FRICTION_EXPONENT.1)
+/// Defines an exponent of the friction law.
+const fn friction_exponent(key: &'static str, unit: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, unit, FRICTION_EXPONENT.0, FRICTION_EXPONENT.1)
 }
 
-/// A gain, live.
-const fn gain(key: &'static str, unit: &'static str) -> Definition {
-    Definition::number(key, unit, 0.0, GAIN).of_axis().live()
+/// Defines a loop gain, settable at run time.
+const fn gain(key: &'static str, unit: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, unit, 0.0, MAX_GAIN).of_axis().live()
 }
 
-/// An integral time, live.
-const fn integral_time(key: &'static str) -> Definition {
-    Definition::number(key, "ms", INTEGRAL_TIME_MS.0, INTEGRAL_TIME_MS.1).of_axis().live()
+/// Defines an integral time, settable at run time.
+const fn integral_time(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, "ms", INTEGRAL_TIME_MS.0, INTEGRAL_TIME_MS.1).of_axis().live()
 }
 
-/// A polynomial of an RST controller, live.
-const fn polynomial(key: &'static str, unit: &'static str, max_len: usize) -> Definition {
-    Definition::new(key, unit, Kind::NumberList { min_len: 1, max_len }).of_axis().optional().live()
+/// Defines a polynomial of an RST controller, settable at run time.
+const fn polynomial(key: &'static str, unit: &'static str, max_len: usize) -> ParameterDefinition {
+    ParameterDefinition::new(key, unit, ParameterKind::NumberList { min_len: 1, max_len })
+        .of_axis()
+        .optional()
+        .live()
 }
 
-/// A delay of the setpoint, live.
-const fn delay(key: &'static str) -> Definition {
-    Definition::number(key, "ms", 0.0, DELAY_MS).of_axis().default(Number(0.0)).live()
+/// Defines a setpoint delay, settable at run time.
+const fn delay(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, "ms", 0.0, MAX_DELAY_MS).of_axis().default(Number(0.0)).live()
 }
 
-/// A horizon of predictive control, live.
-const fn horizon(key: &'static str, default: i64) -> Definition {
-    Definition::new(key, "", Kind::Integer { min: 1, max: MAX_HORIZON })
+/// Defines a horizon of predictive control, settable at run time.
+const fn horizon(key: &'static str, default: i64) -> ParameterDefinition {
+    ParameterDefinition::new(key, "", ParameterKind::Integer { min: 1, max: MAX_HORIZON })
         .of_axis()
         .default(Integer(default))
         .live()
 }
 
-/// A factor of the plant, live.
-const fn deviation(key: &'static str) -> Definition {
-    Definition::number(key, "", DEVIATION.0, DEVIATION.1).of_axis().default(Number(1.0)).live()
+/// Defines a plant deviation factor, settable at run time.
+const fn deviation(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, "", DEVIATION.0, DEVIATION.1).of_axis().default(Number(1.0)).live()
 }
 
-/// The largest error of an axis that goals of the action are held to, live.
-const fn tolerance(key: &'static str, unit: &'static str, max: f64) -> Definition {
-    Definition::number(key, unit, 0.0, max).default(Number(0.0)).live()
+/// Defines a default tolerance of action goals, settable at run time.
+const fn tolerance(key: &'static str, unit: &'static str, max: f64) -> ParameterDefinition {
+    ParameterDefinition::number(key, unit, 0.0, max).default(Number(0.0)).live()
 }
 
-/// A coordinate of a point of the machine, home in the origin.
-const fn coordinate(key: &'static str) -> Definition {
-    Definition::number(key, "mm", -DISTANCE_MM, DISTANCE_MM).default(Number(0.0))
+/// Defines a coordinate in the machine frame, whose origin is the home position.
+const fn coordinate(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, "mm", -MAX_DISTANCE_MM, MAX_DISTANCE_MM).default(Number(0.0))
 }
 
-/// Every parameter there is. A key stands twice where its unit depends on the axis or the motor.
-pub static DEFINITIONS: &[Definition] = &joined::<{ MACHINE.len() + NODE.len() }>(MACHINE, NODE);
+/// Definitions of all parameters. A key has two definitions if its unit depends on the type of axis or motor.
+pub static DEFINITIONS: &[ParameterDefinition] =
+    &concatenate::<{ MACHINE.len() + NODE.len() }>(MACHINE, NODE);
 
-const fn joined<const N: usize>(first: &[Definition], second: &[Definition]) -> [Definition; N] {
+const fn concatenate<const N: usize>(
+    first: &[ParameterDefinition],
+    second: &[ParameterDefinition],
+) -> [ParameterDefinition; N] {
     let mut all = [second[0]; N];
-    let mut place = 0;
-    while place < N {
-        all[place] = if place < first.len() { first[place] } else { second[place - first.len()] };
-        place += 1;
+    let mut index = 0;
+    while index < N {
+        all[index] = if index < first.len() { first[index] } else { second[index - first.len()] };
+        index += 1;
     }
     all
 }
 
 /// Parameters of the machine and its axes.
-const MACHINE: &[Definition] = &[
+const MACHINE: &[ParameterDefinition] = &[
     // Machine.
-    Definition::new("machine", "", Kind::Text).is("Name of the machine."),
-    Definition::new("joints", "", Kind::TextList)
-        .is("Names of the axes, in the order of messages and tables."),
-    Definition::number("periods.position_ms", "ms", PERIOD_MS.0, PERIOD_MS.1)
-        .is("Tsp, sampling period of the position loop, a multiple of periods.velocity_us."),
-    Definition::number("periods.velocity_us", "µs", PERIOD_US.0, PERIOD_US.1)
-        .is("Tsv, sampling period of the velocity loop, a multiple of periods.current_us."),
-    Definition::number("periods.current_us", "µs", PERIOD_US.0, PERIOD_US.1)
-        .is("Tsi, sampling period of the current loop: one tick of the simulation."),
-    // Kinematics, chain workpiece-C-A-X/Y/Z-tool; coordinates of the machine with every axis at home.
-    Definition::number("kinematics.tool_length_mm", "mm", 0.0, DISTANCE_MM)
+    ParameterDefinition::new("machine", "", ParameterKind::Text).describe("Name of the machine."),
+    ParameterDefinition::new("joints", "", ParameterKind::TextList)
+        .describe("Names of the axes, in the order of messages and tables."),
+    ParameterDefinition::number("periods.position_ms", "ms", PERIOD_MS.0, PERIOD_MS.1)
+        .describe("Tsp, period of the position cycle, a multiple of periods.velocity_us."),
+    ParameterDefinition::number("periods.velocity_us", "µs", PERIOD_US.0, PERIOD_US.1)
+        .describe("Tsv, period of the velocity cycle, a multiple of periods.current_us."),
+    ParameterDefinition::number("periods.current_us", "µs", PERIOD_US.0, PERIOD_US.1)
+        .describe("Tsi, period of the current cycle."),
+    // Kinematic chain workpiece-C-A-X/Y/Z-tool; coordinates in the machine frame with every axis at home.
+    ParameterDefinition::number("kinematics.tool_length_mm", "mm", 0.0, MAX_DISTANCE_MM)
         .default(Number(0.0))
-        .is("Tool length, from the point that X, Y and Z move (the origin at home) down to the tool tip."),
-    coordinate("kinematics.pivot_a_y_mm").is("Y of the line about which A turns, which is parallel to X."),
-    coordinate("kinematics.pivot_a_z_mm").is("Z of the line about which A turns, which is parallel to X."),
-    coordinate("kinematics.pivot_c_x_mm").is("X of the line about which C turns, parallel to Z while A is at 0."),
-    coordinate("kinematics.pivot_c_y_mm").is("Y of the line about which C turns, parallel to Z while A is at 0."),
-    coordinate("kinematics.workpiece_x_mm").is("X of the workpiece frame's origin."),
-    coordinate("kinematics.workpiece_y_mm").is("Y of the workpiece frame's origin."),
-    coordinate("kinematics.workpiece_z_mm").is("Z of the workpiece frame's origin."),
+        .describe("Tool length along -Z, from the point moved by X, Y and Z (the origin at home) to the tool tip."),
+    coordinate("kinematics.pivot_a_y_mm").describe("Y of the rotation axis of A, which is parallel to X."),
+    coordinate("kinematics.pivot_a_z_mm").describe("Z of the rotation axis of A, which is parallel to X."),
+    coordinate("kinematics.pivot_c_x_mm").describe("X of the rotation axis of C, which is parallel to Z while A is at 0."),
+    coordinate("kinematics.pivot_c_y_mm").describe("Y of the rotation axis of C, which is parallel to Z while A is at 0."),
+    coordinate("kinematics.workpiece_x_mm").describe("X of the origin of the workpiece frame."),
+    coordinate("kinematics.workpiece_y_mm").describe("Y of the origin of the workpiece frame."),
+    coordinate("kinematics.workpiece_z_mm").describe("Z of the origin of the workpiece frame."),
     // Axis and transmission.
-    Definition::new("type", "", Kind::Choice(&["linear", "rotary"]))
+    ParameterDefinition::new("type", "", ParameterKind::Choice(&["linear", "rotary"]))
         .of_axis()
-        .is("Whether the axis counts in meters or in radians."),
-    Definition::number("transmission.screw_lead_mm", "mm", 1e-3, 1e3)
+        .describe("Type of the axis: linear in meters or rotary in radians."),
+    ParameterDefinition::number("transmission.screw_lead_mm", "mm", 1e-3, 1e3)
         .on(Linear)
         .optional()
-        .is("Lead of the ball screw, axis travel per motor revolution."),
-    Definition::number("transmission.gear_ratio", "", 1e-3, 1e6)
+        .describe("Lead of the ball screw, axis travel per motor revolution."),
+    ParameterDefinition::number("transmission.gear_ratio", "", 1e-3, 1e6)
         .on(Rotary)
         .optional()
-        .is("Gear ratio, motor revolutions per axis revolution."),
-    Definition::new("transmission.direct", "", Kind::Flag)
+        .describe("Gear ratio, motor revolutions per axis revolution."),
+    ParameterDefinition::new("transmission.direct", "", ParameterKind::Flag)
         .of_axis()
         .optional()
-        .is("Direct drive: a torque motor on a rotary axis, a linear motor on a linear one."),
+        .describe("Direct drive: a torque motor on a rotary axis, a linear motor on a linear axis."),
     // Motor.
-    Definition::number("motor.inertia_kg_m2", "kg·m²", POSITIVE, 1e3)
-        .driven_by(RotatingMotor)
-        .is("Jeq, equivalent inertia at the motor shaft (Prévost eqs. 1 and 5)."),
-    Definition::number("motor.mass_kg", "kg", 1e-6, 1e6)
+    ParameterDefinition::number("motor.inertia_kg_m2", "kg·m²", POSITIVE, 1e3)
+        .driven_by(RotaryMotor)
+        .describe("Jeq, equivalent inertia at the motor shaft (Prévost eqs. 1 and 5)."),
+    ParameterDefinition::number("motor.mass_kg", "kg", 1e-6, 1e6)
         .driven_by(LinearMotor)
-        .is("Moving mass, in the place of Jeq (Prévost eq. 1)."),
-    Definition::number("motor.torque_constant_nm_a", "N·m/A", POSITIVE, 1e4)
-        .driven_by(RotatingMotor)
-        .is("Kt, torque constant (Prévost eq. 1)."),
-    Definition::number("motor.force_constant_n_a", "N/A", POSITIVE, 1e5)
+        .describe("Moving mass, in index of Jeq (Prévost eq. 1)."),
+    ParameterDefinition::number("motor.torque_constant_nm_a", "N·m/A", POSITIVE, 1e4)
+        .driven_by(RotaryMotor)
+        .describe("Kt, torque constant (Prévost eq. 1)."),
+    ParameterDefinition::number("motor.force_constant_n_a", "N/A", POSITIVE, 1e5)
         .driven_by(LinearMotor)
-        .is("Force constant, in the place of Kt (Prévost eq. 1)."),
-    Definition::number("motor.emf_constant_v_s_rad", "V·s/rad", 0.0, 1e4)
-        .driven_by(RotatingMotor)
-        .is("Ke, back-EMF constant (Prévost eq. 1)."),
-    Definition::number("motor.emf_constant_v_s_m", "V·s/m", 0.0, 1e5)
+        .describe("Force constant, in index of Kt (Prévost eq. 1)."),
+    ParameterDefinition::number("motor.emf_constant_v_s_rad", "V·s/rad", 0.0, 1e4)
+        .driven_by(RotaryMotor)
+        .describe("Ke, back-EMF constant (Prévost eq. 1)."),
+    ParameterDefinition::number("motor.emf_constant_v_s_m", "V·s/m", 0.0, 1e5)
         .driven_by(LinearMotor)
-        .is("Ke, back-EMF constant (Prévost eq. 1)."),
-    Definition::number("motor.resistance_ohm", "Ω", 0.0, 1e4)
+        .describe("Ke, back-EMF constant (Prévost eq. 1)."),
+    ParameterDefinition::number("motor.resistance_ohm", "Ω", 0.0, 1e4)
         .of_axis()
-        .is("R, winding resistance (Prévost eq. 1)."),
-    Definition::number("motor.inductance_mh", "mH", 1e-6, 1e5)
+        .describe("R, winding resistance (Prévost eq. 1)."),
+    ParameterDefinition::number("motor.inductance_mh", "mH", 1e-6, 1e5)
         .of_axis()
-        .is("L, winding inductance (Prévost eq. 1)."),
-    Definition::number("motor.max_current_a", "A", POSITIVE, CURRENT)
+        .describe("L, winding inductance (Prévost eq. 1)."),
+    ParameterDefinition::number("motor.max_current_a", "A", POSITIVE, MAX_CURRENT)
         .of_axis()
-        .is("imax, limit of the current setpoint."),
-    Definition::number("motor.max_voltage_v", "V", POSITIVE, 1e5)
+        .describe("imax, current setpoint limit."),
+    ParameterDefinition::number("motor.max_voltage_v", "V", POSITIVE, 1e5)
         .of_axis()
-        .is("umax, limit of the motor voltage."),
-    Definition::number("motor.max_speed_rpm", "rpm", 1e-6, 1e6)
-        .driven_by(RotatingMotor)
-        .is("Maximum motor speed, limit of what the position controller asks for; velocity feedforward is added behind it."),
-    Definition::number("motor.max_speed_m_min", "m/min", 1e-6, 1e5)
+        .describe("umax, motor voltage limit."),
+    ParameterDefinition::number("motor.max_speed_rpm", "rpm", 1e-6, 1e6)
+        .driven_by(RotaryMotor)
+        .describe("Maximum motor speed, limit of the position controller output; velocity feedforward is added after the limit."),
+    ParameterDefinition::number("motor.max_speed_m_min", "m/min", 1e-6, 1e5)
         .driven_by(LinearMotor)
-        .is("Maximum motor speed, limit of what the position controller asks for; velocity feedforward is added behind it."),
+        .describe("Maximum motor speed, limit of the position controller output; velocity feedforward is added after the limit."),
     // Friction.
     friction_current("friction.a")
-        .is("Amplitude a of the friction law a·exp(b·V) + c·exp(d·V) (Prévost eq. 3)."),
+        .describe("Amplitude a of the friction law a·exp(b·V) + c·exp(d·V) (Prévost eq. 3)."),
     friction_exponent("friction.b", "min/m")
         .on(Linear)
-        .is("Exponent b of the friction law, V in m/min (Prévost eq. 3)."),
+        .describe("Exponent b of the friction law, V in m/min (Prévost eq. 3)."),
     friction_exponent("friction.b", "min/rev")
         .on(Rotary)
-        .is("Exponent b of the friction law, V in rev/min of the axis (Prévost eq. 3)."),
+        .describe("Exponent b of the friction law, V in rev/min of the axis (Prévost eq. 3)."),
     friction_current("friction.c")
-        .is("Amplitude c of the friction law; a + c, its value towards standstill, is not negative (Prévost eq. 3)."),
+        .describe("Amplitude c of the friction law; a + c, the friction at standstill, must not be negative (Prévost eq. 3)."),
     friction_exponent("friction.d", "min/m")
         .on(Linear)
-        .is("Exponent d of the friction law, V in m/min (Prévost eq. 3)."),
+        .describe("Exponent d of the friction law, V in m/min (Prévost eq. 3)."),
     friction_exponent("friction.d", "min/rev")
         .on(Rotary)
-        .is("Exponent d of the friction law, V in rev/min of the axis (Prévost eq. 3)."),
-    Definition::number("friction.i0", "A", 0.0, CURRENT)
+        .describe("Exponent d of the friction law, V in rev/min of the axis (Prévost eq. 3)."),
+    ParameterDefinition::number("friction.i0", "A", 0.0, MAX_CURRENT)
         .of_axis()
-        .is("Breakaway current i0, bound of static friction (Prévost eq. 3)."),
+        .describe("Breakaway current i0, bound of the static friction (Prévost eq. 3)."),
     // Gravity.
-    Definition::number("gravity.weight_n", "N", -1e6, 1e6)
+    ParameterDefinition::number("gravity.weight_n", "N", -1e6, 1e6)
         .on(Linear)
         .default(Number(0.0))
-        .is("Net weight of a vertical axis, what its counterbalance leaves; positive resists motion towards plus."),
-    Definition::number("gravity.tilt_nm", "N·m", -1e6, 1e6)
+        .describe("Net weight of a vertical axis after counterbalance; positive values oppose motion in the positive direction."),
+    ParameterDefinition::number("gravity.tilt_nm", "N·m", -1e6, 1e6)
         .on(Rotary)
         .default(Number(0.0))
-        .is("Gravity torque amplitude k of a tilting axis, k·sin(position + phase)."),
-    Definition::number("gravity.tilt_phase_deg", "°", -360.0, 360.0)
+        .describe("Gravity torque amplitude k of a tilting axis, k·sin(position + phase)."),
+    ParameterDefinition::number("gravity.tilt_phase_deg", "°", -360.0, 360.0)
         .on(Rotary)
         .default(Number(0.0))
-        .is("Phase of the gravity torque of a tilting axis."),
+        .describe("Phase of the gravity torque of a tilting axis."),
     // Control.
-    Definition::new("position_loop.controller", "", Kind::Choice(&["cascade", "gpc", "rst"]))
+    ParameterDefinition::new("position_loop.controller", "", ParameterKind::Choice(&["cascade", "gpc", "rst"]))
         .of_axis()
         .default(Text("cascade"))
         .live()
-        .is("Position controller: proportional with feedforward (Prévost fig. 3), predictive, or by its polynomials."),
+        .describe("Position controller: cascade with feedforward (Prévost fig. 3), generalized predictive control (GPC), or RST polynomials."),
     gain("position_loop.gain", "(m/min)/mm")
         .on(Linear)
-        .is("Kp, position-loop gain; 1 (m/min)/mm is 16.667 s⁻¹ (Prévost Appendix 2)."),
+        .describe("Kp, position-loop gain; 1 (m/min)/mm is 16.667 s⁻¹ (Prévost Appendix 2)."),
     gain("position_loop.gain", "(1000 °/min)/°")
         .on(Rotary)
-        .is("Kp, position-loop gain; 1 (1000 °/min)/° is 16.667 s⁻¹ (Prévost Appendix 2)."),
+        .describe("Kp, position-loop gain; 1 (1000 °/min)/° is 16.667 s⁻¹ (Prévost Appendix 2)."),
     horizon("position_loop.gpc.n1", 1)
-        .is("N1, first position period of the prediction horizon, at most n2 (Prévost table 1)."),
-    horizon("position_loop.gpc.n2", 14).is("N2, last position period of the prediction horizon (Prévost table 1)."),
+        .describe("N1, first position period of the prediction horizon, at most n2 (Prévost table 1)."),
+    horizon("position_loop.gpc.n2", 14).describe("N2, last position period of the prediction horizon (Prévost table 1)."),
     horizon("position_loop.gpc.nu", 12)
-        .is("Nu, position periods of the control horizon, at most n2 (Prévost table 1)."),
-    Definition::number("position_loop.gpc.lambda_rel", "", 0.0, GAIN)
+        .describe("Nu, position periods of the control horizon, at most n2 (Prévost table 1)."),
+    ParameterDefinition::number("position_loop.gpc.lambda_rel", "", 0.0, MAX_GAIN)
         .of_axis()
         .default(Number(0.005))
         .live()
-        .is("λ / trace(GᵀG), weight of the control increments; not used where lambda is given."),
-    Definition::number("position_loop.gpc.lambda", "s²", 0.0, GAIN)
+        .describe("λ / trace(GᵀG), relative weight of the control increments; unused if lambda is set."),
+    ParameterDefinition::number("position_loop.gpc.lambda", "s²", 0.0, MAX_GAIN)
         .of_axis()
         .optional()
         .live()
-        .is("λ, weight of the control increments (Prévost table 1)."),
-    Definition::new("position_loop.allow_unstable", "", Kind::Flag)
+        .describe("λ, weight of the control increments (Prévost table 1)."),
+    ParameterDefinition::new("position_loop.allow_unstable", "", ParameterKind::Flag)
         .of_axis()
         .default(Flag(false))
         .live()
-        .is("Accept a position controller whose closed loop is unstable."),
-    polynomial("position_loop.rst.r", "s⁻¹", RST_TERMS)
-        .is("R of an RST controller, in rising powers of q⁻¹ from q⁰ on (Prévost eq. 9)."),
-    polynomial("position_loop.rst.s", "", RST_TERMS)
-        .is("S of an RST controller, in rising powers of q⁻¹ from q⁰ on (Prévost eq. 9)."),
+        .describe("Accept a position controller whose closed loop is unstable."),
+    polynomial("position_loop.rst.r", "s⁻¹", MAX_RST_TERMS)
+        .describe("R of an RST controller, in ascending powers of q⁻¹ from q⁰ (Prévost eq. 9)."),
+    polynomial("position_loop.rst.s", "", MAX_RST_TERMS)
+        .describe("S of an RST controller, in ascending powers of q⁻¹ from q⁰ (Prévost eq. 9)."),
     polynomial("position_loop.rst.t", "s⁻¹", 2 * MAX_HORIZON as usize + 1)
-        .is("T of an RST controller, in rising powers of q from position_loop.rst.t_first on (Prévost eq. 9)."),
-    Definition::new("position_loop.rst.t_first", "", Kind::Integer { min: -MAX_HORIZON, max: MAX_HORIZON })
+        .describe("T of an RST controller, in ascending powers of q, beginning with position_loop.rst.t_first (Prévost eq. 9)."),
+    ParameterDefinition::new("position_loop.rst.t_first", "", ParameterKind::Integer { min: -MAX_HORIZON, max: MAX_HORIZON })
         .of_axis()
         .default(Integer(0))
         .live()
-        .is("Power of q of T's first term: 1 begins one position period ahead."),
+        .describe("Power of q of the first term of T: 1 is one position period of preview."),
     gain("velocity_loop.gain", "N·m/(rad/s)")
-        .driven_by(RotatingMotor)
-        .is("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),
+        .driven_by(RotaryMotor)
+        .describe("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),
     gain("velocity_loop.gain", "N/(m/s)")
         .driven_by(LinearMotor)
-        .is("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),
+        .describe("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),
     integral_time("velocity_loop.integral_time_ms")
-        .is("Tv, integral time of the velocity loop (Prévost Appendix 2)."),
+        .describe("Tv, integral time of the velocity loop (Prévost Appendix 2)."),
     gain("current_loop.gain", "V/A")
-        .is("Ki, proportional gain of the current loop (Prévost Appendix 2)."),
+        .describe("Ki, proportional gain of the current loop (Prévost Appendix 2)."),
     integral_time("current_loop.integral_time_ms")
-        .is("Ti, integral time of the current loop (Prévost Appendix 2)."),
-    Definition::number("feedforward.velocity", "", 0.0, 2.0)
+        .describe("Ti, integral time of the current loop (Prévost Appendix 2)."),
+    ParameterDefinition::number("feedforward.velocity", "", 0.0, 2.0)
         .of_axis()
         .default(Number(0.0))
         .live()
-        .is("VFFW, weight of the velocity feedforward; 0 is off (Prévost eq. 6)."),
-    Definition::number("feedforward.torque_kg_m2", "kg·m²", 0.0, 1e3)
-        .driven_by(RotatingMotor)
+        .describe("VFFW, weight of the velocity feedforward; 0 disables it (Prévost eq. 6)."),
+    ParameterDefinition::number("feedforward.torque_kg_m2", "kg·m²", 0.0, 1e3)
+        .driven_by(RotaryMotor)
         .default(Number(0.0))
         .live()
-        .is("TFFW, weight of the torque feedforward at the motor; 0 is off (Prévost eq. 7)."),
-    Definition::number("feedforward.torque_kg", "kg", 0.0, 1e6)
+        .describe("TFFW, weight of the torque feedforward at the motor; 0 disables it (Prévost eq. 7)."),
+    ParameterDefinition::number("feedforward.torque_kg", "kg", 0.0, 1e6)
         .driven_by(LinearMotor)
         .default(Number(0.0))
         .live()
-        .is("TFFW, weight of the force feedforward; 0 is off (Prévost eq. 7)."),
-    Definition::number("feedforward.friction", "", 0.0, 2.0)
+        .describe("TFFW, weight of the force feedforward; 0 disables it (Prévost eq. 7)."),
+    ParameterDefinition::number("feedforward.friction", "", 0.0, 2.0)
         .of_axis()
         .default(Number(0.0))
         .live()
-        .is("Weight of the friction compensation: the friction torque at the setpoint's velocity; 0 is off."),
-    delay("delays.alpha_ms").is("α, delay of the setpoint before the position comparator (Prévost fig. 3)."),
-    delay("delays.beta_ms").is("β, delay of the velocity feedforward (Prévost fig. 3)."),
-    delay("delays.gamma_ms").is("γ, delay of the torque feedforward (Prévost fig. 3)."),
-    delay("delays.friction_ms").is("Shift of the friction compensation behind the setpoint."),
-    // What the controllers do not know.
-    deviation("deviation.inertia").is("Inertia of the plant, relative to the one that controllers are designed for."),
-    deviation("deviation.friction").is("Friction of the plant, relative to the one that is compensated."),
-    deviation("deviation.torque_constant").is("Torque constant of the plant, relative to the one that the drive reckons with."),
+        .describe("Weight of the friction compensation by the friction torque at the setpoint velocity; 0 disables it."),
+    delay("delays.alpha_ms").describe("α, delay of the setpoint before the position comparator (Prévost fig. 3)."),
+    delay("delays.beta_ms").describe("β, delay of the velocity feedforward (Prévost fig. 3)."),
+    delay("delays.gamma_ms").describe("γ, delay of the torque feedforward (Prévost fig. 3)."),
+    delay("delays.friction_ms").describe("Delay of the friction compensation after the setpoint."),
+    // Deviation of the plant from the model of the controllers.
+    deviation("deviation.inertia").describe("Factor on the plant inertia, relative to controller design."),
+    deviation("deviation.friction").describe("Factor on the plant friction, relative to friction compensation."),
+    deviation("deviation.torque_constant").describe("Factor on the plant torque constant, relative to the drive parameters."),
     // Limits.
-    Definition::number("limits.velocity_m_min", "m/min", 1e-6, 1e5)
+    ParameterDefinition::number("limits.velocity_m_min", "m/min", 1e-6, 1e5)
         .on(Linear)
-        .is("Vmax, largest velocity that a trajectory may ask for."),
-    Definition::number("limits.velocity_rpm", "rpm", 1e-6, 1e6)
+        .describe("Vmax, velocity limit of trajectories."),
+    ParameterDefinition::number("limits.velocity_rpm", "rpm", 1e-6, 1e6)
         .on(Rotary)
-        .is("Vmax, largest velocity of the axis that a trajectory may ask for."),
-    Definition::number("limits.acceleration_m_s2", "m/s²", 1e-6, 1e5)
+        .describe("Vmax, velocity limit of trajectories, of the axis."),
+    ParameterDefinition::number("limits.acceleration_m_s2", "m/s²", 1e-6, 1e5)
         .on(Linear)
-        .is("Amax, acceleration of a controlled stop; setpoints are not checked against it."),
-    Definition::number("limits.acceleration_rev_s2", "rev/s²", 1e-6, 1e5)
+        .describe("Amax, acceleration of a controlled stop; setpoints are not checked against it."),
+    ParameterDefinition::number("limits.acceleration_rev_s2", "rev/s²", 1e-6, 1e5)
         .on(Rotary)
-        .is("Amax, acceleration of a controlled stop; setpoints are not checked against it."),
-    Definition::number("limits.jerk_m_s3", "m/s³", 1e-6, 1e7)
+        .describe("Amax, acceleration of a controlled stop; setpoints are not checked against it."),
+    ParameterDefinition::number("limits.jerk_m_s3", "m/s³", 1e-6, 1e7)
         .on(Linear)
-        .is("Jmax, jerk of a controlled stop; setpoints are not checked against it."),
-    Definition::number("limits.jerk_rev_s3", "rev/s³", 1e-6, 1e7)
+        .describe("Jmax, jerk of a controlled stop; setpoints are not checked against it."),
+    ParameterDefinition::number("limits.jerk_rev_s3", "rev/s³", 1e-6, 1e7)
         .on(Rotary)
-        .is("Jmax, jerk of a controlled stop; setpoints are not checked against it."),
-    Definition::number("limits.travel_min_mm", "mm", -1e6, 0.0)
-        .on(Linear)
-        .optional()
-        .is("Lower travel limit; unlimited if omitted. Home is 0."),
-    Definition::number("limits.travel_max_mm", "mm", 0.0, 1e6)
+        .describe("Jmax, jerk of a controlled stop; setpoints are not checked against it."),
+    ParameterDefinition::number("limits.travel_min_mm", "mm", -1e6, 0.0)
         .on(Linear)
         .optional()
-        .is("Upper travel limit; unlimited if omitted. Home is 0."),
-    Definition::number("limits.travel_min_deg", "°", -1e6, 0.0)
+        .describe("Lower travel limit; unlimited if omitted. Home is 0."),
+    ParameterDefinition::number("limits.travel_max_mm", "mm", 0.0, 1e6)
+        .on(Linear)
+        .optional()
+        .describe("Upper travel limit; unlimited if omitted. Home is 0."),
+    ParameterDefinition::number("limits.travel_min_deg", "°", -1e6, 0.0)
         .on(Rotary)
         .optional()
-        .is("Lower travel limit; unlimited if omitted. Home is 0."),
-    Definition::number("limits.travel_max_deg", "°", 0.0, 1e6)
+        .describe("Lower travel limit; unlimited if omitted. Home is 0."),
+    ParameterDefinition::number("limits.travel_max_deg", "°", 0.0, 1e6)
         .on(Rotary)
         .optional()
-        .is("Upper travel limit; unlimited if omitted. Home is 0."),
-    // Default tolerances of action goals, on the synchronized tracking error.
-    tolerance("tolerances.path_mm", "mm", TOLERANCE_MM)
+        .describe("Upper travel limit; unlimited if omitted. Home is 0."),
+    // Default tolerances of action goals, on the delay-compensated following error.
+    tolerance("tolerances.path_mm", "mm", MAX_TOLERANCE_MM)
         .on(Linear)
-        .is("Largest error on the way of an action goal that names none; 0 is any."),
-    tolerance("tolerances.path_deg", "°", TOLERANCE_DEG)
+        .describe("Default path tolerance of action goals; 0 disables it."),
+    tolerance("tolerances.path_deg", "°", MAX_TOLERANCE_DEG)
         .on(Rotary)
-        .is("Largest error on the way of an action goal that names none; 0 is any."),
-    tolerance("tolerances.goal_mm", "mm", TOLERANCE_MM)
+        .describe("Default path tolerance of action goals; 0 disables it."),
+    tolerance("tolerances.goal_mm", "mm", MAX_TOLERANCE_MM)
         .on(Linear)
-        .is("Largest error at the end of an action goal that names none; 0 is any."),
-    tolerance("tolerances.goal_deg", "°", TOLERANCE_DEG)
+        .describe("Default goal tolerance of action goals; 0 disables it."),
+    tolerance("tolerances.goal_deg", "°", MAX_TOLERANCE_DEG)
         .on(Rotary)
-        .is("Largest error at the end of an action goal that names none; 0 is any."),
+        .describe("Default goal tolerance of action goals; 0 disables it."),
 ];

@@ -1,44 +1,44 @@
-//! A parameter's value, with the kinds that ROS 2 parameters and YAML have.
+//! Parameter values of the types that ROS 2 parameters and YAML have.
 
 use std::fmt;
 
-use super::error::shortened;
+use crate::text::shortened;
 
-/// The value of a parameter.
+/// Value of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
-    /// `bool`.
+    /// ROS parameter type `bool`.
     Bool(bool),
-    /// `integer`.
+    /// ROS parameter type `integer`.
     Integer(i64),
-    /// `double`.
+    /// ROS parameter type `double`.
     Double(f64),
-    /// `string`.
+    /// ROS parameter type `string`.
     Text(String),
-    /// `bool_array`.
+    /// ROS parameter type `bool_array`.
     BoolList(Vec<bool>),
-    /// `integer_array`.
+    /// ROS parameter type `integer_array`.
     IntegerList(Vec<i64>),
-    /// `double_array`.
+    /// ROS parameter type `double_array`.
     DoubleList(Vec<f64>),
-    /// `string_array`.
+    /// ROS parameter type `string_array`.
     TextList(Vec<String>),
 }
 
 impl Value {
-    /// The numbers of a list of numbers or integers; an empty list holds none, whatever its kind.
+    /// Returns the numbers of a list of numbers or integers. An empty list of any type counts as a list of numbers.
     pub(super) fn numbers(&self) -> Option<Vec<f64>> {
         match self {
             Self::DoubleList(numbers) => Some(numbers.clone()),
             Self::IntegerList(integers) => Some(integers.iter().map(|integer| *integer as f64).collect()),
-            // YAML and ROS do not know of what an empty list is.
+            // An empty list in YAML has no item type.
             Self::TextList(texts) if texts.is_empty() => Some(Vec::new()),
             Self::BoolList(flags) if flags.is_empty() => Some(Vec::new()),
             _ => None,
         }
     }
 
-    /// Kind and value for a message: `text "abc"`.
+    /// Returns type and value for a message: `text "abc"`.
     pub(super) fn described(&self) -> String {
         match self {
             Self::Bool(_) => format!("flag {self}"),
@@ -73,7 +73,7 @@ fn list_text(f: &mut fmt::Formatter<'_>, items: impl Iterator<Item = String>) ->
     write!(f, "[{}]", shortened(&items.join(", ")))
 }
 
-/// A number as short as it can be written exactly: `0.028`, `1e-9`, `1e3`.
+/// Returns the shortest decimal text that reads back as the same number: `0.028`, `1e-9`, `1e3`.
 pub(super) fn number_text(value: f64) -> String {
     let plain = format!("{value}");
     let exponent = format!("{value:e}");

@@ -1,46 +1,47 @@
-//! Parameters as a machine file.
+//! Writer for machine files.
 
 use std::fmt::Write;
 
 use super::definition::Scope;
-use super::error::breaks_line;
 use super::parameters::Parameters;
 use super::value::Value;
+use crate::text::is_control;
 
-/// Indentation of the first key, below `/**:` and `ros__parameters:`.
+/// Indentation level of the first key, below `/**:` and `ros__parameters:`.
 const DEPTH: usize = 2;
-/// Plain words that some reader of YAML takes for something else than a text.
-const WORDS: [&str; 11] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null", "nan", "inf"];
+/// Plain words that YAML 1.1 readers do not read as text.
+const NON_TEXT_WORDS: [&str; 11] =
+    ["y", "n", "yes", "no", "on", "off", "true", "false", "null", "nan", "inf"];
 
-/// A mapping in the order of its keys.
+/// Mapping in the order of its keys.
 #[derive(Default)]
-struct Section(Vec<(String, Node)>);
+struct Mapping(Vec<(String, MappingEntry)>);
 
-enum Node {
-    Section(Section),
+enum MappingEntry {
+    Mapping(Mapping),
     Value { text: String, comment: Option<String> },
 }
 
 impl Parameters {
-    /// The parameters that are set, as a machine file: what has only its default is left out, and
-    /// loading the file gives the same values, bit for bit.
+    /// Writes the parameters as a machine file, without those at their defaults. Loading the file yields bit-identical
+    /// values.
     ///
-    /// `head` stands as a comment above the file, `comment` gives the one behind a full key.
+    /// `head` becomes a comment at the top of the file, `comment` returns the comment for a full key.
     pub fn to_yaml(&self, head: &str, comment: impl Fn(&str) -> Option<String>) -> String {
-        let mut machine = Section::default();
-        let mut joints = Section::default();
-        let mut node = Section::default();
+        let mut machine = Mapping::default();
+        let mut joints = Mapping::default();
+        let mut node = Mapping::default();
         for (key, definition) in self.definitions() {
             if self.source(&key).is_none() {
                 continue;
             }
             let Some(value) = self.get(&key) else { continue };
-            let section = match definition.scope {
+            let mapping = match definition.scope {
                 Scope::Machine => &mut machine,
                 Scope::Axis => &mut joints,
                 Scope::Node => &mut node,
             };
-            section.insert(&key, Node::Value { text: value_text(&value), comment: comment(&key) });
+            mapping.insert(&key, MappingEntry::Value { text: value_text(&value), comment: comment(&key) });
         }
         let mut out = String::new();
         for line in head.lines() {
@@ -50,7 +51,7 @@ impl Parameters {
         machine.write(&mut out, DEPTH);
         for joint in joints.0 {
             out.push('\n');
-            Section(vec![joint]).write(&mut out, DEPTH);
+            Mapping(vec![joint]).write(&mut out, DEPTH);
         }
         if !node.0.is_empty() {
             out.push('\n');
@@ -60,19 +61,19 @@ impl Parameters {
     }
 }
 
-impl Section {
-    fn insert(&mut self, key: &str, node: Node) {
+impl Mapping {
+    fn insert(&mut self, key: &str, node: MappingEntry) {
         let Some((name, rest)) = key.split_once('.') else {
             self.0.push((key.to_owned(), node));
             return;
         };
-        let place = self.0.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
-            self.0.push((name.to_owned(), Node::Section(Section::default())));
+        let index = self.0.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
+            self.0.push((name.to_owned(), MappingEntry::Mapping(Mapping::default())));
             self.0.len() - 1
         });
-        // No key of the schema is another one's section.
-        if let Some((_, Node::Section(section))) = self.0.get_mut(place) {
-            section.insert(rest, node);
+        // No key of the schema is a prefix of another key.
+        if let Some((_, MappingEntry::Mapping(mapping))) = self.0.get_mut(index) {
+            mapping.insert(rest, node);
         }
     }
 
@@ -81,11 +82,11 @@ impl Section {
         for (name, node) in &self.0 {
             let _ = write!(out, "{indent}{}:", text(name));
             match node {
-                Node::Section(section) => {
+                MappingEntry::Mapping(mapping) => {
                     out.push('\n');
-                    section.write(out, depth + 1);
+                    mapping.write(out, depth + 1);
                 }
-                Node::Value { text, comment } => {
+                MappingEntry::Value { text, comment } => {
                     let _ = write!(out, " {text}");
                     if let Some(comment) = comment {
                         let _ = write!(out, "  # {}", one_line(comment));
@@ -114,8 +115,8 @@ fn list(items: impl Iterator<Item = String>) -> String {
     format!("[{}]", items.collect::<Vec<_>>().join(", "))
 }
 
-/// The shortest text that reads as the same bits; with a point and a signed exponent, without which
-/// YAML 1.1 takes it for a text.
+/// Returns the shortest text that reads back as the same bits, with a decimal point and a signed exponent, since YAML 1.1
+/// requires both in numbers.
 fn number(value: f64) -> String {
     let text = format!("{value:?}");
     match text.split_once('e') {
@@ -128,11 +129,11 @@ fn number(value: f64) -> String {
     }
 }
 
-/// A name as it is, anything else in quotation marks.
+/// Returns names unchanged and any other text in quotation marks.
 fn text(value: &str) -> String {
     let plain = value.starts_with(|c: char| c.is_ascii_alphabetic())
         && value.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-        && !WORDS.contains(&value.to_ascii_lowercase().as_str());
+        && !NON_TEXT_WORDS.contains(&value.to_ascii_lowercase().as_str());
     if plain { value.to_owned() } else { quoted(value) }
 }
 
@@ -141,8 +142,8 @@ fn quoted(value: &str) -> String {
     for c in value.chars() {
         match c {
             '"' | '\\' => out.extend(['\\', c]),
-            // What YAML takes for the end of a line, or does not let stand as it is.
-            c if breaks_line(c) || is_unprintable(c) => {
+            // Line breaks and characters that YAML does not permit.
+            c if is_control(c) || is_unprintable(c) => {
                 let _ = write!(out, "\\U{:08x}", u32::from(c));
             }
             c => out.push(c),
@@ -152,11 +153,11 @@ fn quoted(value: &str) -> String {
     out
 }
 
-/// Characters outside the printable set of YAML.
+/// Returns true for characters outside the printable set of YAML.
 fn is_unprintable(c: char) -> bool {
     matches!(c, '\u{feff}' | '\u{fffe}' | '\u{ffff}')
 }
 
 fn one_line(text: &str) -> String {
-    text.replace(breaks_line, " ")
+    text.replace(is_control, " ")
 }

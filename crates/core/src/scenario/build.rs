@@ -1,41 +1,43 @@
-//! From a scenario's file to a path with a law of time.
+//! Conversion of a scenario file to a program: path and feed profile.
 
 use std::f64::consts::TAU;
 
 use serde_saphyr::Spanned;
 
-use crate::config::{AxisKind, MachineConfig, shortened};
+use crate::config::{AxisKind, MachineConfig};
 use crate::kinematics::Kinematics;
-use crate::path::{Block, Frame, Law, Move, PathError, PathLimits, Program};
+use crate::path::{Block, FeedProfile, Frame, Move, PathError, PathLimits, Program};
+use crate::text::shortened;
 use crate::trajectory::JointLimits;
-use crate::units::{DEGREE, METER_PER_MINUTE, REVOLUTION, RPM};
+use crate::units::{DEGREE, METER_PER_MINUTE, REVOLUTION, RPM, Rounded};
 
 use super::coordinates::{coordinate, overlay};
 use super::error::ScenarioError;
-use super::file::{ArcEntry, Entry, File, FrameName, Number, Values};
+use super::file::{ArcEntry, FrameName, MoveEntry, ScenarioFile, Values};
+use crate::yaml::{self, YamlNumber};
 
-/// Most moves of one scenario.
+/// Maximum number of moves of a scenario.
 const MAX_MOVES: usize = 1_000_000;
-/// Longest rest, dwell, ramp, and scenario, s: a day.
-const LONGEST: f64 = 86_400.0;
+/// Maximum rest, dwell, ramp and duration of a scenario, s: one day.
+const MAX_DURATION: f64 = 86_400.0;
 
-/// Relative rounding of a ramp that takes the whole of a move.
+/// Relative tolerance for a ramp as long as its move.
 const RAMP_TOLERANCE: f64 = 1e-12;
 
-/// Builds the moves of `file` one after the other, then plans their times.
+/// Builds the moves of `file` in order and plans their feed profile.
 pub(super) fn program(
     name: &str,
-    file: &File,
+    file: &ScenarioFile,
     machine: &MachineConfig,
     feed: Option<f64>,
 ) -> Result<Program, ScenarioError> {
-    let joints: Vec<JointLimits> = machine.axes().iter().map(JointLimits::of_axis).collect();
-    let mut builder = Builder {
+    let joints: Vec<JointLimits> = machine.axes().iter().map(JointLimits::from_axis).collect();
+    let mut builder = ProgramBuilder {
         name,
         kinds: joints.iter().map(|joint| joint.kind).collect(),
         point: vec![0.0; joints.len()],
         limits: PathLimits { acceleration: f64::INFINITY, jerk: f64::INFINITY },
-        feeds: Feeds::of(name, file, feed)?,
+        feeds: DefaultFeeds::from_file(name, file, feed)?,
         moves: Vec::new(),
         joints,
     };
@@ -48,15 +50,15 @@ pub(super) fn program(
     }
     if file.moves.is_empty() || file.moves.len() > MAX_MOVES {
         let found = file.moves.len();
-        let reason = format!("{found} moves; a scenario has 1 to {MAX_MOVES}");
+        let reason = format!("found {found} moves, 1 … {MAX_MOVES} are allowed");
         return Err(ScenarioError::Move { at: name.to_owned(), reason });
     }
     for entry in &file.moves {
         builder.add(entry)?;
     }
-    let rest = file.rest_s.map_or(0.0, |Number(rest)| rest);
+    let rest = file.rest_s.map_or(0.0, |YamlNumber(rest)| rest);
     check_time(name, "rest_s", rest)?;
-    let Builder { joints, mut moves, .. } = builder;
+    let ProgramBuilder { joints, mut moves, .. } = builder;
     if let Some(last) = moves.last_mut() {
         last.dwell += rest;
     }
@@ -68,25 +70,25 @@ pub(super) fn program(
     let program = Program::plan(Kinematics::new(machine), frame, &joints, period, rest, moves)
         .map_err(|error| ScenarioError::Plan { name: name.to_owned(), error })?;
     let duration = program.duration();
-    if duration > LONGEST {
-        return Err(ScenarioError::TooLong { name: name.to_owned(), duration, limit: LONGEST });
+    if duration > MAX_DURATION {
+        return Err(ScenarioError::TooLong { name: name.to_owned(), duration, limit: MAX_DURATION });
     }
     Ok(program)
 }
 
-/// Feeds of moves that have none of their own: m/s along linear ones, rad/s along rotary ones.
+/// Default feeds of the moves: m/s for linear moves, rad/s for rotary moves.
 #[derive(Debug, Clone, Copy)]
-struct Feeds {
+struct DefaultFeeds {
     linear: Option<f64>,
     rotary: Option<f64>,
 }
 
-impl Feeds {
-    fn of(name: &str, file: &File, replaced: Option<f64>) -> Result<Self, ScenarioError> {
+impl DefaultFeeds {
+    fn from_file(name: &str, file: &ScenarioFile, replaced: Option<f64>) -> Result<Self, ScenarioError> {
         let own =
-            |entry: &&Spanned<Entry>| entry.value.feed_m_min.is_some() || entry.value.feed_rpm.is_some();
+            |entry: &&Spanned<MoveEntry>| entry.value.feed_m_min.is_some() || entry.value.feed_rpm.is_some();
         let Some(feed) = replaced else {
-            return Ok(Feeds {
+            return Ok(DefaultFeeds {
                 linear: feed_of(name, "feed_m_min", file.feed_m_min, METER_PER_MINUTE)?,
                 rotary: feed_of(name, "feed_rpm", file.feed_rpm, RPM)?,
             });
@@ -95,65 +97,67 @@ impl Feeds {
             return Err(ScenarioError::Key {
                 at: at_line(name, entry),
                 key: "--feed".to_owned(),
-                reason: "this move has a feed of its own, which one feed for all cannot replace".to_owned(),
+                reason:
+                    "cannot replace the feed of this move; only the default feed of the scenario is replaced"
+                        .to_owned(),
             });
         }
-        let Feeds { linear, rotary } = Feeds {
-            linear: file.feed_m_min.and(feed_of(name, "--feed", Some(Number(feed)), METER_PER_MINUTE)?),
-            rotary: file.feed_rpm.and(feed_of(name, "--feed", Some(Number(feed)), RPM)?),
+        let DefaultFeeds { linear, rotary } = DefaultFeeds {
+            linear: file.feed_m_min.and(feed_of(name, "--feed", Some(YamlNumber(feed)), METER_PER_MINUTE)?),
+            rotary: file.feed_rpm.and(feed_of(name, "--feed", Some(YamlNumber(feed)), RPM)?),
         };
         if linear.is_some() && rotary.is_some() {
             return Err(ScenarioError::Key {
                 at: name.to_owned(),
                 key: "--feed".to_owned(),
-                reason: "the scenario has feed_m_min and feed_rpm, which one feed cannot replace".to_owned(),
+                reason: "cannot replace both feed_m_min and feed_rpm of the scenario".to_owned(),
             });
         }
-        Ok(Feeds { linear, rotary })
+        Ok(DefaultFeeds { linear, rotary })
     }
 }
 
-struct Builder<'a> {
+struct ProgramBuilder<'a> {
     name: &'a str,
     joints: Vec<JointLimits>,
     kinds: Vec<AxisKind>,
-    /// Where the next move starts, programmed coordinates.
+    /// Start of the next move, programmed coordinates.
     point: Vec<f64>,
     limits: PathLimits,
-    feeds: Feeds,
+    feeds: DefaultFeeds,
     moves: Vec<Move>,
 }
 
-impl Builder<'_> {
+impl ProgramBuilder<'_> {
     fn at<T>(&self, spanned: &Spanned<T>) -> String {
         at_line(self.name, spanned)
     }
 
-    fn add(&mut self, spanned: &Spanned<Entry>) -> Result<(), ScenarioError> {
+    fn add(&mut self, spanned: &Spanned<MoveEntry>) -> Result<(), ScenarioError> {
         let (entry, at) = (&spanned.value, self.at(spanned));
         let wrong = |reason: &str| ScenarioError::Move { at: at.clone(), reason: reason.to_owned() };
         let given =
             [entry.line.is_some(), entry.arc.is_some(), entry.spline.is_some(), entry.dwell_s.is_some()];
         if given.iter().filter(|&&given| given).count() != 1 {
-            return Err(wrong("a move is exactly one of line, arc, spline, dwell_s"));
+            return Err(wrong("a move must have exactly one of line, arc, spline, dwell_s"));
         }
-        if let Some(Number(dwell)) = entry.dwell_s {
+        if let Some(YamlNumber(dwell)) = entry.dwell_s {
             check_time(&at, "dwell_s", dwell)?;
             let Some(last) = self.moves.last_mut() else {
-                return Err(wrong("a dwell stands behind a move; rest_s is the rest before the first"));
+                return Err(wrong("dwell_s must follow a move; use rest_s for a rest before the first move"));
             };
             last.dwell += dwell;
             return Ok(());
         }
-        let law = match entry.ramp_s {
-            Some(Number(ramp)) => {
+        let profile = match entry.ramp_s {
+            Some(YamlNumber(ramp)) => {
                 check_time(&at, "ramp_s", ramp)?;
                 if ramp == 0.0 {
                     return Err(value_error(&at, "ramp_s", ramp, "be above 0"));
                 }
-                Law::Cosine { ramp }
+                FeedProfile::Cosine { ramp }
             }
-            None => Law::JerkLimited,
+            None => FeedProfile::JerkLimited,
         };
         let block = if let Some(line) = &entry.line {
             self.line(line, &at)?
@@ -162,14 +166,16 @@ impl Builder<'_> {
         } else if let Some(arc) = &entry.arc {
             self.arc(arc, entry, &at)?
         } else {
-            return Err(wrong("a move is exactly one of line, arc, spline, dwell_s"));
+            return Err(wrong("a move must have exactly one of line, arc, spline, dwell_s"));
         };
         let feed = self.feed(entry, block.kind(), &at)?;
-        if let Law::Cosine { ramp } = law
+        if let FeedProfile::Cosine { ramp } = profile
             && feed * ramp > block.length() * (1.0 + RAMP_TOLERANCE)
         {
-            let allowed =
-                format!("be {:.4} s at most, for the length of this move at its feed", block.length() / feed);
+            let allowed = format!(
+                "be at most {} s, the duration of this move at its feed",
+                Rounded(block.length() / feed)
+            );
             return Err(value_error(&at, "ramp_s", ramp, &allowed));
         }
         let corner = match block.kind() {
@@ -177,7 +183,7 @@ impl Builder<'_> {
             AxisKind::Rotary => feed_of(&at, "corner_rpm", entry.corner_rpm, RPM)?,
         };
         block.point(block.length(), &mut self.point);
-        self.moves.push(Move { block, feed, corner, limits: self.limits, law, dwell: 0.0 });
+        self.moves.push(Move { block, feed, corner, limits: self.limits, profile, dwell: 0.0 });
         Ok(())
     }
 
@@ -197,46 +203,48 @@ impl Builder<'_> {
         Block::spline(&self.point, &control, &self.kinds).map_err(|error| path_error(at, error))
     }
 
-    fn arc(&self, arc: &ArcEntry, entry: &Entry, at: &str) -> Result<Block, ScenarioError> {
+    fn arc(&self, arc: &ArcEntry, entry: &MoveEntry, at: &str) -> Result<Block, ScenarioError> {
         let mut center = Vec::new();
-        for (key, &Number(value)) in &arc.center {
+        for (key, &YamlNumber(value)) in &arc.center {
             center.push(coordinate(key, value, &self.joints, at)?);
         }
-        // The plane's first coordinate is the machine's first, whatever the order in the file.
-        center.sort_by_key(|&(place, _)| place);
+        // The order of the coordinates is that of the machine, not that of the file.
+        center.sort_by_key(|&(index, _)| index);
         let [(first, u), (second, v)] = center[..] else {
-            let reason = format!("center has {} coordinates; an arc has a center in two", center.len());
+            let reason = format!("center has {} coordinates, must have two", center.len());
             return Err(ScenarioError::Move { at: at.to_owned(), reason });
         };
-        if let Some(&place) = [first, second].iter().find(|&&place| self.kinds[place] == AxisKind::Rotary) {
+        if let Some(&index) = [first, second].iter().find(|&&index| self.kinds[index] == AxisKind::Rotary) {
             let reason = format!(
-                "center names {}, which is rotary; a circle lies in two linear axes",
-                self.joints[place].name
+                "center contains {}, a rotary axis; the plane of an arc is spanned by two linear axes",
+                self.joints[index].name
             );
             return Err(ScenarioError::Move { at: at.to_owned(), reason });
         }
         let mut sweep = match (arc.angle_deg, arc.turns) {
-            (Some(Number(angle)), None) => finite(at, "angle_deg", angle)? * DEGREE,
-            (None, Some(Number(turns))) => finite(at, "turns", turns)? * TAU,
+            (Some(YamlNumber(angle)), None) => finite(at, "angle_deg", angle)? * DEGREE,
+            (None, Some(YamlNumber(turns))) => finite(at, "turns", turns)? * TAU,
             _ => {
-                let reason = "an arc has one of angle_deg and turns, positive counterclockwise".to_owned();
+                let reason =
+                    "an arc must have one of angle_deg and turns, positive counterclockwise".to_owned();
                 return Err(ScenarioError::Move { at: at.to_owned(), reason });
             }
         };
         let mut end = self.point.clone();
-        for (key, &Number(value)) in &arc.to {
-            let (place, value) = coordinate(key, value, &self.joints, at)?;
-            if place == first || place == second {
+        for (key, &YamlNumber(value)) in &arc.to {
+            let (index, value) = coordinate(key, value, &self.joints, at)?;
+            if index == first || index == second {
                 return Err(ScenarioError::Key {
                     at: at.to_owned(),
                     key: shortened(key),
-                    reason: "lies in the plane of the arc, whose end follows from its angle".to_owned(),
+                    reason: "lies in the plane of the arc, where the angle determines the end point"
+                        .to_owned(),
                 });
             }
-            end[place] = value;
+            end[index] = value;
         }
-        if let Some(Number(ramp)) = entry.ramp_s {
-            // The angle is that at full feed; each of the two ramps adds half of what full feed would.
+        if let Some(YamlNumber(ramp)) = entry.ramp_s {
+            // The angle is covered at full feed; each of the two ramps adds half of its length at full feed.
             let radius = (self.point[first] - u).hypot(self.point[second] - v);
             let feed = self.feed(entry, self.kinds[first], at)?;
             sweep += sweep.signum() * feed * ramp / radius;
@@ -245,24 +253,21 @@ impl Builder<'_> {
             .map_err(|error| path_error(at, error))
     }
 
-    /// Feed along a move whose length counts in `kind`.
-    fn feed(&self, entry: &Entry, kind: AxisKind, at: &str) -> Result<f64, ScenarioError> {
+    /// Returns the feed of a move of type `kind`, m/s or rad/s.
+    fn feed(&self, entry: &MoveEntry, kind: AxisKind, at: &str) -> Result<f64, ScenarioError> {
         let (key, own, unit, default) = match kind {
             AxisKind::Linear => ("feed_m_min", entry.feed_m_min, METER_PER_MINUTE, self.feeds.linear),
             AxisKind::Rotary => ("feed_rpm", entry.feed_rpm, RPM, self.feeds.rotary),
         };
         feed_of(at, key, own, unit)?.or(default).ok_or_else(|| ScenarioError::Move {
             at: at.to_owned(),
-            reason: format!("there is no {key}, neither here nor for the whole scenario"),
+            reason: format!("{key} is missing; set it for this move or for the scenario"),
         })
     }
 }
 
 fn at_line<T>(name: &str, spanned: &Spanned<T>) -> String {
-    match spanned.referenced.line() {
-        0 => name.to_owned(),
-        line => format!("{name}:{line}"),
-    }
+    yaml::position(name, spanned.referenced.line())
 }
 
 fn path_error(at: &str, error: PathError) -> ScenarioError {
@@ -278,25 +283,25 @@ fn finite(at: &str, key: &str, value: f64) -> Result<f64, ScenarioError> {
 }
 
 fn check_time(at: &str, key: &str, value: f64) -> Result<(), ScenarioError> {
-    if (0.0..=LONGEST).contains(&value) {
+    if (0.0..=MAX_DURATION).contains(&value) {
         return Ok(());
     }
-    Err(value_error(at, key, value, &format!("lie in 0 … {LONGEST} s")))
+    Err(value_error(at, key, value, &format!("lie in 0 … {MAX_DURATION} s")))
 }
 
-fn feed_of(at: &str, key: &str, value: Option<Number>, unit: f64) -> Result<Option<f64>, ScenarioError> {
+fn feed_of(at: &str, key: &str, value: Option<YamlNumber>, unit: f64) -> Result<Option<f64>, ScenarioError> {
     match value {
-        Some(Number(feed)) if !(feed > 0.0 && feed.is_finite()) => {
+        Some(YamlNumber(feed)) if !(feed > 0.0 && feed.is_finite()) => {
             Err(value_error(at, key, feed, "be a finite number above 0"))
         }
-        feed => Ok(feed.map(|Number(feed)| feed * unit)),
+        feed => Ok(feed.map(|YamlNumber(feed)| feed * unit)),
     }
 }
 
-/// Limits along the path, besides those of the axes.
+/// Parses the path limits, which apply in addition to the axis limits.
 fn path_limits(values: &Values, at: &str) -> Result<PathLimits, ScenarioError> {
     let mut limits = PathLimits { acceleration: f64::INFINITY, jerk: f64::INFINITY };
-    for (key, &Number(value)) in values {
+    for (key, &YamlNumber(value)) in values {
         let (limit, unit) = match key.as_str() {
             "acceleration_m_s2" => (&mut limits.acceleration, 1.0),
             "acceleration_rev_s2" => (&mut limits.acceleration, REVOLUTION),
@@ -306,8 +311,8 @@ fn path_limits(values: &Values, at: &str) -> Result<PathLimits, ScenarioError> {
                 return Err(ScenarioError::Key {
                     at: at.to_owned(),
                     key: shortened(key),
-                    reason: "unknown; limits are acceleration_m_s2 and jerk_m_s3 along the path, or \
-                             acceleration_rev_s2 and jerk_rev_s3"
+                    reason: "unknown limit; there are acceleration_m_s2 and jerk_m_s3 for linear paths, \
+                             acceleration_rev_s2 and jerk_rev_s3 for rotary paths"
                         .to_owned(),
                 });
             }

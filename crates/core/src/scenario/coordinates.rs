@@ -1,16 +1,15 @@
-//! Coordinates by joint name and unit, as in `x_mm` and `c_deg`.
+//! Coordinates keyed by joint name and unit, as in `x_mm` and `c_deg`.
 
-use crate::config::{AxisKind, shortened};
+use crate::config::AxisKind;
+use crate::text::{nearest_hint, nearest_name, shortened};
 use crate::trajectory::JointLimits;
 use crate::units::{DEGREE, MILLIMETER};
 
 use super::error::ScenarioError;
-use super::file::{Number, Values};
+use super::file::Values;
+use crate::yaml::YamlNumber;
 
-/// Similarity (Jaro-Winkler) below which a known key is no help.
-const NEAR_ENOUGH: f64 = 0.7;
-
-/// Suffix of a coordinate's key, and its unit in SI.
+/// Returns the key suffix of a coordinate and its unit in m or rad.
 fn unit(kind: AxisKind) -> (&'static str, f64) {
     match kind {
         AxisKind::Linear => ("mm", MILLIMETER),
@@ -18,34 +17,28 @@ fn unit(kind: AxisKind) -> (&'static str, f64) {
     }
 }
 
-/// Key of a joint's coordinate.
+/// Returns the key of a joint coordinate.
 fn key_of(joint: &JointLimits) -> String {
     format!("{}_{}", joint.name, unit(joint.kind).0)
 }
 
-/// Place of the joint that `key` names, and the coordinate in m or rad.
+/// Returns the joint index of `key` and the coordinate, m or rad.
 pub(super) fn coordinate(
     key: &str,
     value: f64,
     joints: &[JointLimits],
     at: &str,
 ) -> Result<(usize, f64), ScenarioError> {
-    let Some(place) = joints.iter().position(|joint| key_of(joint) == key) else {
+    let Some(index) = joints.iter().position(|joint| key_of(joint) == key) else {
         let known: Vec<String> = joints.iter().map(key_of).collect();
-        // A key of any length is compared in memory of as many cells.
-        let key = shortened(key);
-        let nearest = known
-            .iter()
-            .min_by_key(|known| strsim::damerau_levenshtein(&key, known))
-            .filter(|known| strsim::jaro_winkler(&key, known) >= NEAR_ENOUGH);
-        let hint = nearest.map(|nearest| format!("; the nearest is {nearest}")).unwrap_or_default();
+        let hint = nearest_hint(&nearest_name(key, &known));
         return Err(ScenarioError::Key {
             at: at.to_owned(),
-            key,
-            reason: format!("no coordinate of this machine, which has {}{hint}", known.join(", ")),
+            key: shortened(key),
+            reason: format!("unknown coordinate; this machine has {}{hint}", known.join(", ")),
         });
     };
-    let scaled = value * unit(joints[place].kind).1;
+    let scaled = value * unit(joints[index].kind).1;
     if !scaled.is_finite() {
         return Err(ScenarioError::Value {
             at: at.to_owned(),
@@ -54,19 +47,19 @@ pub(super) fn coordinate(
             allowed: "be a finite number".to_owned(),
         });
     }
-    Ok((place, scaled))
+    Ok((index, scaled))
 }
 
-/// Puts `values` over the coordinates of `point`.
+/// Overwrites the coordinates of `point` that `values` contains.
 pub(super) fn overlay(
     point: &mut [f64],
     values: &Values,
     joints: &[JointLimits],
     at: &str,
 ) -> Result<(), ScenarioError> {
-    for (key, &Number(value)) in values {
-        let (place, value) = coordinate(key, value, joints, at)?;
-        point[place] = value;
+    for (key, &YamlNumber(value)) in values {
+        let (index, value) = coordinate(key, value, joints, at)?;
+        point[index] = value;
     }
     Ok(())
 }

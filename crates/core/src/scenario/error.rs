@@ -1,83 +1,84 @@
-//! Why a scenario cannot be used.
+//! Errors of scenarios.
 
 use crate::path::{PathError, PlanError};
+use crate::units::Rounded;
 
-/// A refused scenario; its text is one line that begins with the file, and the line in it if known.
+/// Rejection of a scenario. The text is one line that begins with the file and, if known, the line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
-    /// Neither a shipped scenario nor a file that can be read.
-    #[error("{name}: {reason}; the shipped scenarios are {known}")]
+    /// Neither a built-in scenario nor a readable file.
+    #[error("{name}: {reason}; built-in scenarios: {known}")]
     Unknown {
-        /// What was asked for.
+        /// Requested name or path.
         name: String,
-        /// What the operating system says.
+        /// Error of the operating system.
         reason: String,
-        /// Names of the shipped ones, with commas.
+        /// Names of the built-in scenarios, separated by commas.
         known: String,
     },
-    /// Not YAML, an unknown key, or a value of the wrong kind.
-    #[error("{at}: {message}")]
+    /// Invalid YAML, an unknown key, or a value of the wrong type.
+    #[error("{at}: {reason}")]
     Syntax {
         /// File and line.
         at: String,
-        /// What the YAML reader says.
-        message: String,
+        /// Error of the YAML reader.
+        reason: String,
     },
-    /// A value that makes no sense here.
-    #[error("{at}: {key} = {value}: must {allowed}")]
+    /// Value out of range.
+    #[error("{at}: {key} = {}: must {allowed}", Rounded(*value))]
     Value {
         /// File and line.
         at: String,
         /// Key.
         key: String,
-        /// Value found.
+        /// Value.
         value: f64,
-        /// What is allowed, after "must".
+        /// Requirement, a verb phrase after "must".
         allowed: String,
     },
-    /// A key that does not fit the machine or the move.
+    /// Key that is invalid for the machine or the move.
     #[error("{at}: {key}: {reason}")]
     Key {
         /// File and line.
         at: String,
         /// Key.
         key: String,
-        /// Why, and what is allowed.
+        /// Reason and allowed keys.
         reason: String,
     },
-    /// A move is not exactly one of line, arc, spline, dwell_s, or lacks something.
+    /// Incomplete or contradictory move.
     #[error("{at}: {reason}")]
     Move {
         /// File and line.
         at: String,
-        /// What is wrong.
+        /// Reason.
         reason: String,
     },
-    /// A move that is no geometry.
+    /// Invalid geometry of a move.
     #[error("{at}: {error}")]
     Path {
         /// File and line.
         at: String,
-        /// What is wrong with it.
+        /// Reason.
         error: PathError,
     },
-    /// It would take longer than anybody waits for.
-    #[error("{name}: lasts {duration:e} s; a scenario lasts {limit} s at most")]
+    /// Duration above the limit.
+    #[error("{name}: duration is {} s, at most {limit} s are allowed", Rounded(*duration))]
     TooLong {
         /// Scenario.
         name: String,
-        /// s.
+        /// Duration, s.
         duration: f64,
-        /// s.
+        /// Maximum duration, s.
         limit: f64,
     },
-    /// The moves cannot be run one after the other within the limits.
+    /// Moves that cannot be joined within the limits.
     #[error("{name}: {error}")]
     Plan {
         /// Scenario.
         name: String,
-        /// Why.
+        /// Reason.
         error: PlanError,
     },
 }

@@ -1,51 +1,19 @@
-//! The data file of a scenario, as it stands in YAML.
+//! YAML format of a scenario file.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use serde::Deserialize;
-use serde::de::{Deserializer, Visitor};
 use serde_saphyr::Spanned;
 
-/// Values by key, as in `{x_mm: 60, c_deg: 90}`.
-pub(super) type Values = BTreeMap<String, Number>;
+use crate::yaml::YamlNumber;
 
-/// A number; what is none is named in the error.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Number(pub f64);
+/// Numbers by key, as in `{x_mm: 60, c_deg: 90}`.
+pub(super) type Values = BTreeMap<String, YamlNumber>;
 
-impl<'de> Deserialize<'de> for Number {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(NumberVisitor)
-    }
-}
-
-struct NumberVisitor;
-
-impl Visitor<'_> for NumberVisitor {
-    type Value = Number;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number")
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<Number, E> {
-        Ok(Number(value as f64))
-    }
-
-    fn visit_u64<E>(self, value: u64) -> Result<Number, E> {
-        Ok(Number(value as f64))
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<Number, E> {
-        Ok(Number(value))
-    }
-}
-
-/// A whole scenario.
+/// Content of a scenario file.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct File {
+pub(super) struct ScenarioFile {
     pub description: String,
     #[serde(default)]
     pub source: Option<String>,
@@ -54,51 +22,51 @@ pub(super) struct File {
     #[serde(default)]
     pub start: Option<Spanned<Values>>,
     #[serde(default)]
-    pub feed_m_min: Option<Number>,
+    pub feed_m_min: Option<YamlNumber>,
     #[serde(default)]
-    pub feed_rpm: Option<Number>,
+    pub feed_rpm: Option<YamlNumber>,
     #[serde(default)]
     pub limits: Option<Spanned<Values>>,
     #[serde(default)]
-    pub rest_s: Option<Number>,
-    pub moves: Vec<Spanned<Entry>>,
+    pub rest_s: Option<YamlNumber>,
+    pub moves: Vec<Spanned<MoveEntry>>,
 }
 
-/// What the coordinates of x, y and z are.
+/// Frame of the programmed coordinates.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum FrameName {
-    /// Positions of the joints.
+    /// Joint positions.
     #[default]
     Joints,
-    /// The tool tip in the workpiece frame.
+    /// Tool tip in the workpiece frame for x, y and z, joint positions for a and c.
     Workpiece,
 }
 
-/// One entry of `moves`: one of the first four, and what belongs to it.
+/// Entry of `moves`: exactly one of `line`, `arc`, `spline` and `dwell_s`, and its options.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Entry {
+pub(super) struct MoveEntry {
     pub line: Option<Values>,
     pub arc: Option<ArcEntry>,
     pub spline: Option<Vec<Values>>,
-    pub dwell_s: Option<Number>,
-    pub feed_m_min: Option<Number>,
-    pub feed_rpm: Option<Number>,
-    pub corner_m_min: Option<Number>,
-    pub corner_rpm: Option<Number>,
-    pub ramp_s: Option<Number>,
+    pub dwell_s: Option<YamlNumber>,
+    pub feed_m_min: Option<YamlNumber>,
+    pub feed_rpm: Option<YamlNumber>,
+    pub corner_m_min: Option<YamlNumber>,
+    pub corner_rpm: Option<YamlNumber>,
+    pub ramp_s: Option<YamlNumber>,
 }
 
-/// A circular arc about `center`, by an angle or by whole turns.
+/// Circular arc about `center`, given by its angle or by its number of turns.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ArcEntry {
     pub center: Values,
     #[serde(default)]
-    pub angle_deg: Option<Number>,
+    pub angle_deg: Option<YamlNumber>,
     #[serde(default)]
-    pub turns: Option<Number>,
+    pub turns: Option<YamlNumber>,
     #[serde(default)]
     pub to: Values,
 }

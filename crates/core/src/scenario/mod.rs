@@ -1,14 +1,14 @@
-//! Scenarios: trials described in data files.
+//! Scenarios: test motions in YAML files.
 //!
-//! A scenario is a YAML file with a start, a feed and moves; [`Scenario::program`] makes it a path
-//! with a law of time on a given machine. Those of the paper are shipped in `config/scenarios`.
+//! A scenario file contains a start point, a feed and moves. [`Scenario::program`] plans its path and feed profile for
+//! a machine. The test motions of Prévost et al. are built in, from `config/scenarios`.
 //!
 //! ```yaml
-//! description: There and back, with a corner
-//! feed_m_min: 10           # of every move that has none; feed_rpm for rotary moves
-//! rest_s: 0.5              # at rest before the first and after the last move
+//! description: Line, half circle and return line
+//! feed_m_min: 10           # default feed of the moves; feed_rpm for rotary moves
+//! rest_s: 0.5              # rest before the first and after the last move
 //! moves:
-//!   - line: {x_mm: 60}     # joints that are not named stay where they are
+//!   - line: {x_mm: 60}     # other joints keep their positions
 //!   - arc: {center: {x_mm: 60, y_mm: 15}, angle_deg: 180}
 //!   - line: {x_mm: 0}
 //!     feed_m_min: 5
@@ -21,14 +21,13 @@ mod file;
 
 use std::path::Path as FilePath;
 
-use serde_saphyr::{NonFiniteFloatPolicy, options};
-
-use crate::config::{MachineConfig, breaks_line};
+use crate::config::MachineConfig;
 use crate::path::Program;
+use crate::yaml;
 
 pub use error::ScenarioError;
 
-/// Shipped scenarios: name and file, in the order of the paper's figures.
+/// Built-in scenarios: name and file, in the order of the figures in Prévost et al.
 const BUILTIN: &[(&str, &str)] = &[
     ("x-constant", include_str!("../../config/scenarios/x-constant.yaml")),
     ("y-constant", include_str!("../../config/scenarios/y-constant.yaml")),
@@ -48,25 +47,23 @@ const BUILTIN: &[(&str, &str)] = &[
     ("five-axis", include_str!("../../config/scenarios/five-axis.yaml")),
     ("bspline-5x", include_str!("../../config/scenarios/bspline-5x.yaml")),
 ];
-/// Longest part of what the YAML reader says, characters: it quotes keys of any length.
-const LONGEST_MESSAGE: usize = 500;
-/// Largest scenario file that is read.
+/// Maximum size of a scenario file.
 const MAX_FILE_BYTES: u64 = 16 << 20;
 
-/// A trial, as it stands in its file; what depends on a machine is checked by [`Self::program`].
+/// Test motion read from a scenario file. [`Self::program`] checks it against a machine.
 #[derive(Debug, Clone)]
 pub struct Scenario {
     name: String,
-    file: file::File,
+    file: file::ScenarioFile,
 }
 
 impl Scenario {
-    /// Names of the shipped scenarios.
+    /// Returns the names of the built-in scenarios.
     pub fn builtin_names() -> impl Iterator<Item = &'static str> {
         BUILTIN.iter().map(|(name, _)| *name)
     }
 
-    /// A shipped scenario by its name.
+    /// Returns the built-in scenario `name`.
     ///
     /// # Errors
     /// [`ScenarioError::Unknown`].
@@ -74,19 +71,19 @@ impl Scenario {
         Self::from_yaml(Self::builtin_text(name)?, name)
     }
 
-    /// The file of a shipped scenario.
+    /// Returns the YAML text of the built-in scenario `name`.
     ///
     /// # Errors
     /// [`ScenarioError::Unknown`].
     pub fn builtin_text(name: &str) -> Result<&'static str, ScenarioError> {
         let found = BUILTIN.iter().find(|(known, _)| *known == name);
-        found.map(|(_, text)| *text).ok_or_else(|| unknown(name, "no such scenario"))
+        found.map(|(_, text)| *text).ok_or_else(|| unknown(name, "unknown scenario"))
     }
 
-    /// A shipped scenario if `name` is one, otherwise the file `name`.
+    /// Loads the built-in scenario `name`, or the file `name` if there is none.
     ///
     /// # Errors
-    /// [`ScenarioError`] if it cannot be read or is no scenario.
+    /// [`ScenarioError::Unknown`] if the file cannot be read, [`ScenarioError::Syntax`] if it is not a scenario.
     pub fn load(name: &str) -> Result<Self, ScenarioError> {
         if Self::builtin_names().any(|known| known == name) {
             return Self::builtin(name);
@@ -94,55 +91,44 @@ impl Scenario {
         let failed = |error: std::io::Error| unknown(name, &error.to_string());
         let length = std::fs::metadata(FilePath::new(name)).map_err(failed)?.len();
         if length > MAX_FILE_BYTES {
-            return Err(unknown(name, &format!("{length} bytes are more than {MAX_FILE_BYTES}")));
+            return Err(unknown(
+                name,
+                &format!("size is {length} bytes, at most {MAX_FILE_BYTES} are allowed"),
+            ));
         }
         Self::from_yaml(&std::fs::read_to_string(name).map_err(failed)?, name)
     }
 
-    /// The text of a scenario file; `name` is for messages.
+    /// Parses the text of a scenario file; messages name it `name`.
     ///
     /// # Errors
     /// [`ScenarioError::Syntax`].
     pub fn from_yaml(text: &str, name: &str) -> Result<Self, ScenarioError> {
-        let options = options! {
-            strict_booleans: true,
-            // Let through, to be refused together with the key.
-            non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
-            with_snippet: false,
-        };
-        let file = serde_saphyr::from_str_with_options(text, options).map_err(|error| {
-            let line = error.location().map(|location| format!(":{}", location.line()));
-            let text = error.without_snippet().to_string();
-            // The position stands before the message.
-            let message = text.rsplit_once(" at line ").map_or(text.as_str(), |(message, _)| message);
-            ScenarioError::Syntax {
-                at: format!("{name}{}", line.unwrap_or_default()),
-                message: message.chars().take(LONGEST_MESSAGE).collect::<String>().replace(breaks_line, " "),
-            }
-        })?;
+        let file = yaml::document(text)
+            .map_err(|error| ScenarioError::Syntax { at: error.position(name), reason: error.reason })?;
         Ok(Scenario { name: name.to_owned(), file })
     }
 
-    /// Name, or path of the file.
+    /// Returns the name of a built-in scenario, or the path of the file.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What it is.
+    /// Returns the description.
     pub fn description(&self) -> &str {
         &self.file.description
     }
 
-    /// Where it comes from.
+    /// Returns the reference of the scenario, such as a figure of a paper.
     pub fn source(&self) -> Option<&str> {
         self.file.source.as_deref()
     }
 
-    /// Path and law of time on `machine`. `feed` (m/min, or rpm for a scenario of rotary moves)
-    /// takes the place of the scenario's feed.
+    /// Plans path and feed profile on `machine`. `feed` replaces the default feed of the scenario, in m/min, or in rpm
+    /// for rotary moves.
     ///
     /// # Errors
-    /// [`ScenarioError`] naming file, line, key and value, or the move and the limit.
+    /// [`ScenarioError`] with file, line, key and value, or with the move and the limit.
     pub fn program(&self, machine: &MachineConfig, feed: Option<f64>) -> Result<Program, ScenarioError> {
         build::program(&self.name, &self.file, machine, feed)
     }

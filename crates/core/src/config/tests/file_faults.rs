@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::{MIKRON, assert_refused, line_of, mikron_with, refusal};
-use crate::config::{Parameters, Source};
+use crate::config::{Parameters, ValueSource};
 
 #[test]
 fn key_twice_in_one_mapping() {
@@ -95,7 +95,7 @@ fn long_garbage_is_cut_in_messages() {
     let garbage = "k".repeat(100_000);
     let message = refusal(&format!("/**:\n  ros__parameters:\n    ? {garbage}\n    : {garbage}\n"));
     assert!(message.len() < 1000, "{} bytes", message.len());
-    let source = Source::named("--set");
+    let source = ValueSource::named("--set");
     for text in [garbage.clone(), format!("machine={garbage}=[")] {
         let result = super::mikron().set_text(&text, &source);
         let length = result.err().map_or(0, |error| error.to_string().len());
@@ -107,7 +107,7 @@ proptest! {
     #[test]
     fn no_text_panics(text in "\\PC*|[-:\\[\\]{}&*!|>'\"%@`#,? \n\ta-c0-9./_]{0,300}") {
         let _ = Parameters::from_yaml(&text, "my.yaml");
-        let _ = super::mikron().set_text(&text, &Source::named("--set"));
+        let _ = super::mikron().set_text(&text, &ValueSource::named("--set"));
     }
 
     #[test]
@@ -138,7 +138,7 @@ proptest! {
         let keys: Vec<String> = parameters.definitions().map(|(key, _)| key).collect();
         let before = parameters.clone();
         let key = &keys[index % keys.len()];
-        match parameters.set_text(&format!("{key}={value}"), &Source::named("--set")) {
+        match parameters.set_text(&format!("{key}={value}"), &ValueSource::named("--set")) {
             Ok(()) => prop_assert!(parameters.machine_config().is_ok()),
             Err(error) => {
                 prop_assert_eq!(&parameters, &before);

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{MIKRON, mikron};
-use crate::config::{AxisConfig, AxisKind, KinematicsConfig, MachineConfig, Parameters, Source};
+use crate::config::{AxisConfig, AxisKind, KinematicsConfig, MachineConfig, Parameters, ValueSource};
 
 /// Relative difference that the conversion of units may leave.
 const ROUNDING: f64 = 1e-12;
@@ -219,7 +219,7 @@ fn each_part_of_the_kinematics_has_its_key() {
     ];
     for (index, key) in keys.iter().enumerate() {
         let text = format!("kinematics.{key}_mm={}", 1000 * (index + 1));
-        assert_eq!(parameters.set_text(&text, &Source::named("--set")), Ok(()));
+        assert_eq!(parameters.set_text(&text, &ValueSource::named("--set")), Ok(()));
     }
     let machine = parameters.machine_config().expect("a valid machine");
     let expected = KinematicsConfig {

@@ -2,11 +2,12 @@
 
 use super::mikron;
 use crate::config::{
-    Assignment, ConfigError, DEFINITIONS, Kind, Parameters, Presence, Scope, Source, TimeMode, Value, listing,
+    Assignment, ConfigError, DEFINITIONS, ParameterKind, Parameters, Presence, Scope, TimeMode, Value,
+    ValueSource, listing,
 };
 
-fn source() -> Source {
-    Source::named("--set")
+fn source() -> ValueSource {
+    ValueSource::named("--set")
 }
 
 fn set(text: &str) -> Result<Parameters, String> {
@@ -29,16 +30,16 @@ fn every_live_key_takes_both_ends_of_its_range() {
         for (key, definition) in start.definitions().filter(|(_, definition)| definition.live) {
             live += 1;
             let values = match definition.kind {
-                Kind::Number { min, max } => vec![Value::Double(min), Value::Double(max)],
-                Kind::Integer { min, max } => vec![Value::Integer(min), Value::Integer(max)],
-                Kind::Flag => vec![Value::Bool(false), Value::Bool(true)],
-                Kind::Choice(choices) => {
+                ParameterKind::Number { min, max } => vec![Value::Double(min), Value::Double(max)],
+                ParameterKind::Integer { min, max } => vec![Value::Integer(min), Value::Integer(max)],
+                ParameterKind::Flag => vec![Value::Bool(false), Value::Bool(true)],
+                ParameterKind::Choice(choices) => {
                     choices.iter().map(|choice| Value::Text((*choice).to_owned())).collect()
                 }
-                Kind::NumberList { min_len, max_len } => {
+                ParameterKind::NumberList { min_len, max_len } => {
                     vec![Value::DoubleList(vec![1.0; min_len]), Value::DoubleList(vec![-1e300; max_len])]
                 }
-                Kind::Text | Kind::TextList => Vec::new(),
+                ParameterKind::Text | ParameterKind::TextList => Vec::new(),
             };
             for value in values {
                 let mut parameters = start.clone();
@@ -244,7 +245,7 @@ other:
     let overlay = overlay.expect("a good file");
     assert_eq!((overlay.parameters, overlay.sections), (3, 2));
     assert_eq!(overlay.skipped, ["/other"]);
-    assert!(!overlay.machine_replaced);
+    assert!(!overlay.is_machine_replaced);
     // The later section wins.
     assert_eq!(parameters.get("x.velocity_loop.gain"), Some(Value::Double(2.5)));
     assert_eq!(parameters.get("y.velocity_loop.gain"), Some(Value::Double(3.0)));
@@ -285,7 +286,7 @@ fn a_complete_machine_replaces_the_one_before_and_keeps_the_node() {
     assert_eq!(parameters.set_text("joint_prefix=mill_", &source()), Ok(()));
     let text = include_str!("../../../config/linear_motor_center.yaml");
     let overlay = parameters.overlay_yaml(text, "other.yaml", None);
-    assert_eq!(overlay.map(|overlay| overlay.machine_replaced), Ok(true));
+    assert_eq!(overlay.map(|overlay| overlay.is_machine_replaced), Ok(true));
     let expected = Parameters::builtin("linear_motor_center").map(|machine| machine.machine_config());
     assert_eq!(Ok(parameters.machine_config()), expected);
     assert_eq!(parameters.node_config().joint_prefix, "mill_");
@@ -305,7 +306,7 @@ fn definitions_are_sound() {
     for (index, definition) in DEFINITIONS.iter().enumerate() {
         let key = definition.key;
         assert!(definition.description.ends_with('.'), "{key}");
-        if let Kind::Number { min, max } = definition.kind {
+        if let ParameterKind::Number { min, max } = definition.kind {
             assert!(min < max && min.is_finite() && max.is_finite(), "{key}");
         }
         if let Some(value) = definition.default_value() {

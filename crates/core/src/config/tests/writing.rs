@@ -3,10 +3,10 @@
 use proptest::prelude::*;
 
 use super::mikron;
-use crate::config::{Kind, Parameters, Source, Value};
+use crate::config::{ParameterKind, Parameters, Value, ValueSource};
 
-fn source() -> Source {
-    Source::named("test")
+fn source() -> ValueSource {
+    ValueSource::named("test")
 }
 
 /// Asserts that the file of `parameters` holds the same values.
@@ -88,21 +88,21 @@ proptest! {
             let (key, definition) = &all[index.index(all.len())];
             let value = match definition.kind {
                 // Of any magnitude in the range, with all digits.
-                Kind::Number { min, max } => {
+                ParameterKind::Number { min, max } => {
                     Value::Double((fraction * 10f64.powi(exponent)).clamp(min, max))
                 }
-                Kind::Integer { min, max } => {
+                ParameterKind::Integer { min, max } => {
                     Value::Integer(min + ((max - min) as f64 * fraction) as i64)
                 }
-                Kind::Flag => Value::Bool(fraction < 0.5),
-                Kind::NumberList { max_len, .. } => {
+                ParameterKind::Flag => Value::Bool(fraction < 0.5),
+                ParameterKind::NumberList { max_len, .. } => {
                     Value::DoubleList(list.iter().copied().take(max_len).collect())
                 }
-                Kind::Choice(choices) => {
+                ParameterKind::Choice(choices) => {
                     Value::Text(choices[(fraction * choices.len() as f64) as usize].to_owned())
                 }
-                Kind::Text => Value::Text(format!("{fraction}")),
-                Kind::TextList => continue,
+                ParameterKind::Text => Value::Text(format!("{fraction}")),
+                ParameterKind::TextList => continue,
             };
             // What is at odds with another parameter is refused, and nothing is changed.
             let _ = parameters.set(key, value, &source());

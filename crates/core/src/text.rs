@@ -1,0 +1,52 @@
+//! Text from files and peers in messages: truncation, control characters and similar names.
+
+use strsim::{damerau_levenshtein, jaro_winkler};
+
+/// Maximum length of quoted text, characters.
+const MAX_QUOTED_LENGTH: usize = 120;
+/// Minimum Jaro-Winkler similarity of a suggested name.
+const MIN_SIMILARITY: f64 = 0.7;
+
+/// Returns `text` on one line, truncated to 120 characters.
+pub fn shortened(text: &str) -> String {
+    let mut out: String = text.chars().take(MAX_QUOTED_LENGTH).collect();
+    if out.len() < text.len() {
+        out.push('…');
+    }
+    out.replace(is_control, " ")
+}
+
+/// Returns true for characters that change the layout of a line: control characters, line and paragraph separators,
+/// and bidirectional formatting characters.
+pub fn is_control(c: char) -> bool {
+    let marks = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}');
+    marks || c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// Returns the name in `known` with the smallest edit distance to `found`, if it is similar enough to suggest.
+///
+/// Names are shortened before the comparison, which takes time proportional to the product of their lengths.
+pub fn nearest_name<T: AsRef<str>>(found: &str, known: impl IntoIterator<Item = T>) -> Option<String> {
+    let found = shortened(found);
+    let names = known.into_iter().map(|name| shortened(name.as_ref()));
+    let nearest = names.min_by_key(|name| damerau_levenshtein(&found, name))?;
+    (jaro_winkler(&found, &nearest) >= MIN_SIMILARITY).then_some(nearest)
+}
+
+/// Returns the end of a message about an unknown name: `; the nearest is NAME`, or an empty text.
+pub fn nearest_hint(nearest: &Option<String>) -> String {
+    nearest.as_ref().map_or_else(String::new, |name| format!("; the nearest is {name}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn suggests_a_misspelt_name_and_no_unrelated_one() {
+        let known = ["x.motor.inertia_kg_m2", "x.motor.mass_kg", "y.motor.inertia_kg_m2"];
+        let nearest = nearest_name("x.motor.inertia_kgm2", known);
+        assert_eq!(nearest_hint(&nearest), "; the nearest is x.motor.inertia_kg_m2");
+        assert_eq!(nearest_hint(&nearest_name("color", known)), "");
+    }
+}
