@@ -1,38 +1,39 @@
-//! The machine under way: trajectories in, samples and figures out, one position period at a time.
+//! Simulation of a machine: trajectories and streamed setpoints in, samples and figures out, one position
+//! cycle at a time.
 //!
-//! The node and the offline command run the same [`Simulation`]; the node paces it and computes
-//! nothing that the offline run does not.
+//! The node and the offline commands run the same [`Simulation`]; the node paces it and adds no
+//! computation of its own.
 
-mod ask;
-mod load;
-mod motion;
+mod commands;
+mod loads;
+mod motions;
 mod tolerance;
 
-pub use load::MAX_LOAD;
-pub use motion::{Abort, MotionEnd, Outcome};
-pub use tolerance::{Quantity, Tolerance, Tolerances, Violation};
+pub use loads::MAX_LOAD;
+pub use motions::{AbortReason, MotionEnd, MotionOutcome};
+pub use tolerance::{Quantity, Tolerance, ToleranceViolation, Tolerances};
 
 use std::sync::Arc;
 
 use crate::config::{AxisKind, MachineConfig, Periods};
-use crate::machine::{AxisSample, Machine, MachineError, MachineParameters, Width};
-use crate::trajectory::{Event, JointLimits, Timeline, TimelineError};
+use crate::machine::{AxisSample, Machine, MachineError, MachineParameters, SimdWidth};
+use crate::trajectory::{JointLimits, Timeline, TimelineError, TimelineEvent};
 use crate::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
 
-use load::Loads;
-use motion::{Grid, Motions};
-use tolerance::Errors;
+use loads::AxisLoads;
+use motions::{ActiveMotions, PositionGrid};
+use tolerance::ErrorHistory;
 
-/// Velocity below which an axis counts as standing, m/s or rad/s.
+/// Velocity below which an axis is at standstill, m/s or rad/s.
 const STANDSTILL: f64 = 1e-4;
-/// How long after the last motion the axes count as settling.
+/// Settling time after the last command, ns.
 const SETTLING: Nanoseconds = SECOND_NS;
-/// How far contour errors look ahead of the setpoint: longer than an axis runs ahead of it.
-const LOOK_AHEAD: Nanoseconds = 100 * MILLISECOND_NS;
-/// Most setpoints that contour errors look ahead, well inside what they remember.
-const MOST_AHEAD: u32 = 128;
+/// Preview of the contour error, ns; longer than the lead of an axis ahead of its setpoint.
+const CONTOUR_PREVIEW: Nanoseconds = 100 * MILLISECOND_NS;
+/// Largest preview of the contour error, position cycles; well within the memory of the assessor.
+const MAX_CONTOUR_PREVIEW: u32 = 128;
 
-/// Why there is no simulation of a machine.
+/// Failed construction of a [`Simulation`].
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimulationError {
     /// An axis cannot be discretized.
@@ -43,37 +44,36 @@ pub enum SimulationError {
     Timeline(#[from] TimelineError),
 }
 
-/// A machine with the trajectories that it has been given.
+/// Simulated machine with its accepted trajectories.
 ///
-/// Position instant k is at `origin + k·Tsp`; the first is k = 0. Until the first trajectory starts, a
-/// stream first moves a joint or the first load acts, the machine stands still at its start position, exactly: what a trajectory
-/// does afterwards does not depend on how long it was waited for.
+/// Position instant k is at `origin + k·Tsp`; the first one is k = 0. Until the first trajectory starts, a
+/// stream first moves a joint or the first load acts, the machine is exactly at rest at its start position.
+/// Therefore the result of a trajectory does not depend on the waiting time before it.
 #[derive(Debug)]
 pub struct Simulation {
     machine: Machine,
     timeline: Timeline,
-    /// Setpoints of the next periods, as many for each axis.
-    ahead: Vec<f64>,
-    grid: Grid,
-    /// The position instant that the next step computes.
+    /// Preview of setpoints for the controllers, m or rad, the same number for each axis.
+    preview: Vec<f64>,
+    grid: PositionGrid,
+    /// Next position instant.
     next: i64,
-    /// Whether anything has moved the machine since it was last put at rest.
-    awake: bool,
-    loads: Loads,
-    motions: Motions,
-    /// The instant after which nothing is settling any more.
+    /// The machine has moved since it was last reset.
+    has_moved: bool,
+    loads: AxisLoads,
+    motions: ActiveMotions,
+    /// First instant after settling.
     settled_from: i64,
     samples: Vec<AxisSample>,
-    /// Whether an axis was at a limit at any tick behind the last sample.
+    /// Saturation of each axis at any tick after the last sample.
     saturated: Vec<bool>,
-    ends: Vec<MotionEnd>,
-    /// Of each axis, at the last instants.
-    errors: Vec<Errors>,
+    finished: Vec<MotionEnd>,
+    errors: Vec<ErrorHistory>,
 }
 
 impl Simulation {
-    /// The machine of `config` at rest at home, its first position instant at `origin` (ns), for
-    /// trajectories checked against `joints` (see [`joints`]).
+    /// Creates the simulation of the machine `config` at rest at home, with its first position instant at
+    /// `origin` (ns), for trajectories validated against `joints` (see [`joint_limits`]).
     ///
     /// # Errors
     /// [`SimulationError`] if an axis cannot be discretized or there are too many joints.
@@ -93,68 +93,71 @@ impl Simulation {
         timeline.set_stream_delay(stream_delay(&machine));
         Ok(Simulation {
             timeline,
-            loads: Loads::new(axes.len()),
-            motions: Motions::new(kinds, seconds(tick), horizon(period)),
+            loads: AxisLoads::new(axes.len()),
+            motions: ActiveMotions::new(kinds, seconds(tick), contour_preview_cycles(period)),
             saturated: vec![false; axes.len()],
-            ahead: Vec::with_capacity(machine.horizon() * axes.len()),
+            preview: Vec::with_capacity(machine.preview_length() * axes.len()),
             machine,
-            grid: Grid { origin, period },
+            grid: PositionGrid { origin, period },
             next: 0,
-            awake: false,
+            has_moved: false,
             settled_from: 0,
             samples,
-            ends: Vec::new(),
-            errors: vec![Errors::default(); axes.len()],
+            finished: Vec::new(),
+            errors: vec![ErrorHistory::default(); axes.len()],
         })
     }
 
-    /// Whether motions that are accepted from now on are measured, as they are at first: the figures in
-    /// the [`MotionEnd`]s of others are 0. For those who measure themselves.
-    pub fn set_assessing(&mut self, assessing: bool) {
-        self.motions.set_assessing(assessing);
+    /// Enables or disables the assessment of motions accepted from now on; it is enabled at first. Without
+    /// assessment the figures of [`MotionEnd`] are 0.
+    pub fn set_assessing(&mut self, is_assessing: bool) {
+        self.motions.set_assessing(is_assessing);
     }
 
-    /// How wide the processor's vectors are used from now on; the results are the same.
-    pub fn set_width(&mut self, width: Width) {
-        self.machine.set_width(width);
+    /// Sets the SIMD width used from now on; the results do not depend on it.
+    pub fn set_simd_width(&mut self, width: SimdWidth) {
+        self.machine.set_simd_width(width);
     }
 
-    /// Time of position instant k, ns.
+    /// Returns the time of position instant k, ns.
     pub fn time_of(&self, k: i64) -> Nanoseconds {
         self.grid.time_of(k)
     }
 
-    /// The position instant that the next [`step`](Self::step) computes.
+    /// Position instant that the next [`step`](Self::step) computes.
     pub fn next_instant(&self) -> i64 {
         self.next
     }
 
-    /// Tsp, ns.
+    /// Position period Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
         self.grid.period
     }
 
-    /// The machine.
+    /// Simulated machine.
     pub fn machine(&self) -> &Machine {
         &self.machine
     }
 
-    /// Computes the next position instant: its samples, and the ticks up to the one after.
+    /// Steps the simulation by one position cycle: samples of the next instant and the ticks after it.
     ///
-    /// Whether the machine has run: one that nothing has moved yet stands still without being computed.
+    /// Returns true if the machine was computed. A machine that has not moved since its reset is not
+    /// computed.
     pub fn step(&mut self) -> bool {
-        self.step_by(|machine, psec, ahead| machine.advance(psec, ahead))
+        self.step_by(|machine, psec, preview| machine.advance(psec, preview))
     }
 
-    /// Likewise, showing the machine to `observe` at every tick, as [`Machine::advance_with`] does;
-    /// its second argument tells the first tick of the period. A machine that nothing has moved yet
-    /// has no ticks to show.
+    /// Steps the simulation by one position cycle and calls `observe` at each tick, as
+    /// [`Machine::advance_with`]; its second argument is true at the first tick of the cycle.
+    ///
+    /// Returns true if the machine was computed. A machine that has not moved since its reset has no
+    /// ticks.
     pub fn step_with(&mut self, mut observe: impl FnMut(&Machine, bool)) -> bool {
-        self.step_by(|machine, psec, ahead| {
-            let mut position_instant = true;
-            machine.advance_with(psec, ahead, |machine| {
-                observe(machine, position_instant);
-                position_instant = false;
+        self.step_by(|machine, psec, preview| {
+            let mut is_position_instant = true;
+            machine.advance_with(psec, preview, |machine| {
+                observe(machine, is_position_instant);
+                is_position_instant = false;
             });
         })
     }
@@ -162,153 +165,161 @@ impl Simulation {
     fn step_by(&mut self, advance: impl FnOnce(&mut Machine, &[f64], &[f64])) -> bool {
         let k = self.next;
         self.timeline.next();
-        self.follow_timeline_events(k);
-        if !self.awake && self.timeline.is_stream_moving() {
-            self.wake_at_rest();
+        self.process_timeline_events(k);
+        if !self.has_moved && self.timeline.is_stream_moving() {
+            self.advance_at_rest();
         }
-        self.awake |= self.motions.any_running() || self.loads.any();
-        if self.awake {
-            self.motions.look_ahead(&self.timeline);
+        self.has_moved |= self.motions.is_any_running() || self.loads.is_any_active();
+        if self.has_moved {
+            self.motions.push_preview(&self.timeline);
             self.loads.apply(&mut self.machine, k);
-            self.look_ahead();
-            advance(&mut self.machine, self.timeline.psec(), &self.ahead);
-            self.take_period();
+            self.collect_preview();
+            advance(&mut self.machine, self.timeline.psec(), &self.preview);
+            self.record_cycle();
         }
         for (errors, sample) in self.errors.iter_mut().zip(&self.samples) {
-            errors.note(sample);
+            errors.push(sample);
         }
-        while let Some((id, violation)) = self.motions.strayed(&self.errors, self.grid.period) {
+        while let Some((id, violation)) = self.motions.path_violation(&self.errors, self.grid.period) {
             self.timeline.cancel(id);
-            self.motions.end(id, Outcome::PathTolerance(violation), self.time_of(k), &mut self.ends);
+            let outcome = MotionOutcome::PathTolerance(violation);
+            self.motions.end(id, outcome, self.time_of(k), &mut self.finished);
         }
-        self.motions.finish(k, &self.errors, self.grid, &mut self.ends);
-        if self.is_asked() {
+        self.motions.finish(k, &self.errors, self.grid, &mut self.finished);
+        if self.has_active_commands() {
             self.settled_from = k + 1 + SETTLING / self.grid.period;
         }
         self.next = k + 1;
-        self.awake
+        self.has_moved
     }
 
-    /// A position period at rest: of a machine that has moved nothing the first setpoint counts as the
-    /// one before it too, and a stream's first need not be where the machine stands.
-    fn wake_at_rest(&mut self) {
+    /// Computes one position cycle at rest before a stream moves the machine.
+    ///
+    /// A machine that has not moved takes its first setpoint for the previous one too, and the first
+    /// setpoint of a stream can differ from its position.
+    fn advance_at_rest(&mut self) {
         let rest: Vec<f64> = self.samples.iter().map(|sample| sample.psec).collect();
         self.machine.advance(&rest, &[]);
-        self.awake = true;
+        self.has_moved = true;
     }
 
-    fn follow_timeline_events(&mut self, k: i64) {
+    fn process_timeline_events(&mut self, k: i64) {
         let now = self.time_of(k);
         let delay = self.longest_delay();
         for event in self.timeline.events() {
             match *event {
-                Event::Started(id) => self.motions.start(id),
-                Event::Ended(id) if self.motions.is_canceled(id) => {
-                    self.motions.end(id, Outcome::Canceled, now, &mut self.ends);
+                TimelineEvent::Started(id) => self.motions.start(id),
+                TimelineEvent::Completed(id) if self.motions.is_canceled(id) => {
+                    self.motions.end(id, MotionOutcome::Canceled, now, &mut self.finished);
                 }
-                Event::Ended(id) => self.motions.finish_at(id, k + delay),
-                Event::Displaced { id, by, .. } => {
-                    self.motions.end(id, Outcome::Displaced { by }, now, &mut self.ends);
+                TimelineEvent::Completed(id) => self.motions.finish_at(id, k + delay),
+                TimelineEvent::Preempted { id, by, .. } => {
+                    self.motions.end(id, MotionOutcome::Preempted { by }, now, &mut self.finished);
                 }
-                Event::Stopped { id, .. } => {
-                    self.motions.end(id, Outcome::Stopped, now, &mut self.ends);
+                TimelineEvent::Stopped { id, .. } => {
+                    self.motions.end(id, MotionOutcome::Stopped, now, &mut self.finished);
                 }
             }
         }
     }
 
-    /// Position periods until the last setpoint has passed every delay.
+    /// Returns the longest delay of the axes, position cycles, rounded up.
     fn longest_delay(&self) -> i64 {
         let tick = self.machine.periods().current;
         let delay = self.machine.longest_delay() as Nanoseconds * tick;
         delay.unsigned_abs().div_ceil(self.grid.period.unsigned_abs()) as i64
     }
 
-    /// The setpoints that controllers read ahead, as they are known now.
-    fn look_ahead(&mut self) {
-        let horizon = self.machine.horizon();
-        self.ahead.clear();
+    /// Collects the preview of setpoints for the controllers.
+    fn collect_preview(&mut self) {
+        let length = self.machine.preview_length();
+        self.preview.clear();
         for joint in 0..self.machine.axis_count() {
-            self.ahead.extend((1..=horizon).filter_map(|j| self.timeline.psec_ahead(joint, j as u32)));
+            self.preview.extend((1..=length).filter_map(|j| self.timeline.psec_ahead(joint, j as u32)));
         }
     }
 
-    /// Takes the samples of the position instant, and the figures of the period behind it.
-    fn take_period(&mut self) {
+    /// Copies the samples of the position instant and updates saturation and figures.
+    fn record_cycle(&mut self) {
         let axes = self.machine.axes().iter().enumerate();
-        for (((place, axis), sample), saturated) in axes.zip(&mut self.samples).zip(&mut self.saturated) {
+        for (((index, axis), sample), saturated) in axes.zip(&mut self.samples).zip(&mut self.saturated) {
             let instant = axis.sample();
-            let behind = self.machine.activity(place).saturated_ticks - u64::from(instant.saturated);
+            let later_ticks = self.machine.activity(index).saturated_ticks - u64::from(instant.saturated);
             *sample = AxisSample { saturated: *saturated || instant.saturated, ..*instant };
-            *saturated = behind > 0;
+            *saturated = later_ticks > 0;
         }
         self.motions.observe(&self.machine);
     }
 
-    fn take_samples(&mut self) {
+    fn copy_samples(&mut self) {
         for (sample, axis) in self.samples.iter_mut().zip(self.machine.axes()) {
             *sample = *axis.sample();
         }
     }
 
-    /// Signals of every axis at the position instant that was computed last.
+    /// Samples of all axes at the last position instant.
     pub fn samples(&self) -> &[AxisSample] {
         &self.samples
     }
 
-    /// Motions that have ended since the last call.
-    pub fn take_ends(&mut self) -> impl Iterator<Item = MotionEnd> + '_ {
-        self.ends.drain(..)
+    /// Returns the motions that have finished since the last call.
+    pub fn drain_finished(&mut self) -> impl Iterator<Item = MotionEnd> + '_ {
+        self.finished.drain(..)
     }
 
-    /// Whether a trajectory waits, runs or has just ended, or a load acts. A stream does not count: it
-    /// comes at the pace of its sender, which whoever computes ahead would run away from.
-    pub fn is_asked(&self) -> bool {
-        self.motions.any() || self.timeline.is_moving() || self.timeline.is_waiting() || self.loads.any()
+    /// Returns true if a trajectory waits, runs or has not finished, or a load acts.
+    ///
+    /// A stream does not count: its setpoints arrive at the rate of the sender, so the simulation must not
+    /// run faster than it.
+    pub fn has_active_commands(&self) -> bool {
+        !self.motions.is_empty()
+            || self.timeline.is_moving()
+            || self.timeline.is_waiting()
+            || self.loads.is_any_active()
     }
 
-    /// Whether something is asked of the axes, or they still settle.
+    /// Returns true if commands are active or the axes are settling.
     pub fn is_busy(&self) -> bool {
-        self.is_asked() || self.next < self.settled_from
+        self.has_active_commands() || self.next < self.settled_from
     }
 
-    /// Whether an axis really moves, faster than it creeps to rest.
+    /// Returns true if the velocity of an axis exceeds the standstill velocity.
     pub fn is_in_motion(&self) -> bool {
         self.samples.iter().any(|s| s.velocity.abs() > STANDSTILL)
     }
 
-    /// Whether an axis stands outside its stroke, which a load or a step can make it do.
-    pub fn is_outside_stroke(&self, place: usize) -> bool {
-        let (Some(sample), Some(joint)) = (self.samples.get(place), self.timeline.joints().get(place)) else {
+    /// Returns true if the actual position of an axis is outside its travel limits, e.g. because of a load.
+    pub fn is_outside_travel_limits(&self, axis: usize) -> bool {
+        let (Some(sample), Some(joint)) = (self.samples.get(axis), self.timeline.joints().get(axis)) else {
             return false;
         };
-        joint.limits.is_left_by(sample.position)
+        joint.limits.is_outside_travel(sample.position)
     }
 
-    /// Setpoint of a joint `periods` instants after the next one, m or rad, by what is known now;
-    /// none for a joint that there is not.
-    pub fn psec_ahead(&self, joint: usize, periods: u32) -> Option<f64> {
-        self.timeline.psec_ahead(joint, periods.saturating_add(1))
+    /// Returns the previewed setpoint of a joint, `cycles` position cycles after the next instant, m or
+    /// rad; `None` for an unknown joint.
+    pub fn psec_ahead(&self, joint: usize, cycles: u32) -> Option<f64> {
+        self.timeline.psec_ahead(joint, cycles.saturating_add(1))
     }
 
-    /// Whether a trajectory or a stop moves the setpoints.
+    /// Returns true if a trajectory or a stop moves the setpoints.
     pub fn is_moving(&self) -> bool {
         self.timeline.is_moving()
     }
 }
 
-/// Position periods that contour errors look ahead of the setpoint.
-pub fn horizon(period: Nanoseconds) -> u32 {
-    u32::try_from(LOOK_AHEAD / period.max(1)).unwrap_or(u32::MAX).clamp(1, MOST_AHEAD)
+/// Returns the preview of the contour error, position cycles; `period` is Tsp, ns.
+pub fn contour_preview_cycles(period: Nanoseconds) -> u32 {
+    u32::try_from(CONTOUR_PREVIEW / period.max(1)).unwrap_or(u32::MAX).clamp(1, MAX_CONTOUR_PREVIEW)
 }
 
-/// Position periods that a stream is delayed, for controllers that look as far ahead.
+/// Returns the delay of a stream, position cycles: the preview of the controllers.
 fn stream_delay(machine: &Machine) -> u32 {
-    u32::try_from(machine.horizon()).unwrap_or(u32::MAX)
+    u32::try_from(machine.preview_length()).unwrap_or(u32::MAX)
 }
 
-/// The joints of a machine as trajectories name and limit them, `prefix` before each name.
-pub fn joints(config: &MachineConfig, prefix: &str) -> Vec<JointLimits> {
+/// Returns the joint limits of a machine for trajectories, with `prefix` before each joint name.
+pub fn joint_limits(config: &MachineConfig, prefix: &str) -> Vec<JointLimits> {
     let with_prefix = |joint: JointLimits| JointLimits { name: format!("{prefix}{}", joint.name), ..joint };
-    config.axes().iter().map(|axis| with_prefix(JointLimits::of_axis(axis))).collect()
+    config.axes().iter().map(|axis| with_prefix(JointLimits::from_axis(axis))).collect()
 }

@@ -1,6 +1,7 @@
-//! How far a motion may stray, as `control_msgs/FollowJointTrajectory` asks for it.
+//! Path tolerance and goal tolerance of a motion, as defined by the action
+//! `control_msgs/FollowJointTrajectory`.
 //!
-//! With e the synchronized tracking error of an axis at position instant k, the errors are
+//! With e the delay-compensated following error of an axis at position instant k, the errors are
 //!
 //! ```text
 //! position e[k]    velocity (e[k] − e[k−1])/Tsp    acceleration (e[k] − 2 e[k−1] + e[k−2])/Tsp²
@@ -9,69 +10,74 @@
 use crate::machine::AxisSample;
 use crate::units::{Nanoseconds, seconds};
 
-/// Largest error of a joint that is allowed; none is any.
+/// Largest allowed errors of a joint; `None` disables a tolerance.
 ///
-/// Errors are against the setpoints as they reach the position controller, so that the pure delay is
-/// no error.
+/// The errors are relative to the setpoints at the input of the position controller, so the pure delay
+/// is not an error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tolerance {
-    /// m or rad.
+    /// Position tolerance, m or rad.
     pub position: Option<f64>,
-    /// m/s or rad/s.
+    /// Velocity tolerance, m/s or rad/s.
     pub velocity: Option<f64>,
-    /// m/s² or rad/s².
+    /// Acceleration tolerance, m/s² or rad/s².
     pub acceleration: Option<f64>,
 }
 
-/// What a motion has to keep.
+/// Path tolerances, goal tolerances and goal time tolerance of a motion.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tolerances {
-    /// While it is under way, one for each joint of the trajectory, in its order.
+    /// Path tolerances during the motion, one per joint of the trajectory, in its order.
     pub path: Vec<Tolerance>,
-    /// At its end, likewise.
+    /// Goal tolerances at the end of the motion, one per joint of the trajectory, in its order.
     pub goal: Vec<Tolerance>,
-    /// How long after its end, extended by the pure delay, the axes may take to get there, ns; none: as
-    /// long as they need.
+    /// Goal time tolerance, ns: time allowed after the end of the trajectory plus the pure delay to
+    /// reach the goal tolerances; `None` is unlimited.
     pub goal_time: Option<Nanoseconds>,
 }
 
-/// What an error is of.
+/// Quantity of a violated tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// m or rad.
+    /// Position, m or rad.
     Position,
-    /// m/s or rad/s.
+    /// Velocity, m/s or rad/s.
     Velocity,
-    /// m/s² or rad/s².
+    /// Acceleration, m/s² or rad/s².
     Acceleration,
 }
 
-/// A tolerance that was not kept.
+/// Violation of a tolerance by one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Violation {
-    /// Place of the axis in the machine.
-    pub place: usize,
-    /// What of it.
+pub struct ToleranceViolation {
+    /// Index of the axis in the machine.
+    pub axis_index: usize,
+    /// Violated quantity.
     pub quantity: Quantity,
-    /// The error, with its sign: asked for less there.
+    /// Error, setpoint − actual value.
     pub error: f64,
-    /// What was allowed.
+    /// Tolerance.
     pub limit: f64,
 }
 
-/// The errors of one axis at the last three position instants, the newest first.
+/// Delay-compensated following errors of one axis at the last three position instants, newest first.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Errors([f64; 3]);
+pub(super) struct ErrorHistory([f64; 3]);
 
-impl Errors {
-    /// Takes the next instant in.
-    pub fn note(&mut self, sample: &AxisSample) {
+impl ErrorHistory {
+    /// Adds the error of the next instant.
+    pub fn push(&mut self, sample: &AxisSample) {
         let [newest, before, _] = self.0;
-        self.0 = [sample.synchronized_tracking_error(), newest, before];
+        self.0 = [sample.delay_compensated_following_error(), newest, before];
     }
 
-    /// Of the axis at `place`, the first quantity that is not within `tolerance`; `period` is Tsp, ns.
-    pub fn violation(&self, place: usize, tolerance: &Tolerance, period: Nanoseconds) -> Option<Violation> {
+    /// Returns the first violation of `tolerance` by the axis with index `axis_index`; `period` is Tsp, ns.
+    pub fn violation(
+        &self,
+        axis_index: usize,
+        tolerance: &Tolerance,
+        period: Nanoseconds,
+    ) -> Option<ToleranceViolation> {
         let [newest, before, earlier] = self.0;
         let tsp = seconds(period);
         [
@@ -82,20 +88,20 @@ impl Errors {
         .into_iter()
         .find_map(|(quantity, error, limit)| {
             let limit = limit?;
-            (error.abs() > limit).then_some(Violation { place, quantity, error, limit })
+            (error.abs() > limit).then_some(ToleranceViolation { axis_index, quantity, error, limit })
         })
     }
 }
 
-/// The first violation among the axes at `places`, one tolerance each.
+/// Returns the first violation by the axes `axis_indices`, with one tolerance per axis.
 pub(super) fn first_violation(
-    places: &[usize],
+    axis_indices: &[usize],
     tolerances: &[Tolerance],
-    errors: &[Errors],
+    errors: &[ErrorHistory],
     period: Nanoseconds,
-) -> Option<Violation> {
-    places
+) -> Option<ToleranceViolation> {
+    axis_indices
         .iter()
         .zip(tolerances)
-        .find_map(|(&place, tolerance)| errors.get(place)?.violation(place, tolerance, period))
+        .find_map(|(&axis, tolerance)| errors.get(axis)?.violation(axis, tolerance, period))
 }

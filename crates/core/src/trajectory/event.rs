@@ -1,15 +1,15 @@
-//! What the timeline tells about the trajectories that it was given.
+//! Events of motions at position instants: started, completed, preempted, stopped.
 
-/// Names a trajectory; the caller gives it, and gets it back in events.
+/// Identifier of a motion, i.e. of an accepted trajectory; chosen by the caller and returned in events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct MotionId(pub u64);
 
-/// A set of joints, by their index in the machine.
+/// Set of joints, by their index in the machine.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct JointSet(u64);
 
 impl JointSet {
-    /// Most joints that a machine can have.
+    /// Largest number of joints of a machine.
     pub const CAPACITY: usize = u64::BITS as usize;
 
     /// Adds a joint.
@@ -17,46 +17,46 @@ impl JointSet {
         self.0 |= 1 << joint;
     }
 
-    /// Whether `joint` is in it.
+    /// Returns true if the set contains `joint`.
     pub fn contains(self, joint: usize) -> bool {
         joint < Self::CAPACITY && self.0 & (1 << joint) != 0
     }
 
-    /// Whether no joint is in it.
+    /// Returns true if the set is empty.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Its joints, in the machine's order.
+    /// Returns the joint indices in ascending order.
     pub fn iter(self) -> impl Iterator<Item = usize> {
         (0..Self::CAPACITY).filter(move |&joint| self.contains(joint))
     }
 }
 
-/// Something that happened to a trajectory at a position instant.
+/// Event of a motion at a position instant.
 ///
-/// Each accepted trajectory gets [`Event::Started`] at most once and exactly one of the others,
-/// after which nothing more is told about it, even if some of its joints go on.
+/// Each accepted trajectory gets [`TimelineEvent::Started`] at most once and exactly one of the other
+/// events. The latter is its last event, even if some of its joints continue to move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Event {
-    /// Its first setpoint was commanded.
+pub enum TimelineEvent {
+    /// First setpoint commanded.
     Started(MotionId),
-    /// Its last setpoint was commanded, or its successor took over at the end.
-    Ended(MotionId),
-    /// Another trajectory took joints from it before its end.
-    Displaced {
-        /// The one that was displaced.
+    /// Last setpoint commanded, or a successor took over at the end.
+    Completed(MotionId),
+    /// Preemption: another trajectory took joints over before the end.
+    Preempted {
+        /// Preempted motion.
         id: MotionId,
-        /// The one that took its place.
+        /// Preempting motion.
         by: MotionId,
-        /// The joints that were taken at this instant.
+        /// Joints taken over at this instant.
         joints: JointSet,
     },
-    /// A stop or a reset ended it, or removed it while it waited.
+    /// End by a stop or a reset, or removal from the queue by one.
     Stopped {
-        /// The one that was stopped.
+        /// Stopped motion.
         id: MotionId,
-        /// The stop request, or nothing for a reset.
+        /// Stop request; `None` for a reset.
         by: Option<MotionId>,
     },
 }

@@ -1,32 +1,32 @@
-//! What trajectories may ask of the joints.
+//! Joint limits of trajectories: travel limits, Vmax, jump, NaN.
 
-use super::rejection::{Code, Rejection};
+use super::rejection::{Rejection, RejectionCode};
 use crate::config::{AxisConfig, AxisKind, LimitsConfig};
-use crate::units::Told;
+use crate::units::Rounded;
 
-/// Relative tolerance on speeds: rounding of setpoints that sit exactly on the limit.
+/// Relative tolerance of speed checks, for the rounding of setpoints exactly at the limit.
 pub const SPEED_TOLERANCE: f64 = 1e-9;
-/// Tolerance on the stroke, m or rad: a nanometer of rounding is not a collision.
-pub const STROKE_TOLERANCE: f64 = 1e-9;
+/// Tolerance of travel limit checks, m or rad, for rounding.
+pub const TRAVEL_TOLERANCE: f64 = 1e-9;
 
-/// A joint of the machine as trajectories see it.
+/// Name, unit and limits of a joint, as used by trajectories.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointLimits {
-    /// Name that trajectories use, prefix included.
+    /// Joint name in trajectories, with prefix.
     pub name: String,
-    /// Whether positions are in m or in rad.
+    /// Kind of axis: positions in m or rad.
     pub kind: AxisKind,
-    /// Limits, m or rad and seconds.
+    /// Limits in m or rad and s.
     pub limits: LimitsConfig,
 }
 
 impl JointLimits {
-    /// The joint of an axis, named after it.
-    pub fn of_axis(axis: &AxisConfig) -> Self {
+    /// Creates the limits of an axis; the joint has the name of the axis.
+    pub fn from_axis(axis: &AxisConfig) -> Self {
         Self { name: axis.name().to_owned(), kind: axis.kind(), limits: *axis.limits() }
     }
 
-    /// Unit of positions.
+    /// Unit of positions: `m` or `rad`.
     pub fn unit(&self) -> &'static str {
         match self.kind {
             AxisKind::Linear => "m",
@@ -34,30 +34,30 @@ impl JointLimits {
         }
     }
 
-    /// Largest speed that is let through, m/s or rad/s: Vmax with its tolerance.
+    /// Largest accepted speed, m/s or rad/s: Vmax plus its tolerance.
     pub fn speed_bound(&self) -> f64 {
         self.limits.velocity * (1.0 + SPEED_TOLERANCE)
     }
 
-    /// Refuses a position beyond the stroke; `index` is the point that it belongs to.
+    /// Rejects a position outside the travel limits. `index` is the index of the point.
     ///
     /// # Errors
-    /// [`Code::OutsideStroke`]; NaN is outside too.
-    pub fn check_stroke(&self, index: usize, position: f64) -> Result<(), Rejection> {
-        let (min, max) = (self.limits.stroke_min, self.limits.stroke_max);
-        if position >= min - STROKE_TOLERANCE && position <= max + STROKE_TOLERANCE {
+    /// [`RejectionCode::OutsideTravelLimits`], also for NaN.
+    pub fn check_travel_limits(&self, index: usize, position: f64) -> Result<(), Rejection> {
+        let (min, max) = (self.limits.travel_min, self.limits.travel_max);
+        if position >= min - TRAVEL_TOLERANCE && position <= max + TRAVEL_TOLERANCE {
             return Ok(());
         }
         let limit = if position < min { min } else { max };
         let unit = self.unit();
         Err(Rejection::new(
-            Code::OutsideStroke,
+            RejectionCode::OutsideTravelLimits,
             format!(
-                "{}, point {index}: position {} {unit} is outside the stroke [{}, {}] {unit}",
+                "{}, point {index}: position {} {unit} is outside the travel limits [{}, {}] {unit}",
                 self.name,
-                Told(position),
-                Told(min),
-                Told(max)
+                Rounded(position),
+                Rounded(min),
+                Rounded(max)
             ),
         )
         .joint(&self.name)
@@ -65,10 +65,22 @@ impl JointLimits {
         .numbers(position, limit))
     }
 
-    /// Refuses a speed beyond Vmax; `index` is the point that it belongs to, `what` says which.
+    /// Rejects a position that is NaN or infinite.
     ///
     /// # Errors
-    /// [`Code::Speed`]; NaN is too fast too.
+    /// [`RejectionCode::NotFinite`].
+    pub(super) fn check_finite(&self, position: f64) -> Result<(), Rejection> {
+        if position.is_finite() {
+            return Ok(());
+        }
+        let text = format!("{}: position is {position}, not a finite number", self.name);
+        Err(Rejection::new(RejectionCode::NotFinite, text).joint(&self.name).numbers(position, 0.0))
+    }
+
+    /// Rejects a speed beyond Vmax. `index` is the index of the point, `what` the checked quantity.
+    ///
+    /// # Errors
+    /// [`RejectionCode::Speed`], also for NaN.
     pub fn check_speed(&self, index: usize, velocity: f64, what: &str) -> Result<(), Rejection> {
         let speed = velocity.abs();
         if speed <= self.speed_bound() {
@@ -77,12 +89,12 @@ impl JointLimits {
         let limit = self.limits.velocity;
         let unit = self.unit();
         Err(Rejection::new(
-            Code::Speed,
+            RejectionCode::Speed,
             format!(
-                "{}, point {index}: {what} {} {unit}/s is beyond the limit {} {unit}/s",
+                "{}, point {index}: {what} {} {unit}/s exceeds the limit {} {unit}/s",
                 self.name,
-                Told(speed),
-                Told(limit)
+                Rounded(speed),
+                Rounded(limit)
             ),
         )
         .joint(&self.name)
@@ -90,10 +102,10 @@ impl JointLimits {
         .numbers(speed, limit))
     }
 
-    /// Refuses a first setpoint that is not within one period's reach of the one before it.
+    /// Rejects a first setpoint that is more than Vmax·Tsp away from the previous one.
     ///
     /// # Errors
-    /// [`Code::Jump`], with the distance and Vmax·Tsp in m or rad.
+    /// [`RejectionCode::Jump`], with the distance and Vmax·Tsp in m or rad.
     pub fn check_jump(&self, index: usize, before: f64, first: f64, period: f64) -> Result<(), Rejection> {
         let jump = (first - before).abs();
         if jump <= self.speed_bound() * period {
@@ -102,15 +114,15 @@ impl JointLimits {
         let limit = self.limits.velocity * period;
         let unit = self.unit();
         Err(Rejection::new(
-            Code::Jump,
+            RejectionCode::Jump,
             format!(
-                "{}: starts at {} {unit}, {} {unit} away from the setpoint {} {unit} before it; the axis \
-                 moves {} {unit} in a position period at most",
+                "{}: starts at {} {unit}, {} {unit} away from the previous setpoint {} {unit}; at most \
+                 {} {unit} is allowed in one position cycle",
                 self.name,
-                Told(first),
-                Told(jump),
-                Told(before),
-                Told(limit)
+                Rounded(first),
+                Rounded(jump),
+                Rounded(before),
+                Rounded(limit)
             ),
         )
         .joint(&self.name)

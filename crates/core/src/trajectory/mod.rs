@@ -1,13 +1,32 @@
-//! Trajectories: from requested points to one position setpoint (PSEC) per period and joint.
+//! Trajectories: from requested points to one position setpoint (PSEC) per position cycle and joint.
 //!
-//! A [`Request`] holds what was asked for. [`Trajectory::new`] checks it against the machine, on
-//! the side of whoever asks: that is where the work is. The [`Timeline`] belongs to the thread that
-//! moves the machine; it takes checked trajectories, looks at the junction with what is being
-//! commanded only, and hands out setpoints, one position instant after another.
+//! A [`TrajectoryRequest`] contains the values of a request. [`Trajectory::new`] validates it against the
+//! machine in the thread of the caller; this is the expensive part. The [`Timeline`] belongs to the
+//! real-time thread: it accepts validated trajectories, checks only the junction with the commanded
+//! setpoints, replaces or preempts earlier trajectories, and returns the setpoints of one position
+//! instant after another. Rejected trajectories (NaN, outside the travel limits, excessive speed, jump)
+//! get a [`Rejection`] with a [`RejectionCode`].
+//!
+//! Modules import only from modules above them:
+//!
+//! | module | contents |
+//! |---|---|
+//! | `rejection` | rejection codes and texts |
+//! | `event` | events of motions |
+//! | `spline` | segments of degree 1, 3 and 5 |
+//! | `limits` | checks against the limits of a joint |
+//! | `stop` | controlled stop |
+//! | `request` | requested points |
+//! | `joint_trajectory` | validated trajectory |
+//! | `validation` | validation of a request |
+//! | `plan` | plan of one joint |
+//! | `motion_table` | accepted motions |
+//! | `preview`, `stream_gate`, `stream` | streamed setpoints |
+//! | `timeline` | queues and setpoints of all joints |
+//! | `cancel`, `submit` | cancellation and acceptance |
 
 pub mod event;
 pub mod limits;
-pub mod path;
 pub mod rejection;
 pub mod request;
 pub mod spline;
@@ -15,21 +34,23 @@ pub mod stop;
 pub mod stream;
 pub mod timeline;
 
-mod arrivals;
 mod cancel;
-mod check;
-mod motions;
-mod offer;
+mod joint_trajectory;
+mod motion_table;
 mod plan;
+mod preview;
+mod stream_gate;
+mod submit;
+mod validation;
 
-pub use arrivals::STREAM_JITTER;
-pub use cancel::CallOff;
-pub use event::{Event, JointSet, MotionId};
+pub use cancel::CancelOutcome;
+pub use event::{JointSet, MotionId, TimelineEvent};
+pub use joint_trajectory::Trajectory;
 pub use limits::JointLimits;
-pub use offer::Admission;
-pub use path::{Context, Trajectory};
-pub use rejection::{Code, Rejection};
-pub use request::{Request, Row, Start};
-pub use spline::State;
-pub use stream::{StreamCounts, StreamEnd};
+pub use rejection::{Rejection, RejectionCode};
+pub use request::{Start, TrajectoryPoint, TrajectoryRequest};
+pub use spline::KinematicState;
+pub use stream::{STREAM_JITTER, StreamCounts, StreamEnd};
+pub use submit::Admission;
 pub use timeline::{Timeline, TimelineError};
+pub use validation::ValidationContext;

@@ -1,58 +1,59 @@
-//! What one joint does from an instant on: a pure function of the position instant.
+//! Plan of one joint from an instant on: a pure function of the position instant.
 
-use super::path::Trajectory;
-use super::spline::{Segment, State};
+use super::joint_trajectory::Trajectory;
+use super::spline::{KinematicState, Segment};
 use super::stop::Stop;
 use crate::units::{Nanoseconds, seconds};
 use std::sync::Arc;
 
-/// One entry of a joint's queue.
+/// Entry of the plan queue of a joint.
 #[derive(Debug, Clone)]
-pub(super) struct Plan {
-    /// The motion that it belongs to, while that is not over.
+pub(super) struct JointPlan {
+    /// Slot of its motion in the motion table; `None` after the end of the motion.
     pub slot: Option<usize>,
-    /// First instant that it commands.
+    /// First commanded instant.
     pub join_k: i64,
-    /// Instant of its last setpoint.
+    /// Instant of the last setpoint.
     pub end_k: i64,
-    /// Start and end as asked for, in ns of the position grid (k·Tsp), not rounded to an instant.
+    /// Requested start in ns of the position grid (k·Tsp), not rounded to an instant.
     pub nominal_start: i128,
-    /// Likewise.
+    /// Requested end in ns of the position grid (k·Tsp), not rounded to an instant.
     pub nominal_end: i128,
-    pub kind: Kind,
+    pub kind: PlanKind,
 }
 
 #[derive(Debug, Clone)]
-pub(super) enum Kind {
-    /// Stands, m or rad.
+pub(super) enum PlanKind {
+    /// Hold at, or approach to, the newest setpoint, m or rad.
     Hold(f64),
-    /// Comes to rest; `from_k` is the instant of the state that it starts from.
+    /// Controlled stop; `from_k` is the instant of its initial state.
     Stop { from_k: i64, stop: Stop },
-    /// Follows a trajectory.
-    Path(Path),
+    /// Column of a trajectory.
+    Trajectory(TrajectoryColumn),
 }
 
+/// Column of a trajectory, executed by one joint.
 #[derive(Debug, Clone)]
-pub(super) struct Path {
+pub(super) struct TrajectoryColumn {
     pub trajectory: Arc<Trajectory>,
     pub column: usize,
     /// Instant of local time 0.
     pub start_k: i64,
-    /// Where the trajectory was last evaluated.
+    /// Index of the last evaluated segment.
     pub cursor: usize,
-    /// The way from the commanded state to a first point that is later, and its local begin, ns.
+    /// Approach from the commanded state to a later first point, and its local start time, ns.
     pub approach: Option<(Nanoseconds, Segment)>,
 }
 
-impl Path {
-    /// State at local `time`, ns.
-    pub fn state(&self, time: Nanoseconds) -> State {
+impl TrajectoryColumn {
+    /// Returns the state at local `time`, ns.
+    pub fn state(&self, time: Nanoseconds) -> KinematicState {
         if let Some((begin, segment)) = &self.approach
             && time < self.trajectory.first_time()
         {
             return segment.state(time - begin);
         }
-        match self.trajectory.tail(self.column) {
+        match self.trajectory.final_stop(self.column) {
             Some(stop) if time >= self.trajectory.duration() => {
                 stop.state(seconds(time - self.trajectory.duration()))
             }
@@ -61,8 +62,8 @@ impl Path {
     }
 }
 
-impl Plan {
-    /// At rest at `position` from ever on.
+impl JointPlan {
+    /// Creates a plan at rest at `position` without a start.
     pub fn hold(position: f64) -> Self {
         Self {
             slot: None,
@@ -70,35 +71,35 @@ impl Plan {
             end_k: i64::MIN,
             nominal_start: i128::MIN,
             nominal_end: i128::MIN,
-            kind: Kind::Hold(position),
+            kind: PlanKind::Hold(position),
         }
     }
 
-    /// State at instant `k`, not before `join_k`.
-    pub fn state(&self, k: i64, period: Nanoseconds) -> State {
+    /// Returns the state at instant `k`, at the earliest `join_k`.
+    pub fn state(&self, k: i64, period: Nanoseconds) -> KinematicState {
         match &self.kind {
-            Kind::Hold(position) => State::rest(*position),
-            Kind::Stop { from_k, stop } => stop.state(seconds(elapsed(*from_k, k, period))),
-            Kind::Path(path) => path.state(elapsed(path.start_k, k, period)),
+            PlanKind::Hold(position) => KinematicState::at_rest(*position),
+            PlanKind::Stop { from_k, stop } => stop.state(seconds(elapsed(*from_k, k, period))),
+            PlanKind::Trajectory(path) => path.state(elapsed(path.start_k, k, period)),
         }
     }
 
-    /// Remembers where instant `k` is, for the evaluations that follow.
+    /// Moves the cursor to instant `k`, for the next evaluations.
     pub fn advance(&mut self, k: i64, period: Nanoseconds) {
-        if let Kind::Path(path) = &mut self.kind {
+        if let PlanKind::Trajectory(path) = &mut self.kind {
             let time = elapsed(path.start_k, k, period);
             path.cursor = path.trajectory.locate(time, path.cursor);
         }
     }
 
-    /// Whether the joint moves at instant `k` or after it.
+    /// Returns true if the joint moves at or after instant `k`.
     pub fn is_moving(&self, k: i64, period: Nanoseconds) -> bool {
         match &self.kind {
-            Kind::Hold(_) => false,
-            Kind::Stop { .. } => k < self.end_k,
-            Kind::Path(path) => {
+            PlanKind::Hold(_) => false,
+            PlanKind::Stop { .. } => k < self.end_k,
+            PlanKind::Trajectory(path) => {
                 k < self.end_k
-                    || path.trajectory.tail(path.column).is_some_and(|stop| {
+                    || path.trajectory.final_stop(path.column).is_some_and(|stop| {
                         let time = elapsed(path.start_k, k, period) - path.trajectory.duration();
                         seconds(time) < stop.duration()
                     })
@@ -107,7 +108,7 @@ impl Plan {
     }
 }
 
-/// Time between two instants, ns; saturates, in centuries.
+/// Returns the time between two instants, ns, saturating.
 pub(super) fn elapsed(from_k: i64, to_k: i64, period: Nanoseconds) -> Nanoseconds {
     to_k.saturating_sub(from_k).saturating_mul(period)
 }

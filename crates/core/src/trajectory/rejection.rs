@@ -1,126 +1,125 @@
-//! Why a trajectory was refused, with the numbers.
+//! Rejection of trajectories: code, joint, point, value, limit and text.
 
 use std::fmt;
 
-use crate::config::{breaks_line, shortened};
+use crate::text::{is_control, shortened};
 
-/// Longest sentence, characters: what it quotes comes from whoever sent the trajectory, in any length.
-const LONGEST_TEXT: usize = 500;
+/// Largest length of a text, characters; it can contain names of any length from the received message.
+const MAX_TEXT_LENGTH: usize = 500;
 
-/// Reason of a refusal; the numbers are those of the message `TrajectoryResult` and never change.
+/// Code of a rejection; the values are those of the message `TrajectoryResult` and never change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
-pub enum Code {
-    /// A joint that the machine does not have.
+pub enum RejectionCode {
+    /// Unknown joint.
     UnknownJoint = 1,
-    /// A joint that is named twice.
+    /// Joint given twice.
     DuplicateJoint = 2,
-    /// An array with the wrong number of values.
+    /// Array with a wrong number of values.
     WrongSize = 3,
-    /// A point that is not later than the one before it.
+    /// Time of a point not after the time of the previous point.
     TimesNotIncreasing = 4,
-    /// A first point before the start of its own trajectory.
+    /// Negative time of the first point.
     NegativeTime = 5,
     /// NaN or infinity.
     NotFinite = 6,
-    /// A position beyond the stroke.
-    OutsideStroke = 7,
-    /// A first setpoint further from the present one than the axis moves in one period.
+    /// Position outside the travel limits.
+    OutsideTravelLimits = 7,
+    /// First setpoint not reachable from the commanded one within one position cycle.
     Jump = 8,
-    /// A speed beyond that of the axis.
+    /// Speed above Vmax of the axis.
     Speed = 9,
-    /// A trajectory whose last instant is over.
+    /// Last point in the past.
     EndedInThePast = 10,
-    /// More points than allowed.
+    /// More points than `max_points`.
     TooManyPoints = 11,
-    /// A last point that asks for a velocity, which is not allowed by default.
+    /// Velocity at the last point, which is not allowed by default.
     VelocityAtEnd = 12,
-    /// A time that cannot be counted in 64-bit nanoseconds.
+    /// Time outside the range of 64-bit nanoseconds, or an invalid nanosec field.
     InvalidTime = 13,
-    /// Too many trajectories wait for the same joint.
+    /// Queue of a joint full, or too many trajectories or points in total (admission control).
     QueueFull = 14,
-    /// A tolerance that cannot be kept to.
+    /// Invalid path or goal tolerance.
     InvalidTolerance = 15,
-    /// Joints with several degrees of freedom, which the machine does not have.
+    /// Multi-DOF trajectory or component tolerances, which are not supported.
     MultiDof = 16,
-    /// More goals at once than the node keeps.
+    /// Too many goals at the same time.
     TooManyGoals = 17,
 }
 
-impl Code {
-    /// Its name in the message `TrajectoryResult`.
+impl RejectionCode {
+    /// Name of the constant in the message `TrajectoryResult`.
     pub fn name(self) -> &'static str {
         match self {
-            Code::UnknownJoint => "UNKNOWN_JOINT",
-            Code::DuplicateJoint => "DUPLICATE_JOINT",
-            Code::WrongSize => "WRONG_SIZE",
-            Code::TimesNotIncreasing => "TIMES_NOT_INCREASING",
-            Code::NegativeTime => "NEGATIVE_TIME",
-            Code::NotFinite => "NOT_FINITE",
-            Code::OutsideStroke => "OUTSIDE_STROKE",
-            Code::Jump => "JUMP",
-            Code::Speed => "SPEED",
-            Code::EndedInThePast => "ENDED_IN_THE_PAST",
-            Code::TooManyPoints => "TOO_MANY_POINTS",
-            Code::VelocityAtEnd => "VELOCITY_AT_END",
-            Code::InvalidTime => "INVALID_TIME",
-            Code::QueueFull => "QUEUE_FULL",
-            Code::InvalidTolerance => "INVALID_TOLERANCE",
-            Code::MultiDof => "MULTI_DOF",
-            Code::TooManyGoals => "TOO_MANY_GOALS",
+            RejectionCode::UnknownJoint => "UNKNOWN_JOINT",
+            RejectionCode::DuplicateJoint => "DUPLICATE_JOINT",
+            RejectionCode::WrongSize => "WRONG_SIZE",
+            RejectionCode::TimesNotIncreasing => "TIMES_NOT_INCREASING",
+            RejectionCode::NegativeTime => "NEGATIVE_TIME",
+            RejectionCode::NotFinite => "NOT_FINITE",
+            RejectionCode::OutsideTravelLimits => "OUTSIDE_TRAVEL_LIMITS",
+            RejectionCode::Jump => "JUMP",
+            RejectionCode::Speed => "SPEED",
+            RejectionCode::EndedInThePast => "ENDED_IN_THE_PAST",
+            RejectionCode::TooManyPoints => "TOO_MANY_POINTS",
+            RejectionCode::VelocityAtEnd => "VELOCITY_AT_END",
+            RejectionCode::InvalidTime => "INVALID_TIME",
+            RejectionCode::QueueFull => "QUEUE_FULL",
+            RejectionCode::InvalidTolerance => "INVALID_TOLERANCE",
+            RejectionCode::MultiDof => "MULTI_DOF",
+            RejectionCode::TooManyGoals => "TOO_MANY_GOALS",
         }
     }
 }
 
-/// A refused trajectory: what broke which limit, where.
+/// Rejection of a trajectory: code, joint, point, value and limit.
 ///
 /// [`fmt::Display`] prints `text`, which names joint, point, value and limit with their units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rejection {
-    /// Reason.
-    pub code: Code,
-    /// Joint concerned, if it is one.
+    /// Rejection code.
+    pub code: RejectionCode,
+    /// Name of the joint concerned, if any.
     pub joint: Option<String>,
-    /// Index of the point concerned, if it is one.
+    /// Index of the point concerned, if any.
     pub index: Option<usize>,
-    /// What was found, in the unit that `text` names; 0 where there is no number.
+    /// Value found, in the unit given in `text`; 0 if there is none.
     pub value: f64,
-    /// The limit that `value` broke, same unit; 0 where there is no number.
+    /// Limit that `value` violates, in the same unit; 0 if there is none.
     pub limit: f64,
-    /// One sentence for a person.
+    /// Description in one line.
     pub text: String,
 }
 
 impl Rejection {
-    /// A refusal with `code` and the sentence `text`, which becomes one line that is not long; the rest is
-    /// filled in by the methods below.
-    pub fn new(code: Code, text: impl Into<String>) -> Self {
+    /// Creates a rejection with `code` and `text`; `text` is truncated and becomes a single line.
+    pub fn new(code: RejectionCode, text: impl Into<String>) -> Self {
         let mut text = text.into();
-        if let Some((end, _)) = text.char_indices().nth(LONGEST_TEXT) {
+        if let Some((end, _)) = text.char_indices().nth(MAX_TEXT_LENGTH) {
             text.truncate(end);
             text.push('…');
         }
-        if text.contains(breaks_line) {
-            text = text.replace(breaks_line, " ");
+        if text.contains(is_control) {
+            text = text.replace(is_control, " ");
         }
         Self { code, joint: None, index: None, value: 0.0, limit: 0.0, text }
     }
 
-    /// Names the joint; a name that is too long for one is cut.
+    /// Sets the joint; a long name is truncated.
     #[must_use]
     pub fn joint(mut self, name: &str) -> Self {
         self.joint = Some(shortened(name));
         self
     }
 
-    /// Names the point.
+    /// Sets the index of the point.
     #[must_use]
     pub fn index(mut self, index: usize) -> Self {
         self.index = Some(index);
         self
     }
 
-    /// Gives what was found and what is allowed.
+    /// Sets the value found and its limit.
     #[must_use]
     pub fn numbers(mut self, value: f64, limit: f64) -> Self {
         self.value = value;
@@ -141,11 +140,12 @@ impl std::error::Error for Rejection {}
 mod tests {
     use super::*;
 
-    /// A joint's name in a message can be as long as the message, and hold line ends.
+    /// A joint name in a message can be as long as the message and contain line breaks.
     #[test]
-    fn a_name_without_end_does_not_come_back_in_the_refusal() {
+    fn a_long_name_is_truncated_in_the_rejection() {
         let name = "x\n[INFO] forged ".repeat(100_000);
-        let rejection = Rejection::new(Code::UnknownJoint, format!("unknown joint {name}")).joint(&name);
+        let rejection =
+            Rejection::new(RejectionCode::UnknownJoint, format!("unknown joint {name}")).joint(&name);
         let joint = rejection.joint.as_deref().unwrap_or_default();
         assert!(rejection.text.len() < 600 && joint.len() < 600, "{} {}", rejection.text.len(), joint.len());
         assert!(!rejection.text.contains('\n') && !joint.contains('\n'), "{rejection}");

@@ -1,48 +1,49 @@
-//! A trajectory as it was asked for: values only, nothing checked against a machine yet.
+//! Trajectory request: joints and points before validation against a machine.
 
-use super::rejection::{Code, Rejection};
-use super::spline::Order;
-use crate::units::{Nanoseconds, seconds};
+use super::rejection::{Rejection, RejectionCode};
+use super::spline::SplineDegree;
+use crate::units::{Nanoseconds, Rounded, seconds};
 
-/// When a trajectory starts.
+/// Start of a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// At the next position period (stamp 0).
+    /// Start at the next position instant (stamp 0).
     Now,
-    /// At an absolute time, ns; between two position periods it is the later one.
+    /// Start at an absolute time, ns, rounded up to a position instant.
     At(Nanoseconds),
 }
 
-/// The values of one point, m or rad; an empty slice is a field that is not given.
+/// Values of one point; an empty slice is a field that is not given.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Row<'a> {
+pub struct TrajectoryPoint<'a> {
     /// Positions, m or rad, one per joint.
     pub positions: &'a [f64],
     /// Velocities, m/s or rad/s, one per joint or none.
     pub velocities: &'a [f64],
-    /// Accelerations, m/s² or rad/s², one per joint or none; not without velocities.
+    /// Accelerations, m/s² or rad/s², one per joint or none; they require velocities.
     pub accelerations: &'a [f64],
-    /// Efforts, one per joint or none: checked and not used.
+    /// Efforts, one per joint or none; checked for size and NaN, otherwise ignored.
     pub effort: &'a [f64],
 }
 
-/// A request: joints and points, in flat row-major storage (no allocation per point).
+/// Joints and points of a requested trajectory, in row-major storage (no allocation per point).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Request {
+pub struct TrajectoryRequest {
     pub(super) start: Start,
     pub(super) joints: Vec<String>,
     pub(super) times: Vec<Nanoseconds>,
     pub(super) positions: Vec<f64>,
-    /// As long as `positions` once a point has velocities, zero where one has none; else empty.
+    /// Velocities: empty if no point has any, else one per position, zero for points without velocities.
     pub(super) velocities: Vec<f64>,
-    /// Likewise.
+    /// Accelerations: empty if no point has any, else one per position, zero for points without
+    /// accelerations.
     pub(super) accelerations: Vec<f64>,
-    /// The highest derivative that each point has.
-    pub(super) orders: Vec<Order>,
+    /// Spline degree allowed by the fields of each point.
+    pub(super) degrees: Vec<SplineDegree>,
 }
 
-impl Request {
-    /// A request without points, which is a request to stop `joints`, or all of them when empty.
+impl TrajectoryRequest {
+    /// Creates a request without points: a controlled stop of `joints`, or of all joints if empty.
     pub fn new(start: Start, joints: Vec<String>) -> Self {
         Self {
             start,
@@ -51,35 +52,35 @@ impl Request {
             positions: Vec::new(),
             velocities: Vec::new(),
             accelerations: Vec::new(),
-            orders: Vec::new(),
+            degrees: Vec::new(),
         }
     }
 
-    /// Makes room for `points` more points.
+    /// Reserves memory for `points` more points.
     pub fn reserve(&mut self, points: usize) {
         self.times.reserve(points);
-        self.orders.reserve(points);
+        self.degrees.reserve(points);
         self.positions.reserve(points.saturating_mul(self.joints.len()));
     }
 
-    /// When it starts.
+    /// Start of the trajectory.
     pub fn start(&self) -> Start {
         self.start
     }
 
-    /// The same, starting at another time.
+    /// Returns the request with another start.
     #[must_use]
-    pub fn starting(self, start: Start) -> Self {
+    pub fn with_start(self, start: Start) -> Self {
         Self { start, ..self }
     }
 
-    /// Time, ns from the start, and positions, m or rad, of the first point.
+    /// Returns time (ns from the start) and positions (m or rad) of the first point.
     pub fn first_point(&self) -> Option<(Nanoseconds, &[f64])> {
         let columns = self.positions.len() / self.times.len().max(1);
         Some((*self.times.first()?, self.positions.get(..columns)?))
     }
 
-    /// Names of the joints, in the order of the columns.
+    /// Joint names, in the order of the columns.
     pub fn joints(&self) -> &[String] {
         &self.joints
     }
@@ -89,16 +90,18 @@ impl Request {
         self.times.len()
     }
 
-    /// Point `index` and its time, ns from the start; nothing beyond the last. Efforts are not kept.
-    pub fn point(&self, index: usize) -> Option<(Nanoseconds, Row<'_>)> {
-        let order = *self.orders.get(index)?;
+    /// Returns point `index` and its time, ns from the start; `None` beyond the last point. Efforts are
+    /// not stored.
+    pub fn point(&self, index: usize) -> Option<(Nanoseconds, TrajectoryPoint<'_>)> {
+        let degree = *self.degrees.get(index)?;
         let columns = self.joints.len();
         let cells = index * columns..(index + 1) * columns;
-        let mut row = Row { positions: self.positions.get(cells.clone())?, ..Row::default() };
-        if order >= Order::Cubic {
+        let mut row =
+            TrajectoryPoint { positions: self.positions.get(cells.clone())?, ..TrajectoryPoint::default() };
+        if degree >= SplineDegree::Cubic {
             row.velocities = self.velocities.get(cells.clone())?;
         }
-        if order >= Order::Quintic {
+        if degree >= SplineDegree::Quintic {
             row.accelerations = self.accelerations.get(cells)?;
         }
         Some((*self.times.get(index)?, row))
@@ -107,9 +110,10 @@ impl Request {
     /// Appends a point at `time` ns from the start.
     ///
     /// # Errors
-    /// [`Code::WrongSize`] for an array that has neither no value nor one per joint, for positions
-    /// that are not given, for accelerations without velocities; [`Code::NotFinite`].
-    pub fn push(&mut self, time: Nanoseconds, row: Row<'_>) -> Result<(), Rejection> {
+    /// - [`RejectionCode::WrongSize`] for an array that is neither empty nor has one value per joint, for
+    ///   missing positions, for accelerations without velocities.
+    /// - [`RejectionCode::NotFinite`] for NaN and infinity.
+    pub fn push(&mut self, time: Nanoseconds, row: TrajectoryPoint<'_>) -> Result<(), Rejection> {
         self.check_sizes(row)?;
         self.check_finite(row.positions, "position")?;
         self.check_finite(row.velocities, "velocity")?;
@@ -119,22 +123,22 @@ impl Request {
         self.positions.extend_from_slice(row.positions);
         append(&mut self.velocities, row.velocities, self.positions.len());
         append(&mut self.accelerations, row.accelerations, self.positions.len());
-        self.orders.push(match (row.velocities, row.accelerations) {
-            ([], _) => Order::Linear,
-            (_, []) => Order::Cubic,
-            _ => Order::Quintic,
+        self.degrees.push(match (row.velocities, row.accelerations) {
+            ([], _) => SplineDegree::Linear,
+            (_, []) => SplineDegree::Cubic,
+            _ => SplineDegree::Quintic,
         });
         Ok(())
     }
 
-    fn check_sizes(&self, row: Row<'_>) -> Result<(), Rejection> {
+    fn check_sizes(&self, row: TrajectoryPoint<'_>) -> Result<(), Rejection> {
         let (index, joints) = (self.points(), self.joints.len());
         let wrong = |text: String, found: usize| {
-            Rejection::new(Code::WrongSize, text).index(index).numbers(found as f64, joints as f64)
+            Rejection::new(RejectionCode::WrongSize, text).index(index).numbers(found as f64, joints as f64)
         };
         if joints == 0 {
             return Err(wrong(
-                format!("point {index} is given for no joint: joint_names is empty"),
+                format!("point {index}: joint_names is empty; give at least one joint"),
                 row.positions.len(),
             ));
         }
@@ -151,7 +155,7 @@ impl Request {
             }
         }
         if row.velocities.is_empty() && !row.accelerations.is_empty() {
-            return Err(wrong(format!("point {index}: accelerations are given without velocities"), 0));
+            return Err(wrong(format!("point {index}: accelerations without velocities; give both"), 0));
         }
         Ok(())
     }
@@ -162,7 +166,7 @@ impl Request {
         };
         let (index, joint, value) = (self.points(), &self.joints[column], values[column]);
         Err(Rejection::new(
-            Code::NotFinite,
+            RejectionCode::NotFinite,
             format!("{joint}, point {index}: {what} is {value}, not a finite number"),
         )
         .joint(joint)
@@ -170,16 +174,16 @@ impl Request {
         .numbers(value, 0.0))
     }
 
-    /// Refuses times that do not increase, a negative first time, and a last one that cannot be
-    /// counted in absolute nanoseconds.
+    /// Rejects times that do not increase, a negative first time, and a last time that overflows absolute
+    /// nanoseconds.
     pub(super) fn check_times(&self) -> Result<(), Rejection> {
         let (Some(&first), Some(&last)) = (self.times.first(), self.times.last()) else {
             return Ok(());
         };
         if first < 0 {
             return Err(Rejection::new(
-                Code::NegativeTime,
-                format!("point 0: time from start is negative, {} s", seconds(first)),
+                RejectionCode::NegativeTime,
+                format!("point 0: time_from_start is {} s; it must not be negative", Rounded(seconds(first))),
             )
             .index(0)
             .numbers(seconds(first), 0.0));
@@ -187,10 +191,10 @@ impl Request {
         if let Some(i) = self.times.windows(2).position(|pair| pair[1] <= pair[0]) {
             let (before, time) = (seconds(self.times[i]), seconds(self.times[i + 1]));
             return Err(Rejection::new(
-                Code::TimesNotIncreasing,
+                RejectionCode::TimesNotIncreasing,
                 format!(
-                    "point {}: time from start {time} s is not after {before} s of the point \
-                     before it",
+                    "point {}: time_from_start is {time} s; it must be after {before} s of the previous \
+                     point",
                     i + 1
                 ),
             )
@@ -201,9 +205,9 @@ impl Request {
             && stamp.checked_add(last).is_none()
         {
             return Err(Rejection::new(
-                Code::InvalidTime,
+                RejectionCode::InvalidTime,
                 format!(
-                    "point {}: {} s after the stamp cannot be counted in 64-bit nanoseconds",
+                    "point {}: {} s after the stamp exceeds 64-bit nanoseconds",
                     self.points() - 1,
                     seconds(last)
                 ),
@@ -215,7 +219,7 @@ impl Request {
     }
 }
 
-/// Appends `row` to a field that reaches `len` values then; points that lack it have zeros there.
+/// Appends `row` to `field`, which then has `len` values if any point has the field; missing values are zero.
 fn append(field: &mut Vec<f64>, row: &[f64], len: usize) {
     if !row.is_empty() {
         field.resize(len - row.len(), 0.0);
@@ -229,58 +233,71 @@ fn append(field: &mut Vec<f64>, row: &[f64], len: usize) {
 mod tests {
     use super::*;
 
-    fn request() -> Request {
-        Request::new(Start::Now, vec!["x".into(), "y".into()])
+    fn request() -> TrajectoryRequest {
+        TrajectoryRequest::new(Start::Now, vec!["x".into(), "y".into()])
     }
 
     #[test]
-    fn a_field_given_late_does_not_shift_into_earlier_points() {
+    fn a_field_first_given_at_a_later_point_is_zero_at_earlier_points() {
         let mut request = request();
-        let row = |positions, velocities| Row { positions, velocities, ..Row::default() };
+        let row =
+            |positions, velocities| TrajectoryPoint { positions, velocities, ..TrajectoryPoint::default() };
         request.push(0, row(&[1.0, 2.0], &[])).unwrap();
         request.push(1, row(&[3.0, 4.0], &[5.0, 6.0])).unwrap();
         request.push(2, row(&[7.0, 8.0], &[])).unwrap();
         assert_eq!(request.velocities, [0.0, 0.0, 5.0, 6.0, 0.0, 0.0]);
-        assert_eq!(request.orders, [Order::Linear, Order::Cubic, Order::Linear]);
+        assert_eq!(request.degrees, [SplineDegree::Linear, SplineDegree::Cubic, SplineDegree::Linear]);
     }
 
     #[test]
-    fn wrong_sizes_and_values_name_the_point() {
+    fn rejections_of_sizes_and_nan_contain_the_point_index() {
         let two = [0.0, 0.0];
-        let cases: [(Row<'_>, Code); 6] = [
-            (Row::default(), Code::WrongSize),
-            (Row { positions: &[0.0], ..Row::default() }, Code::WrongSize),
-            (Row { positions: &two, velocities: &[0.0; 3], ..Row::default() }, Code::WrongSize),
-            (Row { positions: &two, accelerations: &two, ..Row::default() }, Code::WrongSize),
-            (Row { positions: &two, effort: &[1.0], ..Row::default() }, Code::WrongSize),
-            (Row { positions: &[0.0, f64::NAN], ..Row::default() }, Code::NotFinite),
+        let cases: [(TrajectoryPoint<'_>, RejectionCode); 6] = [
+            (TrajectoryPoint::default(), RejectionCode::WrongSize),
+            (TrajectoryPoint { positions: &[0.0], ..TrajectoryPoint::default() }, RejectionCode::WrongSize),
+            (
+                TrajectoryPoint { positions: &two, velocities: &[0.0; 3], ..TrajectoryPoint::default() },
+                RejectionCode::WrongSize,
+            ),
+            (
+                TrajectoryPoint { positions: &two, accelerations: &two, ..TrajectoryPoint::default() },
+                RejectionCode::WrongSize,
+            ),
+            (
+                TrajectoryPoint { positions: &two, effort: &[1.0], ..TrajectoryPoint::default() },
+                RejectionCode::WrongSize,
+            ),
+            (
+                TrajectoryPoint { positions: &[0.0, f64::NAN], ..TrajectoryPoint::default() },
+                RejectionCode::NotFinite,
+            ),
         ];
         for (row, code) in cases {
             let mut request = request();
-            request.push(0, Row { positions: &two, ..Row::default() }).unwrap();
+            request.push(0, TrajectoryPoint { positions: &two, ..TrajectoryPoint::default() }).unwrap();
             let rejection = request.push(1, row).unwrap_err();
             assert_eq!((rejection.code, rejection.index), (code, Some(1)));
-            assert_eq!(request.points(), 1, "a refused point leaves no trace");
+            assert_eq!(request.points(), 1, "a rejected point changes nothing");
         }
     }
 
     #[test]
-    fn points_for_no_joint_are_refused() {
-        let mut request = Request::new(Start::Now, Vec::new());
-        assert_eq!(request.push(0, Row::default()).unwrap_err().code, Code::WrongSize);
+    fn points_without_joints_are_rejected() {
+        let mut request = TrajectoryRequest::new(Start::Now, Vec::new());
+        assert_eq!(request.push(0, TrajectoryPoint::default()).unwrap_err().code, RejectionCode::WrongSize);
     }
 
     #[test]
-    fn times_are_refused_by_their_own_codes() {
+    fn invalid_times_are_rejected_with_their_codes() {
         let times = |start, times: &[i64]| {
             let mut request = request();
             request.start = start;
             request.times = times.to_vec();
             request.check_times().map_err(|r| (r.code, r.index))
         };
-        assert_eq!(times(Start::Now, &[-1, 3]), Err((Code::NegativeTime, Some(0))));
-        assert_eq!(times(Start::Now, &[0, 3, 3]), Err((Code::TimesNotIncreasing, Some(2))));
+        assert_eq!(times(Start::Now, &[-1, 3]), Err((RejectionCode::NegativeTime, Some(0))));
+        assert_eq!(times(Start::Now, &[0, 3, 3]), Err((RejectionCode::TimesNotIncreasing, Some(2))));
         assert_eq!(times(Start::Now, &[0, i64::MAX]), Ok(()));
-        assert_eq!(times(Start::At(1), &[0, i64::MAX]), Err((Code::InvalidTime, Some(1))));
+        assert_eq!(times(Start::At(1), &[0, i64::MAX]), Err((RejectionCode::InvalidTime, Some(1))));
     }
 }

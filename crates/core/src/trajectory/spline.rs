@@ -1,11 +1,11 @@
-//! One segment of one joint: a polynomial of degree 1, 3 or 5 between two points.
+//! Spline segments: polynomials of degree 1 (linear), 3 (cubic) or 5 (quintic) between two points.
 
 use crate::units::{Nanoseconds, seconds};
 
-/// Degree of a segment, which is also the highest derivative that a point has.
+/// Degree of a spline segment; it follows from the highest derivative given at its points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Order {
-    /// Positions only: constant velocity.
+pub enum SplineDegree {
+    /// Positions only, constant velocity.
     Linear,
     /// Positions and velocities.
     Cubic,
@@ -15,18 +15,18 @@ pub enum Order {
 
 /// Position, velocity and acceleration of a joint at one instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct State {
-    /// m or rad.
+pub struct KinematicState {
+    /// Position, m or rad.
     pub position: f64,
-    /// m/s or rad/s.
+    /// Velocity, m/s or rad/s.
     pub velocity: f64,
-    /// m/s² or rad/s².
+    /// Acceleration, m/s² or rad/s².
     pub acceleration: f64,
 }
 
-impl State {
-    /// At rest at `position`, m or rad.
-    pub fn rest(position: f64) -> Self {
+impl KinematicState {
+    /// Returns the state at rest at `position`, m or rad.
+    pub fn at_rest(position: f64) -> Self {
         Self { position, ..Self::default() }
     }
 }
@@ -35,8 +35,8 @@ impl State {
 ///
 /// `p(s) = p0 + c1 s + c2 s² + c3 s³ + c4 s⁴ + c5 s⁵`
 ///
-/// Normalized because a segment of a nanosecond and one of an hour are then equally well
-/// conditioned. The ends are returned bit for bit.
+/// Normalized time gives segments of a nanosecond and of an hour the same conditioning. The end
+/// positions are returned bit for bit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
     /// p0 and p1, m or rad.
@@ -45,27 +45,32 @@ pub struct Segment {
     coefficients: [f64; 5],
     /// h, ns.
     duration: Nanoseconds,
-    order: Order,
+    degree: SplineDegree,
 }
 
 impl Segment {
-    /// The segment from `start` to `end`, `duration` > 0 ns later.
-    pub fn new(start: State, end: State, duration: Nanoseconds, order: Order) -> Self {
-        debug_assert!(duration > 0, "a segment lasts");
+    /// Creates the segment from `start` to `end`, `duration` > 0 ns later.
+    pub fn new(
+        start: KinematicState,
+        end: KinematicState,
+        duration: Nanoseconds,
+        degree: SplineDegree,
+    ) -> Self {
+        debug_assert!(duration > 0, "duration must be positive");
         Self {
             ends: (start.position, end.position),
-            coefficients: coefficients(&start, &end, seconds(duration), order),
+            coefficients: coefficients(&start, &end, seconds(duration), degree),
             duration,
-            order,
+            degree,
         }
     }
 
-    /// Degree.
-    pub fn order(&self) -> Order {
-        self.order
+    /// Degree of the polynomial.
+    pub fn degree(&self) -> SplineDegree {
+        self.degree
     }
 
-    /// Position `elapsed` ns after the start, m or rad; the ends' own beyond them.
+    /// Returns the position `elapsed` ns after the start, clamped to the segment, m or rad.
     pub fn position(&self, elapsed: Nanoseconds) -> f64 {
         if elapsed <= 0 {
             return self.ends.0;
@@ -78,26 +83,26 @@ impl Segment {
         self.ends.0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
     }
 
-    /// State `elapsed` ns after the start, clamped to the segment. The derivatives are those of
-    /// the polynomial, so a linear segment has no acceleration.
-    pub fn state(&self, elapsed: Nanoseconds) -> State {
+    /// Returns the state `elapsed` ns after the start, clamped to the segment. The derivatives are those
+    /// of the polynomial; a linear segment has zero acceleration.
+    pub fn state(&self, elapsed: Nanoseconds) -> KinematicState {
         let h = seconds(self.duration);
         let [c1, c2, c3, c4, c5] = self.coefficients;
         let s = elapsed.clamp(0, self.duration) as f64 / self.duration as f64;
         let dp = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)));
         let ddp = 2.0 * c2 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5));
-        State { position: self.position(elapsed), velocity: dp / h, acceleration: ddp / (h * h) }
+        KinematicState { position: self.position(elapsed), velocity: dp / h, acceleration: ddp / (h * h) }
     }
 }
 
-/// c1…c5, with Δ = p1 − p0, m = v h, q = a h².
-fn coefficients(start: &State, end: &State, h: f64, order: Order) -> [f64; 5] {
+/// Returns c1…c5, with Δ = p1 − p0, m = v h, q = a h².
+fn coefficients(start: &KinematicState, end: &KinematicState, h: f64, degree: SplineDegree) -> [f64; 5] {
     let delta = end.position - start.position;
     let (m0, m1) = (start.velocity * h, end.velocity * h);
-    match order {
-        Order::Linear => [delta, 0.0, 0.0, 0.0, 0.0],
-        Order::Cubic => [m0, 3.0 * delta - 2.0 * m0 - m1, m0 + m1 - 2.0 * delta, 0.0, 0.0],
-        Order::Quintic => {
+    match degree {
+        SplineDegree::Linear => [delta, 0.0, 0.0, 0.0, 0.0],
+        SplineDegree::Cubic => [m0, 3.0 * delta - 2.0 * m0 - m1, m0 + m1 - 2.0 * delta, 0.0, 0.0],
+        SplineDegree::Quintic => {
             let (q0, q1) = (start.acceleration * h * h, end.acceleration * h * h);
             [
                 m0,
@@ -121,7 +126,12 @@ mod tests {
 
     #[test]
     fn rest_to_rest_quintic_is_10t3_15t4_6t5() {
-        let segment = Segment::new(State::rest(0.0), State::rest(1.0), SECOND_NS, Order::Quintic);
+        let segment = Segment::new(
+            KinematicState::at_rest(0.0),
+            KinematicState::at_rest(1.0),
+            SECOND_NS,
+            SplineDegree::Quintic,
+        );
         for ms in 0..=1000 {
             let t = f64::from(ms) * 1e-3;
             let state = segment.state(i64::from(ms) * 1_000_000);
@@ -132,15 +142,15 @@ mod tests {
     }
 
     #[test]
-    fn a_cubic_and_a_quintic_reproduce_the_polynomial_they_were_cut_from() {
-        // p = 0.3 − 0.2 t + 0.7 t² − 0.4 t³ on [0, 0.75] s, sampled off its own knots.
-        let exact = |t: f64| State {
+    fn cubic_and_quintic_reproduce_a_cubic_polynomial() {
+        // p = 0.3 − 0.2 t + 0.7 t² − 0.4 t³ on [0, 0.75] s, sampled between the points.
+        let exact = |t: f64| KinematicState {
             position: 0.3 + t * (-0.2 + t * (0.7 - t * 0.4)),
             velocity: -0.2 + t * (1.4 - t * 1.2),
             acceleration: 1.4 - t * 2.4,
         };
-        for order in [Order::Cubic, Order::Quintic] {
-            let segment = Segment::new(exact(0.0), exact(0.75), 750_000_000, order);
+        for degree in [SplineDegree::Cubic, SplineDegree::Quintic] {
+            let segment = Segment::new(exact(0.0), exact(0.75), 750_000_000, degree);
             for ns in (0..=750_000_000).step_by(1_234_567) {
                 let (found, wanted) = (segment.state(ns), exact(seconds(ns)));
                 assert_close(found.position, wanted.position, 1e-15);
@@ -152,14 +162,22 @@ mod tests {
 
     #[test]
     fn a_linear_segment_has_velocity_and_no_acceleration() {
-        let segment = Segment::new(State::rest(1.0), State::rest(-1.0), 4 * SECOND_NS, Order::Linear);
-        assert_eq!(segment.state(SECOND_NS), State { position: 0.5, velocity: -0.5, acceleration: 0.0 });
+        let segment = Segment::new(
+            KinematicState::at_rest(1.0),
+            KinematicState::at_rest(-1.0),
+            4 * SECOND_NS,
+            SplineDegree::Linear,
+        );
+        assert_eq!(
+            segment.state(SECOND_NS),
+            KinematicState { position: 0.5, velocity: -0.5, acceleration: 0.0 }
+        );
     }
 
     #[test]
-    fn both_ends_are_bit_for_bit_even_where_the_polynomial_overflows() {
-        let wild = State { position: 0.1, velocity: f64::MAX, acceleration: f64::MAX };
-        let segment = Segment::new(wild, State::rest(0.3), i64::MAX, Order::Quintic);
+    fn both_ends_are_bit_identical_even_if_the_polynomial_overflows() {
+        let wild = KinematicState { position: 0.1, velocity: f64::MAX, acceleration: f64::MAX };
+        let segment = Segment::new(wild, KinematicState::at_rest(0.3), i64::MAX, SplineDegree::Quintic);
         assert_eq!(segment.position(0), 0.1);
         assert_eq!(segment.position(i64::MAX), 0.3);
         assert_eq!(segment.state(i64::MAX).position, 0.3);

@@ -1,81 +1,81 @@
-//! The real-time side: what each joint is commanded at each position instant.
+//! Real-time part of trajectory execution: one position setpoint per joint and position instant.
 
-use super::arrivals::Arrivals;
-use super::event::{Event, JointSet, MotionId};
+use super::event::{JointSet, MotionId, TimelineEvent};
 use super::limits::JointLimits;
-use super::motions::{Motions, Release};
-use super::plan::{Kind, Plan};
-use super::rejection::{Code, Rejection};
-use super::spline::State;
+use super::motion_table::{MotionTable, Release};
+use super::plan::{JointPlan, PlanKind};
+use super::rejection::{Rejection, RejectionCode};
+use super::spline::KinematicState;
 use super::stop::StopPlanner;
-use super::stream::{LookAhead, Stream, StreamEnd, reach};
+use super::stream::{SetpointStream, StreamCounts, StreamEnd, StreamedSetpoint};
 use crate::units::Nanoseconds;
 use std::collections::VecDeque;
 
-/// Most trajectories that wait for one joint.
+/// Largest number of trajectories that wait for one joint.
 pub const MAX_WAITING: usize = 1024;
 
 /// Position setpoints of all joints, one position instant after another.
 ///
-/// Each joint has a queue of plans, ordered by the instant from which they command it. A plan says
-/// where its joint is at any instant, so the timeline can look ahead, and a new trajectory is
-/// checked at its start against what will be commanded there. [`Timeline::next`] does not allocate
-/// and costs the same whatever waits. A trajectory is released when its last joint leaves it: who
-/// keeps an `Arc` of it until its last event spares the machine's thread the freeing.
+/// Each joint has a queue of plans, ordered by the instant from which they command the joint. A plan
+/// gives the state of its joint at any instant. Therefore future setpoints can be previewed, and a new
+/// trajectory is checked at its start against the setpoint commanded there. [`Timeline::next`] does not
+/// allocate; its cost does not depend on the length of the queues. A trajectory is dropped when its
+/// last joint leaves it: a caller that keeps an `Arc` of it until its last event moves the deallocation
+/// out of the real-time thread.
 ///
-/// The rules of [`Timeline::offer`] are those of a `JointTrajectory` that arrives.
+/// [`Timeline::submit`] implements the rules for a received `JointTrajectory`, with replacement and
+/// preemption; [`Timeline::submit_setpoint`] those for a stream of setpoints.
 #[derive(Debug)]
 pub struct Timeline {
     pub(super) joints: Vec<JointLimits>,
     /// Tsp, ns.
     pub(super) period: Nanoseconds,
-    /// The position instant that comes next.
+    /// Next position instant.
     pub(super) next_k: i64,
-    pub(super) tracks: Vec<Track>,
-    pub(super) motions: Motions,
+    pub(super) queues: Vec<JointQueue>,
+    pub(super) motions: MotionTable,
     pub(super) planner: StopPlanner,
-    pub(super) stream: Stream,
+    stream: SetpointStream,
     psec: Vec<f64>,
-    pub(super) events: Vec<Event>,
-    /// Events since the last instant, told at the next.
-    pub(super) pending: Vec<Event>,
+    events: Vec<TimelineEvent>,
+    /// Events since the last instant, reported at the next one.
+    pub(super) pending: Vec<TimelineEvent>,
 }
 
-/// One joint: its plans, the first of which is the present one, and what was last commanded.
+/// Plan queue and last commanded state of one joint.
 #[derive(Debug)]
-pub(super) struct Track {
-    pub queue: VecDeque<Plan>,
-    pub state: State,
-    /// Streamed setpoints between the last commanded one and the one that the joint holds.
-    pub ahead: LookAhead,
-    /// The streamed setpoints that came.
-    pub arrivals: Arrivals,
+pub(super) struct JointQueue {
+    /// Plans of the joint; the first one commands it.
+    pub plans: VecDeque<JointPlan>,
+    /// State commanded at the last instant.
+    pub state: KinematicState,
 }
 
-/// Why there is no timeline for these joints.
+/// Invalid arguments of [`Timeline::new`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum TimelineError {
     /// No joint, or more than [`JointSet::CAPACITY`].
-    #[error("{0} joints; a timeline has 1 to {max}", max = JointSet::CAPACITY)]
+    #[error("machine has {0} joints; a timeline supports 1 to {max}", max = JointSet::CAPACITY)]
     Joints(usize),
-    /// As many positions as joints are wanted.
-    #[error("{positions} positions for {joints} joints")]
+    /// Number of positions different from the number of joints.
+    #[error("{positions} positions are given for {joints} joints; give one position for each joint")]
     Positions {
         /// Number of positions.
         positions: usize,
         /// Number of joints.
         joints: usize,
     },
-    /// Tsp is not positive.
-    #[error("the position period is {0} ns; it must be more than 0")]
+    /// Position period Tsp of 0 or less.
+    #[error("position period is {0} ns; it must be greater than 0")]
     Period(Nanoseconds),
 }
 
 impl Timeline {
-    /// All joints at rest at `positions` (m or rad); the first instant is 0. `period` is Tsp, ns.
+    /// Creates a timeline with all joints at rest at `positions` (m or rad); its first instant is 0.
+    /// `period` is Tsp, ns.
     ///
     /// # Errors
-    /// [`TimelineError`].
+    /// [`TimelineError`] if the number of joints or positions or the period is invalid.
     pub fn new(
         joints: Vec<JointLimits>,
         period: Nanoseconds,
@@ -90,17 +90,15 @@ impl Timeline {
         if period <= 0 {
             return Err(TimelineError::Period(period));
         }
-        let track = |&position: &f64| Track {
-            queue: VecDeque::from([Plan::hold(position)]),
-            state: State::rest(position),
-            ahead: LookAhead::at_rest(position),
-            arrivals: Arrivals::default(),
+        let queue = |&position: &f64| JointQueue {
+            plans: VecDeque::from([JointPlan::hold(position)]),
+            state: KinematicState::at_rest(position),
         };
         Ok(Self {
-            tracks: positions.iter().map(track).collect(),
-            motions: Motions::new(joints.len()),
+            queues: positions.iter().map(queue).collect(),
+            motions: MotionTable::new(joints.len()),
             planner: StopPlanner::default(),
-            stream: Stream::default(),
+            stream: SetpointStream::new(&joints, period, positions),
             psec: positions.to_vec(),
             events: Vec::new(),
             pending: Vec::new(),
@@ -118,48 +116,38 @@ impl Timeline {
         let (k, period) = (self.next_k, self.period);
         self.events.clear();
         self.events.append(&mut self.pending);
-        // A setpoint that was taken comes with the delay that it was foreseen with.
-        if self.stream.taken_k != Some(k) {
-            self.settle_stream_delay();
-        }
-        let mut limited = false;
-        for (joint, track) in self.tracks.iter_mut().enumerate() {
-            if track.queue.get(1).is_some_and(|plan| plan.join_k <= k) {
-                let old = track.queue.pop_front();
-                let new = track.queue.front();
+        self.stream.begin_instant(k, &self.psec);
+        for (joint, queue) in self.queues.iter_mut().enumerate() {
+            if queue.plans.get(1).is_some_and(|plan| plan.join_k <= k) {
+                let old = queue.plans.pop_front();
+                let new = queue.plans.front();
                 if let (Some(old), Some(new)) = (old, new) {
                     self.motions.hand_over(&old, new, joint);
                     self.motions.start(new.slot, &mut self.events);
                 }
             }
-            let Some(plan) = track.queue.front_mut() else {
+            let Some(plan) = queue.plans.front_mut() else {
                 continue;
             };
             plan.advance(k, period);
-            track.state = match plan.kind {
-                Kind::Hold(newest) => {
-                    self.stream.note(k, newest != track.ahead.entered(track.state));
-                    let reach = reach(&self.joints[joint], period);
-                    let (state, arrived) = track.ahead.next(newest, reach, track.state, period);
-                    limited |= !arrived;
-                    state
-                }
+            queue.state = match plan.kind {
+                PlanKind::Hold(newest) => self.stream.next_state(joint, k, newest, queue.state.position),
                 _ => plan.state(k, period),
             };
-            self.psec[joint] = track.state.position;
+            self.psec[joint] = queue.state.position;
             if k >= plan.end_k
                 && let Some(slot) = plan.slot.take()
             {
                 self.motions.release(slot, joint, Release::Completed);
             }
             let is_over = plan.slot.is_none() && !plan.is_moving(k, period);
-            if is_over && !matches!(plan.kind, Kind::Hold(_)) {
-                plan.kind = Kind::Hold(track.state.position);
-                track.ahead.empty(track.state.position);
+            if is_over && !matches!(plan.kind, PlanKind::Hold(_)) {
+                plan.kind = PlanKind::Hold(queue.state.position);
+                self.stream.flush(joint, queue.state.position);
             }
         }
         self.motions.settle(&mut self.events);
-        self.count_stream(k, limited);
+        self.stream.finish_instant(k);
         self.next_k += 1;
         k
     }
@@ -169,8 +157,8 @@ impl Timeline {
         &self.psec
     }
 
-    /// What happened at the last commanded instant, and since the one before it.
-    pub fn events(&self) -> &[Event] {
+    /// Events of the last commanded instant and since the instant before it.
+    pub fn events(&self) -> &[TimelineEvent] {
         &self.events
     }
 
@@ -179,102 +167,109 @@ impl Timeline {
         self.next_k
     }
 
-    /// The joints.
+    /// Joint limits.
     pub fn joints(&self) -> &[JointLimits] {
         &self.joints
     }
 
-    /// Tsp, ns.
+    /// Position period Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
         self.period
     }
 
-    /// Commanded state of `joint` at the last instant, with the derivatives of what commands it.
-    pub fn commanded_state(&self, joint: usize) -> Option<State> {
-        self.tracks.get(joint).map(|track| track.state)
+    /// Returns the state of `joint` commanded at the last instant; its derivatives are those of the
+    /// commanding plan.
+    pub fn commanded_state(&self, joint: usize) -> Option<KinematicState> {
+        self.queues.get(joint).map(|queue| queue.state)
     }
 
-    /// Setpoint of `joint` `periods` instants after the last commanded one, m or rad, by what is
-    /// known now; the last one of all beyond it. `None` for a joint that there is not.
-    pub fn psec_ahead(&self, joint: usize, periods: u32) -> Option<f64> {
-        (joint < self.tracks.len()).then(|| {
-            let k = (self.next_k - 1).saturating_add(i64::from(periods));
+    /// Returns the previewed setpoint of `joint`, `cycles` position cycles after the last commanded
+    /// instant, m or rad.
+    ///
+    /// The preview contains everything accepted up to now; beyond its end the last setpoint is held.
+    /// Returns `None` for an unknown joint.
+    pub fn psec_ahead(&self, joint: usize, cycles: u32) -> Option<f64> {
+        (joint < self.queues.len()).then(|| {
+            let k = (self.next_k - 1).saturating_add(i64::from(cycles));
             self.predicted(joint, k).position
         })
     }
 
-    /// State that `joint` is commanded at instant `k`, not before the last one.
-    pub(super) fn predicted(&self, joint: usize, k: i64) -> State {
-        let track = &self.tracks[joint];
+    /// Returns the state commanded to `joint` at instant `k`, at the earliest the last instant.
+    pub(super) fn predicted(&self, joint: usize, k: i64) -> KinematicState {
+        let queue = &self.queues[joint];
         if k < self.next_k {
-            return track.state;
+            return queue.state;
         }
-        let after = track.queue.partition_point(|plan| plan.join_k <= k);
-        match track.queue.get(after.saturating_sub(1)) {
-            Some(Plan { kind: Kind::Hold(newest), .. }) => {
-                let reach = reach(&self.joints[joint], self.period);
-                track.ahead.at(k - self.next_k, *newest, reach, track.state, self.period)
+        let after = queue.plans.partition_point(|plan| plan.join_k <= k);
+        match queue.plans.get(after.saturating_sub(1)) {
+            Some(JointPlan { kind: PlanKind::Hold(newest), .. }) => {
+                self.stream.state_after(joint, k - self.next_k, *newest, queue.state.position)
             }
             Some(plan) => plan.state(k, self.period),
-            None => track.state,
+            None => queue.state,
         }
     }
 
-    /// Whether a joint is commanded to move after the last instant by a trajectory or a stop that
-    /// has started already. A stream is another matter: [`Timeline::is_stream_moving`].
+    /// Returns true if a started trajectory or stop commands motion of a joint after the last instant.
+    /// Motion by streamed setpoints: [`Timeline::is_stream_moving`].
     pub fn is_moving(&self) -> bool {
         let k = self.next_k - 1;
-        self.tracks
+        self.queues
             .iter()
-            .filter_map(|track| track.queue.front())
+            .filter_map(|queue| queue.plans.front())
             .any(|plan| plan.slot.is_some() || plan.is_moving(k, self.period))
     }
 
-    /// Whether a trajectory or a stop has been accepted and has not started.
+    /// Returns true if an accepted trajectory or stop has not started.
     pub fn is_waiting(&self) -> bool {
-        self.tracks.iter().any(|track| track.queue.len() > 1)
+        self.queues.iter().any(|queue| queue.plans.len() > 1)
     }
 
-    /// Forgets everything and stands at `positions` (m or rad) from the next instant on. Whatever
-    /// moved or waited is told to have been stopped.
+    /// Resets all joints to rest at `positions` (m or rad) from the next instant on and clears the
+    /// queues. All active and waiting motions end with [`TimelineEvent::Stopped`].
     ///
     /// # Errors
-    /// [`Code::WrongSize`], [`Code::NotFinite`]; nothing has changed then.
+    /// [`RejectionCode::WrongSize`] if there is not one position for each joint,
+    /// [`RejectionCode::NotFinite`] for NaN and infinity. The timeline is unchanged then.
     pub fn reset(&mut self, positions: &[f64]) -> Result<(), Rejection> {
         if positions.len() != self.joints.len() {
             let (found, wanted) = (positions.len(), self.joints.len());
-            return Err(Rejection::new(Code::WrongSize, format!("{found} positions for {wanted} joints"))
-                .numbers(found as f64, wanted as f64));
+            return Err(Rejection::new(
+                RejectionCode::WrongSize,
+                format!("{found} positions for {wanted} joints"),
+            )
+            .numbers(found as f64, wanted as f64));
         }
         for (joint, &position) in self.joints.iter().zip(positions) {
-            check_finite(joint, position)?;
+            joint.check_finite(position)?;
         }
         self.end_stream(0..positions.len(), StreamEnd::Reset);
         for (joint, &position) in positions.iter().enumerate() {
             self.stop_all(joint, None);
-            let track = &mut self.tracks[joint];
-            track.queue.clear();
-            track.queue.push_back(Plan::hold(position));
-            track.state = State::rest(position);
-            track.ahead.empty(position);
+            let queue = &mut self.queues[joint];
+            queue.plans.clear();
+            queue.plans.push_back(JointPlan::hold(position));
+            queue.state = KinematicState::at_rest(position);
+            self.stream.flush(joint, position);
             self.psec[joint] = position;
         }
-        self.forget_stream();
-        self.settle_stream_delay();
+        self.stream.clear_activity();
+        self.stream.apply_delay(self.next_k, &self.psec);
         self.motions.settle(&mut self.pending);
         self.reserve_events();
         Ok(())
     }
 
-    /// Makes room for all that the next instant can tell, a start and an end of each motion, so
-    /// that it does not allocate.
+    /// Reserves memory for all events of the next instant, a start and an end of each motion, so that
+    /// it does not allocate.
     pub(super) fn reserve_events(&mut self) {
         self.events.reserve(self.pending.len() + 2 * self.motions.capacity());
     }
 
-    /// Takes `joint` away from everything that moves it or waits for it.
+    /// Releases `joint` from all active and waiting motions.
     pub(super) fn stop_all(&mut self, joint: usize, by: Option<MotionId>) {
-        for plan in &mut self.tracks[joint].queue {
+        for plan in &mut self.queues[joint].plans {
             if let Some(slot) = plan.slot.take() {
                 self.motions.release(slot, joint, Release::Stopped(by));
             }
@@ -282,10 +277,112 @@ impl Timeline {
     }
 }
 
-pub(super) fn check_finite(joint: &JointLimits, position: f64) -> Result<(), Rejection> {
-    if position.is_finite() {
-        return Ok(());
+/// Stream of setpoints.
+impl Timeline {
+    /// Submits one streamed setpoint, m or rad.
+    ///
+    /// Returns true if it is accepted. Returns false while a trajectory or a stop commands the joint or
+    /// waits for it, and after a stop until the stream has paused, i.e. has not changed for
+    /// [`STREAM_PAUSE`].
+    ///
+    /// From the next instant on, the preview buffer approaches the setpoint by at most Vmax·Tsp in each
+    /// position cycle. An entry is commanded [`Timeline::stream_delay`] instants after it has entered.
+    /// The last of several setpoints before one instant applies. A trajectory or a stop takes the joint
+    /// over from its commanded state, with the velocity of the stream, and clears the buffer.
+    ///
+    /// # Errors
+    /// - [`RejectionCode::UnknownJoint`].
+    /// - [`RejectionCode::NotFinite`] for NaN and infinity.
+    /// - [`RejectionCode::OutsideTravelLimits`].
+    /// - [`RejectionCode::Jump`] if the first setpoint of a stream is more than Vmax·Tsp away from the
+    ///   last entry of the buffer, or a further one cannot be reached from the previously accepted one in
+    ///   the elapsed time plus [`STREAM_JITTER`].
+    ///
+    /// The previously accepted setpoint remains valid then.
+    ///
+    /// [`STREAM_JITTER`]: super::STREAM_JITTER
+    /// [`STREAM_PAUSE`]: super::stream::STREAM_PAUSE
+    pub fn submit_setpoint(&mut self, joint: usize, position: f64) -> Result<bool, Rejection> {
+        self.submit_setpoint_stamped(joint, position, None)
     }
-    let text = format!("{}: position is {position}, not a finite number", joint.name);
-    Err(Rejection::new(Code::NotFinite, text).joint(&joint.name).numbers(position, 0.0))
+
+    /// Submits one streamed setpoint, m or rad, with the source time stamp `sent`, ns.
+    ///
+    /// The elapsed time between two setpoints is the longer of the times between their stamps and
+    /// between their arrivals. See [`Timeline::submit_setpoint`].
+    ///
+    /// # Errors
+    /// Those of [`Timeline::submit_setpoint`].
+    pub fn submit_setpoint_stamped(
+        &mut self,
+        joint: usize,
+        position: f64,
+        sent: Option<Nanoseconds>,
+    ) -> Result<bool, Rejection> {
+        let (Some(limits), Some(queue)) = (self.joints.get(joint), self.queues.get_mut(joint)) else {
+            let text = format!("unknown joint index {joint}; the machine has {} joints", self.joints.len());
+            return Err(Rejection::new(RejectionCode::UnknownJoint, text));
+        };
+        let is_free = queue.plans.len() == 1
+            && queue.plans[0].slot.is_none()
+            && matches!(queue.plans[0].kind, PlanKind::Hold(_));
+        let setpoint = StreamedSetpoint { joint, position, sent };
+        let is_accepted = self.stream.submit(setpoint, limits, self.next_k, &self.psec, is_free)?;
+        if is_accepted {
+            queue.plans[0].kind = PlanKind::Hold(position);
+        }
+        Ok(is_accepted)
+    }
+
+    /// Sets the delay of streamed setpoints, position cycles, at most
+    /// [`MAX_STREAM_DELAY`](super::stream::MAX_STREAM_DELAY).
+    ///
+    /// The delay takes effect when the streamed setpoints of all joints have not changed for the present
+    /// delay plus [`STREAM_PAUSE`](super::stream::STREAM_PAUSE), so that it causes no motion; without a
+    /// stream immediately. A stream without a pause keeps its delay.
+    pub fn set_stream_delay(&mut self, cycles: u32) {
+        self.stream.set_delay(cycles, self.next_k, &self.psec);
+    }
+
+    /// Delay of streamed setpoints in effect, position cycles.
+    pub fn stream_delay(&self) -> u32 {
+        self.stream.delay()
+    }
+
+    /// Returns true if a streamed setpoint was accepted within
+    /// [`STREAM_PAUSE`](super::stream::STREAM_PAUSE) or is still to be commanded.
+    pub fn is_streaming(&self) -> bool {
+        self.stream.is_active(self.next_k)
+    }
+
+    /// Returns true if streamed setpoints moved a joint at the last instant or are about to.
+    pub fn is_stream_moving(&self) -> bool {
+        self.stream.is_moving(self.next_k)
+    }
+
+    /// Returns true if setpoints of a joint arrive and are ignored after a stop.
+    pub fn is_stream_inhibited(&self) -> bool {
+        self.stream.is_inhibited(self.next_k)
+    }
+
+    /// Counters of streamed setpoints since construction.
+    pub fn stream_counts(&self) -> StreamCounts {
+        self.stream.counts()
+    }
+
+    /// Returns once the last cause for which a stream lost joints, and these joints.
+    pub fn take_stream_end(&mut self) -> Option<(StreamEnd, JointSet)> {
+        self.stream.take_end()
+    }
+
+    /// Ends the stream of `joints`; after a stop it is inhibited until it pauses.
+    pub(super) fn end_stream(&mut self, joints: impl IntoIterator<Item = usize>, end: StreamEnd) {
+        self.stream.end(joints, end, self.next_k);
+    }
+
+    /// Ends the stream of all joints because of a clock jump.
+    pub(super) fn abort_stream(&mut self) {
+        self.end_stream(0..self.joints.len(), StreamEnd::ClockJump);
+        self.stream.clear_activity();
+    }
 }

@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use crate::simulation_common::{Bench, NONE, TSP, X};
 use allocation_counter::{AllocationInfo, measure};
-use virtual_axes_core::simulation::{Simulation, Tolerance, Tolerances, joints};
-use virtual_axes_core::trajectory::{Context, MotionId, Request, Row, Start, Trajectory};
+use virtual_axes_core::simulation::{Simulation, Tolerance, Tolerances, joint_limits};
+use virtual_axes_core::trajectory::{
+    MotionId, Start, Trajectory, TrajectoryPoint, TrajectoryRequest, ValidationContext,
+};
 use virtual_axes_core::units::{Nanoseconds, seconds};
-use virtual_axes_verification::fixtures::common::configured;
+use virtual_axes_verification::fixtures::machines::configured;
 
 const A: MotionId = MotionId(1);
 /// Periods in which whatever is used again may grow to its size: a second and a half, within which the
@@ -45,25 +47,29 @@ fn to_and_fro(time: f64) -> [f64; 3] {
 
 /// X to and fro for six seconds, by points `every` ns with the first `derivatives` derivatives.
 fn wave(bench: &Bench, every: Nanoseconds, derivatives: usize) -> Arc<Trajectory> {
-    let mut request = Request::new(Start::Now, vec!["x".to_owned()]);
+    let mut request = TrajectoryRequest::new(Start::Now, vec!["x".to_owned()]);
     for k in 0..=6_000_000_000 / every {
         let [position, velocity, acceleration] = to_and_fro(seconds(k * every)).map(|v| [v]);
-        let row = Row {
+        let row = TrajectoryPoint {
             positions: &position,
             velocities: if derivatives > 0 { &velocity } else { &[] },
             accelerations: if derivatives > 1 { &acceleration } else { &[] },
-            ..Row::default()
+            ..TrajectoryPoint::default()
         };
         request.push(k * every, row).expect("well formed");
     }
-    let context =
-        Context { joints: &bench.joints, period: TSP, max_points: 100_000, allow_nonzero_end_velocity: true };
+    let context = ValidationContext {
+        joints: &bench.joints,
+        period: TSP,
+        max_points: 100_000,
+        allow_nonzero_end_velocity: true,
+    };
     Arc::new(Trajectory::new(request, &context).expect("within limits"))
 }
 
 fn predictive() -> Bench {
     let config = configured("mikron_ucp710", &["position_loop.controller=gpc"]);
-    let joints = joints(&config, "");
+    let joints = joint_limits(&config, "");
     let simulation = Simulation::new(&config, joints.clone(), 0).expect("can be simulated");
     Bench { simulation, joints, origin: 0 }
 }
@@ -88,7 +94,7 @@ fn a_trajectory_under_way_allocates_nothing_however_it_is_interpolated() {
         for every in [TSP, 50 * TSP] {
             let mut bench = Bench::new(NONE, 0);
             let trajectory = wave(&bench, every, derivatives);
-            bench.simulation.offer(A, trajectory).expect("accepted");
+            bench.simulation.submit(A, trajectory).expect("accepted");
             let what = format!("{derivatives} derivatives, a point each {every} ns");
             assert_nothing_allocated(&what, &mut bench.simulation, |_| ());
         }
@@ -101,9 +107,9 @@ fn motions_of_several_joints_with_tolerances_allocate_nothing() {
     let circle = bench.ballbar(Start::Now);
     let wide = Tolerance { position: Some(0.1), ..Tolerance::default() };
     let tolerances = Tolerances { path: vec![wide; 2], goal: vec![wide; 2], goal_time: None };
-    bench.simulation.offer_within(A, circle, tolerances).expect("accepted");
+    bench.simulation.submit_with_tolerances(A, circle, tolerances).expect("accepted");
     let other = bench.trajectory(Start::Now, &["c"], &[(0, &[0.0]), (1000 * TSP, &[1.0])]);
-    bench.simulation.offer(MotionId(2), other).expect("accepted");
+    bench.simulation.submit(MotionId(2), other).expect("accepted");
     assert_nothing_allocated("two motions", &mut bench.simulation, |_| ());
 }
 
@@ -111,7 +117,7 @@ fn motions_of_several_joints_with_tolerances_allocate_nothing() {
 fn a_motion_that_waits_for_its_time_allocates_nothing() {
     let mut bench = Bench::new(NONE, 0);
     let later = bench.ballbar(Start::At(10_000 * TSP));
-    bench.simulation.offer(A, later).expect("accepted");
+    bench.simulation.submit(A, later).expect("accepted");
     assert_nothing_allocated("waiting", &mut bench.simulation, |_| ());
 }
 
@@ -120,7 +126,7 @@ fn a_stream_allocates_nothing() {
     for (what, mut bench) in [("cascade", Bench::new(NONE, 0)), ("predictive", predictive())] {
         assert_nothing_allocated(what, &mut bench.simulation, |simulation| {
             let time = simulation.time_of(simulation.next_instant());
-            let taken = simulation.stream_sent(X, to_and_fro(seconds(time))[0], Some(time));
+            let taken = simulation.submit_setpoint_stamped(X, to_and_fro(seconds(time))[0], Some(time));
             assert_eq!(taken, Ok(true));
         });
     }
@@ -139,6 +145,6 @@ fn loads_allocate_nothing() {
 fn predictive_control_allocates_nothing() {
     let mut bench = predictive();
     let circle = bench.ballbar(Start::Now);
-    bench.simulation.offer(A, circle).expect("accepted");
+    bench.simulation.submit(A, circle).expect("accepted");
     assert_nothing_allocated("predictive", &mut bench.simulation, |_| ());
 }

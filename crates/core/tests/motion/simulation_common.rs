@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use virtual_axes_core::simulation::{MotionEnd, Simulation, joints};
-use virtual_axes_core::trajectory::{Context, JointLimits, Request, Row, Start, Trajectory};
+use virtual_axes_core::simulation::{MotionEnd, Simulation, joint_limits};
+use virtual_axes_core::trajectory::{
+    JointLimits, Start, Trajectory, TrajectoryPoint, TrajectoryRequest, ValidationContext,
+};
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds};
-use virtual_axes_verification::fixtures::common::{Ballbar, parameters};
+use virtual_axes_verification::fixtures::machines::{Ballbar, parameters};
 
 pub const TSP: Nanoseconds = 6 * MILLISECOND_NS;
 pub const X: usize = 0;
@@ -20,7 +22,7 @@ pub struct Bench {
 impl Bench {
     pub fn new(changes: &[(&str, f64)], origin: Nanoseconds) -> Self {
         let config = parameters(changes).machine_config().expect("valid");
-        let joints = joints(&config, "");
+        let joints = joint_limits(&config, "");
         let simulation = Simulation::new(&config, joints.clone(), origin).expect("can be simulated");
         Bench { simulation, joints, origin }
     }
@@ -31,11 +33,13 @@ impl Bench {
         names: &[&str],
         points: &[(Nanoseconds, &[f64])],
     ) -> Arc<Trajectory> {
-        let mut request = Request::new(start, names.iter().map(|n| n.to_string()).collect());
+        let mut request = TrajectoryRequest::new(start, names.iter().map(|n| n.to_string()).collect());
         for &(time, positions) in points {
-            request.push(time, Row { positions, ..Row::default() }).expect("well formed");
+            request
+                .push(time, TrajectoryPoint { positions, ..TrajectoryPoint::default() })
+                .expect("well formed");
         }
-        let context = Context {
+        let context = ValidationContext {
             joints: &self.joints,
             period: TSP,
             max_points: 100_000,
@@ -66,7 +70,7 @@ impl Bench {
                 [s.psec, s.position, s.velocity, s.current, s.voltage].map(f64::to_bits)
             };
             rows.push(self.simulation.samples().iter().flat_map(bits).collect());
-            ends.extend(self.simulation.take_ends());
+            ends.extend(self.simulation.drain_finished());
             assert!(rows.len() < 100_000, "it never settles");
         }
         (rows, ends)

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use crate::trajectory_common::*;
 use proptest::prelude::*;
-use virtual_axes_core::config::{Assignment, MachineConfig, Source, Value};
+use virtual_axes_core::config::{Assignment, MachineConfig, Value, ValueSource};
 use virtual_axes_core::machine::MachineParameters;
-use virtual_axes_core::simulation::{Simulation, joints as joints_of};
+use virtual_axes_core::simulation::{Simulation, joint_limits};
 use virtual_axes_core::trajectory::stream::{MAX_STREAM_DELAY, STREAM_PAUSE};
 use virtual_axes_core::trajectory::{
-    Code, Context, MotionId, Request, Row, STREAM_JITTER, Start, State, StreamEnd, Timeline, Trajectory,
+    KinematicState, MotionId, RejectionCode, STREAM_JITTER, Start, StreamEnd, Timeline, Trajectory,
+    TrajectoryPoint, TrajectoryRequest, ValidationContext,
 };
 
 /// Vmax·Tsp of the joints, m or rad.
@@ -27,7 +28,7 @@ fn delayed(periods: u32) -> Timeline {
 /// Streams one setpoint per instant to `joint`; what is commanded at each.
 fn stream(t: &mut Timeline, joint: usize, positions: &[f64]) -> Vec<f64> {
     let command = |&position: &f64| {
-        assert_eq!(t.stream(joint, position), Ok(true));
+        assert_eq!(t.submit_setpoint(joint, position), Ok(true));
         t.next();
         t.psec()[joint]
     };
@@ -64,7 +65,7 @@ fn what_is_in_the_buffer_is_known_ahead() {
         assert_eq!(t.psec_ahead(1, periods), Some(known), "{periods} ahead");
     }
     // What has arrived for the next instant is ahead of the buffer.
-    t.stream(1, 0.031).unwrap();
+    t.submit_setpoint(1, 0.031).unwrap();
     assert_eq!((t.psec_ahead(1, 14), t.psec_ahead(1, 15)), (Some(0.030), Some(0.031)));
     assert_eq!(t.psec_ahead(0, 14), Some(0.0), "the other joint stands");
     let ahead: Vec<_> = (1..=20).map(|periods| t.psec_ahead(1, periods).unwrap()).collect();
@@ -85,7 +86,7 @@ fn a_gap_holds_and_goes_on_being_pushed_through_the_buffer() {
 fn of_several_in_one_period_the_last_counts() {
     let mut t = delayed(1);
     for position in [0.001, -0.002, 0.002] {
-        assert_eq!(t.stream(0, position), Ok(true));
+        assert_eq!(t.submit_setpoint(0, position), Ok(true));
     }
     assert_eq!(run(&mut t, 0, 3).0, [0.0, 0.002, 0.002]);
 }
@@ -94,8 +95,8 @@ fn of_several_in_one_period_the_last_counts() {
 fn a_stream_begins_within_one_periods_reach() {
     let mut t = timeline();
     for away in [1.01 * REACH, -0.1] {
-        let rejection = t.stream(0, away).unwrap_err();
-        assert_eq!((rejection.code, rejection.joint.as_deref()), (Code::Jump, Some("x")));
+        let rejection = t.submit_setpoint(0, away).unwrap_err();
+        assert_eq!((rejection.code, rejection.joint.as_deref()), (RejectionCode::Jump, Some("x")));
         assert!((rejection.value - away.abs()).abs() < 1e-15 && (rejection.limit - REACH).abs() < 1e-15);
     }
     assert_eq!(run(&mut t, 0, 3).0, [0.0; 3], "the refused ones changed nothing");
@@ -111,13 +112,17 @@ fn a_stream_goes_on_within_what_the_joint_comes_in_the_time_between() {
     let newest = positions[9];
     // One period has passed.
     let allowed = REACH * (1.0 + STREAM_JITTER as f64 / TSP as f64);
-    let rejection = t.stream(0, newest + 1.01 * allowed).unwrap_err();
-    assert_eq!((rejection.code, rejection.joint.as_deref()), (Code::Jump, Some("x")));
+    let rejection = t.submit_setpoint(0, newest + 1.01 * allowed).unwrap_err();
+    assert_eq!((rejection.code, rejection.joint.as_deref()), (RejectionCode::Jump, Some("x")));
     assert!((rejection.value - 1.01 * allowed).abs() < 1e-15, "{rejection}");
     // None has passed since the one that was refused.
     let allowed = allowed - REACH;
-    assert_eq!(t.stream(0, newest + 1.01 * allowed).unwrap_err().code, Code::Jump);
-    assert_eq!(t.stream(0, 0.0).unwrap_err().code, Code::Jump, "what is commanded is out of reach");
+    assert_eq!(t.submit_setpoint(0, newest + 1.01 * allowed).unwrap_err().code, RejectionCode::Jump);
+    assert_eq!(
+        t.submit_setpoint(0, 0.0).unwrap_err().code,
+        RejectionCode::Jump,
+        "what is commanded is out of reach"
+    );
     assert_eq!(run(&mut t, 0, 11).0[10], newest, "the refused ones changed nothing");
 }
 
@@ -129,7 +134,7 @@ fn of_two_in_one_period_the_second_is_approached_at_vmax() {
         let positions = ramp(0.0, REACH, 60);
         let mut psec = stream(&mut t, 0, &positions[..10]);
         psec.extend(run(&mut t, 0, 1).0);
-        assert_eq!(t.stream(0, positions[10]), Ok(true));
+        assert_eq!(t.submit_setpoint(0, positions[10]), Ok(true));
         psec.extend(stream(&mut t, 0, &positions[11..40]));
         psec.extend(run(&mut t, 0, delay as usize + 2).0);
         let psec = &psec[delay as usize..];
@@ -157,7 +162,7 @@ fn a_sender_slower_than_the_position_period_is_followed_at_vmax_at_most() {
             sent += 1;
             // The ramp begins within one period's reach.
             let position = speed * 1e-9 * (sent * sample - sample / 2) as f64;
-            assert_eq!(t.stream(0, position), Ok(true), "{sent}");
+            assert_eq!(t.submit_setpoint(0, position), Ok(true), "{sent}");
         }
         t.next();
         psec.push(t.psec()[0]);
@@ -174,7 +179,7 @@ fn a_short_gap_is_caught_up_after_a_pause_the_stream_begins_anew() {
         let mut t = timeline();
         stream(&mut t, 0, &ramp(0.0, at(1), 10));
         run(&mut t, 0, lost);
-        let next = t.stream(0, at(10 + lost + 1));
+        let next = t.submit_setpoint(0, at(10 + lost + 1));
         if lost == 8 {
             assert_eq!(next, Ok(true));
             let psec = run(&mut t, 0, 5).0;
@@ -182,7 +187,7 @@ fn a_short_gap_is_caught_up_after_a_pause_the_stream_begins_anew() {
             assert!(psec.iter().zip(wanted).all(|(p, w)| (p - w).abs() < 1e-15), "{psec:?}");
             assert_eq!(t.stream_counts().gaps, 0);
         } else {
-            assert_eq!(next.unwrap_err().code, Code::Jump);
+            assert_eq!(next.unwrap_err().code, RejectionCode::Jump);
             assert_eq!(t.stream_counts().gaps, 1);
             assert_eq!(stream(&mut t, 0, &[at(11)]), [at(11)]);
         }
@@ -194,10 +199,10 @@ fn a_short_gap_is_caught_up_after_a_pause_the_stream_begins_anew() {
 fn the_time_between_two_set_points_is_the_longer_of_the_senders_and_the_networks() {
     for (sent, taken) in [(Some(40_000_000), true), (Some(1_000_000), false), (None, false)] {
         let mut t = timeline();
-        t.stream_sent(0, 0.001, Some(0)).unwrap();
+        t.submit_setpoint_stamped(0, 0.001, Some(0)).unwrap();
         t.next();
         // 20 mm: 40 ms at Vmax, in one period.
-        assert_eq!(t.stream_sent(0, 0.021, sent).is_ok(), taken, "{sent:?}");
+        assert_eq!(t.submit_setpoint_stamped(0, 0.021, sent).is_ok(), taken, "{sent:?}");
         let psec = run(&mut t, 0, 1).0[0];
         assert!((psec - if taken { 0.001 + REACH } else { 0.001 }).abs() < 1e-15);
     }
@@ -208,7 +213,7 @@ fn a_stream_that_comes_to_rest_and_is_silent_has_no_gap() {
     let mut t = timeline();
     // Braking at the limit, 2.5 m/s².
     let brake = |k: i32| 0.02 - 0.5 * 2.5 * (f64::from(20 - k.min(20)) * TSP_S).powi(2);
-    assert_eq!(t.stream(0, brake(0) - brake(0)), Ok(true));
+    assert_eq!(t.submit_setpoint(0, brake(0) - brake(0)), Ok(true));
     let positions: Vec<_> = (1..=20).map(|k| brake(k) - brake(0)).collect();
     stream(&mut t, 0, &positions);
     run(&mut t, 0, 3 * PAUSE);
@@ -219,27 +224,27 @@ fn a_stream_that_comes_to_rest_and_is_silent_has_no_gap() {
 fn after_a_stop_a_stream_is_ignored_until_it_pauses() {
     let mut t = timeline();
     stream(&mut t, 0, &ramp(0.0, 0.0001, 20));
-    assert!(!t.is_stream_held_off());
+    assert!(!t.is_stream_inhibited());
     offer(&mut t, 1, &stop(&[])).unwrap();
     let (end, joints) = t.take_stream_end().expect("it drove x");
     assert_eq!((end, joints.iter().collect::<Vec<_>>()), (StreamEnd::Stopped(MotionId(1)), vec![0]));
     assert!(t.take_stream_end().is_none(), "told once");
     // Within reach all the time, and for longer than the stop takes.
     for position in ramp(0.002, 0.00001, 60) {
-        assert_eq!(t.stream(0, position), Ok(false));
-        assert!(t.is_stream_held_off());
+        assert_eq!(t.submit_setpoint(0, position), Ok(false));
+        assert!(t.is_stream_inhibited());
         t.next();
     }
     let stands = t.psec()[0];
     // It rests: going on with the same is a pause too.
     let rest = 0.0026;
     let ignored = (0..2 * PAUSE).take_while(|_| {
-        let taken = t.stream(0, rest).unwrap();
+        let taken = t.submit_setpoint(0, rest).unwrap();
         t.next();
         !taken
     });
     assert!((PAUSE - 2..=PAUSE + 1).contains(&ignored.count()));
-    assert!(!t.is_stream_held_off() && stands < 0.0026);
+    assert!(!t.is_stream_inhibited() && stands < 0.0026);
     assert_eq!(stream(&mut t, 0, &[0.003]), [0.003]);
 }
 
@@ -248,11 +253,11 @@ fn a_stop_holds_off_a_stream_that_begins_while_the_axis_brakes() {
     let mut t = timeline();
     offer(&mut t, 1, &stop(&[])).unwrap();
     assert_eq!(t.take_stream_end(), None, "nothing was streamed");
-    assert_eq!(t.stream(0, 0.001), Ok(false));
+    assert_eq!(t.submit_setpoint(0, 0.001), Ok(false));
     run(&mut t, 0, 2);
-    assert_eq!(t.stream(0, 0.002), Ok(false));
+    assert_eq!(t.submit_setpoint(0, 0.002), Ok(false));
     run(&mut t, 0, PAUSE);
-    assert_eq!(t.stream(0, 0.003), Ok(true));
+    assert_eq!(t.submit_setpoint(0, 0.003), Ok(true));
 }
 
 #[test]
@@ -266,7 +271,7 @@ fn who_takes_joints_from_a_stream_is_told_with_those_that_it_drove() {
     offer(&mut t, 2, &too_far).unwrap_err();
     assert_eq!(end(&mut t), None, "refused");
     offer(&mut t, 3, &path(Start::Now, "c", &[(0, &[0.005]), (4, &[0.006])])).unwrap();
-    assert_eq!(end(&mut t), Some((StreamEnd::Displaced(MotionId(3)), vec![1])));
+    assert_eq!(end(&mut t), Some((StreamEnd::Preempted(MotionId(3)), vec![1])));
     run(&mut t, 1, 6);
     assert_eq!(stream(&mut t, 1, &[0.007]), [0.007], "within reach it goes on at once");
     t.reset(&[0.0, 0.0]).unwrap();
@@ -280,12 +285,12 @@ fn who_takes_joints_from_a_stream_is_told_with_those_that_it_drove() {
 fn what_is_no_position_of_the_joint_is_refused() {
     let mut t = delayed(2);
     for (joint, position, code) in [
-        (0, f64::NAN, Code::NotFinite),
-        (0, f64::INFINITY, Code::NotFinite),
-        (0, 0.356, Code::OutsideStroke),
-        (2, 0.0, Code::UnknownJoint),
+        (0, f64::NAN, RejectionCode::NotFinite),
+        (0, f64::INFINITY, RejectionCode::NotFinite),
+        (0, 0.356, RejectionCode::OutsideTravelLimits),
+        (2, 0.0, RejectionCode::UnknownJoint),
     ] {
-        assert_eq!(t.stream(joint, position).unwrap_err().code, code);
+        assert_eq!(t.submit_setpoint(joint, position).unwrap_err().code, code);
     }
     assert!(!t.is_streaming());
 }
@@ -298,13 +303,13 @@ fn a_trajectory_takes_over_from_the_commanded_state_and_empties_the_buffer() {
     // Within reach of the commanded state, out of reach of the newest.
     let trajectory = path(Start::Now, "x", &[(0, &[0.009]), (4, &[0.005])]);
     offer(&mut t, 1, &trajectory).unwrap();
-    assert_eq!(t.stream(0, 0.022), Ok(false));
+    assert_eq!(t.submit_setpoint(0, 0.022), Ok(false));
     let (psec, _) = run(&mut t, 0, 30);
     for (psec, wanted) in psec.iter().zip([0.009, 0.008, 0.007, 0.006]) {
         assert!((psec - wanted).abs() < 1e-15);
     }
     assert_eq!(psec[4..], vec![0.005; 26], "nothing of the stream comes back");
-    assert_eq!(t.stream(0, 0.022).unwrap_err().code, Code::Jump);
+    assert_eq!(t.submit_setpoint(0, 0.022).unwrap_err().code, RejectionCode::Jump);
     // The next stream is delayed as before.
     assert_eq!(stream(&mut t, 0, &[0.006; 7]), [0.005, 0.005, 0.005, 0.005, 0.005, 0.006, 0.006]);
 }
@@ -316,8 +321,8 @@ fn until_a_trajectory_that_waits_begins_the_buffer_goes_on() {
     stream(&mut t, 0, &positions);
     // The buffer is empty at instant 15; two instants before that the trajectory begins where it is then.
     offer(&mut t, 1, &path(at(13), "x", &[(0, &[0.009]), (10, &[0.0])])).unwrap();
-    assert_eq!(t.stream(0, 0.011), Ok(false), "while one waits");
-    assert_eq!(t.stream(1, 0.001), Ok(true), "the other joint is free");
+    assert_eq!(t.submit_setpoint(0, 0.011), Ok(false), "while one waits");
+    assert_eq!(t.submit_setpoint(1, 0.001), Ok(true), "the other joint is free");
     let (psec, _) = run(&mut t, 0, 5);
     assert_eq!(psec[..3], positions[5..8]);
     assert_eq!(psec[3], 0.009);
@@ -341,7 +346,7 @@ fn a_stop_brakes_from_the_velocity_of_the_stream() {
             let acceleration = (three[2] - 2.0 * three[1] + three[0]) / (TSP_S * TSP_S);
             assert!(acceleration.abs() <= 2.5 * (1.0 + 1e-6), "{acceleration} m/s² at delay {delay}");
         }
-        assert_eq!(t.commanded_state(0), Some(State::rest(psec[61])));
+        assert_eq!(t.commanded_state(0), Some(KinematicState::at_rest(psec[61])));
     }
 }
 
@@ -353,7 +358,7 @@ fn a_reset_empties_the_buffer() {
     assert!(!t.is_streaming() && !t.is_stream_moving());
     assert_eq!(t.psec_ahead(0, 3), Some(0.1));
     assert_eq!(run(&mut t, 0, 10).0, [0.1; 10]);
-    assert_eq!(t.stream(0, 0.011).unwrap_err().code, Code::Jump);
+    assert_eq!(t.submit_setpoint(0, 0.011).unwrap_err().code, RejectionCode::Jump);
 }
 
 #[test]
@@ -427,7 +432,7 @@ proptest! {
             if let Some(delay) = delay {
                 t.set_stream_delay(delay);
             }
-            if t.stream(0, target + step * REACH) == Ok(true) {
+            if t.submit_setpoint(0, target + step * REACH) == Ok(true) {
                 target += step * REACH;
             }
             let known: Vec<_> = (1..=30).map(|periods| t.psec_ahead(0, periods).unwrap()).collect();
@@ -446,18 +451,18 @@ proptest! {
 
 /// The default machine with `controller` on X.
 fn config(controller: &str) -> MachineConfig {
-    let mut parameters = virtual_axes_verification::fixtures::common::parameters::<&str>(&[]);
+    let mut parameters = virtual_axes_verification::fixtures::machines::parameters::<&str>(&[]);
     let assignment = Assignment {
         key: "x.position_loop.controller".into(),
         value: Value::Text(controller.into()),
-        source: Source::named("test"),
+        source: ValueSource::named("test"),
     };
     parameters.set_all(vec![assignment]).expect("there is such a controller");
     parameters.machine_config().expect("valid")
 }
 
 fn simulation(config: &MachineConfig) -> Simulation {
-    Simulation::new(config, joints_of(config, ""), 0).expect("can be simulated")
+    Simulation::new(config, joint_limits(config, ""), 0).expect("can be simulated")
 }
 
 /// What there is to tell of X, bit for bit.
@@ -468,13 +473,19 @@ fn signals(s: &Simulation) -> [u64; 4] {
 
 /// A trajectory of X on the grid of position instants, from rest.
 fn given(config: &MachineConfig, positions: &[f64]) -> Arc<Trajectory> {
-    let mut request = Request::new(Start::Now, vec!["x".into()]);
+    let mut request = TrajectoryRequest::new(Start::Now, vec!["x".into()]);
     for (k, position) in positions.iter().enumerate() {
-        request.push(k as i64 * TSP, Row { positions: &[*position], ..Row::default() }).unwrap();
+        request
+            .push(k as i64 * TSP, TrajectoryPoint { positions: &[*position], ..TrajectoryPoint::default() })
+            .unwrap();
     }
-    let joints = joints_of(config, "");
-    let context =
-        Context { joints: &joints, period: TSP, max_points: 1000, allow_nonzero_end_velocity: false };
+    let joints = joint_limits(config, "");
+    let context = ValidationContext {
+        joints: &joints,
+        period: TSP,
+        max_points: 1000,
+        allow_nonzero_end_velocity: false,
+    };
     Trajectory::new(request, &context).unwrap().into()
 }
 
@@ -491,12 +502,12 @@ fn a_streamed_path_is_followed_bit_for_bit_as_the_same_path_in_a_trajectory() {
         assert_eq!(streamed.stream_delay(), delay * TSP, "{controller}");
         let mut followed = Vec::new();
         for &position in positions.iter().chain(&[wave(400); 12]) {
-            streamed.stream(0, position).unwrap();
+            streamed.submit_setpoint(0, position).unwrap();
             streamed.step();
             followed.push(signals(&streamed));
         }
         let mut reference = simulation(&config);
-        reference.offer(MotionId(1), given(&config, &positions)).unwrap();
+        reference.submit(MotionId(1), given(&config, &positions)).unwrap();
         for k in 0..positions.len() {
             reference.step();
             assert_eq!(signals(&reference), followed[k + delay as usize], "{controller}, instant {k}");
@@ -509,10 +520,10 @@ fn another_controller_changes_the_delay_when_the_stream_pauses() {
     let parameters = |controller| Arc::new(MachineParameters::new(&config(controller)).unwrap());
     let mut s = simulation(&config("cascade"));
     for position in ramp(0.0, 0.001, 20) {
-        s.stream(0, position).unwrap();
+        s.submit_setpoint(0, position).unwrap();
         s.step();
     }
-    s.adopt(parameters("gpc")).unwrap();
+    s.update_parameters(parameters("gpc")).unwrap();
     for _ in 0..3 {
         s.step();
         assert_eq!(s.stream_delay(), 0);
@@ -522,7 +533,7 @@ fn another_controller_changes_the_delay_when_the_stream_pauses() {
         s.step();
     }
     assert_eq!(s.stream_delay(), 12 * TSP);
-    s.adopt(parameters("cascade")).unwrap();
+    s.update_parameters(parameters("cascade")).unwrap();
     assert_eq!(s.stream_delay(), 0, "it has paused");
 }
 
@@ -531,18 +542,18 @@ fn a_stream_wakes_the_axes_when_it_moves_them_and_asks_for_no_haste() {
     let mut s = simulation(&config("cascade"));
     let at_rest = s.machine().tick();
     for _ in 0..10 {
-        s.stream(0, 0.0).unwrap();
+        s.submit_setpoint(0, 0.0).unwrap();
         s.step();
     }
     assert_eq!(s.machine().tick(), at_rest, "a stream that stands at home leaves the machine asleep");
-    s.stream(0, 0.001).unwrap();
+    s.submit_setpoint(0, 0.001).unwrap();
     s.step();
     assert!(s.machine().tick() > at_rest);
     assert!(s.is_streaming() && !s.is_moving() && !s.is_busy());
     for _ in 0..200 {
         s.step();
     }
-    virtual_axes_verification::fixtures::common::assert_near(
+    virtual_axes_verification::fixtures::machines::assert_near(
         "x follows",
         s.samples()[0].position,
         0.001,
@@ -560,7 +571,7 @@ fn a_set_point_comes_with_the_delay_that_it_was_foreseen_with() {
             stream(&mut t, 0, &[0.001]);
             t.set_stream_delay(after);
             run(&mut t, 0, before as usize + PAUSE - early);
-            assert_eq!(t.stream(0, 0.0039), Ok(true));
+            assert_eq!(t.submit_setpoint(0, 0.0039), Ok(true));
             let foreseen: Vec<f64> = (1..40).filter_map(|j| t.psec_ahead(0, j)).collect();
             assert_eq!(run(&mut t, 0, 39).0, foreseen, "{before} to {after}, {early} early");
         }
@@ -590,7 +601,7 @@ fn a_stream_begins_the_same_whether_or_not_a_load_wakes_the_machine_with_it() {
                     s.set_load(1, 50.0, TSP);
                 }
                 if k >= 10 {
-                    s.stream(0, 0.001).unwrap();
+                    s.submit_setpoint(0, 0.001).unwrap();
                 }
                 s.step();
                 signals(&s)

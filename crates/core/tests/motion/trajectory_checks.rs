@@ -1,9 +1,9 @@
 //! What a trajectory is refused for before it comes near the machine.
 
 use crate::trajectory_common::*;
-use virtual_axes_core::trajectory::{Code, Request, Row, Start};
+use virtual_axes_core::trajectory::{RejectionCode, Start, TrajectoryPoint, TrajectoryRequest};
 
-fn refused(request: Request) -> (Code, Option<String>, Option<usize>, f64, f64) {
+fn refused(request: TrajectoryRequest) -> (RejectionCode, Option<String>, Option<usize>, f64, f64) {
     let r = check(request, false).unwrap_err();
     assert!(!r.to_string().is_empty());
     (r.code, r.joint, r.index, r.value, r.limit)
@@ -16,23 +16,23 @@ fn joint(name: &str) -> Option<String> {
 #[test]
 fn codes_keep_their_numbers() {
     let codes = [
-        (Code::UnknownJoint, 1),
-        (Code::DuplicateJoint, 2),
-        (Code::WrongSize, 3),
-        (Code::TimesNotIncreasing, 4),
-        (Code::NegativeTime, 5),
-        (Code::NotFinite, 6),
-        (Code::OutsideStroke, 7),
-        (Code::Jump, 8),
-        (Code::Speed, 9),
-        (Code::EndedInThePast, 10),
-        (Code::TooManyPoints, 11),
-        (Code::VelocityAtEnd, 12),
-        (Code::InvalidTime, 13),
-        (Code::QueueFull, 14),
-        (Code::InvalidTolerance, 15),
-        (Code::MultiDof, 16),
-        (Code::TooManyGoals, 17),
+        (RejectionCode::UnknownJoint, 1),
+        (RejectionCode::DuplicateJoint, 2),
+        (RejectionCode::WrongSize, 3),
+        (RejectionCode::TimesNotIncreasing, 4),
+        (RejectionCode::NegativeTime, 5),
+        (RejectionCode::NotFinite, 6),
+        (RejectionCode::OutsideTravelLimits, 7),
+        (RejectionCode::Jump, 8),
+        (RejectionCode::Speed, 9),
+        (RejectionCode::EndedInThePast, 10),
+        (RejectionCode::TooManyPoints, 11),
+        (RejectionCode::VelocityAtEnd, 12),
+        (RejectionCode::InvalidTime, 13),
+        (RejectionCode::QueueFull, 14),
+        (RejectionCode::InvalidTolerance, 15),
+        (RejectionCode::MultiDof, 16),
+        (RejectionCode::TooManyGoals, 17),
     ];
     for (code, number) in codes {
         assert_eq!(code as u8, number);
@@ -41,17 +41,18 @@ fn codes_keep_their_numbers() {
 
 #[test]
 fn unknown_and_duplicate_joints_are_named_even_in_a_stop() {
-    let names =
-        |names: &[&str]| Request::new(Start::Now, names.iter().map(|&name| name.to_owned()).collect());
+    let names = |names: &[&str]| {
+        TrajectoryRequest::new(Start::Now, names.iter().map(|&name| name.to_owned()).collect())
+    };
     assert_eq!(refused(names(&["x", "q"])).1, joint("q"));
-    assert_eq!(refused(names(&["x", "q"])).0, Code::UnknownJoint);
-    assert_eq!(refused(names(&["c", "c"])).0, Code::DuplicateJoint);
+    assert_eq!(refused(names(&["x", "q"])).0, RejectionCode::UnknownJoint);
+    assert_eq!(refused(names(&["c", "c"])).0, RejectionCode::DuplicateJoint);
 }
 
 #[test]
-fn a_point_outside_the_stroke_gives_joint_index_value_and_limit() {
+fn a_point_outside_the_travel_limits_gives_joint_index_value_and_limit() {
     let request = request(Start::Now, "x", &[(0, &[-0.35]), (1_000_000_000, &[-0.3551])]);
-    assert_eq!(refused(request), (Code::OutsideStroke, joint("x"), Some(1), -0.3551, -0.355));
+    assert_eq!(refused(request), (RejectionCode::OutsideTravelLimits, joint("x"), Some(1), -0.3551, -0.355));
 }
 
 #[test]
@@ -64,11 +65,11 @@ fn a_point_exactly_at_the_end_of_the_stroke_is_inside() {
 fn a_spline_that_leaves_the_stroke_between_its_points_is_refused() {
     let r = request(Start::Now, "x", &[(0, &[0.35, 0.4]), (200_000_000, &[0.35, -0.4])]);
     let (code, _, index, value, limit) = refused_moving(r);
-    assert_eq!((code, index, limit), (Code::OutsideStroke, Some(1), 0.355));
+    assert_eq!((code, index, limit), (RejectionCode::OutsideTravelLimits, Some(1), 0.355));
     assert!(value > 0.355);
 }
 
-fn refused_moving(request: Request) -> (Code, Option<String>, Option<usize>, f64, f64) {
+fn refused_moving(request: TrajectoryRequest) -> (RejectionCode, Option<String>, Option<usize>, f64, f64) {
     let r = check(request, true).unwrap_err();
     (r.code, r.joint, r.index, r.value, r.limit)
 }
@@ -77,16 +78,17 @@ fn refused_moving(request: Request) -> (Code, Option<String>, Option<usize>, f64
 fn speed_exactly_at_the_limit_passes_and_a_millionth_more_does_not() {
     let step = 0.5 * TSP_S;
     let ramp = |scale: f64| {
-        let mut r = Request::new(Start::Now, vec!["x".into()]);
+        let mut r = TrajectoryRequest::new(Start::Now, vec!["x".into()]);
         for k in 0..100 {
-            let row = Row { positions: &[f64::from(k) * step * scale], ..Row::default() };
+            let row =
+                TrajectoryPoint { positions: &[f64::from(k) * step * scale], ..TrajectoryPoint::default() };
             r.push(i64::from(k) * TSP, row).unwrap();
         }
         r
     };
     assert!(check(ramp(1.0), false).is_ok());
     let (code, _, index, value, limit) = refused(ramp(1.000_001));
-    assert_eq!((code, index, limit), (Code::Speed, Some(1), 0.5));
+    assert_eq!((code, index, limit), (RejectionCode::Speed, Some(1), 0.5));
     assert!((value - 0.500_000_5).abs() < 1e-12);
 }
 
@@ -94,25 +96,25 @@ fn speed_exactly_at_the_limit_passes_and_a_millionth_more_does_not() {
 fn a_velocity_field_beyond_the_limit_is_a_speed_too() {
     let r = request(Start::Now, "x", &[(0, &[0.0, 100.0]), (TSP, &[0.0, 0.0])]);
     let (code, _, index, value, _) = refused(r);
-    assert_eq!((code, index, value), (Code::Speed, Some(0), 100.0));
+    assert_eq!((code, index, value), (RejectionCode::Speed, Some(0), 100.0));
 }
 
 #[test]
 fn a_fast_step_between_two_dense_points_off_the_grid_is_seen_on_the_grid() {
     // Points every 1 ms; the axis jumps by two periods' reach within one of them.
-    let mut r = Request::new(Start::Now, vec!["c".into()]);
+    let mut r = TrajectoryRequest::new(Start::Now, vec!["c".into()]);
     for ms in 0..20 {
         let positions = [if ms < 10 { 0.0 } else { 0.006 }];
-        let row = Row { positions: &positions, ..Row::default() };
+        let row = TrajectoryPoint { positions: &positions, ..TrajectoryPoint::default() };
         r.push(ms * 1_000_000, row).unwrap();
     }
-    assert_eq!(refused(r).0, Code::Speed);
+    assert_eq!(refused(r).0, RejectionCode::Speed);
 }
 
 #[test]
 fn the_last_step_to_a_point_between_two_periods_is_checked() {
     let r = request(Start::Now, "c", &[(0, &[0.0]), (1_000_000, &[0.004])]);
-    assert_eq!(refused(r).0, Code::Speed);
+    assert_eq!(refused(r).0, RejectionCode::Speed);
 }
 
 #[test]
@@ -120,27 +122,32 @@ fn velocity_at_the_end_needs_permission() {
     let points: &[(i64, &[f64])] = &[(0, &[0.0, 0.1]), (TSP * 10, &[0.006, 0.1])];
     assert_eq!(
         refused(request(Start::Now, "x", points)),
-        (Code::VelocityAtEnd, joint("x"), Some(1), 0.1, 0.0)
+        (RejectionCode::VelocityAtEnd, joint("x"), Some(1), 0.1, 0.0)
     );
     assert!(check(request(Start::Now, "x", points), true).is_ok());
 }
 
 #[test]
 fn too_many_points_are_counted_before_anything_else() {
-    let mut r = Request::new(Start::Now, vec!["x".into()]);
+    let mut r = TrajectoryRequest::new(Start::Now, vec!["x".into()]);
     for k in 0..=100_000 {
-        let row = Row { positions: &[0.0], ..Row::default() };
+        let row = TrajectoryPoint { positions: &[0.0], ..TrajectoryPoint::default() };
         r.push(k, row).unwrap();
     }
     let (code, _, _, value, limit) = refused(r);
-    assert_eq!((code, value, limit), (Code::TooManyPoints, 100_001.0, 100_000.0));
+    assert_eq!((code, value, limit), (RejectionCode::TooManyPoints, 100_001.0, 100_000.0));
 }
 
 #[test]
 fn centuries_cost_no_more_than_the_budget() {
     let (mut r, century) =
-        (Request::new(Start::Now, vec!["x".into(), "c".into()]), 3_155_760_000_000_000_000);
-    let row = |positions| Row { positions, velocities: &[0.0, 0.0], accelerations: &[0.0, 0.0], effort: &[] };
+        (TrajectoryRequest::new(Start::Now, vec!["x".into(), "c".into()]), 3_155_760_000_000_000_000);
+    let row = |positions| TrajectoryPoint {
+        positions,
+        velocities: &[0.0, 0.0],
+        accelerations: &[0.0, 0.0],
+        effort: &[],
+    };
     for i in 0..1000 {
         r.push(i * (century / 1000), row(&[0.0, 0.1])).unwrap();
     }
@@ -152,21 +159,24 @@ fn centuries_cost_no_more_than_the_budget() {
 #[test]
 fn a_long_segment_that_leaves_the_stroke_is_seen_by_its_samples() {
     let hour = 3_600_000_000_000;
-    let mut r = Request::new(Start::Now, vec!["x".into()]);
-    let row = |positions, velocities| Row { positions, velocities, ..Row::default() };
+    let mut r = TrajectoryRequest::new(Start::Now, vec!["x".into()]);
+    let row = |positions, velocities| TrajectoryPoint { positions, velocities, ..TrajectoryPoint::default() };
     // A share of 64 instants each; the second segment overshoots by meters.
     for i in 0..70_000 {
         let velocity: &[f64] = if i == 1 { &[0.01] } else { &[0.0] };
         r.push(i * hour, row(&[0.0], velocity)).unwrap();
     }
     let (code, _, index, _, _) = refused(r);
-    assert_eq!((code, index), (Code::OutsideStroke, Some(1)));
+    assert_eq!((code, index), (RejectionCode::OutsideTravelLimits, Some(1)));
 }
 
 #[test]
 fn values_that_overflow_the_polynomial_are_refused_not_executed() {
     let r = request(Start::Now, "c", &[(0, &[0.0, 0.0, f64::MAX]), (i64::MAX - 1, &[0.0, 0.0, -f64::MAX])]);
-    assert!(matches!(refused(r).0, Code::Speed | Code::OutsideStroke | Code::NotFinite));
+    assert!(matches!(
+        refused(r).0,
+        RejectionCode::Speed | RejectionCode::OutsideTravelLimits | RejectionCode::NotFinite
+    ));
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 use virtual_axes_core::config::{AxisKind, LimitsConfig};
-use virtual_axes_core::trajectory::path::Context;
+use virtual_axes_core::trajectory::ValidationContext;
 use virtual_axes_core::trajectory::{
-    Admission, Event, JointLimits, MotionId, Rejection, Request, Row, Start, Timeline, Trajectory,
+    Admission, JointLimits, MotionId, Rejection, Start, Timeline, TimelineEvent, Trajectory, TrajectoryPoint,
+    TrajectoryRequest,
 };
 
 /// Tsp, ns.
@@ -22,8 +23,8 @@ pub fn joints() -> Vec<JointLimits> {
             velocity: 0.5,
             acceleration: 2.5,
             jerk: 50.0,
-            stroke_min: -stroke,
-            stroke_max: stroke,
+            travel_min: -stroke,
+            travel_max: stroke,
         },
     };
     vec![joint("x", AxisKind::Linear, 0.355), joint("c", AxisKind::Rotary, f64::INFINITY)]
@@ -33,9 +34,9 @@ pub fn timeline() -> Timeline {
     Timeline::new(joints(), TSP, &[0.0, 0.0]).unwrap()
 }
 
-pub fn check(request: Request, may_move_at_end: bool) -> Result<Arc<Trajectory>, Rejection> {
+pub fn check(request: TrajectoryRequest, may_move_at_end: bool) -> Result<Arc<Trajectory>, Rejection> {
     let joints = joints();
-    let context = Context {
+    let context = ValidationContext {
         joints: &joints,
         period: TSP,
         max_points: 100_000,
@@ -50,10 +51,10 @@ pub fn at(k: i64) -> Start {
 }
 
 /// A request of one joint: (time in ns, position and what else is given).
-pub fn request(start: Start, joint: &str, points: &[(i64, &[f64])]) -> Request {
-    let mut request = Request::new(start, vec![joint.into()]);
+pub fn request(start: Start, joint: &str, points: &[(i64, &[f64])]) -> TrajectoryRequest {
+    let mut request = TrajectoryRequest::new(start, vec![joint.into()]);
     for &(time, values) in points {
-        let row = Row {
+        let row = TrajectoryPoint {
             positions: &values[..1],
             velocities: values.get(1..2).unwrap_or(&[]),
             accelerations: values.get(2..3).unwrap_or(&[]),
@@ -72,15 +73,15 @@ pub fn path(start: Start, joint: &str, points: &[(i64, &[f64])]) -> Arc<Trajecto
 
 pub fn stop(joints: &[&str]) -> Arc<Trajectory> {
     let names = joints.iter().map(|&name| name.to_owned()).collect();
-    check(Request::new(Start::Now, names), false).unwrap()
+    check(TrajectoryRequest::new(Start::Now, names), false).unwrap()
 }
 
 pub fn offer(timeline: &mut Timeline, id: u64, trajectory: &Arc<Trajectory>) -> Result<Admission, Rejection> {
-    timeline.offer(MotionId(id), Arc::clone(trajectory), ORIGIN)
+    timeline.submit(MotionId(id), Arc::clone(trajectory), ORIGIN)
 }
 
 /// Steps `count` instants; setpoints of `joint` and all events with their instants.
-pub fn run(timeline: &mut Timeline, joint: usize, count: usize) -> (Vec<f64>, Vec<(i64, Event)>) {
+pub fn run(timeline: &mut Timeline, joint: usize, count: usize) -> (Vec<f64>, Vec<(i64, TimelineEvent)>) {
     let (mut psec, mut events) = (Vec::new(), Vec::new());
     for _ in 0..count {
         let k = timeline.next();

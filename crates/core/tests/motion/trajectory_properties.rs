@@ -4,7 +4,9 @@ use crate::trajectory_common::*;
 use proptest::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
-use virtual_axes_core::trajectory::{Event, MotionId, Request, Row, Start, State};
+use virtual_axes_core::trajectory::{
+    KinematicState, MotionId, Start, TimelineEvent, TrajectoryPoint, TrajectoryRequest,
+};
 
 /// One request of the soup, in plain numbers.
 #[derive(Debug, Clone)]
@@ -28,16 +30,16 @@ fn names(joints: usize) -> Vec<String> {
     sets[joints].iter().map(|&name| name.to_owned()).collect()
 }
 
-fn build(soup: &Soup) -> Option<Request> {
+fn build(soup: &Soup) -> Option<TrajectoryRequest> {
     // Starts are relative to instant 0, off the grid.
     let start = soup.start.map_or(Start::Now, |ns| Start::At(ORIGIN + ns));
-    let mut request = Request::new(start, names(soup.joints));
+    let mut request = TrajectoryRequest::new(start, names(soup.joints));
     let mut time = 0;
     for &(dt, p, v, a) in &soup.points {
         time += dt;
         let n = request.joints().len();
         let (positions, velocities, accelerations) = (vec![p; n], vec![v; n], vec![a; n]);
-        let row = Row {
+        let row = TrajectoryPoint {
             positions: &positions,
             velocities: if soup.order > 0 { &velocities } else { &[] },
             accelerations: if soup.order > 1 { &accelerations } else { &[] },
@@ -89,19 +91,19 @@ fn watch(t: &mut virtual_axes_core::trajectory::Timeline, periods: usize, told: 
             let step = (t.psec()[joint] - before).abs();
             assert!(step <= 0.5 * TSP_S * (1.0 + 1e-6), "{step} on {joint}");
         }
-        assert!(t.psec()[0].abs() <= 0.355 + 1e-9, "outside the stroke");
+        assert!(t.psec()[0].abs() <= 0.355 + 1e-9, "outside the travel limits");
         for event in t.events() {
             match *event {
-                Event::Started(id) => {
+                TimelineEvent::Started(id) => {
                     let entry = told.get_mut(&id).unwrap();
                     assert_eq!(*entry, (0, 0), "{event:?}");
                     entry.0 += 1;
                 }
-                Event::Ended(id) => {
+                TimelineEvent::Completed(id) => {
                     assert_eq!(told[&id], (1, 0), "an end has a start");
                     told.get_mut(&id).unwrap().1 += 1;
                 }
-                Event::Displaced { id, .. } | Event::Stopped { id, .. } => {
+                TimelineEvent::Preempted { id, .. } | TimelineEvent::Stopped { id, .. } => {
                     told.get_mut(&id).unwrap().1 += 1;
                 }
             }
@@ -126,11 +128,11 @@ proptest! {
                     continue;
                 }
                 Step::Stream(joint, position) => {
-                    let _ = t.stream(*joint, *position);
+                    let _ = t.submit_setpoint(*joint, *position);
                     continue;
                 }
                 Step::Offer(soup) => build(soup),
-                Step::Stop(joints) => Some(Request::new(Start::Now, names(*joints))),
+                Step::Stop(joints) => Some(TrajectoryRequest::new(Start::Now, names(*joints))),
             };
             let Some(Ok(trajectory)) = request.map(|r| check(r, true)) else { continue };
             if offer(&mut t, id, &trajectory).is_ok() {
@@ -159,11 +161,11 @@ proptest! {
             position += direction * 0.2 * dk as f64 * TSP_S;
             rows.push((k * TSP, position, velocity * 0.2, acceleration * 0.05));
         }
-        let mut request = Request::new(at(start), vec!["c".into()]);
+        let mut request = TrajectoryRequest::new(at(start), vec!["c".into()]);
         for &(time, p, v, a) in &rows {
             let (v, a) = ([v], [a]);
             request
-                .push(time, Row {
+                .push(time, TrajectoryPoint {
                     positions: &[p],
                     velocities: if order > 0 { &v } else { &[] },
                     accelerations: if order > 1 { &a } else { &[] },
@@ -190,14 +192,14 @@ proptest! {
         after in 0..200usize,
         points in prop::collection::vec((5..80i64, -1.0..1.0f64, -1.0..1.0f64, -4.0..4.0f64), 1..8),
     ) {
-        let mut request = Request::new(Start::Now, vec!["c".into()]);
+        let mut request = TrajectoryRequest::new(Start::Now, vec!["c".into()]);
         let (mut time, mut position) = (0, 0.0);
         for (dk, direction, velocity, acceleration) in points {
             time += dk * TSP + 1_234_567;
             position += direction * 0.3 * dk as f64 * TSP_S;
             let (v, a) = ([velocity * 0.3], [acceleration]);
             request
-                .push(time, Row {
+                .push(time, TrajectoryPoint {
                     positions: &[position],
                     velocities: if order > 0 { &v } else { &[] },
                     accelerations: if order > 1 { &a } else { &[] },
@@ -220,7 +222,7 @@ proptest! {
         prop_assert!(d.iter().all(|v| v.abs() <= 0.5 * (1.0 + 1e-6)));
         prop_assert!(dd.iter().all(|a| a.abs() <= 2.5 * (1.0 + 1e-6)));
         prop_assert!(dd.windows(2).all(|w| (w[1] - w[0]).abs() / TSP_S <= 50.0 * (1.0 + 1e-6)));
-        prop_assert_eq!(t.commanded_state(1), Some(State::rest(psec[150])));
+        prop_assert_eq!(t.commanded_state(1), Some(KinematicState::at_rest(psec[150])));
     }
 
     #[test]
@@ -237,9 +239,9 @@ proptest! {
             times = times.into_iter().map(|t| t.checked_abs().unwrap_or(0)).collect();
             times.sort_unstable();
         }
-        let mut request = Request::new(Start::At(stamp), vec!["c".into()]);
+        let mut request = TrajectoryRequest::new(Start::At(stamp), vec!["c".into()]);
         for (&time, v) in times.iter().zip(values.chunks(3)) {
-            let _ = request.push(time, Row {
+            let _ = request.push(time, TrajectoryPoint {
                 positions: &v[..1],
                 velocities: if order > 0 { &v[1..2] } else { &[] },
                 accelerations: if order > 1 { &v[2..] } else { &[] },
@@ -248,8 +250,8 @@ proptest! {
         }
         let mut t = timeline();
         if let Ok(trajectory) = check(request, true) {
-            let _ = t.offer(MotionId(1), Arc::clone(&trajectory), origin);
-            let _ = t.offer(MotionId(2), trajectory, stamp);
+            let _ = t.submit(MotionId(1), Arc::clone(&trajectory), origin);
+            let _ = t.submit(MotionId(2), trajectory, stamp);
         }
         run(&mut t, 1, 3);
         prop_assert!(t.psec().iter().all(|p| p.is_finite()));

@@ -3,15 +3,17 @@
 use crate::trajectory_common::*;
 use std::sync::Arc;
 use virtual_axes_core::trajectory::timeline::MAX_WAITING;
-use virtual_axes_core::trajectory::{Code, Event, MotionId, Request, Start, State};
+use virtual_axes_core::trajectory::{
+    KinematicState, MotionId, RejectionCode, Start, TimelineEvent, TrajectoryRequest,
+};
 
 const A: MotionId = MotionId(1);
 const B: MotionId = MotionId(2);
 const C: MotionId = MotionId(3);
 
-fn displaced(id: MotionId, by: MotionId, joints: &[usize]) -> impl Fn(&Event) -> bool {
+fn displaced(id: MotionId, by: MotionId, joints: &[usize]) -> impl Fn(&TimelineEvent) -> bool {
     move |event| {
-        matches!(event, Event::Displaced { id: i, by: b, joints: j }
+        matches!(event, TimelineEvent::Preempted { id: i, by: b, joints: j }
             if *i == id && *b == by && j.iter().eq(joints.iter().copied()))
     }
 }
@@ -22,10 +24,10 @@ fn now_starts_at_the_next_period_with_the_points_as_they_are() {
     run(&mut t, 0, 3);
     let points: &[(i64, &[f64])] = &[(0, &[0.0]), (1, &[0.001]), (2, &[0.0031]), (3, &[0.004])];
     let admission = offer(&mut t, 1, &path(Start::Now, "x", points)).unwrap();
-    assert_eq!((admission.start_k, admission.end_k, admission.joined_late), (3, 6, false));
+    assert_eq!((admission.start_k, admission.end_k, admission.is_late), (3, 6, false));
     let (psec, events) = run(&mut t, 0, 5);
     assert_eq!(psec, [0.0, 0.001, 0.0031, 0.004, 0.004]);
-    assert_eq!(events, [(3, Event::Started(A)), (6, Event::Ended(A))]);
+    assert_eq!(events, [(3, TimelineEvent::Started(A)), (6, TimelineEvent::Completed(A))]);
     assert!(!t.is_moving());
 }
 
@@ -55,9 +57,9 @@ fn a_future_start_waits_and_the_present_one_goes_on_until_then() {
     assert_eq!(psec[14], 0.1 * 19.0 / 100.0);
     assert_eq!(psec[15..].to_vec(), vec![0.02; 25]);
     assert_eq!(events.len(), 3);
-    assert_eq!(events[0], (20, Event::Started(B)));
+    assert_eq!(events[0], (20, TimelineEvent::Started(B)));
     assert!(events[1].0 == 20 && displaced(A, B, &[0])(&events[1].1));
-    assert_eq!(events[2], (30, Event::Ended(B)));
+    assert_eq!(events[2], (30, TimelineEvent::Completed(B)));
 }
 
 #[test]
@@ -67,7 +69,7 @@ fn a_past_start_joins_in_at_the_time_that_it_is() {
     // At instant 10 it has moved 0.002 m, within a period's reach.
     let late = path(at(8), "x", &[(0, &[0.0]), (100, &[0.1])]);
     let admission = offer(&mut t, 1, &late).unwrap();
-    assert!(admission.joined_late);
+    assert!(admission.is_late);
     assert_eq!((admission.start_k, admission.join_k), (8, 10));
     assert_eq!(run(&mut t, 0, 1).0, [0.002]);
 }
@@ -78,7 +80,7 @@ fn joining_late_by_a_jump_is_refused_with_the_distance() {
     run(&mut t, 0, 50);
     let late = path(at(0), "x", &[(0, &[0.0]), (100, &[0.1])]);
     let rejection = offer(&mut t, 1, &late).unwrap_err();
-    assert_eq!(rejection.code, Code::Jump);
+    assert_eq!(rejection.code, RejectionCode::Jump);
     assert_eq!(rejection.joint.as_deref(), Some("x"));
     assert!((rejection.value - 0.05).abs() < 1e-15);
     assert!((rejection.limit - 0.003).abs() < 1e-15);
@@ -90,7 +92,7 @@ fn a_trajectory_over_is_refused_and_one_at_its_last_point_is_not() {
     run(&mut t, 0, 11);
     let ends_at = |k: i64| path(at(k - 2), "x", &[(0, &[0.0]), (2, &[0.001])]);
     let rejection = offer(&mut t, 1, &ends_at(10)).unwrap_err();
-    assert_eq!(rejection.code, Code::EndedInThePast);
+    assert_eq!(rejection.code, RejectionCode::EndedInThePast);
     assert!((rejection.value - TSP_S).abs() < 1e-12);
     assert!(offer(&mut t, 2, &ends_at(11)).is_ok());
     assert_eq!(run(&mut t, 0, 1).0, [0.001]);
@@ -103,8 +105,8 @@ fn a_jump_is_measured_from_what_will_be_commanded_then() {
     let from = |position: f64| path(at(50), "x", &[(0, &[position]), (10, &[position])]);
     // Commanded at instant 49: 0.049 m; Vmax·Tsp: 0.003 m.
     assert!(offer(&mut t, 2, &from(0.052)).is_ok());
-    assert_eq!(offer(&mut t, 3, &from(0.053)).unwrap_err().code, Code::Jump);
-    assert_eq!(offer(&mut t, 4, &from(0.0)).unwrap_err().code, Code::Jump);
+    assert_eq!(offer(&mut t, 3, &from(0.053)).unwrap_err().code, RejectionCode::Jump);
+    assert_eq!(offer(&mut t, 4, &from(0.0)).unwrap_err().code, RejectionCode::Jump);
     let (psec, _) = run(&mut t, 0, 51);
     assert_eq!(psec[50], 0.052, "the refused ones changed nothing");
 }
@@ -125,7 +127,7 @@ fn a_later_first_point_is_reached_by_the_fields_it_has() {
             assert!((psec - 0.1 * shape(k as f64 / 100.0)).abs() < 1e-15);
         }
         assert_eq!(psec[100..], [0.1, 0.1]);
-        assert_eq!(events.last(), Some(&(104, Event::Ended(A))));
+        assert_eq!(events.last(), Some(&(104, TimelineEvent::Completed(A))));
     }
 }
 
@@ -145,14 +147,14 @@ fn a_later_first_point_is_reached_from_the_commanded_velocity() {
         assert!((velocity - last).abs() / TSP_S < 3.0);
         last = velocity;
     }
-    assert_eq!(t.commanded_state(0), Some(State::rest(0.0)));
+    assert_eq!(t.commanded_state(0), Some(KinematicState::at_rest(0.0)));
 }
 
 #[test]
 fn the_way_to_a_later_first_point_keeps_to_the_speed_limit() {
     let mut t = timeline();
     let rejection = offer(&mut t, 1, &path(Start::Now, "x", &[(10, &[0.1])])).unwrap_err();
-    assert_eq!((rejection.code, rejection.index), (Code::Speed, Some(0)));
+    assert_eq!((rejection.code, rejection.index), (RejectionCode::Speed, Some(0)));
     assert!((rejection.value - 0.1 / 0.06).abs() < 1e-9);
     // A rest-to-rest quintic peaks at 15/8 of the mean speed; longer than the samples are many.
     let peak = |k: i64| 0.35 * 1.875 / (k as f64 * TSP_S);
@@ -179,12 +181,12 @@ fn chunks_join_without_a_gap_and_each_is_complete() {
         assert!((psec - 0.0006 * k as f64).abs() < 1e-15, "gap at {k}");
     }
     let expected = [
-        (0, Event::Started(MotionId(0))),
-        (20, Event::Started(A)),
-        (20, Event::Ended(MotionId(0))),
-        (40, Event::Started(B)),
-        (40, Event::Ended(A)),
-        (60, Event::Ended(B)),
+        (0, TimelineEvent::Started(MotionId(0))),
+        (20, TimelineEvent::Started(A)),
+        (20, TimelineEvent::Completed(MotionId(0))),
+        (40, TimelineEvent::Started(B)),
+        (40, TimelineEvent::Completed(A)),
+        (60, TimelineEvent::Completed(B)),
     ];
     assert_eq!(events, expected);
 }
@@ -194,7 +196,7 @@ fn a_chunk_that_nothing_follows_becomes_a_controlled_stop() {
     let mut t = timeline();
     offer(&mut t, 1, &chunk(0, 20)).unwrap();
     let (psec, events) = run(&mut t, 0, 60);
-    assert_eq!(events.last(), Some(&(20, Event::Ended(A))));
+    assert_eq!(events.last(), Some(&(20, TimelineEvent::Completed(A))));
     assert!(psec[21] > psec[20], "it does not stop dead");
     within_limits(&psec[19..]);
     assert!(!t.is_moving());
@@ -207,10 +209,10 @@ fn a_late_chunk_takes_over_the_stop_that_began() {
     offer(&mut t, 1, &chunk(0, 20)).unwrap();
     run(&mut t, 0, 23);
     let admission = offer(&mut t, 2, &chunk(20, 20)).unwrap();
-    assert!(admission.joined_late);
+    assert!(admission.is_late);
     let (psec, events) = run(&mut t, 0, 5);
     assert_eq!(psec[4], 0.0006 * 20.0 + (0.0006 * 40.0 - 0.0006 * 20.0) * 7.0 / 20.0);
-    assert_eq!(events, [(23, Event::Started(B))]);
+    assert_eq!(events, [(23, TimelineEvent::Started(B))]);
 }
 
 #[test]
@@ -221,7 +223,7 @@ fn an_earlier_start_discards_what_waits_behind_it_and_says_so_at_once() {
     let (psec, events) = run(&mut t, 0, 70);
     assert!(psec.iter().all(|&p| p == 0.0));
     assert!(events[0].0 == 0 && displaced(A, B, &[0])(&events[0].1));
-    assert_eq!(events[1..], [(40, Event::Started(B)), (49, Event::Ended(B))]);
+    assert_eq!(events[1..], [(40, TimelineEvent::Started(B)), (49, TimelineEvent::Completed(B))]);
 }
 
 #[test]
@@ -232,13 +234,14 @@ fn a_start_after_one_that_waits_leaves_it_alone() {
     let (psec, events) = run(&mut t, 0, 50);
     assert_eq!((psec[19], psec[29], psec[49]), (0.01, 0.01, 0.0));
     assert_eq!(events.len(), 4);
-    assert!(events.contains(&(19, Event::Ended(A))));
+    assert!(events.contains(&(19, TimelineEvent::Completed(A))));
 }
 
 fn both(start: Start, n: i64) -> Arc<virtual_axes_core::trajectory::Trajectory> {
-    let mut request = Request::new(start, vec!["c".into(), "x".into()]);
+    let mut request = TrajectoryRequest::new(start, vec!["c".into(), "x".into()]);
     for (time, positions) in [(0, [0.0, 0.0]), (n * TSP, [0.2, 0.1])] {
-        let row = virtual_axes_core::trajectory::Row { positions: &positions, ..Default::default() };
+        let row =
+            virtual_axes_core::trajectory::TrajectoryPoint { positions: &positions, ..Default::default() };
         request.push(time, row).unwrap();
     }
     check(request, false).unwrap()
@@ -254,7 +257,7 @@ fn joints_that_are_not_named_go_on() {
     assert_eq!(c[90], 0.2, "c arrives where its first trajectory leads");
     assert!(displaced(A, B, &[0])(&events[1].1), "{events:?}");
     assert_eq!(events.len(), 3, "one last word per trajectory: {events:?}");
-    assert_eq!(events[2], (15, Event::Ended(B)));
+    assert_eq!(events[2], (15, TimelineEvent::Completed(B)));
 }
 
 #[test]
@@ -276,10 +279,10 @@ fn a_stop_covers_what_moves_and_what_waits_and_nothing_else() {
     assert!(x[299] < 0.05 && c == 0.2);
     let by = Some(C);
     let expected = [
-        (30, Event::Stopped { id: A, by }),
-        (30, Event::Stopped { id: B, by }),
-        (30, Event::Started(C)),
-        (admission.end_k, Event::Ended(C)),
+        (30, TimelineEvent::Stopped { id: A, by }),
+        (30, TimelineEvent::Stopped { id: B, by }),
+        (30, TimelineEvent::Started(C)),
+        (admission.end_k, TimelineEvent::Completed(C)),
     ];
     assert_eq!(events, expected);
 }
@@ -299,7 +302,7 @@ fn a_stop_from_a_line_brakes_within_acceleration_and_jerk_and_ends_where_it_shou
     // v/2 (v/A + A/J).
     let way = 0.25 * (0.5 / 2.5 + 2.5 / 50.0);
     assert!((psec[99] - from.position - way).abs() < 1e-12);
-    assert!(!t.is_moving() && t.commanded_state(0) == Some(State::rest(psec[99])));
+    assert!(!t.is_moving() && t.commanded_state(0) == Some(KinematicState::at_rest(psec[99])));
 }
 
 #[test]
@@ -318,7 +321,7 @@ fn a_stop_that_does_not_fit_ends_at_the_stroke() {
 fn a_stop_at_rest_is_over_at_once() {
     let mut t = timeline();
     offer(&mut t, 1, &stop(&[])).unwrap();
-    assert_eq!(run(&mut t, 0, 3).1, [(0, Event::Started(A)), (0, Event::Ended(A))]);
+    assert_eq!(run(&mut t, 0, 3).1, [(0, TimelineEvent::Started(A)), (0, TimelineEvent::Completed(A))]);
 }
 
 #[test]
@@ -329,11 +332,13 @@ fn the_queue_is_bounded_and_a_stop_empties_it() {
         offer(&mut t, i as u64, &waiting(i)).unwrap();
     }
     let rejection = offer(&mut t, 9999, &waiting(5000)).unwrap_err();
-    assert_eq!(rejection.code, Code::QueueFull);
+    assert_eq!(rejection.code, RejectionCode::QueueFull);
     assert!(offer(&mut t, 9998, &waiting(3)).is_ok(), "it makes room");
     offer(&mut t, 10_000, &stop(&[])).unwrap();
     let (_, events) = run(&mut t, 0, 5);
-    let told = |e: &&(i64, Event)| matches!(e.1, Event::Stopped { .. } | Event::Displaced { .. });
+    let told = |e: &&(i64, TimelineEvent)| {
+        matches!(e.1, TimelineEvent::Stopped { .. } | TimelineEvent::Preempted { .. })
+    };
     assert_eq!(events.iter().filter(told).count(), MAX_WAITING + 1);
     assert!(!t.is_waiting());
 }
@@ -343,30 +348,30 @@ fn reset_stops_everything_and_stands() {
     let mut t = timeline();
     offer(&mut t, 1, &both(Start::Now, 100)).unwrap();
     run(&mut t, 0, 10);
-    assert_eq!(t.reset(&[f64::NAN, 0.0]).unwrap_err().code, Code::NotFinite);
+    assert_eq!(t.reset(&[f64::NAN, 0.0]).unwrap_err().code, RejectionCode::NotFinite);
     assert!(t.is_moving());
     t.reset(&[0.1, -0.2]).unwrap();
     assert_eq!(t.psec(), [0.1, -0.2]);
     let (psec, events) = run(&mut t, 0, 3);
     assert_eq!(psec, [0.1; 3]);
-    assert_eq!(events, [(10, Event::Stopped { id: A, by: None })]);
+    assert_eq!(events, [(10, TimelineEvent::Stopped { id: A, by: None })]);
 }
 
 #[test]
 fn a_stream_moves_only_what_no_trajectory_owns() {
     let mut t = timeline();
-    assert_eq!(t.stream(0, 0.002), Ok(true));
+    assert_eq!(t.submit_setpoint(0, 0.002), Ok(true));
     assert_eq!(run(&mut t, 0, 2).0, [0.002, 0.002]);
-    assert_eq!(t.stream(0, 0.2).unwrap_err().code, Code::Jump);
-    assert_eq!(t.stream(0, 0.4).unwrap_err().code, Code::OutsideStroke);
-    assert_eq!(t.stream(7, 0.0).unwrap_err().code, Code::UnknownJoint);
+    assert_eq!(t.submit_setpoint(0, 0.2).unwrap_err().code, RejectionCode::Jump);
+    assert_eq!(t.submit_setpoint(0, 0.4).unwrap_err().code, RejectionCode::OutsideTravelLimits);
+    assert_eq!(t.submit_setpoint(7, 0.0).unwrap_err().code, RejectionCode::UnknownJoint);
     offer(&mut t, 1, &path(at(9), "x", &[(0, &[0.002]), (9, &[0.01])])).unwrap();
-    assert_eq!(t.stream(0, 0.003), Ok(false), "while one waits");
-    assert_eq!(t.stream(1, 0.003), Ok(true), "the other joint is free");
+    assert_eq!(t.submit_setpoint(0, 0.003), Ok(false), "while one waits");
+    assert_eq!(t.submit_setpoint(1, 0.003), Ok(true), "the other joint is free");
     run(&mut t, 0, 12);
-    assert_eq!(t.stream(0, 0.003), Ok(false), "while one moves");
+    assert_eq!(t.submit_setpoint(0, 0.003), Ok(false), "while one moves");
     run(&mut t, 0, 9);
-    assert_eq!(t.stream(0, 0.011), Ok(true));
+    assert_eq!(t.submit_setpoint(0, 0.011), Ok(true));
 }
 
 #[test]
@@ -374,7 +379,7 @@ fn a_trajectory_for_another_machine_is_refused() {
     let one = vec![joints().remove(0)];
     let mut t = virtual_axes_core::trajectory::Timeline::new(one, TSP, &[0.0]).unwrap();
     let rejection = offer(&mut t, 1, &both(Start::Now, 100)).unwrap_err();
-    assert_eq!(rejection.code, Code::UnknownJoint);
+    assert_eq!(rejection.code, RejectionCode::UnknownJoint);
 }
 
 #[test]
@@ -382,8 +387,8 @@ fn a_start_beyond_the_count_of_periods_is_refused() {
     let joints = joints();
     let mut t = virtual_axes_core::trajectory::Timeline::new(joints, 1, &[0.0, 0.0]).unwrap();
     let far = check(request(Start::At(i64::MAX), "x", &[(0, &[0.0])]), false).unwrap();
-    let rejection = t.offer(A, far, i64::MIN).unwrap_err();
-    assert_eq!(rejection.code, Code::InvalidTime);
+    let rejection = t.submit(A, far, i64::MIN).unwrap_err();
+    assert_eq!(rejection.code, RejectionCode::InvalidTime);
 }
 
 /// Sampled limits of a stop: differences of the setpoints are means of the derivatives over the
