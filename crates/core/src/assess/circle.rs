@@ -1,51 +1,50 @@
-//! Circularity after ISO 230-4 on simulated points.
+//! Circularity after ISO 230-4 of simulated points.
 
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Bins of the polar angle: a tenth of a degree each.
+/// Number of bins of the polar angle: a tenth of a degree each.
 const BINS: usize = 3600;
-/// Sectors that must each hold a point of a full circle.
+/// Number of sectors, each of which contains a point in a full circle.
 const SECTORS: usize = 36;
 
-/// Collects the points of a circular path in one direction, in memory that does not grow (200 kB).
+/// Accumulator of the points of a circular path in one direction; its memory is constant (200 kB).
 ///
-/// Of a circular path with a nominal center and radius R, positive is outside:
+/// For a circular path with a nominal center and radius R, positive is outside:
 ///
-/// - radial deviation F: distance of a point from the nominal center less R; here its mean, least and
-///   largest value. (The standard also lets the center be found by least squares. A simulation knows
-///   its center, so that it does not have to.)
-/// - circular deviation G: radial separation of two concentric circles that hold the path between
-///   them, evaluated as the range of the radius about the center of the least-squares circle. It
-///   contains neither an error of the radius nor one of the center.
-/// - bi-directional circular deviation G(b): the same for two paths together, one clockwise, one
-///   counterclockwise.
-/// - mean bi-directional radial deviation D: radius of the least-squares circle of both paths, less R.
+/// - radial deviation F: distance of a point from the nominal center minus R; reported are its mean,
+///   smallest and largest value. (The standard also permits the least-squares center. A simulation knows
+///   its center.)
+/// - circular deviation G: radial separation of two concentric circles that enclose the path, evaluated as
+///   the range of the radius about the center of the least-squares circle. It contains no error of the
+///   radius or the center.
+/// - bi-directional circular deviation G(b): G of two paths together, one clockwise, one counterclockwise.
+/// - mean bi-directional radial deviation D: radius of the least-squares circle of both paths minus R.
 ///
 /// # Least squares
 ///
-/// The circle is Kåsa's: it minimizes the sum of (d² − ρ²)², d the distance of a point from the
-/// center sought, ρ the radius sought. With coordinates in units of R about the nominal center
-/// and q = (u² + v² − 1)/2 this is linear,
+/// The circle is that of Kåsa: it minimizes the sum of (d² − ρ²)², where d is the distance of a point from
+/// the unknown center and ρ is the unknown radius. With coordinates in units of R about the nominal center
+/// and q = (u² + v² − 1)/2 the problem is linear,
 ///
 /// ```text
 /// q = eₓ u + e_y v + k        ρ² = 1 + 2 k + eₓ² + e_y²
 /// ```
 ///
-/// and needs nothing but running sums. On points of a true circle it is exact, however far its
-/// center is off. Where the form is off by f, its center differs from the one that minimizes the sum
-/// of (d − ρ)² by less than f²/R (17 nm for f = 50 µm, R = 150 mm); its radius, which is a root mean
-/// square, is brought to the mean distance by the variance of the residuals, exact to f³/R².
+/// and needs running sums only. For points of a true circle it is exact for any center offset. For a form
+/// error f, its center differs from the one that minimizes the sum of (d − ρ)² by less than f²/R (17 nm for
+/// f = 50 µm, R = 150 mm). Its radius is a root mean square; it is corrected to the mean distance by the
+/// variance of the residuals, exact to f³/R².
 ///
-/// # A second pass in bounded memory
+/// # Second pass in constant memory
 ///
-/// G asks for the extremes about a center that is known only at the end. The polar angle is cut
-/// into 3600 bins, each of which keeps its innermost and its outermost point as seen from the
-/// nominal center; the distances of these points from the least-squares center are exact. Inside a
-/// bin of width w the offset e of that center shifts two points by amounts that differ by less than
-/// |e| w, so that G is never too large and too small by less than 2 |e| w (for e = 10 µm by 35 nm; for
-/// a smooth path by far less, since it is flat where it is extreme).
+/// G needs the extremes about a center that is known at the end only. The polar angle is divided into 3600
+/// bins; each keeps its innermost and its outermost point relative to the nominal center. The distances of
+/// these points from the least-squares center are exact. Inside a bin of width w the offset e of that
+/// center shifts two points by amounts that differ by less than |e| w, so G is never too large, and too
+/// small by less than 2 |e| w (35 nm for e = 10 µm; for a smooth path far less, since it is flat at its
+/// extremes).
 #[derive(Debug, Clone)]
 pub struct CircleAssessor {
     center: [f64; 2],
@@ -59,38 +58,38 @@ pub struct CircleAssessor {
 /// Figures of a circular path in one direction, m; see [`CircleAssessor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CircleReport {
-    /// Mean of the radial deviation.
+    /// Mean radial deviation, m.
     pub mean: f64,
-    /// Least radial deviation, Fmin.
+    /// Smallest radial deviation Fmin, m.
     pub min: f64,
-    /// Largest radial deviation, Fmax.
+    /// Largest radial deviation Fmax, m.
     pub max: f64,
-    /// What needs a full circle; none for an arc, whose center the points do not determine well.
+    /// Figures of a full circle; `None` for an arc, whose points do not determine its center well.
     pub full: Option<FullCircle>,
 }
 
 /// Figures of a full circle, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FullCircle {
-    /// G: range of the radius about the center of the least-squares circle.
+    /// Circular deviation G: range of the radius about the center of the least-squares circle, m.
     pub circular_deviation: f64,
-    /// That center, seen from the nominal one.
+    /// Center of the least-squares circle relative to the nominal center, m.
     pub center: [f64; 2],
-    /// Radius of the least-squares circle less the nominal one.
+    /// Radius of the least-squares circle minus the nominal radius, m.
     pub radius_deviation: f64,
 }
 
-/// Figures of a full circle that was run in both directions, m.
+/// Figures of a full circle in both directions, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BidirectionalReport {
-    /// G(b).
+    /// Bi-directional circular deviation G(b), m.
     pub circular_deviation: f64,
-    /// D, positive outside.
+    /// Mean bi-directional radial deviation D, m, positive outside.
     pub mean_radial_deviation: f64,
 }
 
 impl CircleAssessor {
-    /// No point yet of a circle with nominal `center` and `radius`, m; the radius is positive.
+    /// Creates an empty assessor of a circle with nominal `center` and `radius`, m; the radius is positive.
     pub fn new(center: [f64; 2], radius: f64) -> Self {
         debug_assert!(radius > 0.0, "a circle has a radius");
         Self {
@@ -102,12 +101,12 @@ impl CircleAssessor {
         }
     }
 
-    /// Nominal center, m.
+    /// Returns the nominal center, m.
     pub fn center(&self) -> [f64; 2] {
         self.center
     }
 
-    /// Nominal radius, m.
+    /// Returns the nominal radius, m.
     pub fn radius(&self) -> f64 {
         self.radius
     }
@@ -118,13 +117,13 @@ impl CircleAssessor {
         let deviation = (x * x + y * y).sqrt() - self.radius;
         self.sums.add(x / self.radius, y / self.radius, deviation / self.radius);
         self.range = [self.range[0].min(deviation), self.range[1].max(deviation)];
-        // A float becomes an index by truncation; the angle π has the last bin.
+        // The conversion to an index truncates; the angle π belongs to the last bin.
         let bin = ((y.atan2(x) + PI) / TAU * BINS as f64) as usize;
         self.bins[bin.min(BINS - 1)].add([x, y], deviation);
         deviation
     }
 
-    /// The figures so far; none without a point.
+    /// Returns the figures so far, `None` without a point.
     pub fn report(&self) -> Option<CircleReport> {
         let sums = self.sums.means()?;
         let full = self.is_full().then(|| Fit::new(&sums)).flatten().map(|fit| {
@@ -139,21 +138,22 @@ impl CircleAssessor {
         Some(CircleReport { mean: sums.deviation * self.radius, min, max, full })
     }
 
-    /// Whether every sector holds a point.
+    /// Returns true if every sector contains a point.
     fn is_full(&self) -> bool {
         self.bins.chunks(BINS / SECTORS).all(|sector| sector.iter().any(|bin| bin.points.is_some()))
     }
 
-    /// Least and largest distance from `center`, which is seen from the nominal one.
+    /// Returns the smallest and largest distance from `center`, which is relative to the nominal center.
     fn range_about(&self, [x, y]: [f64; 2]) -> Range {
         let points = self.bins.iter().filter_map(|bin| bin.points).flatten();
-        points.fold(Range::EMPTY, |range, point| range.with((point.place[0] - x).hypot(point.place[1] - y)))
+        points.fold(Range::EMPTY, |range, point| range.with((point.offset[0] - x).hypot(point.offset[1] - y)))
     }
 }
 
-/// Figures of one circle run in both directions; each counts the same, however many points it has.
+/// Returns the figures of a circle in both directions, each with the same weight whatever its number of
+/// points.
 ///
-/// None unless both paths are full circles about the same nominal center with the same radius.
+/// Returns `None` unless both paths are full circles about the same nominal center with the same radius.
 pub fn bidirectional(
     clockwise: &CircleAssessor,
     counterclockwise: &CircleAssessor,
@@ -172,22 +172,22 @@ pub fn bidirectional(
     })
 }
 
-/// A point seen from the nominal center, m.
+/// A point relative to the nominal center, m.
 #[derive(Debug, Clone, Copy)]
-struct Point {
-    place: [f64; 2],
+struct PathPoint {
+    offset: [f64; 2],
     deviation: f64,
 }
 
 /// Innermost and outermost point of a bin.
 #[derive(Debug, Clone, Copy, Default)]
 struct Bin {
-    points: Option<[Point; 2]>,
+    points: Option<[PathPoint; 2]>,
 }
 
 impl Bin {
-    fn add(&mut self, place: [f64; 2], deviation: f64) {
-        let point = Point { place, deviation };
+    fn add(&mut self, offset: [f64; 2], deviation: f64) {
+        let point = PathPoint { offset, deviation };
         let [inner, outer] = self.points.get_or_insert([point; 2]);
         if deviation < inner.deviation {
             *inner = point;
@@ -198,7 +198,7 @@ impl Bin {
     }
 }
 
-/// Least and largest value.
+/// Smallest and largest value.
 #[derive(Debug, Clone, Copy)]
 struct Range {
     min: f64,
@@ -221,13 +221,13 @@ impl Range {
 #[derive(Debug, Clone, Copy)]
 struct Sums {
     count: f64,
-    /// Of (u, v, 1)(u, v, 1)ᵀ.
+    /// Sum of (u, v, 1)(u, v, 1)ᵀ.
     normal: Matrix3<f64>,
-    /// Of (u, v, 1) q.
+    /// Sum of (u, v, 1) q.
     right: Vector3<f64>,
-    /// Of q².
+    /// Sum of q².
     square: f64,
-    /// Of the radial deviation.
+    /// Sum of the radial deviation.
     deviation: f64,
 }
 
@@ -239,7 +239,7 @@ impl Default for Sums {
 
 impl Sums {
     fn add(&mut self, u: f64, v: f64, deviation: f64) {
-        // (r² − 1)/2 without the difference of two large numbers.
+        // (r² − 1)/2 without cancellation.
         let q = deviation + deviation * deviation / 2.0;
         let row = Vector3::new(u, v, 1.0);
         self.count += 1.0;
@@ -259,7 +259,7 @@ impl Sums {
         }
     }
 
-    /// The sums as if of one point; none of no point.
+    /// Returns the sums divided by the number of points, `None` without a point.
     fn means(&self) -> Option<Self> {
         let n = self.count;
         (n > 0.0).then(|| Self {
@@ -272,7 +272,7 @@ impl Sums {
     }
 }
 
-/// The least-squares circle, in units of the nominal radius.
+/// Least-squares circle, in units of the nominal radius.
 struct Fit {
     center: [f64; 2],
     radius_deviation: f64,
@@ -282,11 +282,11 @@ impl Fit {
     fn new(means: &Sums) -> Option<Self> {
         let solution = means.normal.cholesky()?.solve(&means.right);
         let [x, y, k] = solution.into();
-        // ρ² − 1; and ρ − 1 without the difference of two large numbers.
+        // ρ² − 1, and ρ − 1 without cancellation.
         let excess = 2.0 * k + x * x + y * y;
         let radius = (1.0 + excess).sqrt();
         let variance = (means.square - solution.dot(&means.right)).max(0.0);
-        // d² = ρ² + 2 ε gives a mean d of ρ − ⟨ε²⟩/(2 ρ³).
+        // d² = ρ² + 2 ε results in a mean d of ρ − ⟨ε²⟩/(2 ρ³).
         let radius_deviation = excess / (radius + 1.0) - variance / (2.0 * radius.powi(3));
         radius_deviation.is_finite().then_some(Self { center: [x, y], radius_deviation })
     }

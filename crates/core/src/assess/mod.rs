@@ -1,5 +1,5 @@
-//! How well the axes follow: tracking, contour, orientation and circularity errors, currents,
-//! saturation.
+//! Motion assessment: following errors, contour error, orientation error, circularity (ISO 230-4), currents
+//! and saturation.
 
 mod axis;
 mod circle;
@@ -14,6 +14,6 @@ pub use axis::{AxisAssessor, AxisReport};
 pub use circle::{BidirectionalReport, CircleAssessor, CircleReport, FullCircle, bidirectional};
 pub use contour::ContourTracker;
 pub use motion::{MotionAssessor, MotionReport};
-pub use path_tracker::{Deviations, Followed, Nearest, PathTracker};
-pub use recording::{AxisTrace, CircleTrace, Recording, ToolTrace};
+pub use path_tracker::{FollowResult, NearestPoint, PathDeviations, PathTracker};
+pub use recording::{AxisTrace, CircleTrace, SignalRecording, ToolTrace};
 pub use setpoint_tracker::SetpointTracker;

@@ -1,4 +1,4 @@
-//! Distance from a geometric path.
+//! Contour error against a geometric path: nearest point on the continuous curve.
 
 mod follow;
 
@@ -7,59 +7,67 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::path_shape::{Room, Shape, pose};
+use super::path_shape::{Scratch, TipCurve, circle_coordinates, distance_to_circle, line_parameter, pose};
 use crate::kinematics::ToolPose;
 use crate::path::Path;
 
-pub use follow::{Deviations, Followed};
-use follow::{from_axis, from_circle, from_line};
+pub use follow::{FollowResult, PathDeviations};
 
-/// How far behind the furthest nearest point the next one may lie, m or rad: an axis that swings back.
-const BACK: f64 = 5e-3;
-/// How far behind it a point still counts as ahead, m or rad, when two are as near.
-const SLACK: f64 = 1e-5;
-/// Distances that differ by less, m, are the same: two passages of one place.
-const SAME: f64 = 1e-12;
-/// Blocks looked at in one call; of more, some around the last nearest point and some spread out.
+/// Search range before the furthest nearest point, m or rad, for an axis that moves back.
+const SEARCH_BACK: f64 = 5e-3;
+/// Distance behind the furthest point up to which a candidate counts as ahead, m or rad, if two are equally
+/// close.
+const ORDER_TOLERANCE: f64 = 1e-5;
+/// Tolerance within which two distances are equal, m: the path passes the same point twice.
+const DISTANCE_TOLERANCE: f64 = 1e-12;
+/// Largest number of blocks evaluated in one call; of more blocks, some near the last nearest point and
+/// some spread evenly are evaluated.
 const MAX_BLOCKS: usize = 16;
-/// Of these, those around the last nearest point, on either side.
+/// Blocks evaluated on either side of the last nearest point.
 const NEIGHBORS: usize = 3;
-/// Steps from block to block towards a nearer one, in one call.
-const MAX_WALK: usize = 64;
-/// Samples of a curve looked at in one call.
+/// Largest number of steps to a neighbor block with a closer point in one call.
+const MAX_DESCENT: usize = 64;
+/// Largest number of samples of a curve evaluated in one call.
 const MAX_SAMPLES: usize = 64;
-/// Newton's steps in one call; two or three suffice.
+/// Largest number of Newton iterations in one call; two or three suffice.
 const MAX_NEWTON: usize = 16;
-/// Newton's steps smaller than that, m or rad, are rounding.
+/// Step size at which Newton's method ends, m or rad.
 const NEWTON_TOLERANCE: f64 = 1e-13;
-/// How far a curve is taken for a quadratic, as a part of its block.
+/// Range of the quadratic approximation of a curve, as a fraction of its block.
 const QUADRATIC_REACH: f64 = 3e-4;
-/// Least part of the tangent's square that Newton's denominator keeps: further from the curve than its
-/// radius there is no nearest point to find.
+/// Smallest denominator of Newton's method, as a fraction of the squared tangent: beyond the radius of
+/// curvature there is no nearest point.
 const MIN_DENOMINATOR: f64 = 0.2;
-/// Arm that makes an angle comparable with a distance, m: where the tip stands still while the axis
-/// turns, the orientation must tell that place from its neighbors.
-const ARM: f64 = 0.1;
+/// Lever arm that converts an angle to a distance, m. Where the tip is fixed while the tool axis turns, the
+/// orientation selects the nearest point.
+const ORIENTATION_ARM: f64 = 0.1;
 
-/// The point of a path that is nearest to a pose of the tool.
+/// Point of a path nearest to a tool pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Nearest {
-    /// Its progress along the path ([`Path::length`]).
+pub struct NearestPoint {
+    /// Progress along the path ([`Path::length`](crate::path::Path::length)).
     pub progress: f64,
-    /// The point, workpiece frame, m.
+    /// Position in the workpiece frame, m.
     pub point: Vector3<f64>,
-    /// The path's tool axis there.
+    /// Tool axis of the path at that point.
     pub axis: Vector3<f64>,
-    /// Distance of the tips, m: the contour error.
+    /// Contour error: distance of the tool tip from the point, m.
     pub distance: f64,
-    /// The distance without what overshoots the path's two ends, m: that to the path continued
-    /// straight beyond its first and last point.
+    /// Contour error without overshoot beyond the path's ends, m: distance from the path extended straight
+    /// beyond its first and last point.
     pub within_ends: f64,
-    /// Angle between the tool axes, rad: the orientation error.
+    /// Orientation error: angle between the tool axes, rad.
     pub orientation: f64,
 }
 
-/// A place on the path and how far it is.
+/// Part of the path that is searched: block and arc length of both ends.
+#[derive(Debug, Clone, Copy)]
+struct SearchWindow {
+    from: (usize, f64),
+    to: (usize, f64),
+}
+
+/// A point of the path and its distance from the tool tip.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     block: usize,
@@ -69,41 +77,41 @@ struct Candidate {
     distance: f64,
 }
 
-/// Follows a pose along a path: the nearest point on the continuous curve, not on samples of it.
+/// Nearest-point search along a path on the continuous curve.
 ///
-/// It is sought from a little behind the furthest one found so far up to what has been commanded, so
-/// that a path that passes a place twice is followed in its order. Lines and circles along which the
-/// tables stand still are closed forms, other curves are sampled once and refined by Newton's method.
-/// Where the tip stands still, the nearest point is that of the nearest tool axis. A call allocates
-/// nothing, and costs the same however long the path is.
+/// The nearest point is searched from a little before the furthest one so far up to the progress commanded
+/// so far, so that a path that passes the same point twice is followed in order. Lines and circles with
+/// fixed rotary tables are evaluated in closed form; other curves are sampled once and refined by Newton's
+/// method. Where the tip is fixed, the nearest tool axis selects the point. A call does not allocate, and
+/// its cost does not depend on the length of the path.
 #[derive(Debug, Clone)]
 pub struct PathTracker {
     path: Arc<Path>,
-    /// Shared by clones.
-    shapes: Arc<[Shape]>,
-    /// Directions of the path at both ends, where the tip moves there.
+    /// Tip curves of the blocks, shared by clones.
+    shapes: Arc<[TipCurve]>,
+    /// Directions of the path at both ends, if the tip moves there.
     ends: [Option<Vector3<f64>>; 2],
     /// Largest progress of a nearest point so far.
     furthest: f64,
-    /// The last nearest one.
+    /// Block of the last nearest point.
     block: usize,
     s: f64,
-    /// The last call, if it found the tracker as it left it: the same one would find the same.
-    last: Option<Call>,
-    /// Room for where the feet of poses are.
+    /// Last query, if it left the state of the tracker unchanged; an equal query has the same result.
+    last: Option<CachedQuery>,
+    /// Buffers for the foot points of poses.
     feet: [Vec<f64>; 2],
-    room: Room,
+    scratch: Scratch,
 }
 
-/// What was asked for, and what was found.
+/// A query and its result.
 #[derive(Debug, Clone, Copy)]
-struct Call {
+struct CachedQuery {
     pose: ToolPose,
     until: f64,
-    nearest: Nearest,
+    nearest: NearestPoint,
 }
 
-impl Call {
+impl CachedQuery {
     fn is_for(&self, pose: &ToolPose, until: f64) -> bool {
         let bits = |vector: &Vector3<f64>| [vector.x, vector.y, vector.z].map(f64::to_bits);
         self.until == until
@@ -113,15 +121,15 @@ impl Call {
 }
 
 impl PathTracker {
-    /// A tracker at the start of `path`.
+    /// Creates a tracker at the start of `path`.
     pub fn new(path: Arc<Path>) -> Self {
-        let mut room = Room::new(path.joint_count());
-        let shapes: Arc<[Shape]> =
-            (0..path.blocks().len()).map(|block| Shape::new(&path, block, &mut room)).collect();
+        let mut scratch = Scratch::new(path.joint_count());
+        let shapes: Arc<[TipCurve]> =
+            (0..path.blocks().len()).map(|block| TipCurve::new(&path, block, &mut scratch)).collect();
         let last = shapes.len() - 1;
         let end = path.blocks()[last].length();
         let ends =
-            [(0, 0.0), (last, end)].map(|(block, s)| shapes[block].direction(&path, block, s, &mut room));
+            [(0, 0.0), (last, end)].map(|(block, s)| shapes[block].direction(&path, block, s, &mut scratch));
         Self {
             path,
             shapes,
@@ -131,32 +139,32 @@ impl PathTracker {
             s: 0.0,
             last: None,
             feet: [Vec::new(), Vec::new()],
-            room,
+            scratch,
         }
     }
 
-    /// The path.
+    /// Returns the path.
     pub fn path(&self) -> &Arc<Path> {
         &self.path
     }
 
-    /// The nearest point of what has been commanded so far, progress ≤ `until`, sought from the last
-    /// nearest one.
-    pub fn nearest(&mut self, pose: &ToolPose, until: f64) -> Nearest {
+    /// Returns the nearest point of the path commanded so far, with progress ≤ `until`. The search starts
+    /// at the last nearest point.
+    pub fn nearest(&mut self, pose: &ToolPose, until: f64) -> NearestPoint {
         let until = until.clamp(0.0, self.path.length()).max(self.furthest);
         if let Some(last) = self.last.filter(|last| last.is_for(pose, until)) {
             return last.nearest;
         }
         let before = (self.furthest, self.block, self.s);
-        let from = (self.furthest - BACK).max(0.0);
-        let window = (self.path.locate(from), self.path.locate(until));
+        let from = (self.furthest - SEARCH_BACK).max(0.0);
+        let window = SearchWindow { from: self.path.locate(from), to: self.path.locate(until) };
         let best = self.search(pose, window);
         if best.s.is_finite() {
             self.furthest = self.furthest.max(best.progress);
             (self.block, self.s) = (best.block, best.s);
         }
-        let axis = self.shapes[best.block].axis(&self.path, best.block, best.s, &mut self.room);
-        let nearest = Nearest {
+        let axis = self.shapes[best.block].axis(&self.path, best.block, best.s, &mut self.scratch);
+        let nearest = NearestPoint {
             progress: best.progress,
             point: best.point,
             axis,
@@ -165,11 +173,11 @@ impl PathTracker {
             orientation: angle(&axis, &pose.axis),
         };
         let stays = before == (self.furthest, self.block, self.s);
-        self.last = stays.then_some(Call { pose: *pose, until, nearest });
+        self.last = stays.then_some(CachedQuery { pose: *pose, until, nearest });
         nearest
     }
 
-    /// See [`Nearest::within_ends`].
+    /// Returns [`NearestPoint::within_ends`].
     fn within_ends(&self, best: &Candidate, pose: &ToolPose) -> f64 {
         let direction = if best.progress >= self.path.length() {
             self.ends[1]
@@ -184,36 +192,36 @@ impl PathTracker {
         if along > 0.0 { (error - outwards * along).norm() } else { best.distance }
     }
 
-    fn search(&mut self, pose: &ToolPose, window: ((usize, f64), (usize, f64))) -> Candidate {
-        let (first, last) = (window.0.0, window.1.0);
+    fn search(&mut self, pose: &ToolPose, window: SearchWindow) -> Candidate {
+        let (first, last) = (window.from.0, window.to.0);
         let mut best = None;
         let count = last - first + 1;
         if count <= MAX_BLOCKS {
             for block in first..=last {
-                self.try_block(pose, window, block, &mut best);
+                self.consider_block(pose, window, block, &mut best);
             }
         } else {
             let here = self.block.clamp(first, last);
             for block in here.saturating_sub(NEIGHBORS).max(first)..=(here + NEIGHBORS).min(last) {
-                self.try_block(pose, window, block, &mut best);
+                self.consider_block(pose, window, block, &mut best);
             }
             let spread = MAX_BLOCKS - 2 * NEIGHBORS - 1;
             for i in 0..spread {
-                self.try_block(pose, window, first + (count - 1) * i / (spread - 1), &mut best);
+                self.consider_block(pose, window, first + (count - 1) * i / (spread - 1), &mut best);
             }
-            self.walk(pose, window, &mut best);
+            self.descend(pose, window, &mut best);
         }
-        // The window has a block, and a block has a candidate.
-        best.unwrap_or_else(|| self.still(pose, self.block, self.s))
+        // The window contains a block, and each block has a candidate.
+        best.unwrap_or_else(|| self.candidate_at(pose, self.block, self.s))
     }
 
-    /// From block to block as long as that comes nearer.
-    fn walk(&mut self, pose: &ToolPose, window: ((usize, f64), (usize, f64)), best: &mut Option<Candidate>) {
-        let (first, last) = (window.0.0, window.1.0);
-        for _ in 0..MAX_WALK {
+    /// Evaluates neighbor blocks while they contain closer points.
+    fn descend(&mut self, pose: &ToolPose, window: SearchWindow, best: &mut Option<Candidate>) {
+        let (first, last) = (window.from.0, window.to.0);
+        for _ in 0..MAX_DESCENT {
             let Some(at) = best.map(|best| best.block) else { return };
             for block in [at.saturating_sub(1).max(first), (at + 1).min(last)] {
-                self.try_block(pose, window, block, best);
+                self.consider_block(pose, window, block, best);
             }
             if best.is_none_or(|best| best.block == at) {
                 return;
@@ -221,31 +229,31 @@ impl PathTracker {
         }
     }
 
-    fn try_block(
+    fn consider_block(
         &mut self,
         pose: &ToolPose,
-        window: ((usize, f64), (usize, f64)),
+        window: SearchWindow,
         block: usize,
         best: &mut Option<Candidate>,
     ) {
-        let low = if block == window.0.0 { window.0.1 } else { 0.0 };
-        let high = if block == window.1.0 { window.1.1 } else { self.path.blocks()[block].length() };
-        let candidate = self.in_block(pose, block, low, high.max(low));
+        let low = if block == window.from.0 { window.from.1 } else { 0.0 };
+        let high = if block == window.to.0 { window.to.1 } else { self.path.blocks()[block].length() };
+        let candidate = self.nearest_in_block(pose, block, low, high.max(low));
         let better = best.is_none_or(|best| self.is_better(pose, &candidate, &best));
         if better {
             *best = Some(candidate);
         }
     }
 
-    /// Whether `a` is nearer than `b`, or as near and the next one in order.
+    /// Returns true if `a` is closer than `b`, or equally close and earlier in order.
     fn is_better(&mut self, pose: &ToolPose, a: &Candidate, b: &Candidate) -> bool {
-        let both_move = self.shapes[a.block].moves_tip() && self.shapes[b.block].moves_tip();
+        let both_move = self.shapes[a.block].is_tip_moving() && self.shapes[b.block].is_tip_moving();
         let (a_cost, b_cost) =
             if both_move { (a.distance, b.distance) } else { (self.cost(pose, a), self.cost(pose, b)) };
-        if (a_cost - b_cost).abs() > SAME {
+        if (a_cost - b_cost).abs() > DISTANCE_TOLERANCE {
             return a_cost < b_cost;
         }
-        let ahead = |candidate: &Candidate| candidate.progress >= self.furthest - SLACK;
+        let ahead = |candidate: &Candidate| candidate.progress >= self.furthest - ORDER_TOLERANCE;
         match (ahead(a), ahead(b)) {
             (true, true) => a.progress < b.progress,
             (false, false) => a.progress > b.progress,
@@ -253,11 +261,11 @@ impl PathTracker {
         }
     }
 
-    /// Distance with the angle between the axes, m.
+    /// Returns the distance combined with the angle between the tool axes, m.
     fn cost(&mut self, pose: &ToolPose, candidate: &Candidate) -> f64 {
         let Candidate { block, s, distance, .. } = *candidate;
-        let axis = self.shapes[block].axis(&self.path, block, s, &mut self.room);
-        distance.hypot(ARM * angle(&axis, &pose.axis))
+        let axis = self.shapes[block].axis(&self.path, block, s, &mut self.scratch);
+        distance.hypot(ORIENTATION_ARM * angle(&axis, &pose.axis))
     }
 
     fn candidate(&self, block: usize, s: f64, point: Vector3<f64>, distance: f64) -> Candidate {
@@ -265,56 +273,59 @@ impl PathTracker {
         Candidate { block, s, progress, point, distance }
     }
 
-    /// The candidate at a given place.
-    fn still(&mut self, pose: &ToolPose, block: usize, s: f64) -> Candidate {
-        let point = self::pose(&self.path, block, s, &mut self.room).tip;
+    /// Returns the candidate at `s` of a block.
+    fn candidate_at(&mut self, pose: &ToolPose, block: usize, s: f64) -> Candidate {
+        let point = self::pose(&self.path, block, s, &mut self.scratch).tip;
         self.candidate(block, s, point, (pose.tip - point).norm())
     }
 
-    /// The nearest point of a block between `low` and `high`.
-    fn in_block(&mut self, pose: &ToolPose, block: usize, low: f64, high: f64) -> Candidate {
+    /// Returns the nearest point of a block between `low` and `high`.
+    fn nearest_in_block(&mut self, pose: &ToolPose, block: usize, low: f64, high: f64) -> Candidate {
         match &self.shapes[block] {
-            Shape::Segment { from, slope, .. } => {
+            TipCurve::Segment { from, slope, .. } => {
                 let (from, slope) = (*from, *slope);
-                let s = from_line(pose.tip, from, slope).clamp(low, high);
+                let s = line_parameter(pose.tip, from, slope).clamp(low, high);
                 let length = self.path.blocks()[block].length();
                 if s <= 0.0 || s >= length {
-                    return self.still(pose, block, s);
+                    return self.candidate_at(pose, block, s);
                 }
                 let point = from + slope * s;
                 self.candidate(block, s, point, (pose.tip - point).norm())
             }
-            Shape::Circle { center, plane, radius, start, turn, .. } => {
+            TipCurve::Circle { center, plane, radius, start, turn, .. } => {
                 let (center, plane, radius, turn) = (*center, *plane, *radius, *turn);
-                let ([x, y, z], off) = from_axis(pose.tip, center, &plane);
+                let ([x, y, z], off) = circle_coordinates(pose.tip, center, &plane);
                 let angle = ((y.atan2(x) - start) * turn.signum()).rem_euclid(TAU);
-                let ahead = self.furthest - SLACK - self.path.start_of(block);
-                match passage(angle / turn.abs(), TAU / turn.abs(), low, high, ahead) {
+                let ahead = self.furthest - ORDER_TOLERANCE - self.path.start_of(block);
+                match select_passage(angle / turn.abs(), TAU / turn.abs(), low, high, ahead) {
                     Some(s) if off > 0.0 => {
                         let point = center + (plane[0] * x + plane[1] * y) * (radius / off);
-                        self.candidate(block, s, point, from_circle(off, z, radius))
+                        self.candidate(block, s, point, distance_to_circle(off, z, radius))
                     }
                     _ => self.nearer_end(pose, block, low, high),
                 }
             }
-            Shape::Curve { .. } | Shape::Turn { .. } => self.in_curve(pose, block, low, high),
-            // Nothing tells where on it the pose is.
-            Shape::Still => self.still(pose, block, high),
+            TipCurve::Sampled { .. } | TipCurve::Reorientation { .. } => {
+                self.nearest_in_curve(pose, block, low, high)
+            }
+            // The progress is undetermined within a fixed block.
+            TipCurve::Fixed => self.candidate_at(pose, block, high),
         }
     }
 
     fn nearer_end(&mut self, pose: &ToolPose, block: usize, low: f64, high: f64) -> Candidate {
-        let (a, b) = (self.still(pose, block, low), self.still(pose, block, high));
+        let (a, b) = (self.candidate_at(pose, block, low), self.candidate_at(pose, block, high));
         if self.is_better(pose, &b, &a) { b } else { a }
     }
 
-    /// The nearest point of a curve without a closed form: from the last one and from the best sample.
-    fn in_curve(&mut self, pose: &ToolPose, block: usize, low: f64, high: f64) -> Candidate {
+    /// Returns the nearest point of a curve without a closed form, refined from the last one and from the
+    /// best sample.
+    fn nearest_in_curve(&mut self, pose: &ToolPose, block: usize, low: f64, high: f64) -> Candidate {
         let shape = &self.shapes[block];
-        let (Shape::Curve { samples, .. } | Shape::Turn { samples }) = shape else {
+        let (TipCurve::Sampled { samples, .. } | TipCurve::Reorientation { samples }) = shape else {
             return self.nearer_end(pose, block, low, high);
         };
-        let target = if shape.moves_tip() { pose.tip } else { pose.axis };
+        let target = if shape.is_tip_moving() { pose.tip } else { pose.axis };
         let spacing = self.path.blocks()[block].length() / (samples.len() - 1) as f64;
         let (from, to) = ((low / spacing).ceil() as usize, (high / spacing).floor() as usize);
         let to = to.min(samples.len() - 1);
@@ -334,50 +345,54 @@ impl PathTracker {
         best
     }
 
-    /// Newton's method for (target − q(s))·q'(s) = 0 from `s`, by a quadratic of the curve there.
+    /// Solves (target − q(s))·q'(s) = 0 by Newton's method from `s`, with a quadratic approximation of the
+    /// curve.
     fn refine(&mut self, pose: &ToolPose, block: usize, s: f64, low: f64, high: f64) -> Candidate {
         let shape = &self.shapes[block];
-        let target = if shape.moves_tip() { pose.tip } else { pose.axis };
+        let target = if shape.is_tip_moving() { pose.tip } else { pose.axis };
         let reach = QUADRATIC_REACH * self.path.blocks()[block].length();
         let mut s = s.clamp(low, high);
-        let mut local = (s, shape.local(&self.path, block, s, &mut self.room));
-        let mut point = local.1.0;
+        let mut expansion = (s, shape.local_derivatives(&self.path, block, s, &mut self.scratch));
+        let mut point = expansion.1.0;
         for _ in 0..MAX_NEWTON {
-            if (s - local.0).abs() > reach {
-                local = (s, shape.local(&self.path, block, s, &mut self.room));
-                point = local.1.0;
+            if (s - expansion.0).abs() > reach {
+                expansion = (s, shape.local_derivatives(&self.path, block, s, &mut self.scratch));
+                point = expansion.1.0;
             }
-            let (from, (_, slope, bend)) = local;
+            let (from, (_, slope, bend)) = expansion;
             let tangent = slope + bend * (s - from);
             let error = target - point;
             let square = tangent.norm_squared();
             let denominator = (square - error.dot(&bend)).max(MIN_DENOMINATOR * square);
             let next = (s + error.dot(&tangent) / denominator).clamp(low, high);
-            // Written so that NaN ends it too: nothing moves there.
+            // The comparison ends the iteration at NaN too.
             let moves = (next - s).abs() > NEWTON_TOLERANCE;
             if !moves {
                 break;
             }
             s = next;
-            point = shape.point(&self.path, block, s, &mut self.room);
+            point = shape.point(&self.path, block, s, &mut self.scratch);
         }
-        let point =
-            if shape.moves_tip() { point } else { self::pose(&self.path, block, s, &mut self.room).tip };
+        let point = if shape.is_tip_moving() {
+            point
+        } else {
+            self::pose(&self.path, block, s, &mut self.scratch).tip
+        };
         self.candidate(block, s, point, (pose.tip - point).norm())
     }
 }
 
-/// Of the places s, s + period, …, the first between `low` and `high` that is not before `ahead`, or
-/// else the last of them.
-fn passage(s: f64, period: f64, low: f64, high: f64, ahead: f64) -> Option<f64> {
+/// Returns the first of s, s + period, … between `low` and `high` that is not before `ahead`, or else the
+/// last of them in the range.
+fn select_passage(s: f64, period: f64, low: f64, high: f64, ahead: f64) -> Option<f64> {
     let first_from = |bound: f64| s + ((bound - s) / period).ceil().max(0.0) * period;
     let next = first_from(low.max(ahead));
-    let place = if next <= high { next } else { s + ((high - s) / period).floor() * period };
-    (low..=high).contains(&place).then_some(place)
+    let index = if next <= high { next } else { s + ((high - s) / period).floor() * period };
+    (low..=high).contains(&index).then_some(index)
 }
 
-/// Angle between two unit vectors, rad; exact for small ones.
+/// Returns the angle between two unit vectors, rad; exact for small angles.
 fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
-    // As it is on all paths along which the tables stand still.
+    // Equal on all paths with fixed rotary tables.
     if a == b { 0.0 } else { a.cross(b).norm().atan2(a.dot(b)) }
 }

@@ -1,20 +1,20 @@
-//! What a run looked like: signals over time, the path of the tool, circles.
+//! Signal recording of a run: axis signals over time, tool path, circles.
 
 use crate::config::AxisKind;
 
-/// Signals of one run at the same position instants; every list of a run is as long as [`Self::time`].
+/// Signals of one run at position instants; all lists of a run have the length of [`Self::time`].
 ///
-/// What figures measure at every tick is taken where it is largest in the position period that begins there, so
-/// that a plot shows the figure.
+/// Quantities whose figures are evaluated at every tick are recorded at their largest value in the position
+/// cycle, so that a plot shows the figure.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Recording {
-    /// s from the start.
+pub struct SignalRecording {
+    /// Time from the start, s.
     pub time: Vec<f64>,
-    /// Of each axis of the machine, in its order.
+    /// Signals of each axis, in the order of the machine.
     pub axes: Vec<AxisTrace>,
-    /// Of the tool in the workpiece frame; none for a machine without linear axes.
+    /// Tool signals in the workpiece frame; `None` without linear axes.
     pub tool: Option<ToolTrace>,
-    /// Circles that were run at constant feed, each direction on its own.
+    /// Circles at constant feed, each direction separately.
     pub circles: Vec<CircleTrace>,
 }
 
@@ -23,56 +23,56 @@ pub struct Recording {
 pub struct AxisTrace {
     /// Name of the joint.
     pub name: String,
-    /// Linear: m, m/s; rotary: rad, rad/s.
+    /// Kind of the axis: linear, m and m/s, or rotary, rad and rad/s.
     pub kind: AxisKind,
-    /// Whether the axis was given setpoints that move.
+    /// True if the setpoints of the axis change.
     pub moves: bool,
-    /// PSEC, m or rad.
+    /// Position setpoint at the entrance of the position controller (PSEC), m or rad.
     pub psec: Vec<f64>,
-    /// SP, m or rad.
+    /// Position SP, m or rad.
     pub position: Vec<f64>,
-    /// PSEC − SP, m or rad.
-    pub tracking_error: Vec<f64>,
-    /// PSEC delayed by α − SP, m or rad.
-    pub synchronized_tracking_error: Vec<f64>,
-    /// SV, m/s or rad/s.
+    /// Following error PSEC − SP, m or rad.
+    pub following_error: Vec<f64>,
+    /// Delay-compensated following error, PSEC delayed by α − SP, m or rad.
+    pub delay_compensated_following_error: Vec<f64>,
+    /// Velocity SV, m/s or rad/s.
     pub velocity: Vec<f64>,
-    /// SMC, A, where it is largest in the position period.
+    /// Motor current SMC of largest magnitude in the position cycle, A.
     pub current: Vec<f64>,
     /// Setpoint of the current loop, A.
     pub current_setpoint: Vec<f64>,
-    /// Part of the current that friction takes, A.
+    /// Friction component of the current, A.
     pub friction_current: Vec<f64>,
-    /// Part of the current that gravity takes, A.
+    /// Gravity component of the current, A.
     pub gravity_current: Vec<f64>,
-    /// Part of the current that the external load takes, A.
+    /// Component of the current from the external load, A.
     pub load_current: Vec<f64>,
 }
 
-/// The tool tip in the workpiece frame.
+/// Tool tip in the workpiece frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ToolTrace {
     /// Nearest point of the path, m.
     pub reference: Vec<[f64; 3]>,
-    /// Where the tip is, m.
+    /// Position of the tip, m.
     pub position: Vec<[f64; 3]>,
-    /// Distance of the tip from the path, m, the largest of the position period.
+    /// Contour error, m: distance of the tip from the path, the largest value of the position cycle.
     pub contour_error: Vec<f64>,
-    /// Angle between the tool axis and that of the path at its nearest point, rad, the largest of the position
-    /// period; empty for a machine without rotary axes.
+    /// Orientation error, rad: angle between the tool axis and that of the path at its nearest point, the
+    /// largest value of the position cycle. Empty without rotary axes.
     pub orientation_error: Vec<f64>,
 }
 
-/// The steady part of a circle.
+/// Part of a circle at constant feed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CircleTrace {
-    /// Names of the two axes, first and second coordinate.
+    /// Names of the axes of the first and second coordinate.
     pub plane: [String; 2],
     /// Nominal radius, m.
     pub radius: f64,
-    /// Whether it turns from the first axis towards the second (counterclockwise).
+    /// True if it turns from the first axis towards the second (counterclockwise).
     pub counterclockwise: bool,
-    /// Polar angle about the nominal center, rad, growing or falling over several turns.
+    /// Polar angle about the nominal center, rad, continuous over several turns.
     pub angle: Vec<f64>,
     /// Radial deviation, m, positive outside.
     pub deviation: Vec<f64>,

@@ -1,40 +1,40 @@
-//! Nearest point on the path that the setpoints describe, where no geometry is known.
+//! Nearest point on the polyline through the setpoints, for motions without a known path.
 
 use nalgebra::Vector3;
 
 use crate::kinematics::ToolPose;
 
 use super::contour::{CAPACITY, ContourTracker};
-use super::path_tracker::Nearest;
+use super::path_tracker::NearestPoint;
 
-/// Length below which two setpoints do not tell a direction, m.
-const SHORTEST: f64 = 1e-12;
+/// Length below which two setpoints do not define a direction, m.
+const MIN_STEP: f64 = 1e-12;
 
-/// Follows the tool along the polyline through its setpoints in the workpiece frame.
+/// Nearest-point search along the polyline through the setpoints in the workpiece frame.
 ///
-/// The chord of a circle runs inside of it, by `(v·Tsp)²/(8R)`: 1.9 µm on the paper's ballbar.
-/// Where the path itself is known, [`PathTracker`](super::PathTracker) measures against that.
+/// The chord of a circle lies inside it by `(v·Tsp)²/(8R)`: 1.9 µm in the ballbar test of Prévost et al. If
+/// the path is known, [`PathTracker`](super::PathTracker) measures against it.
 #[derive(Debug, Clone)]
 pub struct SetpointTracker {
     contour: ContourTracker,
     poses: Box<[ToolPose]>,
-    /// Unit vectors of the first and the last segment that has a length.
-    ends: Option<[Vector3<f64>; 2]>,
+    /// Directions of the first and the last segment of nonzero length.
+    end_directions: Option<[Vector3<f64>; 2]>,
 }
 
 impl SetpointTracker {
-    /// Before the first setpoint, which is at `start`.
+    /// Creates a tracker whose first setpoint is `start`.
     pub fn new(start: ToolPose) -> Self {
         let mut tracker = SetpointTracker {
             contour: ContourTracker::new(3),
             poses: vec![start; CAPACITY].into_boxed_slice(),
-            ends: None,
+            end_directions: None,
         };
         tracker.push(start);
         tracker
     }
 
-    fn place(k: u64) -> usize {
+    fn ring_index(k: u64) -> usize {
         (k % CAPACITY as u64) as usize
     }
 
@@ -42,38 +42,38 @@ impl SetpointTracker {
         self.contour.count().saturating_sub(1)
     }
 
-    /// Adds the tool's pose of a setpoint.
+    /// Adds the tool pose of a setpoint.
     pub fn push(&mut self, pose: ToolPose) {
-        let step = pose.tip - self.poses[Self::place(self.newest())].tip;
-        if step.norm() > SHORTEST {
+        let step = pose.tip - self.poses[Self::ring_index(self.newest())].tip;
+        if step.norm() > MIN_STEP {
             let direction = step.normalize();
-            let first = self.ends.map_or(direction, |[first, _]| first);
-            self.ends = Some([first, direction]);
+            let first = self.end_directions.map_or(direction, |[first, _]| first);
+            self.end_directions = Some([first, direction]);
         }
         self.contour.push(pose.tip.iter().copied());
-        self.poses[Self::place(self.newest())] = pose;
+        self.poses[Self::ring_index(self.newest())] = pose;
     }
 
-    /// The nearest point to where the tool is.
-    pub fn nearest(&mut self, pose: &ToolPose) -> Nearest {
+    /// Returns the point of the polyline closest to `pose`.
+    pub fn nearest(&mut self, pose: &ToolPose) -> NearestPoint {
         let (k, along) = match self.contour.nearest(pose.tip.as_slice()) {
             Some((k, foot)) => (k, foot.along),
             None => (0, 0.0),
         };
-        let from = &self.poses[Self::place(k)];
-        let to = &self.poses[Self::place((k + 1).min(self.newest()))];
+        let from = &self.poses[Self::ring_index(k)];
+        let to = &self.poses[Self::ring_index((k + 1).min(self.newest()))];
         let point = from.tip + along * (to.tip - from.tip);
         let axis = (from.axis + along * (to.axis - from.axis)).normalize();
         let offset = pose.tip - point;
-        let overshoot = self.ends.map_or(0.0, |[first, last]| {
+        let overshoot = self.end_directions.map_or(0.0, |[first, last]| {
             let at_start = k == 0 && along == 0.0;
-            let at_end = point == self.poses[Self::place(self.newest())].tip;
+            let at_end = point == self.poses[Self::ring_index(self.newest())].tip;
             let before = if at_start { (-offset.dot(&first)).max(0.0) } else { 0.0 };
             let behind = if at_end { offset.dot(&last).max(0.0) } else { 0.0 };
             before.max(behind)
         });
         let distance = offset.norm();
-        Nearest {
+        NearestPoint {
             progress: k as f64 + along,
             point,
             axis,
@@ -93,12 +93,12 @@ mod tests {
     }
 
     #[test]
-    fn overshoot_beyond_the_last_set_point_is_told_apart() {
+    fn overshoot_beyond_the_last_setpoint_is_reported_separately() {
         let mut tracker = SetpointTracker::new(at(0.0, 0.0));
         for k in 1..=10 {
             tracker.push(at(0.01 * f64::from(k), 0.0));
         }
-        // At rest: the end stays the end.
+        // At rest the end point is repeated.
         tracker.push(at(0.1, 0.0));
         let inside = tracker.nearest(&at(0.055, 3e-6));
         assert!((inside.distance - 3e-6).abs() < 1e-15 && (inside.within_ends - 3e-6).abs() < 1e-15);

@@ -1,35 +1,18 @@
-//! One geometric element of a path.
+//! Geometric elements of a path: lines, arcs and splines.
 
-use super::arc::{Arc, Circle, turned};
+use super::arc::{Circle, CircularArc, rotated};
+use super::derivatives::Derivatives;
 use super::error::PathError;
 use super::line::Line;
 use super::spline::Spline;
 use crate::config::AxisKind;
 use crate::units::REVOLUTION;
 
-/// Derivatives of the coordinates with respect to the length, one value per coordinate.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Derivatives {
-    /// Of first order.
-    pub first: Vec<f64>,
-    /// Of second order.
-    pub second: Vec<f64>,
-    /// Of third order.
-    pub third: Vec<f64>,
-}
-
-impl Derivatives {
-    /// Room for `joints` coordinates, all 0.
-    pub fn new(joints: usize) -> Self {
-        Self { first: vec![0.0; joints], second: vec![0.0; joints], third: vec![0.0; joints] }
-    }
-}
-
-/// One geometric element in programmed coordinates, one per joint of the machine, m or rad.
+/// A geometric element in programmed coordinates, one per joint of the machine, m or rad.
 ///
-/// Its parameter s is the arc length of the linear coordinates, m; where these stand still, that of
-/// the rotary ones, rad. When both move, the rotary ones follow s. Both ends are returned bit for bit
-/// as they were given.
+/// Its parameter s is the arc length of the linear coordinates, m, or, if these are constant, that of the
+/// rotary coordinates, rad. If both move, the rotary coordinates follow s. Both ends are returned
+/// bit-identical to the input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {
     shape: Shape,
@@ -42,34 +25,36 @@ pub struct Block {
 #[derive(Debug, Clone, PartialEq)]
 enum Shape {
     Line(Line),
-    Arc(Arc),
+    Arc(CircularArc),
     Spline(Spline),
 }
 
 impl Block {
-    /// A straight line.
+    /// Creates a straight line.
     ///
     /// # Errors
-    /// [`PathError`]: another number of coordinates than `kinds`, a value that is not finite, two
-    /// equal points, a length that no f64 holds.
+    /// Returns [`PathError`] if the number of coordinates differs from `kinds`, a value is not finite, both
+    /// points are equal, or the length overflows.
     pub fn line(from: &[f64], to: &[f64], kinds: &[AxisKind]) -> Result<Self, PathError> {
         check_point("the start", from, kinds)?;
         check_point("the end", to, kinds)?;
         let steps: Vec<f64> = from.iter().zip(to).map(|(from, to)| to - from).collect();
-        let (length, kind) = measure(&steps, kinds).ok_or(PathError::StandsStill)?;
+        let (length, kind) = measure(&steps, kinds).ok_or(PathError::ZeroLength)?;
         let slopes = slopes(&steps, length)?;
         let shape = Shape::Line(Line { slopes });
         Ok(Self { shape, start: from.to_vec(), end: to.to_vec(), length, kind })
     }
 
-    /// An arc of a circle in the plane of the two linear coordinates `plane`, with its center in these,
-    /// m; `sweep` in rad, positive from the first towards the second, of any number of turns. `to`
-    /// gives the other coordinates at the end, which are linear in s (a helix); its entries of the
+    /// Creates a circular arc or helix in the plane of the two linear coordinates `plane`, with its center
+    /// in these, m.
+    ///
+    /// `sweep` in rad is positive from the first coordinate towards the second and may exceed one turn.
+    /// `to` contains the end values of the other coordinates, which are linear in s; its entries for the
     /// plane are ignored.
     ///
     /// # Errors
-    /// [`PathError`]: as for a line; a plane that is not two linear coordinates; a start at the center;
-    /// a sweep of 0.
+    /// Returns [`PathError`] for the reasons given at [`line`](Self::line), if the plane is not two
+    /// different linear coordinates, if the start is the center, or if the sweep is 0.
     pub fn arc(
         from: &[f64],
         plane: [usize; 2],
@@ -79,10 +64,10 @@ impl Block {
         kinds: &[AxisKind],
     ) -> Result<Self, PathError> {
         check_point("the start", from, kinds)?;
-        let linear = |place: usize| kinds.get(place) == Some(&AxisKind::Linear);
+        let linear = |index: usize| kinds.get(index) == Some(&AxisKind::Linear);
         let [p, q] = plane;
         if p == q || !linear(p) || !linear(q) {
-            return Err(PathError::Plane {
+            return Err(PathError::InvalidPlane {
                 first: p.saturating_add(1),
                 second: q.saturating_add(1),
                 joints: kinds.len(),
@@ -90,43 +75,47 @@ impl Block {
         }
         check_finite("the center", &center)?;
         if !sweep.is_finite() || sweep == 0.0 {
-            return Err(PathError::Sweep { sweep });
+            return Err(PathError::InvalidSweep { sweep });
         }
         check_size("the end", to, kinds)?;
-        let spoke = [from[p] - center[0], from[q] - center[1]];
-        let radius = spoke[0].hypot(spoke[1]);
+        let radius_vector = [from[p] - center[0], from[q] - center[1]];
+        let radius = radius_vector[0].hypot(radius_vector[1]);
         if radius == 0.0 {
-            return Err(PathError::Radius { center });
+            return Err(PathError::ZeroRadius { center });
         }
         let mut end = to.to_vec();
         (end[p], end[q]) = if (sweep / REVOLUTION).fract() == 0.0 {
             (from[p], from[q])
         } else {
-            let spoke = turned(spoke, sweep);
-            (center[0] + spoke[0], center[1] + spoke[1])
+            let radius_vector = rotated(radius_vector, sweep);
+            (center[0] + radius_vector[0], center[1] + radius_vector[1])
         };
         check_point("the end", &end, kinds)?;
         let mut steps: Vec<f64> = from.iter().zip(&end).map(|(from, to)| to - from).collect();
         (steps[p], steps[q]) = (radius * sweep, 0.0);
-        let (length, kind) = measure(&steps, kinds).ok_or(PathError::StandsStill)?;
+        let (length, kind) = measure(&steps, kinds).ok_or(PathError::ZeroLength)?;
         let mut slopes = slopes(&steps, length)?;
         slopes[p] = 0.0;
-        let turn = sweep / length;
-        if !(turn * turn * turn * radius).is_finite() || turn == 0.0 {
-            return Err(PathError::Unmeasurable { length });
+        let angle_per_length = sweep / length;
+        if !(angle_per_length * angle_per_length * angle_per_length * radius).is_finite()
+            || angle_per_length == 0.0
+        {
+            return Err(PathError::NotComputable { length });
         }
         let circle = Circle { plane, center, radius, sweep };
-        let shape = Shape::Arc(Arc { circle, spoke, turn, slopes });
+        let shape = Shape::Arc(CircularArc { circle, start_radius: radius_vector, angle_per_length, slopes });
         Ok(Self { shape, start: from.to_vec(), end, length, kind })
     }
 
-    /// A clamped uniform cubic B-spline (C²); `points` are its control points after `from`, at least
-    /// three. It starts at `from` towards the first of them and ends at the last, coming from the last
-    /// but one; it does not pass through the others. Its arc length is exact to 10⁻¹⁰ relative.
+    /// Creates a clamped uniform cubic B-spline (C²); `points` are its control points after `from`, at
+    /// least three.
+    ///
+    /// The spline starts at `from` towards the first control point and ends at the last one, coming from
+    /// the last but one; it does not pass through the others. Its arc length is exact to 10⁻¹⁰ relative.
     ///
     /// # Errors
-    /// [`PathError`]: as for a line; fewer than three points; a spline that stands still on its way,
-    /// for instance where the first two or last two points coincide.
+    /// Returns [`PathError`] for the reasons given at [`line`](Self::line), if there are fewer than three
+    /// points, or if the tangent vanishes, for instance because the first two or last two points coincide.
     pub fn spline(from: &[f64], points: &[Vec<f64>], kinds: &[AxisKind]) -> Result<Self, PathError> {
         check_point("the start", from, kinds)?;
         for point in points {
@@ -137,32 +126,32 @@ impl Block {
         Ok(Self { length: spline.length(), shape: Shape::Spline(spline), start: from.to_vec(), end, kind })
     }
 
-    /// Largest s: m or rad, after [`kind`](Self::kind).
+    /// Returns the arc length, m or rad depending on [`kind`](Self::kind).
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// What the length counts in: linear, m, or rotary, rad.
+    /// Returns the kind of the arc length: linear, m, or rotary, rad.
     pub fn kind(&self) -> AxisKind {
         self.kind
     }
 
-    /// Number of coordinates.
+    /// Returns the number of coordinates.
     pub fn joints(&self) -> usize {
         self.start.len()
     }
 
-    /// First point, m or rad.
+    /// Returns the first point, m or rad.
     pub fn start(&self) -> &[f64] {
         &self.start
     }
 
-    /// Last point, m or rad.
+    /// Returns the last point, m or rad.
     pub fn end(&self) -> &[f64] {
         &self.end
     }
 
-    /// The point at `s`, clamped to [0, length], into `out`, one value per coordinate.
+    /// Writes the point at `s`, clamped to [0, length], into `out`, one value per coordinate.
     pub fn point(&self, s: f64, out: &mut [f64]) {
         debug_assert_eq!(out.len(), self.joints(), "one value per coordinate");
         if s <= 0.0 {
@@ -178,14 +167,14 @@ impl Block {
         }
     }
 
-    /// Derivatives at `s`, clamped to [0, length], with respect to it.
+    /// Returns the derivatives with respect to s at `s`, clamped to [0, length].
     pub fn derivatives(&self, s: f64) -> Derivatives {
         let mut out = Derivatives::new(self.joints());
         self.derivatives_into(s, &mut out);
         out
     }
 
-    /// Like [`derivatives`](Self::derivatives), into room that is used again.
+    /// Writes the derivatives into `out`, as [`derivatives`](Self::derivatives) does, without allocation.
     pub fn derivatives_into(&self, s: f64, out: &mut Derivatives) {
         for order in [&mut out.first, &mut out.second, &mut out.third] {
             order.resize(self.joints(), 0.0);
@@ -198,7 +187,7 @@ impl Block {
         }
     }
 
-    /// The circle, if it is an arc.
+    /// Returns the circle of an arc, `None` for other shapes.
     pub fn circle(&self) -> Option<Circle> {
         match &self.shape {
             Shape::Arc(arc) => Some(arc.circle),
@@ -206,12 +195,12 @@ impl Block {
         }
     }
 
-    /// Whether it is a straight line in its coordinates.
+    /// Returns true for a straight line in programmed coordinates.
     pub fn is_line(&self) -> bool {
         matches!(self.shape, Shape::Line(_))
     }
 
-    /// Places s, from 0 to the length, between which all derivatives are continuous.
+    /// Returns the arc lengths, from 0 to the length, between which all derivatives are continuous.
     pub(super) fn knots(&self) -> Vec<f64> {
         match &self.shape {
             Shape::Spline(spline) => spline.knots(),
@@ -219,12 +208,12 @@ impl Block {
         }
     }
 
-    /// Whether none of the coordinates at `places` ever changes.
-    pub fn keeps(&self, places: impl IntoIterator<Item = usize>) -> bool {
-        places.into_iter().filter(|place| *place < self.joints()).all(|place| match &self.shape {
-            Shape::Line(line) => line.slopes[place] == 0.0,
-            Shape::Arc(arc) => !arc.circle.plane.contains(&place) && arc.slopes[place] == 0.0,
-            Shape::Spline(spline) => spline.keeps(place),
+    /// Returns true if the coordinates at `indices` are constant along the block.
+    pub fn is_constant(&self, indices: impl IntoIterator<Item = usize>) -> bool {
+        indices.into_iter().filter(|index| *index < self.joints()).all(|index| match &self.shape {
+            Shape::Line(line) => line.slopes[index] == 0.0,
+            Shape::Arc(arc) => !arc.circle.plane.contains(&index) && arc.slopes[index] == 0.0,
+            Shape::Spline(spline) => spline.is_constant(index),
         })
     }
 }
@@ -254,13 +243,13 @@ fn check_point(what: &'static str, point: &[f64], kinds: &[AxisKind]) -> Result<
     check_finite(what, point)
 }
 
-/// The coordinates of `kind` in `steps`, put together; hypot neither overflows nor underflows on the way.
+/// Returns the Euclidean norm of the coordinates of `kind` in `steps`; hypot avoids overflow and underflow.
 fn norm(steps: &[f64], kinds: &[AxisKind], kind: AxisKind) -> f64 {
     let of_kind = steps.iter().zip(kinds).filter(|(_, found)| **found == kind);
     of_kind.fold(0.0, |sum: f64, (step, _)| sum.hypot(*step))
 }
 
-/// Length of the linear steps, or of the rotary ones where the linear are 0, or nothing.
+/// Returns the length of the linear steps, or of the rotary steps if the linear steps are 0, or `None`.
 fn measure(steps: &[f64], kinds: &[AxisKind]) -> Option<(f64, AxisKind)> {
     let of = |kind| Some((norm(steps, kinds, kind), kind)).filter(|(length, _)| *length > 0.0);
     of(AxisKind::Linear).or_else(|| of(AxisKind::Rotary))
@@ -271,6 +260,6 @@ fn slopes(steps: &[f64], length: f64) -> Result<Vec<f64>, PathError> {
     if length.is_finite() && slopes.iter().all(|slope| slope.is_finite()) {
         Ok(slopes)
     } else {
-        Err(PathError::Unmeasurable { length })
+        Err(PathError::NotComputable { length })
     }
 }

@@ -1,42 +1,42 @@
-//! Rest to rest with cosine ramps: feed v/2 (1 − cos(π t/ramp)), constant, and mirrored.
+//! Feed profile with cosine ramps from rest to rest: feed v/2 (1 − cos(π t/ramp)), constant, and mirrored.
 
 use std::f64::consts::PI;
 
-/// Below this angle x − sin x is computed by its series: the difference would lose its digits.
+/// Angle below which x − sin x is computed by its series, because the difference would cancel, rad.
 const SERIES_BELOW: f64 = 0.5;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Cosine {
+pub(super) struct CosineProfile {
     length: f64,
     feed: f64,
     ramp: f64,
     /// Time at constant feed, s.
-    cruising: f64,
+    cruise_time: f64,
 }
 
-/// Way that both ramps need together.
-pub(super) fn ramps_length(feed: f64, ramp: f64) -> f64 {
+/// Returns the length that both ramps need together.
+pub(super) fn both_ramps_length(feed: f64, ramp: f64) -> f64 {
     feed * ramp
 }
 
-impl Cosine {
-    /// `length` must be that of both ramps at least.
+impl CosineProfile {
+    /// Creates a profile; `length` must be at least that of both ramps.
     pub fn new(length: f64, feed: f64, ramp: f64) -> Self {
-        let cruising = ((length - ramps_length(feed, ramp)) / feed).max(0.0);
-        Self { length, feed, ramp, cruising }
+        let cruise_time = ((length - both_ramps_length(feed, ramp)) / feed).max(0.0);
+        Self { length, feed, ramp, cruise_time }
     }
 
-    /// s.
+    /// Returns the duration, s.
     pub fn duration(&self) -> f64 {
-        2.0 * self.ramp + self.cruising
+        2.0 * self.ramp + self.cruise_time
     }
 
-    /// v/2 (t − ramp/π sin(π t/ramp)).
+    /// Returns the distance in a ramp, v/2 (t − ramp/π sin(π t/ramp)).
     fn ramped(&self, t: f64) -> f64 {
         0.5 * self.feed * self.ramp / PI * minus_sine(PI * t / self.ramp)
     }
 
-    /// Way after `t` seconds.
+    /// Returns the distance after `t` seconds.
     pub fn at(&self, t: f64) -> f64 {
         let left = self.duration() - t;
         if t <= 0.0 {
@@ -53,7 +53,7 @@ impl Cosine {
     }
 }
 
-/// x − sin x for x ≥ 0.
+/// Returns x − sin x for x ≥ 0.
 fn minus_sine(x: f64) -> f64 {
     if x >= SERIES_BELOW {
         return x - x.sin();

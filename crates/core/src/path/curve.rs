@@ -1,75 +1,76 @@
-//! A path as a curve of the joints: derivatives of these with respect to the length of a block.
+//! Derivatives of the joint positions with respect to the arc length of a block.
 
-use super::block::{Block, Derivatives};
-use super::route::{Frame, Path};
+use super::block::Block;
+use super::derivatives::Derivatives;
+use super::geometry::{Frame, Path};
 
-/// Step of the difference quotients, as a part of the smooth piece that they stay in: with five points
-/// their error is below 10⁻⁴ of the third derivative where a piece turns by up to a quarter radian.
+/// Step of the difference quotients, as a fraction of the smooth piece that contains them: with five points
+/// the error is below 10⁻⁴ of the third derivative where a piece turns by up to a quarter radian.
 const STEP: f64 = 1.0 / 200.0;
 
-/// How derivatives of a block's joints are found.
+/// Method for the derivatives of a block's joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Means {
+enum DerivativeMethod {
     /// The coordinates are the joints.
     Direct,
-    /// The tables stand still: joints are coordinates turned and displaced.
-    Turned,
-    /// Five-point difference quotients through the kinematics.
+    /// The rotary tables are fixed: joints are rotated and translated coordinates.
+    Rotated,
+    /// Five-point difference quotients through the inverse kinematics.
     Differences,
 }
 
-/// Finds derivatives along one block, with room for it.
+/// Derivatives along one block, with buffers.
 #[derive(Debug)]
 pub(super) struct JointCurve<'a> {
     path: &'a Path,
     block: usize,
-    means: Means,
+    method: DerivativeMethod,
     points: [Vec<f64>; 5],
 }
 
 impl<'a> JointCurve<'a> {
     pub fn new(path: &'a Path, block: usize) -> Self {
-        let means = match path.frame() {
-            Frame::Joints => Means::Direct,
-            Frame::Workpiece if path.keeps_tables(block) => Means::Turned,
-            Frame::Workpiece => Means::Differences,
+        let method = match path.frame() {
+            Frame::Joints => DerivativeMethod::Direct,
+            Frame::Workpiece if path.has_fixed_tables(block) => DerivativeMethod::Rotated,
+            Frame::Workpiece => DerivativeMethod::Differences,
         };
         let joints = path.joint_count();
-        Self { path, block, means, points: std::array::from_fn(|_| vec![0.0; joints]) }
+        Self { path, block, method, points: std::array::from_fn(|_| vec![0.0; joints]) }
     }
 
     pub fn block(&self) -> &'a Block {
         &self.path.blocks()[self.block]
     }
 
-    /// Whether the joints run along a straight line.
+    /// Returns true if the joints move along a straight line.
     pub fn is_straight(&self) -> bool {
-        self.means != Means::Differences && self.block().is_line()
+        self.method != DerivativeMethod::Differences && self.block().is_line()
     }
 
-    /// Whether the tables move under a path of the tip.
-    pub fn is_bent(&self) -> bool {
-        self.means == Means::Differences
+    /// Returns true if the rotary tables move along a workpiece path.
+    pub fn has_moving_tables(&self) -> bool {
+        self.method == DerivativeMethod::Differences
     }
 
-    /// Derivatives at `s` in the smooth piece from `piece.0` to `piece.1`.
+    /// Computes the derivatives at `s` in the smooth piece from `piece.0` to `piece.1`.
     pub fn derivatives(&mut self, s: f64, piece: (f64, f64), out: &mut Derivatives) {
-        // At a border of pieces the third derivative is that of this piece.
+        // At a piece boundary the third derivative is that of this piece.
         let inside = s.clamp(piece.0, piece.1.next_down().max(piece.0));
-        match self.means {
-            Means::Direct => self.block().derivatives_into(inside, out),
-            Means::Turned => {
+        match self.method {
+            DerivativeMethod::Direct => self.block().derivatives_into(inside, out),
+            DerivativeMethod::Rotated => {
                 self.block().derivatives_into(inside, out);
                 for order in [&mut out.first, &mut out.second, &mut out.third] {
-                    self.turn(order);
+                    self.rotate(order);
                 }
             }
-            Means::Differences => self.differences(s, piece, out),
+            DerivativeMethod::Differences => self.differences(s, piece, out),
         }
     }
 
-    /// Turns a vector of coordinates into one of joints: the difference of two points.
-    fn turn(&mut self, vector: &mut [f64]) {
+    /// Rotates a vector of coordinates into joint space: the difference of two transformed points.
+    fn rotate(&mut self, vector: &mut [f64]) {
         let [origin, tip, ..] = &mut self.points;
         origin.copy_from_slice(self.path.blocks()[self.block].start());
         tip.copy_from_slice(origin);
@@ -84,7 +85,8 @@ impl<'a> JointCurve<'a> {
         }
     }
 
-    /// Derivatives of the quartic through five equidistant points, moved from its middle to `s`.
+    /// Computes the derivatives of the quartic through five equidistant points at `s`, which may be off
+    /// their middle.
     fn differences(&mut self, s: f64, piece: (f64, f64), out: &mut Derivatives) {
         let h = (piece.1 - piece.0) * STEP;
         let middle = s.clamp(piece.0 + 2.0 * h, piece.1 - 2.0 * h);

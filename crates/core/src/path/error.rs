@@ -1,25 +1,25 @@
-//! What is wrong with a path or with its time law.
+//! Errors of paths and feed planning.
 
 use std::fmt;
 
 use thiserror::Error;
 
-use crate::units::Told;
+use crate::units::Rounded;
 
-/// Which derivative of a setpoint a limit is about.
+/// A derivative of the setpoint with a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// m/s or rad/s.
+pub enum SetpointDerivative {
+    /// Speed, m/s or rad/s.
     Speed,
-    /// m/s² or rad/s².
+    /// Acceleration, m/s² or rad/s².
     Acceleration,
-    /// m/s³ or rad/s³.
+    /// Jerk, m/s³ or rad/s³.
     Jerk,
 }
 
-impl Quantity {
-    /// What it is divided by.
-    fn time(self) -> &'static str {
+impl SetpointDerivative {
+    /// Returns the denominator of its unit.
+    fn per_time(self) -> &'static str {
         match self {
             Self::Speed => "s",
             Self::Acceleration => "s²",
@@ -28,7 +28,7 @@ impl Quantity {
     }
 }
 
-impl fmt::Display for Quantity {
+impl fmt::Display for SetpointDerivative {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Speed => "speed",
@@ -38,210 +38,207 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// A path that cannot be. Coordinates and points count from 1; values are in m or rad.
+/// An invalid path. Coordinates and points are counted from 1; values are in m or rad.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PathError {
-    /// No block at all.
+    /// Path without blocks.
     #[error("a path needs at least one block")]
     Empty,
-    /// A point with another number of coordinates than there are joints.
+    /// Number of coordinates different from the number of joints.
     #[error("{what} has {found} coordinates; there are {wanted} joints")]
     WrongSize {
-        /// Which point.
+        /// Point with the wrong size.
         what: &'static str,
-        /// Its number of coordinates.
+        /// Number of coordinates found.
         found: usize,
         /// Number of joints.
         wanted: usize,
     },
-    /// NaN or infinity.
+    /// NaN or infinite coordinate.
     #[error("{what}, coordinate {coordinate}: {value} is not a finite number")]
     NotFinite {
-        /// Which point.
+        /// Point with the coordinate.
         what: &'static str,
-        /// From 1.
+        /// Coordinate, counted from 1.
         coordinate: usize,
-        /// What was found.
+        /// Value found.
         value: f64,
     },
-    /// No coordinate moves.
-    #[error("the block starts and ends at the same point and has no length")]
-    StandsStill,
-    /// A length, or a slope along it, that is no number any more.
-    #[error("a length of {length} cannot be computed with; a block must be neither that long nor that short")]
-    Unmeasurable {
-        /// m or rad.
+    /// Block without motion.
+    #[error("the block starts and ends at the same point and has length 0")]
+    ZeroLength,
+    /// Length, or slope along it, outside the range of floating-point numbers.
+    #[error("the length {length} is outside the range of floating-point computation")]
+    NotComputable {
+        /// Length found, m or rad.
         length: f64,
     },
-    /// An arc's plane that is not two linear coordinates.
+    /// Arc plane that is not two different linear coordinates.
     #[error(
         "the plane of an arc needs two different linear coordinates out of {joints}; found {first} and {second}"
     )]
-    Plane {
-        /// From 1.
+    InvalidPlane {
+        /// First coordinate, counted from 1.
         first: usize,
-        /// From 1.
+        /// Second coordinate, counted from 1.
         second: usize,
         /// Number of joints.
         joints: usize,
     },
-    /// An arc without a radius.
-    #[error("an arc that starts at its center, {center:?} m, has no radius")]
-    Radius {
-        /// m.
+    /// Arc with radius 0.
+    #[error("the arc starts at its center, {center:?} m; its radius must be larger than 0")]
+    ZeroRadius {
+        /// Center, m.
         center: [f64; 2],
     },
-    /// An arc without a sweep.
+    /// Arc with sweep 0 or not finite.
     #[error("the sweep of an arc must be finite and not 0; found {sweep} rad")]
-    Sweep {
-        /// rad.
+    InvalidSweep {
+        /// Sweep found, rad.
         sweep: f64,
     },
-    /// A spline of too few control points.
+    /// Spline with too few control points.
     #[error("a cubic spline needs at least {needed} control points after its start; found {found}")]
     TooFewPoints {
-        /// Points after the start.
+        /// Number of points found after the start.
         found: usize,
-        /// How many there must be.
+        /// Smallest number of points.
         needed: usize,
     },
-    /// A spline that stops on its way: its direction is not defined there.
-    #[error(
-        "the spline stands still or turns back on the spot in its piece {piece} of {pieces}: \
-         control points coincide or fold there"
-    )]
+    /// Spline with a cusp, where its tangent vanishes.
+    #[error("the spline has a cusp in piece {piece} of {pieces}: control points coincide or fold back there")]
     Cusp {
-        /// From 1.
+        /// Piece, counted from 1.
         piece: usize,
-        /// How many pieces there are.
+        /// Number of pieces.
         pieces: usize,
     },
-    /// Two blocks that do not meet.
+    /// Gap between two blocks.
     #[error(
         "block {block} starts at {start}, coordinate {coordinate}, where the block before it ends at \
-         {end}: the path must have no gap"
+         {end}: the path must not have gaps"
     )]
     Gap {
-        /// From 1.
+        /// Block after the gap, counted from 1.
         block: usize,
-        /// From 1.
+        /// Coordinate, counted from 1.
         coordinate: usize,
-        /// m or rad.
+        /// End of the block before, m or rad.
         end: f64,
-        /// m or rad.
+        /// Start of the block, m or rad.
         start: f64,
     },
 }
 
-/// A time law that cannot be. Moves count from 1.
+/// A program that cannot be planned. Moves are counted from 1.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// The path itself.
+    /// Invalid path.
     #[error(transparent)]
     Path(#[from] PathError),
-    /// Another number of limits than of coordinates.
-    #[error("limits of {found} joints for a path of {wanted} coordinates")]
-    Joints {
-        /// Limits given.
+    /// Number of joint limits different from the number of coordinates.
+    #[error("found limits of {found} joints for a path of {wanted} coordinates")]
+    JointCount {
+        /// Number of limits.
         found: usize,
-        /// Coordinates.
+        /// Number of coordinates.
         wanted: usize,
     },
-    /// A limit of a joint that is not one.
+    /// Joint limit that is not finite and positive.
     #[error("joint {joint}: the largest {quantity} must be finite and larger than 0; found {value}")]
-    Limit {
-        /// Its name.
+    InvalidLimit {
+        /// Name of the joint.
         joint: String,
-        /// Which limit.
-        quantity: Quantity,
-        /// What was found.
+        /// Limited quantity.
+        quantity: SetpointDerivative,
+        /// Value found.
         value: f64,
     },
-    /// A position period that is not one.
+    /// Position period that is not positive.
     #[error("the position period must be larger than 0; found {found} ns")]
-    Period {
-        /// ns.
+    InvalidPeriod {
+        /// Value found, ns.
         found: i64,
     },
-    /// A rest before the first move that is not a time.
+    /// Rest before the first move that is negative or not finite.
     #[error("the rest before the first move must be finite and not negative; found {found} s")]
-    Rest {
-        /// s.
+    InvalidRest {
+        /// Value found, s.
         found: f64,
     },
-    /// A value of a move that is out of its range.
-    #[error("move {index}: {what} must be {allowed}; found {}", Told(*found))]
-    Value {
-        /// From 1.
+    /// Move parameter out of range.
+    #[error("move {index}: {what} must be {allowed}; found {}", Rounded(*found))]
+    InvalidValue {
+        /// Move, counted from 1.
         index: usize,
-        /// What it is, with its unit.
+        /// Name and unit of the parameter.
         what: &'static str,
-        /// What is allowed.
+        /// Allowed range.
         allowed: &'static str,
-        /// What was found.
+        /// Value found.
         found: f64,
     },
-    /// A move too short for its cosine ramps.
-    #[error("move {index}: its length of {} is shorter than its two ramps need, {}", Told(*length), Told(*needed))]
+    /// Move shorter than its cosine ramps.
+    #[error("move {index}: length {} is shorter than its two ramps, {}", Rounded(*length), Rounded(*needed))]
     TooShort {
-        /// From 1.
+        /// Move, counted from 1.
         index: usize,
-        /// m or rad.
+        /// Length of the move, m or rad.
         length: f64,
-        /// m or rad.
+        /// Length of both ramps, m or rad.
         needed: f64,
     },
-    /// A cosine move at which an axis is too fast; its law is as prescribed.
+    /// Move with a cosine profile, which is not adapted, that exceeds Vmax of a joint.
     #[error(
-        "move {index}: {joint} would run at {} {unit}/s; its largest speed is {} {unit}/s",
-        Told(*found),
-        Told(*allowed)
+        "move {index}: {joint} reaches {} {unit}/s; its largest speed is {} {unit}/s",
+        Rounded(*found),
+        Rounded(*allowed)
     )]
     TooFast {
-        /// From 1.
+        /// Move, counted from 1.
         index: usize,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// Its unit: m or rad.
+        /// Unit of the joint: m or rad.
         unit: &'static str,
-        /// m/s or rad/s.
+        /// Speed found, m/s or rad/s.
         found: f64,
-        /// m/s or rad/s.
+        /// Largest speed, m/s or rad/s.
         allowed: f64,
     },
-    /// A move whose time, or whose kinematics, is no number any more.
+    /// Duration or kinematics outside the range of floating-point numbers.
     #[error("move {index}: its duration cannot be computed ({found} s)")]
-    Unmeasurable {
-        /// From 1.
+    NotComputable {
+        /// Move, counted from 1.
         index: usize,
-        /// s.
+        /// Duration found, s.
         found: f64,
     },
-    /// Sampled setpoints that exceed a limit however slow the path is passed.
+    /// Sampled setpoints that exceed a limit at any feed.
     #[error(
         "move {index}, {} s: {quantity} of {joint} reaches {} {unit}/{}; allowed is {} {unit}/{}",
-        Told(*time),
-        Told(*found),
-        quantity.time(),
-        Told(*allowed),
-        quantity.time()
+        Rounded(*time),
+        Rounded(*found),
+        quantity.per_time(),
+        Rounded(*allowed),
+        quantity.per_time()
     )]
-    Exceeds {
-        /// From 1.
+    LimitExceeded {
+        /// Move, counted from 1.
         index: usize,
-        /// s.
+        /// Time, s.
         time: f64,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// Its unit: m or rad.
+        /// Unit of the joint: m or rad.
         unit: &'static str,
-        /// Which limit.
-        quantity: Quantity,
-        /// What was found.
+        /// Exceeded quantity.
+        quantity: SetpointDerivative,
+        /// Value found.
         found: f64,
-        /// What is allowed.
+        /// Limit.
         allowed: f64,
     },
 }

@@ -1,39 +1,39 @@
-//! Where two blocks meet: how fast it may be passed.
+//! Junctions of blocks: tangent continuity, curvature jumps and the permitted speed.
 
-use super::block::Derivatives;
-use super::profile::Limits;
+use super::derivatives::Derivatives;
+use super::profile::FeedLimits;
 use crate::config::LimitsConfig;
 
-/// Largest turn of the direction that still counts as tangent, rad, with speeds measured in Vmax: more
-/// than coordinates rounded to a micrometer make of an arc of a centimeter.
+/// Largest change of direction that counts as tangent, rad, with speeds normalized by Vmax: more than
+/// results from coordinates rounded to a micrometer on an arc of a centimeter.
 const TANGENT_TOLERANCE: f64 = 1e-4;
-/// Part of Jmax left to the jump of speed at a junction that is tangent but for rounding.
+/// Fraction of Jmax available for the speed jump at a junction that is tangent except for rounding.
 const TURN_SHARE: f64 = 0.25;
-/// Ratios of the two blocks' lengths that differ from 1 by less are 1.
+/// Tolerance within which the ratio of the two blocks' lengths is 1.
 const RATIO_TOLERANCE: f64 = 1e-9;
 
-/// A junction, in the speed at the end of what comes before it.
+/// A junction; its speed is that at the end of the block before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Junction {
-    /// Speed behind it over speed before it: the two lengths may count in different units.
+    /// Speed after the junction divided by speed before it: the two arc lengths may differ in unit.
     pub ratio: f64,
-    /// Largest speed for its own sake; 0 is an exact stop.
+    /// Largest speed that the junction permits; 0 is an exact stop.
     pub cap: f64,
-    /// Whether setpoints jump in their speed there, as permitted.
-    pub corner: bool,
+    /// True if the setpoint velocity jumps there, as permitted.
+    pub is_corner: bool,
 }
 
 impl Junction {
     /// An exact stop.
-    pub const STOP: Self = Self { ratio: 1.0, cap: 0.0, corner: false };
-    /// Inside a block: nothing changes.
-    pub const INSIDE: Self = Self { ratio: 1.0, cap: f64::INFINITY, corner: false };
+    pub const STOP: Self = Self { ratio: 1.0, cap: 0.0, is_corner: false };
+    /// A boundary of spans inside a block, without a discontinuity.
+    pub const INSIDE: Self = Self { ratio: 1.0, cap: f64::INFINITY, is_corner: false };
 
-    /// The junction between joints with the derivatives `before` and `after`.
+    /// Creates the junction between joints with the derivatives `before` and `after`.
     ///
-    /// Tangent continuous: the jump of acceleration of each joint, v² |Δq''|, is at most Jmax·Tsp; in
-    /// sampled setpoints it is a jerk over a period. Where the direction turns, `corner` is the
-    /// speed permitted, if any.
+    /// At a tangent-continuous junction the acceleration jump of each joint, v² |Δq''|, is at most
+    /// Jmax·Tsp; in sampled setpoints it is a jerk during one cycle. At a change of direction, `corner` is
+    /// the permitted speed, if any.
     pub fn new(
         before: &Derivatives,
         after: &Derivatives,
@@ -53,42 +53,43 @@ impl Junction {
         let turns: Vec<f64> =
             before.first.iter().zip(&after.first).map(|(before, after)| before - ratio * after).collect();
         let turn = size(&turns) / speed_before;
-        // Written so that NaN is no tangent.
+        // The comparison treats NaN as not tangent.
         let tangent = turn <= TANGENT_TOLERANCE;
         if !tangent {
             let cap = corner.unwrap_or(0.0);
-            return Self { ratio: 1.0, cap, corner: cap > 0.0 };
+            return Self { ratio: 1.0, cap, is_corner: cap > 0.0 };
         }
         let mut cap = f64::INFINITY;
         for (i, limits) in joints.iter().enumerate() {
-            let bend = (before.second[i] - ratio * ratio * after.second[i]).abs();
-            let by_bend = (limits.jerk * period / bend).sqrt();
+            let curvature_jump = (before.second[i] - ratio * ratio * after.second[i]).abs();
+            let by_curvature = (limits.jerk * period / curvature_jump).sqrt();
             let by_turn = TURN_SHARE * limits.jerk * period * period / turns[i].abs();
-            cap = cap.min(by_bend).min(by_turn);
+            cap = cap.min(by_curvature).min(by_turn);
         }
-        Self { ratio, cap, corner: false }
+        Self { ratio, cap, is_corner: false }
     }
 }
 
-/// Parts of a span's jerk that are tried where acceleration jumps at its end.
-const JERK_PARTS: [f64; 8] = [1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
-/// Places of the jump in the window of a third difference that are looked at, in periods from its middle.
-const PLACES: [f64; 11] = [-1.25, -1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25];
-/// Jumps of less than that part of Jmax·Tsp are left alone.
+/// Candidate jerks of the spans at an acceleration jump, as fractions.
+const JERK_FRACTIONS: [f64; 8] = [1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
+/// Positions of the jump in the window of a third difference, in cycles from its middle.
+const JUMP_OFFSETS: [f64; 11] = [-1.25, -1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25];
+/// Acceleration jumps below this fraction of Jmax·Tsp are ignored.
 const SMALL_JUMP: f64 = 1e-3;
 
-/// What a jump of curvature does to one joint, in parts of its Jmax.
-struct Jolt {
-    /// v² |Δq''| / Tsp.
+/// Effect of a curvature jump on one joint, as fractions of its Jmax.
+struct AccelerationJump {
+    /// Acceleration jump over a cycle, v² |Δq''| / Tsp.
     jump: f64,
-    /// Jerk before and after it that goes with the jerk along the path, and that goes with the speed.
+    /// Jerk before the jump: part proportional to the jerk along the path, and part from the speed.
     before: (f64, f64),
     after: (f64, f64),
 }
 
-/// A third difference over the period is the jerk, weighted by the quadratic B-spline over three
-/// periods: the weight of a jump of acceleration `x` periods from its middle, and the share of the
-/// window before it.
+/// Returns the weight of an acceleration jump `x` cycles from the middle of the window, and the share of
+/// the window before it.
+///
+/// A third difference over the cycle is the jerk weighted by the quadratic B-spline over three cycles.
 fn weights(x: f64) -> (f64, f64) {
     let tail = |x: f64| (1.5 - x).powi(3) / 6.0;
     if x.abs() <= 0.5 {
@@ -98,66 +99,69 @@ fn weights(x: f64) -> (f64, f64) {
     (0.5 * (1.5 - x.abs()).powi(2), share)
 }
 
-/// A joint that takes part in both, the jump of acceleration at a junction and the jerk along the path
-/// next to it, must share its Jmax: the speed of the junction and the jerk of both spans are reduced
-/// so that it does, in whatever way costs least.
+/// Reduces the junction speed and the jerk of both adjacent spans so that each joint keeps Jmax.
+///
+/// A joint with an acceleration jump at the junction and jerk along the path next to it shares its Jmax
+/// between both. The combination of least cost is selected.
 pub(super) fn share_jerk(
     junction: &mut Junction,
-    (before, earlier): (&Derivatives, &mut Limits),
-    (after, later): (&Derivatives, &mut Limits),
+    (before, earlier): (&Derivatives, &mut FeedLimits),
+    (after, later): (&Derivatives, &mut FeedLimits),
     joints: &[LimitsConfig],
     period: f64,
 ) {
     let ratio = junction.ratio;
     let speed = junction.cap.min(earlier.velocity).min(later.velocity / ratio);
-    let jolts: Vec<Jolt> = joints
+    let jumps: Vec<AccelerationJump> = joints
         .iter()
         .enumerate()
         .map(|(i, limits)| {
-            let bend = (before.second[i] - ratio * ratio * after.second[i]).abs();
+            let curvature_jump = (before.second[i] - ratio * ratio * after.second[i]).abs();
             let of = |derivatives: &Derivatives, jerk: f64, speed: f64| {
                 let along = derivatives.first[i].abs() * jerk / limits.jerk;
                 (along, derivatives.third[i].abs() * speed.powi(3) / limits.jerk)
             };
-            Jolt {
-                jump: speed * speed * bend / (limits.jerk * period),
+            AccelerationJump {
+                jump: speed * speed * curvature_jump / (limits.jerk * period),
                 before: of(before, earlier.jerk, speed),
                 after: of(after, later.jerk, speed * ratio),
             }
         })
         .collect();
-    let jolts: Vec<Jolt> = jolts.into_iter().filter(|jolt| jolt.jump > SMALL_JUMP).collect();
-    if jolts.is_empty() {
+    let jumps: Vec<AccelerationJump> =
+        jumps.into_iter().filter(|joint_jump| joint_jump.jump > SMALL_JUMP).collect();
+    if jumps.is_empty() {
         return;
     }
-    // Part of the jump that is left room for, with these parts of the jerks.
-    let room = |first: f64, second: f64| {
-        let left = |jolt: &Jolt, x: f64| {
+    // Admissible fraction of the jump for the given fractions of the two jerks.
+    let jump_share = |first: f64, second: f64| {
+        let left = |joint_jump: &AccelerationJump, x: f64| {
             let (weight, share) = weights(x);
-            let before = jolt.before.0 * first + jolt.before.1;
-            let after = jolt.after.0 * second + jolt.after.1;
-            (1.0 - share * before - (1.0 - share) * after) / (weight * jolt.jump)
+            let before = joint_jump.before.0 * first + joint_jump.before.1;
+            let after = joint_jump.after.0 * second + joint_jump.after.1;
+            (1.0 - share * before - (1.0 - share) * after) / (weight * joint_jump.jump)
         };
-        let all = jolts.iter().flat_map(|jolt| PLACES.map(|x| left(jolt, x)));
+        let all = jumps.iter().flat_map(|joint_jump| JUMP_OFFSETS.map(|x| left(joint_jump, x)));
         all.fold(1.0, f64::min)
     };
-    let mut best = (0.0, 1.0, 1.0, 0.0);
-    for first in JERK_PARTS {
-        for second in JERK_PARTS {
-            let jump = room(first, second);
-            let worth = jump * (first * second).sqrt();
-            if worth > best.3 {
-                best = (jump, first, second, worth);
+    let (mut best, mut best_merit) = ((0.0, 1.0, 1.0), 0.0);
+    for first in JERK_FRACTIONS {
+        for second in JERK_FRACTIONS {
+            let jump = jump_share(first, second);
+            let merit = jump * (first * second).sqrt();
+            if merit > best_merit {
+                (best, best_merit) = ((jump, first, second), merit);
             }
         }
     }
-    // No room at all: the setpoints will be looked at.
-    if best.3 > 0.0 {
-        if best.0 < 1.0 {
-            junction.cap = speed * best.0.sqrt();
+    // Without an admissible combination, the verification of the setpoints decides.
+    if best_merit > 0.0 {
+        let (jump, first, second) = best;
+        if jump < 1.0 {
+            junction.cap = speed * jump.sqrt();
         }
-        earlier.jerk *= best.1;
-        later.jerk *= best.2;
+        earlier.jerk *= first;
+        later.jerk *= second;
     }
 }
 

@@ -1,8 +1,8 @@
 //! Straight line.
 
-use super::block::Derivatives;
+use super::derivatives::Derivatives;
 
-/// A straight line by its length.
+/// A straight line, parametrized by arc length.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Line {
     /// Change of each coordinate per unit of length.

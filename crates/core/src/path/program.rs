@@ -1,81 +1,78 @@
-//! A path with its law of time.
+//! A path with its feed profiles: position setpoints over time.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use super::block::Block;
-use super::cosine::Cosine;
-use super::error::PlanError;
-use super::planner;
-use super::profile::Profile;
-use super::route::{Frame, Path};
-use crate::kinematics::Kinematics;
-use crate::trajectory::JointLimits;
-use crate::units::Nanoseconds;
+use super::cosine::CosineProfile;
+use super::geometry::Path;
+use super::profile::SpeedProfile;
 
-/// What a move may ask of the path besides the limits of the axes; along s, ∞ where there is none.
+/// Limits along s for one move, in addition to the axis limits; ∞ means no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathLimits {
-    /// m/s² or rad/s².
+    /// Largest acceleration along s, m/s² or rad/s².
     pub acceleration: f64,
-    /// m/s³ or rad/s³.
+    /// Largest jerk along s, m/s³ or rad/s³.
     pub jerk: f64,
 }
 
 impl Default for PathLimits {
-    /// None.
+    /// Returns infinite limits.
     fn default() -> Self {
         Self { acceleration: f64::INFINITY, jerk: f64::INFINITY }
     }
 }
 
-/// How the feed changes along a move.
+/// Feed profile of a move: feed over time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Law {
-    /// Within the limits of acceleration and jerk of path and axes.
+pub enum FeedProfile {
+    /// Jerk-limited profile within the acceleration and jerk limits of path and axes.
     JerkLimited,
-    /// From rest to rest, rising as v/2 (1 − cos(π t/ramp)), constant, falling likewise. The ramps,
-    /// v·ramp/2 each, are part of the block's length. As prescribed: only Vmax is checked.
+    /// Cosine ramps from rest to rest: rising as v/2 (1 − cos(π t/ramp)), constant, falling symmetrically.
+    /// Each ramp takes v·ramp/2 of the block's length. The profile is not adapted; only Vmax of the axes is
+    /// checked.
     Cosine {
-        /// s.
+        /// Duration of a ramp, s.
         ramp: f64,
     },
 }
 
-/// A block and how it is to be passed.
+/// A block with its feed, limits, feed profile and dwell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Move {
-    /// What is passed.
+    /// Geometry of the move.
     pub block: Block,
-    /// Largest speed along s, m/s or rad/s.
+    /// Programmed feed: largest speed along s, m/s or rad/s.
     pub feed: f64,
-    /// Speed along s permitted at the end of this move if the direction turns there; none: exact stop.
-    /// Setpoints jump in their velocity there, and at that instant no limit holds.
+    /// Speed along s permitted at the end of this move if the direction changes there; `None` is an exact
+    /// stop. The setpoint velocity is discontinuous there, and no limit holds at that instant.
     pub corner: Option<f64>,
-    /// Further limits.
+    /// Additional limits along the path.
     pub limits: PathLimits,
-    /// How the feed changes.
-    pub law: Law,
-    /// Time at rest after the move, s.
+    /// Feed profile.
+    pub profile: FeedProfile,
+    /// Dwell after the move, s.
     pub dwell: f64,
 }
 
 impl Move {
-    /// A move at `feed` with an exact stop at its end, no further limits and no dwell.
+    /// Creates a jerk-limited move at `feed` with an exact stop at its end, no additional limits and no
+    /// dwell.
     pub fn new(block: Block, feed: f64) -> Self {
         let limits = PathLimits::default();
-        Self { block, feed, corner: None, limits, law: Law::JerkLimited, dwell: 0.0 }
+        Self { block, feed, corner: None, limits, profile: FeedProfile::JerkLimited, dwell: 0.0 }
     }
 }
 
-/// The law of time of a span.
+/// Planned feed profile of a span.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum SpanLaw {
-    Jerk(Profile),
-    Cosine(Cosine),
+pub(super) enum SpanProfile {
+    Jerk(SpeedProfile),
+    Cosine(CosineProfile),
 }
 
-impl SpanLaw {
+impl SpanProfile {
     pub fn duration(&self) -> f64 {
         match self {
             Self::Jerk(profile) => profile.duration(),
@@ -91,105 +88,88 @@ impl SpanLaw {
     }
 }
 
-/// Part of a block passed by one law.
+/// Part of a block with one feed profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Span {
+pub(super) struct TimedSpan {
     pub block: usize,
     pub s_from: f64,
     pub s_to: f64,
-    /// s.
+    /// Start time, s.
     pub start: f64,
     pub end: f64,
-    pub law: SpanLaw,
+    pub profile: SpanProfile,
 }
 
-/// A path with its law of time: where it is when.
+/// A path with its feed profiles: position along the path over time.
 ///
-/// The feed is the largest such that no joint exceeds its speed, acceleration and jerk, nor the move
-/// its feed and its own limits; jerk and acceleration are constant within the phases of a move. On a
-/// straight line of the joints that is the fastest motion there is; on curves, limits are constant
-/// over spans of the path (see below) and the result is near the fastest.
+/// The feed is the largest for which no joint exceeds its speed, acceleration and jerk limits and the move
+/// does not exceed its feed and its own limits. Jerk and acceleration are piecewise constant. On a straight
+/// line in joint space the motion is time-optimal; on curves the limits are constant over spans of the path
+/// and the motion is close to the optimum.
 ///
-/// Junctions that are tangent continuous are passed at speed, at most at that of the slower move,
-/// without acceleration along the path, and slowly enough that the jump of curvature makes
-/// accelerations jump by Jmax·Tsp at most. Where the direction turns the path is left at rest, without
-/// a pause, unless [`Move::corner`] permits a speed.
+/// Tangent-continuous junctions are passed at speed, at most that of the slower move, without acceleration
+/// along the path, and slowly enough that the curvature jump causes an acceleration jump of at most
+/// Jmax·Tsp. At corners the path stops without a dwell unless [`Move::corner`] permits a speed.
 ///
-/// The setpoints that a controller gets are samples, one per position period: it is their first,
-/// second and third differences over the period, its square and its cube that keep the limits, to
-/// 10⁻⁶ relative; moves by a cosine law and corners passed at speed are excepted.
+/// The controllers receive setpoints sampled once per position cycle. The first, second and third
+/// differences of these samples over the cycle, its square and its cube keep the limits to 10⁻⁶ relative.
+/// Moves with a cosine profile and corners passed at speed are exempt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Program {
     pub(super) path: Arc<Path>,
-    pub(super) spans: Vec<Span>,
-    /// Place of the first span of each block; then the number of spans.
-    pub(super) first: Vec<usize>,
+    pub(super) spans: Vec<TimedSpan>,
+    /// Index of the first span of each block, followed by the number of spans.
+    pub(super) first_span: Vec<usize>,
     pub(super) duration: f64,
 }
 
 impl Program {
-    /// Plans the time law of `moves`, which begin after `rest` seconds, for joints with `limits` whose
-    /// setpoints come every `period` nanoseconds.
-    ///
-    /// Strokes are not looked at: that is the business of whoever moves the machine.
-    ///
-    /// # Errors
-    /// [`PlanError`], which names the move, from 1, the value and what is allowed.
-    pub fn plan(
-        kinematics: Kinematics,
-        frame: Frame,
-        limits: &[JointLimits],
-        period: Nanoseconds,
-        rest: f64,
-        moves: Vec<Move>,
-    ) -> Result<Self, PlanError> {
-        planner::plan(kinematics, frame, limits, period, rest, moves)
-    }
-
-    /// The path.
+    /// Returns the path.
     pub fn path(&self) -> &Arc<Path> {
         &self.path
     }
 
-    /// Time of everything, rests and dwells included, s.
+    /// Returns the total time including rests and dwells, s.
     pub fn duration(&self) -> f64 {
         self.duration
     }
 
-    /// Progress along the path at time `t`, s, clamped; it never decreases with time.
+    /// Returns the progress along the path at time `t`, s, clamped; monotonic in time.
     pub fn progress(&self, t: f64) -> f64 {
-        let (block, s) = self.place(t);
+        let (block, s) = self.locate(t);
         (self.path.start_of(block) + s).min(self.path.start_of(block + 1))
     }
 
-    /// The joints at time `t`, s, clamped, m or rad, into `out`: one value per joint.
+    /// Writes the position setpoints (PSEC) at time `t`, s, clamped, m or rad, into `out`: one value per
+    /// joint.
     pub fn psec(&self, t: f64, out: &mut [f64]) {
-        let (block, s) = self.place(t);
+        let (block, s) = self.locate(t);
         self.path.joints_in(block, s, out);
     }
 
-    /// When `block`, from 0, is executed, s, without the dwell after it; empty beyond the last.
-    pub fn span(&self, block: usize) -> Range<f64> {
-        let place = |i: usize| self.first.get(i).copied().unwrap_or(self.spans.len());
-        let spans = &self.spans[place(block)..place(block.saturating_add(1))];
+    /// Returns the time range of `block`, counted from 0, s, without the dwell after it; empty beyond the
+    /// last block.
+    pub fn time_range(&self, block: usize) -> Range<f64> {
+        let index = |i: usize| self.first_span.get(i).copied().unwrap_or(self.spans.len());
+        let spans = &self.spans[index(block)..index(block.saturating_add(1))];
         match (spans.first(), spans.last()) {
             (Some(first), Some(last)) => first.start..last.end,
             _ => self.duration..self.duration,
         }
     }
 
-    /// The place of the last span that starts not later than `t`; the first one before that.
-    pub(super) fn span_at(&self, t: f64) -> usize {
+    /// Returns the index of the last span that starts at or before `t`, or 0.
+    pub(super) fn span_index_at(&self, t: f64) -> usize {
         self.spans.partition_point(|span| span.start <= t).saturating_sub(1)
     }
 
-    /// Block and length in it at time `t`.
-    fn place(&self, t: f64) -> (usize, f64) {
-        let span = &self.spans[self.span_at(t)];
+    /// Returns the block and the arc length in it at time `t`.
+    fn locate(&self, t: f64) -> (usize, f64) {
+        let span = &self.spans[self.span_index_at(t)];
         let s = if t >= span.end {
             span.s_to
         } else {
-            (span.s_from + span.law.at(t - span.start)).min(span.s_to)
+            (span.s_from + span.profile.at(t - span.start)).min(span.s_to)
         };
         (span.block, s)
     }

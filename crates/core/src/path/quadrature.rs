@@ -3,11 +3,12 @@
 /// Positive nodes of the eight-point rule on [−1, 1] (Abramowitz and Stegun, table 25.4).
 const NODES: [f64; 4] =
     [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_2];
-/// Their weights.
+/// Weights of these nodes.
 const WEIGHTS: [f64; 4] =
     [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_48, 0.101_228_536_290_376_26];
 
-/// ∫ f from `from` to `to` by the eight-point rule, exact for polynomials of degree 15.
+/// Integrates f from `from` to `to` by the eight-point Gauss–Legendre rule, exact for polynomials of degree
+/// 15.
 pub(super) fn integrate(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let pairs = NODES.iter().zip(WEIGHTS);

@@ -1,46 +1,47 @@
-//! Blocks divided into spans, each with its own constant limits.
+//! Division of blocks into spans with constant feed limits.
 
-use super::block::Derivatives;
-use super::bounds::{Samples, fastest};
+use super::bounds::{Samples, fastest_limits};
 use super::curve::JointCurve;
-use super::profile::{Limits, Ramp};
+use super::derivatives::Derivatives;
+use super::profile::{FeedLimits, Ramp};
 use crate::config::LimitsConfig;
 use crate::units::REVOLUTION;
 
-/// Angle between two samples of an arc, rad: a 128th of a turn, so that the quadrants are among them.
+/// Angle between two samples of an arc, rad: a 128th of a turn, so that the quadrants are sampled.
 const ARC_STEP: f64 = REVOLUTION / 128.0;
-/// Cells into which a polynomial piece of a spline is divided: candidates for spans.
+/// Cells per polynomial piece of a spline: candidates for spans.
 const CELLS_OF_PIECE: usize = 4;
-/// Samples of a cell, without its end.
+/// Samples per cell, without its end.
 const SAMPLES_OF_CELL: usize = 6;
-/// Largest turn of the tables, or of an arc, in one cell of a path of the tip, rad.
+/// Largest rotation of the tables, or of an arc, in one cell of a workpiece path, rad.
 const TURN_OF_CELL: f64 = 0.25;
-/// Most cells of a block, whatever its turns: what is missed then is found when setpoints are checked.
+/// Largest number of cells of a block. Limits missed by the coarser sampling are found by the verification
+/// of the setpoints.
 const MAX_CELLS: usize = 2000;
-/// Merging two spans must not cost more than that part of their time.
+/// Largest relative increase in time accepted for merging two spans.
 const MERGE_COST: f64 = 1.01;
 
-/// A part of a block that is passed with constant limits.
+/// Part of a block with constant feed limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Draft {
+pub(super) struct SpanDraft {
     pub block: usize,
     pub s_from: f64,
     pub s_to: f64,
-    pub limits: Limits,
-    /// Whether the joints run along a straight line in it.
-    pub straight: bool,
+    pub limits: FeedLimits,
+    /// True if the joints move along a straight line.
+    pub is_straight: bool,
 }
 
-impl Draft {
+impl SpanDraft {
     pub fn length(&self) -> f64 {
         self.s_to - self.s_from
     }
 }
 
-/// Samples of a whole block.
+/// Returns samples of a whole block.
 pub(super) fn sample_block(curve: &mut JointCurve<'_>) -> Samples {
     let mut samples = Samples::default();
-    let cells = if let Some(places) = one_span(curve) { vec![places] } else { cells(curve) };
+    let cells = if let Some(samples_at) = single_cell(curve) { vec![samples_at] } else { cells(curve) };
     let mut derivatives = Derivatives::new(curve.block().joints());
     for cell in cells {
         sample(curve, &cell, &mut derivatives, &mut samples);
@@ -48,54 +49,54 @@ pub(super) fn sample_block(curve: &mut JointCurve<'_>) -> Samples {
     samples
 }
 
-/// A cell: the smooth piece that it lies in, and the places of its samples, both its ends among them.
+/// A cell: its smooth piece and the arc lengths of its samples, including both ends.
 struct Cell {
     piece: (f64, f64),
-    places: Vec<f64>,
+    samples_at: Vec<f64>,
 }
 
 impl Cell {
     fn ends(&self) -> (f64, f64) {
-        (self.places.first().copied().unwrap_or(0.0), self.places.last().copied().unwrap_or(0.0))
+        (self.samples_at.first().copied().unwrap_or(0.0), self.samples_at.last().copied().unwrap_or(0.0))
     }
 }
 
 fn sample(curve: &mut JointCurve<'_>, cell: &Cell, derivatives: &mut Derivatives, samples: &mut Samples) {
-    for &s in &cell.places {
+    for &s in &cell.samples_at {
         curve.derivatives(s, cell.piece, derivatives);
         samples.push(derivatives);
     }
 }
 
-/// The one cell of a straight line, or of an arc of the joints, which is as curved everywhere.
-fn one_span(curve: &JointCurve<'_>) -> Option<Cell> {
+/// Returns the single cell of a straight line, or of an arc in joint space, which has constant curvature.
+fn single_cell(curve: &JointCurve<'_>) -> Option<Cell> {
     let length = curve.block().length();
     let piece = (0.0, length);
     if curve.is_straight() {
-        return Some(Cell { piece, places: vec![0.0] });
+        return Some(Cell { piece, samples_at: vec![0.0] });
     }
-    let circle = curve.block().circle().filter(|_| !curve.is_bent())?;
+    let circle = curve.block().circle().filter(|_| !curve.has_moving_tables())?;
     let start = curve.block().start();
     let [x, y] = [0, 1].map(|i| start[circle.plane[i]] - circle.center[i]);
-    // Where the spoke points in multiples of the step, and from there on over one turn at most.
+    // Phase of the start radius in multiples of the step; one turn at most is sampled.
     let turns = (y.atan2(x) / ARC_STEP * circle.sweep.signum()).fract();
     let swept = circle.sweep.abs().min(REVOLUTION + ARC_STEP) / ARC_STEP;
     let per_step = length / (circle.sweep.abs() / ARC_STEP);
     let inner = (0..=swept.ceil() as usize).map(|i| (i as f64 - turns) * per_step);
-    let mut places: Vec<f64> = inner.filter(|s| *s > 0.0 && *s < length).collect();
-    places.insert(0, 0.0);
-    places.push(length);
-    Some(Cell { piece, places })
+    let mut samples_at: Vec<f64> = inner.filter(|s| *s > 0.0 && *s < length).collect();
+    samples_at.insert(0, 0.0);
+    samples_at.push(length);
+    Some(Cell { piece, samples_at })
 }
 
-/// The cells of any other block.
+/// Returns the cells of any other block.
 fn cells(curve: &JointCurve<'_>) -> Vec<Cell> {
     let block = curve.block();
     let knots = block.knots();
-    let turns = if curve.is_bent() {
+    let turns = if curve.has_moving_tables() {
         let sweep = block.circle().map_or(0.0, |circle| circle.sweep.abs());
         let steps = block.start().iter().zip(block.end()).map(|(start, end)| (end - start).abs());
-        // Tables and others alike: a path of the tip that turns by more than its tables do is a spline.
+        // All coordinates count: a workpiece path that turns by more than its tables is a spline.
         ((sweep + steps.fold(0.0, f64::max)) / TURN_OF_CELL).ceil().min(MAX_CELLS as f64) as usize
     } else {
         0
@@ -115,19 +116,19 @@ fn cells(curve: &JointCurve<'_>) -> Vec<Cell> {
         for cell in 0..per_piece {
             let parts = per_piece * SAMPLES_OF_CELL;
             let first = cell * SAMPLES_OF_CELL;
-            let places = (first..=first + SAMPLES_OF_CELL).map(|i| at(i, parts)).collect();
+            let samples_at = (first..=first + SAMPLES_OF_CELL).map(|i| at(i, parts)).collect();
             // Difference quotients need a piece not much longer than their cell.
             let piece = (at(cell, per_piece), at(cell + 1, per_piece));
-            cells.push(Cell { piece, places });
+            cells.push(Cell { piece, samples_at });
         }
     }
     cells
 }
 
-/// The first and the last smooth piece of a block, short enough for difference quotients.
+/// Returns the first and the last smooth piece of a block, short enough for difference quotients.
 pub(super) fn end_pieces(curve: &JointCurve<'_>) -> [(f64, f64); 2] {
     let whole = (0.0, curve.block().length());
-    if !curve.is_bent() {
+    if !curve.has_moving_tables() {
         let knots = curve.block().knots();
         return match knots.as_slice() {
             [first, second, .., before, last] => [(*first, *second), (*before, *last)],
@@ -138,24 +139,24 @@ pub(super) fn end_pieces(curve: &JointCurve<'_>) -> [(f64, f64); 2] {
     [cells.first(), cells.last()].map(|cell| cell.map_or(whole, |cell| cell.piece))
 }
 
-/// Divides a block into spans.
-pub(super) struct Divider<'a> {
+/// Divider of a block into spans.
+pub(super) struct SpanDivider<'a> {
     pub joints: &'a [LimitsConfig],
-    pub cap: Limits,
-    /// Length of the whole block.
+    pub cap: FeedLimits,
+    /// Arc length of the whole block, m or rad.
     pub length: f64,
 }
 
-impl Divider<'_> {
-    /// The spans of block `block`, in order; also its samples.
-    pub fn divide(&self, curve: &mut JointCurve<'_>, block: usize) -> Vec<Draft> {
+impl SpanDivider<'_> {
+    /// Returns the spans of block `block` in order.
+    pub fn divide(&self, curve: &mut JointCurve<'_>, block: usize) -> Vec<SpanDraft> {
         let mut samples = Samples::default();
         let mut derivatives = Derivatives::new(self.joints.len());
-        let straight = curve.is_straight();
-        if let Some(cell) = one_span(curve) {
+        let is_straight = curve.is_straight();
+        if let Some(cell) = single_cell(curve) {
             sample(curve, &cell, &mut derivatives, &mut samples);
-            let limits = fastest(samples.all(), self.joints, &self.cap, self.length);
-            return vec![Draft { block, s_from: 0.0, s_to: self.length, limits, straight }];
+            let limits = fastest_limits(samples.all(), self.joints, &self.cap, self.length);
+            return vec![SpanDraft { block, s_from: 0.0, s_to: self.length, limits, is_straight }];
         }
         let cells = cells(curve);
         for cell in &cells {
@@ -164,16 +165,16 @@ impl Divider<'_> {
         let per_cell = SAMPLES_OF_CELL + 1;
         let make = |from: usize, to: usize| {
             let rows = samples.range(from * per_cell, to * per_cell, self.joints.len());
-            let limits = fastest(rows, self.joints, &self.cap, self.length);
+            let limits = fastest_limits(rows, self.joints, &self.cap, self.length);
             let (s_from, s_to) = (cells[from].ends().0, cells[to - 1].ends().1);
-            Draft { block, s_from, s_to, limits, straight }
+            SpanDraft { block, s_from, s_to, limits, is_straight }
         };
         divide(0, cells.len(), &make)
     }
 }
 
-/// Time of passing `spans`, each at its speed, with what changes of speed cost.
-fn time(spans: &[Draft]) -> f64 {
+/// Returns the time for passing `spans`, each at its speed limit, with an estimate for the speed changes.
+fn time(spans: &[SpanDraft]) -> f64 {
     let passing: f64 = spans.iter().map(|span| span.length() / span.limits.velocity).sum();
     let changing = spans.windows(2).map(|pair| {
         let (a, b) = (pair[0].limits, pair[1].limits);
@@ -184,8 +185,9 @@ fn time(spans: &[Draft]) -> f64 {
     passing + changing.sum::<f64>()
 }
 
-/// Spans of cells `from` to `to`: those of its halves, or one if that is as good.
-fn divide(from: usize, to: usize, make: &impl Fn(usize, usize) -> Draft) -> Vec<Draft> {
+/// Returns the spans of the cells `from..to`: those of both halves, or a single one if its time is about
+/// the same.
+fn divide(from: usize, to: usize, make: &impl Fn(usize, usize) -> SpanDraft) -> Vec<SpanDraft> {
     let whole = vec![make(from, to)];
     if to - from <= 1 {
         return whole;

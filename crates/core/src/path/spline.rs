@@ -1,68 +1,68 @@
-//! Clamped uniform cubic B-spline by its arc length.
+//! Clamped uniform cubic B-spline, parametrized by arc length.
 
-use super::block::Derivatives;
+use super::derivatives::Derivatives;
 use super::error::PathError;
 use super::quadrature::integrate;
 use crate::config::AxisKind;
 
 /// Degree of the polynomials.
 const DEGREE: usize = 3;
-/// Coefficients of one.
+/// Number of coefficients of a polynomial.
 const COEFFICIENTS: usize = DEGREE + 1;
-/// Largest relative difference between the length of a stretch and that of its halves.
+/// Largest relative difference between the length of an interval and that of its halves.
 const LENGTH_TOLERANCE: f64 = 1e-13;
-/// Halvings of a piece after which it must have a cusp: where there is none, a few suffice.
+/// Bisections of a piece after which it is considered to have a cusp; a few suffice otherwise.
 const MAX_HALVINGS: u32 = 40;
-/// Smallest speed over the largest one; a spline slower than that stands still.
+/// Ratio of smallest to largest speed below which the spline is considered to have a cusp.
 const MIN_SPEED: f64 = 1e-9;
-/// Newton's steps for the parameter of a length; two or three suffice.
+/// Newton iterations for the parameter at an arc length; two or three suffice.
 const MAX_NEWTON: usize = 12;
 
-/// A stretch of a piece short enough for one quadrature.
+/// Interval of a piece that is short enough for one quadrature.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Stretch {
+struct ArcLengthInterval {
     piece: usize,
-    /// Parameter at both ends, 0 to 1 in the piece.
+    /// Parameter at the start of the interval, 0 to 1 in the piece.
     from: f64,
     to: f64,
-    /// Length at both ends.
+    /// Arc length at the start of the interval.
     s_from: f64,
     s_to: f64,
-    /// du/ds at both ends.
+    /// du/ds at the start of the interval.
     slope_from: f64,
     slope_to: f64,
 }
 
-/// Polynomial pieces, and the table of lengths along them.
+/// Polynomial pieces and their arc-length table.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spline {
     joints: usize,
-    /// Coefficients c0 to c3 of each coordinate of each piece, by its parameter from 0 to 1.
+    /// Coefficients c0 to c3 of each coordinate of each piece, for its parameter from 0 to 1.
     coefficients: Vec<[f64; COEFFICIENTS]>,
-    /// Coordinates that the length counts.
+    /// Coordinates included in the arc length.
     measured: Vec<usize>,
-    stretches: Vec<Stretch>,
+    intervals: Vec<ArcLengthInterval>,
 }
 
 impl Spline {
-    /// The spline and what its length counts.
+    /// Creates a spline; also returns the kind of its arc length.
     pub fn new(from: &[f64], points: &[Vec<f64>], kinds: &[AxisKind]) -> Result<(Self, AxisKind), PathError> {
         if points.len() < DEGREE {
             return Err(PathError::TooFewPoints { found: points.len(), needed: DEGREE });
         }
-        let moves = |place: &usize| points.iter().any(|point| point[*place] != from[*place]);
+        let moves = |index: &usize| points.iter().any(|point| point[*index] != from[*index]);
         let moving = |kind| -> Vec<usize> {
-            (0..kinds.len()).filter(|place| kinds[*place] == kind).filter(moves).collect()
+            (0..kinds.len()).filter(|index| kinds[*index] == kind).filter(moves).collect()
         };
         let (mut measured, mut kind) = (moving(AxisKind::Linear), AxisKind::Linear);
         if measured.is_empty() {
             (measured, kind) = (moving(AxisKind::Rotary), AxisKind::Rotary);
         }
         if measured.is_empty() {
-            return Err(PathError::StandsStill);
+            return Err(PathError::ZeroLength);
         }
         let joints = kinds.len();
-        let mut spline = Self { joints, coefficients: pieces(from, points), measured, stretches: Vec::new() };
+        let mut spline = Self { joints, coefficients: pieces(from, points), measured, intervals: Vec::new() };
         spline.measure()?;
         Ok((spline, kind))
     }
@@ -75,36 +75,35 @@ impl Spline {
         &self.coefficients[piece * self.joints..(piece + 1) * self.joints]
     }
 
-    /// ds/du.
+    /// Returns ds/du.
     fn speed(&self, piece: usize, u: f64) -> f64 {
         let coefficients = self.piece(piece);
-        let square = |place: &usize| {
-            let c = &coefficients[*place];
+        let square = |index: &usize| {
+            let c = &coefficients[*index];
             let d = c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]);
             d * d
         };
         self.measured.iter().map(square).sum::<f64>().sqrt()
     }
 
-    fn stretch_length(&self, piece: usize, from: f64, to: f64) -> f64 {
+    fn arc_length(&self, piece: usize, from: f64, to: f64) -> f64 {
         integrate(from, to, |u| self.speed(piece, u))
     }
 
-    /// Makes the table of lengths.
+    /// Computes the arc-length table.
     fn measure(&mut self) -> Result<(), PathError> {
         let pieces = self.pieces();
         let mut s = 0.0;
         for piece in 0..pieces {
             let cusp = PathError::Cusp { piece: piece + 1, pieces };
-            // Depth-first, left half on top, so that stretches come out in order.
-            let mut stack = vec![(0.0, 1.0, self.stretch_length(piece, 0.0, 1.0), 0)];
+            // Depth-first, left half on top, so that intervals are produced in order.
+            let mut stack = vec![(0.0, 1.0, self.arc_length(piece, 0.0, 1.0), 0)];
             while let Some((from, to, whole, depth)) = stack.pop() {
                 let middle = 0.5 * (from + to);
-                let halves =
-                    [self.stretch_length(piece, from, middle), self.stretch_length(piece, middle, to)];
+                let halves = [self.arc_length(piece, from, middle), self.arc_length(piece, middle, to)];
                 let length = halves[0] + halves[1];
                 if !length.is_finite() {
-                    return Err(PathError::Unmeasurable { length });
+                    return Err(PathError::NotComputable { length });
                 }
                 if (length - whole).abs() > LENGTH_TOLERANCE * length {
                     if depth == MAX_HALVINGS {
@@ -116,63 +115,71 @@ impl Spline {
                 }
                 let (slope_from, slope_to) = (1.0 / self.speed(piece, from), 1.0 / self.speed(piece, to));
                 let (s_from, s_to) = (s, s + length);
-                self.stretches.push(Stretch { piece, from, to, s_from, s_to, slope_from, slope_to });
+                self.intervals.push(ArcLengthInterval {
+                    piece,
+                    from,
+                    to,
+                    s_from,
+                    s_to,
+                    slope_from,
+                    slope_to,
+                });
                 s = s_to;
             }
         }
-        let fastest = self.stretches.iter().map(|stretch| stretch.slope_from.min(stretch.slope_to));
+        let fastest = self.intervals.iter().map(|interval| interval.slope_from.min(interval.slope_to));
         let bound = fastest.fold(f64::INFINITY, f64::min) / MIN_SPEED;
-        // Written so that NaN is a cusp too.
-        let stands = |stretch: &&Stretch| {
-            let slow = stretch.slope_from.max(stretch.slope_to);
+        // The comparison treats NaN as a cusp.
+        let has_cusp = |interval: &&ArcLengthInterval| {
+            let slow = interval.slope_from.max(interval.slope_to);
             !slow.is_finite() || slow > bound
         };
-        match self.stretches.iter().find(stands) {
-            Some(stretch) => Err(PathError::Cusp { piece: stretch.piece + 1, pieces }),
+        match self.intervals.iter().find(has_cusp) {
+            Some(interval) => Err(PathError::Cusp { piece: interval.piece + 1, pieces }),
             None if s > 0.0 => Ok(()),
-            None => Err(PathError::StandsStill),
+            None => Err(PathError::ZeroLength),
         }
     }
 
     pub fn length(&self) -> f64 {
-        self.stretches.last().map_or(0.0, |stretch| stretch.s_to)
+        self.intervals.last().map_or(0.0, |interval| interval.s_to)
     }
 
-    pub fn keeps(&self, place: usize) -> bool {
+    pub fn is_constant(&self, index: usize) -> bool {
         (0..self.pieces()).all(|piece| {
-            let c = &self.piece(piece)[place];
+            let c = &self.piece(piece)[index];
             c[1] == 0.0 && c[2] == 0.0 && c[3] == 0.0
         })
     }
 
-    /// Lengths at the borders of the pieces, both ends of the spline among them.
+    /// Returns the arc lengths at the piece boundaries, including both ends of the spline.
     pub fn knots(&self) -> Vec<f64> {
-        let starts = self.stretches.iter().filter(|stretch| stretch.from == 0.0);
-        starts.map(|stretch| stretch.s_from).chain([self.length()]).collect()
+        let starts = self.intervals.iter().filter(|interval| interval.from == 0.0);
+        starts.map(|interval| interval.s_from).chain([self.length()]).collect()
     }
 
-    /// Piece and parameter at the length `s`.
+    /// Returns the piece and the parameter at arc length `s`.
     fn locate(&self, s: f64) -> (usize, f64) {
-        let place = self.stretches.partition_point(|stretch| stretch.s_to <= s);
-        let stretch = &self.stretches[place.min(self.stretches.len() - 1)];
-        let (length, target) = (stretch.s_to - stretch.s_from, s - stretch.s_from);
-        let width = stretch.to - stretch.from;
-        // Hermite's cubic through both ends of u(s).
+        let index = self.intervals.partition_point(|interval| interval.s_to <= s);
+        let interval = &self.intervals[index.min(self.intervals.len() - 1)];
+        let (length, target) = (interval.s_to - interval.s_from, s - interval.s_from);
+        let width = interval.to - interval.from;
+        // Initial value: cubic Hermite interpolation of u(s).
         let x = (target / length).clamp(0.0, 1.0);
-        let (m0, m1) = (stretch.slope_from * length, stretch.slope_to * length);
+        let (m0, m1) = (interval.slope_from * length, interval.slope_to * length);
         let cubic = x * (m0 + x * (3.0 * width - 2.0 * m0 - m1 + x * (m0 + m1 - 2.0 * width)));
-        let mut u = (stretch.from + cubic).clamp(stretch.from, stretch.to);
+        let mut u = (interval.from + cubic).clamp(interval.from, interval.to);
         for _ in 0..MAX_NEWTON {
-            let missing = target - self.stretch_length(stretch.piece, stretch.from, u);
-            let step = missing / self.speed(stretch.piece, u);
-            let next = (u + step).clamp(stretch.from, stretch.to);
+            let missing = target - self.arc_length(interval.piece, interval.from, u);
+            let step = missing / self.speed(interval.piece, u);
+            let next = (u + step).clamp(interval.from, interval.to);
             let small = (next - u).abs() <= NEWTON_TOLERANCE * width;
             u = next;
             if small {
                 break;
             }
         }
-        (stretch.piece, u)
+        (interval.piece, u)
     }
 
     pub fn point(&self, s: f64, out: &mut [f64]) {
@@ -182,7 +189,7 @@ impl Spline {
         }
     }
 
-    /// By the chain rule through u(s), with σ = ds/du:
+    /// Computes the derivatives with respect to s by the chain rule through u(s), with σ = ds/du:
     ///
     /// ```text
     /// u' = 1/σ      u'' = −σ_u/σ³      u''' = (3 σ_u² − σ σ_uu)/σ⁵
@@ -195,8 +202,8 @@ impl Spline {
             (first, 2.0 * c[2] + u * 6.0 * c[3], 6.0 * c[3])
         };
         let (mut squares, mut mixed, mut curved) = (0.0, 0.0, 0.0);
-        for &place in &self.measured {
-            let (first, second, third) = by_u(&coefficients[place]);
+        for &index in &self.measured {
+            let (first, second, third) = by_u(&coefficients[index]);
             squares += first * first;
             mixed += first * second;
             curved += second * second + first * third;
@@ -216,26 +223,26 @@ impl Spline {
     }
 }
 
-/// Newton's steps smaller than that, relative to the stretch, are rounding.
+/// Relative tolerance of Newton's method.
 const NEWTON_TOLERANCE: f64 = 1e-9;
 
-/// The polynomials of each piece: control points → Bézier points by blossoming → powers.
+/// Returns the polynomials of each piece: control points → Bézier points by blossoming → power basis.
 fn pieces(from: &[f64], points: &[Vec<f64>]) -> Vec<[f64; COEFFICIENTS]> {
     let count = points.len() + 1 - DEGREE;
-    let control = |i: usize, place: usize| if i == 0 { from[place] } else { points[i - 1][place] };
+    let control = |i: usize, index: usize| if i == 0 { from[index] } else { points[i - 1][index] };
     // Uniform knots 0, 1, …, count, the outer ones repeated.
     let knot = |i: usize| i.saturating_sub(DEGREE).min(count) as f64;
     let mut coefficients = Vec::with_capacity(count * from.len());
     let still: Vec<bool> =
-        (0..from.len()).map(|place| points.iter().all(|point| point[place] == from[place])).collect();
+        (0..from.len()).map(|index| points.iter().all(|point| point[index] == from[index])).collect();
     for piece in 0..count {
-        for place in 0..from.len() {
-            if still[place] {
-                coefficients.push([from[place], 0.0, 0.0, 0.0]);
+        for index in 0..from.len() {
+            if still[index] {
+                coefficients.push([from[index], 0.0, 0.0, 0.0]);
                 continue;
             }
             let blossom = |arguments: [f64; DEGREE]| {
-                let mut d: [f64; COEFFICIENTS] = std::array::from_fn(|i| control(piece + i, place));
+                let mut d: [f64; COEFFICIENTS] = std::array::from_fn(|i| control(piece + i, index));
                 for (level, t) in arguments.iter().enumerate() {
                     for i in (level + 1..COEFFICIENTS).rev() {
                         let (left, right) = (knot(piece + i), knot(piece + i + DEGREE - level));

@@ -1,85 +1,89 @@
-//! The promise of a program, looked at in its own setpoints.
+//! Verification of sampled setpoints against the joint limits.
 
-use super::error::Quantity;
+use super::error::SetpointDerivative;
 use super::program::Program;
 use crate::config::LimitsConfig;
 use crate::trajectory::limits::SPEED_TOLERANCE;
 use crate::units::{Nanoseconds, seconds};
 
-/// Excess that is let through, relative: what the program promises.
+/// Relative tolerance for acceleration and jerk, as documented at [`Program`].
 const TOLERANCE: f64 = 1e-6;
-/// The same for speeds, half of what trajectories are let through with.
+/// Relative tolerance for speed: half of the tolerance of trajectory validation.
 const VELOCITY_TOLERANCE: f64 = 0.5 * SPEED_TOLERANCE;
-/// Roundings of a position and of a time that a difference may add up.
+/// Rounding errors of position and time, in units of ε, that a difference may accumulate.
 const ROUNDINGS: f64 = 16.0;
-/// Instants up to which a program is looked at entirely: more than an hour and a half at 6 ms. Of a longer one each span
-/// has its share, half from its start, half up to its end: in between the feed is constant.
+/// Number of instants up to which a program is checked completely: more than an hour and a half at 6 ms. In
+/// a longer program each span gets an equal share, half at its start and half at its end; in between, the
+/// feed is constant.
 const MAX_INSTANTS: u64 = 1_000_000;
-/// Least share.
+/// Smallest share per span, instants.
 const MIN_SHARE: u64 = 64;
-/// Setpoints that the highest difference needs.
+/// Number of setpoints in the third difference.
 const WINDOW: usize = 4;
 
-/// What the verification must know of a span and of the junction after it.
+/// Properties of a span and of the junction after it that the verification needs.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Nature {
-    /// The limits hold by construction: the joints run along a straight line.
-    pub straight: bool,
-    /// The limits need not hold.
-    pub exempt: bool,
-    /// Acceleration jumps at the junction after it.
-    pub jumps: bool,
-    /// Speed jumps there, as permitted.
-    pub corner: bool,
+pub(super) struct SpanProperties {
+    /// The joints move along a straight line, so the limits hold by construction.
+    pub is_straight: bool,
+    /// The span is exempt from the limits.
+    pub is_exempt: bool,
+    /// The acceleration jumps at the junction after the span.
+    pub has_jump: bool,
+    /// The speed jumps at the junction after the span, as permitted.
+    pub is_corner: bool,
 }
 
-/// The largest excess that was found.
+/// The largest limit violation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Excess {
     pub span: usize,
-    /// s.
+    /// Time of the violation, s.
     pub time: f64,
     pub joint: usize,
-    pub quantity: Quantity,
-    /// What was found over what is allowed.
+    pub quantity: SetpointDerivative,
+    /// Value found divided by the limit.
     pub ratio: f64,
     pub allowed: f64,
 }
 
-/// By how much spans and junctions are to be slowed; 1 where not at all.
+/// Reduction factors of spans and junctions, 1 for none, and the largest violation.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Finding {
-    pub spans: Vec<f64>,
-    pub junctions: Vec<f64>,
+pub(super) struct LimitViolations {
+    pub span_factors: Vec<f64>,
+    pub junction_factors: Vec<f64>,
     pub worst: Option<Excess>,
 }
 
-/// Looks at the setpoints of `program`, `period` apart, wherever limits do not hold by construction:
-/// three differences of each joint against its limits. What is blamed for an excess is a junction
-/// where acceleration jumps, or else the curves near it, or with `strict` everything near it. The
-/// memory needed is that of the spans, whatever the duration.
+/// Checks the setpoints of `program`, `period` apart, against the joint limits wherever these do not hold
+/// by construction.
+///
+/// Compares first, second and third differences. A violation is attributed to a junction with an
+/// acceleration jump, otherwise to the curves near it, or with `strict` to everything near it. The memory
+/// used depends on the number of spans, not on the duration.
 pub(super) fn verify(
     program: &Program,
-    natures: &[Nature],
+    properties: &[SpanProperties],
     joints: &[LimitsConfig],
     period: Nanoseconds,
     strict: bool,
-) -> Finding {
+) -> LimitViolations {
     let mut verifier = Verifier {
         program,
-        natures,
+        properties,
         joints,
         period,
         strict,
         window: std::array::from_fn(|_| (0, vec![0.0; joints.len()])),
-        finding: Finding {
-            spans: vec![1.0; natures.len()],
-            junctions: vec![1.0; natures.len()],
+        violations: LimitViolations {
+            span_factors: vec![1.0; properties.len()],
+            junction_factors: vec![1.0; properties.len()],
             worst: None,
         },
     };
     let count = |t: f64| (t / seconds(period)) as u64;
-    let curved = || program.spans.iter().zip(natures).filter(|(_, nature)| !nature.straight || nature.jumps);
+    let curved =
+        || program.spans.iter().zip(properties).filter(|(_, span)| !span.is_straight || span.has_jump);
     let ranges =
         curved().map(|(span, _)| (count(span.start) + 1, count(span.end).saturating_add(WINDOW as u64)));
     let total = ranges.clone().fold(0_u64, |total, (from, to)| total.saturating_add(to - from));
@@ -91,58 +95,58 @@ pub(super) fn verify(
     for (from, to) in ranges {
         let from = from.max(next);
         if to.saturating_sub(from) > share {
-            verifier.look(from, from + share / 2);
-            verifier.look(to - share / 2, to);
+            verifier.check_instants(from, from + share / 2);
+            verifier.check_instants(to - share / 2, to);
         } else {
-            verifier.look(from, to);
+            verifier.check_instants(from, to);
         }
         next = next.max(to);
     }
-    verifier.finding
+    verifier.violations
 }
 
 struct Verifier<'a> {
     program: &'a Program,
-    natures: &'a [Nature],
+    properties: &'a [SpanProperties],
     joints: &'a [LimitsConfig],
     period: Nanoseconds,
     strict: bool,
-    /// Span and setpoints of the last instants.
+    /// Span index and setpoints of the latest instants.
     window: [(usize, Vec<f64>); WINDOW],
-    finding: Finding,
+    violations: LimitViolations,
 }
 
 impl Verifier<'_> {
-    /// Looks at instants `from` to `to`, the latter excluded, with those before.
-    fn look(&mut self, from: u64, to: u64) {
+    /// Checks the instants `from..to`, using the instants before them.
+    fn check_instants(&mut self, from: u64, to: u64) {
         for k in (from.saturating_sub(WINDOW as u64 - 1)..to).take_while(|_| from < to) {
-            // An instant that cannot be counted has no setpoint.
+            // An instant whose time overflows has no setpoint.
             let count = i64::try_from(k).ok().and_then(|k| k.checked_mul(self.period));
             let Some(t) = count.map(seconds) else { return };
             self.window.rotate_left(1);
             let (span, joints) = &mut self.window[WINDOW - 1];
-            *span = self.program.span_at(t);
+            *span = self.program.span_index_at(t);
             self.program.psec(t, joints);
             if k == 0 {
-                // Before its first setpoint the machine stands there.
+                // The machine rests at the first setpoint before the program starts.
                 let first = self.window[WINDOW - 1].clone();
                 self.window.fill(first);
             }
             if k >= from {
-                self.compare(t);
+                self.check_limits(t);
             }
         }
     }
 
-    fn compare(&mut self, t: f64) {
+    fn check_limits(&mut self, t: f64) {
         let period = seconds(self.period);
         for (joint, limits) in self.joints.iter().enumerate() {
             let [a, b, c, d] = std::array::from_fn(|i| self.window[i].1[joint]);
             let rounding = ROUNDINGS * f64::EPSILON * (a.abs().max(d.abs()) + t * ((d - a) / period).abs());
             let orders = [
-                (Quantity::Speed, d - c, limits.velocity, 1, VELOCITY_TOLERANCE),
-                (Quantity::Acceleration, d - 2.0 * c + b, limits.acceleration, 2, TOLERANCE),
-                (Quantity::Jerk, d - 3.0 * (c - b) - a, limits.jerk, 3, TOLERANCE),
+                (SetpointDerivative::Speed, d - c, limits.velocity, 1, VELOCITY_TOLERANCE),
+                (SetpointDerivative::Acceleration, d - 2.0 * c + b, limits.acceleration, 2, TOLERANCE),
+                (SetpointDerivative::Jerk, d - 3.0 * (c - b) - a, limits.jerk, 3, TOLERANCE),
             ];
             for (quantity, difference, allowed, order, tolerance) in orders {
                 let found = (difference.abs() - rounding).max(0.0) / period.powi(order);
@@ -150,32 +154,32 @@ impl Verifier<'_> {
                 if ratio > 1.0 + tolerance {
                     let (from, to) = (self.window[WINDOW - 1 - order as usize].0, self.window[WINDOW - 1].0);
                     let excess = Excess { span: to, time: t, joint, quantity, ratio, allowed };
-                    self.blame(from, to, order, excess);
+                    self.attribute(from, to, order, excess);
                 }
             }
         }
     }
 
-    /// Notes who is to be slowed for `excess` in the spans `from` to `to`.
-    fn blame(&mut self, from: usize, to: usize, order: i32, excess: Excess) {
-        let (spans, borders) = (&self.natures[from..=to], &self.natures[from..to]);
-        if spans.iter().any(|span| span.exempt) || borders.iter().any(|border| border.corner) {
+    /// Records reduction factors for `excess` in the spans `from` to `to`.
+    fn attribute(&mut self, from: usize, to: usize, order: i32, excess: Excess) {
+        let (spans, junctions) = (&self.properties[from..=to], &self.properties[from..to]);
+        if spans.iter().any(|span| span.is_exempt) || junctions.iter().any(|junction| junction.is_corner) {
             return;
         }
-        if self.finding.worst.is_none_or(|worst| worst.ratio < excess.ratio) {
-            self.finding.worst = Some(excess);
+        if self.violations.worst.is_none_or(|worst| worst.ratio < excess.ratio) {
+            self.violations.worst = Some(excess);
         }
-        let pace = excess.ratio.powf(-1.0 / f64::from(order));
-        let slow = |paces: &mut [f64], blamed: &dyn Fn(&Nature) -> bool| {
-            for (slowed, _) in paces.iter_mut().zip(spans).filter(|(_, nature)| blamed(nature)) {
-                *slowed = slowed.min(pace);
+        let factor = excess.ratio.powf(-1.0 / f64::from(order));
+        let slow = |factors: &mut [f64], is_cause: &dyn Fn(&SpanProperties) -> bool| {
+            for (slowed, _) in factors.iter_mut().zip(spans).filter(|(_, span)| is_cause(span)) {
+                *slowed = slowed.min(factor);
             }
         };
-        slow(&mut self.finding.junctions[from..to], &|border| border.jumps);
-        if borders.iter().any(|border| border.jumps) && !self.strict {
+        slow(&mut self.violations.junction_factors[from..to], &|junction| junction.has_jump);
+        if junctions.iter().any(|junction| junction.has_jump) && !self.strict {
             return;
         }
-        let all = self.strict || spans.iter().all(|span| span.straight);
-        slow(&mut self.finding.spans[from..=to], &|span| all || !span.straight);
+        let all = self.strict || spans.iter().all(|span| span.is_straight);
+        slow(&mut self.violations.span_factors[from..=to], &|span| all || !span.is_straight);
     }
 }

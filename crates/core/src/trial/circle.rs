@@ -1,4 +1,4 @@
-//! Circularity of the circles of a program.
+//! Circularity (ISO 230-4) of the circles of a program.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -8,21 +8,21 @@ use crate::config::{AxisKind, MachineConfig};
 use crate::path::{Circle, Program};
 
 use super::figures::{BidirectionalFigures, CircleFigures};
-use super::windows::steady_circle;
+use super::path_features::steady_window;
 
-/// Most circles that are told one by one.
-const MOST: usize = 100;
-/// Points of a circle that are kept for its polar plot: every tick of 16 s at 125 µs.
-const TRACE: usize = 1 << 17;
-/// Circles of which points are kept.
-const TRACED: usize = 8;
-/// Circles within this of each other are the same one, m.
-const SAME: f64 = 1e-9;
+/// Largest number of circles reported individually.
+const MAX_COUNT: usize = 100;
+/// Largest number of points kept for the polar plot of a circle: every tick of 16 s at 125 µs.
+const MAX_TRACE_POINTS: usize = 1 << 17;
+/// Number of circles whose points are kept.
+const MAX_TRACES: usize = 8;
+/// Tolerance within which two circles are the same, m.
+const SAME_CIRCLE_TOLERANCE: f64 = 1e-9;
 
-/// One circle at steady feed.
+/// One circle at constant feed.
 #[derive(Debug, Clone)]
-struct Steady {
-    /// Move, from 0.
+struct SteadyCircle {
+    /// Move, counted from 0.
     index: usize,
     window: Range<f64>,
     circle: Circle,
@@ -30,43 +30,44 @@ struct Steady {
     trace: CircleTrace,
 }
 
-/// The circles of a program, in order.
+/// Circles of a program, in order.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Circles {
-    list: Vec<Steady>,
-    /// The first whose window is not over.
+    list: Vec<SteadyCircle>,
+    /// Index of the first circle whose window has not ended.
     next: usize,
-    /// Whole circles behind those of the list.
+    /// Number of whole circles beyond those of the list.
     more: usize,
 }
 
 impl Circles {
     pub(super) fn of(program: &Program, machine: &MachineConfig) -> Self {
         let axes = machine.axes();
-        let is_linear = |place: &usize| axes[*place].kind() == AxisKind::Linear;
+        let is_linear = |index: &usize| axes[*index].kind() == AxisKind::Linear;
         let blocks = program.path().blocks().iter().enumerate();
         let mut circles = blocks.filter_map(|(index, block)| {
             Some((index, block.circle().filter(|circle| circle.plane.iter().all(is_linear))?))
         });
         let steady = |(index, circle): (usize, Circle)| {
             let plane = circle.plane;
-            let window = steady_circle(program, index)?;
+            let window = steady_window(program, index)?;
             let trace = CircleTrace {
-                plane: plane.map(|place| axes[place].name().to_owned()),
+                plane: plane.map(|index| axes[index].name().to_owned()),
                 radius: circle.radius,
                 counterclockwise: circle.sweep > 0.0,
                 angle: Vec::new(),
                 deviation: Vec::new(),
             };
             let assessor = CircleAssessor::new(circle.center, circle.radius);
-            Some(Steady { index, window, circle, assessor, trace })
+            Some(SteadyCircle { index, window, circle, assessor, trace })
         };
-        let list = circles.by_ref().filter_map(steady).take(MOST).collect();
+        let list = circles.by_ref().filter_map(steady).take(MAX_COUNT).collect();
         let more = circles.filter(|(_, circle)| circle.sweep.abs() >= TAU).count();
         Circles { list, next: 0, more }
     }
 
-    /// Takes where the axes are at `times`, s, into account: `coordinates` has the programmed ones of an axis.
+    /// Adds the axis positions at `times`, s; `coordinates` returns the programmed coordinate of an axis at
+    /// these times.
     pub(super) fn observe<'m>(
         &mut self,
         times: &[f64],
@@ -82,8 +83,8 @@ impl Circles {
                 return;
             };
             if steady.window.contains(time) {
-                let [u, v] = steady.circle.plane.map(|place| coordinates(place)[tick]);
-                steady.push(u, v, record && self.next < TRACED);
+                let [u, v] = steady.circle.plane.map(|index| coordinates(index)[tick]);
+                steady.push(u, v, record && self.next < MAX_TRACES);
             }
         }
     }
@@ -105,12 +106,12 @@ impl Circles {
         figures.collect()
     }
 
-    /// Whole circles of which nothing is measured.
+    /// Returns the number of whole circles that are not evaluated.
     pub(super) fn more(&self) -> usize {
         self.more
     }
 
-    /// Each circle that was run in both directions.
+    /// Returns the figures of each circle that is run in both directions.
     pub(super) fn bidirectional(&self) -> Vec<BidirectionalFigures> {
         let mut pairs = Vec::new();
         for (i, first) in self.list.iter().enumerate() {
@@ -132,11 +133,11 @@ impl Circles {
     }
 }
 
-impl Steady {
-    /// Adds a point; `record` keeps it for the plot.
+impl SteadyCircle {
+    /// Adds a point and, with `record`, keeps it for the plot.
     fn push(&mut self, u: f64, v: f64, record: bool) {
         let deviation = self.assessor.push(u, v);
-        if record && self.trace.angle.len() < TRACE {
+        if record && self.trace.angle.len() < MAX_TRACE_POINTS {
             let [cu, cv] = self.circle.center;
             let angle = (v - cv).atan2(u - cu);
             let angle = match self.trace.angle.last() {
@@ -148,12 +149,12 @@ impl Steady {
         }
     }
 
-    fn is_reverse_of(&self, other: &Steady) -> bool {
+    fn is_reverse_of(&self, other: &SteadyCircle) -> bool {
         let (a, b) = (&self.circle, &other.circle);
         a.plane == b.plane
             && (a.sweep > 0.0) != (b.sweep > 0.0)
-            && (a.radius - b.radius).abs() < SAME
-            && (a.center[0] - b.center[0]).hypot(a.center[1] - b.center[1]) < SAME
+            && (a.radius - b.radius).abs() < SAME_CIRCLE_TOLERANCE
+            && (a.center[0] - b.center[0]).hypot(a.center[1] - b.center[1]) < SAME_CIRCLE_TOLERANCE
     }
 }
 
@@ -162,22 +163,23 @@ mod tests {
     use super::*;
     use crate::config::Parameters;
     use crate::kinematics::Kinematics;
-    use crate::path::{Block, Frame, Law, Move};
-    use crate::simulation::joints;
+    use crate::path::{Block, FeedProfile, Frame, Move};
+    use crate::simulation::joint_limits;
 
     #[test]
-    fn circles_that_are_not_measured_are_counted() {
+    fn circles_beyond_the_maximum_are_counted() {
         let machine = Parameters::embedded_default().and_then(|p| p.machine_config()).expect("valid");
         let kinds: Vec<AxisKind> = machine.axes().iter().map(|axis| axis.kind()).collect();
         let (from, turns) = ([0.0; 5], 2.0);
         let block = Block::arc(&from, [0, 1], [-0.01, 0.0], turns * 2.0 * PI, &from, &kinds).expect("an arc");
-        let circle = Move { law: Law::Cosine { ramp: 0.1 }, ..Move::new(block, 0.05) };
+        let circle = Move { profile: FeedProfile::Cosine { ramp: 0.1 }, ..Move::new(block, 0.05) };
         let period = machine.periods().position;
-        for (count, measured, more) in [(MOST, MOST, 0), (MOST + 3, MOST, 3)] {
+        for (count, measured, more) in [(MAX_COUNT, MAX_COUNT, 0), (MAX_COUNT + 3, MAX_COUNT, 3)] {
             let moves = vec![circle.clone(); count];
             let kinematics = Kinematics::new(&machine);
-            let program = Program::plan(kinematics, Frame::Joints, &joints(&machine, ""), period, 0.0, moves)
-                .expect("the machine can do it");
+            let program =
+                Program::plan(kinematics, Frame::Joints, &joint_limits(&machine, ""), period, 0.0, moves)
+                    .expect("the machine can do it");
             let circles = Circles::of(&program, &machine);
             assert_eq!((circles.list.len(), circles.more()), (measured, more), "{count} circles");
         }

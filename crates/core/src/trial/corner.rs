@@ -1,25 +1,25 @@
-//! Contour error around the corners of a path.
+//! Contour error at the corners of a path.
 
 use crate::config::MachineConfig;
 use crate::path::Program;
 use crate::units::seconds;
 
 use super::figures::CornerFigures;
-use super::windows::turn;
+use super::path_features::turn;
 
-/// Half the length of the window around a corner, s.
+/// Half of the evaluation window of a corner, s.
 const WINDOW: f64 = 0.15;
-/// Most corners that are told one by one.
-const MOST: usize = 1000;
+/// Largest number of corners reported individually.
+const MAX_COUNT: usize = 1000;
 
-/// Looks at each corner within its window.
+/// Contour errors of the corners within their windows.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Corners {
-    /// Time at which the corner has passed the delay of the position loop, s, and its figures.
+    /// Time of the corner plus the delay of the position loop, s, and its figures.
     list: Vec<(f64, CornerFigures)>,
-    /// The first whose window is not over.
+    /// Index of the first corner whose window has not ended.
     next: usize,
-    /// Corners behind those of the list.
+    /// Number of corners beyond those of the list.
     more: usize,
 }
 
@@ -30,19 +30,19 @@ impl Corners {
         let blocks = program.path().blocks();
         let mut corners = blocks.windows(2).enumerate().filter_map(|(index, pair)| {
             let turn = turn(&pair[0], &pair[1], &kinds)?;
-            let (end, next) = (program.span(index).end, program.span(index + 1).start);
-            // Behind a dwell the axes start anew: that is no corner.
+            let (end, next) = (program.time_range(index).end, program.time_range(index + 1).start);
+            // The axes restart after a dwell, so this is not a corner.
             if next > end {
                 return None;
             }
             let time = end + seconds(delay);
             Some((time, CornerFigures { index: index + 1, turn, max_contour_error: 0.0 }))
         });
-        let list = corners.by_ref().take(MOST).collect();
+        let list = corners.by_ref().take(MAX_COUNT).collect();
         Corners { list, next: 0, more: corners.count() }
     }
 
-    /// Takes distances from the path, less what overshoots its ends, m, at `times`, s, into account.
+    /// Adds contour errors at `times`, s, without overshoot beyond the path's ends, m.
     pub(super) fn observe(&mut self, times: &[f64], within_ends: &[f64]) {
         let Some(last) = times.last() else { return };
         for (&time, &distance) in times.iter().zip(within_ends) {
@@ -59,7 +59,7 @@ impl Corners {
         }
     }
 
-    /// Corners of which nothing is measured.
+    /// Returns the number of corners that are not evaluated.
     pub(super) fn more(&self) -> usize {
         self.more
     }
@@ -75,10 +75,10 @@ mod tests {
     use crate::config::{AxisKind, Parameters};
     use crate::kinematics::Kinematics;
     use crate::path::{Block, Frame, Move};
-    use crate::simulation::joints;
+    use crate::simulation::joint_limits;
 
-    /// Steps in X and Y by turns: each but the last ends in a corner.
-    fn stairs(steps: usize) -> (Program, MachineConfig) {
+    /// Plans alternate steps in X and Y: each but the last ends in a corner.
+    fn zigzag(steps: usize) -> (Program, MachineConfig) {
         let machine = Parameters::embedded_default().and_then(|p| p.machine_config()).expect("valid");
         let kinds: Vec<AxisKind> = machine.axes().iter().map(|axis| axis.kind()).collect();
         let at = |step: usize| [1e-4 * step.div_ceil(2) as f64, 1e-4 * (step / 2) as f64, 0.0, 0.0, 0.0];
@@ -88,7 +88,7 @@ mod tests {
         let program = Program::plan(
             Kinematics::new(&machine),
             Frame::Joints,
-            &joints(&machine, ""),
+            &joint_limits(&machine, ""),
             period,
             0.0,
             moves,
@@ -97,9 +97,11 @@ mod tests {
     }
 
     #[test]
-    fn corners_that_are_not_measured_are_counted() {
-        for (steps, measured, more) in [(MOST, MOST - 1, 0), (MOST + 1, MOST, 0), (MOST + 4, MOST, 3)] {
-            let (program, machine) = stairs(steps);
+    fn corners_beyond_the_maximum_are_counted() {
+        for (steps, measured, more) in
+            [(MAX_COUNT, MAX_COUNT - 1, 0), (MAX_COUNT + 1, MAX_COUNT, 0), (MAX_COUNT + 4, MAX_COUNT, 3)]
+        {
+            let (program, machine) = zigzag(steps);
             let corners = Corners::of(&program, &machine);
             assert_eq!((corners.figures().len(), corners.more()), (measured, more), "{steps} steps");
         }

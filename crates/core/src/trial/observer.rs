@@ -1,88 +1,89 @@
-//! Looks at every tick of a trial.
+//! Evaluation of every tick of a trial: figures and signal recording.
 
 use std::sync::Arc;
 
-use crate::assess::{AxisAssessor, Deviations, Nearest, PathTracker, SetpointTracker};
+use crate::assess::{AxisAssessor, NearestPoint, PathDeviations, PathTracker, SetpointTracker};
 use crate::config::{AxisKind, MachineConfig};
-use crate::kinematics::{Kinematics, Poses, Role, Turned};
+use crate::kinematics::{Kinematics, Poses, AxisRole, TableAngles};
 use crate::machine::Machine;
 use crate::path::Frame;
-use crate::simulation::{Simulation, horizon};
+use crate::simulation::{Simulation, contour_preview_cycles};
+use crate::statistics::rms_of_sum;
 use crate::units::seconds;
 
 use super::circle::Circles;
 use super::corner::Corners;
+use super::cycle::PositionCycle;
+use super::definition::{Trial, TrialOutcome};
 use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, Reference};
-use super::period::Period;
-use super::recorder::{Recorder, Tool};
-use super::{Outcome, Trial};
+use super::recorder::{SignalRecorder, ToolSample};
 
-/// Largest and mean square of an error.
+/// Largest value and RMS of an error.
 #[derive(Debug, Clone, Copy, Default)]
-struct Extent {
+struct ErrorStatistics {
     max: f64,
-    squares: f64,
+    sum_of_squares: f64,
     count: u64,
 }
 
-impl Extent {
+impl ErrorStatistics {
     fn push(&mut self, value: f64) {
         self.max = self.max.max(value);
-        self.squares += value * value;
+        self.sum_of_squares += value * value;
         self.count += 1;
     }
 
     fn rms(&self) -> f64 {
-        if self.count == 0 { 0.0 } else { (self.squares / self.count as f64).sqrt() }
+        rms_of_sum(self.sum_of_squares, self.count).unwrap_or(0.0)
     }
 }
 
-/// What is measured.
+/// Scope of the evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Measures {
+pub(super) enum MeasurementScope {
     All,
-    /// Not the circles, each of which takes longer and more memory than all of the rest.
+    /// All figures but the circles, each of which needs more time and memory than the rest.
     WithoutCircles,
 }
 
-/// What the tool is followed along.
+/// Reference of the tool's contour error.
 #[derive(Clone)]
 enum Tracker {
     Path(Box<PathTracker>),
     Setpoints(Box<SetpointTracker>),
 }
 
-/// Gathers figures and recording.
+/// Accumulator of figures and recording.
 #[derive(Clone)]
 pub(super) struct Observer<'a> {
     trial: &'a Trial<'a>,
     kinematics: Kinematics,
-    turned: Turned,
+    rotated: TableAngles,
     tracker: Option<Tracker>,
     tick: f64,
     end: f64,
     axes: Vec<AxisAssessor>,
     moves: Vec<bool>,
     extrapolated: Vec<bool>,
-    /// Position instants at which an axis had left its stroke.
-    outside: Vec<u64>,
+    /// Number of position instants outside the travel limits, per axis.
+    outside_travel: Vec<u64>,
     start: Vec<f64>,
-    /// Room for setpoints to come.
-    ahead: Vec<f64>,
-    looked_ahead: bool,
-    /// Where the tool was in the position period, and by how much it was off.
+    /// Buffer for future setpoints.
+    preview: Vec<f64>,
+    has_preview: bool,
+    /// Tool poses of the position cycle and their deviations.
     poses: Poses,
-    found: Deviations,
-    contour: Extent,
-    within_ends: Extent,
-    orientation: Extent,
+    deviations: PathDeviations,
+    contour: ErrorStatistics,
+    within_ends: ErrorStatistics,
+    orientation: ErrorStatistics,
     circles: Circles,
     corners: Corners,
-    recorder: Option<Recorder>,
+    recorder: Option<SignalRecorder>,
 }
 
 impl<'a> Observer<'a> {
-    pub(super) fn new(trial: &'a Trial<'a>, start: &[f64], measures: Measures) -> Self {
+    pub(super) fn new(trial: &'a Trial<'a>, start: &[f64], scope: MeasurementScope) -> Self {
         let machine: &MachineConfig = trial.machine;
         let count = machine.axes().len();
         let kinematics = Kinematics::new(machine);
@@ -92,78 +93,82 @@ impl<'a> Observer<'a> {
             None => Tracker::Setpoints(Box::new(SetpointTracker::new(kinematics.forward(start)))),
         });
         let program = trial.program.as_deref();
-        let circles = program.filter(|_| measures == Measures::All);
+        let circles = program.filter(|_| scope == MeasurementScope::All);
         Observer {
             trial,
             tracker,
-            turned: Turned::default(),
+            rotated: TableAngles::default(),
             tick: seconds(machine.periods().current),
             end: 0.0,
             axes: vec![AxisAssessor::default(); count],
             moves: vec![false; count],
             extrapolated: vec![false; count],
-            outside: vec![0; count],
+            outside_travel: vec![0; count],
             start: start.to_vec(),
-            ahead: start.to_vec(),
-            looked_ahead: false,
+            preview: start.to_vec(),
+            has_preview: false,
             poses: Poses::default(),
-            found: Deviations::default(),
-            contour: Extent::default(),
-            within_ends: Extent::default(),
-            orientation: Extent::default(),
+            deviations: PathDeviations::default(),
+            contour: ErrorStatistics::default(),
+            within_ends: ErrorStatistics::default(),
+            orientation: ErrorStatistics::default(),
             circles: circles.map(|p| Circles::of(p, machine)).unwrap_or_default(),
-            // Without a tool there is no contour error to tell at a corner.
+            // Without a tool there is no contour error at corners.
             corners: program.filter(|_| has_tool).map(|p| Corners::of(p, machine)).unwrap_or_default(),
-            recorder: trial.record.then(|| Recorder::new(count)),
+            recorder: trial.record.then(|| SignalRecorder::new(count)),
             kinematics,
         }
     }
 
-    /// Takes a position period in; `axis` tells where each axis is: a machine, and the place in it.
-    pub(super) fn observe<'m>(&mut self, axis: impl Fn(usize) -> (&'m Machine, usize), period: &mut Period) {
-        for place in 0..self.axes.len() {
-            let (machine, at) = axis(place);
+    /// Adds a position cycle; `axis` returns the machine of an axis and its index there.
+    pub(super) fn observe<'m>(
+        &mut self,
+        axis: impl Fn(usize) -> (&'m Machine, usize),
+        cycle: &mut PositionCycle,
+    ) {
+        for index in 0..self.axes.len() {
+            let (machine, at) = axis(index);
             let (sample, activity) = (machine.axis(at).sample(), machine.activity(at));
-            self.moves[place] |= sample.psec != self.start[place];
-            self.extrapolated[place] |= activity.friction_extrapolated;
-            let limits = &self.trial.machine.axes()[place].limits;
-            self.outside[place] += u64::from(limits.is_left_by(sample.position));
-            if period.moving {
-                self.axes[place].observe(sample, &activity);
+            self.moves[index] |= sample.psec != self.start[index];
+            self.extrapolated[index] |= activity.friction_extrapolated;
+            let limits = &self.trial.machine.axes()[index].limits;
+            self.outside_travel[index] += u64::from(limits.is_outside_travel(sample.position));
+            if cycle.is_moving {
+                self.axes[index].observe(sample, &activity);
             }
         }
-        self.kinematics.forward_all(&mut self.turned, &period.positions, period.ticks(), &mut self.poses);
-        let first = self.follow(period);
+        self.kinematics.forward_batch(&mut self.rotated, &cycle.positions, cycle.ticks(), &mut self.poses);
+        let first = self.follow(cycle);
         if let Some(recorder) = &mut self.recorder {
-            let axes = (0..self.axes.len()).map(|place| {
-                let (machine, at) = axis(place);
-                (machine.axis(at).sample(), machine.largest_current(at))
+            let axes = (0..self.axes.len()).map(|index| {
+                let (machine, at) = axis(index);
+                (machine.axis(at).sample(), machine.signed_peak_current(at))
             });
             let largest = |errors: &[f64]| errors.iter().copied().fold(0.0, f64::max);
-            let tool = first.map(|nearest| Tool {
+            let tool = first.map(|nearest| ToolSample {
                 reference: nearest.point.into(),
                 position: self.poses.tip(0).into(),
-                contour_error: largest(&self.found.distance),
-                orientation_error: largest(&self.found.orientation),
+                contour_error: largest(&self.deviations.distance),
+                orientation_error: largest(&self.deviations.orientation),
             });
-            recorder.push(period.times[0], axes, tool);
+            recorder.push(cycle.times[0], axes, tool);
         }
-        self.observe_circles(period);
-        self.end = period.end;
+        self.observe_circles(cycle);
+        self.end = cycle.end;
     }
 
-    /// Takes the tool into account: what is nearest to it at the first tick.
-    fn follow(&mut self, period: &mut Period) -> Option<Nearest> {
-        let (poses, found) = (&self.poses, &mut self.found);
+    /// Adds the tool poses; returns the nearest point at the first tick.
+    fn follow(&mut self, cycle: &mut PositionCycle) -> Option<NearestPoint> {
+        let (poses, deviations) = (&self.poses, &mut self.deviations);
         let first = match (self.tracker.as_mut()?, &self.trial.program) {
             (Tracker::Path(tracker), Some(program)) => {
-                tracker.follow(poses, |tick| period.until(program, tick), found)?.first
+                tracker.follow(poses, |tick| cycle.until(program, tick), deviations)?.first
             }
             (Tracker::Setpoints(tracker), _) => {
-                found.clear();
+                deviations.clear();
                 let mut at = |tick| {
                     let nearest = tracker.nearest(&poses.get(tick));
-                    found.push(&nearest);
+                    deviations.push(&nearest);
                     nearest
                 };
                 let first = at(0);
@@ -172,37 +177,38 @@ impl<'a> Observer<'a> {
             }
             (Tracker::Path(_), None) => return None,
         };
-        let each = found.distance.iter().zip(&found.within_ends).zip(&found.orientation);
+        let each = deviations.distance.iter().zip(&deviations.within_ends).zip(&deviations.orientation);
         for ((&distance, &within_ends), &orientation) in each {
             self.contour.push(distance);
             self.within_ends.push(within_ends);
             self.orientation.push(orientation);
         }
-        self.corners.observe(&period.times, &found.within_ends);
+        self.corners.observe(&cycle.times, &deviations.within_ends);
         Some(first)
     }
 
-    fn observe_circles(&mut self, period: &Period) {
+    fn observe_circles(&mut self, cycle: &PositionCycle) {
         let workpiece = self.trial.program.as_ref().is_some_and(|p| p.path().frame() == Frame::Workpiece);
-        let (kinematics, poses, ticks) = (&self.kinematics, &self.poses, period.ticks());
-        let tips = Role::LINEAR.map(|role| kinematics.role(role)).into_iter().zip(poses.tips());
-        let coordinates = |place: usize| {
-            let tip = tips.clone().find(|(joint, _)| workpiece && *joint == Some(place));
-            tip.map_or(&period.positions[place * ticks..][..ticks], |(_, values)| values)
+        let (kinematics, poses, ticks) = (&self.kinematics, &self.poses, cycle.ticks());
+        let tips = AxisRole::LINEAR.map(|role| kinematics.role(role)).into_iter().zip(poses.tips());
+        let coordinates = |index: usize| {
+            let tip = tips.clone().find(|(joint, _)| workpiece && *joint == Some(index));
+            tip.map_or(&cycle.positions[index * ticks..][..ticks], |(_, values)| values)
         };
-        self.circles.observe(&period.times, coordinates, self.recorder.is_some());
+        self.circles.observe(&cycle.times, coordinates, self.recorder.is_some());
     }
 
-    /// What was measured so far, without a recording.
+    /// Returns the figures so far, without a recording.
     pub(super) fn figures(&self) -> Figures {
         let machine = self.trial.machine;
-        let axes = machine.axes().iter().enumerate().map(|(place, axis)| AxisFigures {
+        let axes = machine.axes().iter().enumerate().map(|(index, axis)| AxisFigures {
             name: axis.name().to_owned(),
             kind: axis.kind(),
-            moves: self.moves[place],
-            report: self.axes[place].report(self.tick),
-            outside_stroke_time: self.outside[place] as f64 * seconds(machine.periods().position),
-            friction_extrapolated: self.extrapolated[place],
+            moves: self.moves[index],
+            report: self.axes[index].report(self.tick),
+            outside_travel_limits_time: self.outside_travel[index] as f64
+                * seconds(machine.periods().position),
+            friction_extrapolated: self.extrapolated[index],
         });
         let reference = match self.tracker {
             Some(Tracker::Path(_)) => Some(Reference::Path),
@@ -230,36 +236,35 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// Whether a rotary axis moves.
-    fn turns(&self) -> bool {
+    /// Returns true if a rotary axis moves.
+    fn has_rotary_motion(&self) -> bool {
         let axes = self.trial.machine.axes().iter();
         axes.zip(&self.moves).any(|(axis, &moves)| moves && axis.kind() == AxisKind::Rotary)
     }
 
-    /// Learns, before a position instant, where the setpoints go, if they are what the tool is
-    /// followed along.
-    pub(super) fn look_ahead(&mut self, simulation: &Simulation) {
+    /// Adds future setpoints to the polyline before a position instant, if it is the reference.
+    pub(super) fn push_preview(&mut self, simulation: &Simulation) {
         let Some(Tracker::Setpoints(tracker)) = &mut self.tracker else { return };
-        let horizon = horizon(simulation.period());
-        let first = if self.looked_ahead { horizon } else { 0 };
-        self.looked_ahead = true;
+        let horizon = contour_preview_cycles(simulation.period());
+        let first = if self.has_preview { horizon } else { 0 };
+        self.has_preview = true;
         for periods in first..=horizon {
-            for (joint, value) in self.ahead.iter_mut().enumerate() {
+            for (joint, value) in self.preview.iter_mut().enumerate() {
                 *value = simulation.psec_ahead(joint, periods).unwrap_or(*value);
             }
-            tracker.push(self.kinematics.forward(&self.ahead));
+            tracker.push(self.kinematics.forward(&self.preview));
         }
     }
 
-    pub(super) fn finish(self) -> Outcome {
+    pub(super) fn finish(self) -> TrialOutcome {
         let figures = self.figures();
         let machine = self.trial.machine;
-        let turns = figures.orientation.is_some() && self.turns();
+        let turns = figures.orientation.is_some() && self.has_rotary_motion();
         let recording = self.recorder.map(|recorder| {
             let mut recording = recorder.finish(machine, &self.moves, turns);
             recording.circles = self.circles.into_traces();
             recording
         });
-        Outcome { figures, recording }
+        TrialOutcome { figures, recording }
     }
 }

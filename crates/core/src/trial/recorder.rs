@@ -1,25 +1,25 @@
-//! Keeps the signals of a trial in bounded memory.
+//! Recording of the signals of a trial in bounded memory, by min–max decimation.
 
-use crate::assess::{AxisTrace, Recording, ToolTrace};
+use crate::assess::{AxisTrace, SignalRecording, ToolTrace};
 use crate::config::MachineConfig;
 use crate::machine::AxisSample;
 
-/// Rows that are kept; beyond, two become one. An even number.
+/// Largest number of rows; beyond it, pairs of rows are merged. An even number.
 const CAPACITY: usize = 1 << 15;
 
-/// A signal that keeps its extremes when it is thinned.
+/// A signal whose decimation keeps its extremes.
 #[derive(Debug, Clone, Default)]
 struct Signal {
     values: Vec<f64>,
-    /// Lowest and highest since the last values were written, and whether the lowest came first.
+    /// Smallest value of the current bucket.
     low: f64,
     high: f64,
     low_first: bool,
 }
 
 impl Signal {
-    /// Adds sample number `count` of a bucket of `bucket` samples, which becomes two values; a bucket
-    /// of one is that value.
+    /// Adds sample number `count` of a bucket of `bucket` samples. A bucket becomes two values; a bucket of
+    /// one sample is that value.
     fn push(&mut self, value: f64, count: usize, bucket: usize) {
         if bucket == 1 {
             self.values.push(value);
@@ -39,14 +39,14 @@ impl Signal {
         }
     }
 
-    /// Makes two values of the bucket.
+    /// Appends the two values of the current bucket.
     fn close(&mut self) {
         let (first, second) = if self.low_first { (self.low, self.high) } else { (self.high, self.low) };
         self.values.extend([first, second]);
     }
 
-    /// Makes two values of each four, the extremes in their order.
-    fn thin(&mut self) {
+    /// Reduces each four values to two, the extremes in their order.
+    fn decimate(&mut self) {
         let mut kept = Vec::with_capacity(self.values.capacity());
         for four in self.values.chunks(4) {
             let at = |order: fn(&f64, &f64) -> std::cmp::Ordering| {
@@ -61,23 +61,23 @@ impl Signal {
 }
 
 /// Reference and position of the tool tip, m.
-type Pair = [[f64; 3]; 2];
+type TipPair = [[f64; 3]; 2];
 
-/// The pair whose points are farther apart, the first if they are alike.
-fn farther(one: Pair, other: Pair) -> Pair {
-    let apart = |[a, b]: Pair| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+/// Returns the pair whose points are farther apart, the first one if they are equal.
+fn farther(one: TipPair, other: TipPair) -> TipPair {
+    let apart = |[a, b]: TipPair| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
     if apart(other) > apart(one) { other } else { one }
 }
 
-/// Signals of an axis, in the order of [`AxisTrace`].
+/// Number of signals of an axis, in the order of [`AxisTrace`].
 const AXIS_SIGNALS: usize = 10;
 
 fn axis_values(s: &AxisSample, current: f64) -> [f64; AXIS_SIGNALS] {
     [
         s.psec,
         s.position,
-        s.tracking_error(),
-        s.synchronized_tracking_error(),
+        s.following_error(),
+        s.delay_compensated_following_error(),
         s.velocity,
         current,
         s.current_setpoint,
@@ -87,39 +87,39 @@ fn axis_values(s: &AxisSample, current: f64) -> [f64; AXIS_SIGNALS] {
     ]
 }
 
-/// The tool in a position period.
+/// Tool data of a position cycle.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Tool {
+pub(super) struct ToolSample {
     /// Nearest point of the path to the tip at the position instant, m.
     pub reference: [f64; 3],
-    /// The tip then, m.
+    /// Tip at the position instant, m.
     pub position: [f64; 3],
-    /// Largest distance from the path at any tick, m.
+    /// Largest contour error at any tick, m.
     pub contour_error: f64,
-    /// Largest angle between the tool axes at any tick, rad.
+    /// Largest orientation error at any tick, rad.
     pub orientation_error: f64,
 }
 
-/// Gathers a [`Recording`], one row per position instant as long as there is room.
+/// Accumulator of a [`SignalRecording`]: one row per position instant until the capacity is reached.
 #[derive(Debug, Clone)]
-pub(super) struct Recorder {
+pub(super) struct SignalRecorder {
     time: Vec<f64>,
     axes: Vec<[Signal; AXIS_SIGNALS]>,
     contour: Signal,
     orientation: Signal,
     /// Reference and position of the tool tip, one pair per value of the signals.
-    tool: Vec<Pair>,
-    /// Samples in a bucket: 1, then 4, 8, …
+    tool: Vec<TipPair>,
+    /// Samples per bucket: 1, then 4, 8, …
     bucket: usize,
-    /// Samples in the bucket that was begun.
+    /// Samples in the current bucket.
     count: usize,
     /// Time of the last sample, s.
     last: f64,
 }
 
-impl Recorder {
+impl SignalRecorder {
     pub(super) fn new(axes: usize) -> Self {
-        Recorder {
+        SignalRecorder {
             time: Vec::new(),
             axes: (0..axes).map(|_| Default::default()).collect(),
             contour: Signal::default(),
@@ -131,13 +131,13 @@ impl Recorder {
         }
     }
 
-    /// Adds the position period that begins at `time`, s from the start: of each axis the sample of that instant
-    /// and the largest current of all ticks, A.
+    /// Adds the position cycle that begins at `time`, s from the start: for each axis its sample at that
+    /// instant and the largest current at any tick, A.
     pub(super) fn push<'a>(
         &mut self,
         time: f64,
         axes: impl Iterator<Item = (&'a AxisSample, f64)>,
-        tool: Option<Tool>,
+        tool: Option<ToolSample>,
     ) {
         let (count, bucket) = (self.count, self.bucket);
         self.last = time;
@@ -146,9 +146,9 @@ impl Recorder {
                 signal.push(value, count, bucket);
             }
         }
-        // A bucket is told by its first instant and its middle.
-        let told = bucket == 1 || count == 0 || count == bucket / 2;
-        if told {
+        // A bucket is represented by its first instant and its middle.
+        let is_stored = bucket == 1 || count == 0 || count == bucket / 2;
+        if is_stored {
             self.time.push(time);
         }
         if let Some(tool) = tool {
@@ -156,27 +156,27 @@ impl Recorder {
             self.orientation.push(tool.orientation_error, count, bucket);
             let pair = [tool.reference, tool.position];
             match self.tool.last_mut() {
-                // Of each half of a bucket, where the tool is farthest from the path.
-                Some(last) if !told => *last = farther(*last, pair),
+                // Each half of a bucket keeps the pair farthest from the path.
+                Some(last) if !is_stored => *last = farther(*last, pair),
                 _ => self.tool.push(pair),
             }
         }
         self.count = (count + 1) % bucket;
         if self.count == 0 && self.time.len() >= CAPACITY {
-            self.thin();
+            self.decimate();
         }
     }
 
-    fn thin(&mut self) {
+    fn decimate(&mut self) {
         for signal in self.axes.iter_mut().flatten() {
-            signal.thin();
+            signal.decimate();
         }
-        self.contour.thin();
-        self.orientation.thin();
-        let mut place = 0;
+        self.contour.decimate();
+        self.orientation.decimate();
+        let mut row = 0;
         let mut every_second = || {
-            place += 1;
-            place % 2 == 1
+            row += 1;
+            row % 2 == 1
         };
         self.time.retain(|_| every_second());
         let halves = self.tool.chunks(2);
@@ -184,7 +184,7 @@ impl Recorder {
         self.bucket = if self.bucket == 1 { 4 } else { 2 * self.bucket };
     }
 
-    /// Ends the bucket that was begun, so that all lists are of one length.
+    /// Completes the current bucket, so that all lists have the same length.
     fn close(&mut self) {
         if self.count == 0 {
             return;
@@ -193,22 +193,27 @@ impl Recorder {
         let of_tool = [&mut self.contour, &mut self.orientation].into_iter().filter(|_| has_tool);
         self.axes.iter_mut().flatten().chain(of_tool).for_each(Signal::close);
         if self.count <= self.bucket / 2 {
-            // Its middle was not reached.
+            // The middle of the bucket was not reached.
             self.time.push(self.last);
             self.tool.extend(self.tool.last().copied());
         }
         self.count = 0;
     }
 
-    /// The recording; `moves` tells which axes move.
-    pub(super) fn finish(mut self, machine: &MachineConfig, moves: &[bool], orientation: bool) -> Recording {
+    /// Returns the recording; `moves` contains true for axes that move.
+    pub(super) fn finish(
+        mut self,
+        machine: &MachineConfig,
+        moves: &[bool],
+        orientation: bool,
+    ) -> SignalRecording {
         self.close();
         let axes = machine.axes().iter().zip(self.axes).zip(moves).map(|((axis, signals), &moves)| {
             let [
                 psec,
                 position,
-                tracking_error,
-                synchronized_tracking_error,
+                following_error,
+                delay_compensated_following_error,
                 velocity,
                 current,
                 current_setpoint,
@@ -222,8 +227,8 @@ impl Recorder {
                 moves,
                 psec,
                 position,
-                tracking_error,
-                synchronized_tracking_error,
+                following_error,
+                delay_compensated_following_error,
                 velocity,
                 current,
                 current_setpoint,
@@ -238,7 +243,7 @@ impl Recorder {
             contour_error: self.contour.values,
             orientation_error: if orientation { self.orientation.values } else { Vec::new() },
         });
-        Recording { time: self.time, axes: axes.collect(), tool, circles: Vec::new() }
+        SignalRecording { time: self.time, axes: axes.collect(), tool, circles: Vec::new() }
     }
 }
 
@@ -247,9 +252,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_thinned_signal_keeps_a_spike_of_one_sample() {
+    fn a_decimated_signal_keeps_a_spike_of_one_sample() {
         let mut signal = Signal::default();
-        let mut recorder = Recorder::new(1);
+        let mut recorder = SignalRecorder::new(1);
         let length = 3 * CAPACITY;
         for k in 0..length {
             let position = if k == length / 2 + 1 { 1.0 } else { 0.0 };
@@ -265,14 +270,15 @@ mod tests {
         assert!(distance <= recorder.bucket as f64, "the spike is {distance} instants off");
     }
 
-    /// An hour at 6 ms; each signal has its one peak elsewhere, the last at the very end.
+    /// Records an hour at 6 ms; each signal has a single peak at a different time, the last at the very
+    /// end.
     #[test]
-    fn an_hour_keeps_the_one_peak_of_every_signal_and_of_the_path() {
+    fn decimation_of_an_hour_keeps_the_peak_of_every_signal_and_of_the_path() {
         const HOUR: usize = 600_001;
         let peaks = [1, 33_000, 100_003, 300_001, 555_555, HOUR - 2, HOUR - 1];
-        let mut recorder = Recorder::new(1);
+        let mut recorder = SignalRecorder::new(1);
         for k in 0..HOUR {
-            let at = |place: usize| if k == peaks[place] { 1.0 } else { 0.0 };
+            let at = |index: usize| if k == peaks[index] { 1.0 } else { 0.0 };
             let sample = AxisSample {
                 psec: 5.0 + at(0),
                 position: 3.0 - at(1),
@@ -282,7 +288,7 @@ mod tests {
                 gravity_current: at(6),
                 ..AxisSample::default()
             };
-            let tool = Tool {
+            let tool = ToolSample {
                 reference: [0.0; 3],
                 position: [0.1 + at(5), 0.0, 0.0],
                 contour_error: 0.1 + at(5),
@@ -309,20 +315,20 @@ mod tests {
             (&tool.orientation_error, 1.0, 6),
         ];
         assert!(recording.time.len() <= CAPACITY && recording.time.is_sorted());
-        for (values, peak, place) in found {
+        for (values, peak, index) in found {
             assert_eq!(values.len(), recording.time.len());
             let at: Vec<usize> = (0..values.len()).filter(|&i| values[i] == peak).collect();
-            // A bucket of one sample has it twice.
-            assert!((1..=2).contains(&at.len()), "peak {place} is there {} times", at.len());
-            let near = |&i: &usize| (recording.time[i] - peaks[place] as f64).abs() <= within;
-            assert!(at.iter().all(near), "peak {place}");
+            // A bucket of one sample contains it twice.
+            assert!((1..=2).contains(&at.len()), "peak {index} is there {} times", at.len());
+            let near = |&i: &usize| (recording.time[i] - peaks[index] as f64).abs() <= within;
+            assert!(at.iter().all(near), "peak {index}");
         }
     }
 
     #[test]
     fn time_and_signals_are_of_one_length() {
         for length in [1, CAPACITY - 1, CAPACITY, CAPACITY + 3, 2 * CAPACITY + 5] {
-            let mut recorder = Recorder::new(1);
+            let mut recorder = SignalRecorder::new(1);
             for k in 0..length {
                 recorder.push(k as f64, [(&AxisSample::default(), 0.0)].into_iter(), None);
             }

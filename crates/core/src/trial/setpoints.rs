@@ -1,40 +1,40 @@
-//! Where the setpoints of a trial come from.
+//! Setpoint sources of a trial: grid, trajectories, or a planned program.
 
 use std::error::Error;
 use std::sync::Arc;
 
 use crate::path::Program;
-use crate::trajectory::{JointLimits, Rejection, Request};
+use crate::trajectory::{JointLimits, Rejection, TrajectoryRequest};
 use crate::units::{Nanoseconds, seconds};
 
-/// What a source of setpoints says when it fails; the text names the file and the place in it.
+/// Error of a setpoint source; its text names the file and the position in it.
 pub type SourceError = Box<dyn Error + Send + Sync>;
 
 /// Setpoints on the position grid, one instant after the other.
 pub trait GridSource {
-    /// Places in the machine of the joints that it moves, in the order of its rows.
+    /// Returns the machine indices of the moved joints, in the order of the rows.
     fn joints(&self) -> &[usize];
 
-    /// Writes PSEC of the next instant, m or rad; `false` behind the last one. The first is that of
-    /// the start.
+    /// Writes the position setpoints (PSEC) of the next instant, m or rad, and returns false after the last
+    /// one. The first row is the start position.
     ///
     /// # Errors
-    /// Whatever keeps it from going on.
+    /// Returns an error if the setpoints cannot be read or are invalid.
     fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError>;
 }
 
-/// Trajectories with the times at which they arrive, ns, in order.
-pub type Requests<'a> = dyn Iterator<Item = Result<(Nanoseconds, Request), SourceError>> + 'a;
+/// Trajectories with their arrival times, ns, in order.
+pub type Requests<'a> = dyn Iterator<Item = Result<(Nanoseconds, TrajectoryRequest), SourceError>> + 'a;
 
 /// Setpoints of a trial.
-pub enum Setpoints<'a> {
-    /// One after the other on the grid, from k = 0.
+pub enum SetpointSource<'a> {
+    /// Rows on the position grid, from k = 0.
     Grid(Box<dyn GridSource + 'a>),
-    /// Trajectories, as a node would receive them.
+    /// Trajectories as received by a node.
     Requests(Box<Requests<'a>>),
 }
 
-/// Setpoints of a planned path, computed and checked when they are asked for.
+/// Setpoints of a planned path, computed and checked row by row.
 #[derive(Debug, Clone)]
 pub struct ProgramSource {
     name: String,
@@ -45,20 +45,21 @@ pub struct ProgramSource {
     next: i64,
 }
 
-/// A setpoint that the machine cannot reach.
+/// A setpoint outside the travel limits.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{name}: move {index}, at {time} s: {rejection}")]
 pub struct UnreachableError {
     name: String,
-    /// The move, from 1.
+    /// Move, counted from 1.
     index: usize,
-    /// s from the start.
+    /// Time from the start, s.
     time: f64,
     rejection: Rejection,
 }
 
 impl ProgramSource {
-    /// Those of `program`, every `period` ns, for a machine with `limits`; `name` is for messages.
+    /// Creates the setpoints of `program`, every `period` ns, for a machine with `limits`; `name` is used
+    /// in messages.
     pub fn new(program: Arc<Program>, name: &str, limits: &[JointLimits], period: Nanoseconds) -> Self {
         let (limits, joints) = (limits.to_vec(), (0..limits.len()).collect());
         ProgramSource { name: name.to_owned(), program, limits, joints, period, next: 0 }
@@ -78,7 +79,7 @@ impl GridSource for ProgramSource {
         self.program.psec(time, row);
         for (joint, &position) in self.limits.iter().zip(&*row) {
             let index = usize::try_from(self.next).unwrap_or(usize::MAX);
-            joint.check_stroke(index, position).map_err(|rejection| {
+            joint.check_travel_limits(index, position).map_err(|rejection| {
                 let (block, _) = self.program.path().locate(self.program.progress(time));
                 Box::new(UnreachableError { name: self.name.clone(), index: block + 1, time, rejection })
             })?;

@@ -1,11 +1,12 @@
-//! Circularity after ISO 230-4 of the ballbar trial, in both directions.
+//! Circularity (ISO 230-4) of the ballbar test in both directions.
 
 use virtual_axes_core::assess::{CircleAssessor, bidirectional};
-use virtual_axes_verification::fixtures::common::{Ballbar, assert_near, machine, run};
+use virtual_axes_verification::fixtures::machines::{Ballbar, assert_near, machine, run};
 
 const MICROMETER: f64 = 1e-6;
 
-/// The steady part of the paper's ballbar; the other direction has Y mirrored.
+/// Runs the ballbar test of Prévost et al. and returns its part at constant feed; the clockwise direction
+/// has Y mirrored.
 fn ballbar(counterclockwise: bool) -> CircleAssessor {
     let trial = Ballbar::paper();
     let mut assessor = CircleAssessor::new([-trial.radius, 0.0], trial.radius);
@@ -26,7 +27,7 @@ fn ballbar(counterclockwise: bool) -> CircleAssessor {
 }
 
 #[test]
-fn the_ballbar_has_the_radial_deviations_of_the_reference() {
+fn ballbar_radial_deviations_match_the_reference() {
     let paths = [false, true].map(ballbar);
     for path in &paths {
         let report = path.report().expect("points");
@@ -34,7 +35,7 @@ fn the_ballbar_has_the_radial_deviations_of_the_reference() {
         assert_near("Fmin", report.min / MICROMETER, 47.7, 1.0);
         assert_near("Fmax", report.max / MICROMETER, 68.6, 1.0);
         let full = report.full.expect("a full circle");
-        // The center is where it should be to a few µm, so that G differs from Fmax − Fmin by that.
+        // The center is within a few micrometers of the nominal one, so G differs from Fmax − Fmin by that.
         let offset = full.center[0].hypot(full.center[1]);
         assert!((full.circular_deviation - (report.max - report.min)).abs() <= 2.0 * offset);
     }
@@ -42,7 +43,7 @@ fn the_ballbar_has_the_radial_deviations_of_the_reference() {
     assert_near("D", both.mean_radial_deviation / MICROMETER, 49.0, 0.2);
     for path in &paths {
         let full = path.report().and_then(|report| report.full).expect("a full circle");
-        // Both lie in the ring of the two; about centers that differ by their offsets.
+        // Both lie between the two circles of G(b), about centers that differ by their offsets.
         let offset = full.center[0].hypot(full.center[1]);
         assert!(both.circular_deviation >= full.circular_deviation - 2.0 * offset);
     }

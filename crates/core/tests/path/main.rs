@@ -1,4 +1,4 @@
-//! TODO
+//! Tests of paths, kinematics, scenarios and motion assessment.
 
 mod circularity;
 mod kinematics;

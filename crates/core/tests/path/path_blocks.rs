@@ -1,4 +1,4 @@
-//! Lines, arcs and splines against closed forms, an independent B-spline, and difference quotients.
+//! Lines, arcs and splines compared with closed forms, an independent B-spline and difference quotients.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,7 +20,7 @@ fn spline(from: [f64; 5], points: &[[f64; 5]]) -> Result<Block, PathError> {
     Block::spline(&from, &points, &KINDS)
 }
 
-/// Cubic B-spline basis by the recursion of Cox and de Boor.
+/// Returns the B-spline basis by the Cox–de Boor recursion.
 fn basis(knots: &[f64], i: usize, degree: usize, t: f64) -> f64 {
     if degree == 0 {
         let last = knots[knots.len() - 1];
@@ -35,7 +35,7 @@ fn basis(knots: &[f64], i: usize, degree: usize, t: f64) -> f64 {
             * basis(knots, i + 1, degree - 1, t)
 }
 
-/// The clamped uniform cubic B-spline of `points` at t from 0 to the number of its pieces.
+/// Evaluates the clamped uniform cubic B-spline of `points` at t from 0 to the number of its pieces.
 fn de_boor(points: &[[f64; 5]], t: f64) -> [f64; 5] {
     let pieces = points.len() - 3;
     let mut knots = vec![0.0; 3];
@@ -51,15 +51,15 @@ fn de_boor(points: &[[f64; 5]], t: f64) -> [f64; 5] {
     out
 }
 
-/// Length by chords, extrapolated: Richardson on 2n and n chords of each of `pieces`.
-fn chord_length(points: &[[f64; 5]], places: std::ops::Range<usize>) -> f64 {
+/// Returns the length by chords, with Richardson extrapolation of n, 2n and 4n chords of each piece.
+fn chord_length(points: &[[f64; 5]], indices: std::ops::Range<usize>) -> f64 {
     let pieces = points.len() - 3;
     let polygon = |n: usize| {
         let at = |i: usize| de_boor(points, i as f64 / n as f64);
         let mut sum = 0.0;
         for i in 0..n * pieces {
             let (a, b) = (at(i), at(i + 1));
-            sum += places.clone().map(|j| (b[j] - a[j]).powi(2)).sum::<f64>().sqrt();
+            sum += indices.clone().map(|j| (b[j] - a[j]).powi(2)).sum::<f64>().sqrt();
         }
         sum
     };
@@ -71,7 +71,7 @@ fn chord_length(points: &[[f64; 5]], places: std::ops::Range<usize>) -> f64 {
 fn control_points() -> impl Strategy<Value = Vec<[f64; 5]>> {
     let point = prop::array::uniform5(-0.05..0.05f64);
     prop::collection::vec(point, 4..9).prop_map(|mut points| {
-        // Along x, so that no spline has a cusp.
+        // The points advance along x, so that no spline has a cusp.
         for (i, point) in points.iter_mut().enumerate() {
             point[0] += 0.15 * i as f64;
         }
@@ -79,7 +79,7 @@ fn control_points() -> impl Strategy<Value = Vec<[f64; 5]>> {
     })
 }
 
-/// Derivatives at `s` against central differences of the points, each of the one before it.
+/// Compares the derivatives at `s` with central differences, each of the order below.
 fn assert_derivatives(block: &Block, s: f64, h: f64, tolerance: f64) {
     let (before, here, after) = (block.derivatives(s - h), block.derivatives(s), block.derivatives(s + h));
     let (a, b) = (point(block, s - h), point(block, s + h));
@@ -105,7 +105,7 @@ proptest! {
         let block = spline(points[0], &points[1..]).expect("a spline");
         let wanted = chord_length(&points, 0..3);
         prop_assert!((block.length() / wanted - 1.0).abs() < 1e-10, "{} {wanted}", block.length());
-        // Between two places: the chords of 2000 parts of the way between them.
+        // Chords of 2000 parts between two arc lengths.
         let (low, high) = (a.min(b) * block.length(), a.max(b) * block.length());
         let polygon = |n: i32| {
             let at = |i: i32| point(&block, low + (high - low) * f64::from(i) / f64::from(n));
@@ -117,7 +117,7 @@ proptest! {
         let (coarse, fine) = (polygon(1000), polygon(2000));
         let length = fine + (fine - coarse) / 3.0;
         prop_assert!((length - (high - low)).abs() < 1e-10 * block.length() + 1e-13);
-        // Unit speed, and an acceleration across the direction.
+        // Unit speed, and a second derivative normal to the direction.
         let d = block.derivatives(low);
         let dot = |a: &[f64], b: &[f64]| a[..3].iter().zip(&b[..3]).map(|(a, b)| a * b).sum::<f64>();
         prop_assert!((dot(&d.first, &d.first) - 1.0).abs() < 1e-12);
@@ -125,10 +125,10 @@ proptest! {
     }
 
     #[test]
-    fn a_spline_is_that_of_its_control_points(points in control_points()) {
+    fn a_spline_matches_an_independent_evaluation_of_its_control_points(points in control_points()) {
         let block = spline(points[0], &points[1..]).expect("a spline");
         let pieces = points.len() - 3;
-        // Each point of the independent spline lies on the block: at the length of its chords.
+        // Each point of the independent spline lies on the block at the length of its chords.
         let n = 400;
         let mut s = 0.0;
         let mut before = points[0];
@@ -137,7 +137,7 @@ proptest! {
             s += (0..3).map(|j| (wanted[j] - before[j]).powi(2)).sum::<f64>().sqrt();
             before = wanted;
             let found = point(&block, s);
-            // Chords of 1/400 of a piece fall short by less than 1e-5 of the length.
+            // Chords of 1/400 of a piece are shorter by less than 1e-5 of the length.
             let error = (0..5).map(|j| (found[j] - wanted[j]).abs()).fold(0.0, f64::max);
             prop_assert!(error < 2e-5, "{error}");
         }
@@ -145,7 +145,7 @@ proptest! {
         prop_assert_eq!(block.start(), &points[0]);
         prop_assert_eq!(point(&block, 0.0), points[0]);
         prop_assert_eq!(point(&block, block.length()), points[last]);
-        // It leaves towards the second control point and comes from the last but one.
+        // The spline starts towards the second control point and ends coming from the last but one.
         for (s, from, to) in [(0.0, 0, 1), (block.length(), last - 1, last)] {
             let chord: Vec<f64> = (0..5).map(|j| points[to][j] - points[from][j]).collect();
             let length = (0..3).map(|j| chord[j].powi(2)).sum::<f64>().sqrt();
@@ -157,9 +157,9 @@ proptest! {
     }
 
     #[test]
-    fn derivatives_are_those_of_the_points(points in control_points(), part in 0.01..0.99f64) {
+    fn derivatives_match_differences_of_the_points(points in control_points(), part in 0.01..0.99f64) {
         let block = spline(points[0], &points[1..]).expect("a spline");
-        // Third derivatives jump at knots, so differences across one are left out by their size.
+        // Third derivatives jump at knots; differences across a knot are skipped by their size.
         let s = part * block.length();
         let h = 1e-6;
         let (a, b) = (block.derivatives(s - h), block.derivatives(s + h));
@@ -184,7 +184,7 @@ proptest! {
 }
 
 #[test]
-fn knots_of_a_spline_do_not_show_in_its_second_derivative() {
+fn second_derivative_is_continuous_at_knots() {
     let points = [
         HOME,
         [0.1, 0.05, 0.0, 0.1, 0.0],
@@ -206,7 +206,7 @@ fn knots_of_a_spline_do_not_show_in_its_second_derivative() {
 }
 
 #[test]
-fn a_line_counts_linear_coordinates_and_rotary_ones_follow() {
+fn length_of_a_line_is_that_of_its_linear_coordinates() {
     let to = [0.03, 0.0, 0.04, 0.5, -1.0];
     let block = line(HOME, to);
     assert_eq!(block.length(), 0.05);
@@ -223,7 +223,7 @@ fn a_line_counts_linear_coordinates_and_rotary_ones_follow() {
 }
 
 #[test]
-fn an_arc_is_a_circle_with_its_other_coordinates_linear() {
+fn an_arc_is_a_circle_with_linear_other_coordinates() {
     let (r, sweep, rise) = (0.05, -3.0 * PI, 0.02);
     let block = arc([0.01, 0.02, 0.0, 0.0, 0.0], [0.01, 0.02 - r], sweep, [9.0, 9.0, rise, 0.6, 0.0]);
     let length = (r * sweep).hypot(rise);
@@ -243,7 +243,7 @@ fn an_arc_is_a_circle_with_its_other_coordinates_linear() {
 }
 
 #[test]
-fn whole_turns_end_where_they_begin_bit_for_bit() {
+fn whole_turns_return_to_the_start_bit_identically() {
     let from = [0.1, 0.2, 0.3, 0.0, 0.0];
     for turns in [1.0, -1.0, 2.0, 7.0] {
         assert_eq!(arc(from, [0.037, 0.411], turns * TAU, from).end(), from);
@@ -251,31 +251,31 @@ fn whole_turns_end_where_they_begin_bit_for_bit() {
 }
 
 #[test]
-fn what_is_no_block_is_refused_with_its_values() {
+fn invalid_blocks_are_rejected_with_their_values() {
     let kinds = &KINDS;
     let nan = [0.0, f64::NAN, 0.0, 0.0, 0.0];
-    assert_eq!(Block::line(&HOME, &HOME, kinds), Err(PathError::StandsStill));
+    assert_eq!(Block::line(&HOME, &HOME, kinds), Err(PathError::ZeroLength));
     assert!(matches!(Block::line(&HOME, &nan, kinds), Err(PathError::NotFinite { coordinate: 2, .. })));
     assert!(matches!(
         Block::line(&HOME, &[1.0], kinds),
         Err(PathError::WrongSize { found: 1, wanted: 5, .. })
     ));
     let far = [1e308, -1e308, 1e308, 0.0, 0.0];
-    assert!(matches!(Block::line(&HOME.map(|_| -1e308), &far, kinds), Err(PathError::Unmeasurable { .. })));
+    assert!(matches!(Block::line(&HOME.map(|_| -1e308), &far, kinds), Err(PathError::NotComputable { .. })));
     let arc = |plane, center, sweep| Block::arc(&HOME, plane, center, sweep, &HOME, kinds).unwrap_err();
-    assert!(matches!(arc([0, 0], [1.0, 0.0], 1.0), PathError::Plane { first: 1, second: 1, .. }));
-    assert!(matches!(arc([0, 3], [1.0, 0.0], 1.0), PathError::Plane { second: 4, .. }));
-    assert!(matches!(arc([0, 9], [1.0, 0.0], 1.0), PathError::Plane { second: 10, .. }));
-    assert!(matches!(arc([0, 1], [0.0, 0.0], 1.0), PathError::Radius { .. }));
-    assert!(matches!(arc([0, 1], [1.0, 0.0], 0.0), PathError::Sweep { .. }));
-    assert!(matches!(arc([0, 1], [1.0, 0.0], f64::INFINITY), PathError::Sweep { .. }));
+    assert!(matches!(arc([0, 0], [1.0, 0.0], 1.0), PathError::InvalidPlane { first: 1, second: 1, .. }));
+    assert!(matches!(arc([0, 3], [1.0, 0.0], 1.0), PathError::InvalidPlane { second: 4, .. }));
+    assert!(matches!(arc([0, 9], [1.0, 0.0], 1.0), PathError::InvalidPlane { second: 10, .. }));
+    assert!(matches!(arc([0, 1], [0.0, 0.0], 1.0), PathError::ZeroRadius { .. }));
+    assert!(matches!(arc([0, 1], [1.0, 0.0], 0.0), PathError::InvalidSweep { .. }));
+    assert!(matches!(arc([0, 1], [1.0, 0.0], f64::INFINITY), PathError::InvalidSweep { .. }));
     assert!(matches!(arc([0, 1], [f64::NAN, 0.0], 1.0), PathError::NotFinite { .. }));
     let x = |x: f64| [x, 0.0, 0.0, 0.0, 0.0];
     assert!(matches!(spline(HOME, &[x(1.0), x(2.0)]), Err(PathError::TooFewPoints { found: 2, needed: 3 })));
     assert!(matches!(spline(HOME, &[HOME, x(2.0), x(3.0)]), Err(PathError::Cusp { piece: 1, pieces: 1 })));
     assert!(matches!(spline(HOME, &[x(1.0), x(2.0), x(2.0)]), Err(PathError::Cusp { .. })));
     assert!(matches!(spline(HOME, &[x(1.0), x(1.0), x(0.5)]), Err(PathError::Cusp { .. })), "turns back");
-    assert_eq!(spline(HOME, &[HOME; 4]), Err(PathError::StandsStill));
+    assert_eq!(spline(HOME, &[HOME; 4]), Err(PathError::ZeroLength));
     for message in [
         arc([0, 3], [1.0, 0.0], 1.0).to_string(),
         spline(HOME, &[x(1.0), x(1.0), x(0.5)]).unwrap_err().to_string(),
@@ -301,7 +301,7 @@ fn a_path_has_no_gaps() {
 }
 
 #[test]
-fn absurd_sizes_are_computed_with_or_refused() {
+fn extreme_sizes_are_accepted_or_rejected() {
     for size in [1e-300, 1e-12, 1e12, 1e150, 1e300] {
         let to = [size, size, 0.0, 0.0, 0.0];
         let block = line(HOME, to);

@@ -1,21 +1,21 @@
-//! The default machine as paths see it, and differences of setpoints over the position period.
+//! Fixtures of path tests: default machine, moves, and differences of setpoints over the position cycle.
 
 use virtual_axes_core::config::{AxisKind, Parameters};
 use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::path::{Block, Frame, Move, PlanError, Program};
 use virtual_axes_core::trajectory::JointLimits;
 
-/// Position period of the default machine, ns and s.
+/// Position period of the default machine, ns.
 pub const PERIOD: i64 = 6_000_000;
 pub const TSP: f64 = 0.006;
-/// x, y, z, a, c.
+/// Kinds of the axes x, y, z, a, c.
 pub const KINDS: [AxisKind; 5] =
     [AxisKind::Linear, AxisKind::Linear, AxisKind::Linear, AxisKind::Rotary, AxisKind::Rotary];
 
-/// Kinematics of the default machine with some parameters changed.
+/// Kinematics of the default machine with changed parameters.
 pub fn kinematics(changes: &[(&str, f64)]) -> Kinematics {
     Kinematics::new(
-        &virtual_axes_verification::fixtures::common::parameters(changes).machine_config().expect("valid"),
+        &virtual_axes_verification::fixtures::machines::parameters(changes).machine_config().expect("valid"),
     )
 }
 
@@ -23,10 +23,10 @@ pub fn kinematics(changes: &[(&str, f64)]) -> Kinematics {
 pub fn limits() -> Vec<JointLimits> {
     let parameters = Parameters::embedded_default().expect("valid");
     let machine = parameters.machine_config().expect("valid");
-    machine.axes().iter().map(JointLimits::of_axis).collect()
+    machine.axes().iter().map(JointLimits::from_axis).collect()
 }
 
-/// Plans for the default machine, without a rest.
+/// Plans a program for the default machine without a rest.
 pub fn plan(frame: Frame, moves: Vec<Move>) -> Result<Program, PlanError> {
     Program::plan(kinematics(&[]), frame, &limits(), PERIOD, 0.0, moves)
 }
@@ -35,19 +35,19 @@ pub fn line(from: [f64; 5], to: [f64; 5]) -> Block {
     Block::line(&from, &to, &KINDS).expect("a line")
 }
 
-/// An arc in X–Y.
+/// Creates an arc in the X–Y plane.
 pub fn arc(from: [f64; 5], center: [f64; 2], sweep: f64, to: [f64; 5]) -> Block {
     Block::arc(&from, [0, 1], center, sweep, &to, &KINDS).expect("an arc")
 }
 
-/// Setpoints at time `t`.
+/// Returns the setpoints at time `t`.
 pub fn psec(program: &Program, t: f64) -> [f64; 5] {
     let mut joints = [0.0; 5];
     program.psec(t, &mut joints);
     joints
 }
 
-/// Largest first, second and third difference of each joint over its limit, in the order of time.
+/// Returns the largest first, second and third difference of each joint, divided by its limit.
 pub fn use_of_limits(program: &Program) -> [[f64; 5]; 3] {
     let limits = limits();
     let last = (program.duration() / TSP).ceil() as i64 + 4;
@@ -73,7 +73,7 @@ pub fn use_of_limits(program: &Program) -> [[f64; 5]; 3] {
     used
 }
 
-/// Asserts that no difference exceeds its limit by more than 10⁻⁶, as promised.
+/// Asserts that no difference exceeds its limit by more than the guaranteed 10⁻⁶.
 #[track_caller]
 pub fn assert_within_limits(program: &Program) {
     let used = use_of_limits(program);

@@ -1,16 +1,16 @@
-//! Time laws of paths against closed forms, and their promise to keep the limits.
+//! Feed profiles compared with closed forms, and limits of the sampled setpoints.
 
 use std::f64::consts::{PI, TAU};
 
 use crate::path_common::*;
 use proptest::prelude::*;
-use virtual_axes_core::path::{Block, Frame, Law, Move, PathLimits, PlanError, Program};
+use virtual_axes_core::path::{Block, FeedProfile, Frame, Move, PathLimits, PlanError, Program};
 use virtual_axes_core::units::{DEGREE, RPM};
-use virtual_axes_verification::fixtures::common::{Ballbar, M_MIN, Profile};
+use virtual_axes_verification::fixtures::machines::{Ballbar, M_MIN, RestToRestProfile};
 
 const HOME: [f64; 5] = [0.0; 5];
 
-/// Setpoints at instants against `wanted`, m or rad.
+/// Compares the sampled setpoints with `wanted`, m or rad.
 #[track_caller]
 fn assert_joint(program: &Program, joint: usize, tolerance: f64, wanted: impl Fn(f64) -> f64) {
     let last = (program.duration() / TSP).ceil() as usize + 2;
@@ -22,8 +22,8 @@ fn assert_joint(program: &Program, joint: usize, tolerance: f64, wanted: impl Fn
 }
 
 #[test]
-fn a_line_of_200_mm_is_the_textbook_profile_of_seven_phases() {
-    let profile = Profile::new(0.2, 10.0 * M_MIN, 2.5, 50.0);
+fn a_line_of_200_mm_has_the_seven_phase_jerk_limited_profile() {
+    let profile = RestToRestProfile::new(0.2, 10.0 * M_MIN, 2.5, 50.0);
     let block = line(HOME, [0.2, 0.0, 0.0, 0.0, 0.0]);
     let program = plan(Frame::Joints, vec![Move::new(block, 10.0 * M_MIN)]).expect("planned");
     assert!((program.duration() - profile.duration()).abs() < 1e-14);
@@ -32,25 +32,25 @@ fn a_line_of_200_mm_is_the_textbook_profile_of_seven_phases() {
 }
 
 #[test]
-fn a_rotation_counts_in_radians() {
-    let profile = Profile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * TAU, 50.0 * TAU);
+fn a_rotation_is_measured_in_radians() {
+    let profile = RestToRestProfile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * TAU, 50.0 * TAU);
     let block = line(HOME, [0.0, 0.0, 0.0, 0.0, 90.0 * DEGREE]);
     let program = plan(Frame::Joints, vec![Move::new(block, 10.0 * RPM)]).expect("planned");
     assert_joint(&program, 4, 1e-12, |t| profile.at(t));
 }
 
 #[test]
-fn legs_with_an_exact_stop_follow_each_other_without_a_pause_off_the_grid() {
-    let leg = Profile::new(0.05, 10.0 * M_MIN, 2.5, 50.0);
+fn moves_with_an_exact_stop_follow_without_a_dwell_off_the_grid() {
+    let leg = RestToRestProfile::new(0.05, 10.0 * M_MIN, 2.5, 50.0);
     for turn in [90.0 * DEGREE, 45.0 * DEGREE] {
         let corner = [0.05, 0.0, 0.0, 0.0, 0.0];
         let end = [0.05 + 0.05 * turn.cos(), 0.05 * turn.sin(), 0.0, 0.0, 0.0];
-        // Along a diagonal two axes would allow more than one; the trial does not.
+        // Along a diagonal the limits of two axes would permit more than those of the test.
         let limits = PathLimits { acceleration: 2.5, jerk: 50.0 };
         let moves = [line(HOME, corner), line(corner, end)]
             .map(|block| Move { limits, ..Move::new(block, 10.0 * M_MIN) });
         let program = plan(Frame::Joints, moves.to_vec()).expect("planned");
-        assert_eq!(program.span(0).end, program.span(1).start);
+        assert_eq!(program.time_range(0).end, program.time_range(1).start);
         assert!((program.duration() - 2.0 * leg.duration()).abs() < 1e-14);
         let second = |t: f64| leg.at(t - leg.duration());
         assert_joint(&program, 0, 1e-12, |t| leg.at(t) + turn.cos() * second(t));
@@ -60,11 +60,11 @@ fn legs_with_an_exact_stop_follow_each_other_without_a_pause_off_the_grid() {
 }
 
 #[test]
-fn the_ballbar_is_the_one_of_the_trial() {
+fn a_planned_ballbar_matches_its_closed_form() {
     let trial = Ballbar::paper();
     let circle = arc(HOME, [-0.15, 0.0], 0.0 + 2.0 * TAU + trial.velocity * Ballbar::RAMP / 0.15, HOME);
-    let law = Law::Cosine { ramp: Ballbar::RAMP };
-    let moves = vec![Move { law, dwell: Ballbar::REST, ..Move::new(circle, trial.velocity) }];
+    let profile = FeedProfile::Cosine { ramp: Ballbar::RAMP };
+    let moves = vec![Move { profile, dwell: Ballbar::REST, ..Move::new(circle, trial.velocity) }];
     let program = Program::plan(kinematics(&[]), Frame::Joints, &limits(), PERIOD, Ballbar::REST, moves)
         .expect("planned");
     assert!((program.duration() - trial.duration()).abs() < 1e-12);
@@ -74,18 +74,18 @@ fn the_ballbar_is_the_one_of_the_trial() {
 }
 
 #[test]
-fn two_speeds_on_one_line_meet_at_the_slower_one_at_the_border() {
+fn two_feeds_on_one_line_change_before_the_junction() {
     let (border, end) = (130.0 * DEGREE, 210.0 * DEGREE);
     let [a, b] = [border, end].map(|c| [0.0, 0.0, 0.0, 0.0, c]);
     let moves = vec![Move::new(line(HOME, a), 18.0 * RPM), Move::new(line(a, b), 6.0 * RPM)];
     let program = plan(Frame::Joints, moves).expect("planned");
-    let at = program.span(0).end;
+    let at = program.time_range(0).end;
     assert_eq!(psec(&program, at)[4], border);
     let h = 1e-5;
     let speed = |t: f64| (psec(&program, t + h)[4] - psec(&program, t - h)[4]) / (2.0 * h);
     assert!((speed(at) / (6.0 * RPM) - 1.0).abs() < 1e-6, "{}", speed(at) / RPM);
     assert!((speed(at / 2.0) / (18.0 * RPM) - 1.0).abs() < 1e-9);
-    // Ramp down from 18 to 6 rpm before the border, none behind it but that to rest.
+    // Ramp from 18 to 6 rpm before the junction; after it only the ramp to rest.
     let (acceleration, jerk) = (0.83 * TAU, 50.0 * TAU);
     let ramp = |gain: f64| gain * RPM / acceleration + acceleration / jerk;
     let first = 130.0 * DEGREE - 9.0 * RPM * ramp(18.0) - 12.0 * RPM * ramp(12.0);
@@ -95,7 +95,7 @@ fn two_speeds_on_one_line_meet_at_the_slower_one_at_the_border() {
     assert_within_limits(&program);
 }
 
-/// Two lines of 60 mm joined by half-circles of 15 mm.
+/// Moves along two lines of 60 mm joined by half circles of 15 mm.
 fn contour_b(turned: f64) -> Vec<Move> {
     let (s, c) = turned.sin_cos();
     let at = |x: f64, y: f64| [c * x - s * y, s * x + c * y, 0.0, 0.0, 0.0];
@@ -109,12 +109,12 @@ fn contour_b(turned: f64) -> Vec<Move> {
 }
 
 #[test]
-fn a_jump_of_curvature_is_passed_at_the_speed_whose_acceleration_is_jerk_times_period() {
+fn a_curvature_jump_is_passed_at_the_speed_whose_acceleration_is_jerk_times_period() {
     let program = plan(Frame::Joints, contour_b(0.0)).expect("planned");
-    // Y has 3.0 m/s² and 50 m/s³: v² / R = Jmax Tsp.
+    // Y has 3.0 m/s² and 50 m/s³: v²/R = Jmax·Tsp.
     let wanted = (50.0 * TSP * 0.015_f64).sqrt();
     for block in 0..3 {
-        let at = program.span(block).end;
+        let at = program.time_range(block).end;
         let h = 1e-6;
         let speed = (program.progress(at + h) - program.progress(at - h)) / (2.0 * h);
         assert!((speed / wanted - 1.0).abs() < 1e-5, "end of block {block}: {speed}, wanted {wanted}");
@@ -123,7 +123,7 @@ fn a_jump_of_curvature_is_passed_at_the_speed_whose_acceleration_is_jerk_times_p
 }
 
 #[test]
-fn contours_with_jumps_of_curvature_keep_the_limits_whatever_their_direction() {
+fn contours_with_curvature_jumps_keep_the_limits_in_any_direction() {
     for degrees in [15.0, 30.0, 45.0, 60.0, 200.0] {
         let program = plan(Frame::Joints, contour_b(degrees * DEGREE)).expect("planned");
         println!("{degrees}°: {} s", program.duration());
@@ -131,7 +131,7 @@ fn contours_with_jumps_of_curvature_keep_the_limits_whatever_their_direction() {
     }
 }
 
-/// Speed along the path at time `t`.
+/// Returns the speed along the path at time `t`.
 fn speed(program: &Program, t: f64) -> f64 {
     let h = 1e-5;
     (program.progress(t + h) - program.progress(t - h)) / (2.0 * h)
@@ -143,7 +143,7 @@ fn spline(from: [f64; 5], points: &[[f64; 5]]) -> Block {
 }
 
 #[test]
-fn the_first_and_last_points_are_exact_and_progress_never_falls() {
+fn first_and_last_points_are_exact_and_progress_is_monotonic() {
     let corner = [0.0123, 0.0456, 0.0789, 0.1, -0.2];
     let end = [0.05, 0.02, 0.07, 0.3, 0.4];
     let moves = vec![
@@ -152,13 +152,13 @@ fn the_first_and_last_points_are_exact_and_progress_never_falls() {
     ];
     let program =
         Program::plan(kinematics(&[]), Frame::Joints, &limits(), PERIOD, 0.25, moves).expect("planned");
-    assert_eq!(program.span(0).start, 0.25);
-    assert!((program.span(1).start - program.span(0).end - 0.1).abs() < 1e-15);
-    assert_eq!(program.duration(), program.span(1).end);
+    assert_eq!(program.time_range(0).start, 0.25);
+    assert!((program.time_range(1).start - program.time_range(0).end - 0.1).abs() < 1e-15);
+    assert_eq!(program.duration(), program.time_range(1).end);
     assert_eq!(psec(&program, -1.0), HOME);
     assert_eq!(psec(&program, 0.25), HOME);
-    assert_eq!(psec(&program, program.span(0).end), corner);
-    assert_eq!(psec(&program, program.span(1).start), corner);
+    assert_eq!(psec(&program, program.time_range(0).end), corner);
+    assert_eq!(psec(&program, program.time_range(1).start), corner);
     assert_eq!(psec(&program, program.duration()), end);
     assert_eq!(psec(&program, f64::INFINITY), end);
     assert_eq!(program.progress(f64::INFINITY), program.path().length());
@@ -168,8 +168,8 @@ fn the_first_and_last_points_are_exact_and_progress_never_falls() {
         assert!(u >= before);
         before = u;
     }
-    // Near the ends of spans, and from one rounding to the next.
-    for span in [program.span(0), program.span(1)] {
+    // Times close to the ends of spans, in steps of a few rounding errors.
+    for span in [program.time_range(0), program.time_range(1)] {
         for border in [span.start, span.end] {
             let mut t = border - 1e-9;
             let mut before = program.progress(t);
@@ -186,13 +186,13 @@ fn the_first_and_last_points_are_exact_and_progress_never_falls() {
 
 #[test]
 fn a_straight_line_of_the_tip_is_as_fast_as_the_axes_allow() {
-    // Along the diagonal of X and Y on a table turned by 45° only X moves.
+    // Along the diagonal of X and Y with the table at 45° only X moves.
     let c = 45.0 * DEGREE;
     let from = [0.0, 0.0, 0.0, 0.0, c];
     let to = [0.1, 0.1, 0.0, 0.0, c];
     let length = 0.1 * 2.0_f64.sqrt();
     let program = plan(Frame::Workpiece, vec![Move::new(line(from, to), 10.0 * M_MIN)]).expect("planned");
-    let profile = Profile::new(length, 10.0 * M_MIN, 2.5, 50.0);
+    let profile = RestToRestProfile::new(length, 10.0 * M_MIN, 2.5, 50.0);
     assert!((program.duration() - profile.duration()).abs() < 1e-12);
     let start = psec(&program, 0.0)[0];
     assert_joint(&program, 0, 1e-12, |t| start + profile.at(t));
@@ -201,8 +201,8 @@ fn a_straight_line_of_the_tip_is_as_fast_as_the_axes_allow() {
 }
 
 #[test]
-fn limits_of_the_move_are_kept_besides_those_of_the_axes() {
-    let profile = Profile::new(0.2, 10.0 * M_MIN, 1.0, 20.0);
+fn limits_of_the_move_are_kept_in_addition_to_those_of_the_axes() {
+    let profile = RestToRestProfile::new(0.2, 10.0 * M_MIN, 1.0, 20.0);
     let limits = PathLimits { acceleration: 1.0, jerk: 20.0 };
     let block = line(HOME, [0.2, 0.0, 0.0, 0.0, 0.0]);
     let program =
@@ -211,12 +211,12 @@ fn limits_of_the_move_are_kept_besides_those_of_the_axes() {
 }
 
 #[test]
-fn a_feed_beyond_the_axes_is_what_the_axes_have() {
+fn a_feed_above_the_axis_limits_is_reduced_to_them() {
     // 30 m/min on each of X and Y.
     let to = [0.3, 0.3, 0.0, 0.0, 0.0];
     let program = plan(Frame::Joints, vec![Move::new(line(HOME, to), 1e9)]).expect("planned");
     let root = 2.0_f64.sqrt();
-    let profile = Profile::new(0.3 * root, 0.5 * root, 2.5 * root, 50.0 * root);
+    let profile = RestToRestProfile::new(0.3 * root, 0.5 * root, 2.5 * root, 50.0 * root);
     assert!((program.duration() - profile.duration()).abs() < 1e-12);
     assert_within_limits(&program);
 }
@@ -229,14 +229,14 @@ fn a_permitted_corner_is_passed_at_its_speed() {
     let first = Move { corner: Some(permitted), ..Move::new(line(HOME, corner), 10.0 * M_MIN) };
     let program =
         plan(Frame::Joints, vec![first, Move::new(line(corner, end), 10.0 * M_MIN)]).expect("planned");
-    let at = program.span(0).end;
+    let at = program.time_range(0).end;
     assert!((speed(&program, at) / permitted - 1.0).abs() < 1e-3);
     assert!(speed(&program, at - 0.05) > 2.0 * permitted && speed(&program, at + 0.05) > 2.0 * permitted);
 }
 
 #[test]
-fn the_spline_of_a_path_slows_down_only_where_it_must() {
-    // A sharp bend in the middle of a long spline that is straight elsewhere.
+fn a_spline_is_slow_only_where_its_curvature_requires_it() {
+    // A sharp bend in the middle of a long, otherwise straight spline.
     let points: Vec<[f64; 5]> = (1..=20)
         .map(|i| {
             let x = 0.03 * f64::from(i);
@@ -271,7 +271,7 @@ fn a_spline_that_nearly_turns_back_is_passed_slowly() {
 }
 
 #[test]
-fn the_tip_of_the_tool_follows_its_path_while_the_tables_turn() {
+fn the_tool_tip_follows_its_path_while_the_tables_rotate() {
     let a = [0.02, 0.0, 0.0, 0.0, 0.0];
     let b = [0.05, 0.01, 0.0, 30.0 * DEGREE, 60.0 * DEGREE];
     let center = [0.05, 0.03];
@@ -283,22 +283,22 @@ fn the_tip_of_the_tool_follows_its_path_while_the_tables_turn() {
     let program = plan(Frame::Workpiece, moves.to_vec()).expect("planned");
     println!("{} s", program.duration());
     assert_within_limits(&program);
-    // On the arc the tip is on a helix round its center.
+    // On the arc the tip follows a helix around its center.
     let kinematics = kinematics(&[]);
-    let span = program.span(2);
+    let span = program.time_range(2);
     for i in 0..=1000 {
         let t = span.start + (span.end - span.start) * f64::from(i) / 1000.0;
         let tip = kinematics.forward(&psec(&program, t)).tip;
         assert!(((tip.x - center[0]).hypot(tip.y - center[1]) - 0.02).abs() < 1e-14);
     }
-    // An axis is at work at its limit: near the fastest.
+    // At least one axis is near its limit, so the motion is near the optimum.
     let used = use_of_limits(&program).concat().into_iter().fold(0.0, f64::max);
     assert!(used > 0.9, "{used}");
 }
 
 #[test]
-fn halves_of_one_curve_of_the_tip_are_joined_at_speed() {
-    // A helix round the axis of C while A and C turn, cut in two.
+fn a_divided_tip_curve_is_passed_at_speed() {
+    // A helix around the axis of C while A and C rotate, divided in two.
     let from = [0.03, 0.0, 0.0, 10.0 * DEGREE, 0.0];
     let middle = arc(from, [0.0, 0.0], PI, [0.0, 0.0, 0.005, 20.0 * DEGREE, 60.0 * DEGREE]);
     let mut at = [0.0; 5];
@@ -307,7 +307,7 @@ fn halves_of_one_curve_of_the_tip_are_joined_at_speed() {
     let moves = [middle, rest].map(|block| Move::new(block, 2.0 * M_MIN)).to_vec();
     let program = plan(Frame::Workpiece, moves).expect("planned");
     assert_within_limits(&program);
-    let border = program.span(0).end;
+    let border = program.time_range(0).end;
     assert!((speed(&program, border) / (2.0 * M_MIN) - 1.0).abs() < 1e-6, "{}", speed(&program, border));
 }
 
@@ -330,18 +330,18 @@ fn a_change_of_orientation_over_a_fixed_tip_keeps_the_limits_of_all_axes() {
         let t = program.duration() * f64::from(i) / 1000.0;
         assert!((kinematics(&[]).forward(&psec(&program, t)).tip - tip).norm() < 1e-15);
     }
-    // Some axis is near a limit somewhere: it is not slower than it must be by much.
+    // At least one axis is near a limit, so the motion is not much slower than necessary.
     let used = use_of_limits(&program).concat().into_iter().fold(0.0, f64::max);
     assert!(used > 0.9, "{used}");
 }
 
-/// Random blocks, end to end.
+/// Random consecutive blocks.
 #[derive(Debug, Clone)]
 enum Piece {
     Line([f64; 5]),
     Arc(f64, f64, f64, [f64; 3]),
     Spline(Vec<[f64; 5]>),
-    /// A line on, in the direction of the last one.
+    /// Line that continues in the direction of the last block.
     Further(f64),
 }
 
@@ -374,7 +374,7 @@ fn blocks(pieces: &[Piece], tangent: bool) -> Vec<Block> {
         let block = match piece {
             Piece::Line(step) => line(at, plus(at, *step)),
             Piece::Arc(radius, angle, sweep, rest) => {
-                // Tangent to what was before, where that is flat.
+                // Tangent to the last block if that is planar.
                 let angle = if tangent {
                     direction[1].atan2(direction[0]) - PI / 2.0 * sweep.signum()
                 } else {
@@ -414,7 +414,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn set_points_of_any_path_keep_the_limits(
+    fn setpoints_of_any_path_keep_the_limits(
         pieces in prop::collection::vec(piece(0.3), 1..6), tangent: bool, workpiece: bool, feed in 0.01..0.6f64,
     ) {
         let frame = if workpiece { Frame::Workpiece } else { Frame::Joints };
@@ -425,7 +425,7 @@ proptest! {
     }
 
     #[test]
-    fn set_points_of_flat_tangent_paths_keep_the_limits(
+    fn setpoints_of_planar_tangent_paths_keep_the_limits(
         pieces in prop::collection::vec(piece(1e-12), 2..8), feed in 0.01..0.6f64,
     ) {
         let moves: Vec<Move> = blocks(&pieces, true).into_iter().map(|block| Move::new(block, feed)).collect();
@@ -436,39 +436,45 @@ proptest! {
 }
 
 #[test]
-fn what_cannot_be_planned_is_refused_with_its_move_and_values() {
+fn invalid_moves_are_rejected_with_their_number_and_values() {
     let block = || line(HOME, [0.1, 0.0, 0.0, 0.0, 0.0]);
     let good = || Move::new(block(), 0.1);
-    let refused = |order: Move| {
+    let rejected = |order: Move| {
         let first = Move::new(line([-0.1, 0.0, 0.0, 0.0, 0.0], HOME), 0.1);
         let error = plan(Frame::Joints, vec![first, order]).unwrap_err();
         println!("{error}");
         error
     };
     for feed in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(refused(Move { feed, ..good() }), PlanError::Value { index: 2, .. }));
+        assert!(matches!(rejected(Move { feed, ..good() }), PlanError::InvalidValue { index: 2, .. }));
     }
-    assert!(matches!(refused(Move { dwell: -1.0, ..good() }), PlanError::Value { index: 2, .. }));
-    assert!(matches!(refused(Move { corner: Some(f64::NAN), ..good() }), PlanError::Value { index: 2, .. }));
+    assert!(matches!(rejected(Move { dwell: -1.0, ..good() }), PlanError::InvalidValue { index: 2, .. }));
+    assert!(matches!(
+        rejected(Move { corner: Some(f64::NAN), ..good() }),
+        PlanError::InvalidValue { index: 2, .. }
+    ));
     let limits = PathLimits { acceleration: 0.0, jerk: 1.0 };
-    assert!(matches!(refused(Move { limits, ..good() }), PlanError::Value { index: 2, .. }));
-    let law = Law::Cosine { ramp: 2.0 };
-    assert_eq!(refused(Move { law, ..good() }), PlanError::TooShort { index: 2, length: 0.1, needed: 0.2 });
-    let law = Law::Cosine { ramp: 0.01 };
-    let fast = refused(Move { law, feed: 0.6, ..good() });
+    assert!(matches!(rejected(Move { limits, ..good() }), PlanError::InvalidValue { index: 2, .. }));
+    let profile = FeedProfile::Cosine { ramp: 2.0 };
+    assert_eq!(
+        rejected(Move { profile, ..good() }),
+        PlanError::TooShort { index: 2, length: 0.1, needed: 0.2 }
+    );
+    let profile = FeedProfile::Cosine { ramp: 0.01 };
+    let fast = rejected(Move { profile, feed: 0.6, ..good() });
     assert!(matches!(&fast, PlanError::TooFast { index: 2, joint, .. } if joint == "x"), "{fast}");
     assert!(matches!(plan(Frame::Joints, vec![]), Err(PlanError::Path(_))));
     let few = Program::plan(kinematics(&[]), Frame::Joints, &limits_of(3), PERIOD, 0.0, vec![good()]);
-    assert_eq!(few, Err(PlanError::Joints { found: 3, wanted: 5 }));
+    assert_eq!(few, Err(PlanError::JointCount { found: 3, wanted: 5 }));
     for (period, rest) in [(0, 0.0), (PERIOD, -1.0), (PERIOD, f64::NAN)] {
         let planned =
             Program::plan(kinematics(&[]), Frame::Joints, &limits_of(5), period, rest, vec![good()]);
-        assert!(matches!(planned, Err(PlanError::Period { .. } | PlanError::Rest { .. })));
+        assert!(matches!(planned, Err(PlanError::InvalidPeriod { .. } | PlanError::InvalidRest { .. })));
     }
     let mut broken = limits_of(5);
     broken[2].limits.jerk = 0.0;
     let planned = Program::plan(kinematics(&[]), Frame::Joints, &broken, PERIOD, 0.0, vec![good()]);
-    assert!(matches!(planned, Err(PlanError::Limit { .. })));
+    assert!(matches!(planned, Err(PlanError::InvalidLimit { .. })));
 }
 
 fn limits_of(count: usize) -> Vec<virtual_axes_core::trajectory::JointLimits> {
@@ -476,7 +482,7 @@ fn limits_of(count: usize) -> Vec<virtual_axes_core::trajectory::JointLimits> {
 }
 
 #[test]
-fn absurd_but_finite_moves_are_planned_or_refused_quickly() {
+fn extreme_finite_moves_are_planned_or_rejected_quickly() {
     for size in [1e-300, 1e-12, 1e6, 1e150, 1e300] {
         for feed in [1e-300, 0.1, 1e300] {
             let to = [size, size, 0.0, 0.1, 0.0];

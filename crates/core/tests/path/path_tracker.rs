@@ -1,4 +1,4 @@
-//! The nearest point of a path against closed forms and against brute force.
+//! Nearest point of a path compared with closed forms and with brute force.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::path_common::*;
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use virtual_axes_core::assess::{Nearest, PathTracker};
+use virtual_axes_core::assess::{NearestPoint, PathTracker};
 use virtual_axes_core::kinematics::ToolPose;
 use virtual_axes_core::path::{Block, Frame, Path};
 use virtual_axes_core::units::DEGREE;
@@ -22,14 +22,14 @@ fn spline(from: [f64; 5], points: &[[f64; 5]]) -> Block {
     Block::spline(&from, &points, &KINDS).expect("a spline")
 }
 
-/// Smallest distance of the tip from the path between two values of progress: sampled, then by halving
-/// the interval around the best sample.
+/// Returns the smallest distance of the tip from the path between two values of progress, by sampling and
+/// interval reduction around the best sample.
 fn brute_force(path: &Path, from: f64, to: f64, tip: &Vector3<f64>) -> f64 {
     let at = |u: f64| (path.tool(u).tip - tip).norm();
     let count = 2000;
-    let place = |i: i32| from + (to - from) * f64::from(i.clamp(0, count)) / f64::from(count);
-    let best = (0..=count).min_by(|a, b| at(place(*a)).total_cmp(&at(place(*b)))).expect("samples");
-    let (mut low, mut high) = (place(best - 1), place(best + 1));
+    let progress = |i: i32| from + (to - from) * f64::from(i.clamp(0, count)) / f64::from(count);
+    let best = (0..=count).min_by(|a, b| at(progress(*a)).total_cmp(&at(progress(*b)))).expect("samples");
+    let (mut low, mut high) = (progress(best - 1), progress(best + 1));
     for _ in 0..90 {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
         if at(a) < at(b) { high = b } else { low = a }
@@ -38,7 +38,7 @@ fn brute_force(path: &Path, from: f64, to: f64, tip: &Vector3<f64>) -> f64 {
 }
 
 #[test]
-fn on_a_circle_the_distance_is_the_radial_deviation() {
+fn distance_from_a_circle_is_the_radial_deviation() {
     let radius = 0.15;
     for (frame, offset) in [(Frame::Joints, 0.1), (Frame::Workpiece, 0.0)] {
         let mut tracker = PathTracker::new(path(frame, vec![arc(HOME, [-radius, 0.0], 2.0 * TAU, HOME)]));
@@ -50,7 +50,7 @@ fn on_a_circle_the_distance_is_the_radial_deviation() {
             let r = radius + deviation;
             let tip = Vector3::new(r * angle.cos() - radius, r * angle.sin(), -offset);
             let nearest = tracker.nearest(&ToolPose { tip, axis: Vector3::z() }, u + lag);
-            // The deviation that the rounded point has.
+            // Deviation of the rounded point.
             let wanted = ((tip.x + radius).hypot(tip.y) - radius).abs();
             assert!((nearest.distance - wanted).abs() <= 1e-14, "{} {wanted}", nearest.distance);
             assert!((nearest.progress - angle * radius).abs() < 1e-12, "in order over both turns");
@@ -60,7 +60,7 @@ fn on_a_circle_the_distance_is_the_radial_deviation() {
 }
 
 #[test]
-fn there_and_back_is_followed_in_order() {
+fn a_forward_and_backward_line_is_followed_in_order() {
     let end = [0.1, 0.0, 0.0, 0.0, 0.0];
     let path = path(Frame::Joints, vec![line(HOME, end), line(end, HOME)]);
     let mut tracker = PathTracker::new(Arc::clone(&path));
@@ -73,7 +73,7 @@ fn there_and_back_is_followed_in_order() {
         pose.tip.y = 1e-5;
         let nearest = tracker.nearest(&pose, u);
         assert!(nearest.progress >= before, "{} after {before}", nearest.progress);
-        // Within the slack around the turning point both legs are as near.
+        // Both lines are equally close around the turning point, within the order tolerance.
         assert!((nearest.progress - late).abs() < 3e-5, "{} at {late}", nearest.progress);
         assert!((nearest.distance - 1e-5).abs() < 1e-15);
         before = nearest.progress;
@@ -86,7 +86,7 @@ fn a_cut_corner_passes_from_one_leg_to_the_next() {
     let end = [0.05, 0.05, 0.0, 0.0, 0.0];
     let path = path(Frame::Joints, vec![line(HOME, corner), line(corner, end)]);
     let mut tracker = PathTracker::new(Arc::clone(&path));
-    // A quarter circle of 1 mm inside the corner: farthest in its middle.
+    // A quarter circle of 1 mm inside the corner, farthest from the path in its middle.
     let (r, start) = (1e-3, 0.049);
     let mut largest = 0.0_f64;
     for i in 0..=1000 {
@@ -101,7 +101,7 @@ fn a_cut_corner_passes_from_one_leg_to_the_next() {
 }
 
 #[test]
-fn what_overshoots_the_ends_is_reported_apart() {
+fn overshoot_beyond_the_ends_is_reported_separately() {
     let end = [0.03, 0.04, 0.0, 0.0, 0.0];
     let path = path(Frame::Joints, vec![line(HOME, end)]);
     let mut tracker = PathTracker::new(Arc::clone(&path));
@@ -126,8 +126,8 @@ fn what_overshoots_the_ends_is_reported_apart() {
 }
 
 #[test]
-fn where_the_tip_stands_still_the_orientation_tells_the_place() {
-    // A and C turn with the tip fixed in the workpiece frame, between two lines.
+fn orientation_determines_the_progress_while_the_tip_is_fixed() {
+    // A and C rotate with the tip fixed in the workpiece frame, between two lines.
     let a = [0.02, 0.0, 0.0, 0.0, 0.0];
     let b = [0.02, 0.0, 0.0, 40.0 * DEGREE, 30.0 * DEGREE];
     let c = [0.02, 0.03, 0.0, 40.0 * DEGREE, 30.0 * DEGREE];
@@ -150,8 +150,8 @@ fn where_the_tip_stands_still_the_orientation_tells_the_place() {
     }
 }
 
-/// Follows `path` with a lag, off by up to `amplitude`; hands out tip, result and window.
-fn follow(path: &Arc<Path>, amplitude: f64, mut observe: impl FnMut(&ToolPose, Nearest, f64, f64)) {
+/// Follows `path` with a lag and an error of `amplitude`, and passes tip, result and window to `observe`.
+fn follow(path: &Arc<Path>, amplitude: f64, mut observe: impl FnMut(&ToolPose, NearestPoint, f64, f64)) {
     let mut tracker = PathTracker::new(Arc::clone(path));
     let count = 600;
     for i in 0..=count {
@@ -185,7 +185,7 @@ fn assert_nearest(path: &Arc<Path>, amplitude: f64, tolerance: f64) {
 }
 
 #[test]
-fn on_a_spline_the_nearest_point_is_that_of_brute_force() {
+fn nearest_point_on_a_spline_matches_brute_force() {
     let points =
         [[0.02, 0.03, 0.0], [0.05, -0.01, 0.01], [0.08, 0.04, -0.01], [0.1, 0.0, 0.02], [0.12, 0.02, 0.0]];
     let points = points.map(|[x, y, z]| [x, y, z, 0.0, 0.0]);
@@ -197,7 +197,7 @@ fn on_a_spline_the_nearest_point_is_that_of_brute_force() {
 }
 
 #[test]
-fn with_five_axes_the_nearest_point_is_that_of_brute_force() {
+fn nearest_point_with_five_axes_matches_brute_force() {
     let points = [
         [0.02, 0.03, 0.0, 0.1, 0.0],
         [0.05, -0.01, 0.01, 0.3, 0.5],
@@ -291,7 +291,7 @@ proptest! {
 }
 
 #[test]
-fn numbers_that_are_none_do_no_harm() {
+fn nan_and_huge_inputs_are_tolerated() {
     let end = [0.1, 0.0, 0.0, 0.0, 0.0];
     let mut tracker = PathTracker::new(path(Frame::Joints, vec![line(HOME, end)]));
     let nan = Vector3::new(f64::NAN, 0.0, 0.0);

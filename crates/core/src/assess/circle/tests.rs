@@ -1,4 +1,4 @@
-//! Circularity against closed forms, and against a fit that sees all points.
+//! Circularity compared with closed forms and with a fit to all points.
 
 use super::*;
 
@@ -85,7 +85,7 @@ fn a_displaced_circle_has_radial_deviation_of_its_offset_and_no_circular_deviati
         let offset = [0.6 * e, -0.8 * e];
         let (report, full) = report(&points(1.0, offset, |_| R));
         assert_near("mean", report.mean, e.powi(2) / (4.0 * R) + e.powi(4) / (64.0 * R.powi(3)), ROUNDING);
-        // The nearest of the points is within half a step of the extreme, where the cosine is flat.
+        // The nearest point is within half a step of the extreme, where the cosine is flat.
         assert_near("Fmin", report.min, -e, 1e-7 * e + ROUNDING);
         assert_near("Fmax", report.max, e, 1e-7 * e + ROUNDING);
         assert_near("G", full.circular_deviation, 0.0, ROUNDING);
@@ -96,7 +96,7 @@ fn a_displaced_circle_has_radial_deviation_of_its_offset_and_no_circular_deviati
 }
 
 #[test]
-fn part_of_a_turn_that_is_run_twice_does_not_draw_the_center() {
+fn a_partly_repeated_turn_does_not_shift_the_center() {
     let (_, full) = report(&points(1.37, [3e-4, 4e-4], |_| R + 1e-4));
     assert_near("x", full.center[0], 3e-4, ROUNDING);
     assert_near("y", full.center[1], 4e-4, ROUNDING);
@@ -104,8 +104,8 @@ fn part_of_a_turn_that_is_run_twice_does_not_draw_the_center() {
     assert_near("G", full.circular_deviation, 0.0, ROUNDING);
 }
 
-/// An ellipse, its half axes R + h and R − h, by its eccentric angle; its center by symmetry. It is turned
-/// so that its vertices lie in the middle of a bin: on the edge of one the bins would cost nothing.
+/// Points of an ellipse with half axes R + h and R − h, parametrized by its eccentric angle. It is rotated
+/// so that its vertices lie in the middle of a bin: at the edge of a bin the bins cause no error.
 fn ellipse(h: f64, offset: [f64; 2]) -> Vec<[f64; 2]> {
     let (sin_turn, cos_turn) = (50.5 * WIDTH).sin_cos();
     let point = |k: u32| {
@@ -137,13 +137,14 @@ fn a_displaced_ellipse_has_the_same_circular_deviation_within_the_width_of_a_bin
         let offset = [e * angle.cos(), e * angle.sin()];
         let (_, full) = report(&ellipse(h, offset));
         let lost = 2.0 * h - full.circular_deviation;
-        // Smooth, so the bin costs its square: a deviation h cos 2φ is 2 h w² lower a bin aside.
+        // For a smooth path the error of a bin is quadratic: a deviation h cos 2φ is 2 h w² lower one bin
+        // aside.
         assert!((-ROUNDING..=2.0 * (2.0 * h * WIDTH.powi(2))).contains(&lost), "{lost:e}");
         assert_near("x", full.center[0], offset[0], 1e-12);
     }
 }
 
-/// Spikes at the quadrants as friction makes them, on a displaced circle of a wrong radius.
+/// Points with reversal spikes at the quadrants on a displaced circle of a wrong radius.
 fn with_spikes(offset: [f64; 2]) -> Vec<[f64; 2]> {
     points(1.8, offset, |angle| {
         let after = angle.rem_euclid(TAU / 4.0);
@@ -152,13 +153,13 @@ fn with_spikes(offset: [f64; 2]) -> Vec<[f64; 2]> {
 }
 
 #[test]
-fn spikes_agree_with_a_fit_that_sees_all_points() {
+fn spikes_agree_with_a_fit_to_all_points() {
     for offset in [[0.0, 0.0], [10e-6, 0.0], [-20e-6, 30e-6]] {
         let points = with_spikes(offset);
         let (_, full) = report(&points);
         let (radius, range) = geometric_fit(&points);
         let e = full.center[0].hypot(full.center[1]);
-        // Spikes on a few degrees draw the two kinds of center apart by far less than f²/R.
+        // Spikes of a few degrees separate both kinds of center by far less than f²/R.
         let form = 1e-10;
         assert_near("radius", full.radius_deviation, radius, 1e-11);
         let lost = range - full.circular_deviation;
@@ -167,20 +168,20 @@ fn spikes_agree_with_a_fit_that_sees_all_points() {
 }
 
 #[test]
-fn both_directions_with_radii_of_their_own() {
+fn both_directions_with_different_radii() {
     let (d1, d2) = (50e-6, 30e-6);
-    // Not the same number of points, which must not matter.
+    // The number of points differs, which has no effect.
     let clockwise = assessor(&points(-2.0, [0.0; 2], |_| R + d1));
     let counterclockwise = assessor(&points(1.0, [0.0; 2], |_| R - d2));
     let both = bidirectional(&clockwise, &counterclockwise).expect("two circles");
     assert_near("G(b)", both.circular_deviation, d1 + d2, ROUNDING);
-    // The mean is reached to the third order of the deviation: d³/R² is 5e-12 m.
+    // The mean is exact to the third order of the deviation: d³/R² is 5e-12 m.
     assert_near("D", both.mean_radial_deviation, (d1 - d2) / 2.0, 5e-12);
 }
 
-/// Displaced by e and −e: each is round, both together lie between R − e and R + e.
+/// Circles displaced by e and −e: each is round, both lie between R − e and R + e.
 #[test]
-fn both_directions_displaced_against_each_other() {
+fn both_directions_with_displaced_centers() {
     let e = 40e-6;
     let clockwise = assessor(&points(-1.0, [e, 0.0], |_| R));
     let counterclockwise = assessor(&points(1.0, [-e, 0.0], |_| R));
@@ -194,7 +195,7 @@ fn both_directions_displaced_against_each_other() {
 }
 
 #[test]
-fn an_arc_has_radial_deviations_only() {
+fn an_arc_has_only_radial_deviations() {
     let arc = assessor(&points(0.9, [0.0; 2], |_| R + 1e-5));
     let report = arc.report().expect("points");
     assert_near("mean", report.mean, 1e-5, ROUNDING);
@@ -205,7 +206,7 @@ fn an_arc_has_radial_deviations_only() {
 }
 
 #[test]
-fn circles_that_are_not_the_same_are_not_compared() {
+fn different_circles_are_not_compared() {
     let circle = assessor(&points(1.0, [0.0; 2], |_| R));
     let mut other = CircleAssessor::new(CENTER, R + 1e-3);
     for [x, y] in points(-1.0, [0.0; 2], |_| R) {
@@ -215,12 +216,12 @@ fn circles_that_are_not_the_same_are_not_compared() {
 }
 
 #[test]
-fn no_point_no_figure() {
+fn a_circle_without_points_has_no_report() {
     assert_eq!(CircleAssessor::new(CENTER, R).report(), None);
 }
 
 #[test]
-fn each_point_is_answered_with_its_deviation() {
+fn push_returns_the_radial_deviation() {
     let mut assessor = CircleAssessor::new([0.0; 2], 5.0);
     assert_eq!(assessor.push(3.0, 4.0), 0.0);
     assert_eq!(assessor.push(-6.0, -8.0), 5.0);

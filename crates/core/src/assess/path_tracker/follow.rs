@@ -1,170 +1,149 @@
-//! A stretch of poses at once, where the path has a closed form.
+//! Contour errors of a series of poses in closed form on lines and circles.
 //!
-//! Along a line or a circle the nearest point need not be sought for every pose: once it is known that the feet
-//! of all of them lie in the block, inside of what would be searched, the distance follows from the pose alone.
-//! What is computed then is what the search computes, so that the distances are the same bits.
+//! Along a line or a circle, no search is needed for each pose: if the foot points of all poses lie in the
+//! block, within the search range, the distance follows directly from the pose. The computation is the same
+//! as in the search, so the distances are bit-identical.
 
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::{BACK, Candidate, Nearest, PathTracker};
-use crate::assess::path_shape::Shape;
+use super::{Candidate, NearestPoint, PathTracker, SEARCH_BACK};
+use crate::assess::path_shape::{TipCurve, circle_coordinates, distance_to_circle, line_parameter};
 use crate::kinematics::{Poses, ToolPose};
 
-/// How far from the ends of what is searched all feet must lie, m: more than rounding moves them.
-const CLEAR: f64 = 1e-9;
-/// Least angle from one foot on a circle to the next, rad, that surely is one forwards.
-const FORWARDS: f64 = 1e-9;
+/// Distance from the ends of the search range that all foot points keep, m: more than rounding.
+const CLEARANCE: f64 = 1e-9;
+/// Smallest angle between consecutive foot points on a circle that counts as forward, rad.
+const MIN_ADVANCE: f64 = 1e-9;
 
-/// How far poses that follow each other are from a path.
+/// Deviations of consecutive poses from a path.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Deviations {
-    /// [`Nearest::distance`] of each, m.
+pub struct PathDeviations {
+    /// [`NearestPoint::distance`] of each pose, m.
     pub distance: Vec<f64>,
-    /// [`Nearest::within_ends`] of each, m.
+    /// [`NearestPoint::within_ends`] of each pose, m.
     pub within_ends: Vec<f64>,
-    /// [`Nearest::orientation`] of each, rad.
+    /// [`NearestPoint::orientation`] of each pose, rad.
     pub orientation: Vec<f64>,
 }
 
-impl Deviations {
-    /// Forgets all of them.
+impl PathDeviations {
+    /// Removes all deviations.
     pub fn clear(&mut self) {
         self.distance.clear();
         self.within_ends.clear();
         self.orientation.clear();
     }
 
-    /// Adds those of one pose.
-    pub fn push(&mut self, nearest: &Nearest) {
+    /// Adds the deviations of one pose.
+    pub fn push(&mut self, nearest: &NearestPoint) {
         self.distance.push(nearest.distance);
         self.within_ends.push(nearest.within_ends);
         self.orientation.push(nearest.orientation);
     }
 }
 
-/// A stretch of poses that was followed.
+/// Result for a series of poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Followed {
-    /// What is nearest to the first of them.
-    pub first: Nearest,
-    /// Whether it took a closed form of the path, and not a search for each of them.
+pub struct FollowResult {
+    /// Nearest point to the first pose.
+    pub first: NearestPoint,
+    /// True if the closed form was used instead of a search for each pose.
     pub closed_form: bool,
 }
 
-/// What is searched, as lengths in the one block that holds all of it.
+/// Search range, as arc lengths in the single block that contains it.
 #[derive(Debug, Clone, Copy)]
-struct Reach {
+struct SearchRange {
     block: usize,
     /// Progress at the start of the block.
     start: f64,
-    /// From where on at the first pose.
+    /// Start of the range at the first pose.
     low: f64,
-    /// Up to where at the first pose, and at the last one.
+    /// End of the range at the first and at the last pose.
     high: [f64; 2],
 }
 
-/// Distance from a line through `from`, and how far along it the foot lies.
-#[inline(always)]
-pub(super) fn from_line(tip: Vector3<f64>, from: Vector3<f64>, slope: Vector3<f64>) -> f64 {
-    slope.dot(&(tip - from)) / slope.norm_squared()
-}
-
-/// Coordinates of a tip in the frame of a circle, and its distance from the circle's axis.
-#[inline(always)]
-pub(super) fn from_axis(
-    tip: Vector3<f64>,
-    center: Vector3<f64>,
-    plane: &[Vector3<f64>; 3],
-) -> ([f64; 3], f64) {
-    let out = tip - center;
-    let [x, y, z] = plane.map(|vector| vector.dot(&out));
-    ([x, y, z], (x * x + y * y).sqrt())
-}
-
-/// Distance from a circle of what lies `off` its axis and `z` off its plane.
-#[inline(always)]
-pub(super) fn from_circle(off: f64, z: f64, radius: f64) -> f64 {
-    let outside = off - radius;
-    (outside * outside + z * z).sqrt()
-}
-
-/// The tips, one after the other.
+/// Returns the tips in order.
 fn tips(poses: &Poses) -> impl Iterator<Item = Vector3<f64>> {
     let [xs, ys, zs] = poses.tips();
     xs.iter().zip(ys).zip(zs).map(|((x, y), z)| Vector3::new(*x, *y, *z))
 }
 
 impl PathTracker {
-    /// As [`nearest`](Self::nearest) for each of `poses`, one after the other: what they deviate by goes to
-    /// `found`, in the place of what was there. `until` tells by the place of a pose what has been commanded by
-    /// then; it never decreases. None without a pose.
+    /// Computes the deviations of `poses` as [`nearest`](Self::nearest) does for each of them in order, and
+    /// replaces the contents of `found` by them.
+    ///
+    /// `until` returns the progress commanded at the pose of an index; it never decreases. Returns `None`
+    /// without a pose.
     pub fn follow(
         &mut self,
         poses: &Poses,
         mut until: impl FnMut(usize) -> f64,
-        found: &mut Deviations,
-    ) -> Option<Followed> {
+        found: &mut PathDeviations,
+    ) -> Option<FollowResult> {
         found.clear();
         let last = poses.len().checked_sub(1)?;
         let before = self.furthest;
         let begin = until(0);
         let first = self.nearest(&poses.get(0), begin);
         found.push(&first);
-        // The call before found the tracker as it left it, and so would all of these.
-        if self.last.is_some() && poses.stand_still() && until(last) == begin {
+        // The query before left the state unchanged, and so would all of these.
+        if self.last.is_some() && poses.is_constant() && until(last) == begin {
             (0..last).for_each(|_| found.push(&first));
-            return Some(Followed { first, closed_form: false });
+            return Some(FollowResult { first, closed_form: false });
         }
-        if poses.only_axis().is_some() && begin >= self.path.length() && self.all_beyond(poses, &first) {
-            for place in 1..=last {
-                found.push(&self.at_end(&poses.get(place), &first));
+        if poses.constant_axis().is_some() && begin >= self.path.length() && self.all_beyond_end(poses, &first) {
+            for index in 1..=last {
+                found.push(&self.nearest_at_end(&poses.get(index), &first));
             }
-            return Some(Followed { first, closed_form: true });
+            return Some(FollowResult { first, closed_form: true });
         }
-        let reach = if last > 1 { self.reach(before, [begin, until(last)]) } else { None };
-        let closed_form = poses.only_axis().and(reach).is_some_and(|reach| {
-            self.follow_line(poses, reach, &mut found.distance)
-                || self.follow_circle(poses, reach, &mut found.distance)
+        let range = if last > 1 { self.range(before, [begin, until(last)]) } else { None };
+        let closed_form = poses.constant_axis().and(range).is_some_and(|range| {
+            self.follow_line(poses, range, &mut found.distance)
+                || self.follow_circle(poses, range, &mut found.distance)
         });
         if closed_form {
             self.nearest(&poses.get(last), until(last));
             found.within_ends.extend_from_slice(&found.distance[1..]);
-            // The tool axis stands still, and so does that of the path.
+            // The tool axis and that of the path are constant.
             found.orientation.resize(poses.len(), first.orientation);
         } else {
             found.clear();
             found.push(&first);
-            for place in 1..=last {
-                let nearest = self.nearest(&poses.get(place), until(place));
+            for index in 1..=last {
+                let nearest = self.nearest(&poses.get(index), until(index));
                 found.push(&nearest);
             }
         }
-        Some(Followed { first, closed_form })
+        Some(FollowResult { first, closed_form })
     }
 
-    /// Whether all of `poses` lie beyond the path's last point, to which the first of them is nearest, and all of
-    /// the path has been commanded.
-    fn all_beyond(&self, poses: &Poses, first: &Nearest) -> bool {
+    /// Returns true if all of `poses` lie beyond the path's last point, which is nearest to the first of
+    /// them, and the whole path has been commanded.
+    fn all_beyond_end(&self, poses: &Poses, first: &NearestPoint) -> bool {
         let (block, length) = (self.block, self.path.blocks()[self.block].length());
         let is_last = block + 1 == self.path.blocks().len();
         let at_end = is_last && first.progress >= self.path.length() && self.s >= length;
-        let low = self.furthest - BACK;
+        let low = self.furthest - SEARCH_BACK;
         if !at_end || self.path.locate(low.max(0.0)).0 != block || self.furthest < self.path.length() {
             return false;
         }
-        // Written so that what is no number is not beyond.
+        // The comparisons treat NaN as not beyond the end.
         match &self.shapes[block] {
-            Shape::Segment { from, slope, .. } => {
-                tips(poses).all(|tip| from_line(tip, *from, *slope) > length + CLEAR)
+            TipCurve::Segment { from, slope, .. } => {
+                tips(poses).all(|tip| line_parameter(tip, *from, *slope) > length + CLEARANCE)
             }
-            // The begin of what is searched is further off than the end, less than a quarter of a turn before.
-            Shape::Circle { center, plane, radius, turn, .. } if BACK * turn.abs() < 1.0 && length > BACK => {
-                let (least, direction) = (FORWARDS * radius * radius, turn.signum());
-                let ([x0, y0, _], _) = from_axis(first.point, *center, plane);
+            // The start of the search range is less than a quarter turn before the end, and further away.
+            TipCurve::Circle { center, plane, radius, turn, .. }
+                if SEARCH_BACK * turn.abs() < 1.0 && length > SEARCH_BACK =>
+            {
+                let (least, direction) = (MIN_ADVANCE * radius * radius, turn.signum());
+                let ([x0, y0, _], _) = circle_coordinates(first.point, *center, plane);
                 tips(poses).all(|tip| {
-                    let ([x, y, _], _) = from_axis(tip, *center, plane);
+                    let ([x, y, _], _) = circle_coordinates(tip, *center, plane);
                     (x0 * y - y0 * x) * direction > least && x0 * x + y0 * y > 0.0
                 })
             }
@@ -172,8 +151,9 @@ impl PathTracker {
         }
     }
 
-    /// What is nearest to a pose beyond the path's last point, which `first` is nearest to.
-    fn at_end(&self, pose: &ToolPose, first: &Nearest) -> Nearest {
+    /// Returns the nearest point to a pose beyond the path's last point; `first` is the result at that
+    /// point.
+    fn nearest_at_end(&self, pose: &ToolPose, first: &NearestPoint) -> NearestPoint {
         let distance = (pose.tip - first.point).norm();
         let end = Candidate {
             block: self.block,
@@ -182,19 +162,20 @@ impl PathTracker {
             point: first.point,
             distance,
         };
-        Nearest { distance, within_ends: self.within_ends(&end, pose), ..*first }
+        NearestPoint { distance, within_ends: self.within_ends(&end, pose), ..*first }
     }
 
-    /// What is searched for poses, the first of which has been sought already, if it lies in one block.
-    /// `before` is the furthest nearest point before that.
-    fn reach(&self, before: f64, until: [f64; 2]) -> Option<Reach> {
+    /// Returns the search range of poses if it lies in one block; the first pose has been evaluated.
+    ///
+    /// `before` is the furthest nearest point before the first pose.
+    fn range(&self, before: f64, until: [f64; 2]) -> Option<SearchRange> {
         let block = self.block;
         let holds = |progress: f64| self.path.locate(progress).0 == block;
         let (start, length) = (self.path.start_of(block), self.path.blocks()[block].length());
-        let low = (before - BACK).max(0.0);
+        let low = (before - SEARCH_BACK).max(0.0);
         let [first, last] = until.map(|until| until.clamp(0.0, self.path.length()));
         let (first, last) = (first.max(before), last.max(self.furthest));
-        (holds(low) && holds(last)).then(|| Reach {
+        (holds(low) && holds(last)).then(|| SearchRange {
             block,
             start,
             low: low - start,
@@ -202,65 +183,66 @@ impl PathTracker {
         })
     }
 
-    /// Distances of all poses from a line, as long as all feet lie inside of what is searched. The feet of all
-    /// but the last are taken into account.
-    fn follow_line(&mut self, poses: &Poses, reach: Reach, distances: &mut Vec<f64>) -> bool {
-        let Shape::Segment { from, slope, .. } = &self.shapes[reach.block] else { return false };
+    /// Computes the distances of all poses from a line; returns true if all foot points lie within the
+    /// search range. Updates the furthest point with all poses but the last.
+    fn follow_line(&mut self, poses: &Poses, range: SearchRange, distances: &mut Vec<f64>) -> bool {
+        let TipCurve::Segment { from, slope, .. } = &self.shapes[range.block] else { return false };
         let (from, slope) = (*from, *slope);
         let [feet, _] = &mut self.feet;
         feet.resize(poses.len(), 0.0);
         distances.resize(poses.len(), 0.0);
         for ((foot, distance), tip) in feet.iter_mut().zip(&mut *distances).zip(tips(poses)) {
-            let s = from_line(tip, from, slope);
+            let s = line_parameter(tip, from, slope);
             *foot = s;
             *distance = (tip - (from + slope * s)).norm();
         }
-        // Written so that what is no number is not inside.
-        let inside = feet.iter().fold(true, |inside, s| inside & (*s > CLEAR && *s < reach.high[0] - CLEAR));
+        // The comparison treats NaN as outside.
+        let inside =
+            feet.iter().fold(true, |inside, s| inside & (*s > CLEARANCE && *s < range.high[0] - CLEARANCE));
         let least = feet.iter().fold(f64::INFINITY, |least, s| if *s < least { *s } else { least });
         let most = |feet: &[f64]| feet.iter().fold(0.0, |most, s| if *s > most { *s } else { most });
         let (furthest, before) = (most(feet), most(&feet[..poses.len() - 1]));
-        let low = (self.furthest.max(reach.start + furthest) - BACK - reach.start).max(reach.low);
-        let inside = inside && least > low + CLEAR && self.is_within_ends(reach, least, furthest);
+        let low = (self.furthest.max(range.start + furthest) - SEARCH_BACK - range.start).max(range.low);
+        let inside = inside && least > low + CLEARANCE && self.is_within_ends(range, least, furthest);
         if inside {
-            let progress = (reach.start + before).min(self.path.start_of(reach.block + 1));
+            let progress = (range.start + before).min(self.path.start_of(range.block + 1));
             self.furthest = self.furthest.max(progress);
             self.last = None;
         }
         inside
     }
 
-    /// Distances of all poses from a circle, as long as each foot lies clearly ahead of the one before, and all
-    /// inside of what is searched.
+    /// Computes the distances of all poses from a circle; returns true if each foot point lies clearly
+    /// ahead of the one before, and all lie within the search range.
     ///
-    /// The first one has been found between both ends. What is searched begins some way behind the furthest foot
-    /// so far, and ends further ahead at each pose: feet that lie ahead of each other are never before its begin,
-    /// and none is behind its end if the last one is not behind the end that the first one had. As less than a
-    /// turn is searched there is one passage only for each.
-    fn follow_circle(&mut self, poses: &Poses, reach: Reach, distances: &mut Vec<f64>) -> bool {
-        let Shape::Circle { center, plane, radius, turn, .. } = &self.shapes[reach.block] else {
+    /// The first foot point lies within the range. The range starts a fixed length before the furthest foot
+    /// point so far, and its end advances with each pose. Foot points in forward order are never before its
+    /// start, and none is beyond its end if the last one is not beyond the end for the first pose. The
+    /// range is less than one turn, so each pose has a single foot point.
+    fn follow_circle(&mut self, poses: &Poses, range: SearchRange, distances: &mut Vec<f64>) -> bool {
+        let TipCurve::Circle { center, plane, radius, turn, .. } = &self.shapes[range.block] else {
             return false;
         };
         let (center, plane, radius, turn) = (*center, *plane, *radius, *turn);
         let first = self.s;
-        let one_turn = reach.high[1] - reach.low < TAU / turn.abs() - CLEAR;
-        if !(one_turn && first > reach.low + CLEAR && first < reach.high[0] - CLEAR) {
+        let one_turn = range.high[1] - range.low < TAU / turn.abs() - CLEARANCE;
+        if !(one_turn && first > range.low + CLEARANCE && first < range.high[0] - CLEARANCE) {
             return false;
         }
         let [xs, ys] = &mut self.feet;
         xs.resize(poses.len(), 0.0);
         ys.resize(poses.len(), 0.0);
         distances.resize(poses.len(), 0.0);
-        let places = xs.iter_mut().zip(ys.iter_mut()).zip(&mut *distances);
-        for (((x_out, y_out), distance), tip) in places.zip(tips(poses)) {
-            let ([x, y, z], off) = from_axis(tip, center, &plane);
+        let outputs = xs.iter_mut().zip(ys.iter_mut()).zip(&mut *distances);
+        for (((x_out, y_out), distance), tip) in outputs.zip(tips(poses)) {
+            let ([x, y, z], off) = circle_coordinates(tip, center, &plane);
             (*x_out, *y_out) = (x, y);
-            *distance = from_circle(off, z, radius);
+            *distance = distance_to_circle(off, z, radius);
         }
-        let (least, direction) = (FORWARDS * radius * radius, turn.signum());
+        let (least, direction) = (MIN_ADVANCE * radius * radius, turn.signum());
         let (x0, y0) = (xs[0], ys[0]);
         let steps = xs.iter().zip(ys.iter()).zip(xs[1..].iter().zip(&ys[1..]));
-        // Written so that what is no number is not ahead.
+        // The comparison treats NaN as not ahead.
         let ahead = steps.fold(true, |ahead, ((x_before, y_before), (x, y))| {
             let forwards = (x_before * y - y_before * x) * direction > least;
             ahead & forwards & (x0 * x + y0 * y > 0.0)
@@ -271,15 +253,16 @@ impl PathTracker {
         let (x, y) = (xs[poses.len() - 1], ys[poses.len() - 1]);
         let swept = ((x0 * y - y0 * x) * direction).atan2(x0 * x + y0 * y);
         let end = first + swept / turn.abs();
-        end < reach.high[0] - CLEAR && self.is_within_ends(reach, first, end)
+        end < range.high[0] - CLEARANCE && self.is_within_ends(range, first, end)
     }
 
-    /// Whether what lies between two lengths in a block lies between the ends of the block and of the path.
-    fn is_within_ends(&self, reach: Reach, least: f64, most: f64) -> bool {
-        let length = self.path.blocks()[reach.block].length();
-        least > CLEAR
-            && most < length - CLEAR
-            && reach.start + least > 0.0
-            && reach.start + most + CLEAR < self.path.length()
+    /// Returns true if the range between two arc lengths of a block lies between the ends of the block and
+    /// of the path.
+    fn is_within_ends(&self, range: SearchRange, least: f64, most: f64) -> bool {
+        let length = self.path.blocks()[range.block].length();
+        least > CLEARANCE
+            && most < length - CLEARANCE
+            && range.start + least > 0.0
+            && range.start + most + CLEARANCE < self.path.length()
     }
 }

@@ -1,4 +1,4 @@
-//! When a program runs a circle at steady feed, and when it turns.
+//! Features of a program for the evaluation: circles at constant feed and corners.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -8,31 +8,31 @@ use nalgebra::DVector;
 use crate::config::AxisKind;
 use crate::path::{Block, Program};
 
-/// What is left out at both ends of the steady part of a circle, s: what the ramps have stirred up.
+/// Time excluded at both ends of a circle at constant feed, s: decay of transients after the ramps.
 const MARGIN: f64 = 0.5;
-/// A feed this near the largest one is steady.
+/// Relative tolerance within which the feed is the largest one.
 const STEADY: f64 = 1e-9;
-/// Half the base of the difference that measures the feed, s.
+/// Half the base of the difference quotient for the feed, s.
 const HALF_STEP: f64 = 5e-5;
-/// Instants at which the feed of a circle is looked at.
-const LOOKS: usize = 20_000;
-/// A turn below this is rounding of a straight path, rad.
+/// Number of samples of the feed along a circle.
+const FEED_SAMPLES: usize = 20_000;
+/// Change of direction below which a path is straight, rad.
 const STRAIGHT: f64 = 1e-6;
-/// Less than a whole turn by this is still a whole one, rad.
+/// Relative tolerance for a whole turn.
 const TURN_TOLERANCE: f64 = 1e-9;
 
-/// When block `index` is run at steady feed with a margin at both ends, s; none for what is no whole
-/// turn then.
-pub(super) fn steady_circle(program: &Program, index: usize) -> Option<Range<f64>> {
+/// Returns the time range of block `index` at constant feed with a margin at both ends, s, or `None` if
+/// that is less than a whole turn.
+pub(super) fn steady_window(program: &Program, index: usize) -> Option<Range<f64>> {
     let circle = program.path().blocks()[index].circle()?;
-    let span = program.span(index);
-    let step = (span.end - span.start) / LOOKS as f64;
+    let span = program.time_range(index);
+    let step = (span.end - span.start) / FEED_SAMPLES as f64;
     let feed = |t: f64| {
         let (before, behind) = ((t - HALF_STEP).max(span.start), (t + HALF_STEP).min(span.end));
         (program.progress(behind) - program.progress(before)) / (behind - before)
     };
     let time = |i: usize| span.start + step * i as f64;
-    let feeds: Vec<f64> = (0..=LOOKS).map(|i| feed(time(i))).collect();
+    let feeds: Vec<f64> = (0..=FEED_SAMPLES).map(|i| feed(time(i))).collect();
     let top = feeds.iter().copied().fold(0.0, f64::max);
     let steady = |feed: &f64| *feed >= top * (1.0 - STEADY);
     let (first, last) = (time(feeds.iter().position(steady)?), time(feeds.iter().rposition(steady)?));
@@ -45,8 +45,8 @@ pub(super) fn steady_circle(program: &Program, index: usize) -> Option<Range<f64
     Some(first + margin..last - margin)
 }
 
-/// Turn of the direction between two blocks along linear coordinates, rad; none where it goes straight
-/// on, and where one of them turns the tool only.
+/// Returns the change of direction between two blocks along linear coordinates, rad, or `None` if it is 0
+/// or one of the blocks only rotates the tool.
 pub(super) fn turn(first: &Block, second: &Block, kinds: &[AxisKind]) -> Option<f64> {
     if first.kind() != AxisKind::Linear || second.kind() != AxisKind::Linear {
         return None;
@@ -60,7 +60,7 @@ pub(super) fn turn(first: &Block, second: &Block, kinds: &[AxisKind]) -> Option<
         )
     };
     let (u, v) = (direction(first, first.length()), direction(second, 0.0));
-    // Twice the half angle between unit vectors is exact for small and for large turns.
+    // Twice the half angle between unit vectors is exact for small and for large angles.
     let turn = 2.0 * (&u - &v).norm().atan2((&u + &v).norm());
     (turn > STRAIGHT).then_some(turn)
 }

@@ -1,32 +1,32 @@
-//! Blocks joined without gaps, and what the tool does along them.
+//! Continuous paths: blocks joined without gaps, and the tool pose along them.
 
 use super::block::Block;
 use super::error::PathError;
-use crate::kinematics::{Kinematics, Role, ToolPose};
+use crate::kinematics::{Kinematics, AxisRole, ToolPose};
 
-/// Largest gap between two blocks relative to the coordinate (or to 1 m, 1 rad): rounding.
+/// Largest gap between two blocks, relative to the coordinate (or to 1 m, 1 rad).
 const GAP_TOLERANCE: f64 = 1e-12;
 
-/// What the coordinates of a path are.
+/// Coordinate system of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frame {
-    /// Those of the joints.
+    /// Joint positions.
     Joints,
-    /// x, y and z are those of the tool tip in the workpiece frame, the others those of the joints
+    /// Tool tip in the workpiece frame for x, y and z, joint positions for the others
     /// ([`Kinematics::tip_to_joints`]).
     Workpiece,
 }
 
-/// A continuous path: blocks, the frame of their coordinates, and the kinematics of the machine.
+/// A continuous path: blocks, the frame of their coordinates, and the machine kinematics.
 ///
-/// Its parameter is the progress u, the sum of the lengths of the blocks passed: meters and, in
-/// blocks that only turn, radians.
+/// Its parameter is the progress u, the sum of the arc lengths of the blocks: meters and, in purely rotary
+/// blocks, radians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     kinematics: Kinematics,
     frame: Frame,
     blocks: Vec<Block>,
-    /// Progress at the start of each block, and at the end of the last.
+    /// Progress at the start of each block, followed by the length of the path.
     starts: Vec<f64>,
 }
 
@@ -34,8 +34,8 @@ impl Path {
     /// Joins `blocks`, which have one coordinate for each joint of the machine.
     ///
     /// # Errors
-    /// [`PathError`]: no block; a block of another number of coordinates than the first; a gap, or a
-    /// sum of lengths that no f64 holds.
+    /// Returns [`PathError`] if there is no block, if the blocks differ in their number of coordinates, if
+    /// there is a gap, or if the total length overflows.
     pub fn new(kinematics: Kinematics, frame: Frame, blocks: Vec<Block>) -> Result<Self, PathError> {
         let Some(first) = blocks.first() else { return Err(PathError::Empty) };
         let wanted = first.joints();
@@ -44,9 +44,9 @@ impl Path {
         }
         for (i, pair) in blocks.windows(2).enumerate() {
             let ends = pair[0].end().iter().zip(pair[1].start()).enumerate();
-            for (place, (&end, &start)) in ends {
+            for (index, (&end, &start)) in ends {
                 if (start - end).abs() > GAP_TOLERANCE * end.abs().max(1.0) {
-                    return Err(PathError::Gap { block: i + 2, coordinate: place + 1, end, start });
+                    return Err(PathError::Gap { block: i + 2, coordinate: index + 1, end, start });
                 }
             }
         }
@@ -58,43 +58,44 @@ impl Path {
             starts.push(length);
         }
         if !length.is_finite() {
-            return Err(PathError::Unmeasurable { length });
+            return Err(PathError::NotComputable { length });
         }
         Ok(Self { kinematics, frame, blocks, starts })
     }
 
-    /// The blocks, in order.
+    /// Returns the blocks in order.
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
     }
 
-    /// What their coordinates are.
+    /// Returns the coordinate system of the blocks.
     pub fn frame(&self) -> Frame {
         self.frame
     }
 
-    /// The kinematics that turns them into joints.
+    /// Returns the kinematics that transforms the coordinates into joints.
     pub fn kinematics(&self) -> &Kinematics {
         &self.kinematics
     }
 
-    /// Number of joints.
+    /// Returns the number of joints.
     pub fn joint_count(&self) -> usize {
         self.blocks.first().map_or(0, Block::joints)
     }
 
-    /// Largest progress.
+    /// Returns the total length: the largest progress.
     pub fn length(&self) -> f64 {
         self.starts.last().copied().unwrap_or(0.0)
     }
 
-    /// Progress at the start of `block`, from 0; the length of the path from the last block on.
+    /// Returns the progress at the start of `block`, counted from 0, or the length of the path beyond the
+    /// last block.
     pub fn start_of(&self, block: usize) -> f64 {
         self.starts[block.min(self.starts.len() - 1)]
     }
 
-    /// The block, from 0, and the length in it at the progress `u`, clamped to the path. Where two
-    /// blocks meet it is the start of the later one.
+    /// Returns the block, counted from 0, and the arc length in it at progress `u`, clamped to the path.
+    /// At a junction this is the start of the later block.
     pub fn locate(&self, u: f64) -> (usize, f64) {
         let last = self.blocks.len() - 1;
         let block = self.starts.partition_point(|start| *start <= u).saturating_sub(1).min(last);
@@ -104,13 +105,13 @@ impl Path {
         (block, s.min(self.blocks[block].length()))
     }
 
-    /// The joints at the progress `u`, clamped to the path, m or rad, into `out`.
+    /// Writes the joint positions at progress `u`, clamped to the path, m or rad, into `out`.
     pub fn joints(&self, u: f64, out: &mut [f64]) {
         let (block, s) = self.locate(u);
         self.joints_in(block, s, out);
     }
 
-    /// The joints at the length `s` of `block`, likewise.
+    /// Writes the joint positions at arc length `s` of `block`, m or rad, into `out`.
     pub(super) fn joints_in(&self, block: usize, s: f64, out: &mut [f64]) {
         self.blocks[block].point(s, out);
         if self.frame == Frame::Workpiece {
@@ -118,21 +119,23 @@ impl Path {
         }
     }
 
-    /// Pose of the tool in the workpiece frame at the progress `u`, clamped to the path.
+    /// Returns the tool pose in the workpiece frame at progress `u`, clamped to the path.
     pub fn tool(&self, u: f64) -> ToolPose {
         let mut joints = vec![0.0; self.joint_count()];
         self.tool_with(u, &mut joints)
     }
 
-    /// Like [`tool`](Self::tool), in room for one value per joint, which then holds the joints.
+    /// Returns the tool pose as [`tool`](Self::tool) does, and the joint positions in `joints`, which holds
+    /// one value per joint.
     pub fn tool_with(&self, u: f64, joints: &mut [f64]) -> ToolPose {
         self.joints(u, joints);
         self.kinematics.forward(joints)
     }
 
-    /// Whether the tables stand still along `block`, so that joints and tip differ by a fixed motion.
-    pub fn keeps_tables(&self, block: usize) -> bool {
-        let tables = [Role::A, Role::C].into_iter().filter_map(|role| self.kinematics.role(role));
-        self.blocks.get(block).is_none_or(|block| block.keeps(tables))
+    /// Returns true if the rotary tables are fixed along `block`, so that joints and tip differ by a rigid
+    /// transformation.
+    pub fn has_fixed_tables(&self, block: usize) -> bool {
+        let tables = [AxisRole::A, AxisRole::C].into_iter().filter_map(|role| self.kinematics.role(role));
+        self.blocks.get(block).is_none_or(|block| block.is_constant(tables))
     }
 }

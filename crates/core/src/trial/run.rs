@@ -1,0 +1,97 @@
+//! Runs one machine on the setpoints of a trial.
+
+use std::io;
+
+use crate::simulation::{Simulation, joint_limits};
+
+use super::cycle::PositionCycle;
+use super::definition::{Tick, Trial, TrialError, TrialOutcome};
+use super::observer::{MeasurementScope, Observer};
+use super::setpoints::SetpointSource;
+use super::submitter::TrajectorySubmitter;
+
+/// Runs `setpoints` until the axes have settled and calls `callback` at every position instant.
+///
+/// The machine starts at rest at the first setpoint. If the first point of a trajectory is later than 0, the machine
+/// approaches it from the home position.
+///
+/// # Errors
+/// Returns [`TrialError`] if setpoints are invalid or rejected, the machine cannot be simulated, or `callback` fails.
+pub fn run(
+    trial: &Trial<'_>,
+    setpoints: SetpointSource<'_>,
+    mut callback: impl FnMut(Tick<'_>) -> io::Result<()>,
+) -> Result<TrialOutcome, TrialError> {
+    run_with(trial, setpoints, |simulation| {
+        let time = simulation.time_of(simulation.next_instant());
+        let ran = simulation.step();
+        let machine = simulation.machine();
+        if ran { callback(Tick { time, position_instant: true, machine }).map(|()| ran) } else { Ok(ran) }
+    })
+}
+
+/// Runs `setpoints` as [`run`] does and calls `callback` at every tick.
+///
+/// # Errors
+/// Returns [`TrialError`] as [`run`] does.
+pub fn trace(
+    trial: &Trial<'_>,
+    setpoints: SetpointSource<'_>,
+    mut callback: impl FnMut(Tick<'_>) -> io::Result<()>,
+) -> Result<TrialOutcome, TrialError> {
+    let tick = trial.machine.periods().current;
+    run_with(trial, setpoints, |simulation| {
+        let mut time = simulation.time_of(simulation.next_instant());
+        let mut result = Ok(());
+        let ran = simulation.step_with(|machine, position_instant| {
+            if result.is_ok() {
+                result = callback(Tick { time, position_instant, machine });
+            }
+            time += tick;
+        });
+        result.map(|()| ran)
+    })
+}
+
+/// Runs `setpoints`; `step` computes a position cycle and returns true if the machine advanced.
+fn run_with(
+    trial: &Trial<'_>,
+    setpoints: SetpointSource<'_>,
+    mut step: impl FnMut(&mut Simulation) -> io::Result<bool>,
+) -> Result<TrialOutcome, TrialError> {
+    let (mut simulation, mut submitter, start) = start(trial, setpoints)?;
+    let mut observer = Observer::new(trial, &start, MeasurementScope::All);
+    let mut cycle = PositionCycle::new(trial.machine.periods(), start.len());
+    loop {
+        submitter.submit_due(&mut simulation)?;
+        if !simulation.is_busy() && submitter.is_empty() {
+            break;
+        }
+        let is_moving = simulation.has_active_commands();
+        observer.push_preview(&simulation);
+        let time = simulation.time_of(simulation.next_instant());
+        if step(&mut simulation).map_err(TrialError::Callback)? {
+            let machine = simulation.machine();
+            cycle.begin(time, is_moving);
+            (0..start.len()).for_each(|index| cycle.store_positions(index, machine, index));
+            observer.observe(|index| (machine, index), &mut cycle);
+        }
+    }
+    Ok(observer.finish())
+}
+
+/// Returns the trial's machine at rest at the first setpoints, the submitter, and that position, m or rad.
+pub(super) fn start<'a>(
+    trial: &Trial<'_>,
+    setpoints: SetpointSource<'a>,
+) -> Result<(Simulation, TrajectorySubmitter<'a>, Vec<f64>), TrialError> {
+    let limits = joint_limits(trial.machine, "");
+    let mut simulation = Simulation::new(trial.machine, limits.clone(), 0)?;
+    // The observer computes the figures.
+    simulation.set_assessing(false);
+    let submitter = TrajectorySubmitter::new(setpoints, &limits, trial)?;
+    let home = vec![0.0; limits.len()];
+    let start = submitter.start().unwrap_or(&home).to_vec();
+    simulation.reset_to(&start).map_err(|rejection| TrialError::Rejected { time: 0.0, rejection })?;
+    Ok((simulation, submitter, start))
+}
