@@ -142,7 +142,7 @@ def test_a_newer_goal_or_trajectory_displaces_and_both_are_told(follow: Follow) 
     ended = first.ended()
     assert (ended.status, ended.result.error_code) == (GoalStatus.STATUS_ABORTED, Result.INVALID_GOAL)
     assert ended.result.error_string == f"axes were taken over by goal {second.id.hex()}"
-    assert ending(follow, first).status == TrajectoryResult.DISPLACED
+    assert ending(follow, first).status == TrajectoryResult.PREEMPTED
 
     second.wait_for_feedback(5)
     number = drive.accept(onward).sequence_number
@@ -152,7 +152,7 @@ def test_a_newer_goal_or_trajectory_displaces_and_both_are_told(follow: Follow) 
 
     third = follow.send(goal(onward))
     told = drive.end(number, 20)
-    assert told.status == TrajectoryResult.DISPLACED and f"goal {third.id.hex()}" in told.text
+    assert told.status == TrajectoryResult.PREEMPTED and f"goal {third.id.hex()}" in told.text
     third.wait_for_feedback(1)
     drive.stop()
     ended = third.ended()

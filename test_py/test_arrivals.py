@@ -130,7 +130,7 @@ def test_new_one_while_moving_replaces_the_old_one(home: Drive):
     # A cubic starts with the commanded velocity: no step in it beyond what the swing itself has.
     assert np.abs(np.diff(psec, 2)).max() <= ACCELERATION_LIMIT_X * 0.006**2
     assert psec[-1] == 0.02
-    assert home.end(first.sequence_number, 5).status == R.DISPLACED
+    assert home.end(first.sequence_number, 5).status == R.PREEMPTED
     assert home.end(second.sequence_number, 10).status == R.COMPLETED
 
 
@@ -186,7 +186,7 @@ def test_order_of_the_joints_is_the_senders(home: Drive):
 
 
 def test_an_unlimited_rotary_axis_turns_on(home: Drive):
-    """C has no stroke: beyond a full turn is accepted."""
+    """C has no travel limits: beyond a full turn is accepted."""
     home.accept(joint_trajectory(["c"], [30.0], [[7.0]]))
 
 

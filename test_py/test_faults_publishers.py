@@ -248,7 +248,7 @@ def test_of_two_publishers_that_contend_the_newest_has_the_joint(node: Drive):
             plans[to_ns(accepted.start)] = ("", position)
             node.wait_until(to_ns(accepted.start) + 5 * TSP_NS, 10)
         ends = [drive.end(number, 10).status for drive, number in results]
-        assert ends == [R.DISPLACED] * 11 + [R.COMPLETED]
+        assert ends == [R.PREEMPTED] * 11 + [R.COMPLETED]
         states = node.record(begin, max(plans) + 299 * TSP_NS).states
     starts = np.array(sorted(plans))
     assert set(np.diff(states.stamp)) == {TSP_NS}

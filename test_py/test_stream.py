@@ -169,7 +169,7 @@ def test_a_trajectory_takes_over_and_the_stream_is_ignored_meanwhile(real: Drive
 
 
 def test_a_set_point_that_cannot_be_is_refused_counted_and_told_once_a_second(start: Callable[..., Drive]):
-    """Beyond the stroke, out of reach, of no joint; the axis stays, and the log is not flooded."""
+    """Beyond the travel limits, out of reach, of no joint; the axis stays, and the log is not flooded."""
     drive = start()
     begin = drive.now()
     assert counts(drive) == (0, 0)
@@ -187,7 +187,7 @@ def test_a_set_point_that_cannot_be_is_refused_counted_and_told_once_a_second(st
     assert not commanded(drive, "x", begin).any()
     np.testing.assert_array_equal(commanded(drive, "y", begin), [0.0, 0.001])
     told = [line for line in drive.process.output().splitlines() if "setpoint of the stream refused" in line]
-    for words in ("outside the stroke", "away from the setpoint", "unknown joint q"):
+    for words in ("outside the travel limits", "away from the previous setpoint", "unknown joint q"):
         lines = [line for line in told if words in line]
         assert 1 <= len(lines) <= 1 + lasted, told
 
@@ -209,7 +209,7 @@ def test_a_trajectory_that_takes_joints_from_a_stream_is_told_to_it(real: Drive)
     """Once, with the joints that it takes and drove."""
     hold = joint_trajectory(["x", "z"], [0.0, 0.1], [[0.001, 0.0], [0.002, 0.0]])
     told = told_when(real, lambda: real.run(hold))
-    assert [(result.status, result.name) for result in told] == [(R.DISPLACED, ["x"])]
+    assert [(result.status, result.name) for result in told] == [(R.PREEMPTED, ["x"])]
     assert re.fullmatch(r"axes were taken over by trajectory \d+ of psec", told[0].text)
 
 

@@ -300,7 +300,7 @@ class Drive:
         )[0]
 
     def end(self, sequence_number: int, timeout: float) -> TrajectoryResult:
-        """How the trajectory ended: COMPLETED, DISPLACED, STOPPED, ABORTED, or REJECTED."""
+        """How the trajectory ended: COMPLETED, PREEMPTED, STOPPED, ABORTED, or REJECTED."""
         return self.wait_for(
             lambda: [r for r in self.results(sequence_number) if r.status != TrajectoryResult.ACCEPTED],
             timeout,
