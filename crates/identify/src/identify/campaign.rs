@@ -1,16 +1,17 @@
-//! The setpoints of an identification campaign: what an axis is to be moved through.
+//! Position setpoints of an identification campaign.
 //!
-//! A campaign has up to three parts ([`FeedforwardMode`]). `off` excites everything that the steps of the paper need with the
-//! feedforward off: a slow start, legs there and back at constant speeds (Prévost eq. 3), standstills approached
-//! from both sides and, on a rotary axis, slow sweeps (gravity), ramps at half and at full acceleration, as far
-//! as the highest speed lets the axis reach it (eq. 5). `velocity` and `both` are short: there and back at a middle and at the highest speed, for the
-//! feedforward and its delays (eqs. 6–8).
+//! A campaign has up to three parts ([`FeedforwardMode`]). `off` runs without feedforward and excites
+//! everything that the steps of the paper need: a slow start, legs in both directions at constant speeds
+//! (Prévost eq. 3), standstills approached from both sides and, on a rotary axis, slow sweeps (gravity), and
+//! ramps at half and at full acceleration where the highest speed permits (eq. 5). `velocity` and `both` are
+//! short: legs in both directions at a medium and at the highest speed, for the feedforward and its delays
+//! (eqs. 6–8).
 //!
-//! Every part starts and ends at rest at [`Campaign::start`], on the grid of Tsp.
+//! Each part starts and ends at rest at [`Campaign::start`], on the grid of Tsp.
 
 mod error;
-mod legs;
-mod room;
+mod planner;
+mod travel_limits;
 
 use std::ops::Range;
 
@@ -19,63 +20,65 @@ use virtual_axes_core::units::{Nanoseconds, seconds};
 
 pub use error::CampaignError;
 
-use legs::Legs;
-use room::Room;
+use planner::CampaignPlanner;
+use travel_limits::TravelLimits;
 
-use super::mode::FeedforwardMode;
+use super::feedforward_mode::FeedforwardMode;
 
-/// Rest between two parts, s: time to switch the feedforward.
+/// Rest between two parts, s, for switching the feedforward.
 const PAUSE: f64 = 3.0;
-/// Longest part, s.
+/// Longest duration of a part, s.
 const LONGEST: f64 = 3600.0;
 
-/// What limits a campaign besides the axis.
+/// Limits of a campaign in addition to the axis limits.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Options {
-    /// Where the setpoints have to stay, m or rad; none: the stroke.
+pub struct CampaignOptions {
+    /// Permitted setpoint range, m or rad; the travel limits by default.
     pub range: Option<[f64; 2]>,
-    /// Highest speed, m/s or rad/s; none: 20 m/min or 20 rev/min, or what the axis has.
+    /// Highest speed, m/s or rad/s; by default 20 m/min or 20 rev/min, limited by the axis.
     pub max_feed: Option<f64>,
 }
 
-/// A part within the setpoints of a campaign.
+/// Part of a campaign within its setpoints.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
-    /// Which part.
+pub struct CampaignRun {
+    /// Feedforward of the part.
     pub part: FeedforwardMode,
-    /// Its setpoints in [`Campaign::psec`].
+    /// Index range of the part in [`Campaign::psec`].
     pub rows: Range<usize>,
-    /// Speeds of its legs, m/s or rad/s, rising.
+    /// Speeds of the legs in rising order, m/s or rad/s.
     pub speeds: Vec<f64>,
 }
 
-/// The setpoints of one axis, part after part.
+/// Planned setpoints of one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Campaign {
     period: Nanoseconds,
     start: f64,
     range: [f64; 2],
-    runs: Vec<Run>,
+    runs: Vec<CampaignRun>,
     psec: Vec<f64>,
 }
 
 impl Campaign {
-    /// Plans `parts`, one after the other with 3 s of standstill between them, for the axis at `place`, from 0.
+    /// Plans `parts` in sequence for the axis at index `axis`, with 3 s of standstill between them, starting
+    /// at time 0.
     ///
-    /// Speeds reach up to 20 m/min (rev/min), 95 % of Vmax or of the motor's speed, or `options.max_feed`; setpoints
-    /// stay 5 % of the range (the stroke, or `options.range`) away from its ends, and within Amax and Jmax. Start and
-    /// end of each part are at home, 0, if that is within the range, otherwise at the place nearest to it that the
-    /// setpoints may have.
+    /// Speeds reach up to 20 m/min (rev/min), limited to 95 % of Vmax and of the motor speed, or
+    /// `options.max_feed`. Setpoints keep 5 % of the range (the travel limits, or `options.range`) from its
+    /// ends, and stay within Amax and Jmax. Each part starts and ends at home, 0, if it is within the range,
+    /// otherwise at the nearest permitted position.
     ///
     /// # Errors
-    /// [`CampaignError`]: no such axis; a range outside the stroke, or too short; a feed that the axis does not have.
+    /// [`CampaignError`] if the axis does not exist, if the range is outside the travel limits or too short,
+    /// or if the axis cannot reach the feed.
     pub fn plan(
         machine: &MachineConfig,
         place: usize,
         parts: &[FeedforwardMode],
-        options: &Options,
+        options: &CampaignOptions,
     ) -> Result<Self, CampaignError> {
-        let room = Room::of(machine, place, options)?;
+        let room = TravelLimits::new(machine, place, options)?;
         let period = machine.periods().position;
         let mut campaign =
             Campaign { period, start: room.start, range: room.window, runs: Vec::new(), psec: Vec::new() };
@@ -84,10 +87,10 @@ impl Campaign {
                 let pause = (PAUSE / seconds(period)).round() as usize;
                 campaign.psec.resize(campaign.psec.len() + pause, last);
             }
-            let mut legs = Legs::new(machine, place, &room);
+            let mut legs = CampaignPlanner::new(machine, place, &room);
             let speeds = match part {
-                FeedforwardMode::Off => legs.off()?,
-                FeedforwardMode::Velocity | FeedforwardMode::Both => legs.short()?,
+                FeedforwardMode::Off => legs.plan_off()?,
+                FeedforwardMode::Velocity | FeedforwardMode::Both => legs.plan_short()?,
             };
             let program = legs.program(machine)?;
             let duration = program.duration();
@@ -102,38 +105,38 @@ impl Campaign {
                 program.psec(seconds(k * period), &mut joints);
                 joints[place]
             }));
-            campaign.runs.push(Run { part, rows: from..campaign.psec.len(), speeds });
+            campaign.runs.push(CampaignRun { part, rows: from..campaign.psec.len(), speeds });
         }
         Ok(campaign)
     }
 
-    /// The setpoints, m or rad, one per position period, from time 0 on.
+    /// Returns the setpoints from time 0 on, one per position cycle, m or rad.
     pub fn psec(&self) -> &[f64] {
         &self.psec
     }
 
-    /// The parts, in the order of time.
-    pub fn runs(&self) -> &[Run] {
+    /// Returns the parts in order of time.
+    pub fn runs(&self) -> &[CampaignRun] {
         &self.runs
     }
 
-    /// First and last setpoint of `run`, s.
-    pub fn times(&self, run: &Run) -> [f64; 2] {
+    /// Returns the times of the first and last setpoint of `run`, s.
+    pub fn times(&self, run: &CampaignRun) -> [f64; 2] {
         let time = |row: usize| seconds(row as Nanoseconds * self.period);
         [time(run.rows.start), time(run.rows.end.saturating_sub(1))]
     }
 
-    /// Tsp, ns.
+    /// Returns the position period Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
         self.period
     }
 
-    /// Where every part starts and ends, m or rad.
+    /// Returns the start and end position of each part, m or rad.
     pub fn start(&self) -> f64 {
         self.start
     }
 
-    /// Between which places the axis is moved, m or rad; start and end can lie outside, at home.
+    /// Returns the range of motion, m or rad; the start can lie outside of it, at home.
     pub fn range(&self) -> [f64; 2] {
         self.range
     }

@@ -1,4 +1,4 @@
-//! The whole axis, simulated on the setpoints of a recording.
+//! Closed-loop simulation of an axis on recorded setpoints.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -6,78 +6,78 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::mode::FeedforwardMode;
-use super::setpoints::Setpoints;
-use crate::recording::{Signals, Span};
+use super::feedforward_mode::FeedforwardMode;
+use super::setpoints::SetpointGrid;
+use crate::recording::{SignalSpan, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig, Periods};
 use virtual_axes_core::machine::{Machine, MachineError, MachineParameters};
 use virtual_axes_core::units::{DEGREE, seconds};
 
-/// How long PSEC must stand, s, before an axis is taken for at rest.
+/// Duration of constant PSEC, s, after which an axis can be at rest.
 const AT_REST: f64 = 0.1;
-/// How far the axis may move meanwhile, m: some steps of an encoder; and rad.
+/// Largest motion at rest during that time, m and rad: a few encoder increments.
 const RESTING: f64 = 5e-6;
 const RESTING_ANGLE: f64 = 5e-3 * DEGREE;
 
-/// A part of a recording that begins at rest, and can be simulated.
+/// Section of a recording that starts at rest and can be simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
-    /// Number of the recording.
+    /// Index of the recording.
     pub recording: usize,
-    /// Number of the span in [`Signals::spans`], and of its first sample that belongs here.
+    /// Index of the span in [`Signals::spans`].
     pub span: usize,
-    /// That sample.
+    /// Index of the first sample of the experiment in the span.
     pub sample: usize,
-    /// What feedforward acted.
+    /// Active feedforward.
     pub mode: FeedforwardMode,
-    /// PSEC at the position instants from the first one on, m or rad.
+    /// PSEC from the first position cycle on, m or rad.
     psec: Vec<f64>,
-    /// Time of the first sample behind the first instant, s, and from sample to sample.
+    /// Time of the first sample after the first position cycle, s.
     first: f64,
     period: f64,
     /// Time of the first sample in the recording, s.
     pub start: f64,
     /// Recorded position, m or rad.
     pub position: Vec<f64>,
-    /// Recorded velocity, or that of the filtered position, m/s or rad/s.
+    /// Recorded velocity, or the derivative of the filtered position, m/s or rad/s.
     pub velocity: Vec<f64>,
     /// Recorded current, A.
     pub current: Option<Vec<f64>>,
 }
 
-/// An axis at the samples of an experiment.
+/// Simulated signals at the samples of an experiment.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Simulated {
-    /// SP, m or rad.
+pub struct SimulatedExperiment {
+    /// Simulated position, m or rad.
     pub position: Vec<f64>,
-    /// SV, m/s or rad/s.
+    /// Simulated velocity, m/s or rad/s.
     pub velocity: Vec<f64>,
-    /// SMC, A.
+    /// Simulated motor current, A.
     pub current: Vec<f64>,
 }
 
 impl Experiment {
-    /// Sampling period, s.
+    /// Returns the sampling period, s.
     pub fn period(&self) -> f64 {
         self.period
     }
 
-    /// Whether PSEC moves.
+    /// Returns true if PSEC changes.
     pub fn moves(&self) -> bool {
         self.psec.windows(2).any(|pair| pair[0] != pair[1])
     }
 
-    /// PSEC under sample i as the staircase shows it, m or rad.
+    /// Returns PSEC at sample `i` with zero-order hold, m or rad; `tsp` is the position period, s.
     pub fn psec_at(&self, i: usize, tsp: f64) -> f64 {
         let instant = ((self.first + i as f64 * self.period) / tsp + 1e-9).floor().max(0.0) as usize;
         self.psec.get(instant.min(self.psec.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
     }
 }
 
-/// The parts of a recording that begin at rest and keep one kind of feedforward; none without PSEC.
+/// Splits a recording into experiments that start at rest and have one feedforward mode; empty without PSEC.
 ///
-/// `mode` says what feedforward acted where the recording does not show VFFWS and TFFWS.
-pub fn experiments(
+/// `mode` is the active feedforward if the recording does not contain VFFWS and TFFWS.
+pub fn find_experiments(
     signals: &Signals,
     recording: usize,
     axis: &AxisConfig,
@@ -92,8 +92,8 @@ pub fn experiments(
     };
     let instants = (AT_REST / tsp).ceil() as usize;
     for (number, span) in signals.spans.iter().enumerate() {
-        let Some(setpoints) = Setpoints::of(span, signals.period, tsp) else { continue };
-        for (mode, part) in parts(span, &setpoints, signals.period, tsp, mode) {
+        let Some(setpoints) = SetpointGrid::of(span, signals.period, tsp) else { continue };
+        for (mode, part) in split_by_feedforward(span, &setpoints, signals.period, tsp, mode) {
             let (psec, end) = (&setpoints.values[part.clone()], part.end);
             let sample_of = |instant: usize| {
                 let time = setpoints.first + instant as f64 * tsp;
@@ -101,7 +101,7 @@ pub fn experiments(
             };
             let position =
                 |k: usize| span.position.get(sample_of(part.start + k)).copied().unwrap_or(f64::NAN);
-            let Some(begin) = rest_from(psec, instants, resting, position).map(|k| part.start + k) else {
+            let Some(begin) = find_rest(psec, instants, resting, position).map(|k| part.start + k) else {
                 continue;
             };
             let sample = sample_of(begin);
@@ -126,10 +126,10 @@ pub fn experiments(
     found
 }
 
-/// Position instants of a span with one kind of feedforward: cut in the standstill before it changes.
-fn parts(
-    span: &Span,
-    setpoints: &Setpoints,
+/// Splits the position cycles of a span by feedforward mode, at the standstill before a change.
+fn split_by_feedforward(
+    span: &SignalSpan,
+    setpoints: &SetpointGrid,
     period: f64,
     tsp: f64,
     given: FeedforwardMode,
@@ -143,13 +143,13 @@ fn parts(
         channel.and_then(|c| c.get(sample(from).min(end)..end)).is_some_and(|c| c.iter().any(|v| *v != 0.0))
     };
     let mut found: Vec<(FeedforwardMode, Range<usize>)> = Vec::new();
-    for (from, to) in moves(&setpoints.values, instants) {
-        // Delays keep the feedforward acting for a while behind the setpoints.
+    for (from, to) in find_moves(&setpoints.values, instants) {
+        // The delays keep the feedforward active for some time after the setpoints.
         let to = (to + instants).min(count);
         let mode = match (acts(Some(velocity), from, to), acts(span.torque_feedforward.as_ref(), from, to)) {
             (false, _) => FeedforwardMode::Off,
             (true, true) => FeedforwardMode::Both,
-            // Without its channel nobody sees whether the torque was fed forward.
+            // Without the TFFWS channel the torque feedforward cannot be detected.
             (true, false) if span.torque_feedforward.is_none() && given == FeedforwardMode::Both => given,
             (true, false) => FeedforwardMode::Velocity,
         };
@@ -169,8 +169,8 @@ fn parts(
     found
 }
 
-/// Instants from which to which PSEC moves; pauses shorter than `rest` instants belong to a move.
-fn moves(psec: &[f64], rest: usize) -> Vec<(usize, usize)> {
+/// Returns start and end of each move of PSEC; pauses shorter than `rest` cycles belong to a move.
+fn find_moves(psec: &[f64], rest: usize) -> Vec<(usize, usize)> {
     let mut found: Vec<(usize, usize)> = Vec::new();
     for (k, pair) in psec.windows(2).enumerate() {
         if pair[0] == pair[1] {
@@ -184,8 +184,8 @@ fn moves(psec: &[f64], rest: usize) -> Vec<(usize, usize)> {
     found
 }
 
-/// The first instant from which PSEC stands for `count` instants, and the axis with it: its lag has run out.
-fn rest_from(psec: &[f64], count: usize, resting: f64, position: impl Fn(usize) -> f64) -> Option<usize> {
+/// Returns the first position cycle from which PSEC and position are constant for `count` cycles.
+fn find_rest(psec: &[f64], count: usize, resting: f64, position: impl Fn(usize) -> f64) -> Option<usize> {
     let stands = |k: usize| (position(k + count.saturating_sub(1)) - position(k)).abs() <= resting;
     let windows = psec.windows(count.max(1)).enumerate();
     windows
@@ -197,19 +197,19 @@ fn rest_from(psec: &[f64], count: usize, resting: f64, position: impl Fn(usize) 
 /// Simulates an axis on an experiment.
 ///
 /// # Errors
-/// [`MachineError`] if there is no such axis.
+/// [`MachineError`] if the axis parameters are invalid.
 pub fn simulate(
     axis: &AxisConfig,
     periods: &Periods,
     experiment: &Experiment,
-) -> Result<Simulated, MachineError> {
+) -> Result<SimulatedExperiment, MachineError> {
     let config = MachineConfig::from_axis(experiment.mode.of(axis), *periods);
     let mut machine = Machine::new(Arc::new(MachineParameters::new(&config)?));
-    let Some(first) = experiment.psec.first() else { return Ok(Simulated::default()) };
+    let Some(first) = experiment.psec.first() else { return Ok(SimulatedExperiment::default()) };
     machine.reset(&[*first]);
     let tick = seconds(periods.current);
     let (count, mut next) = (experiment.position.len(), 0);
-    let mut simulated = Simulated::default();
+    let mut simulated = SimulatedExperiment::default();
     let mut before = [0.0; 3];
     // Time in ticks; samples between two ticks are interpolated.
     let time_of = |i: usize| (experiment.first + i as f64 * experiment.period) / tick;
@@ -235,20 +235,20 @@ pub fn simulate(
     Ok(simulated)
 }
 
-/// Simulates all of several experiments, over all cores.
+/// Simulates an axis on several experiments in parallel.
 ///
 /// # Errors
-/// As [`simulate`].
+/// [`MachineError`] if the axis parameters are invalid.
 pub fn simulate_all(
     axis: &AxisConfig,
     periods: &Periods,
     experiments: &[Experiment],
-) -> Result<Vec<Simulated>, MachineError> {
+) -> Result<Vec<SimulatedExperiment>, MachineError> {
     experiments.par_iter().map(|experiment| simulate(axis, periods, experiment)).collect()
 }
 
-/// Simulated minus recorded position at every sample of every experiment, m or rad.
-pub(super) fn deviations(
+/// Returns simulated minus recorded position at every sample of every experiment, m or rad.
+pub(super) fn position_residuals(
     axis: &AxisConfig,
     periods: &Periods,
     experiments: &[Experiment],

@@ -1,108 +1,110 @@
-//! The delays α, β and γ one after the other, by least squares on positions (Prévost section 3.5).
+//! Identification of the delays α, β and γ by least squares on positions (Prévost section 3.5).
 //!
-//! A delay acts at the instants of a loop only: α where the position comparator samples (every Tsp), β and γ
-//! where the velocity loop reads the feedforward (every Tsv). All delays between two such instants give the
-//! same motion, so that what is found is an interval, open below and closed above.
+//! A delay takes effect at the cycles of a loop only: α where the position comparator samples (every Tsp), β
+//! and γ where the velocity loop reads the feedforward (every Tsv). All delays between two such cycles cause
+//! the same motion. The result is therefore an interval, open below and closed above.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::closed_loop::{Experiment, deviations};
-use super::mode::FeedforwardMode;
+use super::closed_loop::{Experiment, position_residuals};
+use super::feedforward_mode::FeedforwardMode;
 use virtual_axes_core::config::{AxisConfig, DelaysConfig, Periods};
+use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds};
 
-/// Longest delay, as in the schema of parameters.
+/// Longest delay, as in the parameter schema.
 const LONGEST: Nanoseconds = 100 * MILLISECOND_NS;
-/// First pass over β and γ.
+/// Step of the first pass over β and γ.
 const COARSE: Nanoseconds = 2 * MILLISECOND_NS;
-/// Change of the sum of squares that is noise, in units of the residuals' variance: three standard deviations.
+/// Significant change of the sum of squares, in units of the residual variance: three standard deviations.
 const NOISE: f64 = 9.0;
-/// Delays that are tried at once where an interval is followed.
+/// Delays evaluated in parallel while the interval is extended.
 const BLOCK: i64 = 8;
-/// Longest correlation of residuals that is looked for, samples.
+/// Longest lag of the residual autocorrelation, samples.
 const CORRELATION: usize = 200;
 
-/// Which delay.
+/// Delay parameter of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Delay {
-    /// α, before the position comparator; seen without feedforward.
+pub enum DelayParameter {
+    /// α, before the position comparator; identified without feedforward.
     Alpha,
-    /// β, behind the velocity feedforward; seen with velocity feedforward only.
+    /// β, behind the velocity feedforward; identified with velocity feedforward only.
     Beta,
-    /// γ, behind the torque feedforward; seen with both.
+    /// γ, behind the torque feedforward; identified with both.
     Gamma,
 }
 
-impl Delay {
-    /// Name in a machine file, without the unit.
+impl DelayParameter {
+    /// Returns the name in a machine file, without unit.
     pub fn name(self) -> &'static str {
         match self {
-            Delay::Alpha => "alpha",
-            Delay::Beta => "beta",
-            Delay::Gamma => "gamma",
+            DelayParameter::Alpha => "alpha",
+            DelayParameter::Beta => "beta",
+            DelayParameter::Gamma => "gamma",
         }
     }
 
-    /// Recordings that show it.
-    pub fn mode(self) -> FeedforwardMode {
+    /// Returns the feedforward mode of the recordings that identify the delay.
+    pub fn feedforward_mode(self) -> FeedforwardMode {
         match self {
-            Delay::Alpha => FeedforwardMode::Off,
-            Delay::Beta => FeedforwardMode::Velocity,
-            Delay::Gamma => FeedforwardMode::Both,
+            DelayParameter::Alpha => FeedforwardMode::Off,
+            DelayParameter::Beta => FeedforwardMode::Velocity,
+            DelayParameter::Gamma => FeedforwardMode::Both,
         }
     }
 
-    /// Its value on an axis, ns.
+    /// Returns the value of the delay on an axis, ns.
     pub(super) fn of(self, delays: &DelaysConfig) -> Nanoseconds {
         match self {
-            Delay::Alpha => delays.alpha,
-            Delay::Beta => delays.beta,
-            Delay::Gamma => delays.gamma,
+            DelayParameter::Alpha => delays.alpha,
+            DelayParameter::Beta => delays.beta,
+            DelayParameter::Gamma => delays.gamma,
         }
     }
 
     pub(super) fn set(self, axis: &mut AxisConfig, value: Nanoseconds) {
         match self {
-            Delay::Alpha => axis.delays.alpha = value,
-            Delay::Beta => axis.delays.beta = value,
-            Delay::Gamma => axis.delays.gamma = value,
+            DelayParameter::Alpha => axis.delays.alpha = value,
+            DelayParameter::Beta => axis.delays.beta = value,
+            DelayParameter::Gamma => axis.delays.gamma = value,
         }
     }
 
-    /// Period of the loop that reads it, ns.
+    /// Returns the period of the loop that reads the delay, ns.
     fn grid(self, periods: &Periods) -> Nanoseconds {
         match self {
-            Delay::Alpha => periods.position,
-            Delay::Beta | Delay::Gamma => periods.velocity,
+            DelayParameter::Alpha => periods.position,
+            DelayParameter::Beta | DelayParameter::Gamma => periods.velocity,
         }
     }
 }
 
-/// What a recording tells of a delay.
+/// Identified delay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DelayFit {
-    /// Which one.
-    pub delay: Delay,
-    /// The data tell no difference between delays above the first and up to the second, ns.
+    /// Delay parameter.
+    pub delay: DelayParameter,
+    /// Interval of equivalent delays: above the first and up to the second value, ns.
     pub interval: (Nanoseconds, Nanoseconds),
-    /// The delay to take, ns: that of the machine where it is in the interval, else the middle of the best part.
+    /// Identified delay, ns: the value of the machine file if it is in the interval, otherwise the center of
+    /// the best part.
     pub value: Nanoseconds,
-    /// Whether the data would bear longer delays than there are.
-    pub at_end: bool,
-    /// Whether the machine's own delay was left as it is.
-    pub left: bool,
-    /// Delays that were tried (ns), with the RMS of the deviations, m or rad.
+    /// True if the interval ends at the longest delay.
+    pub is_at_end: bool,
+    /// True if the value of the machine file was kept.
+    pub is_unchanged: bool,
+    /// Evaluated delays, ns, and RMS position residual, m or rad.
     pub profile: Vec<(Nanoseconds, f64)>,
 }
 
-/// Finds a delay from the experiments with its feedforward; none if there are none.
+/// Identifies a delay from the experiments with its feedforward mode. Returns none without experiments.
 ///
-/// `nuisance` moves other parameters a little: what a change of them explains is not counted for the delay.
-/// `own` is the machine file's delay, which is kept if the data do not speak against it.
-/// `around` looks near the axis's present delay only, for an axis that is known well.
-pub(super) fn delay(
-    which: Delay,
+/// `nuisance` contains axes with slightly changed other parameters; residuals that these changes explain do
+/// not count. `own` is the delay of the machine file, which is kept if it is in the interval. `around` limits
+/// the search to the neighborhood of the present delay.
+pub(super) fn fit_delay(
+    which: DelayParameter,
     axis: &AxisConfig,
     periods: &Periods,
     experiments: &[Experiment],
@@ -115,35 +117,35 @@ pub(super) fn delay(
     }
     let grid = which.grid(periods);
     let longest = LONGEST / grid;
-    // Part m holds the delays above (m − 1) and up to m instants.
+    // Part m contains the delays above (m − 1) and up to m cycles.
     let middle = |m: i64| (m * grid - grid / 2).max(0);
     let residuals = |m: i64| {
         let mut axis = axis.clone();
         which.set(&mut axis, middle(m));
-        deviations(&axis, periods, experiments)
+        position_residuals(&axis, periods, experiments)
     };
     let coarse = (COARSE / grid).max(1);
     let present = (which.of(&axis.delays) + grid - 1) / grid;
     let first = if around { present..=present } else { 0..=longest };
     let mut tried: Vec<(i64, DVector<f64>)> =
-        tries(first.step_by(usize::try_from(coarse).unwrap_or(1)).collect(), &residuals);
+        evaluate(first.step_by(usize::try_from(coarse).unwrap_or(1)).collect(), &residuals);
     let best = |tried: &[(i64, DVector<f64>)]| {
         tried.iter().min_by(|a, b| a.1.norm_squared().total_cmp(&b.1.norm_squared())).map(|(m, _)| *m)
     };
     let near = best(&tried)?;
     let between =
         ((near - coarse).max(0)..=(near + coarse).min(longest)).filter(|m| m % coarse != 0).collect();
-    tried.extend(tries(between, &residuals));
+    tried.extend(evaluate(between, &residuals));
     let at_best = best(&tried)?;
 
-    // Only what no other parameter explains is counted.
+    // Only residuals that no other parameter explains count.
     let (_, at_minimum) = tried.iter().find(|(m, _)| *m == at_best)?.clone();
     let directions: Vec<DVector<f64>> = nuisance
         .iter()
         .filter_map(|moved| {
             let mut moved = moved.clone();
             which.set(&mut moved, middle(at_best));
-            Some(deviations(&moved, periods, experiments)? - &at_minimum)
+            Some(position_residuals(&moved, periods, experiments)? - &at_minimum)
         })
         .filter(|direction| direction.norm() > 0.0)
         .collect();
@@ -154,10 +156,11 @@ pub(super) fn delay(
     };
     let least = squares(&at_minimum);
     let count = at_minimum.len() as f64;
-    // Residuals that are alike from sample to sample count less than their number.
-    let limit = least * (1.0 + NOISE * inflation(at_minimum.as_slice()) / count) + count * f64::EPSILON;
+    // Autocorrelated residuals count less than their number.
+    let limit =
+        least * (1.0 + NOISE * correlation_inflation(at_minimum.as_slice()) / count) + count * f64::EPSILON;
 
-    // The accepted neighborhood of the best, part by part; several are tried at once.
+    // Extends the accepted interval from the best part; several parts are evaluated in parallel.
     let mut reach = |step: i64| {
         let mut end = at_best;
         loop {
@@ -167,7 +170,7 @@ pub(super) fn delay(
             }
             if !tried.iter().any(|(known, _)| *known == next) {
                 let block = (0..BLOCK).map(|k| next + k * step).filter(|m| (0..=longest).contains(m));
-                tried.extend(tries(block.collect(), &residuals));
+                tried.extend(evaluate(block.collect(), &residuals));
             }
             let accepted = tried.iter().find(|(m, _)| *m == next).is_some_and(|(_, r)| squares(r) <= limit);
             if !accepted {
@@ -186,22 +189,23 @@ pub(super) fn delay(
         delay: which,
         interval: (interval.0.max(0), interval.1),
         value: if left { own } else { middle(at_best) },
-        at_end: high == longest,
-        left,
+        is_at_end: high == longest,
+        is_unchanged: left,
         profile,
     })
 }
 
-fn tries(
+fn evaluate(
     parts: Vec<i64>,
     residuals: &(impl Fn(i64) -> Option<DVector<f64>> + Sync),
 ) -> Vec<(i64, DVector<f64>)> {
     parts.into_par_iter().filter_map(|m| Some((m, residuals(m)?))).collect()
 }
 
-/// How many samples count as one: 1 + 2 Σ ρ_k up to the first correlation that is not positive.
-fn inflation(residuals: &[f64]) -> f64 {
-    let mean = super::segments::mean(residuals);
+/// Returns the number of samples that count as one independent sample: 1 + 2 Σ ρ_k up to the first
+/// non-positive correlation.
+fn correlation_inflation(residuals: &[f64]) -> f64 {
+    let mean = mean(residuals).unwrap_or(f64::NAN);
     let covariance = |lag: usize| {
         let pairs = residuals.iter().zip(residuals.iter().skip(lag));
         pairs.map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>()

@@ -1,93 +1,95 @@
-//! Weights of the feedforward by regression on the derivatives of PSEC (Prévost section 3.5, eqs. 6 to 8).
+//! Identification of the feedforward weights by regression on the derivatives of PSEC (Prévost section 3.5,
+//! eqs. 6–8).
 
-use super::fit::{determination, linear};
-use super::setpoints::Setpoints;
-use crate::recording::{Finding, Signals, Span};
+use super::fit::{fit_linear, r_squared};
+use super::setpoints::SetpointGrid;
+use crate::recording::{Finding, SignalSpan, Signals};
 
-/// Longest delay of a feedforward that is looked for, s.
+/// Longest delay of the feedforward, s.
 const LONGEST_DELAY: f64 = 0.1;
 /// R² below which the ratio is not constant.
 const LEAST_DETERMINATION: f64 = 0.99;
-/// Part of the largest derivative below which an instant is left out of the picture.
+/// Smallest derivative shown in plots, relative to the largest.
 const SHOWN: f64 = 0.02;
 
-/// A weight of the feedforward.
+/// Regression of a feedforward weight.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Regression {
-    /// VFFW (1), or TFFW (kg·m² at the motor, kg for a linear motor).
+pub struct FeedforwardRegression {
+    /// VFFW (dimensionless), or TFFW (kg·m² at the motor, kg for a linear motor).
     pub value: f64,
-    /// Its standard error.
+    /// Standard error of the weight.
     pub error: f64,
-    /// R².
-    pub determination: f64,
-    /// Delay of the recorded setpoint behind the derivative: above the first, up to the second, s.
+    /// Coefficient of determination R².
+    pub r_squared: f64,
+    /// Delay of the recorded setpoint behind the derivative, s: above the first and up to the second value.
     pub delay: (f64, f64),
-    /// Derivative of PSEC at the motor (rad/s, rad/s²) and the recorded setpoint, pairs.
+    /// Pairs of the derivative of PSEC at the motor (rad/s, rad/s²) and the recorded setpoint.
     pub points: Vec<(f64, f64)>,
 }
 
-/// VFFW and TFFW.
+/// Regressions of VFFW and TFFW.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FeedforwardFit {
-    /// VFFW.
-    pub velocity: Option<Regression>,
-    /// TFFW.
-    pub torque: Option<Regression>,
-    /// Whether a recording with torque feedforward shows that TFFW is 0.
-    pub no_torque: bool,
+    /// Regression of VFFW.
+    pub velocity: Option<FeedforwardRegression>,
+    /// Regression of TFFW.
+    pub torque: Option<FeedforwardRegression>,
+    /// True if a recording with torque feedforward shows that TFFW is 0.
+    pub is_torque_zero: bool,
 }
 
-/// (Prévost eqs. 6, 7) ratios of the recorded VFFWS and TFFWS to the derivatives of PSEC.
+/// Fits VFFW and TFFW as ratios of the recorded VFFWS and TFFWS to the derivatives of PSEC (Prévost eqs. 6,
+/// 7).
 ///
-/// `tsp` is the position period, s; `ratio` r, m or rad of the axis per rad of the motor.
-pub fn feedforward(
+/// `tsp` is the position period, s; `ratio` is r, m or rad of the axis per rad of the motor.
+pub fn fit_feedforward(
     recordings: &[&Signals],
     tsp: f64,
     ratio: f64,
     findings: &mut Vec<Finding>,
 ) -> FeedforwardFit {
-    let velocity = regression(
+    let velocity = fit_weight(
         recordings,
         tsp,
         |span| span.velocity_feedforward.as_ref(),
         |p| (p[2] - p[1]) / tsp / ratio,
     );
-    let torque = regression(
+    let torque = fit_weight(
         recordings,
         tsp,
         |span| span.torque_feedforward.as_ref(),
         |p| ((p[2] - p[1]) - (p[1] - p[0])) / (tsp * tsp) / ratio,
     );
     for (name, key, found) in [("VFFW", "velocity", &velocity), ("TFFW", "torque", &torque)] {
-        if let Some(r) = found.as_ref().filter(|r| r.determination < LEAST_DETERMINATION) {
+        if let Some(r) = found.as_ref().filter(|r| r.r_squared < LEAST_DETERMINATION) {
             findings.push(Finding::warning(
                 "feedforward-not-constant",
-                format!("{name} is not constant: R² of its regression is {:.4}", r.determination),
-                format!("check the column and the unit of {key}_feedforward"),
+                format!("{name} is not constant: R² of its regression is {:.4}", r.r_squared),
+                format!("check column and unit of {key}_feedforward"),
             ));
         }
     }
-    FeedforwardFit { velocity, torque, no_torque: false }
+    FeedforwardFit { velocity, torque, is_torque_zero: false }
 }
 
-fn regression<'a>(
+fn fit_weight<'a>(
     recordings: &[&'a Signals],
     tsp: f64,
-    channel: impl Fn(&'a Span) -> Option<&'a Vec<f64>>,
+    channel: impl Fn(&'a SignalSpan) -> Option<&'a Vec<f64>>,
     derivative: impl Fn(&[f64]) -> f64,
-) -> Option<Regression> {
-    // The staircase of the derivative under each sample, with what was recorded there.
+) -> Option<FeedforwardRegression> {
+    // Zero-order-held derivative at each sample, recorded signal, sampling period.
     let mut parts: Vec<(Vec<f64>, &'a [f64], f64)> = Vec::new();
     for signals in recordings {
         for span in &signals.spans {
             let Some(recorded) = channel(span).filter(|c| c.iter().any(|value| *value != 0.0)) else {
                 continue;
             };
-            let Some(setpoints) = Setpoints::of(span, signals.period, tsp) else { continue };
+            let Some(setpoints) = SetpointGrid::of(span, signals.period, tsp) else { continue };
             let derivatives: Vec<f64> = setpoints.values.windows(3).map(&derivative).collect();
             let at = |i: usize| {
                 let instant = ((i as f64 * signals.period - setpoints.first) / tsp + 1e-9).floor();
-                // The first derivative is that of the third setpoint.
+                // The first derivative belongs to the third setpoint.
                 let place = instant - 2.0;
                 if place < 0.0 { 0.0 } else { derivatives.get(place as usize).copied().unwrap_or(0.0) }
             };
@@ -102,9 +104,9 @@ fn regression<'a>(
                 .iter()
                 .flat_map(move |(d, recorded, _)| d.iter().copied().zip(recorded.iter().copied().skip(shift)))
         };
-        let fit = linear(pairs().map(|(x, y)| (vec![x], y, 1.0)))?;
+        let fit = fit_linear(pairs().map(|(x, y)| (vec![x], y, 1.0)))?;
         let value = *fit.values.first()?;
-        let determination = determination(pairs().map(|(x, y)| (y, value * x)));
+        let determination = r_squared(pairs().map(|(x, y)| (y, value * x)));
         determination.is_finite().then(|| (shift, value, fit.error(0), determination))
     });
     let (shift, value, error, determination) = fits.max_by(|a, b| a.3.total_cmp(&b.3))?;
@@ -113,5 +115,5 @@ fn regression<'a>(
     let largest = all.clone().map(|(x, _)| x.abs()).fold(0.0, f64::max);
     let points = all.filter(|(x, _)| x.abs() > SHOWN * largest).collect();
     let delay = ((shift as f64 - 1.0).max(0.0) * period, shift as f64 * period);
-    Some(Regression { value, error, determination, delay, points })
+    Some(FeedforwardRegression { value, error, r_squared: determination, delay, points })
 }

@@ -1,22 +1,23 @@
-//! Least squares: linear with weights, and nonlinear within bounds.
+//! Least squares: weighted linear, and nonlinear within bounds (Levenberg–Marquardt).
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 use rayon::prelude::*;
+use virtual_axes_core::statistics::median;
 
-/// Part of its range within which a value lies at a bound.
+/// Distance from a bound, relative to the range, within which a value is at the bound.
 const AT_BOUND: f64 = 1e-3;
-/// How much work an optimization is worth.
+/// Accuracy of a nonlinear fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Effort {
-    /// Formulas: central differences, to the last digits.
+    /// Closed-form residuals: central differences, tight tolerance.
     Formula,
-    /// Simulations: forward differences, until nothing changes that noise would not hide.
+    /// Simulated residuals: forward differences, loose tolerance.
     Simulation,
 }
 
 impl Effort {
-    /// Where it ends: relative change of the sum of squares and of the parameters.
+    /// Returns the relative tolerance of sum of squares and parameters.
     fn tolerance(self) -> f64 {
         match self {
             Effort::Formula => 1e-10,
@@ -24,8 +25,9 @@ impl Effort {
         }
     }
 
-    /// Evaluations, for each parameter and one: a simulation that still gets better after these is of a wrong model.
-    fn patience(self) -> usize {
+    /// Returns the evaluation limit per parameter plus one; a simulation that still improves after it has a
+    /// wrong model.
+    fn max_evaluations_per_parameter(self) -> usize {
         match self {
             Effort::Formula => 60,
             Effort::Simulation => 8,
@@ -33,14 +35,14 @@ impl Effort {
     }
 }
 
-/// Singular values below this part of the largest carry no information.
+/// Relative size of singular values that are treated as zero.
 const RANK: f64 = 1e-10;
-/// Iterations for the singular values of a matrix of some ten rows; it takes some ten.
+/// Iteration limit of the singular value decomposition of a matrix of about ten rows.
 const SVD_ITERATIONS: usize = 1000;
 
-/// A parameter of a nonlinear fit.
+/// Bounded parameter of a nonlinear fit.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Bounded {
+pub(super) struct BoundedParameter {
     pub start: f64,
     pub low: f64,
     pub high: f64,
@@ -48,42 +50,43 @@ pub(super) struct Bounded {
     pub step: f64,
 }
 
-/// Where a nonlinear fit ended.
+/// Result of a nonlinear fit.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Minimum {
+pub(super) struct NonlinearFit {
     pub values: Vec<f64>,
-    /// Covariance of the values, from the residuals' variance.
+    /// Covariance of the values, from the residual variance.
     pub covariance: DMatrix<f64>,
     /// Sum of squares of the residuals.
-    pub squares: f64,
-    /// Whether each value lies at one of its bounds.
-    pub at_bound: Vec<bool>,
+    pub sum_of_squares: f64,
+    /// True for each value at one of its bounds.
+    pub is_at_bound: Vec<bool>,
 }
 
-impl Minimum {
-    /// Standard error of a value.
+impl NonlinearFit {
+    /// Returns the standard error of value `k`.
     pub fn error(&self, k: usize) -> f64 {
         self.covariance.get((k, k)).map_or(f64::NAN, |variance| variance.max(0.0).sqrt())
     }
 
-    /// Coefficient of correlation of two values.
+    /// Returns the correlation coefficient of two values.
     pub fn correlation(&self, j: usize, k: usize) -> f64 {
         self.covariance.get((j, k)).map_or(f64::NAN, |both| both / (self.error(j) * self.error(k)))
     }
 }
 
-/// Minimizes the sum of squares of `residuals` within bounds; none if they cannot be computed at the start.
+/// Minimizes the sum of squares of `residuals` within bounds by the Levenberg–Marquardt method. Returns none
+/// if the residuals cannot be computed.
 ///
-/// Levenberg and Marquardt's method on z with `x = low + (high − low)(1 + sin z)/2`, which keeps the bounds.
+/// The substitution `x = low + (high − low)(1 + sin z)/2` keeps the bounds.
 pub(super) fn minimize(
-    parameters: &[Bounded],
+    parameters: &[BoundedParameter],
     effort: Effort,
     residuals: impl Fn(&[f64]) -> Option<DVector<f64>> + Sync,
-) -> Option<Minimum> {
+) -> Option<NonlinearFit> {
     let problem = Problem { z: start(parameters), parameters, effort, residuals: &residuals };
     let (problem, _) = LevenbergMarquardt::new()
         .with_tol(effort.tolerance())
-        .with_patience(effort.patience())
+        .with_patience(effort.max_evaluations_per_parameter())
         .minimize(problem);
     let values = problem.values();
     let at_end = residuals(&values)?;
@@ -96,11 +99,11 @@ pub(super) fn minimize(
         .zip(&values)
         .map(|(p, &x)| (x - p.low).min(p.high - x) < AT_BOUND * (p.high - p.low))
         .collect();
-    Some(Minimum { values, covariance, squares, at_bound })
+    Some(NonlinearFit { values, covariance, sum_of_squares: squares, is_at_bound: at_bound })
 }
 
-fn start(parameters: &[Bounded]) -> DVector<f64> {
-    let z = |p: &Bounded| {
+fn start(parameters: &[BoundedParameter]) -> DVector<f64> {
+    let z = |p: &BoundedParameter| {
         // Away from the bounds, where the derivative vanishes.
         let inside = ((p.start - p.low) / (p.high - p.low)).clamp(AT_BOUND, 1.0 - AT_BOUND);
         (2.0 * inside - 1.0).asin()
@@ -110,18 +113,18 @@ fn start(parameters: &[Bounded]) -> DVector<f64> {
 
 struct Problem<'a, R> {
     z: DVector<f64>,
-    parameters: &'a [Bounded],
+    parameters: &'a [BoundedParameter],
     effort: Effort,
     residuals: &'a R,
 }
 
 impl<R: Fn(&[f64]) -> Option<DVector<f64>> + Sync> Problem<'_, R> {
     fn values(&self) -> Vec<f64> {
-        let value = |(p, z): (&Bounded, &f64)| p.low + (p.high - p.low) * 0.5 * (1.0 + z.sin());
+        let value = |(p, z): (&BoundedParameter, &f64)| p.low + (p.high - p.low) * 0.5 * (1.0 + z.sin());
         self.parameters.iter().zip(self.z.iter()).map(value).collect()
     }
 
-    /// Derivatives of the residuals by the values.
+    /// Returns the Jacobian of the residuals with respect to the values.
     fn derivatives(&self, values: &[f64]) -> Option<DMatrix<f64>> {
         let at = |k: usize, x: f64| {
             let mut moved = values.to_vec();
@@ -173,24 +176,24 @@ impl<R: Fn(&[f64]) -> Option<DVector<f64>> + Sync> LeastSquaresProblem<f64, Dyn,
     }
 }
 
-/// A linear fit.
+/// Result of a linear fit.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Linear {
+pub(super) struct LinearFit {
     pub values: Vec<f64>,
     pub covariance: DMatrix<f64>,
 }
 
-impl Linear {
-    /// Standard error of a value.
+impl LinearFit {
+    /// Returns the standard error of value `k`.
     pub fn error(&self, k: usize) -> f64 {
         self.covariance.get((k, k)).map_or(f64::NAN, |variance| variance.max(0.0).sqrt())
     }
 }
 
-/// Weighted linear least squares: factors, what they are to give, and the weight of the row.
+/// Solves weighted linear least squares. Each row contains factors, right-hand side and weight.
 ///
-/// None if the rows do not determine the values.
-pub(super) fn linear(rows: impl Iterator<Item = (Vec<f64>, f64, f64)>) -> Option<Linear> {
+/// Returns none if the rows do not determine the values.
+pub(super) fn fit_linear(rows: impl Iterator<Item = (Vec<f64>, f64, f64)>) -> Option<LinearFit> {
     let mut rows = rows.peekable();
     let size = rows.peek()?.0.len();
     let mut normal = DMatrix::zeros(size, size);
@@ -210,10 +213,10 @@ pub(super) fn linear(rows: impl Iterator<Item = (Vec<f64>, f64, f64)>) -> Option
     let values = &inverse * &right;
     let left = (squares - values.dot(&right)).max(0.0);
     let variance = left / count.saturating_sub(size).max(1) as f64;
-    Some(Linear { values: values.iter().copied().collect(), covariance: inverse * variance })
+    Some(LinearFit { values: values.iter().copied().collect(), covariance: inverse * variance })
 }
 
-/// The inverse of a symmetric matrix of unlike units; none if it is not of full rank.
+/// Returns the inverse of a symmetric matrix after scaling of its diagonal, or none if it is rank-deficient.
 fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
     if !scale.iter().all(|s| s.is_finite()) {
@@ -221,7 +224,7 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }
     let scale = DMatrix::from_diagonal(&scale);
     let scaled = &scale * matrix * &scale;
-    // With a number that is none among them the decomposition would never end.
+    // The decomposition does not terminate with non-finite elements.
     if !scaled.iter().all(|s| s.is_finite()) {
         return None;
     }
@@ -230,8 +233,9 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     sound.then(|| scaled.try_inverse()).flatten().map(|inverse| &scale * inverse * &scale)
 }
 
-/// Coefficient of determination R² of `(measured, modeled)` pairs; NaN if nothing varies.
-pub(super) fn determination(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+/// Returns the coefficient of determination R² of `(measured, modeled)` pairs; NaN if the measured values are
+/// constant.
+pub(super) fn r_squared(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
     let count = pairs.clone().count() as f64;
     let mean = pairs.clone().map(|(measured, _)| measured).sum::<f64>() / count;
     let (mut left, mut total) = (0.0, 0.0);
@@ -242,22 +246,14 @@ pub(super) fn determination(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> 
     1.0 - left / total
 }
 
-/// The middle of a list that is put in order; NaN if it is empty.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// Median, and 1.4826 times the median distance from it: the standard deviation of a normal distribution.
-pub(super) fn robust(values: &[f64]) -> (f64, f64) {
-    /// Standard deviation of a normal distribution over its median distance from the median.
+/// Returns the median and 1.4826 times the median absolute deviation, the standard deviation of a normal
+/// distribution.
+pub(super) fn robust_mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    /// Ratio of the standard deviation of a normal distribution to its median absolute deviation.
     const NORMAL: f64 = 1.4826;
-    let middle = median(&mut values.to_vec());
+    let middle = median(&mut values.to_vec()).unwrap_or(f64::NAN);
     let mut distances: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
-    (middle, NORMAL * median(&mut distances))
+    (middle, NORMAL * median(&mut distances).unwrap_or(f64::NAN))
 }
 
 #[cfg(test)]
@@ -276,7 +272,7 @@ mod tests {
     fn a_line_through_three_points_has_the_textbook_errors() {
         // y = 1, 2, 4 at x = 0, 1, 2: slope 3/2, intercept 5/6, residual sum of squares 1/6.
         let rows = [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)];
-        let fit = linear(rows.into_iter().map(|(x, y)| (vec![1.0, x], y, 1.0))).expect("two of three");
+        let fit = fit_linear(rows.into_iter().map(|(x, y)| (vec![1.0, x], y, 1.0))).expect("two of three");
         assert!((fit.values[0] - 5.0 / 6.0).abs() < 1e-12 && (fit.values[1] - 1.5).abs() < 1e-12);
         // s² / Sxx = (1/6) / 2, and s² (1/3 + 1/2).
         assert!((fit.error(1) - (1.0_f64 / 12.0).sqrt()).abs() < 1e-9);
@@ -285,7 +281,7 @@ mod tests {
 
     #[test]
     fn collinear_factors_are_no_fit() {
-        assert!(linear((0..9).map(|k| (vec![1.0, 2.0], f64::from(k), 1.0))).is_none());
+        assert!(fit_linear((0..9).map(|k| (vec![1.0, 2.0], f64::from(k), 1.0))).is_none());
     }
 
     #[test]
@@ -299,21 +295,21 @@ mod tests {
                 }),
             ))
         };
-        let bounded = |start, low, high| Bounded { start, low, high, step: 1e-5 };
+        let bounded = |start, low, high| BoundedParameter { start, low, high, step: 1e-5 };
         let free = minimize(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -5.0, 5.0)], Effort::Formula, residuals)
             .expect("a minimum");
         assert!((free.values[0] - 3.0).abs() < 1e-6 && (free.values[1] + 0.7).abs() < 1e-6);
-        assert_eq!(free.at_bound, [false, false]);
+        assert_eq!(free.is_at_bound, [false, false]);
         let held = minimize(&[bounded(1.0, 0.0, 10.0), bounded(0.5, -0.2, 5.0)], Effort::Formula, residuals)
             .expect("a minimum");
-        assert_eq!(held.at_bound, [false, true]);
+        assert_eq!(held.is_at_bound, [false, true]);
         assert!(held.values[1] >= -0.2);
     }
 
     #[test]
     fn the_robust_spread_of_a_normal_sample_is_its_standard_deviation() {
         // Quantiles of a normal distribution of mean 2 and deviation 1: -1.5, -0.6745, 0, 0.6745, 1.5.
-        let (middle, spread) = robust(&[0.5, 1.3255, 2.0, 2.6745, 3.5]);
+        let (middle, spread) = robust_mean_and_deviation(&[0.5, 1.3255, 2.0, 2.6745, 3.5]);
         assert!((middle - 2.0).abs() < 1e-12 && (spread - 1.0).abs() < 1e-3);
     }
 }

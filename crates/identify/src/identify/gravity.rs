@@ -1,69 +1,70 @@
-//! Gravity, and the current that each speed asks for beside it.
+//! Identification of gravity and of the friction current at each speed.
 //!
-//! At constant velocity and at rest nothing accelerates (Prévost eq. 2), so the current is
-//! `i = s f(|V|) + C_gravity(q) / Kt` with the sign s of the velocity. Steady motion in both directions tells
-//! the two apart whatever the law f is. At rest friction holds anything up to ±i0 of it: what is left of it
-//! changes its sign with the direction in which the axis came, and cancels where it came from both.
+//! Without acceleration (Prévost eq. 2) the current is `i = s f(|V|) + C_gravity(q) / Kt` with the sign s of
+//! the velocity. Steady motion in both directions separates the two for any law f. At rest the current
+//! contains a friction part within ±i0 whose sign follows the approach direction; it cancels with approaches
+//! from both sides.
 
-use super::fit::linear;
-use super::segments::{Segment, SegmentKind, mean};
+use super::fit::fit_linear;
+use super::segments::{MotionSegment, SegmentKind};
 use crate::recording::Signals;
 use virtual_axes_core::config::{AxisConfig, AxisKind};
+use virtual_axes_core::statistics::mean;
 
-/// Samples of a segment are averaged over so long, s, before they enter a fit.
+/// Averaging time of samples before a fit, s.
 const BATCH: f64 = 0.1;
-/// Speeds that differ by less than this part are one.
+/// Relative difference below which two speeds are the same.
 const SAME_SPEED: f64 = 0.03;
-/// Standard errors beyond which a gravity is there.
+/// Number of standard errors of a significant gravity.
 const SIGNIFICANT: f64 = 4.0;
-/// Part of the friction below which a gravity does not matter.
+/// Gravity relative to friction below which it is neglected.
 const RELEVANT: f64 = 0.01;
 
-/// Mean current of a speed in one direction.
+/// Mean current at one speed in one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Level {
-    /// Velocity of the axis, m/s or rad/s, with its sign.
+pub struct SteadyCurrent {
+    /// Velocity of the axis with sign, m/s or rad/s.
     pub velocity: f64,
-    /// Mean motor current as recorded, A.
+    /// Mean recorded motor current, A.
     pub current: f64,
-    /// What friction has of it, A, with the sign of the velocity.
+    /// Friction part of the current with the sign of the velocity, A.
     pub friction: f64,
-    /// Standard error of both, A.
+    /// Standard error of current and friction, A.
     pub error: f64,
-    /// How long it was moved at, s.
+    /// Duration of the motion, s.
     pub duration: f64,
 }
 
-/// Mean current of a standstill.
+/// Mean current at a standstill.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rest {
+pub struct Standstill {
     /// Position, m or rad.
     pub position: f64,
     /// Mean motor current, A.
     pub current: f64,
-    /// Sign of the velocity with which the axis came; 0 if it had not moved.
+    /// Sign of the approach velocity; 0 without motion before.
     pub approach: f64,
 }
 
-/// Gravity as motor currents, A: `constant + sine · sin q + cosine · cos q`.
+/// Gravity as motor current, A: `constant + sine · sin q + cosine · cos q`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct GravityCurrent {
-    /// Alike at each position.
+    /// Part independent of the position, A.
     pub constant: f64,
-    /// Factor of the sine of the position (rotary axes).
+    /// Factor of the sine of the position, A (rotary axes).
     pub sine: f64,
-    /// Factor of the cosine of the position (rotary axes).
+    /// Factor of the cosine of the position, A (rotary axes).
     pub cosine: f64,
 }
 
 impl GravityCurrent {
-    /// At a position (m or rad), A.
+    /// Returns the gravity current at a position (m or rad), A.
     pub fn at(&self, position: f64) -> f64 {
         self.constant + self.sine * position.sin() + self.cosine * position.cos()
     }
 }
 
-/// Where a gravity comes from.
+/// Source of an identified gravity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GravitySource {
     /// Constant velocities in both directions.
@@ -72,29 +73,29 @@ pub enum GravitySource {
     Rest,
 }
 
-/// Gravity of an axis, with standard errors.
+/// Identified gravity of an axis with standard errors.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gravity {
-    /// As motor currents, with nothing left out.
+pub struct GravityFit {
+    /// Fitted gravity current before the significance test.
     pub current: GravityCurrent,
-    /// Standard errors of those, A.
+    /// Standard errors of the gravity current, A.
     pub error: GravityCurrent,
-    /// What the model takes over: zero where it is not significant.
+    /// Gravity current of the model; zero if it is not significant.
     pub model: GravityCurrent,
-    /// W, N, and its standard error (linear axes).
+    /// Weight W and its standard error, N (linear axes).
     pub weight: Option<(f64, f64)>,
-    /// k, N·m, and its standard error (rotary axes).
+    /// Tilting torque k and its standard error, N·m (rotary axes).
     pub tilt: Option<(f64, f64)>,
-    /// φ, rad, and its standard error (rotary axes that have k).
+    /// Phase φ and its standard error, rad (rotary axes with significant k).
     pub phase: Option<(f64, f64)>,
-    /// Whether it was found in motion or at rest.
+    /// Source: motion or standstills.
     pub source: GravitySource,
-    /// The same from standstills alone, where both are there, A.
+    /// Gravity current and standard errors from standstills alone, A, if the source is motion.
     pub at_rest: Option<(GravityCurrent, GravityCurrent)>,
 }
 
-impl Gravity {
-    /// Makes it the gravity of an axis.
+impl GravityFit {
+    /// Sets the gravity parameters of an axis.
     pub(super) fn apply(&self, axis: &mut AxisConfig) {
         if let Some((weight, _)) = self.weight {
             axis.gravity.weight = weight;
@@ -106,18 +107,18 @@ impl Gravity {
     }
 }
 
-/// What steady segments hold.
+/// Measured currents at constant velocity and at rest.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Steady {
-    /// Speeds in rising order, those towards minus first.
-    pub levels: Vec<Level>,
-    /// Standstills, in the order of time.
-    pub rests: Vec<Rest>,
+pub struct SteadyMeasurements {
+    /// Mean currents by velocity in rising order, negative velocities first.
+    pub levels: Vec<SteadyCurrent>,
+    /// Standstills in order of time.
+    pub standstills: Vec<Standstill>,
 }
 
-/// A piece of a segment, averaged.
-struct Batch {
-    /// Number of the speed, and sign of the velocity; none at rest.
+/// Averaged part of a segment.
+struct CurrentBatch {
+    /// Index of the speed and sign of the velocity; none at rest.
     speed: Option<(usize, f64)>,
     approach: f64,
     velocity: f64,
@@ -125,27 +126,27 @@ struct Batch {
     sine: f64,
     cosine: f64,
     samples: f64,
-    /// s.
+    /// Duration, s.
     duration: f64,
 }
 
-/// Gravity and currents of each speed, from recordings with their segments.
+/// Fits gravity and the mean currents of each speed to segmented recordings.
 ///
-/// `inertia` is the motor current per acceleration of the axis (A per m/s² or rad/s²), as far as it is known:
-/// what is left of accelerations is taken off.
-pub fn gravity(
-    recordings: &[(&Signals, &[Segment])],
+/// `inertia` is the known motor current per acceleration of the axis (A per m/s² or rad/s²); it corrects for
+/// residual accelerations.
+pub fn fit_gravity(
+    recordings: &[(&Signals, &[MotionSegment])],
     axis: &AxisConfig,
     inertia: f64,
-) -> (Steady, Option<Gravity>) {
+) -> (SteadyMeasurements, Option<GravityFit>) {
     let rotary = axis.kind() == AxisKind::Rotary;
     let speeds = distinct_speeds(recordings);
-    let batches = batches(recordings, &speeds, inertia);
-    let shape = |b: &Batch| if rotary { vec![1.0, b.sine, b.cosine] } else { vec![1.0] };
+    let batches = average_batches(recordings, &speeds, inertia);
+    let shape = |b: &CurrentBatch| if rotary { vec![1.0, b.sine, b.cosine] } else { vec![1.0] };
     let unknowns = if rotary { 3 } else { 1 };
-    let moving = |b: &&Batch| b.speed.is_some();
+    let moving = |b: &&CurrentBatch| b.speed.is_some();
 
-    let in_motion = linear(batches.iter().filter(moving).map(|b| {
+    let in_motion = fit_linear(batches.iter().filter(moving).map(|b| {
         let mut row = shape(b);
         row.extend((0..speeds.len()).map(|k| match b.speed {
             Some((speed, sign)) if speed == k => sign,
@@ -153,7 +154,7 @@ pub fn gravity(
         }));
         (row, b.current, b.samples)
     }));
-    let at_rest = linear(batches.iter().filter(|b| b.speed.is_none()).map(|b| {
+    let at_rest = fit_linear(batches.iter().filter(|b| b.speed.is_none()).map(|b| {
         let mut row = shape(b);
         row.push(b.approach);
         (row, b.current, b.samples)
@@ -163,25 +164,31 @@ pub fn gravity(
         sine: if rotary { values(1) } else { 0.0 },
         cosine: if rotary { values(2) } else { 0.0 },
     };
-    let of = |fit: &super::fit::Linear| (read(&|k| fit.values[k]), read(&|k| fit.error(k)));
+    let of = |fit: &super::fit::LinearFit| (read(&|k| fit.values[k]), read(&|k| fit.error(k)));
     let rest = at_rest.as_ref().map(of);
     let found = in_motion.as_ref().map(|fit| (of(fit), GravitySource::Motion));
     let found = found.or(rest.map(|rest| (rest, GravitySource::Rest)));
 
     let friction_scale = in_motion.as_ref().map_or(0.0, |fit| {
         let levels = &fit.values[unknowns..];
-        mean(&levels.iter().map(|level| level.abs()).collect::<Vec<_>>())
+        mean(&levels.iter().map(|level| level.abs()).collect::<Vec<_>>()).unwrap_or(f64::NAN)
     });
     let gravity = found.map(|((current, error), source)| {
         let at_rest = rest.filter(|_| source == GravitySource::Motion);
-        model(axis, current, error, source, at_rest, friction_scale)
+        select_model(axis, current, error, source, at_rest, friction_scale)
     });
     let current = gravity.as_ref().map_or_else(GravityCurrent::default, |g| g.model);
-    (Steady { levels: levels(&batches, &speeds, &current), rests: rests(recordings) }, gravity)
+    (
+        SteadyMeasurements {
+            levels: average_levels(&batches, &speeds, &current),
+            standstills: find_standstills(recordings),
+        },
+        gravity,
+    )
 }
 
-/// Speeds of the segments of constant velocity, each once, rising.
-fn distinct_speeds(recordings: &[(&Signals, &[Segment])]) -> Vec<f64> {
+/// Returns the distinct speeds of the constant-velocity segments in rising order.
+fn distinct_speeds(recordings: &[(&Signals, &[MotionSegment])]) -> Vec<f64> {
     let segments = recordings.iter().flat_map(|(_, segments)| segments.iter());
     let mut found: Vec<f64> = segments
         .filter(|s| s.kind == SegmentKind::ConstantVelocity)
@@ -193,7 +200,11 @@ fn distinct_speeds(recordings: &[(&Signals, &[Segment])]) -> Vec<f64> {
     found
 }
 
-fn batches(recordings: &[(&Signals, &[Segment])], speeds: &[f64], inertia: f64) -> Vec<Batch> {
+fn average_batches(
+    recordings: &[(&Signals, &[MotionSegment])],
+    speeds: &[f64],
+    inertia: f64,
+) -> Vec<CurrentBatch> {
     let mut found = Vec::new();
     for (signals, segments) in recordings {
         let length = ((BATCH / signals.period).round() as usize).max(1);
@@ -202,7 +213,7 @@ fn batches(recordings: &[(&Signals, &[Segment])], speeds: &[f64], inertia: f64) 
             let Some(current) = &span.current else { continue };
             let speed = (segment.kind == SegmentKind::ConstantVelocity).then(|| {
                 let v = segment.velocity.abs();
-                // The speed that the segment was counted to: the last one that is not faster.
+                // Index of the speed of the segment: the last one that is not faster.
                 (speeds.partition_point(|s| *s <= v).saturating_sub(1), segment.velocity.signum())
             });
             let channels =
@@ -213,12 +224,19 @@ fn batches(recordings: &[(&Signals, &[Segment])], speeds: &[f64], inertia: f64) 
                         .zip(segment.of(&span.acceleration).chunks(length)),
                 );
             for ((current, position), (velocity, acceleration)) in channels {
-                let average = |f: fn(f64) -> f64| mean(&position.iter().map(|q| f(*q)).collect::<Vec<_>>());
-                found.push(Batch {
+                let average = |f: fn(f64) -> f64| {
+                    mean(&position.iter().map(|q| f(*q)).collect::<Vec<_>>()).unwrap_or(f64::NAN)
+                };
+                found.push(CurrentBatch {
                     speed,
                     approach: segment.approach,
-                    velocity: mean(velocity),
-                    current: mean(current) - if speed.is_some() { inertia * mean(acceleration) } else { 0.0 },
+                    velocity: mean(velocity).unwrap_or(f64::NAN),
+                    current: mean(current).unwrap_or(f64::NAN)
+                        - if speed.is_some() {
+                            inertia * mean(acceleration).unwrap_or(f64::NAN)
+                        } else {
+                            0.0
+                        },
                     sine: average(f64::sin),
                     cosine: average(f64::cos),
                     samples: current.len() as f64,
@@ -230,8 +248,8 @@ fn batches(recordings: &[(&Signals, &[Segment])], speeds: &[f64], inertia: f64) 
     found
 }
 
-/// Means of each speed and direction.
-fn levels(batches: &[Batch], speeds: &[f64], gravity: &GravityCurrent) -> Vec<Level> {
+/// Averages the currents of each speed and direction.
+fn average_levels(batches: &[CurrentBatch], speeds: &[f64], gravity: &GravityCurrent) -> Vec<SteadyCurrent> {
     let mut found = Vec::new();
     for direction in [-1.0, 1.0] {
         for number in 0..speeds.len() {
@@ -241,12 +259,13 @@ fn levels(batches: &[Batch], speeds: &[f64], gravity: &GravityCurrent) -> Vec<Le
                 continue;
             }
             let average =
-                |f: &dyn Fn(&Batch) -> f64| of_it().map(|b| b.samples * f(b)).sum::<f64>() / samples;
-            let weight = |b: &Batch| gravity.constant + gravity.sine * b.sine + gravity.cosine * b.cosine;
+                |f: &dyn Fn(&CurrentBatch) -> f64| of_it().map(|b| b.samples * f(b)).sum::<f64>() / samples;
+            let weight =
+                |b: &CurrentBatch| gravity.constant + gravity.sine * b.sine + gravity.cosine * b.cosine;
             let friction = average(&|b| b.current - weight(b));
             let count = of_it().count() as f64;
             let scatter = average(&|b| (b.current - weight(b) - friction).powi(2));
-            found.push(Level {
+            found.push(SteadyCurrent {
                 velocity: average(&|b| b.velocity),
                 current: average(&|b| b.current),
                 friction,
@@ -259,32 +278,37 @@ fn levels(batches: &[Batch], speeds: &[f64], gravity: &GravityCurrent) -> Vec<Le
     found
 }
 
-fn rests(recordings: &[(&Signals, &[Segment])]) -> Vec<Rest> {
+fn find_standstills(recordings: &[(&Signals, &[MotionSegment])]) -> Vec<Standstill> {
     let mut found = Vec::new();
     for (signals, segments) in recordings {
         for segment in segments.iter().filter(|s| s.kind == SegmentKind::Static) {
             let current = signals.spans.get(segment.span).and_then(|span| span.current.as_ref());
             if let Some(current) = current {
                 let (position, approach) = (segment.position, segment.approach);
-                found.push(Rest { position, current: mean(segment.of(current)), approach });
+                found.push(Standstill {
+                    position,
+                    current: mean(segment.of(current)).unwrap_or(f64::NAN),
+                    approach,
+                });
             }
         }
     }
     found
 }
 
-/// What the model of the axis has of it (Prévost section 3.4).
-fn model(
+/// Converts the gravity current to the parameters of the axis model (Prévost section 3.4); insignificant
+/// gravity is zero.
+fn select_model(
     axis: &AxisConfig,
     current: GravityCurrent,
     error: GravityCurrent,
     source: GravitySource,
     at_rest: Option<(GravityCurrent, GravityCurrent)>,
     friction: f64,
-) -> Gravity {
+) -> GravityFit {
     let force = axis.motor.torque_constant / axis.transmission_ratio;
     let is_there = |value: f64, error: f64| value.abs() > (SIGNIFICANT * error).max(RELEVANT * friction);
-    let mut gravity = Gravity {
+    let mut gravity = GravityFit {
         current,
         error,
         model: GravityCurrent::default(),

@@ -1,108 +1,112 @@
-//! What recordings tell about an axis.
+//! Identification of one axis: inputs, options and result.
 
 use super::delays::DelayFit;
 use super::feedforward::FeedforwardFit;
-use super::friction::{Breakaway, Friction};
-use super::gravity::{Gravity, Steady};
-use super::inertia::Inertia;
-use super::mode::FeedforwardMode;
+use super::feedforward_mode::FeedforwardMode;
+use super::friction::{Breakaway, FrictionFit};
+use super::gravity::{GravityFit, SteadyMeasurements};
+use super::inertia::InertiaFit;
 use super::refine::Refinement;
-use super::steps::Steps;
+use super::steps::IdentificationSteps;
 use super::validate::Agreement;
 use crate::recording::{Finding, Signals};
 use virtual_axes_core::config::{AxisConfig, Periods};
 
-/// A recording and what is known about it.
+/// Recording with its known conditions.
 #[derive(Debug, Clone, Copy)]
-pub struct Input<'a> {
-    /// The recording.
+pub struct IdentificationInput<'a> {
+    /// Conditioned recording.
     pub signals: &'a Signals,
-    /// The feedforward that acted; needed where the recording does not show VFFWS and TFFWS.
+    /// Active feedforward; required if the recording does not contain VFFWS and TFFWS.
     pub feedforward: Option<FeedforwardMode>,
 }
 
-/// What is to be done.
+/// Options of the identification.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
-    /// Where i0 comes from.
+pub struct IdentificationOptions {
+    /// Source of the breakaway current i0.
     pub i0: Breakaway,
-    /// What the refinement on the closed loop moves.
-    pub refine: Refine,
+    /// Parameters of the closed-loop refinement.
+    pub refine: RefinementScope,
 }
 
-/// What the refinement on the closed loop moves; what is left out stays as the steps found it.
+/// Parameters that the closed-loop refinement changes; the others keep the result of the steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Refine {
-    /// Jeq.
+pub struct RefinementScope {
+    /// Equivalent inertia Jeq.
     pub inertia: bool,
-    /// The friction law, and i0 where it is freed.
+    /// Friction law, and i0 if it is a separate parameter.
     pub friction: bool,
-    /// W, or k and φ, where there is a gravity.
+    /// Gravity: W, or k and φ, if significant.
     pub gravity: bool,
-    /// VFFW and TFFW, where their setpoints were not recorded.
+    /// VFFW and TFFW, if their setpoints were not recorded.
     pub feedforward: bool,
 }
 
-impl Refine {
-    /// All of it.
-    pub const ALL: Refine = Refine { inertia: true, friction: true, gravity: true, feedforward: true };
-    /// Nothing: only the steps of the paper.
-    pub const NONE: Refine = Refine { inertia: false, friction: false, gravity: false, feedforward: false };
+impl RefinementScope {
+    /// All parameters.
+    pub const ALL: RefinementScope =
+        RefinementScope { inertia: true, friction: true, gravity: true, feedforward: true };
+    /// No refinement, only the steps of the paper.
+    pub const NONE: RefinementScope =
+        RefinementScope { inertia: false, friction: false, gravity: false, feedforward: false };
 }
 
-impl Default for Options {
+impl Default for IdentificationOptions {
     fn default() -> Self {
-        Options { i0: Breakaway::Held, refine: Refine::ALL }
+        IdentificationOptions { i0: Breakaway::Held, refine: RefinementScope::ALL }
     }
 }
 
-/// What the recordings tell about an axis.
+/// Result of an identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
-    /// The axis as it was taken for.
-    pub before: AxisConfig,
-    /// The axis as it was found.
+    /// Axis parameters before the identification.
+    pub initial: AxisConfig,
+    /// Identified axis parameters.
     pub(crate) axis: AxisConfig,
-    /// Currents of steady motion and of standstills.
-    pub steady: Steady,
-    /// Gravity.
-    pub gravity: Option<Gravity>,
-    /// Friction.
-    pub friction: Option<Friction>,
-    /// Inertia by eq. 5.
-    pub inertia: Option<Inertia>,
-    /// What eq. 5 gives on the simulation of the axis as it was found, sampled as the recordings are: where this
-    /// agrees with the recorded one and neither with the axis, the current swings between two samples.
+    /// Mean currents at constant velocity and at rest.
+    pub steady: SteadyMeasurements,
+    /// Identified gravity.
+    pub gravity: Option<GravityFit>,
+    /// Identified friction.
+    pub friction: Option<FrictionFit>,
+    /// Inertia by Prévost eq. 5.
+    pub inertia: Option<InertiaFit>,
+    /// Inertia by eq. 5 from the simulation of the identified axis, sampled like the recordings.
+    ///
+    /// If it agrees with the inertia by eq. 5 from the recordings, but both differ from the identified
+    /// inertia, the current varies between the samples.
     pub replayed_inertia: Option<f64>,
-    /// VFFW and TFFW.
+    /// VFFW and TFFW by regression.
     pub feedforward: FeedforwardFit,
-    /// α, β, γ.
+    /// Identified delays α, β, γ.
     pub delays: Vec<DelayFit>,
-    /// Parameters refined on the closed loop.
+    /// Closed-loop refinement.
     pub refinement: Option<Refinement>,
-    /// How the axis as it was found agrees with each recording.
+    /// Agreement of the identified axis with each recording.
     pub agreements: Vec<Agreement>,
-    /// What must be said.
+    /// Findings.
     pub findings: Vec<Finding>,
 }
 
 impl Identification {
-    /// The axis as it was found.
+    /// Returns the identified axis parameters.
     pub fn axis(&self) -> &AxisConfig {
         &self.axis
     }
 }
 
-/// Identifies `axis` from recordings of it, starting from what its machine file says.
+/// Identifies `axis` from recordings, starting from the parameters of its machine file.
 pub fn identify(
-    inputs: &[Input<'_>],
+    inputs: &[IdentificationInput<'_>],
     axis: &AxisConfig,
     periods: &Periods,
-    options: &Options,
+    options: &IdentificationOptions,
 ) -> Identification {
-    let mut steps = Steps::new(inputs, axis, periods, options);
-    steps.steady_steps();
-    steps.feedforward();
-    steps.closed_loop();
+    let mut steps = IdentificationSteps::new(inputs, axis, periods, options);
+    steps.fit_plant();
+    steps.fit_feedforward_weights();
+    steps.fit_closed_loop();
     steps.finish()
 }

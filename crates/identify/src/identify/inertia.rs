@@ -1,50 +1,52 @@
-//! Equivalent inertia from accelerating instants (Prévost section 3.4, eq. 5).
+//! Identification of the equivalent inertia from accelerating samples (Prévost section 3.4, eq. 5).
 
-use super::fit::{median, robust};
+use super::fit::robust_mean_and_deviation;
 use super::friction::{LawFit, speed_unit};
 use super::gravity::GravityCurrent;
-use super::segments::{Segment, SegmentKind, largest, mean};
+use super::segments::{MotionSegment, SegmentKind, largest_magnitude};
 use crate::recording::{Finding, Signals};
 use virtual_axes_core::config::AxisConfig;
+use virtual_axes_core::statistics::{mean, median};
 
-/// Instants count whose acceleration is at least this part of the largest.
+/// Smallest acceleration of a used sample, relative to the largest.
 const STRONG: f64 = 0.5;
-/// Instants further from the middle than so many robust standard deviations are left out of the mean.
+/// Number of robust standard deviations beyond which a sample is an outlier.
 const OUTLIER: f64 = 3.0;
-/// Least number of instants.
+/// Fewest samples.
 const FEWEST: usize = 10;
-/// A current at this part of the motor's largest one is saturated.
+/// Current relative to the limit of the motor above which it is saturated.
 pub(super) const SATURATED: f64 = 0.98;
 
 /// Equivalent inertia of an axis, kg·m² at the motor (kg for a linear motor).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Inertia {
+pub struct InertiaFit {
     /// Mean without outliers.
     pub value: f64,
-    /// Standard error, from the scatter of the accelerations as wholes.
+    /// Standard error, from the scatter between accelerations.
     pub error: f64,
-    /// Robust standard deviation of single instants.
+    /// Robust standard deviation of single samples.
     pub spread: f64,
-    /// Every instant: the number of its recording among those with a current, its time in s, and eq. 5 there.
+    /// Samples: index of the recording among those with current, time in s, inertia by eq. 5.
     pub instants: Vec<(usize, f64, f64)>,
-    /// Accelerations that they belong to.
+    /// Number of accelerations.
     pub accelerations: usize,
 }
 
-/// (Prévost eq. 5) `Jeq = (Kt i − C_friction − C_gravity) / (dω/dt)` at each accelerating instant.
-pub fn inertia(
-    recordings: &[(&Signals, &[Segment])],
+/// Evaluates `Jeq = (Kt i − C_friction − C_gravity) / (dω/dt)` (Prévost eq. 5) at each accelerating sample
+/// and averages it.
+pub fn fit_inertia(
+    recordings: &[(&Signals, &[MotionSegment])],
     axis: &AxisConfig,
     friction: &LawFit,
     gravity: &GravityCurrent,
     findings: &mut Vec<Finding>,
-) -> Option<Inertia> {
+) -> Option<InertiaFit> {
     let accelerations: Vec<f64> = recordings
         .iter()
         .flat_map(|(s, _)| s.spans.iter())
         .flat_map(|s| s.acceleration.iter().copied())
         .collect();
-    let strong = STRONG * largest(&accelerations);
+    let strong = STRONG * largest_magnitude(&accelerations);
     let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, speed_unit(axis));
     let limit = SATURATED * axis.motor.max_current;
     let (mut instants, mut phases, mut saturated) = (Vec::new(), Vec::new(), 0_usize);
@@ -68,7 +70,7 @@ pub fn inertia(
                 phase.push(value);
             }
             if !phase.is_empty() {
-                phases.push(median(&mut phase));
+                phases.push(median(&mut phase).unwrap_or(f64::NAN));
             }
         }
     }
@@ -76,7 +78,7 @@ pub fn inertia(
         findings.push(Finding::warning(
             "saturated-current",
             format!(
-                "{saturated} instants at the motor's largest current ({:.1} A) are left out",
+                "{saturated} samples at the current limit of the motor ({:.1} A) are excluded",
                 axis.motor.max_current
             ),
             "record with a lower acceleration",
@@ -85,25 +87,23 @@ pub fn inertia(
     if instants.len() < FEWEST {
         findings.push(Finding::missing(
             "no-acceleration",
-            format!("no inertia: {} accelerating instants with a current", instants.len()),
-            "record moves that start and stop at a good part of the axis's acceleration, with their currents",
+            format!("no inertia: only {} accelerating samples with current", instants.len()),
+            "record moves with current that use at least half of the axis acceleration",
         ));
         return None;
     }
     let values: Vec<f64> = instants.iter().map(|instant| instant.2).collect();
-    let (middle, spread) = robust(&values);
+    let (middle, spread) = robust_mean_and_deviation(&values);
     let kept: Vec<f64> = values.into_iter().filter(|v| (v - middle).abs() <= OUTLIER * spread).collect();
-    let error = robust(&phases).1 / (phases.len() as f64).sqrt();
-    let value = if kept.is_empty() { middle } else { mean(&kept) };
+    let error = robust_mean_and_deviation(&phases).1 / (phases.len() as f64).sqrt();
+    let value = if kept.is_empty() { middle } else { mean(&kept).unwrap_or(f64::NAN) };
     if value <= 0.0 {
         findings.push(Finding::missing(
             "negative-inertia",
-            format!(
-                "no inertia: eq. 5 gives {value:.4}; the current does not push the way the axis accelerates"
-            ),
-            "check the sign of the current's column (`current=COLUMN[-1 A]`)",
+            format!("no inertia: Prévost eq. 5 gives {value:.4}; the current opposes the acceleration"),
+            "check the sign of the current (`current=COLUMN[-1 A]`)",
         ));
         return None;
     }
-    Some(Inertia { value, error, spread, instants, accelerations: phases.len() })
+    Some(InertiaFit { value, error, spread, instants, accelerations: phases.len() })
 }

@@ -1,37 +1,42 @@
-//! Identification: the parameters of an axis from recordings of it (Prévost section 3).
+//! Identification of axis parameters from recordings (Prévost section 3).
 //!
-//! The steps of the paper take [`Signals`](crate::recording::Signals) one after the other: segments, gravity,
-//! friction, inertia, feedforward, delays; behind them stands a refinement on the whole closed loop. What
-//! they could not tell, and what to record to mend it, are [`Finding`](crate::recording::Finding)s.
+//! The steps of the paper run in sequence on [`Signals`](crate::recording::Signals): segmentation, gravity,
+//! friction, inertia, feedforward, delays. A refinement of the whole closed loop by nonlinear least squares
+//! follows. [`Finding`](crate::recording::Finding)s list parameters that the recordings do not determine, and
+//! what to record instead.
 
 pub mod campaign;
 
 mod closed_loop;
 mod delays;
 mod feedforward;
+mod feedforward_mode;
+mod findings;
 mod fit;
 mod friction;
 mod gravity;
 mod identification;
 mod inertia;
-mod mode;
 mod refine;
 mod segments;
 mod setpoints;
 mod steps;
-mod tell;
 mod validate;
 mod values;
 
-pub use closed_loop::{Experiment, Simulated, experiments, simulate, simulate_all};
-pub use delays::{Delay, DelayFit};
-pub use feedforward::{FeedforwardFit, Regression, feedforward};
-pub use friction::{Breakaway, Friction, FrictionLaw, LawFit, friction};
-pub use gravity::{Gravity, GravityCurrent, GravitySource, Level, Rest, Steady, gravity};
-pub use identification::{Identification, Input, Options, Refine, identify};
-pub use inertia::{Inertia, inertia};
-pub use mode::FeedforwardMode;
-pub use refine::{Parameter, Refined, Refinement, refine};
-pub use segments::{Segment, SegmentKind, segments};
-pub use validate::{Agreement, Comparison, Deviation, InverseDynamics, validate};
-pub use values::{Identified, adopt};
+pub use closed_loop::{Experiment, SimulatedExperiment, find_experiments, simulate, simulate_all};
+pub use delays::{DelayFit, DelayParameter};
+pub use feedforward::{FeedforwardFit, FeedforwardRegression, fit_feedforward};
+pub use feedforward_mode::FeedforwardMode;
+pub use friction::{Breakaway, FrictionFit, FrictionLaw, LawFit, fit_friction};
+pub use gravity::{
+    GravityCurrent, GravityFit, GravitySource, Standstill, SteadyCurrent, SteadyMeasurements, fit_gravity,
+};
+pub use identification::{
+    Identification, IdentificationInput, IdentificationOptions, RefinementScope, identify,
+};
+pub use inertia::{InertiaFit, fit_inertia};
+pub use refine::{RefinedParameter, RefinedValue, Refinement, refine};
+pub use segments::{MotionSegment, SegmentKind, find_segments};
+pub use validate::{Agreement, ExperimentComparison, InverseDynamics, ResidualStatistics, validate};
+pub use values::{IdentifiedValue, update_parameters};

@@ -1,172 +1,185 @@
-//! Refinement beyond the paper: parameters by joint least squares on the whole closed loop.
+//! Closed-loop refinement: joint nonlinear least squares on positions and currents.
 
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::closed_loop::{Experiment, Simulated, simulate_all};
-use super::fit::{Bounded, Effort, Minimum, minimize};
+use super::closed_loop::{Experiment, SimulatedExperiment, simulate_all};
+use super::fit::{BoundedParameter, Effort, NonlinearFit, minimize};
 use super::friction::FrictionLaw;
 use virtual_axes_core::config::{AxisConfig, AxisKind, FrictionConfig, Periods};
+use virtual_axes_core::statistics::rms;
 
-/// Rounds in which the weights of the channels are taken anew from what is left.
+/// Number of passes; each one recomputes the weights of the channels from the residuals.
 const ROUNDS: usize = 2;
-/// Step of the difference quotients, part of a parameter's scale.
+/// Step of the difference quotients, relative to the scale of a parameter.
 const STEP: f64 = 1e-3;
-/// Parameters correlated more than this are named.
+/// Correlation above which a finding names a pair of parameters.
 pub const CORRELATED: f64 = 0.95;
-/// Friction written as a straight line keeps its exponents, min/m or min/rev.
-const STRAIGHT: f64 = super::friction::STRAIGHT;
+/// Fixed exponent of a linear friction law, min/m or min/rev.
+const STRAIGHT: f64 = super::friction::LINEAR_EXPONENT;
 
-/// A parameter that can be refined.
+/// Parameter of the closed-loop refinement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Parameter {
-    /// Jeq, kg·m² (kg).
+pub enum RefinedParameter {
+    /// Equivalent inertia Jeq, kg·m² (kg).
     Inertia,
-    /// a of the friction law, A.
+    /// Friction coefficient a, A.
     FrictionA,
-    /// b, min/m or min/rev.
+    /// Friction exponent b, min/m or min/rev.
     FrictionB,
-    /// c, A.
+    /// Friction coefficient c, A.
     FrictionC,
-    /// d, min/m or min/rev.
+    /// Friction exponent d, min/m or min/rev.
     FrictionD,
-    /// i0 where it is not a + c, A.
+    /// Breakaway current i0 as a separate parameter, A.
     Breakaway,
-    /// Coulomb level of a straight law, A.
+    /// Coulomb level of a linear law, A.
     Coulomb,
-    /// Slope of a straight law, A per m/min or rev/min.
+    /// Viscous slope of a linear law, A per m/min or rev/min.
     Viscous,
-    /// W, N.
+    /// Weight W, N.
     Weight,
-    /// k cos φ, N·m.
+    /// Tilting torque k cos φ, N·m.
     TiltSine,
-    /// k sin φ, N·m.
+    /// Tilting torque k sin φ, N·m.
     TiltCosine,
-    /// VFFW.
+    /// Velocity feedforward weight VFFW.
     VelocityFeedforward,
-    /// TFFW, kg·m² (kg).
+    /// Torque feedforward weight TFFW, kg·m² (kg).
     TorqueFeedforward,
 }
 
-impl fmt::Display for Parameter {
+impl fmt::Display for RefinedParameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Parameter::Inertia => "inertia",
-            Parameter::FrictionA => "friction.a",
-            Parameter::FrictionB => "friction.b",
-            Parameter::FrictionC => "friction.c",
-            Parameter::FrictionD => "friction.d",
-            Parameter::Breakaway => "friction.i0",
-            Parameter::Coulomb => "Coulomb level",
-            Parameter::Viscous => "viscous slope",
-            Parameter::Weight => "gravity.weight_n",
-            Parameter::TiltSine => "gravity k cos φ",
-            Parameter::TiltCosine => "gravity k sin φ",
-            Parameter::VelocityFeedforward => "feedforward.velocity",
-            Parameter::TorqueFeedforward => "feedforward.torque",
+            RefinedParameter::Inertia => "inertia",
+            RefinedParameter::FrictionA => "friction.a",
+            RefinedParameter::FrictionB => "friction.b",
+            RefinedParameter::FrictionC => "friction.c",
+            RefinedParameter::FrictionD => "friction.d",
+            RefinedParameter::Breakaway => "friction.i0",
+            RefinedParameter::Coulomb => "Coulomb level",
+            RefinedParameter::Viscous => "viscous slope",
+            RefinedParameter::Weight => "gravity.weight_n",
+            RefinedParameter::TiltSine => "gravity k cos φ",
+            RefinedParameter::TiltCosine => "gravity k sin φ",
+            RefinedParameter::VelocityFeedforward => "feedforward.velocity",
+            RefinedParameter::TorqueFeedforward => "feedforward.torque",
         })
     }
 }
 
-impl Parameter {
-    /// Those of gravity that an axis has.
-    pub fn of_gravity(axis: &AxisConfig) -> &'static [Parameter] {
+impl RefinedParameter {
+    /// Returns the gravity parameters of an axis.
+    pub fn of_gravity(axis: &AxisConfig) -> &'static [RefinedParameter] {
         match axis.kind() {
-            AxisKind::Linear => &[Parameter::Weight],
-            AxisKind::Rotary => &[Parameter::TiltSine, Parameter::TiltCosine],
+            AxisKind::Linear => &[RefinedParameter::Weight],
+            AxisKind::Rotary => &[RefinedParameter::TiltSine, RefinedParameter::TiltCosine],
         }
     }
 
-    /// Those of a friction law.
-    pub fn of_friction(law: FrictionLaw) -> &'static [Parameter] {
+    /// Returns the parameters of a friction law.
+    pub fn of_friction(law: FrictionLaw) -> &'static [RefinedParameter] {
         match law {
-            FrictionLaw::DoubleExponential => {
-                &[Parameter::FrictionA, Parameter::FrictionB, Parameter::FrictionC, Parameter::FrictionD]
-            }
-            FrictionLaw::Linear => &[Parameter::Coulomb, Parameter::Viscous],
+            FrictionLaw::DoubleExponential => &[
+                RefinedParameter::FrictionA,
+                RefinedParameter::FrictionB,
+                RefinedParameter::FrictionC,
+                RefinedParameter::FrictionD,
+            ],
+            FrictionLaw::Linear => &[RefinedParameter::Coulomb, RefinedParameter::Viscous],
         }
     }
 
-    /// Its value on an axis.
+    /// Returns the value on an axis, SI.
     pub fn get(self, axis: &AxisConfig) -> f64 {
         let (f, g) = (&axis.friction, &axis.gravity);
         match self {
-            Parameter::Inertia => axis.motor.inertia,
-            Parameter::FrictionA => f.a,
-            Parameter::FrictionB => f.b,
-            Parameter::FrictionC => f.c,
-            Parameter::FrictionD => f.d,
-            Parameter::Breakaway => f.i0,
-            Parameter::Coulomb => f.a + f.c,
-            Parameter::Viscous => (f.a - f.c) * STRAIGHT,
-            Parameter::Weight => g.weight,
-            Parameter::TiltSine => g.tilt * g.phase.cos(),
-            Parameter::TiltCosine => g.tilt * g.phase.sin(),
-            Parameter::VelocityFeedforward => axis.feedforward.velocity,
-            Parameter::TorqueFeedforward => axis.feedforward.torque,
+            RefinedParameter::Inertia => axis.motor.inertia,
+            RefinedParameter::FrictionA => f.a,
+            RefinedParameter::FrictionB => f.b,
+            RefinedParameter::FrictionC => f.c,
+            RefinedParameter::FrictionD => f.d,
+            RefinedParameter::Breakaway => f.i0,
+            RefinedParameter::Coulomb => f.a + f.c,
+            RefinedParameter::Viscous => (f.a - f.c) * STRAIGHT,
+            RefinedParameter::Weight => g.weight,
+            RefinedParameter::TiltSine => g.tilt * g.phase.cos(),
+            RefinedParameter::TiltCosine => g.tilt * g.phase.sin(),
+            RefinedParameter::VelocityFeedforward => axis.feedforward.velocity,
+            RefinedParameter::TorqueFeedforward => axis.feedforward.torque,
         }
     }
 
-    /// What its changes are measured by.
+    /// Returns the scale of changes of the parameter, SI.
     pub(super) fn scale(self, axis: &AxisConfig) -> f64 {
         let friction = (axis.friction.a + axis.friction.c).abs().max(1e-3 * axis.motor.max_current);
         let force = axis.motor.torque_constant / axis.transmission_ratio;
         match self {
-            Parameter::Inertia | Parameter::TorqueFeedforward => axis.motor.inertia,
-            Parameter::FrictionA | Parameter::FrictionC | Parameter::Coulomb | Parameter::Breakaway => {
-                friction
+            RefinedParameter::Inertia | RefinedParameter::TorqueFeedforward => axis.motor.inertia,
+            RefinedParameter::FrictionA
+            | RefinedParameter::FrictionC
+            | RefinedParameter::Coulomb
+            | RefinedParameter::Breakaway => friction,
+            RefinedParameter::FrictionB => 0.02,
+            RefinedParameter::FrictionD => axis.friction.d.abs().max(0.1),
+            RefinedParameter::Viscous => friction / 20.0,
+            RefinedParameter::Weight | RefinedParameter::TiltSine | RefinedParameter::TiltCosine => {
+                force * friction
             }
-            Parameter::FrictionB => 0.02,
-            Parameter::FrictionD => axis.friction.d.abs().max(0.1),
-            Parameter::Viscous => friction / 20.0,
-            Parameter::Weight | Parameter::TiltSine | Parameter::TiltCosine => force * friction,
-            Parameter::VelocityFeedforward => 1.0,
+            RefinedParameter::VelocityFeedforward => 1.0,
         }
     }
 
     fn bounds(self, axis: &AxisConfig) -> (f64, f64) {
         let (value, scale) = (self.get(axis), self.scale(axis));
         match self {
-            Parameter::Inertia => (value / 10.0, value * 10.0),
-            Parameter::FrictionB => (-0.05, 0.1),
-            Parameter::FrictionD => (-10.0, -0.05),
-            Parameter::Coulomb | Parameter::Viscous | Parameter::FrictionA | Parameter::Breakaway => {
-                (0.0, value.abs() * 5.0 + 5.0 * scale)
-            }
-            Parameter::VelocityFeedforward => (0.0, 2.0),
-            Parameter::TorqueFeedforward => (0.0, 2.0 * scale),
+            RefinedParameter::Inertia => (value / 10.0, value * 10.0),
+            RefinedParameter::FrictionB => (-0.05, 0.1),
+            RefinedParameter::FrictionD => (-10.0, -0.05),
+            RefinedParameter::Coulomb
+            | RefinedParameter::Viscous
+            | RefinedParameter::FrictionA
+            | RefinedParameter::Breakaway => (0.0, value.abs() * 5.0 + 5.0 * scale),
+            RefinedParameter::VelocityFeedforward => (0.0, 2.0),
+            RefinedParameter::TorqueFeedforward => (0.0, 2.0 * scale),
             _ => (value - 10.0 * scale, value + 10.0 * scale),
         }
     }
 }
 
-/// An axis with other values of some parameters; i0 goes with a + c where it is held.
-pub(super) fn with(axis: &AxisConfig, parameters: &[Parameter], values: &[f64], held: bool) -> AxisConfig {
+/// Returns a copy of an axis with changed parameters. If `held`, i0 is set to a + c.
+pub(super) fn with_parameters(
+    axis: &AxisConfig,
+    parameters: &[RefinedParameter],
+    values: &[f64],
+    held: bool,
+) -> AxisConfig {
     let mut axis = axis.clone();
     let (mut line, mut tilt) = (None, None);
-    let tilted = |axis: &AxisConfig| (Parameter::TiltSine.get(axis), Parameter::TiltCosine.get(axis));
+    let tilted =
+        |axis: &AxisConfig| (RefinedParameter::TiltSine.get(axis), RefinedParameter::TiltCosine.get(axis));
     for (parameter, &value) in parameters.iter().zip(values) {
-        let straight = (Parameter::Coulomb.get(&axis), Parameter::Viscous.get(&axis));
+        let straight = (RefinedParameter::Coulomb.get(&axis), RefinedParameter::Viscous.get(&axis));
         match parameter {
-            Parameter::Inertia => axis.motor.inertia = value,
-            Parameter::FrictionA => axis.friction.a = value,
-            Parameter::FrictionB => axis.friction.b = value,
-            Parameter::FrictionC => axis.friction.c = value,
-            Parameter::FrictionD => axis.friction.d = value,
-            Parameter::Breakaway => axis.friction.i0 = value,
-            Parameter::Coulomb => line = Some((value, line.unwrap_or(straight).1)),
-            Parameter::Viscous => line = Some((line.unwrap_or(straight).0, value)),
-            Parameter::Weight => axis.gravity.weight = value,
-            Parameter::TiltSine => tilt = Some((value, tilt.unwrap_or(tilted(&axis)).1)),
-            Parameter::TiltCosine => tilt = Some((tilt.unwrap_or(tilted(&axis)).0, value)),
-            Parameter::VelocityFeedforward => axis.feedforward.velocity = value,
-            Parameter::TorqueFeedforward => axis.feedforward.torque = value,
+            RefinedParameter::Inertia => axis.motor.inertia = value,
+            RefinedParameter::FrictionA => axis.friction.a = value,
+            RefinedParameter::FrictionB => axis.friction.b = value,
+            RefinedParameter::FrictionC => axis.friction.c = value,
+            RefinedParameter::FrictionD => axis.friction.d = value,
+            RefinedParameter::Breakaway => axis.friction.i0 = value,
+            RefinedParameter::Coulomb => line = Some((value, line.unwrap_or(straight).1)),
+            RefinedParameter::Viscous => line = Some((line.unwrap_or(straight).0, value)),
+            RefinedParameter::Weight => axis.gravity.weight = value,
+            RefinedParameter::TiltSine => tilt = Some((value, tilt.unwrap_or(tilted(&axis)).1)),
+            RefinedParameter::TiltCosine => tilt = Some((tilt.unwrap_or(tilted(&axis)).0, value)),
+            RefinedParameter::VelocityFeedforward => axis.feedforward.velocity = value,
+            RefinedParameter::TorqueFeedforward => axis.feedforward.torque = value,
         }
     }
     if let Some((level, slope)) = line {
-        axis.friction =
-            FrictionConfig { i0: axis.friction.i0, ..super::friction::straight_law(level, slope) };
+        axis.friction = FrictionConfig { i0: axis.friction.i0, ..super::friction::linear_law(level, slope) };
     }
     if let Some((sine, cosine)) = tilt {
         (axis.gravity.tilt, axis.gravity.phase) = (sine.hypot(cosine), cosine.atan2(sine));
@@ -177,39 +190,39 @@ pub(super) fn with(axis: &AxisConfig, parameters: &[Parameter], values: &[f64], 
     axis
 }
 
-/// A refined parameter.
+/// Refined parameter with standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Refined {
-    /// Which one.
-    pub parameter: Parameter,
-    /// Value before, SI.
+pub struct RefinedValue {
+    /// Parameter.
+    pub parameter: RefinedParameter,
+    /// Value before the refinement, SI.
     pub before: f64,
-    /// Value now, SI.
+    /// Refined value, SI.
     pub value: f64,
     /// Standard error, SI.
     pub error: f64,
-    /// Whether it ended at one of its bounds.
-    pub at_bound: bool,
+    /// True if the value is at one of its bounds.
+    pub is_at_bound: bool,
 }
 
-/// What the refinement came to.
+/// Result of the closed-loop refinement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refinement {
-    /// The axis with the refined parameters.
+    /// Axis with the refined parameters.
     pub(super) axis: AxisConfig,
-    /// Each parameter.
-    pub parameters: Vec<Refined>,
-    /// Coefficients of correlation, a row and a column for each parameter.
+    /// Refined parameters.
+    pub parameters: Vec<RefinedValue>,
+    /// Correlation matrix of the parameters.
     pub correlations: Vec<Vec<f64>>,
-    /// RMS of the deviations of position before and after, m or rad.
+    /// RMS position residual before and after, m or rad.
     pub position: (f64, f64),
-    /// RMS of the deviations of current before and after, A; none without currents.
+    /// RMS current residual before and after, A; none without currents.
     pub current: Option<(f64, f64)>,
 }
 
 impl Refinement {
-    /// Pairs of parameters that the recordings can hardly tell apart, with their correlation.
-    pub fn correlated(&self) -> Vec<(Parameter, Parameter, f64)> {
+    /// Returns the pairs of parameters whose correlation exceeds [`CORRELATED`], with the correlation.
+    pub fn correlated_pairs(&self) -> Vec<(RefinedParameter, RefinedParameter, f64)> {
         let mut found = Vec::new();
         for (j, row) in self.correlations.iter().enumerate() {
             for (k, rho) in row.iter().enumerate().take(j) {
@@ -222,14 +235,14 @@ impl Refinement {
     }
 }
 
-/// A channel as it was recorded, if it was, and as it is simulated.
+/// Recorded channel, if present, and simulated channel.
 type Channel<'a> = (Option<&'a Vec<f64>>, &'a Vec<f64>);
 
-/// Deviations of one channel, simulated minus recorded; recorded values that are missing are left out.
-fn differences<'a>(
+/// Returns the residuals of one channel, simulated minus recorded, without missing values.
+fn channel_residuals<'a>(
     experiments: &'a [Experiment],
-    simulated: &'a [Simulated],
-    channel: fn(&'a Experiment, &'a Simulated) -> Channel<'a>,
+    simulated: &'a [SimulatedExperiment],
+    channel: fn(&'a Experiment, &'a SimulatedExperiment) -> Channel<'a>,
 ) -> impl Iterator<Item = f64> + 'a {
     experiments.iter().zip(simulated).flat_map(move |(experiment, simulated)| {
         let (recorded, simulated) = channel(experiment, simulated);
@@ -237,70 +250,65 @@ fn differences<'a>(
     })
 }
 
-fn positions<'a>(e: &'a Experiment, s: &'a Simulated) -> Channel<'a> {
+fn positions<'a>(e: &'a Experiment, s: &'a SimulatedExperiment) -> Channel<'a> {
     (Some(&e.position), &s.position)
 }
 
-fn currents<'a>(e: &'a Experiment, s: &'a Simulated) -> Channel<'a> {
+fn currents<'a>(e: &'a Experiment, s: &'a SimulatedExperiment) -> Channel<'a> {
     (e.current.as_ref(), &s.current)
 }
 
-fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (count, squares) = values.fold((0_usize, 0.0), |(n, sum), d| (n + 1, sum + d * d));
-    (count > 0).then(|| (squares / count as f64).sqrt())
-}
-
-/// Moves `parameters` of an axis so that its simulation comes closest to what was recorded.
+/// Refines `parameters` of an axis by minimizing the deviation of its simulation from the recordings.
 ///
-/// Deviations of position and current are weighted by what is left of them (maximum likelihood of normal
-/// noise of unknown size). None if the axis cannot be simulated or the recordings do not determine the
+/// Residuals of position and current are weighted by their RMS (maximum likelihood for normal noise of
+/// unknown variance). Returns none if the axis cannot be simulated or the recordings do not determine the
 /// parameters.
 pub fn refine(
     axis: &AxisConfig,
     periods: &Periods,
     experiments: &[Experiment],
-    parameters: &[Parameter],
+    parameters: &[RefinedParameter],
     held: bool,
 ) -> Option<Refinement> {
     let spread = |axis: &AxisConfig| {
         let simulated = simulate_all(axis, periods, experiments).ok()?;
-        let position = rms(differences(experiments, &simulated, positions))?;
-        Some((position, rms(differences(experiments, &simulated, currents))))
+        let position = rms(channel_residuals(experiments, &simulated, positions))?;
+        Some((position, rms(channel_residuals(experiments, &simulated, currents))))
     };
     let before = spread(axis)?;
     let (mut present, mut left) = (axis.clone(), before);
-    let mut minimum: Option<Minimum> = None;
+    let mut minimum: Option<NonlinearFit> = None;
     for _ in 0..ROUNDS {
         let weights = (1.0 / left.0.max(f64::MIN_POSITIVE), left.1.map(|s| 1.0 / s.max(f64::MIN_POSITIVE)));
-        let bounded: Vec<Bounded> = parameters
+        let bounded: Vec<BoundedParameter> = parameters
             .iter()
             .map(|parameter| {
                 let (low, high) = parameter.bounds(axis);
                 let start = parameter.get(&present).clamp(low, high);
-                Bounded { start, low, high, step: STEP * parameter.scale(axis) }
+                BoundedParameter { start, low, high, step: STEP * parameter.scale(axis) }
             })
             .collect();
         let found = minimize(&bounded, Effort::Simulation, |values| {
-            let moved = with(&present, parameters, values, held);
+            let moved = with_parameters(&present, parameters, values, held);
             let simulated = simulate_all(&moved, periods, experiments).ok()?;
             let mut residuals: Vec<f64> =
-                differences(experiments, &simulated, positions).map(|d| d * weights.0).collect();
+                channel_residuals(experiments, &simulated, positions).map(|d| d * weights.0).collect();
             if let Some(weight) = weights.1 {
-                residuals.extend(differences(experiments, &simulated, currents).map(|d| d * weight));
+                residuals.extend(channel_residuals(experiments, &simulated, currents).map(|d| d * weight));
             }
             residuals.iter().all(|r| r.is_finite()).then(|| DVector::from_vec(residuals))
         })?;
-        present = with(&present, parameters, &found.values, held);
+        present = with_parameters(&present, parameters, &found.values, held);
         left = spread(&present)?;
         minimum = Some(found);
     }
     let minimum = minimum?;
-    let refined = parameters.iter().enumerate().map(|(k, &parameter)| Refined {
+    let refined = parameters.iter().enumerate().map(|(k, &parameter)| RefinedValue {
         parameter,
         before: parameter.get(axis),
         value: minimum.values[k],
         error: minimum.error(k),
-        at_bound: minimum.at_bound[k],
+        is_at_bound: minimum.is_at_bound[k],
     });
     let count = parameters.len();
     let correlations = DMatrix::from_fn(count, count, |j, k| minimum.correlation(j, k));

@@ -1,88 +1,89 @@
-//! Where the axis stands, moves at constant velocity, and accelerates.
+//! Segmentation of a recording into standstill, constant velocity and acceleration.
 
 use std::ops::Range;
 
-use super::fit::robust;
-use crate::recording::{Signals, Span};
+use super::fit::robust_mean_and_deviation;
+use crate::recording::{SignalSpan, Signals};
+use virtual_axes_core::statistics::mean;
 
-/// An axis accelerates beyond this part of its largest acceleration.
+/// Acceleration, relative to the largest, above which an axis accelerates.
 const ACCELERATING: f64 = 0.05;
-/// It stands below this part of its largest velocity.
+/// Velocity, relative to the largest, below which an axis is at rest.
 const STANDING: f64 = 1e-3;
-/// Standard deviations of the noise of a derivative that are still noise.
+/// Noise limit of a derivative in standard deviations.
 const NOISE: f64 = 4.0;
-/// Part of the samples, the fastest, that are left out when the largest value is taken: outliers.
+/// Share of the largest values that are excluded as outliers.
 const OUTLIERS: f64 = 0.001;
 /// Shortest segment of standstill or constant velocity, s.
 const SHORTEST: f64 = 0.1;
-/// Time that the drive needs to settle behind an acceleration, s: six time constants of a position loop of
-/// 25 s⁻¹; of short segments no more than this part.
+/// Settling time after an acceleration, s (six time constants of a position loop of 25 s⁻¹), and its largest
+/// share of a segment.
 const SETTLING: f64 = 0.25;
 const SETTLING_PART: f64 = 0.5;
-/// Largest change of velocity within a segment of constant velocity, part of it.
+/// Largest relative change of velocity within a segment of constant velocity.
 const STEADY: f64 = 0.02;
-/// Standard deviation of the filter's kernel, s, times its cut-off frequency in Hz: √(ln 2) / 2π.
+/// Standard deviation of the filter kernel, s, times its cut-off frequency in Hz: √(ln 2) / 2π.
 const KERNEL: f64 = 0.132_496_2;
 
-/// What an axis does.
+/// State of motion of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SegmentKind {
-    /// It stands.
+    /// Standstill.
     Static,
-    /// It moves at constant velocity, and the drive has settled.
+    /// Constant velocity after settling.
     ConstantVelocity,
-    /// Its velocity changes.
+    /// Changing velocity.
     Accelerating,
 }
 
-/// A part of a recording in which the axis does one thing.
+/// Section of a recording with one state of motion.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Segment {
-    /// What it does.
+pub struct MotionSegment {
+    /// State of motion.
     pub kind: SegmentKind,
-    /// Number of the span in [`Signals::spans`].
+    /// Index of the span in [`Signals::spans`].
     pub span: usize,
-    /// Samples of the span.
+    /// Sample range in the span.
     pub samples: Range<usize>,
     /// Mean velocity, m/s or rad/s.
     pub velocity: f64,
     /// Mean position, m or rad.
     pub position: f64,
-    /// Sign of the velocity that led here; 0 at the beginning of a recording.
+    /// Sign of the approach velocity; 0 at the start of a recording.
     pub approach: f64,
 }
 
-impl Segment {
-    /// The samples of a channel that belong to it.
+impl MotionSegment {
+    /// Returns the samples of a channel in the segment.
     pub(super) fn of<'a>(&self, channel: &'a [f64]) -> &'a [f64] {
         channel.get(self.samples.clone()).unwrap_or_default()
     }
 }
 
-/// Divides a recording; what is neither one nor the other for long enough is left out.
-pub fn segments(signals: &Signals) -> Vec<Segment> {
-    let all = |channel: fn(&Span) -> &[f64]| -> Vec<f64> {
+/// Splits a recording into segments; short and unsteady sections are omitted.
+pub fn find_segments(signals: &Signals) -> Vec<MotionSegment> {
+    let all = |channel: fn(&SignalSpan) -> &[f64]| -> Vec<f64> {
         signals.spans.iter().flat_map(|span| channel(span).iter().copied()).collect()
     };
     let (accelerations, velocities) = (all(|s| &s.acceleration), all(|s| &s.velocity));
-    // Most of a campaign is steady: the middle of its accelerations is noise, which is that of the position.
-    let noise = robust(&accelerations).1;
+    // Most of a campaign is steady, so the median acceleration is noise of the position.
+    let noise = robust_mean_and_deviation(&accelerations).1;
     let velocity_noise = noise * KERNEL / signals.cutoff * (2.0_f64 / 3.0).sqrt();
-    let limits = Limits {
-        acceleration: (ACCELERATING * largest(&accelerations)).max(NOISE * noise),
-        velocity: (STANDING * largest(&velocities)).max(NOISE * velocity_noise),
+    let limits = SegmentThresholds {
+        acceleration: (ACCELERATING * largest_magnitude(&accelerations)).max(NOISE * noise),
+        velocity: (STANDING * largest_magnitude(&velocities)).max(NOISE * velocity_noise),
         period: signals.period,
         filter: (3.0 * KERNEL / signals.cutoff / signals.period).ceil() as usize,
     };
     let mut found = Vec::new();
     for (number, span) in signals.spans.iter().enumerate() {
-        limits.divide(number, span, &mut found);
+        limits.split_span(number, span, &mut found);
     }
     found
 }
 
-/// Largest magnitude but for outliers.
-pub(super) fn largest(values: &[f64]) -> f64 {
+/// Returns the largest magnitude without outliers.
+pub(super) fn largest_magnitude(values: &[f64]) -> f64 {
     let mut magnitudes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
     let place = ((magnitudes.len() as f64) * (1.0 - OUTLIERS)) as usize;
     match magnitudes.len() {
@@ -91,16 +92,16 @@ pub(super) fn largest(values: &[f64]) -> f64 {
     }
 }
 
-struct Limits {
+struct SegmentThresholds {
     acceleration: f64,
     velocity: f64,
     period: f64,
-    /// Samples over which the filter carries an acceleration.
+    /// Samples over which the filter spreads an acceleration.
     filter: usize,
 }
 
-impl Limits {
-    fn kind(&self, span: &Span, i: usize) -> SegmentKind {
+impl SegmentThresholds {
+    fn kind(&self, span: &SignalSpan, i: usize) -> SegmentKind {
         let (v, a) = (span.velocity[i], span.acceleration[i]);
         if a.abs() > self.acceleration {
             SegmentKind::Accelerating
@@ -111,7 +112,7 @@ impl Limits {
         }
     }
 
-    fn divide(&self, number: usize, span: &Span, found: &mut Vec<Segment>) {
+    fn split_span(&self, number: usize, span: &SignalSpan, found: &mut Vec<MotionSegment>) {
         let count = span.position.len();
         let settling = (SETTLING / self.period).round() as usize;
         let part_of = |samples: usize| (SETTLING_PART * samples as f64) as usize;
@@ -125,7 +126,7 @@ impl Limits {
             }
             let samples = match kind {
                 SegmentKind::Accelerating => begin..end,
-                // The axis settles first, and the filter sees the next acceleration before it comes.
+                // Excludes the settling time, and the end where the filter contains the next acceleration.
                 _ => {
                     let from = if begin == 0 { 0 } else { begin + settling.min(part_of(end - begin)) };
                     from..if end == count { end } else { end.saturating_sub(self.filter) }
@@ -133,9 +134,9 @@ impl Limits {
             };
             let long = kind == SegmentKind::Accelerating || samples.len() >= shortest;
             if long {
-                let segment = Segment {
-                    velocity: mean(&span.velocity[samples.clone()]),
-                    position: mean(&span.position[samples.clone()]),
+                let segment = MotionSegment {
+                    velocity: mean(&span.velocity[samples.clone()]).unwrap_or(f64::NAN),
+                    position: mean(&span.position[samples.clone()]).unwrap_or(f64::NAN),
                     kind,
                     span: number,
                     samples,
@@ -153,16 +154,14 @@ impl Limits {
         }
     }
 
-    /// Whether the velocity is the same at both ends.
-    fn is_steady(&self, span: &Span, segment: &Segment) -> bool {
+    /// Returns true if the velocity is equal at both ends.
+    fn is_steady(&self, span: &SignalSpan, segment: &MotionSegment) -> bool {
         let velocity = segment.of(&span.velocity);
         let third = velocity.len().div_ceil(3);
-        let (first, last) = (mean(&velocity[..third]), mean(&velocity[velocity.len() - third..]));
+        let (first, last) = (
+            mean(&velocity[..third]).unwrap_or(f64::NAN),
+            mean(&velocity[velocity.len() - third..]).unwrap_or(f64::NAN),
+        );
         (last - first).abs() <= (STEADY * segment.velocity.abs()).max(self.velocity)
     }
-}
-
-/// Mean of a list; NaN if it is empty.
-pub(super) fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }

@@ -1,48 +1,48 @@
-//! The steps of the paper one after the other, and the refinement behind them.
+//! Sequence of the identification steps and the closed-loop refinement.
 
 use rayon::prelude::*;
 
-use super::closed_loop::{Experiment, deviations, experiments};
-use super::delays::{Delay, delay};
-use super::feedforward::{FeedforwardFit, feedforward};
-use super::friction::{Breakaway, FrictionLaw, friction};
-use super::gravity::{GravityCurrent, Steady, gravity};
-use super::identification::{Identification, Input, Options, Refine};
-use super::inertia::inertia;
-use super::mode::FeedforwardMode;
-use super::refine::{Parameter, refine, with};
-use super::segments::{Segment, SegmentKind, segments};
+use super::closed_loop::{Experiment, find_experiments, position_residuals};
+use super::delays::{DelayParameter, fit_delay};
+use super::feedforward::{FeedforwardFit, fit_feedforward};
+use super::feedforward_mode::FeedforwardMode;
+use super::findings::{inertia_of_simulation, report_delays, report_result};
+use super::friction::{Breakaway, FrictionLaw, fit_friction};
+use super::gravity::{GravityCurrent, SteadyMeasurements, fit_gravity};
+use super::identification::{Identification, IdentificationInput, IdentificationOptions, RefinementScope};
+use super::inertia::fit_inertia;
+use super::refine::{RefinedParameter, refine, with_parameters};
+use super::segments::{MotionSegment, SegmentKind, find_segments};
 use super::setpoints::stride;
-use super::tell::{replayed_inertia, tell, tell_delays};
-use super::validate::agreement;
+use super::validate::compute_agreement;
 use crate::recording::{Finding, Signals};
 use virtual_axes_core::config::{AxisConfig, DeviationConfig, Periods, PositionControllerConfig};
 use virtual_axes_core::units::seconds;
 
-/// Step by which a parameter is moved to see what of a delay it could explain, part of its scale.
+/// Change of a nuisance parameter, relative to its scale, for the delay identification.
 const NUISANCE: f64 = 1e-2;
-/// Inertias that are tried first, parts of what eq. 5 or the machine file says. Of eq. 5 most is unseen where the
-/// drive is quick and the recording slow.
+/// Trial inertias relative to the start value. Eq. 5 misses most of the inertia with a fast drive and slow
+/// sampling.
 const LADDER: [f64; 13] = [0.06, 0.12, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
 
-/// An identification in progress.
-pub(super) struct Steps<'a> {
-    inputs: &'a [Input<'a>],
+/// Identification in progress.
+pub(super) struct IdentificationSteps<'a> {
+    inputs: &'a [IdentificationInput<'a>],
     periods: &'a Periods,
-    options: &'a Options,
-    /// Of each recording.
-    segments: Vec<Vec<Segment>>,
-    /// Parts of the recordings that can be simulated.
+    options: &'a IdentificationOptions,
+    /// Segments of each recording.
+    segments: Vec<Vec<MotionSegment>>,
+    /// Sections of the recordings that can be simulated.
     experiments: Vec<Experiment>,
     found: Identification,
 }
 
-impl<'a> Steps<'a> {
+impl<'a> IdentificationSteps<'a> {
     pub(super) fn new(
-        inputs: &'a [Input<'a>],
+        inputs: &'a [IdentificationInput<'a>],
         axis: &AxisConfig,
         periods: &'a Periods,
-        options: &'a Options,
+        options: &'a IdentificationOptions,
     ) -> Self {
         let mut findings = Vec::new();
         let as_designed = DeviationConfig { inertia: 1.0, friction: 1.0, torque_constant: 1.0 };
@@ -50,20 +50,20 @@ impl<'a> Steps<'a> {
         if found.deviation != as_designed {
             findings.push(Finding::note(
                 "deviation-reset",
-                "the machine's `deviation` is set to 1: what is identified is the plant as it is",
+                "the `deviation` factors of the machine are set to 1: the identified values describe the real plant",
             ));
             found.deviation = as_designed;
         }
-        Steps {
+        IdentificationSteps {
             inputs,
             periods,
             options,
-            segments: inputs.iter().map(|input| segments(input.signals)).collect(),
+            segments: inputs.iter().map(|input| find_segments(input.signals)).collect(),
             experiments: Vec::new(),
             found: Identification {
-                before: axis.clone(),
+                initial: axis.clone(),
                 axis: found,
-                steady: Steady::default(),
+                steady: SteadyMeasurements::default(),
                 gravity: None,
                 friction: None,
                 inertia: None,
@@ -77,17 +77,18 @@ impl<'a> Steps<'a> {
         }
     }
 
-    /// Gravity, friction, inertia: twice, since the inertia takes what is left of accelerations off the first two.
-    pub(super) fn steady_steps(&mut self) {
+    /// Fits gravity, friction and inertia in two passes; the second corrects for residual accelerations with
+    /// the inertia.
+    pub(super) fn fit_plant(&mut self) {
         let found = &mut self.found;
         if !self.segments.iter().flatten().any(|segment| segment.kind == SegmentKind::Static) {
             found.findings.push(Finding::warning(
                 "no-standstill",
-                "no recording has a standstill: gravity is not checked at rest",
-                "record half a second of rest at several positions, each approached from both sides",
+                "no recording contains a standstill: gravity is not verified at rest",
+                "record 0.5 s of rest at several positions, each approached from both sides",
             ));
         }
-        let recordings: Vec<(&Signals, &[Segment])> = self
+        let recordings: Vec<(&Signals, &[MotionSegment])> = self
             .inputs
             .iter()
             .zip(&self.segments)
@@ -97,7 +98,7 @@ impl<'a> Steps<'a> {
         if recordings.is_empty() {
             found.findings.push(Finding::missing(
                 "no-current",
-                "no recording has a current: friction, gravity and inertia are seen through the position alone",
+                "no recording contains a current: friction, gravity and inertia are identified from positions only",
                 "record the motor current",
             ));
             return;
@@ -107,12 +108,12 @@ impl<'a> Steps<'a> {
         let mut current_per_acceleration = 0.0;
         for last in [false, true] {
             let mut findings = Vec::new();
-            let (steady, gravity) = gravity(&recordings, axis, current_per_acceleration);
+            let (steady, gravity) = fit_gravity(&recordings, axis, current_per_acceleration);
             let weight = gravity.as_ref().map_or_else(GravityCurrent::default, |g| g.model);
-            let friction = friction(&steady.levels, axis, &mut findings);
+            let friction = fit_friction(&steady.levels, axis, &mut findings);
             let inertia = friction
                 .as_ref()
-                .and_then(|friction| inertia(&recordings, axis, &friction.law, &weight, &mut findings));
+                .and_then(|friction| fit_inertia(&recordings, axis, &friction.law, &weight, &mut findings));
             current_per_acceleration = inertia.as_ref().map_or(0.0, |found| found.value * per_acceleration);
             (found.steady, found.gravity, found.friction, found.inertia) =
                 (steady, gravity, friction, inertia);
@@ -131,52 +132,50 @@ impl<'a> Steps<'a> {
         }
     }
 
-    pub(super) fn feedforward(&mut self) {
+    pub(super) fn fit_feedforward_weights(&mut self) {
         let found = &mut self.found;
         let signals: Vec<&Signals> = self.inputs.iter().map(|input| input.signals).collect();
         let (tsp, ratio) = (seconds(self.periods.position), found.axis.transmission_ratio);
-        found.feedforward = feedforward(&signals, tsp, ratio, &mut found.findings);
+        found.feedforward = fit_feedforward(&signals, tsp, ratio, &mut found.findings);
         if let Some(velocity) = &found.feedforward.velocity {
             found.axis.feedforward.velocity = velocity.value.max(0.0);
         }
         if let Some(torque) = &found.feedforward.torque {
             found.axis.feedforward.torque = torque.value.max(0.0);
-        } else if let Some(input) = self.inputs.iter().find(|input| shows_no_torque(input)) {
-            let what = format!(
-                "{}: TFFWS is 0 throughout with torque feedforward on: TFFW is 0",
-                input.signals.name
-            );
+        } else if let Some(input) = self.inputs.iter().find(|input| is_torque_feedforward_zero(input)) {
+            let what =
+                format!("{}: TFFWS is always 0 with torque feedforward on: TFFW is 0", input.signals.name);
             found.findings.push(Finding::note("no-torque-feedforward", what));
             found.axis.feedforward.torque = 0.0;
-            found.feedforward.no_torque = true;
+            found.feedforward.is_torque_zero = true;
         }
     }
 
-    /// Delays and refinement.
-    pub(super) fn closed_loop(&mut self) {
+    /// Fits delays and refines parameters in closed loop.
+    pub(super) fn fit_closed_loop(&mut self) {
         let (axis, default) = (&self.found.axis, FeedforwardMode::Both);
         let experiments: Vec<Experiment> = self
             .inputs
             .iter()
             .enumerate()
             .flat_map(|(k, input)| {
-                experiments(input.signals, k, axis, self.periods, input.feedforward.unwrap_or(default))
+                find_experiments(input.signals, k, axis, self.periods, input.feedforward.unwrap_or(default))
             })
             .collect();
         if experiments.is_empty() {
             self.found.findings.push(Finding::missing(
                 "no-setpoints",
-                why_no_experiments(self.inputs, self.periods),
-                "record the position setpoints (PSEC) from standstill on, at every position instant or a whole \
-                 fraction of the position period",
+                explain_missing_experiments(self.inputs, self.periods),
+                "record the position setpoints (PSEC), starting at rest, with the position period or an integer \
+                 fraction of it",
             ));
             return;
         }
         if self.found.axis.position_loop.controller != PositionControllerConfig::Cascade {
             self.found.findings.push(Finding::missing(
                 "not-a-cascade",
-                "no delays and no refinement: the machine file's position controller is not the cascade",
-                "record with the cascade, and give `--set <joint>.position_loop.controller=cascade`",
+                "no delays and no refinement: the position controller of the machine file is not the cascade",
+                "record with the cascade and set `--set <joint>.position_loop.controller=cascade`",
             ));
             return;
         }
@@ -185,103 +184,105 @@ impl<'a> Steps<'a> {
             all.iter().filter(|e| e.mode == mode).cloned().collect()
         };
         let off = of(FeedforwardMode::Off, &self.experiments);
-        self.take_delay(Delay::Alpha, &[]);
+        self.fit_one_delay(DelayParameter::Alpha, &[]);
         let first = if off.is_empty() { self.experiments.clone() } else { off };
         if self.options.refine.inertia {
-            if let Some(inertia) = start_of_inertia(&self.found.axis, self.periods, &first) {
+            if let Some(inertia) = initial_inertia(&self.found.axis, self.periods, &first) {
                 self.found.axis.motor.inertia = inertia;
             }
-            // The delays ask for an inertia that is about right; everything else can wait for them.
-            self.refine(&first, &[Parameter::Inertia]);
+            // The delays need an approximate inertia only.
+            self.refine_parameters(&first, &[RefinedParameter::Inertia]);
         }
-        // With a wrong delay the weight comes out a little wrong, which the next step would see.
-        for _ in 0..self.rounds(Parameter::VelocityFeedforward) {
-            self.take_feedforward(FeedforwardMode::Velocity, Parameter::VelocityFeedforward);
-            self.take_delay(Delay::Beta, &[]);
+        // A wrong delay biases the weight slightly; a second round corrects it.
+        for _ in 0..self.rounds(RefinedParameter::VelocityFeedforward) {
+            self.fit_free_weight(FeedforwardMode::Velocity, RefinedParameter::VelocityFeedforward);
+            self.fit_one_delay(DelayParameter::Beta, &[]);
         }
-        for _ in 0..self.rounds(Parameter::TorqueFeedforward) {
-            self.take_feedforward(FeedforwardMode::Both, Parameter::TorqueFeedforward);
-            self.take_delay(Delay::Gamma, &[]);
+        for _ in 0..self.rounds(RefinedParameter::TorqueFeedforward) {
+            self.fit_free_weight(FeedforwardMode::Both, RefinedParameter::TorqueFeedforward);
+            self.fit_one_delay(DelayParameter::Gamma, &[]);
         }
-        let mut parameters = self.parameters(self.options.refine);
-        parameters.extend(self.free_feedforward());
+        let mut parameters = self.plant_parameters(self.options.refine);
+        parameters.extend(self.free_weights());
         if !parameters.is_empty() {
             let all = self.experiments.clone();
-            self.refine(&all, &parameters);
+            self.refine_parameters(&all, &parameters);
         }
-        let nuisance = self.nuisance(&self.parameters(Refine::ALL));
-        for which in [Delay::Alpha, Delay::Beta, Delay::Gamma] {
-            self.take_delay(which, &nuisance);
+        let nuisance = self.nuisance_axes(&self.plant_parameters(RefinementScope::ALL));
+        for which in [DelayParameter::Alpha, DelayParameter::Beta, DelayParameter::Gamma] {
+            self.fit_one_delay(which, &nuisance);
         }
-        tell_delays(&self.experiments, &mut self.found);
+        report_delays(&self.experiments, &mut self.found);
     }
 
-    /// What the closed loop can refine of the plant.
-    fn parameters(&self, wanted: Refine) -> Vec<Parameter> {
+    /// Returns the plant parameters of the closed-loop refinement.
+    fn plant_parameters(&self, wanted: RefinementScope) -> Vec<RefinedParameter> {
         let found = &self.found;
         let law = found.friction.as_ref().map_or(FrictionLaw::DoubleExponential, |f| f.law.law);
         let mut parameters = Vec::new();
         if wanted.inertia {
-            parameters.push(Parameter::Inertia);
+            parameters.push(RefinedParameter::Inertia);
         }
         if wanted.friction {
-            parameters.extend(Parameter::of_friction(law));
-            parameters.extend((self.options.i0 == Breakaway::Freed).then_some(Parameter::Breakaway));
+            parameters.extend(RefinedParameter::of_friction(law));
+            parameters.extend((self.options.i0 == Breakaway::Freed).then_some(RefinedParameter::Breakaway));
         }
         let gravity = &found.axis.gravity;
         if wanted.gravity && (gravity.weight != 0.0 || gravity.tilt != 0.0) {
-            parameters.extend(Parameter::of_gravity(&found.axis));
+            parameters.extend(RefinedParameter::of_gravity(&found.axis));
         }
         parameters
     }
 
-    /// Weights of the feedforward that no regression has given.
-    fn free_feedforward(&self) -> Vec<Parameter> {
+    /// Returns the feedforward weights without regression result.
+    fn free_weights(&self) -> Vec<RefinedParameter> {
         let (found, modes) = (&self.found, |mode| self.experiments.iter().any(|e| e.mode == mode));
         let mut parameters = Vec::new();
         if !self.options.refine.feedforward {
             return parameters;
         }
         if found.feedforward.velocity.is_none() && modes(FeedforwardMode::Velocity) {
-            parameters.push(Parameter::VelocityFeedforward);
+            parameters.push(RefinedParameter::VelocityFeedforward);
         }
         if found.feedforward.torque.is_none()
             && modes(FeedforwardMode::Both)
             && found.axis.feedforward.torque != 0.0
         {
-            parameters.push(Parameter::TorqueFeedforward);
+            parameters.push(RefinedParameter::TorqueFeedforward);
         }
         parameters
     }
 
-    fn refine(&mut self, experiments: &[Experiment], parameters: &[Parameter]) {
+    fn refine_parameters(&mut self, experiments: &[Experiment], parameters: &[RefinedParameter]) {
         let held = self.options.i0 == Breakaway::Held;
         let refined = refine(&self.found.axis, self.periods, experiments, parameters, held);
         match &refined {
             Some(refinement) => self.found.axis = refinement.axis.clone(),
             None => self.found.findings.push(Finding::warning(
                 "not-refined",
-                "the closed loop does not determine the parameters: they stay as the steps found them",
-                "record faster and slower moves, with their currents",
+                "the closed loop does not determine the parameters: the refinement is skipped",
+                "record faster and slower moves with current",
             )),
         }
         self.found.refinement = refined;
     }
 
-    /// How often a weight and its delay are looked for one after the other.
-    fn rounds(&self, weight: Parameter) -> usize {
-        if self.free_feedforward().contains(&weight) { 2 } else { 1 }
+    /// Returns the number of alternations between a weight and its delay.
+    fn rounds(&self, weight: RefinedParameter) -> usize {
+        if self.free_weights().contains(&weight) { 2 } else { 1 }
     }
 
-    /// A weight that no regression has given, before its delay is looked for: with a wrong weight any delay
-    /// may come closest. γ is begun at β, since both are delays of the same card.
-    fn take_feedforward(&mut self, mode: FeedforwardMode, parameter: Parameter) {
-        if !self.free_feedforward().contains(&parameter) {
+    /// Fits a weight without regression result before its delay, because with a wrong weight any delay can
+    /// fit best.
+    ///
+    /// γ starts at β, since both are delays of the same controller board.
+    fn fit_free_weight(&mut self, mode: FeedforwardMode, parameter: RefinedParameter) {
+        if !self.free_weights().contains(&parameter) {
             return;
         }
         let mut axis = self.found.axis.clone();
         let known = |delay| self.found.delays.iter().any(|fit| fit.delay == delay);
-        if mode == FeedforwardMode::Both && known(Delay::Beta) && !known(Delay::Gamma) {
+        if mode == FeedforwardMode::Both && known(DelayParameter::Beta) && !known(DelayParameter::Gamma) {
             axis.delays.gamma = axis.delays.beta;
         }
         let of_mode: Vec<Experiment> = self.experiments.iter().filter(|e| e.mode == mode).cloned().collect();
@@ -291,31 +292,31 @@ impl<'a> Steps<'a> {
         }
     }
 
-    fn nuisance(&self, parameters: &[Parameter]) -> Vec<AxisConfig> {
+    fn nuisance_axes(&self, parameters: &[RefinedParameter]) -> Vec<AxisConfig> {
         let axis = &self.found.axis;
-        let moved = |parameter: &Parameter| {
+        let moved = |parameter: &RefinedParameter| {
             let value = parameter.get(axis) + NUISANCE * parameter.scale(axis);
-            with(axis, &[*parameter], &[value], self.options.i0 == Breakaway::Held)
+            with_parameters(axis, &[*parameter], &[value], self.options.i0 == Breakaway::Held)
         };
         parameters.iter().map(moved).collect()
     }
 
-    fn take_delay(&mut self, which: Delay, nuisance: &[AxisConfig]) {
+    fn fit_one_delay(&mut self, which: DelayParameter, nuisance: &[AxisConfig]) {
         let found = &mut self.found;
         let shows_nothing = match which {
-            Delay::Alpha => false,
-            Delay::Beta => found.axis.feedforward.velocity == 0.0,
-            Delay::Gamma => found.axis.feedforward.torque == 0.0,
+            DelayParameter::Alpha => false,
+            DelayParameter::Beta => found.axis.feedforward.velocity == 0.0,
+            DelayParameter::Gamma => found.axis.feedforward.torque == 0.0,
         };
         if shows_nothing {
             return;
         }
         let experiments: Vec<Experiment> =
-            self.experiments.iter().filter(|e| e.mode == which.mode()).cloned().collect();
-        // The long recordings are those that show α, which is found at once.
-        let own = which.of(&found.before.delays);
-        let around = which == Delay::Alpha && !nuisance.is_empty();
-        if let Some(fit) = delay(which, &found.axis, self.periods, &experiments, nuisance, own, around) {
+            self.experiments.iter().filter(|e| e.mode == which.feedforward_mode()).cloned().collect();
+        // The recordings that identify α are the long ones; α is known well after its first fit.
+        let own = which.of(&found.initial.delays);
+        let around = which == DelayParameter::Alpha && !nuisance.is_empty();
+        if let Some(fit) = fit_delay(which, &found.axis, self.periods, &experiments, nuisance, own, around) {
             which.set(&mut found.axis, fit.value);
             found.delays.retain(|known| known.delay != which);
             found.delays.push(fit);
@@ -327,48 +328,49 @@ impl<'a> Steps<'a> {
             let segments = self.segments.get(number).cloned().unwrap_or_default();
             let of_it = |e: &&Experiment| e.recording == number;
             let experiments = self.experiments.iter().filter(of_it).cloned().collect();
-            let found = agreement(input.signals, segments, experiments, &self.found.axis, self.periods);
-            // An axis that has been simulated all along can be simulated.
+            let found =
+                compute_agreement(input.signals, segments, experiments, &self.found.axis, self.periods);
+            // An axis that was simulated before can be simulated here.
             self.found.agreements.extend(found.ok());
         }
         let refined = |parameter| {
             let refinement = self.found.refinement.as_ref();
             refinement.is_some_and(|r| r.parameters.iter().any(|refined| refined.parameter == parameter))
         };
-        if self.options.i0 == Breakaway::Freed && !refined(Parameter::Breakaway) {
+        if self.options.i0 == Breakaway::Freed && !refined(RefinedParameter::Breakaway) {
             self.found.findings.push(Finding::warning(
                 "i0-held",
-                "i0 is held at a + c: it is freed in the refinement on the closed loop only",
-                "record PSEC, with slow starts from rest",
+                "i0 = a + c: only the closed-loop refinement identifies i0 separately",
+                "record PSEC with slow starts from rest",
             ));
         }
-        let replayed = replayed_inertia(self.inputs, &self.found);
+        let replayed = inertia_of_simulation(self.inputs, &self.found);
         self.found.replayed_inertia = replayed;
-        tell(self.inputs, seconds(self.periods.position), &mut self.found);
+        report_result(self.inputs, seconds(self.periods.position), &mut self.found);
         self.found
     }
 }
 
-/// Why nothing can be simulated.
-fn why_no_experiments(inputs: &[Input<'_>], periods: &Periods) -> String {
+/// Returns the reason why no recording can be simulated.
+fn explain_missing_experiments(inputs: &[IdentificationInput<'_>], periods: &Periods) -> String {
     let tsp = seconds(periods.position);
     let with_psec: Vec<&Signals> =
         inputs.iter().map(|i| i.signals).filter(|s| s.spans.iter().any(|span| span.psec.is_some())).collect();
     let why = match with_psec.iter().find(|signals| stride(signals.period, tsp).is_none()) {
-        _ if with_psec.is_empty() => "no recording has PSEC".to_owned(),
+        _ if with_psec.is_empty() => "no recording contains PSEC".to_owned(),
         Some(signals) => format!(
-            "{} is sampled every {:.3} ms, which is no whole fraction of the position period of {:.3} ms",
+            "{} is sampled every {:.3} ms, not an integer fraction of the position period of {:.3} ms",
             signals.name,
             1e3 * signals.period,
             1e3 * tsp
         ),
-        None => "no recording has PSEC that begins at rest".to_owned(),
+        None => "no recording contains PSEC that starts at rest".to_owned(),
     };
     format!("no delays and no refinement: {why}")
 }
 
-/// Whether a recording that was made with torque feedforward shows that it is nothing.
-fn shows_no_torque(input: &Input<'_>) -> bool {
+/// Returns true if a recording with active torque feedforward shows a weight of zero.
+fn is_torque_feedforward_zero(input: &IdentificationInput<'_>) -> bool {
     let channels = || input.signals.spans.iter().map(|span| span.torque_feedforward.as_ref());
     let is_nothing =
         |channel: Option<&Vec<f64>>| channel.is_some_and(|c| c.iter().all(|value| *value == 0.0));
@@ -377,14 +379,15 @@ fn shows_no_torque(input: &Input<'_>) -> bool {
         && channels().all(is_nothing)
 }
 
-/// The inertia, of a ladder of them, whose closed loop moves most like the recorded one.
+/// Returns the trial inertia whose closed-loop simulation fits the recordings best.
 ///
-/// Eq. 5 can be far off where the current swings between two samples, and a search from there can end elsewhere.
-fn start_of_inertia(axis: &AxisConfig, periods: &Periods, experiments: &[Experiment]) -> Option<f64> {
+/// Eq. 5 can be far off if the current varies between the samples, and a local search from there can end in
+/// another minimum.
+fn initial_inertia(axis: &AxisConfig, periods: &Periods, experiments: &[Experiment]) -> Option<f64> {
     let of = |inertia: f64| {
         let mut axis = axis.clone();
         axis.motor.inertia = inertia;
-        Some((inertia, deviations(&axis, periods, experiments)?.norm_squared()))
+        Some((inertia, position_residuals(&axis, periods, experiments)?.norm_squared()))
     };
     let ladder = LADDER.map(|factor| factor * axis.motor.inertia);
     let found: Vec<(f64, f64)> = ladder.into_par_iter().filter_map(of).collect();

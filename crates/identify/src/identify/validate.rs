@@ -1,88 +1,94 @@
-//! A model against a recording: in closed loop where PSEC was recorded, by inverse dynamics where the current was.
+//! Validation of a model against a recording: closed-loop simulation with PSEC, inverse dynamics with
+//! current.
 
-use super::closed_loop::{Experiment, Simulated, experiments, simulate_all};
-use super::fit::determination;
-use super::friction::{current, speed_unit};
-use super::identification::Input;
-use super::mode::FeedforwardMode;
-use super::segments::{Segment, SegmentKind, segments};
+use super::closed_loop::{Experiment, SimulatedExperiment, find_experiments, simulate_all};
+use super::feedforward_mode::FeedforwardMode;
+use super::fit::r_squared;
+use super::friction::{friction_current, speed_unit};
+use super::identification::IdentificationInput;
+use super::segments::{MotionSegment, SegmentKind, find_segments};
 use crate::recording::Signals;
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::drive::Gravity;
 use virtual_axes_core::machine::MachineError;
 
-/// Largest and RMS deviation.
+/// Largest and RMS residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Deviation {
+pub struct ResidualStatistics {
     /// Largest magnitude.
     pub max: f64,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rms: f64,
 }
 
-/// Simulated against recorded signals.
+/// Residuals of a closed-loop simulation.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Comparison {
-    /// Position where the velocity is constant, m or rad; none if it never is.
-    pub constant_velocity: Option<Deviation>,
-    /// Position everywhere else, m or rad.
-    pub elsewhere: Option<Deviation>,
-    /// Velocity, m/s or rad/s.
-    pub velocity: Option<Deviation>,
-    /// Current, A.
-    pub current: Option<Deviation>,
-    /// R² of the current as recorded.
-    pub current_determination: Option<f64>,
+pub struct ExperimentComparison {
+    /// Position residual at constant velocity, m or rad; none without constant velocity.
+    pub constant_velocity: Option<ResidualStatistics>,
+    /// Position residual elsewhere, m or rad.
+    pub elsewhere: Option<ResidualStatistics>,
+    /// Velocity residual, m/s or rad/s.
+    pub velocity: Option<ResidualStatistics>,
+    /// Current residual, A.
+    pub current: Option<ResidualStatistics>,
+    /// R² of the unfiltered current.
+    pub current_r_squared: Option<f64>,
 }
 
-/// Currents that the recorded motion asks for against those recorded.
+/// Motor current by inverse dynamics compared with the recorded current.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InverseDynamics {
-    /// R² of the current as recorded, unfiltered.
-    pub determination: f64,
-    /// Deviation of the current, A.
-    pub current: Deviation,
-    /// Number of the span, and the current that the model asks for at each of its samples, A.
+    /// R² of the unfiltered current.
+    pub r_squared: f64,
+    /// Current residual, A.
+    pub current: ResidualStatistics,
+    /// Index of the span and modeled current at each of its samples, A.
     pub modeled: Vec<(usize, Vec<f64>)>,
 }
 
-/// How an axis agrees with a recording.
+/// Agreement of an axis model with a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
-    /// What the recorded axis does when.
-    pub segments: Vec<Segment>,
-    /// Parts of the recording that were simulated; none without PSEC.
+    /// Segments of the recording.
+    pub segments: Vec<MotionSegment>,
+    /// Simulated sections of the recording; empty without PSEC.
     pub experiments: Vec<Experiment>,
-    /// Their simulations.
-    pub simulated: Vec<Simulated>,
-    /// How the two agree.
-    pub comparisons: Vec<Comparison>,
-    /// What the recorded motion asks for against the recorded current; none without one.
+    /// Simulation of each experiment.
+    pub simulated: Vec<SimulatedExperiment>,
+    /// Residuals of each experiment.
+    pub comparisons: Vec<ExperimentComparison>,
+    /// Comparison by inverse dynamics; none without current.
     pub inverse: Option<InverseDynamics>,
 }
 
 impl Agreement {
-    /// R² of the current as recorded: the lowest of the simulated parts, else that of inverse dynamics.
-    pub fn current_determination(&self) -> Option<f64> {
-        let simulated = self.comparisons.iter().filter_map(|c| c.current_determination).reduce(f64::min);
-        simulated.or(self.inverse.as_ref().map(|inverse| inverse.determination))
+    /// Returns the R² of the unfiltered current: the lowest of the simulations, otherwise that of inverse
+    /// dynamics.
+    pub fn current_r_squared(&self) -> Option<f64> {
+        let simulated = self.comparisons.iter().filter_map(|c| c.current_r_squared).reduce(f64::min);
+        simulated.or(self.inverse.as_ref().map(|inverse| inverse.r_squared))
     }
 }
 
-/// Simulates `axis` on a recording that it was not identified from, and compares.
+/// Simulates `axis` on a recording that was not used for the identification, and computes the residuals.
 ///
 /// # Errors
 /// [`MachineError`] if the axis cannot be simulated.
-pub fn validate(input: &Input<'_>, axis: &AxisConfig, periods: &Periods) -> Result<Agreement, MachineError> {
+pub fn validate(
+    input: &IdentificationInput<'_>,
+    axis: &AxisConfig,
+    periods: &Periods,
+) -> Result<Agreement, MachineError> {
     let mode = input.feedforward.unwrap_or(FeedforwardMode::Both);
-    let experiments = experiments(input.signals, 0, axis, periods, mode);
-    agreement(input.signals, segments(input.signals), experiments, axis, periods)
+    let experiments = find_experiments(input.signals, 0, axis, periods, mode);
+    compute_agreement(input.signals, find_segments(input.signals), experiments, axis, periods)
 }
 
-/// The agreement of an axis with the parts of a recording.
-pub(super) fn agreement(
+/// Computes the agreement of an axis with the experiments of a recording.
+pub(super) fn compute_agreement(
     signals: &Signals,
-    segments: Vec<Segment>,
+    segments: Vec<MotionSegment>,
     experiments: Vec<Experiment>,
     axis: &AxisConfig,
     periods: &Periods,
@@ -93,16 +99,20 @@ pub(super) fn agreement(
     Ok(Agreement { segments, experiments, simulated, comparisons, inverse })
 }
 
-fn deviation(differences: impl Iterator<Item = f64>) -> Option<Deviation> {
+fn residual_statistics(differences: impl Iterator<Item = f64>) -> Option<ResidualStatistics> {
     let (mut count, mut squares, mut max) = (0_usize, 0.0, 0.0_f64);
     for d in differences.filter(|d| !d.is_nan()) {
         (count, squares, max) = (count + 1, squares + d * d, max.max(d.abs()));
     }
-    (count > 0).then(|| Deviation { max, rms: (squares / count as f64).sqrt() })
+    (count > 0).then(|| ResidualStatistics { max, rms: (squares / count as f64).sqrt() })
 }
 
-/// Compares an experiment with its simulation.
-fn compare(experiment: &Experiment, simulated: &Simulated, segments: &[Segment]) -> Comparison {
+/// Computes the residuals of an experiment.
+fn compare(
+    experiment: &Experiment,
+    simulated: &SimulatedExperiment,
+    segments: &[MotionSegment],
+) -> ExperimentComparison {
     let mut constant = vec![false; experiment.position.len()];
     let of_it =
         segments.iter().filter(|s| s.span == experiment.span && s.kind == SegmentKind::ConstantVelocity);
@@ -114,26 +124,33 @@ fn compare(experiment: &Experiment, simulated: &Simulated, segments: &[Segment])
     }
     let position = |wanted: bool| {
         let pairs = simulated.position.iter().zip(&experiment.position).zip(&constant);
-        deviation(pairs.filter(move |(_, c)| **c == wanted).map(|((s, r), _)| s - r))
+        residual_statistics(pairs.filter(move |(_, c)| **c == wanted).map(|((s, r), _)| s - r))
     };
     let currents = || experiment.current.iter().flatten().copied().zip(simulated.current.iter().copied());
     let recorded = || currents().filter(|(r, _)| !r.is_nan());
-    let r2 = determination(recorded());
-    Comparison {
+    let r2 = r_squared(recorded());
+    ExperimentComparison {
         constant_velocity: position(true),
         elsewhere: position(false),
-        velocity: deviation(simulated.velocity.iter().zip(&experiment.velocity).map(|(s, r)| s - r)),
-        current: deviation(recorded().map(|(r, s)| s - r)),
-        // At rest there is nothing to explain.
-        current_determination: (experiment.moves() && r2.is_finite()).then_some(r2),
+        velocity: residual_statistics(
+            simulated.velocity.iter().zip(&experiment.velocity).map(|(s, r)| s - r),
+        ),
+        current: residual_statistics(recorded().map(|(r, s)| s - r)),
+        // At rest the variance is zero.
+        current_r_squared: (experiment.moves() && r2.is_finite()).then_some(r2),
     }
 }
 
-/// (Prévost eqs. 1 and 3) `i = (Jeq dω/dt + C_friction + C_gravity) / Kt` of the recorded motion; none
-/// without a current.
+/// Computes `i = (Jeq dω/dt + C_friction + C_gravity) / Kt` (Prévost eqs. 1 and 3) of the recorded motion;
+/// none without current.
 ///
-/// At rest any friction within ±i0 holds an axis: of the current what is within that of gravity is taken for it.
-fn inverse_dynamics(signals: &Signals, segments: &[Segment], axis: &AxisConfig) -> Option<InverseDynamics> {
+/// At rest friction holds the axis with any current within ±i0 around that of gravity; a recorded current
+/// within this band counts as modeled.
+fn inverse_dynamics(
+    signals: &Signals,
+    segments: &[MotionSegment],
+    axis: &AxisConfig,
+) -> Option<InverseDynamics> {
     let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, speed_unit(axis));
     let gravity = Gravity::new(&axis.gravity, r);
     let mut modeled = Vec::new();
@@ -151,13 +168,15 @@ fn inverse_dynamics(signals: &Signals, segments: &[Segment], axis: &AxisConfig) 
                     return held + (recorded[i] - held).clamp(-axis.friction.i0, axis.friction.i0);
                 }
                 let v = span.velocity[i] / unit;
-                axis.motor.inertia * span.acceleration[i] / (r * kt) + current(&axis.friction, v) + held
+                axis.motor.inertia * span.acceleration[i] / (r * kt)
+                    + friction_current(&axis.friction, v)
+                    + held
             })
             .collect();
         pairs.extend(recorded.iter().copied().zip(currents.iter().copied()).filter(|(r, _)| !r.is_nan()));
         modeled.push((number, currents));
     }
-    let current = deviation(pairs.iter().map(|(r, m)| m - r))?;
-    let determination = determination(pairs.iter().copied());
-    Some(InverseDynamics { determination, current, modeled })
+    let current = residual_statistics(pairs.iter().map(|(r, m)| m - r))?;
+    let determination = r_squared(pairs.iter().copied());
+    Some(InverseDynamics { r_squared: determination, current, modeled })
 }

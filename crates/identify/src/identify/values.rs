@@ -1,39 +1,39 @@
-//! What was identified, as parameters of a machine file.
+//! Identified values as parameters of a machine file.
 
-use super::delays::Delay;
-use super::friction::{FrictionLaw, LawFit, speed_name};
+use super::delays::DelayParameter;
+use super::friction::{FrictionLaw, LawFit, speed_unit_name};
 use super::gravity::{GravityCurrent, GravitySource};
 use super::identification::Identification;
-use super::refine::{Parameter, Refined};
-use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Source, Value};
+use super::refine::{RefinedParameter, RefinedValue};
+use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Value, ValueSource};
 use virtual_axes_core::units::{DEGREE, MILLISECOND_NS};
 
-/// Digits of a value behind the first digit of its uncertainty.
+/// Digits of a value beyond the first digit of its standard error.
 const GUARD_DIGITS: i32 = 2;
-/// Digits of a value whose uncertainty is not known, or is nothing.
+/// Digits of a value without standard error.
 const MOST_DIGITS: i32 = 9;
 
-/// A parameter of the machine file with what is known about it.
+/// Identified parameter of the machine file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Identified {
-    /// Full key: `x.motor.inertia_kg_m2`.
+pub struct IdentifiedValue {
+    /// Full key, such as `x.motor.inertia_kg_m2`.
     pub key: String,
-    /// Value in the machine file's unit.
+    /// Value in the unit of the machine file.
     pub value: f64,
-    /// What the machine file said before.
+    /// Value before the identification.
     pub before: f64,
     /// Unit; can be empty.
     pub unit: &'static str,
-    /// Standard error in that unit, if there is one.
+    /// Standard error in the unit of the machine file.
     pub error: Option<f64>,
-    /// For a delay: above the first and up to the second value, the data tell no difference.
+    /// Interval of equivalent delays: above the first and up to the second value.
     pub interval: Option<[f64; 2]>,
-    /// Where it comes from: the steps and the equations.
+    /// Identification steps and equations that determine the value.
     pub source: String,
 }
 
-impl Identified {
-    /// What stands as a comment behind the value in a machine file.
+impl IdentifiedValue {
+    /// Returns the comment behind the value in a machine file.
     pub fn comment(&self) -> String {
         let mut text = String::from("identified: ");
         match (self.interval, self.error) {
@@ -53,7 +53,7 @@ fn number(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// A value to the digits that its uncertainty lets count.
+/// Rounds a value to the digits that its standard error permits.
 fn rounded(value: f64, error: Option<f64>) -> f64 {
     let magnitude = |x: f64| x.abs().log10().floor() as i32;
     if value == 0.0 || !value.is_finite() {
@@ -68,65 +68,72 @@ fn rounded(value: f64, error: Option<f64>) -> f64 {
 }
 
 impl Identification {
-    /// Every parameter of `joint` that the recordings have told, in the order of a machine file.
+    /// Returns the identified parameters of `joint` in the order of a machine file.
     ///
-    /// `parameters` is the machine that the identification started from: it says which keys and units the axis
-    /// has. What the data could not tell is not among them.
-    pub fn values(&self, parameters: &Parameters, joint: &str) -> Vec<Identified> {
+    /// `parameters` is the machine before the identification; it defines the keys and units of the axis.
+    /// Parameters that the data do not determine are omitted.
+    pub fn values(&self, parameters: &Parameters, joint: &str) -> Vec<IdentifiedValue> {
         let mut out = Vec::new();
-        let mut put =
-            |keys: &[&str], value: f64, error: Option<f64>, interval: Option<[f64; 2]>, source: String| {
-                let known = keys.iter().map(|key| format!("{joint}.{key}"));
-                let Some((key, definition)) =
-                    known.into_iter().find_map(|key| parameters.definition(&key).map(|d| (key.clone(), d)))
-                else {
-                    return;
-                };
-                let before = match parameters.get(&key) {
-                    Some(Value::Double(value)) => value,
-                    _ => f64::NAN,
-                };
-                let value = if interval.is_some() { value } else { rounded(value, error) };
-                out.push(Identified { key, value, before, unit: definition.unit, error, interval, source });
+        let mut put = |keys: &[&str],
+                       value: f64,
+                       error: Option<f64>,
+                       interval: Option<[f64; 2]>,
+                       source: String| {
+            let known = keys.iter().map(|key| format!("{joint}.{key}"));
+            let Some((key, definition)) =
+                known.into_iter().find_map(|key| parameters.definition(&key).map(|d| (key.clone(), d)))
+            else {
+                return;
             };
-        self.put_plant(&mut put);
-        self.put_control(&mut put);
+            let before = match parameters.get(&key) {
+                Some(Value::Double(value)) => value,
+                _ => f64::NAN,
+            };
+            let value = if interval.is_some() { value } else { rounded(value, error) };
+            out.push(IdentifiedValue { key, value, before, unit: definition.unit, error, interval, source });
+        };
+        self.push_plant(&mut put);
+        self.push_control(&mut put);
         out
     }
 
-    fn put_plant(&self, put: &mut Put<'_>) {
+    fn push_plant(&self, put: &mut ValueSink<'_>) {
         let axis = &self.axis;
         if let Some((error, source)) =
-            self.told(Parameter::Inertia, self.inertia.as_ref().map(|i| i.error), || match &self.inertia {
-                Some(found) => format!("Prévost eq. 5 ({} accelerations)", found.accelerations),
-                None => "positions".to_owned(),
+            self.error_and_source(RefinedParameter::Inertia, self.inertia.as_ref().map(|i| i.error), || {
+                match &self.inertia {
+                    Some(found) => format!("Prévost eq. 5 ({} accelerations)", found.accelerations),
+                    None => "positions".to_owned(),
+                }
             })
         {
             put(&["motor.inertia_kg_m2", "motor.mass_kg"], axis.motor.inertia, error, None, source);
         }
-        self.put_friction(put);
-        self.put_gravity(put);
+        self.push_friction(put);
+        self.push_gravity(put);
     }
 
-    fn put_friction(&self, put: &mut Put<'_>) {
+    fn push_friction(&self, put: &mut ValueSink<'_>) {
         let (law, fit) = (&self.axis.friction, self.friction.as_ref().map(|friction| &friction.law));
         let straight = fit.is_some_and(|fit| fit.law == FrictionLaw::Linear);
-        let parameters =
-            [Parameter::FrictionA, Parameter::FrictionB, Parameter::FrictionC, Parameter::FrictionD];
-        let refined = self.refined(if straight { Parameter::Coulomb } else { Parameter::FrictionA });
+        let parameters = [
+            RefinedParameter::FrictionA,
+            RefinedParameter::FrictionB,
+            RefinedParameter::FrictionC,
+            RefinedParameter::FrictionD,
+        ];
+        let refined =
+            self.refined(if straight { RefinedParameter::Coulomb } else { RefinedParameter::FrictionA });
         if fit.is_none() && refined.is_none() {
             return;
         }
-        let line = (Parameter::Coulomb.get(&self.axis), Parameter::Viscous.get(&self.axis));
+        let line = (RefinedParameter::Coulomb.get(&self.axis), RefinedParameter::Viscous.get(&self.axis));
         let what = |fit: &LawFit| match fit.law {
             FrictionLaw::Linear => {
-                let unit = speed_name(&self.axis);
-                format!(
-                    "the line {:.4} A + {:.5} A/({unit}) · V in the form of Prévost eq. 3",
-                    line.0, line.1
-                )
+                let unit = speed_unit_name(&self.axis);
+                format!("line {:.4} A + {:.5} A/({unit}) · V in the form of Prévost eq. 3", line.0, line.1)
             }
-            FrictionLaw::DoubleExponential => format!("Prévost eq. 3, R² {:.4}", fit.determination),
+            FrictionLaw::DoubleExponential => format!("Prévost eq. 3, R² {:.4}", fit.r_squared),
         };
         let source = match (fit, refined) {
             (Some(fit), Some(_)) => format!("{}; refined on the closed loop", what(fit)),
@@ -136,30 +143,30 @@ impl Identification {
         let values = [law.a, law.b, law.c, law.d];
         for (k, key) in ["friction.a", "friction.b", "friction.c", "friction.d"].iter().enumerate() {
             let error = self.refined(parameters[k]).map(|r| r.error).or(fit.map(|fit| fit.errors[k]));
-            // The terms of a straight line nearly cancel: they keep all of their digits.
+            // The terms of a linear law nearly cancel, so they keep all digits.
             put(&[key], values[k], error.filter(|e| e.is_finite() && !straight), None, source.clone());
         }
-        let (source, error) = match self.refined(Parameter::Breakaway) {
+        let (source, error) = match self.refined(RefinedParameter::Breakaway) {
             Some(refined) => ("refined on the closed loop", Some(refined.error)),
             None => ("i0 = a + c, assumed", self.error_of_sum().or(fit.map(|fit| fit.error_at(0.0)))),
         };
         put(&["friction.i0"], law.i0, error, None, source.to_owned());
     }
 
-    /// Standard error of a + c from the refinement.
+    /// Returns the standard error of a + c from the refinement.
     fn error_of_sum(&self) -> Option<f64> {
         let refinement = self.refinement.as_ref()?;
         let place = |parameter| refinement.parameters.iter().position(|p| p.parameter == parameter);
-        if let Some(level) = place(Parameter::Coulomb) {
+        if let Some(level) = place(RefinedParameter::Coulomb) {
             return Some(refinement.parameters[level].error);
         }
-        let (a, c) = (place(Parameter::FrictionA)?, place(Parameter::FrictionC)?);
+        let (a, c) = (place(RefinedParameter::FrictionA)?, place(RefinedParameter::FrictionC)?);
         let (x, y) = (refinement.parameters[a].error, refinement.parameters[c].error);
         let rho = refinement.correlations.get(a)?.get(c)?;
         Some((x * x + y * y + 2.0 * rho * x * y).max(0.0).sqrt())
     }
 
-    fn put_gravity(&self, put: &mut Put<'_>) {
+    fn push_gravity(&self, put: &mut ValueSink<'_>) {
         let Some(gravity) = &self.gravity else { return };
         let nothing = if gravity.model == GravityCurrent::default() { ": not significant" } else { "" };
         let source = || match gravity.source {
@@ -167,12 +174,14 @@ impl Identification {
             GravitySource::Rest => format!("standstills{nothing}"),
         };
         if let Some((_, error)) = gravity.weight
-            && let Some((error, source)) = self.told(Parameter::Weight, Some(error), source)
+            && let Some((error, source)) =
+                self.error_and_source(RefinedParameter::Weight, Some(error), source)
         {
             put(&["gravity.weight_n"], self.axis.gravity.weight, error, None, source);
         }
         if let Some((_, error)) = gravity.tilt
-            && let Some((error, source)) = self.told(Parameter::TiltSine, Some(error), source)
+            && let Some((error, source)) =
+                self.error_and_source(RefinedParameter::TiltSine, Some(error), source)
         {
             put(&["gravity.tilt_nm"], self.axis.gravity.tilt, error, None, source);
         }
@@ -188,53 +197,54 @@ impl Identification {
         }
     }
 
-    fn put_control(&self, put: &mut Put<'_>) {
+    fn push_control(&self, put: &mut ValueSink<'_>) {
         let weights = &self.axis.feedforward;
-        let regression = |found: &Option<super::feedforward::Regression>, equation: u32| {
-            found.as_ref().map(|r| (r.error, format!("Prévost eq. {equation}, R² {:.6}", r.determination)))
+        let regression = |found: &Option<super::feedforward::FeedforwardRegression>, equation: u32| {
+            found.as_ref().map(|r| (r.error, format!("Prévost eq. {equation}, R² {:.6}", r.r_squared)))
         };
         let velocity = regression(&self.feedforward.velocity, 6);
-        if let Some((error, source)) =
-            self.told(Parameter::VelocityFeedforward, velocity.as_ref().map(|v| v.0), || {
-                velocity.as_ref().map_or_else(String::new, |v| v.1.clone())
-            })
-        {
+        if let Some((error, source)) = self.error_and_source(
+            RefinedParameter::VelocityFeedforward,
+            velocity.as_ref().map(|v| v.0),
+            || velocity.as_ref().map_or_else(String::new, |v| v.1.clone()),
+        ) {
             put(&["feedforward.velocity"], weights.velocity, error, None, source);
         }
         let torque = regression(&self.feedforward.torque, 7);
         if let Some((error, source)) =
-            self.told(Parameter::TorqueFeedforward, torque.as_ref().map(|t| t.0), || {
+            self.error_and_source(RefinedParameter::TorqueFeedforward, torque.as_ref().map(|t| t.0), || {
                 torque.as_ref().map_or_else(String::new, |t| t.1.clone())
             })
         {
             put(&["feedforward.torque_kg_m2", "feedforward.torque_kg"], weights.torque, error, None, source);
         }
-        if self.feedforward.no_torque {
+        if self.feedforward.is_torque_zero {
             let keys = ["feedforward.torque_kg_m2", "feedforward.torque_kg"];
-            put(&keys, 0.0, None, None, "TFFWS is 0 throughout".to_owned());
+            put(&keys, 0.0, None, None, "TFFWS is always 0".to_owned());
         }
         let ms = |delay: i64| delay as f64 / MILLISECOND_NS as f64;
         for fit in &self.delays {
-            let left = if fit.left { "; left as it was" } else { "" };
-            let source = format!("feedforward {}{left}", fit.delay.mode().name());
+            let left = if fit.is_unchanged { "; unchanged" } else { "" };
+            let source = format!("feedforward {}{left}", fit.delay.feedforward_mode().name());
             let key = match fit.delay {
-                Delay::Alpha => "delays.alpha_ms",
-                Delay::Beta => "delays.beta_ms",
-                Delay::Gamma => "delays.gamma_ms",
+                DelayParameter::Alpha => "delays.alpha_ms",
+                DelayParameter::Beta => "delays.beta_ms",
+                DelayParameter::Gamma => "delays.gamma_ms",
             };
             let interval = Some([ms(fit.interval.0), ms(fit.interval.1)]);
             put(&[key], ms(fit.delay.of(&self.axis.delays)), None, interval, source);
         }
     }
 
-    fn refined(&self, parameter: Parameter) -> Option<&Refined> {
+    fn refined(&self, parameter: RefinedParameter) -> Option<&RefinedValue> {
         self.refinement.as_ref()?.parameters.iter().find(|refined| refined.parameter == parameter)
     }
 
-    /// Standard error and source of a parameter, refined or as its step found it; none if neither has told it.
-    fn told(
+    /// Returns standard error and source of a parameter from the refinement or its step; none if it was not
+    /// identified.
+    fn error_and_source(
         &self,
-        parameter: Parameter,
+        parameter: RefinedParameter,
         step: Option<f64>,
         source: impl FnOnce() -> String,
     ) -> Option<(Option<f64>, String)> {
@@ -249,20 +259,24 @@ impl Identification {
     }
 }
 
-/// Takes a parameter: keys of which the axis has one, value, standard error, interval, source.
-type Put<'a> = dyn FnMut(&[&str], f64, Option<f64>, Option<[f64; 2]>, String) + 'a;
+/// Sink of a parameter: alternative keys, value, standard error, interval, source.
+type ValueSink<'a> = dyn FnMut(&[&str], f64, Option<f64>, Option<[f64; 2]>, String) + 'a;
 
-/// Makes identified values those of a machine.
+/// Sets identified values in a machine.
 ///
 /// # Errors
-/// [`ConfigError`] if a value is not within the schema's range.
-pub fn adopt(parameters: &mut Parameters, joint: &str, values: &[Identified]) -> Result<(), ConfigError> {
-    let source = Source::named("identification");
+/// [`ConfigError`] if a value is outside the range of the schema.
+pub fn update_parameters(
+    parameters: &mut Parameters,
+    joint: &str,
+    values: &[IdentifiedValue],
+) -> Result<(), ConfigError> {
+    let source = ValueSource::named("identification");
     let mut assignments: Vec<Assignment> = values
         .iter()
         .map(|v| Assignment { key: v.key.clone(), value: Value::Double(v.value), source: source.clone() })
         .collect();
-    // What was identified is the plant itself.
+    // The identified values describe the plant itself, so the deviation factors become 1.
     for factor in ["inertia", "friction", "torque_constant"] {
         let key = format!("{joint}.deviation.{factor}");
         if parameters.source(&key).is_some() {

@@ -1,52 +1,52 @@
-//! From a recording as it was read to signals that are fit for use.
+//! Conditioning of a raw recording: time grid, gaps, zero-phase filter, plausibility, current lag.
 
-use super::filter::{Filtered, Gaussian, MAX_CUTOFF_PERIOD, default_cutoff, deviation};
-use super::lag::{self, HIGHEST_LAG, LOWEST_LAG};
-use super::order::{drop_copies, ordered};
+use super::current_lag::{self, HIGHEST_LAG, LOWEST_LAG};
+use super::filter::{FilteredSignal, GaussianFilter, MAX_CUTOFF_PERIOD, default_cutoff, deviation};
+use super::ordering::{drop_copies, sort_samples};
 use super::spans::{
-    CHANNELS, CURRENT, NAMES, POSITION, PSEC, Piece, TORQUE_FEEDFORWARD, VELOCITY, VELOCITY_FEEDFORWARD,
-    channels, columns, pieces, stamped_smoother,
+    CHANNELS, CURRENT, NAMES, POSITION, PSEC, RecordingSection, TORQUE_FEEDFORWARD, VELOCITY,
+    VELOCITY_FEEDFORWARD, channels, extract_sections, is_smoother_over_stamps, usable_columns,
 };
-use super::stamps::{Placed, place};
-use super::{Finding, RawRecording, RecordingFault, Signals, Span, plausible};
+use super::uniform_grid::{UniformGrid, assign_to_grid};
+use super::{ConditioningError, Finding, RawRecording, SignalSpan, Signals, plausibility};
 use virtual_axes_core::config::{AxisConfig, Periods};
-use virtual_axes_core::units::seconds;
+use virtual_axes_core::units::{Rounded, seconds};
 
-/// Fewest samples of a span, however short the filter is.
+/// Fewest samples of a span, independent of the filter length.
 const SHORTEST_SPAN: usize = 16;
-/// Standard deviations of the filter that the longest span must have at least.
+/// Shortest permitted length of the longest span, in standard deviations of the filter.
 const SPAN_DEVIATIONS: f64 = 20.0;
-/// Part of the position period up to which a sampling period can show a lag of the current.
+/// Longest sampling period that can show a lag of the current, relative to the position period.
 const COARSEST: f64 = 0.5;
-/// Rounding that a given cut-off is forgiven.
+/// Relative rounding tolerance of a given cut-off frequency.
 const ROUNDING: f64 = 1e-9;
 
-/// How a recording is conditioned.
+/// Options of the conditioning.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Conditioning {
-    /// Where the filter of position, velocity, acceleration and current passes half the power, Hz;
-    /// none: 100 Hz, less where the sampling period allows only less (0.16 / period).
+    /// Cut-off frequency (half power) of the filter of position, velocity, acceleration and current, Hz. The
+    /// default is 100 Hz, limited to 0.16 / sampling period.
     pub cutoff: Option<f64>,
-    /// By how much the current lags behind the motion, s, −0.010 … 0.020; it is taken back as given.
-    /// None: it is estimated and taken back only where it is significant.
+    /// Lag of the current behind the motion, s, −0.010 … 0.020; compensated as given. Without a value the lag
+    /// is estimated, and compensated only if it is significant.
     pub current_lag: Option<f64>,
 }
 
-/// A span on its way.
-pub(super) struct Part<'a> {
-    pub filter: &'a Gaussian,
-    pub piece: Piece,
-    /// Position behind the filter with its derivatives.
-    pub motion: Filtered,
+/// Section of a recording after filtering.
+pub(super) struct FilteredSection<'a> {
+    pub filter: &'a GaussianFilter,
+    pub piece: RecordingSection,
+    /// Filtered position and its derivatives.
+    pub motion: FilteredSignal,
     pub smooth_current: Option<Vec<f64>>,
 }
 
-impl<'a> Part<'a> {
-    fn new(piece: Piece, filter: &'a Gaussian) -> Self {
+impl<'a> FilteredSection<'a> {
+    fn new(piece: RecordingSection, filter: &'a GaussianFilter) -> Self {
         let apply = |channel: usize| piece.columns[channel].as_ref().map(|values| filter.apply(values));
         let motion = apply(POSITION).unwrap_or_default();
         let smooth_current = apply(CURRENT).map(|current| current.value);
-        Part { filter, piece, motion, smooth_current }
+        FilteredSection { filter, piece, motion, smooth_current }
     }
 
     /// Keeps the samples of `range`.
@@ -62,9 +62,9 @@ impl<'a> Part<'a> {
         self.piece.cut(range, period);
     }
 
-    fn into_span(self) -> Span {
+    fn into_span(self) -> SignalSpan {
         let mut columns = self.piece.columns;
-        Span {
+        SignalSpan {
             start: self.piece.start,
             psec: columns[PSEC].take(),
             position: columns[POSITION].take().unwrap_or_default(),
@@ -79,64 +79,68 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Checks a recording of `axis` and makes it even in time, with zero-phase derivatives.
+/// Conditions a recording of `axis`: checks it, resamples it to a uniform time grid and filters it without
+/// phase.
 ///
-/// Samples are put on an even grid where their count fits the time (stamps that jitter, loggers that stall and
-/// catch up), otherwise interpolated to it; missing values are interpolated up to two in a row, longer gaps and
-/// positions that freeze amid motion part the recording into spans. Velocity, acceleration and smoothed current
-/// are those of one Gaussian without phase; at the ends of a span, over 5 standard deviations of 0.1325 / cutoff
-/// each, it sees the signal mirrored about its end value. A lag of the current is taken back where it explains
-/// the current clearly better and exceeds a sampling period. All that was done is among the findings.
+/// Samples are assigned to a uniform grid if their number fits the recorded time (jittering stamps, loggers
+/// that stall and catch up); otherwise they are interpolated to it. Up to two missing values in a row are
+/// interpolated. Longer gaps and frozen positions during motion split the recording into spans. Velocity,
+/// acceleration and smoothed current are outputs of one zero-phase Gaussian filter; within 5 standard
+/// deviations (of 0.1325 / cutoff each) of the ends of a span the filter uses the signal mirrored about its
+/// end value. A lag of the current is compensated if that explains the current clearly better and the lag
+/// exceeds a sampling period. The findings list every correction.
 ///
 /// # Errors
-/// [`RecordingFault`] if the recording cannot be that of the axis as it was read, or nothing of it is left.
+/// [`ConditioningError`] if the recording is not plausible for the axis or no usable span is left.
 pub fn condition(
     raw: &RawRecording,
     axis: &AxisConfig,
     periods: &Periods,
     options: &Conditioning,
-) -> Result<(Signals, Vec<Finding>), RecordingFault> {
+) -> Result<(Signals, Vec<Finding>), ConditioningError> {
     let mut findings = Vec::new();
     check_lengths(raw)?;
-    let mut ordered = ordered(raw, &mut findings)?;
-    let mut columns = columns(raw, &mut findings);
+    let mut ordered = sort_samples(raw, &mut findings)?;
+    let mut columns = usable_columns(raw, &mut findings);
     drop_copies(&mut ordered, &raw.name, columns.iter().flatten(), &mut findings);
     drop_constant_current(&raw.name, &mut columns, &mut findings);
     let Some(position) = &columns[POSITION] else {
-        return Err(RecordingFault::NoPosition { name: raw.name.clone() });
+        return Err(ConditioningError::NoPosition { name: raw.name.clone() });
     };
-    let smoother = |placed: &Placed| stamped_smoother(placed, position);
-    let placed = place(&raw.name, &ordered, periods, smoother, &mut findings)?;
+    let smoother = |placed: &UniformGrid| is_smoother_over_stamps(placed, position);
+    let placed = assign_to_grid(&raw.name, &ordered, periods, smoother, &mut findings)?;
     let period = placed.period;
-    let cutoff = cutoff(&raw.name, options, &placed)?;
-    let filter = Gaussian::new(cutoff, period);
+    let cutoff = select_cutoff(&raw.name, options, &placed)?;
+    let filter = GaussianFilter::new(cutoff, period);
     let shortest = (2 * filter.radius() + 1).max(SHORTEST_SPAN);
-    let (pieces, longest) = pieces(&raw.name, &placed, &columns, shortest, &mut findings);
-    let nothing_left = || RecordingFault::NothingLeft { name: raw.name.clone(), longest, wanted: shortest };
+    let (pieces, longest) = extract_sections(&raw.name, &placed, &columns, shortest, &mut findings);
+    let nothing_left =
+        || ConditioningError::NothingLeft { name: raw.name.clone(), longest, wanted: shortest };
     if pieces.is_empty() {
         return Err(nothing_left());
     }
-    let mut parts: Vec<Part> = pieces.into_iter().map(|piece| Part::new(piece, &filter)).collect();
-    plausible::check(&raw.name, &parts, axis, period, deviation(cutoff))?;
+    let mut parts: Vec<FilteredSection> =
+        pieces.into_iter().map(|piece| FilteredSection::new(piece, &filter)).collect();
+    plausibility::check(&raw.name, &parts, axis, period, deviation(cutoff))?;
     let current_lag =
-        current_lag(&raw.name, &parts, axis, periods, (period, cutoff), options, &mut findings)?;
+        select_current_lag(&raw.name, &parts, axis, periods, (period, cutoff), options, &mut findings)?;
     if current_lag != 0.0 {
-        lag::take_back(&mut parts, current_lag, period);
+        current_lag::compensate(&mut parts, current_lag, period);
         parts.retain(|part| part.piece.len() > 0);
         if parts.is_empty() {
             return Err(nothing_left());
         }
     }
-    let mut spans: Vec<Span> = parts.into_iter().map(Part::into_span).collect();
-    keep_apart(&mut spans, period);
+    let mut spans: Vec<SignalSpan> = parts.into_iter().map(FilteredSection::into_span).collect();
+    separate_spans(&mut spans, period);
     Ok((Signals { name: raw.name.clone(), period, cutoff, current_lag, spans }, findings))
 }
 
-fn check_lengths(raw: &RawRecording) -> Result<(), RecordingFault> {
+fn check_lengths(raw: &RawRecording) -> Result<(), ConditioningError> {
     let channels = channels(raw);
     for n in 0..CHANNELS {
         let Some(values) = channels[n].filter(|values| values.len() != raw.time.len()) else { continue };
-        return Err(RecordingFault::Lengths {
+        return Err(ConditioningError::Lengths {
             name: raw.name.clone(),
             channel: NAMES[n],
             found: values.len(),
@@ -145,12 +149,13 @@ fn check_lengths(raw: &RawRecording) -> Result<(), RecordingFault> {
     }
     match channels[POSITION] {
         Some(position) if position.is_empty() || position.iter().any(|x| x.is_finite()) => Ok(()),
-        _ => Err(RecordingFault::NoPosition { name: raw.name.clone() }),
+        _ => Err(ConditioningError::NoPosition { name: raw.name.clone() }),
     }
 }
 
-/// Where the first stamps of a span jitter it could begin before the one before has ended: it is moved behind it.
-fn keep_apart(spans: &mut [Span], period: f64) {
+/// Moves the start of a span behind the end of the span before it; jittering first stamps can make them
+/// overlap.
+fn separate_spans(spans: &mut [SignalSpan], period: f64) {
     let mut earliest = f64::NEG_INFINITY;
     for span in spans {
         span.start = span.start.max(earliest);
@@ -158,7 +163,7 @@ fn keep_apart(spans: &mut [Span], period: f64) {
     }
 }
 
-/// A current that does not change although the axis moves was not measured.
+/// Drops a current that is constant although the axis moves: it was not measured.
 fn drop_constant_current(
     name: &str,
     columns: &mut [Option<Vec<f64>>; CHANNELS],
@@ -172,13 +177,12 @@ fn drop_constant_current(
     };
     if columns[CURRENT].is_some() && varies(POSITION) && !varies(CURRENT) {
         columns[CURRENT] = None;
-        let what =
-            format!("{name}: the current is the same throughout although the axis moves; it is left out");
+        let what = format!("{name}: the current is constant although the axis moves; it is dropped");
         findings.push(Finding::warning("constant-current", what, "record the motor current"));
     }
 }
 
-fn cutoff(name: &str, options: &Conditioning, placed: &Placed) -> Result<f64, RecordingFault> {
+fn select_cutoff(name: &str, options: &Conditioning, placed: &UniformGrid) -> Result<f64, ConditioningError> {
     let period = placed.period;
     let Some(found) = options.cutoff else { return Ok(default_cutoff(period)) };
     let longest =
@@ -188,57 +192,60 @@ fn cutoff(name: &str, options: &Conditioning, placed: &Placed) -> Result<f64, Re
     if found >= lowest && found <= highest * (1.0 + ROUNDING) {
         return Ok(found);
     }
-    Err(RecordingFault::Cutoff { name: name.to_owned(), found, lowest, highest, period })
+    Err(ConditioningError::Cutoff { name: name.to_owned(), found, lowest, highest, period })
 }
 
-/// The lag that is to be taken back, s.
-fn current_lag(
+/// Returns the current lag to compensate, s.
+fn select_current_lag(
     name: &str,
-    parts: &[Part],
+    parts: &[FilteredSection],
     axis: &AxisConfig,
     periods: &Periods,
     (period, cutoff): (f64, f64),
     options: &Conditioning,
     findings: &mut Vec<Finding>,
-) -> Result<f64, RecordingFault> {
+) -> Result<f64, ConditioningError> {
     const CODE: &str = "current-lag";
     if let Some(found) = options.current_lag {
         if !(LOWEST_LAG..=HIGHEST_LAG).contains(&found) {
             let (lowest, highest) = (LOWEST_LAG, HIGHEST_LAG);
-            return Err(RecordingFault::Lag { name: name.to_owned(), found, lowest, highest });
+            return Err(ConditioningError::Lag { name: name.to_owned(), found, lowest, highest });
         }
         return Ok(found);
     }
-    // Sampled about as slowly as the setpoints come, the current shows their ripple, which looks like a lag.
+    // A current sampled at about the position period shows the ripple of the setpoints, which looks like a
+    // lag.
     if period > COARSEST * seconds(periods.position) {
         return Ok(0.0);
     }
-    // A filter of its own, so that the ripple at the position period is not matched with its neighbor.
-    let filter = Gaussian::new(lag::cutoff(periods).min(cutoff), period);
+    // A narrower filter prevents matching the ripple at the position period with the neighboring period.
+    let filter = GaussianFilter::new(current_lag::max_cutoff(periods).min(cutoff), period);
     let long = parts.iter().filter(|part| part.piece.len() > 2 * filter.radius());
-    let smooth: Vec<Part> = long.map(|part| Part::new(part.piece.clone(), &filter)).collect();
-    let Some(lag) = lag::estimate(&smooth, axis.kind(), period) else { return Ok(0.0) };
+    let smooth: Vec<FilteredSection> =
+        long.map(|part| FilteredSection::new(part.piece.clone(), &filter)).collect();
+    let Some(lag) = current_lag::estimate(&smooth, axis.kind(), period) else { return Ok(0.0) };
     let milliseconds = lag.lag * 1e3;
-    if lag.better && lag.at_end {
-        let what =
-            format!("{name}: the current lags the motion by {milliseconds:.1} ms or more; it is left so");
+    if lag.is_better && lag.is_at_end {
+        let what = format!(
+            "{name}: the current lags the motion by {milliseconds:.1} ms or more; it is not compensated"
+        );
         findings.push(Finding::warning(CODE, what, "record the current with the clock of the position"));
         return Ok(0.0);
     }
-    if lag.better && lag.long {
+    if lag.is_better && lag.exceeds_period {
         let what = format!(
-            "{name}: the current lags the motion by {milliseconds:.2} ms (R² {:.4} with, {:.4} without); \
-             this is taken back",
+            "{name}: the current lags the motion by {milliseconds:.2} ms (R² {:.4} with compensation, {:.4} without); \
+             compensated",
             lag.r2, lag.r2_without
         );
         findings.push(Finding::note(CODE, what));
         return Ok(lag.lag);
     }
-    if lag.better {
+    if lag.is_better {
         let what = format!(
             "{name}: the current seems to lag the motion by {milliseconds:.2} ms, no more than a sampling period \
-             of {} ms; it is left so",
-            period * 1e3
+             of {} ms; it is not compensated",
+            Rounded(period * 1e3)
         );
         findings.push(Finding::note(CODE, what));
     }

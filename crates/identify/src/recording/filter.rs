@@ -1,31 +1,32 @@
-//! Zero-phase Gaussian: smoothed value and first two derivatives through one and the same filter.
+//! Zero-phase Gaussian filter: smoothed value, first and second derivative with one kernel width.
 
 use std::f64::consts::{LN_2, TAU};
 
-/// Highest cut-off times period. The standard deviation is 0.83 samples there; below 0.8 the aliases of the
-/// sampled second derivative pass half a per cent of it at the cut-off.
+/// Highest cut-off frequency times sampling period. The standard deviation is 0.83 samples there; below 0.8
+/// samples, aliasing of the sampled second derivative exceeds half a per cent at the cut-off.
 pub(super) const MAX_CUTOFF_PERIOD: f64 = 0.16;
-/// Default cut-off, Hz: above the bandwidth of a velocity loop's motion, below the ripple of its current.
+/// Default cut-off frequency, Hz: above the bandwidth of the velocity loop, below the ripple of its current.
 pub(super) const DEFAULT_CUTOFF: f64 = 100.0;
-/// Half length of the kernel in standard deviations: what is cut off is 6e-7 of it.
+/// Half length of the kernel in standard deviations; the truncated part is 6e-7.
 const REACH: f64 = 5.0;
 
-/// Standard deviation, s, of the Gaussian that passes half the power at `cutoff` (Hz):
-/// |H(f)|² = exp(−(2π f σ)²) = 1/2.
+/// Returns the standard deviation, s, of the Gaussian that passes half the power at `cutoff` (Hz): |H(f)|² =
+/// exp(−(2π f σ)²) = 1/2.
 pub(super) fn deviation(cutoff: f64) -> f64 {
     LN_2.sqrt() / (TAU * cutoff)
 }
 
-/// Cut-off, Hz, where none is wished for.
+/// Returns the default cut-off frequency, Hz, for a sampling period, s.
 pub(super) fn default_cutoff(period: f64) -> f64 {
     DEFAULT_CUTOFF.min(MAX_CUTOFF_PERIOD / period)
 }
 
-/// A sampled Gaussian g and its derivatives, corrected by their moments: the derivatives are exact on
-/// polynomials up to degree 2, the smoothed value on straight lines (a parabola is lifted by σ² of it, as by
-/// any Gaussian; its derivatives are not).
+/// Sampled Gaussian kernel and its derivatives, corrected by their moments.
+///
+/// The derivatives are exact on polynomials up to degree 2, the smoothed value on straight lines. The
+/// smoothed value of a parabola is offset by σ² times its second derivative / 2, as with any Gaussian.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gaussian {
+pub struct GaussianFilter {
     /// Weights of x(n−k) + x(n+k) − 2 x(n), k = 1, 2 …, in the smoothed value.
     value: Vec<f64>,
     /// Weights of x(n+k) − x(n−k) in the first derivative, 1/s.
@@ -34,19 +35,19 @@ pub struct Gaussian {
     second: Vec<f64>,
 }
 
-/// What a [`Gaussian`] makes of a signal; each as long as it.
+/// Output of a [`GaussianFilter`]; each signal is as long as the input.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Filtered {
+pub struct FilteredSignal {
     /// Smoothed signal.
     pub value: Vec<f64>,
-    /// Its derivative, per s.
+    /// First derivative, 1/s.
     pub first: Vec<f64>,
-    /// Its second derivative, per s².
+    /// Second derivative, 1/s².
     pub second: Vec<f64>,
 }
 
-impl Gaussian {
-    /// The filter with `cutoff` (Hz) for samples `period` (s) apart.
+impl GaussianFilter {
+    /// Creates a filter with cut-off frequency `cutoff` (Hz) for samples `period` (s) apart.
     pub fn new(cutoff: f64, period: f64) -> Self {
         let sigma = deviation(cutoff) / period;
         let radius = (REACH * sigma).ceil().max(1.0) as usize;
@@ -58,25 +59,25 @@ impl Gaussian {
         let (m0, m2, m4) = (1.0 + moment(0), moment(1), moment(2));
         // Second derivative: (scale k² − scale m2/m0) g, whose moments of order 0 and 2 are 0 and 2.
         let scale = 2.0 / (m4 - m2 * m2 / m0) / (period * period);
-        Gaussian {
+        GaussianFilter {
             value: weights.iter().map(|(_, g)| g / m0).collect(),
             first: weights.iter().map(|(k2, g)| k2.sqrt() * g / m2 / period).collect(),
             second: weights.iter().map(|(k2, g)| scale * (k2 - m2 / m0) * g).collect(),
         }
     }
 
-    /// How many samples the kernel reaches to either side.
+    /// Returns the half length of the kernel, samples.
     pub fn radius(&self) -> usize {
         self.value.len()
     }
 
-    /// Smoothed value and derivatives of `signal`, which is longer than the kernel reaches.
+    /// Returns smoothed value and derivatives of `signal`, which must be longer than the kernel.
     ///
-    /// Beyond its ends the signal is continued by odd reflection about the end value,
-    /// x(−k) = 2 x(0) − x(k): at the very ends the value is the recorded one and the acceleration is zero.
-    pub fn apply(&self, signal: &[f64]) -> Filtered {
+    /// Beyond its ends the signal is continued by odd reflection about the end value, x(−k) = 2 x(0) − x(k).
+    /// At the first and last sample the smoothed value is the input and the second derivative is zero.
+    pub fn apply(&self, signal: &[f64]) -> FilteredSignal {
         let (padded, radius) = (self.extended(signal), self.radius());
-        let mut out = Filtered::default();
+        let mut out = FilteredSignal::default();
         for center in radius..radius + signal.len() {
             let middle = padded[center];
             let (mut value, mut first, mut second) = (0.0, 0.0, 0.0);
@@ -99,7 +100,7 @@ impl Gaussian {
             return vec![0.0; 2 * self.radius()];
         };
         let end = signal.len() - 1;
-        // A signal shorter than the kernel is held beyond its mirror image; callers have dropped such spans.
+        // A signal shorter than the kernel is held beyond its mirror image; callers drop such spans.
         let mirrored = |k: usize| k.min(end);
         let before = (1..=self.radius()).rev().map(|k| 2.0 * first - signal[mirrored(k)]);
         let after = (1..=self.radius()).map(|k| 2.0 * last - signal[end - mirrored(k)]);
@@ -120,13 +121,14 @@ mod tests {
     #[test]
     fn derivatives_are_exact_on_parabolas() {
         for cutoff in [20.0, 100.0, 160.0] {
-            let out = Gaussian::new(cutoff, PERIOD).apply(&sampled(|t| 0.3 - 2.0 * t + 5.0 * t * t));
+            let out = GaussianFilter::new(cutoff, PERIOD).apply(&sampled(|t| 0.3 - 2.0 * t + 5.0 * t * t));
             for n in 100..300 {
                 let t = n as f64 * PERIOD;
                 assert!((out.first[n] - (-2.0 + 10.0 * t)).abs() < 1e-11, "{cutoff} Hz: {}", out.first[n]);
                 assert!((out.second[n] - 10.0).abs() < 1e-7, "{cutoff} Hz: {}", out.second[n]);
                 let lifted = 0.3 - 2.0 * t + 5.0 * t * t + 5.0 * deviation(cutoff).powi(2);
-                // Its variance as sampled: 6e-5 from σ² at 0.83 samples by aliasing, 2e-5 by the tails.
+                // Variance of the sampled kernel: 6e-5 from σ² at 0.83 samples by aliasing, 2e-5 by
+                // truncation.
                 assert!(
                     (out.value[n] - lifted).abs() < 1e-4 * 5.0 * deviation(cutoff).powi(2),
                     "{cutoff} Hz"
@@ -140,7 +142,7 @@ mod tests {
         let (cutoff, frequency) = (100.0, 12.0);
         let w = TAU * frequency;
         let gain = (-0.5 * (w * deviation(cutoff)).powi(2)).exp();
-        let out = Gaussian::new(cutoff, PERIOD).apply(&sampled(|t| (w * t).sin()));
+        let out = GaussianFilter::new(cutoff, PERIOD).apply(&sampled(|t| (w * t).sin()));
         for n in 50..350 {
             let t = n as f64 * PERIOD;
             assert!((out.value[n] - gain * (w * t).sin()).abs() < 1e-3);
@@ -153,8 +155,8 @@ mod tests {
     fn half_the_power_passes_at_the_cutoff() {
         for cutoff in [25.0, 100.0, 160.0] {
             let w = TAU * cutoff;
-            let filter = Gaussian::new(cutoff, PERIOD);
-            // Two quadratures at one sample give the magnitude whatever the phase.
+            let filter = GaussianFilter::new(cutoff, PERIOD);
+            // Two quadratures at one sample give the magnitude for any phase.
             let center = 200;
             let sine = filter.apply(&sampled(|t| (w * t).sin())).value[center];
             let cosine = filter.apply(&sampled(|t| (w * t).cos())).value[center];
@@ -165,7 +167,7 @@ mod tests {
 
     #[test]
     fn the_ends_of_a_ramp_keep_their_slope() {
-        let out = Gaussian::new(100.0, PERIOD).apply(&sampled(|t| 1.0 + 3.0 * t));
+        let out = GaussianFilter::new(100.0, PERIOD).apply(&sampled(|t| 1.0 + 3.0 * t));
         for n in [0, 1, 398, 399] {
             assert!((out.first[n] - 3.0).abs() < 1e-10);
             assert!(out.second[n].abs() < 1e-6);

@@ -1,43 +1,43 @@
-//! What must be said about a recording or a result.
+//! Findings: messages about a recording or an identification result.
 
 use std::fmt;
 
-/// How much a finding matters.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// Good to know; nothing is lost.
+    /// Information without effect on the result.
     Note,
-    /// The result is less certain than it could be.
+    /// Reduced certainty of the result.
     Warning,
-    /// Something was not identified for want of data.
+    /// Parameter that was not identified because data are missing.
     Missing,
 }
 
-/// One thing that the user must know, with what to record to mend it.
+/// Message about a recording or result, with the remedy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// How much it matters.
+    /// Severity.
     pub severity: Severity,
-    /// A stable name: `gap`, `few-speeds`, …
+    /// Stable identifier such as `gap` or `few-speeds`.
     pub code: &'static str,
-    /// What was found, with its numbers and the name of the recording.
+    /// Message with its numbers and the name of the recording.
     pub what: String,
-    /// What to record or to change; empty where there is nothing to do.
+    /// Remedy: what to record or to change; empty if nothing is to be done.
     pub remedy: String,
 }
 
 impl Finding {
-    /// Something good to know.
+    /// Creates an informational finding.
     pub fn note(code: &'static str, what: impl Into<String>) -> Self {
         Finding { severity: Severity::Note, code, what: what.into(), remedy: String::new() }
     }
 
-    /// Something that makes the result less certain.
+    /// Creates a finding about reduced certainty.
     pub fn warning(code: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Finding { severity: Severity::Warning, code, what: what.into(), remedy: remedy.into() }
     }
 
-    /// Something that was not identified.
+    /// Creates a finding about a parameter that was not identified.
     pub fn missing(code: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Finding { severity: Severity::Missing, code, what: what.into(), remedy: remedy.into() }
     }

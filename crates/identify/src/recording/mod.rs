@@ -1,23 +1,24 @@
-//! Recordings of an axis: checked, made even in time, filtered without phase.
+//! Conditioning of axis recordings: plausibility checks, resampling to a uniform time grid, zero-phase
+//! filtering.
 //!
-//! A recording is read as a [`RawRecording`]; [`condition`] makes it [`Signals`] that are fit for identification,
-//! or says why it cannot. What was found on the way are [`Finding`]s.
+//! [`condition`] turns a [`RawRecording`] into [`Signals`] that the identification can use, or returns a
+//! [`ConditioningError`]. [`Finding`]s list all corrections and shortcomings.
 
 mod condition;
-mod fault;
+mod current_lag;
+mod error;
 mod filter;
 mod finding;
-mod lag;
-mod order;
-mod plausible;
+mod ordering;
+mod plausibility;
 mod regression;
 mod sampling;
 mod signals;
 mod spans;
-mod stamps;
+mod uniform_grid;
 
 pub use condition::{Conditioning, condition};
-pub use fault::RecordingFault;
-pub use filter::{Filtered, Gaussian};
+pub use error::ConditioningError;
+pub use filter::{FilteredSignal, GaussianFilter};
 pub use finding::{Finding, Severity};
-pub use signals::{RawRecording, Signals, Span};
+pub use signals::{RawRecording, SignalSpan, Signals};

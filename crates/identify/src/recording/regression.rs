@@ -1,33 +1,35 @@
-//! How well the motion explains the current: least squares on centerd, scaled columns.
+//! Linear least squares on centered, scaled columns, and correlation.
 
 use nalgebra::{DMatrix, DVector};
+use virtual_axes_core::statistics::mean;
 
-/// Part of the largest eigenvalue below which a combination of columns counts as not there.
+/// Relative eigenvalue below which a combination of columns is treated as zero.
 const RANK: f64 = 1e-10;
 
-/// Least squares with a constant, for many right-hand sides.
+/// Linear least-squares regression with a constant term, for many right-hand sides.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Regression {
+pub(super) struct LeastSquares {
     columns: Vec<Vec<f64>>,
     scales: Vec<f64>,
     inverse: DMatrix<f64>,
 }
 
-/// What a [`Regression`] finds.
+/// Result of a [`LeastSquares`] fit.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Fit {
-    /// Per column.
+pub(super) struct LeastSquaresFit {
+    /// Coefficient of each column.
     pub coefficients: Vec<f64>,
-    /// Part of the variance that is explained.
+    /// Coefficient of determination R².
     pub r2: f64,
 }
 
-impl Regression {
-    /// A regression on `columns`, all as long, and a constant. A column that does not vary gets 0.
+impl LeastSquares {
+    /// Creates a regression on `columns` of equal length and a constant. The coefficient of a constant column
+    /// is 0.
     pub fn new(mut columns: Vec<Vec<f64>>) -> Self {
         let mut scales = Vec::new();
         for column in &mut columns {
-            let mean = mean(column);
+            let mean = mean(column).unwrap_or(0.0);
             column.iter_mut().for_each(|x| *x -= mean);
             let scale = column.iter().map(|x| x * x).sum::<f64>().sqrt();
             if scale > 0.0 && scale.is_finite() {
@@ -45,12 +47,12 @@ impl Regression {
         let reciprocal = eigen.eigenvalues.map(|l| if l > RANK * largest { 1.0 / l } else { 0.0 });
         let inverse =
             &eigen.eigenvectors * DMatrix::from_diagonal(&reciprocal) * eigen.eigenvectors.transpose();
-        Regression { columns, scales, inverse }
+        LeastSquares { columns, scales, inverse }
     }
 
-    /// Explains `values`, as many as each column has.
-    pub fn fit(&self, values: &[f64]) -> Fit {
-        let mean = mean(values);
+    /// Fits `values`, one per row of the columns.
+    pub fn fit(&self, values: &[f64]) -> LeastSquaresFit {
+        let mean = mean(values).unwrap_or(0.0);
         let centerd: Vec<f64> = values.iter().map(|y| y - mean).collect();
         let products =
             DVector::from_iterator(self.columns.len(), self.columns.iter().map(|x| dot(x, &centerd)));
@@ -58,21 +60,17 @@ impl Regression {
         let total = dot(&centerd, &centerd);
         let r2 = if total > 0.0 { solution.dot(&products) / total } else { 0.0 };
         let coefficients = solution.iter().zip(&self.scales).map(|(c, scale)| c / scale).collect();
-        Fit { coefficients, r2 }
+        LeastSquaresFit { coefficients, r2 }
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Correlation of two signals about their means; 0 where one of them does not vary.
+/// Returns the correlation coefficient of two signals, or 0 if one of them is constant.
 pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let (mean_a, mean_b) = (mean(a), mean(b));
+    let (mean_a, mean_b) = (mean(a).unwrap_or(0.0), mean(b).unwrap_or(0.0));
     let (mut cross, mut square_a, mut square_b) = (0.0, 0.0, 0.0);
     for (a, b) in a.iter().zip(b) {
         let (a, b) = (a - mean_a, b - mean_b);

@@ -1,13 +1,13 @@
-//! One axis of a real (or virtual) machine, as it was recorded.
+//! Recorded signals of one axis, raw and conditioned.
 
-/// What was recorded of one axis, as it was read: SI units, nothing mended.
+/// Raw recording of one axis in SI units.
 ///
-/// Every channel that is there has a value for each stamp; NaN where nothing was recorded.
+/// Each recorded channel has one value per stamp, NaN for missing values.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RawRecording {
-    /// What it is called in messages: the file.
+    /// Name in messages, usually the file name.
     pub name: String,
-    /// Stamps, s, as they were written: they can jitter, leap and repeat.
+    /// Stamps as recorded, s; they can jitter, jump and repeat.
     pub time: Vec<f64>,
     /// PSEC, m or rad.
     pub psec: Option<Vec<f64>>,
@@ -23,39 +23,40 @@ pub struct RawRecording {
     pub torque_feedforward: Option<Vec<f64>>,
 }
 
-/// A recording that is fit for use: even in time within its spans, with zero-phase derivatives.
+/// Conditioned recording: uniform sampling within each span, with zero-phase derivatives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signals {
-    /// What it is called in messages: the file.
+    /// Name in messages, usually the file name.
     pub name: String,
     /// Sampling period, s.
     pub period: f64,
-    /// Where the filter of velocity, acceleration and smoothed current passes half the power, Hz.
+    /// Cut-off frequency (half power) of the filter of velocity, acceleration and smoothed current, Hz.
     pub cutoff: f64,
-    /// How far the recorded current lags behind the motion, s; it has been taken back.
+    /// Compensated lag of the recorded current behind the motion, s.
     pub current_lag: f64,
-    /// What lies between two gaps, in the order of time.
-    pub spans: Vec<Span>,
+    /// Sections between gaps, in order of time.
+    pub spans: Vec<SignalSpan>,
 }
 
-/// A part of a recording without gap: sample i is at `start + i · period`; all channels are as long.
+/// Section of a recording without gap. Sample i is at `start + i · period`; all channels have the same
+/// length.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Span {
+pub struct SignalSpan {
     /// Time of the first sample in the recording, s.
     pub start: f64,
     /// PSEC, m or rad.
     pub psec: Option<Vec<f64>>,
-    /// Actual position, m or rad, as recorded.
+    /// Recorded position, m or rad.
     pub position: Vec<f64>,
     /// Velocity, m/s or rad/s: derivative of the filtered position.
     pub velocity: Vec<f64>,
     /// Acceleration, m/s² or rad/s²: second derivative of the filtered position.
     pub acceleration: Vec<f64>,
-    /// Velocity as recorded, m/s or rad/s.
+    /// Recorded velocity, m/s or rad/s.
     pub recorded_velocity: Option<Vec<f64>>,
-    /// Motor current as recorded, A.
+    /// Recorded motor current, A.
     pub current: Option<Vec<f64>>,
-    /// Motor current behind the filter of the derivatives, A.
+    /// Motor current filtered as the position, A.
     pub smooth_current: Option<Vec<f64>>,
     /// VFFWS, rad/s of the motor.
     pub velocity_feedforward: Option<Vec<f64>>,

@@ -1,10 +1,10 @@
-//! From placed samples to spans in which every channel has a value at every multiple of the period.
+//! Extraction of complete sections: every channel has a value at every multiple of the sampling period.
 
-use super::order::{median, quantile};
-use super::stamps::{Block, MAX_BRIDGED, Placed};
+use super::uniform_grid::{MAX_BRIDGED, SampleBlock, UniformGrid};
 use super::{Finding, RawRecording};
+use virtual_axes_core::statistics::{median, quantile};
 
-/// Channels of a recording; the first is the position.
+/// Number of channels; the first is the position.
 pub(super) const CHANNELS: usize = 6;
 pub(super) const POSITION: usize = 0;
 pub(super) const PSEC: usize = 1;
@@ -12,49 +12,50 @@ pub(super) const VELOCITY: usize = 2;
 pub(super) const CURRENT: usize = 3;
 pub(super) const VELOCITY_FEEDFORWARD: usize = 4;
 pub(super) const TORQUE_FEEDFORWARD: usize = 5;
-/// What they are called.
+/// Names of the channels in messages.
 pub(super) const NAMES: [&str; CHANNELS] =
     ["position", "PSEC", "velocity", "current", "velocity feedforward", "torque feedforward"];
-/// A value for each sample, by channel.
-pub(super) type Columns = [Option<Vec<f64>>; CHANNELS];
+/// Values of each channel, one per sample.
+pub(super) type ChannelColumns = [Option<Vec<f64>>; CHANNELS];
 
-/// Largest magnitude of a value in any unit: beyond it there is no number that was measured.
+/// Largest plausible magnitude of a value in any unit.
 const LARGEST: f64 = 1e15;
-/// Part of its samples that a channel must have to be used at all.
+/// Smallest share of valid values of a usable channel.
 const FEWEST_VALUES: f64 = 0.5;
-/// Samples on either side from which the speed about a frozen run is taken.
+/// Samples on either side that determine the speed around a frozen run.
 const ABOUT: usize = 10;
-/// Steps of the common size that the position must leap by behind a frozen run, at least and per frozen sample.
+/// Smallest jump of the position behind a frozen run, in usual steps: in total, and per frozen sample.
 const LEAP: f64 = 2.5;
 const LEAP_PER_SAMPLE: f64 = 0.5;
-/// Equal steps of zero that make a frozen run.
+/// Number of zero steps in a row that form a frozen run.
 const FROZEN: usize = 2;
-/// Part of samples from which on frozen positions are no accident.
+/// Share of frozen samples above which a remedy is suggested.
 const MOSTLY_FROZEN: f64 = 0.05;
-/// Part of a period within which a sample is at a multiple of it, and keeps its value.
+/// Distance from a multiple of the period, relative to it, within which a sample keeps its value.
 const AT: f64 = 1e-3;
-/// Weights of two interpolations between the neighbors that differ less tell nothing about jitter.
+/// Smallest difference of interpolation weights that is informative about jitter.
 const TELLING: f64 = 0.05;
-/// Fewest samples that tell something about jitter.
+/// Fewest informative samples for a decision about jitter.
 const FEWEST_TELLING: usize = 20;
-/// How much smoother the position must be over the stamps than over the grid.
+/// Ratio of roughness over the stamps to roughness over the grid below which the stamps are the true sampling
+/// times.
 const SMOOTHER: f64 = 0.5;
 
-/// A part of a recording in which nothing is missing.
+/// Section of a recording without missing values.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Piece {
+pub(super) struct RecordingSection {
     /// Time of the first sample, s.
     pub start: f64,
-    pub columns: Columns,
+    pub columns: ChannelColumns,
 }
 
-impl Piece {
-    /// Samples there are.
+impl RecordingSection {
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         self.columns[POSITION].as_ref().map_or(0, Vec::len)
     }
 
-    /// Keeps the samples of `range`, counted from the start.
+    /// Keeps the samples of `range`, relative to the start of the section.
     pub fn cut(&mut self, range: std::ops::Range<usize>, period: f64) {
         self.start += range.start as f64 * period;
         for column in self.columns.iter_mut().flatten() {
@@ -64,17 +65,21 @@ impl Piece {
     }
 }
 
-/// The channels of `raw` that can be used; what is no number that was measured is NaN.
-pub(super) fn columns(raw: &RawRecording, findings: &mut Vec<Finding>) -> Columns {
+/// Returns the usable channels of `raw`; implausible values are NaN.
+pub(super) fn usable_columns(raw: &RawRecording, findings: &mut Vec<Finding>) -> ChannelColumns {
     let channels = channels(raw);
-    let mut columns = Columns::default();
+    let mut columns = ChannelColumns::default();
     for (n, channel) in channels.into_iter().enumerate() {
         let Some(values) = channel else { continue };
         let there = values.iter().filter(|value| value.abs() <= LARGEST).count();
         if (there as f64) < FEWEST_VALUES * values.len() as f64 {
-            let what =
-                format!("{}: the {} has only {there} values for {} stamps", raw.name, NAMES[n], values.len());
-            findings.push(Finding::warning("channel-dropped", what, "it is left out; record it fully"));
+            let what = format!(
+                "{}: the {} has {there} valid values for {} stamps and is dropped",
+                raw.name,
+                NAMES[n],
+                values.len()
+            );
+            findings.push(Finding::warning("channel-dropped", what, "record the channel completely"));
             continue;
         }
         let finite = |value: &f64| if value.abs() <= LARGEST { *value } else { f64::NAN };
@@ -83,7 +88,7 @@ pub(super) fn columns(raw: &RawRecording, findings: &mut Vec<Finding>) -> Column
     columns
 }
 
-/// The channels of `raw` in their order.
+/// Returns the channels of `raw` in fixed order.
 pub(super) fn channels(raw: &RawRecording) -> [Option<&Vec<f64>>; CHANNELS] {
     [
         raw.position.as_ref(),
@@ -95,10 +100,11 @@ pub(super) fn channels(raw: &RawRecording) -> [Option<&Vec<f64>>; CHANNELS] {
     ]
 }
 
-/// Whether the position is smoother over the stamps than over the grid: then the samples were taken when they
-/// are stamped, and not evenly.
-pub(super) fn stamped_smoother(placed: &Placed, position: &[f64]) -> bool {
-    // Travel, and the distance from the straight line between the neighbors: over the grid, over the stamps.
+/// Returns true if the position is smoother over the stamps than over the grid, so that the samples were
+/// taken at their stamps.
+pub(super) fn is_smoother_over_stamps(placed: &UniformGrid, position: &[f64]) -> bool {
+    // Travel between the neighbors, and distance from the straight line between them over the grid and over
+    // the stamps.
     let mut triples: Vec<(f64, f64, f64)> = Vec::new();
     for block in &placed.blocks {
         for n in 1..block.rows.len().saturating_sub(1) {
@@ -116,36 +122,38 @@ pub(super) fn stamped_smoother(placed: &Placed, position: &[f64]) -> bool {
             }
         }
     }
-    let fast = 0.5 * quantile(&mut triples.iter().map(|t| t.0).collect::<Vec<_>>(), 0.9);
+    let fast = 0.5 * quantile(&mut triples.iter().map(|t| t.0).collect::<Vec<_>>(), 0.9).unwrap_or(0.0);
     triples.retain(|t| t.0 > 0.0 && t.0 >= fast);
-    let even = median(&mut triples.iter().map(|t| t.1).collect::<Vec<_>>());
-    let stamped = median(&mut triples.iter().map(|t| t.2).collect::<Vec<_>>());
+    let even = median(&mut triples.iter().map(|t| t.1).collect::<Vec<_>>()).unwrap_or(0.0);
+    let stamped = median(&mut triples.iter().map(|t| t.2).collect::<Vec<_>>()).unwrap_or(0.0);
     triples.len() >= FEWEST_TELLING && stamped < SMOOTHER * even
 }
 
-/// The spans of a recording, of `shortest` samples and more; the length of the longest there is.
-pub(super) fn pieces(
+/// Returns the sections of at least `shortest` samples, and the length of the longest section of any length.
+pub(super) fn extract_sections(
     name: &str,
-    placed: &Placed,
-    columns: &Columns,
+    placed: &UniformGrid,
+    columns: &ChannelColumns,
     shortest: usize,
     findings: &mut Vec<Finding>,
-) -> (Vec<Piece>, usize) {
-    tell_gaps(name, placed, findings);
+) -> (Vec<RecordingSection>, usize) {
+    report_gaps(name, placed, findings);
     let mut pieces = Vec::new();
     let (mut bridged, mut holes, mut frozen) = (0, 0, Vec::new());
     for block in &placed.blocks {
-        let mut dense =
-            if placed.even { gridded(block, columns) } else { resampled(block, columns, placed.period) };
-        if placed.even {
-            frozen.extend(thaw(&mut dense, block.start, placed.period));
+        let mut dense = if placed.is_uniform {
+            place_on_grid(block, columns)
+        } else {
+            resample(block, columns, placed.period)
+        };
+        if placed.is_uniform {
+            frozen.extend(remove_frozen(&mut dense, block.start, placed.period));
         }
-        bridged += (0..CHANNELS).map(|n| bridge(&mut dense[n], n)).sum::<usize>();
-        holes += split(&dense, block.start, placed.period, &mut pieces);
+        bridged += (0..CHANNELS).map(|n| interpolate_missing(&mut dense[n], n)).sum::<usize>();
+        holes += split_at_holes(&dense, block.start, placed.period, &mut pieces);
     }
     if bridged > 0 {
-        let what =
-            format!("{name}: {bridged} missing values, at most {MAX_BRIDGED} in a row, are interpolated");
+        let what = format!("{name}: {bridged} missing values interpolated, at most {MAX_BRIDGED} in a row");
         findings.push(Finding::note("bridged", what));
     }
     if let Some((begin, _)) = frozen.first() {
@@ -153,26 +161,27 @@ pub(super) fn pieces(
         let samples: usize = placed.blocks.iter().map(|block| block.rows.len()).sum();
         let lost: f64 = frozen.iter().map(|(_, length)| length / placed.period).sum();
         let what = format!(
-            "{name}: the position stands still {} times amid motion and leaps, first at {begin:.3} s, at most {:.1} ms; \
-             these samples are cut out",
+            "{name}: the position freezes {} times during motion, first at {begin:.3} s, for at most {:.1} ms; \
+             these samples are dropped",
             frozen.len(),
             longest * 1e3
         );
-        let remedy =
-            if lost > MOSTLY_FROZEN * samples as f64 { "record with less load on the logger" } else { "" };
+        let remedy = if lost > MOSTLY_FROZEN * samples as f64 { "reduce the load on the logger" } else { "" };
         findings.push(Finding::warning("frozen", what, remedy));
     }
     if holes > 0 {
-        let what = format!("{name}: {holes} times values are missing for more than {MAX_BRIDGED} samples");
-        findings.push(Finding::warning("hole", what, "the recording is parted there"));
+        let what = format!(
+            "{name}: {holes} times more than {MAX_BRIDGED} values in a row are missing; the recording is split there"
+        );
+        findings.push(Finding::warning("hole", what, ""));
     }
-    let longest = pieces.iter().map(Piece::len).max().unwrap_or(0);
-    let (all, before) = (pieces.len(), pieces.iter().map(Piece::len).sum::<usize>());
+    let longest = pieces.iter().map(RecordingSection::len).max().unwrap_or(0);
+    let (all, before) = (pieces.len(), pieces.iter().map(RecordingSection::len).sum::<usize>());
     pieces.retain(|piece| piece.len() >= shortest);
     if pieces.len() < all {
-        let lost = before - pieces.iter().map(Piece::len).sum::<usize>();
+        let lost = before - pieces.iter().map(RecordingSection::len).sum::<usize>();
         let what = format!(
-            "{name}: {} parts shorter than {shortest} samples, {lost} samples together, are left out",
+            "{name}: {} sections shorter than {shortest} samples dropped, {lost} samples in total",
             all - pieces.len()
         );
         findings.push(Finding::note("short-span", what));
@@ -180,21 +189,21 @@ pub(super) fn pieces(
     (pieces, longest)
 }
 
-fn tell_gaps(name: &str, placed: &Placed, findings: &mut Vec<Finding>) {
+fn report_gaps(name: &str, placed: &UniformGrid, findings: &mut Vec<Finding>) {
     let ends = placed.blocks.windows(2).map(|pair| (pair[0].stamps.last(), pair[1].stamps.first()));
     let gaps: Vec<(f64, f64)> = ends.filter_map(|(a, b)| Some((*a?, b? - a?))).collect();
     let Some((begin, _)) = gaps.first() else { return };
     let longest = gaps.iter().map(|(_, length)| *length).fold(0.0, f64::max);
     let what = format!(
-        "{name}: {} gaps, the first at {begin:.3} s, the longest of {:.1} ms; the recording is parted there",
+        "{name}: {} gaps, the first at {begin:.3} s, the longest of {:.1} ms; the recording is split there",
         gaps.len(),
         longest * 1e3
     );
     findings.push(Finding::warning("gap", what, ""));
 }
 
-/// The samples of a block in their slots, NaN where there is none.
-fn gridded(block: &Block, columns: &Columns) -> Columns {
+/// Places the samples of a block in their slots; empty slots are NaN.
+fn place_on_grid(block: &SampleBlock, columns: &ChannelColumns) -> ChannelColumns {
     let count = block.slots.last().map_or(0, |last| last + 1);
     let fill = |values: &Vec<f64>| {
         let mut dense = vec![f64::NAN; count];
@@ -206,8 +215,8 @@ fn gridded(block: &Block, columns: &Columns) -> Columns {
     std::array::from_fn(|n| columns[n].as_ref().map(fill))
 }
 
-/// The samples of a block interpolated from their stamps to the grid.
-fn resampled(block: &Block, columns: &Columns, period: f64) -> Columns {
+/// Interpolates the samples of a block from their stamps to the grid.
+fn resample(block: &SampleBlock, columns: &ChannelColumns, period: f64) -> ChannelColumns {
     let length = block.stamps.last().map_or(0.0, |last| last - block.start);
     let count = (length / period + AT) as usize + 1;
     let interpolate = |(n, values): (usize, &Vec<f64>)| {
@@ -220,15 +229,15 @@ fn resampled(block: &Block, columns: &Columns, period: f64) -> Columns {
                 while at + 1 < nodes.len() && nodes[at + 1].0 <= time + AT * period {
                     at += 1;
                 }
-                between(&nodes, at, time, period, n <= VELOCITY)
+                interpolate(&nodes, at, time, period, n <= VELOCITY)
             })
             .collect()
     };
     std::array::from_fn(|n| columns[n].as_ref().map(|values| interpolate((n, values))))
 }
 
-/// Value at `time` between node `at` and the next one: `smooth` by a cubic, otherwise by a straight line.
-fn between(nodes: &[(f64, f64)], at: usize, time: f64, period: f64, smooth: bool) -> f64 {
+/// Interpolates at `time` between node `at` and the next one: cubic if `smooth`, otherwise linear.
+fn interpolate(nodes: &[(f64, f64)], at: usize, time: f64, period: f64, smooth: bool) -> f64 {
     let Some(&(t0, x0)) = nodes.get(at) else { return f64::NAN };
     if (time - t0).abs() <= AT * period {
         return x0;
@@ -240,7 +249,7 @@ fn between(nodes: &[(f64, f64)], at: usize, time: f64, period: f64, smooth: bool
     }
     let part = (time - t0) / step;
     let straight = x0 + part * (x1 - x0);
-    // Slopes from the parabola through three nodes; at an end that of the straight line.
+    // Slopes of the parabola through three nodes; of the straight line at an end.
     let slope = |a: Option<&(f64, f64)>, b: (f64, f64), c: Option<&(f64, f64)>| match (a, c) {
         (Some(a), Some(c)) => {
             let (left, right) = (b.0 - a.0, c.0 - b.0);
@@ -258,8 +267,9 @@ fn between(nodes: &[(f64, f64)], at: usize, time: f64, period: f64, smooth: bool
     straight + part * (1.0 - part) * (a * (1.0 - part) + b * part)
 }
 
-/// Takes out where the position stands still amid fast motion and then leaps: begin and length of each, s.
-fn thaw(dense: &mut Columns, start: f64, period: f64) -> Vec<(f64, f64)> {
+/// Removes samples where the position freezes during motion and then jumps. Returns start and length of each
+/// run, s.
+fn remove_frozen(dense: &mut ChannelColumns, start: f64, period: f64) -> Vec<(f64, f64)> {
     let Some(position) = &dense[POSITION] else { return Vec::new() };
     let steps: Vec<f64> = position.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let mut frozen = Vec::new();
@@ -267,7 +277,7 @@ fn thaw(dense: &mut Columns, start: f64, period: f64) -> Vec<(f64, f64)> {
     while n < steps.len() {
         let run = steps[n..].iter().take_while(|step| **step == 0.0).count();
         let end = n + run;
-        if run >= FROZEN && end < steps.len() && leaps(&steps, n, end) {
+        if run >= FROZEN && end < steps.len() && is_frozen(&steps, n, end) {
             frozen.push(n + 1..end + 1);
         }
         n = end + 1;
@@ -280,10 +290,11 @@ fn thaw(dense: &mut Columns, start: f64, period: f64) -> Vec<(f64, f64)> {
     frozen.iter().map(|run| (start + run.start as f64 * period, run.len() as f64 * period)).collect()
 }
 
-/// Whether the motion before and behind the steps n..end, which are zero, shows that they are not true.
-fn leaps(steps: &[f64], n: usize, end: usize) -> bool {
-    let common =
-        |steps: &[f64]| median(&mut steps.iter().copied().filter(|s| !s.is_nan()).collect::<Vec<_>>());
+/// Returns true if the zero steps `n..end` are a frozen signal, judged by the motion before and behind them.
+fn is_frozen(steps: &[f64], n: usize, end: usize) -> bool {
+    let common = |steps: &[f64]| {
+        median(&mut steps.iter().copied().filter(|s| !s.is_nan()).collect::<Vec<_>>()).unwrap_or(0.0)
+    };
     let before = common(&steps[n.saturating_sub(ABOUT)..n]);
     let after = common(&steps[end + 1..(end + 1 + ABOUT).min(steps.len())]);
     let step = 0.5 * (before + after);
@@ -291,8 +302,8 @@ fn leaps(steps: &[f64], n: usize, end: usize) -> bool {
     before * after > 0.0 && leap >= LEAP && leap >= LEAP_PER_SAMPLE * (end - n + 1) as f64
 }
 
-/// Interpolates runs of at most [`MAX_BRIDGED`] missing values; how many values that were.
-fn bridge(column: &mut Option<Vec<f64>>, channel: usize) -> usize {
+/// Interpolates runs of at most [`MAX_BRIDGED`] missing values. Returns the number of interpolated values.
+fn interpolate_missing(column: &mut Option<Vec<f64>>, channel: usize) -> usize {
     let Some(values) = column else { return 0 };
     let (mut bridged, mut n) = (0, 1);
     while n < values.len() {
@@ -305,7 +316,7 @@ fn bridge(column: &mut Option<Vec<f64>>, channel: usize) -> usize {
                 near.into_iter().filter_map(value).filter(|(_, v)| !v.is_nan()).collect();
             let before = usize::from(nodes.first().is_some_and(|node| node.0 < (n - 1) as f64));
             for (j, missing) in values.iter_mut().enumerate().skip(n).take(run) {
-                *missing = between(&nodes, before, j as f64, 1.0, channel <= VELOCITY);
+                *missing = interpolate(&nodes, before, j as f64, 1.0, channel <= VELOCITY);
             }
             bridged += run;
         }
@@ -314,8 +325,13 @@ fn bridge(column: &mut Option<Vec<f64>>, channel: usize) -> usize {
     bridged
 }
 
-/// Adds the parts in which every channel has its value; how many holes are between them.
-fn split(dense: &Columns, start: f64, period: f64, pieces: &mut Vec<Piece>) -> usize {
+/// Appends the sections in which every channel has a value. Returns the number of holes between them.
+fn split_at_holes(
+    dense: &ChannelColumns,
+    start: f64,
+    period: f64,
+    pieces: &mut Vec<RecordingSection>,
+) -> usize {
     let count = dense[POSITION].as_ref().map_or(0, Vec::len);
     let whole = |n: usize| dense.iter().flatten().all(|column| !column[n].is_nan());
     let (mut parts, mut n) = (0, 0);
@@ -325,7 +341,7 @@ fn split(dense: &Columns, start: f64, period: f64, pieces: &mut Vec<Piece>) -> u
             parts += 1;
             let columns =
                 std::array::from_fn(|c| dense[c].as_ref().map(|column| column[n..n + run].to_vec()));
-            pieces.push(Piece { start: start + n as f64 * period, columns });
+            pieces.push(RecordingSection { start: start + n as f64 * period, columns });
         }
         n += run + 1;
     }

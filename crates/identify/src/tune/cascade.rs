@@ -1,4 +1,5 @@
-//! Search of the cascade's gains: Powell's COBYLA from several starts, first alike on each axis, then apart.
+//! Search of the cascade gains by COBYLA (Powell) from several starts, first common to all axes, then per
+//! axis.
 
 use std::cell::RefCell;
 use std::f64::consts::LN_10;
@@ -7,47 +8,52 @@ use cobyla::{Func, RhoBeg, StopTols, minimize};
 use rayon::prelude::*;
 
 use super::TuneError;
-use super::bench::{Bench, Candidate, Search, ranked};
-use super::loops::MarginLimits;
-use super::tuning::{AxisGains, Tuning, rounded, torque_key};
+use super::margin_limits::MarginLimits;
+use super::problem::{SearchResult, TuningCandidate, TuningProblem, ranked};
+use super::tuning::{AxisGains, Tuning, round_significant, torque_key};
 use virtual_axes_core::config::Value;
 
-/// Starts of the first part: the machine's own gains, and so many less one beside them.
+/// Starts of the first stage: the present gains and random ones.
 const STARTS: usize = 8;
-/// Starts of the second part: the best of the first.
+/// Starts of the second stage: the best results of the first.
 const FINISHERS: usize = 2;
-/// Runs of a start of the first part.
+/// Runs per start of the first stage.
 const COMMON_RUNS: usize = 50;
-/// Runs of a start of the second part, for each variable.
+/// Runs per start and variable of the second stage.
 const RUNS_PER_VARIABLE: usize = 20;
-/// Variables of an axis: ln of Kp over the machine's, VFFW, TFFW over Jeq.
+/// Variables per axis: ln of Kp relative to the present one, VFFW, TFFW relative to Jeq.
 const VARIABLES: usize = 3;
-/// Bounds of the variables: a tenth to ten times Kp; feedforward off to beyond the inverse of the plant.
+/// Bounds of the variables: Kp from a tenth to ten times; feedforward from off to beyond the inverse of the
+/// plant.
 const BOUNDS: [(f64, f64); VARIABLES] = [(-LN_10, LN_10), (0.0, 1.2), (0.0, 1.2)];
-/// Part of the bounds in which starts lie: beyond a few times Kp no axis is stable.
+/// Bounds of the random starts; axes are unstable beyond a few times Kp.
 const START_BOUNDS: [(f64, f64); VARIABLES] = [(-0.7, 0.7), (0.7, 1.1), (0.0, 1.0)];
-/// First steps of the variables, alike and apart.
+/// Initial steps of the variables in the first and second stage.
 const STEPS: [f64; VARIABLES] = [0.2, 0.05, 0.15];
 const FINE_STEPS: [f64; VARIABLES] = [0.05, 0.01, 0.05];
-/// Steps at which a search ends, part of the first ones.
+/// Final step relative to the initial step.
 const LAST_STEP: f64 = 0.02;
-/// Kp of an axis that has none to begin from, (m/min)/mm.
+/// Kp of an axis without gain, (m/min)/mm.
 const DEFAULT_GAIN: f64 = 1.0;
-/// What a loop without margins costs, times the machine as it is.
+/// Cost of an unstable loop relative to the present cost.
 const UNSTABLE: f64 = 10.0;
-/// Delay margins beyond this, s, are as good as any: constraints must be finite.
+/// Largest delay margin in the constraints, s; constraints must be finite.
 const LONG: f64 = 1.0;
 /// Significant digits of the gains.
 const DIGITS: usize = 5;
 
-/// The gains of the cascade (Kp, VFFW, TFFW) of each axis that moves that cost least on the bench's path.
+/// Searches the cascade gains (Kp, VFFW, TFFW) of each moving axis with the lowest cost.
 ///
-/// Kv and Tv stay as they are: the margins are those of the position loop and do not guard the loop inside.
-/// The starts beside the machine's own gains come from `seed`; the same seed gives the same gains.
+/// Kv and Tv stay unchanged: the margins are those of the position loop and do not protect the velocity loop.
+/// `seed` determines the random starts; the same seed gives the same gains.
 ///
 /// # Errors
-/// [`TuneError`], also if no tuning keeps the limits.
-pub fn tune_cascade(bench: &Bench<'_>, limits: &MarginLimits, seed: u64) -> Result<Search, TuneError> {
+/// [`TuneError`] if a run fails or no tuning is within the limits.
+pub fn tune_cascade(
+    bench: &TuningProblem<'_>,
+    limits: &MarginLimits,
+    seed: u64,
+) -> Result<SearchResult, TuneError> {
     let axes: Vec<Axis> =
         bench.joints().iter().zip(bench.axes()).map(|(j, a)| Axis::of(bench, j, a.motor.inertia)).collect();
     let own: Vec<[f64; VARIABLES]> = axes.iter().map(Axis::own).collect();
@@ -57,16 +63,16 @@ pub fn tune_cascade(bench: &Bench<'_>, limits: &MarginLimits, seed: u64) -> Resu
     starts
         .resize_with(STARTS, || START_BOUNDS.map(|(low, high)| low + (high - low) * random.next()).to_vec());
 
-    bench.watch().begin("alike on each axis", STARTS * COMMON_RUNS);
+    bench.progress().begin("alike on each axis", STARTS * COMMON_RUNS);
     let spread = |x: &[f64]| -> Tuning {
         let point: Vec<f64> = axes.iter().flat_map(|_| x.iter().copied()).collect();
         tuning(&axes, &point)
     };
     let common = descend_all(bench, limits, starts, &STEPS, COMMON_RUNS, &spread)?;
-    // Where the axes of the machine differ, its own gains are no common ones.
+    // The mean gains are poor common gains if the axes differ, so the own gains are a start, too.
     let mut ends: Vec<(f64, Vec<f64>)> = common.iter().filter_map(|found| found.end(limits)).collect();
     ends.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut tried: Vec<Found> = common;
+    let mut tried: Vec<DescentHistory> = common;
 
     let apart = |x: &[f64]| tuning(&axes, x);
     let mut fine: Vec<Vec<f64>> = ends
@@ -76,16 +82,16 @@ pub fn tune_cascade(bench: &Bench<'_>, limits: &MarginLimits, seed: u64) -> Resu
         .collect();
     fine.push(own.concat());
     let runs = RUNS_PER_VARIABLE * VARIABLES * axes.len();
-    bench.watch().begin("each axis by itself", fine.len() * runs);
+    bench.progress().begin("each axis by itself", fine.len() * runs);
     tried.extend(descend_all(bench, limits, fine, &FINE_STEPS, runs, &apart)?);
 
     let designs = tried.iter().map(|found| found.history.len()).sum();
-    let all: Vec<Candidate> =
+    let all: Vec<TuningCandidate> =
         tried.into_iter().flat_map(|found| found.history).filter_map(|(_, candidate)| candidate).collect();
     let runs = all.len();
     let most = all.iter().filter_map(|c| c.margins).max_by(|a, b| a.modulus.total_cmp(&b.modulus));
-    let kept: Vec<Candidate> =
-        all.into_iter().filter(|c| c.margins.is_some_and(|m| limits.are_kept_by(&m))).collect();
+    let kept: Vec<TuningCandidate> =
+        all.into_iter().filter(|c| c.margins.is_some_and(|m| limits.allows(&m))).collect();
     if kept.is_empty() {
         return Err(match most {
             Some(m) => TuneError::NoMargins { designs, limits: *limits, modulus: m.modulus, delay: m.delay },
@@ -94,10 +100,10 @@ pub fn tune_cascade(bench: &Bench<'_>, limits: &MarginLimits, seed: u64) -> Resu
     }
     let tried = ranked(kept);
     let best = tried.first().cloned().ok_or(TuneError::Saturated { runs })?;
-    Ok(Search { best, tried, designs, runs })
+    Ok(SearchResult { best, tried, designs, runs })
 }
 
-/// An axis and the gains it has.
+/// Axis with its present gains.
 struct Axis {
     joint: String,
     gains: AxisGains,
@@ -105,7 +111,7 @@ struct Axis {
 }
 
 impl Axis {
-    fn of(bench: &Bench<'_>, joint: &str, inertia: f64) -> Self {
+    fn of(bench: &TuningProblem<'_>, joint: &str, inertia: f64) -> Self {
         let number = |key: String| match bench.parameters().get(&key) {
             Some(Value::Double(value)) => value,
             _ => 0.0,
@@ -119,7 +125,7 @@ impl Axis {
         Axis { joint: joint.to_owned(), gains, inertia }
     }
 
-    /// Its own gains as variables.
+    /// Returns the present gains as variables.
     fn own(&self) -> [f64; VARIABLES] {
         let own = [0.0, self.gains.velocity, self.gains.torque / self.inertia];
         let mut within = own.into_iter().zip(BOUNDS).map(|(x, (low, high))| x.clamp(low, high));
@@ -127,46 +133,46 @@ impl Axis {
     }
 }
 
-/// The gains at a point of three variables for each axis.
+/// Converts a point of three variables per axis to gains.
 fn tuning(axes: &[Axis], x: &[f64]) -> Tuning {
     let of_axis = |(axis, x): (&Axis, &[f64])| {
         let at = |variable: usize| x.get(variable).copied().unwrap_or_default();
         let gains = AxisGains {
-            gain: rounded(axis.gains.gain * at(0).exp(), DIGITS),
-            velocity: rounded(at(1), DIGITS),
-            torque: rounded(at(2) * axis.inertia, DIGITS),
+            gain: round_significant(axis.gains.gain * at(0).exp(), DIGITS),
+            velocity: round_significant(at(1), DIGITS),
+            torque: round_significant(at(2) * axis.inertia, DIGITS),
         };
         (axis.joint.clone(), gains)
     };
     Tuning::Cascade(axes.iter().zip(x.chunks(VARIABLES)).map(of_axis).collect())
 }
 
-/// What a search has seen: its points, with the run where the loop is stable.
-struct Found {
-    history: Vec<(Vec<f64>, Option<Candidate>)>,
+/// Evaluated points of a search; candidates are none for unstable loops.
+struct DescentHistory {
+    history: Vec<(Vec<f64>, Option<TuningCandidate>)>,
 }
 
-impl Found {
-    /// The best point that keeps the limits, with its cost.
+impl DescentHistory {
+    /// Returns the best point within the limits and its cost.
     fn end(&self, limits: &MarginLimits) -> Option<(f64, Vec<f64>)> {
         let kept = self.history.iter().filter_map(|(x, candidate)| {
             let candidate = candidate.as_ref()?;
-            let keeps = limits.are_kept_by(&candidate.margins?) && !candidate.saturated;
+            let keeps = limits.allows(&candidate.margins?) && !candidate.is_saturated;
             keeps.then(|| (candidate.cost, x.clone()))
         });
         kept.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 }
 
-/// One search from each start, over all cores.
+/// Runs one search per start in parallel.
 fn descend_all(
-    bench: &Bench<'_>,
+    bench: &TuningProblem<'_>,
     limits: &MarginLimits,
     starts: Vec<Vec<f64>>,
     steps: &[f64; VARIABLES],
     runs: usize,
     tuning_at: &(impl Fn(&[f64]) -> Tuning + Sync),
-) -> Result<Vec<Found>, TuneError> {
+) -> Result<Vec<DescentHistory>, TuneError> {
     starts
         .into_par_iter()
         .with_max_len(1)
@@ -174,19 +180,19 @@ fn descend_all(
         .collect()
 }
 
-/// Minimizes from `start` on; margins and saturation are constraints.
+/// Minimizes the cost from `start`; margins and saturation are constraints.
 fn descend(
-    bench: &Bench<'_>,
+    bench: &TuningProblem<'_>,
     limits: &MarginLimits,
     start: &[f64],
     steps: &[f64; VARIABLES],
     runs: usize,
     tuning_at: &impl Fn(&[f64]) -> Tuning,
-) -> Result<Found, TuneError> {
-    let seen: RefCell<Vec<(Vec<f64>, Option<Candidate>)>> = RefCell::default();
+) -> Result<DescentHistory, TuneError> {
+    let seen: RefCell<Vec<(Vec<f64>, Option<TuningCandidate>)>> = RefCell::default();
     let failed: RefCell<Option<TuneError>> = RefCell::default();
-    // Objective and constraints ask about the same point one after the other.
-    let look = |x: &[f64], read: &dyn Fn(Option<&Candidate>) -> f64| -> f64 {
+    // Objective and constraints evaluate the same point in sequence.
+    let look = |x: &[f64], read: &dyn Fn(Option<&TuningCandidate>) -> f64| -> f64 {
         if failed.borrow().is_some() {
             return 0.0;
         }
@@ -196,7 +202,7 @@ fn descend(
         }
         let tuning = tuning_at(x);
         let run = match bench.margins(&tuning) {
-            // An unstable axis is not run: it would only saturate.
+            // An unstable axis is not simulated; it would saturate.
             None => Ok(None),
             margins => bench.run(&tuning, margins).map(Some),
         };
@@ -218,12 +224,13 @@ fn descend(
         look(x, &|c| c.and_then(|c| c.margins).map_or(-1.0, |m| m.modulus - limits.modulus))
     };
     let delay = |x: &[f64], (): &mut ()| {
-        // In units of the limit, so that both constraints are of like size.
+        // Scaled by the limit, so that both constraints have similar magnitude.
         let scale = if limits.delay > 0.0 { limits.delay } else { LONG };
         look(x, &|c| c.and_then(|c| c.margins).map_or(-1.0, |m| (m.delay.min(LONG) - limits.delay) / scale))
     };
     let saturation = |x: &[f64], (): &mut ()| {
-        let time = |c: &Candidate| c.figures.axes.iter().map(|axis| axis.report.saturation_time).sum::<f64>();
+        let time =
+            |c: &TuningCandidate| c.figures.axes.iter().map(|axis| axis.report.saturation_time).sum::<f64>();
         look(x, &|c| c.map_or(-1.0, |c| -time(c)))
     };
     let constraints: [&dyn Func<()>; 3] = [&modulus, &delay, &saturation];
@@ -234,19 +241,19 @@ fn descend(
     let bounds: Vec<(f64, f64)> = BOUNDS.into_iter().cycle().take(start.len()).collect();
     let tolerances =
         StopTols { xtol_abs: steps.iter().map(|step| step * LAST_STEP).collect(), ..StopTols::default() };
-    // How it ends is of no interest: the best point is taken from all that it has seen.
+    // The return value is not needed; the best point is taken from the history.
     let _ = minimize(objective, start, &bounds, &constraints, (), runs, RhoBeg::Set(steps), Some(tolerances));
     match failed.into_inner() {
         Some(error) => Err(error),
-        None => Ok(Found { history: seen.into_inner() }),
+        None => Ok(DescentHistory { history: seen.into_inner() }),
     }
 }
 
-/// Pseudo-random numbers: SplitMix64 (Steele, Lea and Flood 2014).
+/// Pseudo-random number generator SplitMix64 (Steele, Lea and Flood 2014).
 struct SplitMix(u64);
 
 impl SplitMix {
-    /// In 0 … 1.
+    /// Returns a number in 0 … 1.
     fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

@@ -1,58 +1,64 @@
-//! What a run costs: one number from its figures.
+//! Cost of a run: weighted sum of its figures.
 
 use std::fmt;
 use std::str::FromStr;
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::trial::{AxisFigures, Figures};
-use virtual_axes_core::units::{DEGREE, MILLIMETER, Told};
+use virtual_axes_core::units::{DEGREE, MILLIMETER, Rounded};
 
-/// m in µm.
+/// Micrometer in m.
 const MICROMETER: f64 = 1e-3 * MILLIMETER;
-/// rad in mdeg.
+/// Millidegree in rad.
 const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 
-/// A figure of a run that can be part of a cost.
+/// Figure of a run that can be part of a cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Term {
-    /// Largest contour error, µm; where there is no contour to be off, as [`Term::Tracking`].
+pub enum CostTerm {
+    /// Largest contour error, µm; without contour error the same as [`CostTerm::Following`].
     Contour,
-    /// RMS contour error, µm; where there is no contour to be off, as [`Term::Rms`].
+    /// RMS contour error, µm; without contour error the same as [`CostTerm::Rms`].
     ContourRms,
-    /// Largest synchronized tracking error of any axis, µm or mdeg.
-    Tracking,
-    /// RMS synchronized tracking error of the worst axis, µm or mdeg.
-    Rms,
-    /// Largest current of any axis, part of its limit.
+    /// Largest delay-compensated following error of any axis, µm or mdeg.
+    Following,
+    /// Largest RMS delay-compensated following error of any axis, µm or mdeg.
+    FollowingRms,
+    /// Largest current of any axis relative to its limit.
     Current,
-    /// Control activity of the liveliest axis, A.
+    /// Largest control activity of any axis, A.
     Activity,
 }
 
-impl Term {
-    /// All of them.
-    pub const ALL: [Term; 6] =
-        [Term::Contour, Term::ContourRms, Term::Tracking, Term::Rms, Term::Current, Term::Activity];
+impl CostTerm {
+    /// All terms.
+    pub const ALL: [CostTerm; 6] = [
+        CostTerm::Contour,
+        CostTerm::ContourRms,
+        CostTerm::Following,
+        CostTerm::FollowingRms,
+        CostTerm::Current,
+        CostTerm::Activity,
+    ];
 
-    /// As it is written in a cost.
+    /// Returns the name in the text form of a cost.
     pub fn name(self) -> &'static str {
         match self {
-            Term::Contour => "contour",
-            Term::ContourRms => "contour-rms",
-            Term::Tracking => "tracking",
-            Term::Rms => "rms",
-            Term::Current => "current",
-            Term::Activity => "activity",
+            CostTerm::Contour => "contour",
+            CostTerm::ContourRms => "contour-rms",
+            CostTerm::Following => "following",
+            CostTerm::FollowingRms => "rms",
+            CostTerm::Current => "current",
+            CostTerm::Activity => "activity",
         }
     }
 
-    /// Its unit on a path that has `figures`.
+    /// Returns the unit on a path with `figures`.
     pub fn unit(self, figures: &Figures) -> &'static str {
         let moves = |kind: AxisKind| figures.axes.iter().any(|axis| axis.moves && axis.kind == kind);
         match self {
-            Term::Current => "of the limit",
-            Term::Activity => "A",
-            Term::Contour | Term::ContourRms if has_contour(figures) => "µm",
+            CostTerm::Current => "of the limit",
+            CostTerm::Activity => "A",
+            CostTerm::Contour | CostTerm::ContourRms if has_contour(figures) => "µm",
             _ => match (moves(AxisKind::Linear), moves(AxisKind::Rotary)) {
                 (true, true) => "µm or mdeg",
                 (false, true) => "mdeg",
@@ -61,7 +67,7 @@ impl Term {
         }
     }
 
-    /// Its value in a run of `machine`, in its unit; of the axes that move.
+    /// Returns the value in a run of `machine` over the moving axes, in the unit of the term.
     pub fn of(self, figures: &Figures, machine: &MachineConfig) -> f64 {
         let worst = |value: &dyn Fn(&AxisFigures) -> f64| {
             figures.axes.iter().filter(|axis| axis.moves).map(value).fold(0.0, f64::max)
@@ -71,16 +77,16 @@ impl Term {
             AxisKind::Rotary => MILLIDEGREE,
         };
         match (self, figures.contour.filter(|_| has_contour(figures))) {
-            (Term::Contour, Some(contour)) => contour.max / MICROMETER,
-            (Term::ContourRms, Some(contour)) => contour.rms / MICROMETER,
-            (Term::Contour | Term::Tracking, _) => {
-                worst(&|axis| axis.report.max_synchronized_tracking_error / unit(axis))
+            (CostTerm::Contour, Some(contour)) => contour.max / MICROMETER,
+            (CostTerm::ContourRms, Some(contour)) => contour.rms / MICROMETER,
+            (CostTerm::Contour | CostTerm::Following, _) => {
+                worst(&|axis| axis.report.max_delay_compensated_following_error / unit(axis))
             }
-            (Term::ContourRms | Term::Rms, _) => {
-                worst(&|axis| axis.report.rms_synchronized_tracking_error / unit(axis))
+            (CostTerm::ContourRms | CostTerm::FollowingRms, _) => {
+                worst(&|axis| axis.report.rms_delay_compensated_following_error / unit(axis))
             }
-            (Term::Activity, _) => worst(&|axis| axis.report.control_activity),
-            (Term::Current, _) => {
+            (CostTerm::Activity, _) => worst(&|axis| axis.report.control_activity),
+            (CostTerm::Current, _) => {
                 let limited = machine.axes().iter().zip(&figures.axes).filter(|(_, axis)| axis.moves);
                 let parts = limited.map(|(config, axis)| axis.report.peak_current / config.motor.max_current);
                 parts.fold(0.0, f64::max)
@@ -89,88 +95,88 @@ impl Term {
     }
 }
 
-/// Whether the axes can be off a contour: one axis alone never leaves its line but at the ends, and without
-/// a linear axis the tool turns in place.
+/// Returns true if the axes can have a contour error. A single axis leaves its line only at the ends, and
+/// without a linear axis the tool tip does not move.
 fn has_contour(figures: &Figures) -> bool {
     let moving = || figures.axes.iter().filter(|axis| axis.moves);
     figures.contour.is_some() && moving().count() > 1 && moving().any(|axis| axis.kind == AxisKind::Linear)
 }
 
-/// Of a term: beside each other they leave room for any ratio, and a sum of figures stays a number.
+/// Largest weight of a term; permits any useful ratio and keeps the sum finite.
 const LARGEST_WEIGHT: f64 = 1e9;
 
-/// A weighted sum of figures, to be as small as possible.
+/// Weighted sum of figures that a search minimizes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cost {
-    terms: Vec<(Term, f64)>,
+    terms: Vec<(CostTerm, f64)>,
 }
 
-/// A cost that cannot be read.
+/// Error of parsing a cost.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CostError {
-    /// No such figure.
-    #[error("unknown term {term}; there are {}", Term::ALL.map(Term::name).join(", "))]
+    /// Unknown term.
+    #[error("unknown term {term}; available terms: {}", CostTerm::ALL.map(CostTerm::name).join(", "))]
     UnknownTerm {
-        /// What was found.
+        /// Name of the term.
         term: String,
     },
-    /// A weight that is none.
+    /// Weight out of range.
     #[error("{term}={weight}: the weight must be a number from 0 to {LARGEST_WEIGHT:e}")]
     Weight {
-        /// Of which figure.
+        /// Name of the term.
         term: &'static str,
-        /// What was found.
+        /// Weight.
         weight: String,
     },
-    /// A figure that stands twice.
-    #[error("{term} stands twice")]
-    Twice {
-        /// Which.
+    /// Duplicate term.
+    #[error("{term} is given twice")]
+    Duplicate {
+        /// Name of the term.
         term: &'static str,
     },
-    /// Every weight is zero.
-    #[error("no term has a weight: every tuning would cost the same")]
-    Nothing,
+    /// Cost whose weights are all zero.
+    #[error("all weights are 0; at least one must be above 0")]
+    AllZero,
 }
 
 impl Default for Cost {
-    /// The largest contour error.
+    /// Returns the largest contour error with weight 1.
     fn default() -> Self {
-        Cost { terms: vec![(Term::Contour, 1.0)] }
+        Cost { terms: vec![(CostTerm::Contour, 1.0)] }
     }
 }
 
 impl Cost {
-    /// The cost with these weights.
+    /// Creates a cost from terms and weights.
     ///
     /// # Errors
-    /// [`CostError`].
-    pub fn new(terms: &[(Term, f64)]) -> Result<Self, CostError> {
+    /// [`CostError`] if a weight is out of range, a term is duplicate or all weights are zero.
+    pub fn new(terms: &[(CostTerm, f64)]) -> Result<Self, CostError> {
         for (place, (term, weight)) in terms.iter().enumerate() {
             if !(0.0..=LARGEST_WEIGHT).contains(weight) {
-                return Err(CostError::Weight { term: term.name(), weight: Told(*weight).to_string() });
+                return Err(CostError::Weight { term: term.name(), weight: Rounded(*weight).to_string() });
             }
             if terms[..place].iter().any(|(before, _)| before == term) {
-                return Err(CostError::Twice { term: term.name() });
+                return Err(CostError::Duplicate { term: term.name() });
             }
         }
         if terms.iter().all(|(_, weight)| *weight == 0.0) {
-            return Err(CostError::Nothing);
+            return Err(CostError::AllZero);
         }
         Ok(Cost { terms: terms.to_vec() })
     }
 
-    /// Its terms with their weights.
-    pub fn terms(&self) -> &[(Term, f64)] {
+    /// Returns the terms and weights.
+    pub fn terms(&self) -> &[(CostTerm, f64)] {
         &self.terms
     }
 
-    /// What a run of `machine` costs.
+    /// Returns the cost of a run of `machine`.
     pub fn of(&self, figures: &Figures, machine: &MachineConfig) -> f64 {
         self.terms.iter().map(|(term, weight)| weight * term.of(figures, machine)).sum()
     }
 
-    /// Unit of the cost on a path that has `figures`; empty for a sum of terms, and for one with a weight.
+    /// Returns the unit on a path with `figures`; empty for several terms or a weight other than 1.
     pub fn unit(&self, figures: &Figures) -> &'static str {
         match self.terms.as_slice() {
             [(term, 1.0)] => term.unit(figures),
@@ -195,17 +201,17 @@ impl fmt::Display for Cost {
 impl FromStr for Cost {
     type Err = CostError;
 
-    /// Reads `contour=1,rms=0.5`; a term without a weight has 1.
+    /// Parses `contour=1,rms=0.5`; the default weight is 1.
     fn from_str(text: &str) -> Result<Self, CostError> {
         let terms = text.split(',').map(|part| {
             let (name, weight) = part.split_once('=').map_or((part, "1"), |(name, weight)| (name, weight));
             let (name, weight) = (name.trim(), weight.trim());
-            let term = Term::ALL.into_iter().find(|term| term.name() == name);
+            let term = CostTerm::ALL.into_iter().find(|term| term.name() == name);
             let term = term
-                .ok_or_else(|| CostError::UnknownTerm { term: virtual_axes_core::config::shortened(name) })?;
+                .ok_or_else(|| CostError::UnknownTerm { term: virtual_axes_core::text::shortened(name) })?;
             let refused = || CostError::Weight {
                 term: term.name(),
-                weight: virtual_axes_core::config::shortened(weight),
+                weight: virtual_axes_core::text::shortened(weight),
             };
             Ok((term, weight.parse().map_err(|_| refused())?))
         });

@@ -1,50 +1,50 @@
-//! Search of the tuning of a predictive controller: a grid, then what lies about its best.
+//! Search of the tuning of a predictive controller (GPC): grid search, then local refinement.
 
 use std::collections::HashSet;
 
 use super::TuneError;
-use super::bench::{Bench, Candidate, Search, keeping, ranked};
-use super::loops::MarginLimits;
-use super::tuning::{Tuning, rounded};
+use super::margin_limits::MarginLimits;
+use super::problem::{SearchResult, TuningCandidate, TuningProblem, ranked, within_limits};
+use super::tuning::{Tuning, round_significant};
 use virtual_axes_core::config::Value;
 
 /// Largest N2 of the grid.
 pub const GRID_N2: usize = 24;
 /// Largest Nu of the grid.
 pub const GRID_NU: usize = 8;
-/// λ_rel of the grid, at least.
+/// λ_rel of the grid.
 pub const GRID_LAMBDA: [f64; 12] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1, 2e-1, 5e-1];
 
-/// Largest N2 that the search goes to.
+/// Largest N2 of the local refinement.
 const MAX_N2: usize = 60;
-/// Tunings whose neighbors are looked at in each round.
+/// Number of best tunings refined in each round.
 const CENTERS: usize = 4;
 /// Steps of N1, N2 and Nu to a neighbor.
 const STEPS: [isize; 4] = [-4, -1, 1, 4];
-/// First factor of λ_rel to a neighbor: less than half a step of the grid.
+/// Initial factor of λ_rel to a neighbor: less than half a step of the grid.
 const FIRST_FACTOR: f64 = 1.4;
-/// The search ends when λ_rel is known to this.
+/// Factor of λ_rel at which the search ends.
 const LAST_FACTOR: f64 = 1.02;
-/// A round that saves less than this part of the cost makes the steps of λ_rel smaller.
+/// Relative improvement of the cost below which the steps of λ_rel shrink.
 const GAIN: f64 = 1e-3;
-/// Rounds at most, however slowly the cost falls.
+/// Largest number of rounds.
 const ROUNDS: usize = 16;
 /// Significant digits of λ_rel.
 const DIGITS: usize = 3;
 
-/// Tunings that are remembered, of more the cheapest.
-const REMEMBERED: usize = 10_000;
+/// Largest number of kept tunings; the cheapest are kept.
+const MAX_KEPT: usize = 10_000;
 
-/// The grid: N1 = 1, N2 up to [`GRID_N2`], Nu up to [`GRID_NU`] and N2, λ_rel of [`GRID_LAMBDA`].
-pub fn grid() -> Vec<Tuning> {
+/// Returns the grid: N1 = 1, N2 up to [`GRID_N2`], Nu up to [`GRID_NU`] and N2, λ_rel of [`GRID_LAMBDA`].
+pub fn design_grid() -> Vec<Tuning> {
     let horizons = (1..=GRID_N2).flat_map(|n2| (1..=GRID_NU.min(n2)).map(move |nu| (n2, nu)));
     let of_horizon = |(n2, nu)| GRID_LAMBDA.map(|lambda_rel| Tuning::Gpc { n1: 1, n2, nu, lambda_rel });
     horizons.flat_map(of_horizon).collect()
 }
 
-/// The grid with so many λ_rel between its first and its last, evenly on a logarithmic scale, that it has at
-/// least `designs`.
-pub fn fine_grid(designs: usize) -> Vec<Tuning> {
+/// Returns a grid of at least `designs` tunings with logarithmically spaced λ_rel over the range of
+/// [`GRID_LAMBDA`].
+pub fn fine_design_grid(designs: usize) -> Vec<Tuning> {
     let horizons = || (1..=GRID_N2).flat_map(|n2| (1..=GRID_NU.min(n2)).map(move |nu| (n2, nu)));
     let count = designs.div_ceil(horizons().count()).max(2);
     let (least, most) = (GRID_LAMBDA[0], GRID_LAMBDA[GRID_LAMBDA.len() - 1]);
@@ -53,40 +53,40 @@ pub fn fine_grid(designs: usize) -> Vec<Tuning> {
     horizons().flat_map(of_horizon).collect()
 }
 
-/// The cheapest of `candidates`, as many as are remembered.
-fn remembered(candidates: Vec<Candidate>) -> Vec<Candidate> {
+/// Sorts `candidates` by cost and keeps the cheapest.
+fn keep_cheapest(candidates: Vec<TuningCandidate>) -> Vec<TuningCandidate> {
     let mut candidates = ranked(candidates);
-    candidates.truncate(REMEMBERED);
+    candidates.truncate(MAX_KEPT);
     candidates
 }
 
-/// The predictive controller, alike on each axis that moves, that costs least on the bench's path.
+/// Searches the predictive controller, common to all moving axes, with the lowest cost.
 ///
-/// Of the grid and the machine's own preset every design that keeps `limits` is run; then, round by round,
-/// the neighbors of the best few, also beyond the grid and between its λ_rel.
+/// Runs every design of the grid and the preset of the machine within `limits`, then in rounds the neighbors
+/// of the best designs, also beyond the grid and between its λ_rel.
 ///
 /// # Errors
-/// [`TuneError`], also if no tuning keeps the limits.
-pub fn tune_gpc(bench: &Bench<'_>, limits: &MarginLimits) -> Result<Search, TuneError> {
-    tune_gpc_from(bench, limits, grid())
+/// [`TuneError`] if a run fails or no tuning is within the limits.
+pub fn tune_gpc(bench: &TuningProblem<'_>, limits: &MarginLimits) -> Result<SearchResult, TuneError> {
+    tune_gpc_from(bench, limits, design_grid())
 }
 
-/// As [`tune_gpc`], with another grid `first`, such as a [`fine_grid`].
+/// Searches like [`tune_gpc`] with another grid `first`, such as a [`fine_design_grid`].
 ///
 /// # Errors
-/// As [`tune_gpc`].
+/// [`TuneError`] if a run fails or no tuning is within the limits.
 pub fn tune_gpc_from(
-    bench: &Bench<'_>,
+    bench: &TuningProblem<'_>,
     limits: &MarginLimits,
     mut first: Vec<Tuning>,
-) -> Result<Search, TuneError> {
+) -> Result<SearchResult, TuneError> {
     first.extend(preset(bench).filter(|preset| !first.contains(preset)));
     let mut seen: HashSet<Key> = first.iter().filter_map(key).collect();
     let mut designs = first.len();
     let all = bench.designs(first);
     let closest =
         all.iter().filter_map(|(_, margins)| *margins).max_by(|a, b| a.modulus.total_cmp(&b.modulus));
-    let kept = keeping(all, limits);
+    let kept = within_limits(all, limits);
     if kept.is_empty() {
         return Err(match closest {
             Some(most) => {
@@ -96,7 +96,7 @@ pub fn tune_gpc_from(
         });
     }
     let mut runs = kept.len();
-    let mut tried = remembered(bench.runs("grid", kept)?);
+    let mut tried = keep_cheapest(bench.runs("grid", kept)?);
     let mut factor = FIRST_FACTOR;
     for _ in 0..ROUNDS {
         let Some(best) = tried.first().map(|best| best.cost) else { break };
@@ -107,10 +107,10 @@ pub fn tune_gpc_from(
             .filter(|tuning| key(tuning).is_some_and(|key| seen.insert(key)))
             .collect();
         designs += around.len();
-        let kept = keeping(bench.designs(around), limits);
+        let kept = within_limits(bench.designs(around), limits);
         runs += kept.len();
         tried.extend(bench.runs("about the best", kept)?);
-        tried = remembered(tried);
+        tried = keep_cheapest(tried);
         let saved = tried.first().is_some_and(|now| now.cost < best * (1.0 - GAIN));
         if !saved {
             factor = factor.sqrt();
@@ -120,9 +120,9 @@ pub fn tune_gpc_from(
         }
     }
     let best = tried.first_mut().ok_or(TuneError::Saturated { runs })?;
-    *best = bench.completed(bench.course(), best)?;
+    *best = bench.with_complete_figures(bench.workload(), best)?;
     let best = best.clone();
-    Ok(Search { best, tried, designs, runs })
+    Ok(SearchResult { best, tried, designs, runs })
 }
 
 /// N1, N2, Nu and the bits of λ_rel.
@@ -135,8 +135,8 @@ fn key(tuning: &Tuning) -> Option<Key> {
     }
 }
 
-/// The tuning that the machine file has for a predictive controller, if it is one for all axes.
-pub(super) fn preset(bench: &Bench<'_>) -> Option<Tuning> {
+/// Returns the predictive controller of the machine file if it is the same on all axes.
+pub(super) fn preset(bench: &TuningProblem<'_>) -> Option<Tuning> {
     let parameters = bench.parameters();
     let own = |joint: &String| {
         let get = |key: &str| parameters.get(&format!("{joint}.position_loop.gpc.{key}"));
@@ -157,12 +157,12 @@ pub(super) fn preset(bench: &Bench<'_>) -> Option<Tuning> {
     alike.then_some(first)
 }
 
-/// What lies about a tuning.
+/// Returns the neighbors of a tuning.
 fn neighbors(center: &Tuning, factor: f64) -> Vec<Tuning> {
     let Tuning::Gpc { n1, n2, nu, lambda_rel } = *center else { return Vec::new() };
     let mut around = Vec::new();
     for lambda in [lambda_rel / factor, lambda_rel * factor] {
-        around.push(Tuning::Gpc { n1, n2, nu, lambda_rel: rounded(lambda, DIGITS) });
+        around.push(Tuning::Gpc { n1, n2, nu, lambda_rel: round_significant(lambda, DIGITS) });
     }
     for step in STEPS {
         let moved = |value: usize| value.saturating_add_signed(step);

@@ -1,106 +1,105 @@
-//! Search for the tuning of the position controllers that suits a path best.
+//! Search of position controller tunings that minimize a cost on a path.
 //!
-//! A [`Bench`] is a machine on a [`Course`] with a [`Cost`]: it runs what it is given and says what that
-//! costs, with the stability margins of the worst axis. [`tune_gpc`] searches the tunings of a predictive
-//! controller, [`tune_cascade`] the gains of the cascade; both take only tunings that keep the
-//! [`MarginLimits`] and never saturate. Runs go over all cores; the same search gives the same tuning
-//! whatever their number.
+//! A [`TuningProblem`] combines a machine, a [`Workload`] and a [`Cost`]; it simulates tunings and returns
+//! their cost and the stability margins of the worst axis. [`tune_gpc`] searches tunings of a predictive
+//! controller, [`tune_cascade`] gains of the cascade. Both accept only tunings within the [`MarginLimits`]
+//! that never saturate. Simulations run in parallel on all cores; the result does not depend on the number of
+//! cores.
 
-mod bench;
 mod cascade;
 mod contrast;
 mod cost;
-mod course;
 mod gpc;
-mod loops;
+mod margin_limits;
 mod pareto;
+mod problem;
 mod robustness;
 mod tuning;
+mod workload;
 
 use std::io;
 
 use virtual_axes_core::config::ConfigError;
 use virtual_axes_core::machine::MachineError;
 use virtual_axes_core::trial::TrialError;
+use virtual_axes_core::units::Rounded;
 
-pub use bench::{Bench, Candidate, Search};
 pub use cascade::tune_cascade;
-pub use contrast::{Contrast, contrast};
-pub use cost::{Cost, CostError, Term};
-pub use course::Course;
-pub use gpc::{GRID_LAMBDA, GRID_N2, GRID_NU, fine_grid, grid, tune_gpc, tune_gpc_from};
-pub use loops::MarginLimits;
-pub use pareto::front;
-pub use robustness::{Deviated, Deviation, Robustness, robustness};
+pub use contrast::{Contrast, find_contrasts};
+pub use cost::{Cost, CostError, CostTerm};
+pub use gpc::{GRID_LAMBDA, GRID_N2, GRID_NU, design_grid, fine_design_grid, tune_gpc, tune_gpc_from};
+pub use margin_limits::MarginLimits;
+pub use pareto::pareto_front;
+pub use problem::{SearchResult, TuningCandidate, TuningProblem};
+pub use robustness::{DeviatingRun, PlantDeviation, Robustness, analyze_robustness};
 pub use tuning::{AxisGains, Tuning};
+pub use workload::Workload;
 
-/// Who looks on while a search goes on, from any thread.
-pub trait Watch: Sync {
-    /// A part of the work begins: its name, and how many runs it takes at most.
+/// Receiver of progress reports and source of interrupts, called from any thread.
+pub trait Progress: Sync {
+    /// Starts a part of the search with its name and the largest number of runs.
     fn begin(&self, _part: &'static str, _runs: usize) {}
 
-    /// A run has ended.
-    fn done(&self) {}
+    /// Counts a finished run.
+    fn finish_run(&self) {}
 
-    /// Asked at every position period of every run.
+    /// Checks for an interrupt; called in every position cycle of every run.
     ///
     /// # Errors
-    /// What ends the search.
-    fn go_on(&self) -> io::Result<()> {
+    /// Error that ends the search.
+    fn check_interrupt(&self) -> io::Result<()> {
         Ok(())
     }
 }
 
-/// Nobody.
+/// Progress receiver without output that never interrupts.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Unwatched;
+pub struct NoProgress;
 
-impl Watch for Unwatched {}
+impl Progress for NoProgress {}
 
-/// Why there is no tuning.
+/// Error of a tuning search.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TuneError {
-    /// A run did not come to its end.
+    /// Simulation run that failed.
     #[error(transparent)]
     Trial(#[from] TrialError),
-    /// A value that the machine does not take.
+    /// Parameter value that the schema rejects.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// An axis has no prediction model.
+    /// Axis without prediction model.
     #[error(transparent)]
     Machine(#[from] MachineError),
-    /// The path asks nothing of any axis.
+    /// Path without motion of any axis.
     #[error("no axis moves: there is nothing to tune")]
     NothingMoves,
-    /// No design keeps the margins.
+    /// No design within the margin limits.
     #[error(
-        "none of {designs} designs keeps a modulus margin of {} and a delay margin of {} ms on its worst axis; \
-         the largest modulus margin is {modulus:.3}, that design's delay margin {:.2} ms",
-        limits.modulus, limits.delay * 1e3, delay * 1e3
+        "none of {designs} designs has a modulus margin of {} and a delay margin of {} ms on its worst axis; \
+         the largest modulus margin is {modulus:.3}, with a delay margin of {:.2} ms",
+        Rounded(limits.modulus), Rounded(limits.delay * 1e3), delay * 1e3
     )]
     NoMargins {
-        /// How many were looked at.
+        /// Number of designs.
         designs: usize,
-        /// What was asked for.
+        /// Margin limits.
         limits: MarginLimits,
         /// Largest modulus margin of a design.
         modulus: f64,
         /// Delay margin of that design, s.
         delay: f64,
     },
-    /// No design is stable.
-    #[error("none of {designs} designs is stable on every axis that moves")]
+    /// No stable design.
+    #[error("none of {designs} designs is stable on every moving axis")]
     NoneStable {
-        /// How many were looked at.
+        /// Number of designs.
         designs: usize,
     },
-    /// Every design that keeps the margins saturates.
-    #[error(
-        "each of the {runs} tunings that keep the margins saturates an axis on this path; lower its feed"
-    )]
+    /// Saturation of every design within the margin limits.
+    #[error("each of the {runs} tunings within the margins saturates an axis on this path; reduce the feed")]
     Saturated {
-        /// How many were run.
+        /// Number of runs.
         runs: usize,
     },
 }

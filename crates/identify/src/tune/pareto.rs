@@ -1,11 +1,13 @@
-//! Tunings that no other beats in two respects at once.
+//! Pareto front of cost and a second figure of merit.
 
-use super::bench::Candidate;
+use super::problem::TuningCandidate;
 
-/// Of `candidates` those for which none both costs less and has more of `merit` (or one of both and as much
-/// of the other), the cheapest first.
-pub fn front(candidates: &[Candidate], merit: impl Fn(&Candidate) -> f64) -> Vec<&Candidate> {
-    let mut sorted: Vec<(&Candidate, f64)> = candidates.iter().map(|c| (c, merit(c))).collect();
+/// Returns the Pareto-optimal `candidates` with low cost and high `merit` in order of rising cost.
+pub fn pareto_front(
+    candidates: &[TuningCandidate],
+    merit: impl Fn(&TuningCandidate) -> f64,
+) -> Vec<&TuningCandidate> {
+    let mut sorted: Vec<(&TuningCandidate, f64)> = candidates.iter().map(|c| (c, merit(c))).collect();
     sorted.retain(|(candidate, merit)| candidate.cost.is_finite() && !merit.is_nan());
     sorted.sort_by(|a, b| a.0.cost.total_cmp(&b.0.cost).then(b.1.total_cmp(&a.1)));
     let mut most = f64::NEG_INFINITY;

@@ -1,48 +1,48 @@
-//! One tuning on plants that deviate from what it was designed for.
+//! Robustness of a tuning against deviations of the plant.
 
 use rayon::prelude::*;
 
 use super::cost::Cost;
-use super::course::Course;
-use super::loops::worst;
-use super::{TuneError, Watch};
-use virtual_axes_core::config::{Assignment, MachineConfig, Parameters, Source, Value};
+use super::margin_limits::worst_margins;
+use super::workload::Workload;
+use super::{Progress, TuneError};
+use virtual_axes_core::config::{Assignment, MachineConfig, Parameters, Value, ValueSource};
 use virtual_axes_core::design::Margins;
-use virtual_axes_core::machine::{MachineError, designed, deviating_model, prediction_model};
+use virtual_axes_core::machine::{MachineError, design_controller, deviating_plant_model, prediction_model};
 use virtual_axes_core::trial::Figures;
 
-/// Factors of the plant relative to what the controllers are designed for.
+/// Factors of the plant relative to the model of the controller design.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Deviation {
-    /// Of the inertia.
+pub struct PlantDeviation {
+    /// Factor of the inertia.
     pub inertia: f64,
-    /// Of the friction.
+    /// Factor of the friction.
     pub friction: f64,
-    /// Of the torque constant.
+    /// Factor of the torque constant.
     pub torque_constant: f64,
 }
 
-impl Deviation {
-    /// None.
-    pub const NONE: Deviation = Deviation { inertia: 1.0, friction: 1.0, torque_constant: 1.0 };
+impl PlantDeviation {
+    /// No deviation.
+    pub const NONE: PlantDeviation = PlantDeviation { inertia: 1.0, friction: 1.0, torque_constant: 1.0 };
 
-    /// Each by itself below and above.
-    pub fn single(by: f64) -> [Deviation; 6] {
+    /// Returns each deviation by itself, low and high.
+    pub fn single(by: f64) -> [PlantDeviation; 6] {
         let [low, high] = [1.0 - by, 1.0 + by];
         [
-            Deviation { inertia: low, ..Self::NONE },
-            Deviation { inertia: high, ..Self::NONE },
-            Deviation { friction: low, ..Self::NONE },
-            Deviation { friction: high, ..Self::NONE },
-            Deviation { torque_constant: low, ..Self::NONE },
-            Deviation { torque_constant: high, ..Self::NONE },
+            PlantDeviation { inertia: low, ..Self::NONE },
+            PlantDeviation { inertia: high, ..Self::NONE },
+            PlantDeviation { friction: low, ..Self::NONE },
+            PlantDeviation { friction: high, ..Self::NONE },
+            PlantDeviation { torque_constant: low, ..Self::NONE },
+            PlantDeviation { torque_constant: high, ..Self::NONE },
         ]
     }
 
-    /// All three together, below or above each.
-    pub fn combined(by: f64) -> [Deviation; 8] {
+    /// Returns all combinations of low and high deviations.
+    pub fn combined(by: f64) -> [PlantDeviation; 8] {
         let at = |above: usize| if above == 1 { 1.0 + by } else { 1.0 - by };
-        std::array::from_fn(|i| Deviation {
+        std::array::from_fn(|i| PlantDeviation {
             inertia: at(i >> 2),
             friction: at(i >> 1 & 1),
             torque_constant: at(i & 1),
@@ -50,46 +50,45 @@ impl Deviation {
     }
 }
 
-/// A run on a deviating plant.
+/// Run on a deviating plant.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Deviated {
-    /// By what the plant of every axis deviates.
-    pub deviation: Deviation,
-    /// Of the worst axis that moves, the controller being that for the plant without deviation; none where
-    /// a loop is unstable.
+pub struct DeviatingRun {
+    /// Deviation of the plant of every axis.
+    pub deviation: PlantDeviation,
+    /// Margins of the worst moving axis with the controller of the nominal plant; none if a loop is unstable.
     pub margins: Option<Margins>,
-    /// What it costs.
+    /// Cost.
     pub cost: f64,
-    /// What was measured, all but the circles.
+    /// Figures of the run without circles.
     pub figures: Figures,
 }
 
-/// One tuning on several plants.
+/// Tuning evaluated on several plants.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robustness {
-    /// Without deviation.
-    pub nominal: Deviated,
-    /// One deviation at a time, in the order of [`Deviation::single`].
-    pub single: Vec<Deviated>,
-    /// The worst of [`Deviation::combined`]: unstable before stable, then that which costs most.
-    pub worst: Deviated,
+    /// Run without deviation.
+    pub nominal: DeviatingRun,
+    /// Runs with single deviations in the order of [`PlantDeviation::single`].
+    pub single: Vec<DeviatingRun>,
+    /// Worst run of [`PlantDeviation::combined`]: unstable before stable, then the highest cost.
+    pub worst: DeviatingRun,
 }
 
-/// Runs `parameters` on `course` with inertia, friction and torque constant off `by` a part.
+/// Runs `parameters` on `course` with inertia, friction and torque constant changed by ±`by` (relative).
 ///
-/// It comes on top of what the parameters deviate by themselves.
+/// The changes multiply the deviations of the parameters themselves.
 ///
 /// # Errors
-/// [`TuneError`].
-pub fn robustness(
+/// [`TuneError`] if a run fails.
+pub fn analyze_robustness(
     parameters: &Parameters,
-    course: &Course,
+    course: &Workload,
     cost: &Cost,
     by: f64,
-    watch: &dyn Watch,
+    watch: &dyn Progress,
 ) -> Result<Robustness, TuneError> {
-    let (single, combined) = (Deviation::single(by), Deviation::combined(by));
-    let all: Vec<Deviation> = [Deviation::NONE].into_iter().chain(single).chain(combined).collect();
+    let (single, combined) = (PlantDeviation::single(by), PlantDeviation::combined(by));
+    let all: Vec<PlantDeviation> = [PlantDeviation::NONE].into_iter().chain(single).chain(combined).collect();
     watch.begin("deviating plants", all.len());
     let plants =
         all.iter().map(|deviation| deviating(parameters, deviation)).collect::<Result<Vec<_>, _>>()?;
@@ -97,31 +96,31 @@ pub fn robustness(
     let axes: Vec<usize> = (0..machine.axes().len()).collect();
     let allow = parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
     let side_by_side = |plants: &[MachineConfig]| {
-        let figures = course.run_together(&machine, plants, &axes, allow, || watch.go_on())?;
-        figures.iter().for_each(|_| watch.done());
+        let figures = course.run_variants(&machine, plants, &axes, allow, || watch.check_interrupt())?;
+        figures.iter().for_each(|_| watch.finish_run());
         Ok(figures)
     };
     let share = plants.len().div_ceil(rayon::current_num_threads().max(1));
     let figures = plants.par_chunks(share).map(side_by_side).collect::<Result<Vec<_>, TuneError>>()?;
-    let run = |((deviation, config), figures): ((Deviation, &MachineConfig), Figures)| {
+    let run = |((deviation, config), figures): ((PlantDeviation, &MachineConfig), Figures)| {
         let margins = margins(config, &figures)?;
-        Ok(Deviated { deviation, margins, cost: cost.of(&figures, config), figures })
+        Ok(DeviatingRun { deviation, margins, cost: cost.of(&figures, config), figures })
     };
     let runs = all.into_iter().zip(&plants).zip(figures.into_iter().flatten()).map(run);
     let mut runs = runs.collect::<Result<Vec<_>, TuneError>>()?;
     let combined = runs.split_off(1 + single.len());
     let nominal = runs.remove(0);
-    let key = |run: &Deviated| (run.margins.is_none(), run.cost);
-    let worst = combined.into_iter().fold(None, |worst: Option<Deviated>, run| match worst {
+    let key = |run: &DeviatingRun| (run.margins.is_none(), run.cost);
+    let worst = combined.into_iter().fold(None, |worst: Option<DeviatingRun>, run| match worst {
         Some(worst) if key(&worst) >= key(&run) => Some(worst),
         _ => Some(run),
     });
     Ok(Robustness { worst: worst.unwrap_or_else(|| nominal.clone()), nominal, single: runs })
 }
 
-/// The machine with plants that deviate.
-fn deviating(parameters: &Parameters, deviation: &Deviation) -> Result<MachineConfig, TuneError> {
-    let source = Source::named("deviation");
+/// Returns the machine with deviating plants.
+fn deviating(parameters: &Parameters, deviation: &PlantDeviation) -> Result<MachineConfig, TuneError> {
+    let source = ValueSource::named("deviation");
     let mut changed = parameters.clone();
     let factors = [
         ("inertia", deviation.inertia),
@@ -145,15 +144,15 @@ fn deviating(parameters: &Parameters, deviation: &Deviation) -> Result<MachineCo
     Ok(changed.machine_config()?)
 }
 
-/// Of the worst axis that moves: the controller for the nominal plant on the plant as it is.
+/// Returns the margins of the worst moving axis: nominal controller on the deviating plant.
 fn margins(config: &MachineConfig, figures: &Figures) -> Result<Option<Margins>, TuneError> {
     let mut loops = Vec::new();
     for (axis, _) in config.axes().iter().zip(&figures.axes).filter(|(_, figures)| figures.moves) {
         let periods = config.periods();
         let named = |source| MachineError::Axis { axis: axis.name().to_owned(), source };
         let nominal = prediction_model(axis, &periods).map_err(named)?;
-        let plant = deviating_model(axis, &periods).map_err(named)?;
-        loops.push((plant, designed(axis, &nominal)));
+        let plant = deviating_plant_model(axis, &periods).map_err(named)?;
+        loops.push((plant, design_controller(axis, &nominal)));
     }
-    Ok(worst(loops.iter().map(|(plant, rst)| (plant, rst.clone()))))
+    Ok(worst_margins(loops.iter().map(|(plant, rst)| (plant, rst.clone()))))
 }

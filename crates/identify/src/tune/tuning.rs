@@ -1,53 +1,53 @@
-//! Values of the parameters that a search turns.
+//! Tuning of position controllers: the parameters that a search changes.
 
 use std::fmt;
 
-use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Source, Value};
-use virtual_axes_core::design::{GpcTuning, Weight};
+use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Value, ValueSource};
+use virtual_axes_core::design::{ControlWeight, GpcTuning};
 
-/// Gains of the cascade on one axis, in the units of a machine file.
+/// Gains of the cascade on one axis, in units of a machine file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisGains {
-    /// Kp, (m/min)/mm or (1000 °/min)/°.
+    /// Position gain Kp, (m/min)/mm or (1000 °/min)/°.
     pub gain: f64,
-    /// VFFW, 1.
+    /// Velocity feedforward weight VFFW.
     pub velocity: f64,
-    /// TFFW, kg·m² (kg).
+    /// Torque feedforward weight TFFW, kg·m² (kg).
     pub torque: f64,
 }
 
-/// A tuning of the axes that move.
+/// Tuning of the moving axes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Tuning {
-    /// As the machine is.
+    /// Present tuning of the machine.
     Present,
-    /// A predictive controller, alike on each axis.
+    /// Predictive controller, common to all axes.
     Gpc {
-        /// N1.
+        /// First prediction horizon N1.
         n1: usize,
-        /// N2.
+        /// Last prediction horizon N2.
         n2: usize,
-        /// Nu.
+        /// Control horizon Nu.
         nu: usize,
-        /// λ / trace(GᵀG).
+        /// Control weight λ / trace(GᵀG).
         lambda_rel: f64,
     },
-    /// The cascade: the gains of each axis, in the order of the joints that are tuned.
+    /// Gains of the cascade per joint.
     Cascade(Vec<(String, AxisGains)>),
 }
 
 impl Tuning {
-    /// The design of a predictive controller; none for the others.
+    /// Returns the design of a predictive controller; none for other tunings.
     pub fn gpc(&self) -> Option<GpcTuning> {
         match *self {
             Tuning::Gpc { n1, n2, nu, lambda_rel } => {
-                Some(GpcTuning { n1, n2, nu, weight: Weight::Relative(lambda_rel) })
+                Some(GpcTuning { n1, n2, nu, weight: ControlWeight::Relative(lambda_rel) })
             }
             _ => None,
         }
     }
 
-    /// Full keys and values of the parameters that it sets on `joints`.
+    /// Returns the full keys and values of the parameters on `joints`.
     pub fn values(&self, joints: &[String], parameters: &Parameters) -> Vec<(String, Value)> {
         let count = |value: usize| Value::Integer(i64::try_from(value).unwrap_or(i64::MAX));
         let controller = |name: &str| ("controller".to_owned(), Value::Text(name.to_owned()));
@@ -81,16 +81,16 @@ impl Tuning {
         }
     }
 
-    /// The machine `parameters` with this tuning on `joints`.
+    /// Returns `parameters` with this tuning on `joints`.
     ///
     /// # Errors
-    /// [`ConfigError`] for a value that the schema does not take.
+    /// [`ConfigError`] if the schema rejects a value.
     pub fn apply(&self, parameters: &Parameters, joints: &[String]) -> Result<Parameters, ConfigError> {
-        let source = Source::named("tuning");
+        let source = ValueSource::named("tuning");
         let mut tuned = parameters.clone();
         if self.gpc().is_some() {
             for joint in joints {
-                // λ itself would stand in the place of λ_rel.
+                // An absolute λ would override λ_rel.
                 tuned.unset(&format!("{joint}.position_loop.gpc.lambda"), &source)?;
             }
         }
@@ -101,7 +101,7 @@ impl Tuning {
     }
 }
 
-/// The key of TFFW: in kg for a linear motor.
+/// Returns the key of TFFW, which is in kg for a linear motor.
 pub(super) fn torque_key(joint: &str, parameters: &Parameters) -> String {
     let linear = format!("{joint}.feedforward.torque_kg");
     if parameters.definition(&linear).is_some() { linear } else { format!("{linear}_m2") }
@@ -110,7 +110,7 @@ pub(super) fn torque_key(joint: &str, parameters: &Parameters) -> String {
 impl fmt::Display for Tuning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Tuning::Present => f.write_str("as it is"),
+            Tuning::Present => f.write_str("present"),
             Tuning::Gpc { n1, n2, nu, lambda_rel } => {
                 write!(f, "N1 {n1}, N2 {n2}, Nu {nu}, λ_rel {lambda_rel}")
             }
@@ -126,7 +126,7 @@ impl fmt::Display for Tuning {
     }
 }
 
-/// `value` with so many significant digits: what a person would write into a machine file.
-pub(super) fn rounded(value: f64, digits: usize) -> f64 {
+/// Rounds `value` to `digits` significant digits.
+pub(super) fn round_significant(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }

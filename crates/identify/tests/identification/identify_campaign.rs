@@ -5,9 +5,11 @@ use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::trajectory::JointLimits;
 use virtual_axes_core::units::{DEGREE, MILLIMETER, RPM, seconds};
 use virtual_axes_identify::identify::FeedforwardMode;
-use virtual_axes_identify::identify::campaign::{Campaign, CampaignError, Options};
-use virtual_axes_verification::fixtures::common::{M_MIN, TSP, parameters};
-use virtual_axes_verification::fixtures::recordings::{Disturbance, feedforward, place, record};
+use virtual_axes_identify::identify::campaign::{Campaign, CampaignError, CampaignOptions};
+use virtual_axes_verification::fixtures::machines::{M_MIN, TSP, parameters};
+use virtual_axes_verification::fixtures::recordings::{
+    Disturbance, axis_index, machine_with_feedforward, record,
+};
 
 const MACHINES: [&str; 2] = ["mikron_ucp710", "linear_motor_center"];
 const AXES: [&str; 5] = ["x", "y", "z", "a", "c"];
@@ -18,8 +20,13 @@ fn shipped(machine: &str) -> MachineConfig {
     Parameters::builtin(machine).expect("shipped").machine_config().expect("valid")
 }
 
-fn plan(machine: &MachineConfig, axis: &str, parts: &[FeedforwardMode], options: &Options) -> Campaign {
-    Campaign::plan(machine, place(machine, axis), parts, options)
+fn plan(
+    machine: &MachineConfig,
+    axis: &str,
+    parts: &[FeedforwardMode],
+    options: &CampaignOptions,
+) -> Campaign {
+    Campaign::plan(machine, axis_index(machine, axis), parts, options)
         .unwrap_or_else(|error| panic!("{} {axis}: {error}", machine.name()))
 }
 
@@ -88,9 +95,9 @@ fn campaigns_of_the_shipped_machines_keep_the_limits_of_their_axes() {
     for machine in MACHINES {
         let config = shipped(machine);
         for axis in AXES {
-            let campaign = plan(&config, axis, &FeedforwardMode::ALL, &Options::default());
-            let limits = JointLimits::of_axis(&config.axes()[place(&config, axis)]);
-            let range = [limits.limits.stroke_min, limits.limits.stroke_max];
+            let campaign = plan(&config, axis, &FeedforwardMode::ALL, &CampaignOptions::default());
+            let limits = JointLimits::from_axis(&config.axes()[axis_index(&config, axis)]);
+            let range = [limits.limits.travel_min, limits.limits.travel_max];
             let checked = check(&campaign, &limits, range, 0.95 * limits.limits.velocity);
             assert_eq!(checked, Ok(()), "{machine} {axis}");
             let lasts: Vec<f64> =
@@ -99,7 +106,7 @@ fn campaigns_of_the_shipped_machines_keep_the_limits_of_their_axes() {
             assert!(lasts[0] < 200.0 && lasts[1] < 20.0 && lasts[2] < 20.0, "{machine} {axis}: {lasts:?}");
         }
     }
-    let x = plan(&shipped(MACHINES[0]), "x", &[FeedforwardMode::Off], &Options::default());
+    let x = plan(&shipped(MACHINES[0]), "x", &[FeedforwardMode::Off], &CampaignOptions::default());
     assert!(x.psec().len() as f64 * TSP < 120.0);
 }
 
@@ -118,8 +125,8 @@ proptest! {
             ("x.limits.velocity_m_min", velocity),
             ("x.limits.acceleration_m_s2", acceleration),
             ("x.limits.jerk_m_s3", jerk),
-            ("x.limits.stroke_min_mm", stroke.0),
-            ("x.limits.stroke_max_mm", stroke.1),
+            ("x.limits.travel_min_mm", stroke.0),
+            ("x.limits.travel_max_mm", stroke.1),
             ("x.motor.max_speed_rpm", motor),
             ("x.position_loop.gain", gain),
         ];
@@ -141,8 +148,8 @@ proptest! {
             ("a.limits.velocity_rpm", velocity),
             ("a.limits.acceleration_rev_s2", acceleration),
             ("a.limits.jerk_rev_s3", jerk),
-            ("a.limits.stroke_min_deg", stroke.0),
-            ("a.limits.stroke_max_deg", stroke.1),
+            ("a.limits.travel_min_deg", stroke.0),
+            ("a.limits.travel_max_deg", stroke.1),
             ("a.motor.max_speed_rpm", motor),
             ("a.position_loop.gain", gain),
         ];
@@ -163,12 +170,12 @@ fn any_axis(
     top: f64,
 ) -> Result<(), TestCaseError> {
     let config = parameters(changes).machine_config().expect("valid");
-    let place = place(&config, axis);
-    let limits = JointLimits::of_axis(&config.axes()[place]);
+    let place = axis_index(&config, axis);
+    let limits = JointLimits::from_axis(&config.axes()[place]);
     let at = |part: f64| stroke[0] + part * (stroke[1] - stroke[0]);
     let range = range.map(|(a, b)| [at(a.min(b)), at(a.max(b))]).filter(|range| range[0] < range[1]);
     let within = range.unwrap_or(stroke);
-    let mut options = Options { range, max_feed: feed.map(|part| part * top) };
+    let mut options = CampaignOptions { range, max_feed: feed.map(|part| part * top) };
     let unit = if axis == "x" { M_MIN } else { RPM };
     let mut found = Campaign::plan(&config, place, &FeedforwardMode::ALL, &options);
     if let Err(CampaignError::TooShort { possible, .. }) = found {
@@ -197,7 +204,7 @@ fn the_range_that_a_refusal_tells_is_long_enough() {
     let config = shipped(MACHINES[0]);
     let planned = |millimeters: f64| {
         let range = Some([0.0, millimeters * MILLIMETER]);
-        Campaign::plan(&config, 0, &[FeedforwardMode::Off], &Options { range, max_feed: None })
+        Campaign::plan(&config, 0, &[FeedforwardMode::Off], &CampaignOptions { range, max_feed: None })
     };
     let Err(CampaignError::TooShort { found, needed, .. }) = planned(100.0) else { panic!("100 mm do") };
     assert_eq!(found, 100.0);
@@ -214,7 +221,8 @@ fn ranges_and_feeds_that_an_axis_does_not_have_are_refused() {
     let config = shipped(MACHINES[0]);
     let refused = |axis: usize, range: Option<[f64; 2]>, max_feed: Option<f64>| {
         let error =
-            Campaign::plan(&config, axis, &FeedforwardMode::ALL, &Options { range, max_feed }).unwrap_err();
+            Campaign::plan(&config, axis, &FeedforwardMode::ALL, &CampaignOptions { range, max_feed })
+                .unwrap_err();
         println!("{error}");
         error
     };
@@ -224,9 +232,9 @@ fn ranges_and_feeds_that_an_axis_does_not_have_are_refused() {
     for feed in [0.0, -1.0, f64::NAN, f64::INFINITY, 28.6 * M_MIN] {
         assert!(matches!(refused(0, None, Some(feed)), CampaignError::Feed { .. }), "{feed}");
     }
-    assert_eq!(refused(5, None, None), CampaignError::NoAxis { place: 6, count: 5 });
+    assert_eq!(refused(5, None, None), CampaignError::NoAxis { number: 6, count: 5 });
     // Somebody would wait for days.
-    let slow = Options { range: None, max_feed: Some(1e-4 * RPM) };
+    let slow = CampaignOptions { range: None, max_feed: Some(1e-4 * RPM) };
     let error = Campaign::plan(&config, 4, &[FeedforwardMode::Off], &slow).unwrap_err();
     assert!(matches!(error, CampaignError::TooLong { part: "off", .. }), "{error}");
 }
@@ -242,8 +250,8 @@ fn the_long_part_accelerates_dozens_of_times_at_half_and_at_full_acceleration() 
         let config = shipped(machine);
         let period = seconds(config.periods().position);
         for axis in AXES {
-            let limits = JointLimits::of_axis(&config.axes()[place(&config, axis)]).limits;
-            let campaign = plan(&config, axis, &[FeedforwardMode::Off], &Options::default());
+            let limits = JointLimits::from_axis(&config.axes()[axis_index(&config, axis)]).limits;
+            let campaign = plan(&config, axis, &[FeedforwardMode::Off], &CampaignOptions::default());
             let velocity = velocities(campaign.psec(), period);
             // The most that a ramp from rest has with the jerk that there is: √(v j).
             let top = campaign.runs()[0].speeds.last().copied().expect("speeds");
@@ -274,7 +282,7 @@ fn standstills_are_approached_from_both_sides_all_over_the_range() {
         let config = shipped(machine);
         let period = seconds(config.periods().position);
         for axis in AXES {
-            let campaign = plan(&config, axis, &[FeedforwardMode::Off], &Options::default());
+            let campaign = plan(&config, axis, &[FeedforwardMode::Off], &CampaignOptions::default());
             let psec = campaign.psec();
             let velocity = velocities(psec, period);
             // Places of rest for three quarters of a second or more, and the side from which they were reached.
@@ -308,7 +316,7 @@ fn a_rotary_axis_is_swept_through_its_range_at_two_speeds_and_a_full_turn_if_it_
         let config = shipped(machine);
         let period = seconds(config.periods().position);
         for (axis, wanted) in [("a", 0.8), ("c", 0.0)] {
-            let campaign = plan(&config, axis, &[FeedforwardMode::Off], &Options::default());
+            let campaign = plan(&config, axis, &[FeedforwardMode::Off], &CampaignOptions::default());
             let velocity = velocities(campaign.psec(), period);
             let top = campaign.runs()[0].speeds.last().copied().expect("speeds");
             let [low, high] = campaign.range();
@@ -360,8 +368,8 @@ fn friction_of_x(velocity: f64) -> f64 {
 #[test]
 fn legs_of_the_long_part_settle_at_twelve_speeds_in_both_directions() {
     let parameters = Parameters::builtin("mikron_ucp710").expect("shipped");
-    let machine = feedforward(&parameters, "x", FeedforwardMode::Off);
-    let campaign = plan(&machine, "x", &[FeedforwardMode::Off], &Options::default());
+    let machine = machine_with_feedforward(&parameters, "x", FeedforwardMode::Off);
+    let campaign = plan(&machine, "x", &[FeedforwardMode::Off], &CampaignOptions::default());
     let recording = record(&machine, "x", campaign.psec(), &Disturbance::default());
     let current = recording.current.expect("recorded");
     let velocity = velocities(recording.psec.as_deref().expect("recorded"), TSP);

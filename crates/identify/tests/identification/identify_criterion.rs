@@ -4,18 +4,20 @@
 
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::units::{DEGREE, seconds};
-use virtual_axes_identify::identify::campaign::Options as Campaign;
-use virtual_axes_identify::identify::{Agreement, FeedforwardMode, Input, Options, identify, validate};
+use virtual_axes_identify::identify::campaign::CampaignOptions as Campaign;
+use virtual_axes_identify::identify::{
+    Agreement, FeedforwardMode, IdentificationInput, IdentificationOptions, identify, validate,
+};
 use virtual_axes_identify::recording::{Conditioning, Signals, condition};
 use virtual_axes_verification::fixtures::recordings::{
-    Disturbance, ignorant, place, record, record_campaign, stribeck, truth,
+    Disturbance, axis_index, initial_parameters, record, record_campaign, stribeck, true_parameters,
 };
 
 const MICROMETER: f64 = 1e-6;
 const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 
 fn hidden(machine: &MachineConfig, axis: &str, seed: u64) -> Disturbance {
-    let usual = Disturbance::usual(machine.axes()[place(machine, axis)].kind(), seed);
+    let usual = Disturbance::usual(machine.axes()[axis_index(machine, axis)].kind(), seed);
     Disturbance { backlash: 2.0 * usual.resolution, friction: Some(stribeck), ..usual }
 }
 
@@ -28,9 +30,10 @@ struct Trial {
 
 impl Trial {
     fn of(axis: &str, seed: u64) -> Self {
-        let (parameters, start) = (truth(), ignorant(axis).machine_config().expect("a machine"));
+        let (parameters, start) =
+            (true_parameters(), initial_parameters(axis).machine_config().expect("a machine"));
         let machine = parameters.machine_config().expect("a machine");
-        let config = &start.axes()[place(&start, axis)];
+        let config = &start.axes()[axis_index(&start, axis)];
         let recordings = record_campaign(
             &parameters,
             axis,
@@ -45,17 +48,20 @@ impl Trial {
             })
             .collect();
         let modes = FeedforwardMode::ALL.into_iter().map(Some);
-        let inputs: Vec<Input> =
-            signals.iter().zip(modes).map(|(signals, feedforward)| Input { signals, feedforward }).collect();
-        let found = identify(&inputs, config, &machine.periods(), &Options::default());
+        let inputs: Vec<IdentificationInput> = signals
+            .iter()
+            .zip(modes)
+            .map(|(signals, feedforward)| IdentificationInput { signals, feedforward })
+            .collect();
+        let found = identify(&inputs, config, &machine.periods(), &IdentificationOptions::default());
         let identified = found.axis().clone();
         Trial { axis: axis.to_owned(), machine, identified }
     }
 
     /// Simulated against "measured" motion on a scenario: largest deviation at constant velocity and elsewhere.
     fn deviations(&self, scenario: &str) -> (f64, f64) {
-        let program = virtual_axes_verification::fixtures::common::program(scenario, &self.machine);
-        let axis = place(&self.machine, &self.axis);
+        let program = virtual_axes_verification::fixtures::machines::program(scenario, &self.machine);
+        let axis = axis_index(&self.machine, &self.axis);
         let period = self.machine.periods().position;
         let last = (program.duration() / seconds(period)).ceil() as i64;
         let mut joints = vec![0.0; self.machine.axes().len()];
@@ -71,11 +77,11 @@ impl Trial {
         let config = &self.machine.axes()[axis];
         let (signals, _) =
             condition(&raw, config, &self.machine.periods(), &Conditioning::default()).expect("a recording");
-        let input = Input { signals: &signals, feedforward: Some(FeedforwardMode::Both) };
+        let input = IdentificationInput { signals: &signals, feedforward: Some(FeedforwardMode::Both) };
         let agreement: Agreement = validate(&input, &self.identified, &self.machine.periods())
             .expect("an axis that can be simulated");
         let comparison = agreement.comparisons.first().expect("PSEC was recorded");
-        let max = |d: &Option<virtual_axes_identify::identify::Deviation>| d.map_or(0.0, |d| d.max);
+        let max = |d: &Option<virtual_axes_identify::identify::ResidualStatistics>| d.map_or(0.0, |d| d.max);
         (max(&comparison.constant_velocity), max(&comparison.elsewhere))
     }
 }

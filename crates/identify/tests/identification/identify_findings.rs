@@ -1,14 +1,15 @@
 //! What a recording does not show is said, with what to record; what it shows in another way is still found.
 
-use virtual_axes_core::config::{Parameters, Source, Value};
-use virtual_axes_identify::identify::campaign::{Campaign, Options as Limits};
+use virtual_axes_core::config::{Parameters, Value, ValueSource};
+use virtual_axes_identify::identify::campaign::{Campaign, CampaignOptions as Limits};
 use virtual_axes_identify::identify::{
-    Breakaway, FeedforwardMode, FrictionLaw, Identification, Input, Options, Parameter, Refine, identify,
+    Breakaway, FeedforwardMode, FrictionLaw, Identification, IdentificationInput, IdentificationOptions,
+    RefinedParameter, RefinementScope, identify,
 };
 use virtual_axes_identify::recording::{Conditioning, RawRecording, Severity, condition};
-use virtual_axes_verification::fixtures::common::Profile;
+use virtual_axes_verification::fixtures::machines::RestToRestProfile;
 use virtual_axes_verification::fixtures::recordings::{
-    Disturbance, feedforward, ignorant, place, record, truth,
+    Disturbance, axis_index, initial_parameters, machine_with_feedforward, record, true_parameters,
 };
 
 const TSP: f64 = 6e-3;
@@ -24,7 +25,8 @@ fn legs(speeds: &[f64], back: bool) -> Vec<f64> {
     let mut psec = vec![0.0; 100];
     for &speed in speeds {
         let v = speed / 60.0;
-        let line = Profile::new(1.2 * v + 0.12 * v.sqrt(), v, (0.99 * (50.0 * v).sqrt()).min(2.5), 50.0);
+        let line =
+            RestToRestProfile::new(1.2 * v + 0.12 * v.sqrt(), v, (0.99 * (50.0 * v).sqrt()).min(2.5), 50.0);
         let count = (line.duration() / TSP).ceil() as usize + 1;
         let rest = 80;
         let from = *psec.last().expect("it begins at rest");
@@ -41,7 +43,7 @@ fn legs(speeds: &[f64], back: bool) -> Vec<f64> {
 
 /// X without feedforward on the way that `psec` says.
 fn recorded(parameters: &Parameters, psec: &[f64], disturbance: &Disturbance) -> RawRecording {
-    record(&feedforward(parameters, "x", FeedforwardMode::Off), "x", psec, disturbance)
+    record(&machine_with_feedforward(parameters, "x", FeedforwardMode::Off), "x", psec, disturbance)
 }
 
 fn clean() -> Disturbance {
@@ -49,23 +51,26 @@ fn clean() -> Disturbance {
 }
 
 fn with(mut parameters: Parameters, key: &str, value: Value) -> Parameters {
-    parameters.set(key, value, &Source::named("the test")).expect("a value in range");
+    parameters.set(key, value, &ValueSource::named("the test")).expect("a value in range");
     parameters
 }
 
-fn identified(raw: &[RawRecording], start: &Parameters, options: &Options) -> Identification {
+fn identified(raw: &[RawRecording], start: &Parameters, options: &IdentificationOptions) -> Identification {
     let machine = start.machine_config().expect("a machine");
-    let axis = &machine.axes()[place(&machine, "x")];
+    let axis = &machine.axes()[axis_index(&machine, "x")];
     let signals: Vec<_> = raw
         .iter()
         .map(|raw| condition(raw, axis, &machine.periods(), &Conditioning::default()).expect("a recording").0)
         .collect();
-    let inputs: Vec<Input> =
-        signals.iter().map(|signals| Input { signals, feedforward: Some(FeedforwardMode::Off) }).collect();
+    let inputs: Vec<IdentificationInput> = signals
+        .iter()
+        .map(|signals| IdentificationInput { signals, feedforward: Some(FeedforwardMode::Off) })
+        .collect();
     identify(&inputs, axis, &machine.periods(), options)
 }
 
-const STEPS_ONLY: Options = Options { i0: Breakaway::Held, refine: Refine::NONE };
+const STEPS_ONLY: IdentificationOptions =
+    IdentificationOptions { i0: Breakaway::Held, refine: RefinementScope::NONE };
 
 /// The text of the one finding with this code, and its remedy.
 fn finding(found: &Identification, severity: Severity, code: &str) -> String {
@@ -77,13 +82,13 @@ fn finding(found: &Identification, severity: Severity, code: &str) -> String {
 }
 
 fn inertia_of(found: &Identification) -> f64 {
-    Parameter::Inertia.get(found.axis())
+    RefinedParameter::Inertia.get(found.axis())
 }
 
 #[test]
 fn three_speeds_get_a_straight_law_and_are_told_so() {
-    let raw = recorded(&truth(), &legs(&[4.0, 8.0, 12.0], true), &clean());
-    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let raw = recorded(&true_parameters(), &legs(&[4.0, 8.0, 12.0], true), &clean());
+    let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
     let told = finding(&found, Severity::Warning, "few-speeds");
     assert!(told.contains("not fitted to 3 speeds (4.000, 8.000, 12.000 m/min)"), "{told}");
     assert!(told.contains("record at least 6 speeds"), "{told}");
@@ -104,16 +109,16 @@ fn three_speeds_get_a_straight_law_and_are_told_so() {
 
 #[test]
 fn six_speeds_that_lie_close_together_are_no_law_of_four_parameters() {
-    let raw = recorded(&truth(), &legs(&[4.0, 5.0, 6.0, 7.0, 8.0, 9.0], true), &clean());
-    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let raw = recorded(&true_parameters(), &legs(&[4.0, 5.0, 6.0, 7.0, 8.0, 9.0], true), &clean());
+    let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
     finding(&found, Severity::Warning, "few-speeds");
     assert_eq!(found.friction.map(|f| f.law.law), Some(FrictionLaw::Linear));
 }
 
 #[test]
 fn one_speed_is_no_law_at_all() {
-    let raw = recorded(&truth(), &legs(&[6.0], true), &clean());
-    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let raw = recorded(&true_parameters(), &legs(&[6.0], true), &clean());
+    let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
     let told = finding(&found, Severity::Missing, "few-speeds");
     assert!(told.contains("1 speed"), "{told}");
     assert!(found.friction.is_none() && found.inertia.is_none());
@@ -123,16 +128,16 @@ fn one_speed_is_no_law_at_all() {
 
 #[test]
 fn a_standstill_tells_of_no_motion() {
-    let raw = recorded(&truth(), &[0.0; 400], &clean());
-    let found = identified(&[raw], &ignorant("x"), &Options::default());
+    let raw = recorded(&true_parameters(), &[0.0; 400], &clean());
+    let found = identified(&[raw], &initial_parameters("x"), &IdentificationOptions::default());
     finding(&found, Severity::Missing, "few-speeds");
     assert!(found.friction.is_none() && found.inertia.is_none());
 }
 
 #[test]
 fn speeds_in_one_direction_are_told() {
-    let raw = recorded(&truth(), &legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], false), &clean());
-    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let raw = recorded(&true_parameters(), &legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], false), &clean());
+    let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
     let told = finding(&found, Severity::Warning, "one-direction");
     assert!(told.contains("record each speed in both directions"), "{told}");
 }
@@ -140,8 +145,8 @@ fn speeds_in_one_direction_are_told() {
 #[test]
 fn a_saturated_current_is_left_out_and_told() {
     let weak = |parameters| with(parameters, "x.motor.max_current_a", Value::Double(4.0));
-    let raw = recorded(&weak(truth()), &legs(&[1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true), &clean());
-    let found = identified(&[raw], &weak(ignorant("x")), &STEPS_ONLY);
+    let raw = recorded(&weak(true_parameters()), &legs(&[1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true), &clean());
+    let found = identified(&[raw], &weak(initial_parameters("x")), &STEPS_ONLY);
     let told = finding(&found, Severity::Warning, "saturated-current");
     assert!(told.contains("4.0 A") && told.contains("lower acceleration"), "{told}");
 }
@@ -149,7 +154,7 @@ fn a_saturated_current_is_left_out_and_told() {
 #[test]
 fn a_recording_that_begins_in_motion_has_no_closed_loop() {
     let whole = legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true);
-    let mut raw = recorded(&truth(), &whole, &clean());
+    let mut raw = recorded(&true_parameters(), &whole, &clean());
     let psec = raw.psec.clone().expect("PSEC is recorded");
     // From a setpoint in motion to the last one in motion, without the rests between: none is as long as 0.1 s.
     let moving: Vec<usize> = (1..psec.len()).filter(|&k| psec[k] != psec[k - 1]).collect();
@@ -157,7 +162,7 @@ fn a_recording_that_begins_in_motion_has_no_closed_loop() {
     (raw.psec, raw.position, raw.current) = (pick(&raw.psec), pick(&raw.position), pick(&raw.current));
     (raw.velocity_feedforward, raw.torque_feedforward) = (None, None);
     raw.time = (0..moving.len()).map(|k| k as f64 * TSP).collect();
-    let found = identified(&[raw], &ignorant("x"), &Options::default());
+    let found = identified(&[raw], &initial_parameters("x"), &IdentificationOptions::default());
     let told = finding(&found, Severity::Missing, "no-setpoints");
     assert!(told.contains("from standstill on"), "{told}");
     finding(&found, Severity::Warning, "no-standstill");
@@ -167,26 +172,30 @@ fn a_recording_that_begins_in_motion_has_no_closed_loop() {
 #[test]
 fn a_friction_that_no_law_describes_is_told() {
     let rough = Disturbance { friction: Some(|v| 0.6 * (2.5 * v).sin()), ..clean() };
-    let raw = recorded(&truth(), &legs(&[0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0], true), &rough);
-    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let raw = recorded(&true_parameters(), &legs(&[0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0], true), &rough);
+    let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
     finding(&found, Severity::Warning, "poor-friction-law");
 }
 
 #[test]
 fn an_exponent_at_its_bound_is_told() {
     // A law that is flat beyond 0.2 m/min: d would have to be far below its bound.
-    let steep = with(with(truth(), "x.friction.d", Value::Double(-60.0)), "x.friction.b", Value::Double(0.0));
+    let steep = with(
+        with(true_parameters(), "x.friction.d", Value::Double(-60.0)),
+        "x.friction.b",
+        Value::Double(0.0),
+    );
     let raw = recorded(&steep, &legs(&[0.02, 0.04, 0.06, 0.1, 0.5, 2.0, 5.0, 10.0], true), &clean());
-    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
     let told = finding(&found, Severity::Warning, "at-bound");
     assert!(told.contains("friction.d"), "{told}");
 }
 
 #[test]
 fn another_position_controller_is_not_taken_for_the_cascade() {
-    let raw = recorded(&truth(), &legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true), &clean());
-    let start = with(ignorant("x"), "x.position_loop.controller", Value::Text("gpc".to_owned()));
-    let found = identified(&[raw], &start, &Options::default());
+    let raw = recorded(&true_parameters(), &legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true), &clean());
+    let start = with(initial_parameters("x"), "x.position_loop.controller", Value::Text("gpc".to_owned()));
+    let found = identified(&[raw], &start, &IdentificationOptions::default());
     let told = finding(&found, Severity::Missing, "not-a-cascade");
     assert!(told.contains("controller=cascade"), "{told}");
     assert!(found.friction.is_some(), "the steps before do not need it");
@@ -195,8 +204,8 @@ fn another_position_controller_is_not_taken_for_the_cascade() {
 #[test]
 fn a_current_every_millisecond_shows_the_inertia_by_equation_5_alone() {
     let psec = legs(&[1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true);
-    let raw = recorded(&truth(), &psec, &Disturbance { every: Some(8), ..clean() });
-    let found = identified(&[raw], &ignorant("x"), &STEPS_ONLY);
+    let raw = recorded(&true_parameters(), &psec, &Disturbance { sample_ticks: Some(8), ..clean() });
+    let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
     let inertia = found.inertia.expect("an inertia");
     println!("eq. 5 at 1 ms: {:.5} ± {:.5}", inertia.value, inertia.error);
     assert!((inertia.value / 0.028 - 1.0).abs() < 0.03, "{}", inertia.value);
@@ -205,16 +214,20 @@ fn a_current_every_millisecond_shows_the_inertia_by_equation_5_alone() {
 #[test]
 fn positions_alone_tell_inertia_and_friction() {
     let psec = legs(&[0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true);
-    let mut raw = recorded(&truth(), &psec, &clean());
+    let mut raw = recorded(&true_parameters(), &psec, &clean());
     raw.current = None;
-    let found = identified(&[raw], &ignorant("x"), &Options::default());
+    let found = identified(&[raw], &initial_parameters("x"), &IdentificationOptions::default());
     finding(&found, Severity::Missing, "no-current");
     let inertia = inertia_of(&found);
     println!("inertia from positions {inertia:.5}");
     assert!((inertia / 0.028 - 1.0).abs() < 0.01, "{inertia}");
-    let [a, b, c, d] =
-        [Parameter::FrictionA, Parameter::FrictionB, Parameter::FrictionC, Parameter::FrictionD]
-            .map(|parameter| parameter.get(found.axis()));
+    let [a, b, c, d] = [
+        RefinedParameter::FrictionA,
+        RefinedParameter::FrictionB,
+        RefinedParameter::FrictionC,
+        RefinedParameter::FrictionD,
+    ]
+    .map(|parameter| parameter.get(found.axis()));
     for v in [0.5, 2.0, 8.0, 16.0] {
         let current = a * (b * v).exp() + c * (d * v).exp();
         println!("  {v} m/min: {current:.4} against {:.4} A", law(v));
@@ -224,32 +237,32 @@ fn positions_alone_tell_inertia_and_friction() {
 
 #[test]
 fn a_breakaway_above_the_law_is_found_where_it_is_freed() {
-    let sticky = with(truth(), "x.friction.i0", Value::Double(1.4));
+    let sticky = with(true_parameters(), "x.friction.i0", Value::Double(1.4));
     let psec = legs(&[0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0], true);
     let raw = recorded(&sticky, &psec, &Disturbance::usual(virtual_axes_core::config::AxisKind::Linear, 5));
-    let options = Options { i0: Breakaway::Freed, refine: Refine::ALL };
-    let found = identified(&[raw], &ignorant("x"), &options);
-    let i0 = Parameter::Breakaway.get(found.axis());
+    let options = IdentificationOptions { i0: Breakaway::Freed, refine: RefinementScope::ALL };
+    let found = identified(&[raw], &initial_parameters("x"), &options);
+    let i0 = RefinedParameter::Breakaway.get(found.axis());
     println!("i0 {i0:.4} A");
     assert!((i0 / 1.4 - 1.0).abs() < 0.03, "{i0}");
 }
 
 #[test]
 fn a_logger_that_stalls_jitters_and_leaves_gaps_costs_no_accuracy() {
-    let machine = truth().machine_config().expect("a machine");
+    let machine = true_parameters().machine_config().expect("a machine");
     let campaign =
         Campaign::plan(&machine, 0, &[FeedforwardMode::Off], &Limits { range: None, max_feed: Some(0.2) })
             .expect("a campaign");
     let bad = Disturbance {
-        every: Some(8),
+        sample_ticks: Some(8),
         jitter: 5e-5,
         stalls: vec![20.0..20.05, 41.0..41.2],
         gaps: vec![30.0..30.5],
         current_lag: 3e-3,
         ..Disturbance::usual(virtual_axes_core::config::AxisKind::Linear, 6)
     };
-    let raw = recorded(&truth(), campaign.psec(), &bad);
-    let found = identified(&[raw], &ignorant("x"), &Options::default());
+    let raw = recorded(&true_parameters(), campaign.psec(), &bad);
+    let found = identified(&[raw], &initial_parameters("x"), &IdentificationOptions::default());
     let inertia = inertia_of(&found);
     println!("inertia {inertia:.5}, {} spans", found.agreements[0].experiments.len());
     assert!((inertia / 0.028 - 1.0).abs() < 0.01, "{inertia}");
@@ -258,13 +271,13 @@ fn a_logger_that_stalls_jitters_and_leaves_gaps_costs_no_accuracy() {
 
 #[test]
 fn parts_in_one_recording_are_told_apart_by_their_feedforward() {
-    let parameters = truth();
+    let parameters = true_parameters();
     let machine = parameters.machine_config().expect("a machine");
     let axis = &machine.axes()[0];
     let short = legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true);
     let mut all: Option<RawRecording> = None;
     for mode in FeedforwardMode::ALL {
-        let raw = record(&feedforward(&parameters, "x", mode), "x", &short, &clean());
+        let raw = record(&machine_with_feedforward(&parameters, "x", mode), "x", &short, &clean());
         all = Some(match all {
             None => raw,
             Some(mut all) => {
@@ -285,7 +298,7 @@ fn parts_in_one_recording_are_told_apart_by_their_feedforward() {
     let all = all.expect("three parts");
     let (signals, _) =
         condition(&all, axis, &machine.periods(), &Conditioning::default()).expect("a recording");
-    let parts = virtual_axes_identify::identify::experiments(
+    let parts = virtual_axes_identify::identify::find_experiments(
         &signals,
         0,
         axis,
@@ -299,13 +312,18 @@ fn parts_in_one_recording_are_told_apart_by_their_feedforward() {
 #[test]
 fn only_what_is_chosen_is_refined() {
     let psec = legs(&[0.5, 1.0, 2.0, 4.0, 8.0, 12.0], true);
-    let raw = recorded(&truth(), &psec, &clean());
-    let chosen = Refine { inertia: true, ..Refine::NONE };
-    let found = identified(&[raw], &ignorant("x"), &Options { i0: Breakaway::Held, refine: chosen });
+    let raw = recorded(&true_parameters(), &psec, &clean());
+    let chosen = RefinementScope { inertia: true, ..RefinementScope::NONE };
+    let found = identified(
+        &[raw],
+        &initial_parameters("x"),
+        &IdentificationOptions { i0: Breakaway::Held, refine: chosen },
+    );
     let refinement = found.refinement.as_ref().expect("a refinement");
-    let moved: Vec<Parameter> = refinement.parameters.iter().map(|refined| refined.parameter).collect();
-    assert_eq!(moved, [Parameter::Inertia]);
+    let moved: Vec<RefinedParameter> =
+        refinement.parameters.iter().map(|refined| refined.parameter).collect();
+    assert_eq!(moved, [RefinedParameter::Inertia]);
     assert!((inertia_of(&found) / 0.028 - 1.0).abs() < 0.01);
     let law = &found.friction.as_ref().expect("a law").law.config;
-    assert_eq!(Parameter::FrictionA.get(found.axis()), law.a, "as the step found it");
+    assert_eq!(RefinedParameter::FrictionA.get(found.axis()), law.a, "as the step found it");
 }

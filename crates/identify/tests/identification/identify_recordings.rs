@@ -2,11 +2,11 @@
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_identify::identify::FeedforwardMode;
-use virtual_axes_identify::identify::campaign::Options;
+use virtual_axes_identify::identify::campaign::CampaignOptions;
 use virtual_axes_identify::recording::RawRecording;
-use virtual_axes_verification::fixtures::common::{M_MIN, TSP, parameters};
+use virtual_axes_verification::fixtures::machines::{M_MIN, TSP, parameters};
 use virtual_axes_verification::fixtures::recordings::{
-    CurrentNoise, Disturbance, Random, feedforward, record, record_campaign, stribeck,
+    CurrentNoise, Disturbance, NoiseGenerator, machine_with_feedforward, record, record_campaign, stribeck,
 };
 
 /// X there and back at 3 m/min, with ramps of constant acceleration, 0.2 s at rest before and after.
@@ -69,7 +69,11 @@ fn a_clean_recording_has_the_set_points_at_their_instants() {
 #[test]
 fn more_samples_are_taken_between_the_instants() {
     let clean = recorded(&Disturbance::default());
-    let fine = recorded(&Disturbance { every: Some(8), velocity: true, ..Disturbance::default() });
+    let fine = recorded(&Disturbance {
+        sample_ticks: Some(8),
+        is_velocity_recorded: true,
+        ..Disturbance::default()
+    });
     // 1 ms of 6 ms.
     assert_eq!(fine.time.len(), 6 * clean.time.len());
     assert!((fine.time[1] - 0.001).abs() < 1e-15);
@@ -108,7 +112,7 @@ fn noise_and_resolution_are_as_large_as_they_say_and_repeat_with_the_seed() {
 
 #[test]
 fn normal_numbers_are_normal() {
-    let mut random = Random::new(3);
+    let mut random = NoiseGenerator::new(3);
     let count = 100_000;
     let numbers: Vec<f64> = (0..count).map(|_| random.normal()).collect();
     let within = |limit: f64| numbers.iter().filter(|x| x.abs() < limit).count() as f64 / count as f64;
@@ -149,7 +153,7 @@ fn more_friction_is_more_current() {
 
 #[test]
 fn the_current_lags_and_the_stamps_jitter_leap_and_stall() {
-    let fine = |current_lag| Disturbance { every: Some(8), current_lag, ..Disturbance::default() };
+    let fine = |current_lag| Disturbance { sample_ticks: Some(8), current_lag, ..Disturbance::default() };
     let (clean, late) = (recorded(&fine(0.0)), recorded(&fine(0.003)));
     assert_eq!(&current(&late)[3..], &current(&clean)[..current(&clean).len() - 3]);
     assert_eq!(position(&late), position(&clean));
@@ -174,7 +178,7 @@ fn the_current_lags_and_the_stamps_jitter_leap_and_stall() {
 fn parts_of_a_campaign_differ_in_what_the_feedforward_does() {
     let parameters = parameters::<&str>(&[]);
     let clean = Disturbance::default();
-    let short = Options { range: Some([0.0, 0.05]), max_feed: Some(3.0 * M_MIN) };
+    let short = CampaignOptions { range: Some([0.0, 0.05]), max_feed: Some(3.0 * M_MIN) };
     let recordings = record_campaign(&parameters, "x", &FeedforwardMode::ALL, &short, &clean);
     let largest = |channel: &Option<Vec<f64>>| {
         channel.iter().flatten().fold(0.0_f64, |largest, value| largest.max(value.abs()))
@@ -188,6 +192,6 @@ fn parts_of_a_campaign_differ_in_what_the_feedforward_does() {
         assert!((velocity - wanted).abs() < 1e-6, "{part:?}: {velocity}");
         assert_eq!(torque > 0.0, *part == FeedforwardMode::Both, "{part:?}: {torque}");
     }
-    let off = feedforward(&parameters, "x", FeedforwardMode::Off);
+    let off = machine_with_feedforward(&parameters, "x", FeedforwardMode::Off);
     assert_eq!(off.axes()[1], default_machine().axes()[1]);
 }

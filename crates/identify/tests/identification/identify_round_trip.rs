@@ -1,16 +1,19 @@
 //! Axes that are identified from simulated recordings of a campaign, against the parameters they were made with.
 
 use virtual_axes_core::config::{AxisKind, MachineConfig, Parameters, Value};
-use virtual_axes_identify::identify::campaign::Options as Campaign;
+use virtual_axes_identify::identify::campaign::CampaignOptions as Campaign;
 use virtual_axes_identify::identify::{
-    FeedforwardMode, Identification, Identified, Input, Options, adopt, identify,
+    FeedforwardMode, Identification, IdentificationInput, IdentificationOptions, IdentifiedValue, identify,
+    update_parameters,
 };
 use virtual_axes_identify::recording::{Conditioning, Severity, Signals, condition};
-use virtual_axes_verification::fixtures::recordings::{Disturbance, ignorant, place, record_campaign, truth};
+use virtual_axes_verification::fixtures::recordings::{
+    Disturbance, axis_index, initial_parameters, record_campaign, true_parameters,
+};
 
 fn conditioned(parameters: &Parameters, axis: &str, seed: u64) -> Vec<Signals> {
     let machine = parameters.machine_config().expect("a machine");
-    let config = &machine.axes()[place(&machine, axis)];
+    let config = &machine.axes()[axis_index(&machine, axis)];
     let disturbance = Disturbance::usual(config.kind(), seed);
     record_campaign(parameters, axis, &FeedforwardMode::ALL, &Campaign::default(), &disturbance)
         .iter()
@@ -23,7 +26,7 @@ fn conditioned(parameters: &Parameters, axis: &str, seed: u64) -> Vec<Signals> {
 struct Found {
     axis: String,
     identification: Identification,
-    values: Vec<Identified>,
+    values: Vec<IdentifiedValue>,
     machine: Parameters,
 }
 
@@ -31,13 +34,16 @@ impl Found {
     fn from(signals: &[Signals], start: &Parameters, axis: &str) -> Self {
         let machine = start.machine_config().expect("a machine");
         let modes = FeedforwardMode::ALL.into_iter().map(Some);
-        let inputs: Vec<Input> =
-            signals.iter().zip(modes).map(|(signals, feedforward)| Input { signals, feedforward }).collect();
-        let config = &machine.axes()[place(&machine, axis)];
-        let identification = identify(&inputs, config, &machine.periods(), &Options::default());
+        let inputs: Vec<IdentificationInput> = signals
+            .iter()
+            .zip(modes)
+            .map(|(signals, feedforward)| IdentificationInput { signals, feedforward })
+            .collect();
+        let config = &machine.axes()[axis_index(&machine, axis)];
+        let identification = identify(&inputs, config, &machine.periods(), &IdentificationOptions::default());
         let values = identification.values(start, axis);
         let mut machine = start.clone();
-        adopt(&mut machine, axis, &values).expect("values in range");
+        update_parameters(&mut machine, axis, &values).expect("values in range");
         Found { axis: axis.to_owned(), identification, values, machine }
     }
 
@@ -45,7 +51,7 @@ impl Found {
         number(&self.machine, &format!("{}.{key}", self.axis))
     }
 
-    fn value(&self, key: &str) -> &Identified {
+    fn value(&self, key: &str) -> &IdentifiedValue {
         let key = format!("{}.{key}", self.axis);
         self.values.iter().find(|value| value.key == key).unwrap_or_else(|| panic!("{key} is not identified"))
     }
@@ -120,8 +126,8 @@ const AXES: [Axis; 5] = [
 
 fn round_trip(number: usize) -> Found {
     let axis = &AXES[number];
-    let signals = conditioned(&truth(), axis.name, 11 + number as u64);
-    let found = Found::from(&signals, &ignorant(axis.name), axis.name);
+    let signals = conditioned(&true_parameters(), axis.name, 11 + number as u64);
+    let found = Found::from(&signals, &initial_parameters(axis.name), axis.name);
     let relative = |found: f64, truth: f64| found / truth - 1.0;
 
     let inertia = relative(found.number("motor.inertia_kg_m2"), axis.inertia);
@@ -169,14 +175,14 @@ fn x_and_y_come_back_and_their_ballbar_is_that_of_the_truth() {
     let (x, y) = (round_trip(0), round_trip(1));
     assert_eq!((x.number("gravity.weight_n"), y.number("gravity.weight_n")), (0.0, 0.0));
     let mut machine = x.machine.clone();
-    adopt(&mut machine, "y", &y.values).expect("values in range");
+    update_parameters(&mut machine, "y", &y.values).expect("values in range");
     let radial = |parameters: &Parameters| {
         let config = parameters.machine_config().expect("a machine");
         let figures = ballbar(&config);
         println!("ballbar: mean {:.2}, {:.2} … {:.2} µm", figures[0], figures[1], figures[2]);
         figures
     };
-    let (found, truth) = (radial(&machine), radial(&truth()));
+    let (found, truth) = (radial(&machine), radial(&true_parameters()));
     for (found, truth) in found.iter().zip(truth) {
         assert!((found - truth).abs() < 1.0, "{found} against {truth} µm");
     }
@@ -184,7 +190,7 @@ fn x_and_y_come_back_and_their_ballbar_is_that_of_the_truth() {
 
 /// Radial deviation on the ballbar: mean, min, max, µm.
 fn ballbar(machine: &MachineConfig) -> [f64; 3] {
-    let figures = virtual_axes_verification::fixtures::common::watch_scenario("ballbar", machine, |_| {});
+    let figures = virtual_axes_verification::fixtures::machines::watch_scenario("ballbar", machine, |_| {});
     let circle = &figures.circles[0];
     [circle.mean, circle.min, circle.max].map(|meters| meters * 1e6)
 }
@@ -213,17 +219,17 @@ fn c_comes_back_without_gravity() {
     let gravity = found.identification.gravity.as_ref().expect("gravity is looked for");
     assert_eq!(gravity.tilt.map(|(tilt, _)| tilt), Some(0.0));
     let machine = found.machine.machine_config().expect("a machine");
-    assert_eq!(machine.axes()[place(&machine, "c")].kind(), AxisKind::Rotary);
+    assert_eq!(machine.axes()[axis_index(&machine, "c")].kind(), AxisKind::Rotary);
 }
 
 #[test]
 fn weights_and_delays_of_the_feedforward_come_back_without_its_set_points() {
-    let mut start = ignorant("x");
+    let mut start = initial_parameters("x");
     for (key, value) in [("delays.beta_ms", 15.0), ("delays.gamma_ms", 3.0), ("friction.a", 2.0)] {
-        let source = virtual_axes_core::config::Source::named("the test");
+        let source = virtual_axes_core::config::ValueSource::named("the test");
         start.set(&format!("x.{key}"), Value::Double(value), &source).expect("a value in range");
     }
-    let mut signals = conditioned(&truth(), "x", 31);
+    let mut signals = conditioned(&true_parameters(), "x", 31);
     for span in signals.iter_mut().flat_map(|signals| &mut signals.spans) {
         (span.velocity_feedforward, span.torque_feedforward) = (None, None);
     }

@@ -5,7 +5,7 @@ use std::f64::consts::{LN_2, PI, TAU};
 use proptest::prelude::*;
 use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_identify::recording::{
-    Conditioning, Finding, RawRecording, RecordingFault, Signals, condition,
+    Conditioning, ConditioningError, Finding, RawRecording, Signals, condition,
 };
 
 /// 1 kHz.
@@ -93,7 +93,10 @@ fn axis(name: &str) -> AxisConfig {
     machine().axes().iter().find(|axis| axis.name() == name).expect("an axis of the machine").clone()
 }
 
-fn run_with(raw: &RawRecording, options: &Conditioning) -> Result<(Signals, Vec<Finding>), RecordingFault> {
+fn run_with(
+    raw: &RawRecording,
+    options: &Conditioning,
+) -> Result<(Signals, Vec<Finding>), ConditioningError> {
     condition(raw, &axis("x"), &machine().periods(), options)
 }
 
@@ -101,7 +104,7 @@ fn run(raw: &RawRecording) -> (Signals, Vec<Finding>) {
     run_with(raw, &Conditioning::default()).expect("the recording is good")
 }
 
-fn fault(raw: &RawRecording) -> RecordingFault {
+fn fault(raw: &RawRecording) -> ConditioningError {
     run_with(raw, &Conditioning::default()).expect_err("the recording is bad")
 }
 
@@ -183,7 +186,7 @@ fn a_cutoff_out_of_range_is_refused() {
     for cutoff in [0.0, -1.0, f64::NAN, 161.0, 0.01] {
         let options = Conditioning { cutoff: Some(cutoff), ..Conditioning::default() };
         let fault = run_with(&recording(), &options).expect_err("out of range");
-        assert!(matches!(fault, RecordingFault::Cutoff { highest: 160.0, .. }), "{fault}");
+        assert!(matches!(fault, ConditioningError::Cutoff { highest: 160.0, .. }), "{fault}");
     }
     let (signals, _) = run(&sampled(0.006, 1500));
     assert!((signals.cutoff - 0.16 / 0.006).abs() < 1e-9);
@@ -422,7 +425,7 @@ fn a_lag_that_is_given_is_taken_back_exactly() {
     }
     for lag in [f64::NAN, 0.03, -0.02] {
         let options = Conditioning { current_lag: Some(lag), ..Conditioning::default() };
-        assert!(matches!(run_with(&recording(), &options), Err(RecordingFault::Lag { .. })));
+        assert!(matches!(run_with(&recording(), &options), Err(ConditioningError::Lag { .. })));
     }
 }
 
@@ -509,23 +512,23 @@ fn swapped_columns_are_named() {
     let mut raw = good.clone();
     (raw.position, raw.psec) = (good.psec.clone(), good.position.clone());
     (raw.velocity, raw.current) = (None, None);
-    assert!(matches!(fault(&raw), RecordingFault::PsecBehind { lag, .. } if (lag - 0.009).abs() < 2e-4));
+    assert!(matches!(fault(&raw), ConditioningError::PsecBehind { lag, .. } if (lag - 0.009).abs() < 2e-4));
     let mut raw = good.clone();
     raw.current = good.velocity.clone();
-    assert!(matches!(fault(&raw), RecordingFault::CurrentIsMotion { signal: "velocity", .. }));
+    assert!(matches!(fault(&raw), ConditioningError::CurrentIsMotion { signal: "velocity", .. }));
     let mut raw = good.clone();
     raw.current = good.position.clone();
-    assert!(matches!(fault(&raw), RecordingFault::CurrentIsMotion { signal: "position", .. }));
+    assert!(matches!(fault(&raw), ConditioningError::CurrentIsMotion { signal: "position", .. }));
     let mut raw = good.clone();
     raw.velocity = good.position.clone();
     assert!(fault(&raw).to_string().contains("the velocity is a position"), "{}", fault(&raw));
     let mut raw = good.clone();
     raw.psec = good.current.clone();
     scale(&mut raw.psec, 0.01);
-    assert!(matches!(fault(&raw), RecordingFault::PsecUnrelated { .. }), "{}", fault(&raw));
+    assert!(matches!(fault(&raw), ConditioningError::PsecUnrelated { .. }), "{}", fault(&raw));
     let mut raw = good;
     raw.psec.iter_mut().flatten().for_each(|psec| *psec += 0.1);
-    assert!(matches!(fault(&raw), RecordingFault::PsecApart { .. }), "{}", fault(&raw));
+    assert!(matches!(fault(&raw), ConditioningError::PsecApart { .. }), "{}", fault(&raw));
 }
 
 #[test]
@@ -533,20 +536,20 @@ fn files_without_substance_are_refused() {
     let good = recording();
     assert!(matches!(
         fault(&RawRecording { position: Some(vec![]), ..RawRecording::default() }),
-        RecordingFault::TooFew { found: 0, .. }
+        ConditioningError::TooFew { found: 0, .. }
     ));
     let raw = RawRecording { position: None, ..good.clone() };
-    assert!(matches!(fault(&raw), RecordingFault::NoPosition { .. }));
+    assert!(matches!(fault(&raw), ConditioningError::NoPosition { .. }));
     let raw = RawRecording { position: Some(vec![f64::NAN; SAMPLES]), ..good.clone() };
-    assert!(matches!(fault(&raw), RecordingFault::NoPosition { .. }));
+    assert!(matches!(fault(&raw), ConditioningError::NoPosition { .. }));
     let raw = RawRecording { current: Some(vec![0.0; SAMPLES - 1]), ..good.clone() };
-    assert!(matches!(fault(&raw), RecordingFault::Lengths { channel: "current", .. }));
+    assert!(matches!(fault(&raw), ConditioningError::Lengths { channel: "current", .. }));
     let raw = RawRecording { time: vec![f64::NAN; SAMPLES], ..good.clone() };
-    assert!(matches!(fault(&raw), RecordingFault::StampsNotFinite { .. }));
+    assert!(matches!(fault(&raw), ConditioningError::StampsNotFinite { .. }));
     let raw = RawRecording { time: vec![4.0; SAMPLES], ..good.clone() };
-    assert!(matches!(fault(&raw), RecordingFault::StampsEqual { stamp: 4.0, .. }));
+    assert!(matches!(fault(&raw), ConditioningError::StampsEqual { stamp: 4.0, .. }));
     let raw = RawRecording { time: good.time.iter().rev().copied().collect(), ..good };
-    assert!(matches!(fault(&raw), RecordingFault::StampsBackwards { .. }));
+    assert!(matches!(fault(&raw), ConditioningError::StampsBackwards { .. }));
 }
 
 fn any_value() -> impl Strategy<Value = f64> {

@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::LimitsConfig;
 use virtual_axes_identify::recording::{Conditioning, RawRecording, condition};
-use virtual_axes_verification::fixtures::common::{AXES, TSP, machine, parameters};
+use virtual_axes_verification::fixtures::machines::{AXES, TSP, machine, parameters};
 
 /// Tick of the default machine, s.
 const TICK: f64 = 125e-6;

@@ -6,22 +6,22 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
-use virtual_axes_core::config::{MachineConfig, Parameters, Source, Value};
-use virtual_axes_core::design::{GpcTuning, Weight, gpc, margins};
+use virtual_axes_core::config::{MachineConfig, Parameters, Value, ValueSource};
+use virtual_axes_core::design::{ControlWeight, GpcTuning, gpc, margins};
 use virtual_axes_core::machine::prediction_model;
 use virtual_axes_core::trial::{self, Trial};
 use virtual_axes_identify::tune::{
-    Bench, Candidate, Cost, MarginLimits, Search, Term, TuneError, Tuning, Unwatched, Watch, contrast, front,
-    tune_cascade, tune_gpc,
+    Cost, CostTerm, MarginLimits, NoProgress, Progress, SearchResult, TuneError, Tuning, TuningCandidate,
+    TuningProblem, find_contrasts, pareto_front, tune_cascade, tune_gpc,
 };
-use virtual_axes_verification::fixtures::tune_common::{
-    CIRCLE, CORNER, THERE_AND_BACK, course, machine, program, setpoints,
+use virtual_axes_verification::fixtures::tuning::{
+    CIRCLE, CORNER, THERE_AND_BACK, machine, program, setpoints, workload,
 };
 
 const MICROMETER: f64 = 1e-6;
 
 fn set(parameters: &mut Parameters, key: &str, value: Value) {
-    parameters.set(key, value, &Source::named("test")).expect(key);
+    parameters.set(key, value, &ValueSource::named("test")).expect(key);
 }
 
 /// The machine with a predictive controller on each of `joints`, key by key.
@@ -52,7 +52,7 @@ fn tracking_error(config: &MachineConfig, scenario: &str) -> Option<f64> {
     };
     let outcome = trial::run(&trial, setpoints(&program, config), |_| Ok(())).expect("a run");
     let report = outcome.figures.axes[0].report;
-    (report.saturation_time == 0.0).then_some(report.max_synchronized_tracking_error / MICROMETER)
+    (report.saturation_time == 0.0).then_some(report.max_delay_compensated_following_error / MICROMETER)
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn the_tuning_is_as_good_as_any_of_the_grid_by_brute_force() {
     let keeping: Vec<_> = grid
         .into_iter()
         .filter(|&(n2, nu, lambda_rel)| {
-            let tuning = GpcTuning { n1: 1, n2, nu, weight: Weight::Relative(lambda_rel) };
+            let tuning = GpcTuning { n1: 1, n2, nu, weight: ControlWeight::Relative(lambda_rel) };
             let design = gpc(&model, &tuning).ok().and_then(|rst| margins(&model, &rst).ok());
             design.is_some_and(|margins| margins.modulus >= 0.5 && margins.delay >= 0.005)
         })
@@ -85,22 +85,23 @@ fn the_tuning_is_as_good_as_any_of_the_grid_by_brute_force() {
     let best =
         keeping.par_iter().filter_map(cost).min_by(f64::total_cmp).expect("one that does not saturate");
 
-    let course = course(THERE_AND_BACK, &config);
+    let course = workload(THERE_AND_BACK, &config);
     let cost = Cost::default();
-    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
     let found = tune_gpc(&bench, &MarginLimits::default()).expect("a tuning");
     assert!(found.best.cost <= best, "{} found, {best} on the grid", found.best.cost);
     // One axis has no contour: the cost is its largest synchronized tracking error.
     let Tuning::Gpc { n1, n2, nu, lambda_rel } = found.best.tuning else { panic!("{}", found.best.tuning) };
     let again = with_gpc(&parameters, &["x"], (n1 as i64, n2 as i64, nu as i64, lambda_rel));
     assert_eq!(tracking_error(&again, THERE_AND_BACK), Some(found.best.cost));
-    let rst = gpc(&model, &GpcTuning { n1, n2, nu, weight: Weight::Relative(lambda_rel) }).expect("a design");
+    let rst = gpc(&model, &GpcTuning { n1, n2, nu, weight: ControlWeight::Relative(lambda_rel) })
+        .expect("a design");
     let kept = margins(&model, &rst).expect("stable");
     assert!(kept.modulus >= 0.5 && kept.delay >= 0.005, "{kept:?}");
 }
 
 /// A search with so many threads.
-fn with_threads(threads: usize, search: impl Fn() -> Search + Sync) -> Search {
+fn with_threads(threads: usize, search: impl Fn() -> SearchResult + Sync) -> SearchResult {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     // Elsewhere than in the pool's own thread, `install` would not use it.
     let search = &search;
@@ -111,12 +112,12 @@ fn with_threads(threads: usize, search: impl Fn() -> Search + Sync) -> Search {
 fn the_number_of_threads_changes_nothing() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = course(CORNER, &config);
+    let course = workload(CORNER, &config);
     let cost: Cost = "contour=1,rms=0.5,activity=10".parse().expect("a cost");
     // High margins leave few designs to run.
     let limits = MarginLimits { modulus: 0.75, delay: 0.01 };
     let search = |seed: Option<u64>| {
-        let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+        let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
         match seed {
             None => tune_gpc(&bench, &limits).expect("a tuning"),
             Some(seed) => tune_cascade(&bench, &limits, seed).expect("a tuning"),
@@ -134,9 +135,9 @@ fn the_number_of_threads_changes_nothing() {
 fn the_cascade_is_tuned_within_the_margins() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = course(CIRCLE, &config);
+    let course = workload(CIRCLE, &config);
     let cost = Cost::default();
-    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
     let limits = MarginLimits { modulus: 0.7, delay: 0.02 };
     let found = tune_cascade(&bench, &limits, 1).expect("a tuning");
     // The lead of the feedforward costs the machine as it is ΔR ≈ v²/(R Kp) Tsp/2: 167 µm here.
@@ -152,7 +153,7 @@ fn the_cascade_is_tuned_within_the_margins() {
         let kept = margins(&model, &rst).expect("stable");
         assert!(kept.modulus >= 0.7 && kept.delay >= 0.02, "{kept:?}");
     }
-    assert!(found.tried.iter().all(|c| !c.saturated && c.cost >= found.best.cost));
+    assert!(found.tried.iter().all(|c| !c.is_saturated && c.cost >= found.best.cost));
 }
 
 #[test]
@@ -161,10 +162,10 @@ fn what_saturates_is_not_taken() {
     // The move asks for more current than there is, whatever the controller.
     set(&mut parameters, "x.motor.max_current_a", Value::Double(2.0));
     let config = parameters.machine_config().expect("a machine");
-    let course = course(THERE_AND_BACK, &config);
+    let course = workload(THERE_AND_BACK, &config);
     let cost = Cost::default();
-    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
-    assert!(bench.present().saturated);
+    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
+    assert!(bench.present().is_saturated);
     let limits = MarginLimits { modulus: 0.85, delay: 0.02 };
     let error = tune_gpc(&bench, &limits).expect_err("no tuning");
     assert!(matches!(error, TuneError::Saturated { runs } if runs > 0), "{error}");
@@ -175,9 +176,9 @@ fn what_saturates_is_not_taken() {
 fn margins_that_no_design_has_are_refused_with_the_best_there_is() {
     let parameters = machine(&["x"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = course(THERE_AND_BACK, &config);
+    let course = workload(THERE_AND_BACK, &config);
     let cost = Cost::default();
-    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
+    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
     let limits = MarginLimits { modulus: 0.999, delay: 0.005 };
     match tune_gpc(&bench, &limits).expect_err("no tuning") {
         TuneError::NoMargins { designs, limits: asked, modulus, .. } => {
@@ -194,10 +195,11 @@ fn a_path_without_motion_has_nothing_to_tune() {
     let parameters = machine(&["x"]);
     let cost = Cost::default();
     let rows = Rows { left: 100 };
-    let setpoints = trial::Setpoints::Grid(Box::new(rows));
+    let setpoints = trial::SetpointSource::Grid(Box::new(rows));
     let course =
-        virtual_axes_identify::tune::Course::read("still", None, setpoints, || Ok(())).expect("setpoints");
-    let error = Bench::new(&parameters, &course, &cost, &Unwatched).map(|_| ()).expect_err("nothing moves");
+        virtual_axes_identify::tune::Workload::read("still", None, setpoints, || Ok(())).expect("setpoints");
+    let error =
+        TuningProblem::new(&parameters, &course, &cost, &NoProgress).map(|_| ()).expect_err("nothing moves");
     assert!(matches!(error, TuneError::NothingMoves), "{error}");
 }
 
@@ -221,8 +223,8 @@ impl trial::GridSource for Rows {
 /// Ends the search after so many position periods.
 struct Impatient(AtomicUsize);
 
-impl Watch for Impatient {
-    fn go_on(&self) -> io::Result<()> {
+impl Progress for Impatient {
+    fn check_interrupt(&self) -> io::Result<()> {
         let left = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
         left.map(|_| ()).map_err(|_| io::Error::other("enough"))
     }
@@ -247,11 +249,11 @@ fn a_weight_given_as_such_does_not_hide_the_relative_one() {
 fn a_search_that_is_interrupted_ends_with_the_reason() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = course(CORNER, &config);
+    let course = workload(CORNER, &config);
     let cost = Cost::default();
     for cascade in [false, true] {
         let watch = Impatient(AtomicUsize::new(2000));
-        let bench = Bench::new(&parameters, &course, &cost, &watch).expect("a bench");
+        let bench = TuningProblem::new(&parameters, &course, &cost, &watch).expect("a bench");
         let limits = MarginLimits::default();
         let found = if cascade { tune_cascade(&bench, &limits, 1) } else { tune_gpc(&bench, &limits) };
         assert_eq!(found.expect_err("interrupted").to_string(), "enough");
@@ -262,11 +264,11 @@ fn a_search_that_is_interrupted_ends_with_the_reason() {
 fn contrasts_are_better_here_and_worse_there() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let (circle, corner) = (course(CIRCLE, &config), course(CORNER, &config));
+    let (circle, corner) = (workload(CIRCLE, &config), workload(CORNER, &config));
     let cost = Cost::default();
-    let bench = Bench::new(&parameters, &circle, &cost, &Unwatched).expect("a bench");
+    let bench = TuningProblem::new(&parameters, &circle, &cost, &NoProgress).expect("a bench");
     let limits = MarginLimits { modulus: 0.7, delay: 0.0 };
-    let (present, found) = contrast(&bench, &corner, &limits).expect("contrasts");
+    let (present, found) = find_contrasts(&bench, &corner, &limits).expect("contrasts");
     assert!(!found.is_empty());
     for pair in &found {
         assert!(pair.better.cost < bench.present().cost && pair.worse.cost > present.cost);
@@ -275,8 +277,8 @@ fn contrasts_are_better_here_and_worse_there() {
     }
     assert!(found.windows(2).all(|pair| pair[0].worse.cost >= pair[1].worse.cost));
     // The other way round the longer path comes first.
-    let bench = Bench::new(&parameters, &corner, &cost, &Unwatched).expect("a bench");
-    let (_, other) = contrast(&bench, &circle, &limits).expect("contrasts");
+    let bench = TuningProblem::new(&parameters, &corner, &cost, &NoProgress).expect("a bench");
+    let (_, other) = find_contrasts(&bench, &circle, &limits).expect("contrasts");
     for pair in &other {
         assert!(
             pair.better.cost < bench.present().cost && pair.worse.cost > circle_cost(&parameters, &circle)
@@ -284,7 +286,7 @@ fn contrasts_are_better_here_and_worse_there() {
     }
 }
 
-fn circle_cost(parameters: &Parameters, circle: &virtual_axes_identify::tune::Course) -> f64 {
+fn circle_cost(parameters: &Parameters, circle: &virtual_axes_identify::tune::Workload) -> f64 {
     let config = parameters.machine_config().expect("a machine");
     let outcome = circle.run(&config, false, false, |_| Ok(())).expect("a run");
     outcome.figures.contour.expect("a contour").max / MICROMETER
@@ -293,17 +295,23 @@ fn circle_cost(parameters: &Parameters, circle: &virtual_axes_identify::tune::Co
 #[test]
 fn costs_are_read_and_refused_by_name() {
     let cost: Cost = "contour=1, rms=0.5,current".parse().expect("a cost");
-    assert_eq!(cost.terms(), [(Term::Contour, 1.0), (Term::Rms, 0.5), (Term::Current, 1.0)]);
+    assert_eq!(
+        cost.terms(),
+        [(CostTerm::Contour, 1.0), (CostTerm::FollowingRms, 0.5), (CostTerm::Current, 1.0)]
+    );
     assert_eq!(cost.to_string(), "contour,rms=0.5,current");
     for (text, message) in [
-        ("color", "unknown term color; there are contour, contour-rms, tracking, rms, current, activity"),
-        ("", "unknown term ; there are contour, contour-rms, tracking, rms, current, activity"),
+        (
+            "color",
+            "unknown term color; available terms: contour, contour-rms, following, rms, current, activity",
+        ),
+        ("", "unknown term ; available terms: contour, contour-rms, following, rms, current, activity"),
         ("rms=-1", "rms=-1: the weight must be a number from 0 to 1e9"),
         ("rms=inf", "rms=inf: the weight must be a number from 0 to 1e9"),
         ("rms=1e10", "rms=10000000000: the weight must be a number from 0 to 1e9"),
         ("rms=much", "rms=much: the weight must be a number from 0 to 1e9"),
-        ("rms=1,rms=2", "rms stands twice"),
-        ("rms=0,contour=0", "no term has a weight: every tuning would cost the same"),
+        ("rms=1,rms=2", "rms is given twice"),
+        ("rms=0,contour=0", "all weights are 0; at least one must be above 0"),
     ] {
         assert_eq!(text.parse::<Cost>().expect_err(text).to_string(), message);
     }
@@ -313,7 +321,7 @@ fn costs_are_read_and_refused_by_name() {
 fn a_cost_is_the_weighted_sum_of_figures() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = course(CORNER, &config);
+    let course = workload(CORNER, &config);
     let figures = course.run(&config, false, false, |_| Ok(())).expect("a run").figures;
     let of = |text: &str| text.parse::<Cost>().expect("a cost").of(&figures, &config);
     let contour = figures.contour.expect("a contour");
@@ -322,8 +330,8 @@ fn a_cost_is_the_weighted_sum_of_figures() {
     let worst = |value: fn(&virtual_axes_core::assess::AxisReport) -> f64| {
         f64::max(value(&figures.axes[0].report), value(&figures.axes[1].report))
     };
-    assert_eq!(of("tracking"), worst(|r| r.max_synchronized_tracking_error) / MICROMETER);
-    assert_eq!(of("rms"), worst(|r| r.rms_synchronized_tracking_error) / MICROMETER);
+    assert_eq!(of("following"), worst(|r| r.max_delay_compensated_following_error) / MICROMETER);
+    assert_eq!(of("rms"), worst(|r| r.rms_delay_compensated_following_error) / MICROMETER);
     assert_eq!(of("activity"), worst(|r| r.control_activity));
     // The motors of X and Y have 54 A.
     assert_eq!(of("current"), worst(|r| r.peak_current) / 54.0);
@@ -335,12 +343,12 @@ fn a_cost_is_the_weighted_sum_of_figures() {
 fn the_front_is_what_no_other_beats() {
     let parameters = machine(&["x"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = course(THERE_AND_BACK, &config);
+    let course = workload(THERE_AND_BACK, &config);
     let cost = Cost::default();
-    let bench = Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench");
-    let merit = |c: &Candidate| c.margins.map_or(f64::NAN, |m| m.modulus);
+    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
+    let merit = |c: &TuningCandidate| c.margins.map_or(f64::NAN, |m| m.modulus);
     // Costs and margins that repeat, by a multiplicative sequence.
-    let all: Vec<Candidate> = (0..200)
+    let all: Vec<TuningCandidate> = (0..200)
         .map(|i| {
             let mut candidate = bench.present().clone();
             candidate.cost = f64::from(i * 37 % 41);
@@ -350,8 +358,8 @@ fn the_front_is_what_no_other_beats() {
             candidate
         })
         .collect();
-    let on_front = front(&all, merit);
-    let beats = |a: &Candidate, b: &Candidate| {
+    let on_front = pareto_front(&all, merit);
+    let beats = |a: &TuningCandidate, b: &TuningCandidate| {
         a.cost <= b.cost && merit(a) >= merit(b) && (a.cost < b.cost || merit(a) > merit(b))
     };
     let expected: Vec<(f64, f64)> = {

@@ -1,15 +1,15 @@
 //! Tunings on plants that deviate, and the measure of control activity.
 
 use virtual_axes_core::assess::AxisAssessor;
-use virtual_axes_core::config::{AxisConfig, Parameters, Source, Value};
-use virtual_axes_core::machine::{Activity, AxisSample, deviating_model, prediction_model};
-use virtual_axes_identify::tune::{Cost, Deviation, Unwatched, robustness};
-use virtual_axes_verification::fixtures::tune_common::{CIRCLE, course, machine};
+use virtual_axes_core::config::{AxisConfig, Parameters, Value, ValueSource};
+use virtual_axes_core::machine::{Activity, AxisSample, deviating_plant_model, prediction_model};
+use virtual_axes_identify::tune::{Cost, NoProgress, PlantDeviation, analyze_robustness};
+use virtual_axes_verification::fixtures::tuning::{CIRCLE, machine, workload};
 
 fn with(parameters: &Parameters, changes: &[(&str, f64)]) -> Parameters {
     let mut changed = parameters.clone();
     for (key, value) in changes {
-        changed.set(key, Value::Double(*value), &Source::named("test")).expect(key);
+        changed.set(key, Value::Double(*value), &ValueSource::named("test")).expect(key);
     }
     changed
 }
@@ -31,26 +31,26 @@ fn a_deviating_model_is_that_of_a_machine_with_such_a_plant() {
             ("x.velocity_loop.gain", 5.0 * 0.7),
         ],
     );
-    let (found, expected) = (model(&deviating, deviating_model), model(&such, prediction_model));
+    let (found, expected) = (model(&deviating, deviating_plant_model), model(&such, prediction_model));
     assert_eq!(found.a().len(), expected.a().len());
     for (a, b) in found.a().iter().chain(found.b()).zip(expected.a().iter().chain(expected.b())) {
         assert!((a - b).abs() < 1e-9, "{a} and {b}");
     }
     // What it is designed for does not see it.
     assert_eq!(model(&deviating, prediction_model), model(&nominal, prediction_model));
-    assert_eq!(model(&nominal, deviating_model), model(&nominal, prediction_model));
+    assert_eq!(model(&nominal, deviating_plant_model), model(&nominal, prediction_model));
 }
 
 #[test]
 fn each_deviation_is_a_run_of_its_own() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = course(CIRCLE, &config);
+    let course = workload(CIRCLE, &config);
     let cost = Cost::default();
-    let found = robustness(&parameters, &course, &cost, 0.3, &Unwatched).expect("runs");
+    let found = analyze_robustness(&parameters, &course, &cost, 0.3, &NoProgress).expect("runs");
     let plain = course.run(&config, false, false, |_| Ok(())).expect("a run").figures;
     assert_eq!(found.nominal.figures, plain);
-    assert_eq!(found.nominal.deviation, Deviation::NONE);
+    assert_eq!(found.nominal.deviation, PlantDeviation::NONE);
     assert_eq!(found.single.len(), 6);
     for (place, (name, factor)) in [
         ("inertia", 0.7),
@@ -73,7 +73,7 @@ fn each_deviation_is_a_run_of_its_own() {
     // Friction is outside the linear loop.
     assert_eq!(found.single[2].margins, found.nominal.margins);
     assert_ne!(found.single[1].margins, found.nominal.margins);
-    let combined = Deviation::combined(0.3);
+    let combined = PlantDeviation::combined(0.3);
     assert!(combined.contains(&found.worst.deviation));
     assert_eq!(
         combined.map(|d| (d.inertia + d.friction + d.torque_constant) * 10.0).iter().sum::<f64>().round(),

@@ -1,89 +1,93 @@
-//! Why there is no campaign.
+//! Errors of planning a campaign.
 
 use virtual_axes_core::path::{PathError, PlanError};
 
-use super::room::SPEED_RESERVE;
+use super::travel_limits::SPEED_RESERVE;
+use virtual_axes_core::units::Rounded;
 
-/// A campaign that cannot be. Values are in the units of the axis: mm and m/min, or ° and rev/min.
+/// Error of [`Campaign::plan`](super::Campaign::plan). Values are in mm and m/min, or ° and rev/min.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CampaignError {
-    /// The machine has no such axis.
-    #[error("axis {place}: the machine has {count}")]
+    /// Axis that does not exist.
+    #[error("axis {number} does not exist: the machine has {count} axes")]
     NoAxis {
-        /// From 1.
-        place: usize,
-        /// Axes of the machine.
+        /// Axis number, starting at 1.
+        number: usize,
+        /// Number of axes of the machine.
         count: usize,
     },
-    /// A range that is none, or not within the stroke.
-    #[error("range {min},{max} {unit}: must rise and lie within the stroke of {axis}, {stroke}")]
+    /// Empty range, or range outside the travel limits.
+    #[error("range {min},{max} {unit} of {axis}: must be rising and within the travel limits {limits}")]
     Range {
         /// Lower end.
         min: f64,
         /// Upper end.
         max: f64,
-        /// mm or deg.
+        /// Unit: mm or deg.
         unit: &'static str,
         /// Name of the axis.
         axis: String,
-        /// The stroke, with its unit.
-        stroke: String,
+        /// Travel limits with unit.
+        limits: String,
     },
-    /// A speed that the axis cannot have.
-    #[error("feed {found} {unit}: must be above 0 and at most {allowed}, {SPEED_RESERVE} of what {axis} can")]
-    Feed {
-        /// What was asked for.
-        found: f64,
-        /// Largest one.
-        allowed: f64,
-        /// m/min or rpm.
-        unit: &'static str,
-        /// Name of the axis.
-        axis: String,
-    },
-    /// No room to reach the speed and to hold it.
+    /// Feed that the axis cannot reach.
     #[error(
-        "{axis}: a range of {found} {unit} is too short for {feed} {feed_unit}: it needs {needed} {unit}, or a feed \
-         of {possible} {feed_unit} at most"
+        "feed {} {unit} of {axis}: must be above 0 and at most {allowed} {unit}, {SPEED_RESERVE} of the axis limit",
+        Rounded(*found)
+    )]
+    Feed {
+        /// Given feed.
+        found: f64,
+        /// Highest permitted feed.
+        allowed: f64,
+        /// Unit: m/min or rpm.
+        unit: &'static str,
+        /// Name of the axis.
+        axis: String,
+    },
+    /// Range too short to reach the feed and hold it.
+    #[error(
+        "{axis}: a range of {found} {unit} is too short for a feed of {feed} {feed_unit}; give a range of at least \
+         {needed} {unit} or a feed of at most {possible} {feed_unit}"
     )]
     TooShort {
         /// Name of the axis.
         axis: String,
         /// Length of the range.
         found: f64,
-        /// Length that the speed needs.
+        /// Length required for the feed.
         needed: f64,
-        /// mm or deg.
+        /// Unit: mm or deg.
         unit: &'static str,
-        /// Highest speed of the campaign.
+        /// Highest feed of the campaign.
         feed: f64,
-        /// Highest speed that the range has room for.
+        /// Highest feed that is possible within the range.
         possible: f64,
-        /// m/min or rpm.
+        /// Unit: m/min or rpm.
         feed_unit: &'static str,
     },
-    /// More than an hour.
+    /// Part that takes too long.
     #[error(
-        "{axis}: part {part} would last {duration:.0} s, {limit} s at most are allowed: a shorter range or \
-             a higher feed is needed"
+        "{axis}: part {part} takes {duration:.0} s, at most {limit} s are allowed; give a shorter range or a \
+         higher feed"
     )]
     TooLong {
         /// Name of the axis.
         axis: String,
-        /// Which part.
+        /// Name of the part.
         part: &'static str,
-        /// s.
+        /// Planned duration, s.
         duration: f64,
-        /// s.
+        /// Longest permitted duration, s.
         limit: f64,
     },
-    /// A leg that is no geometry: too short for the numbers that describe it.
+    /// Leg with invalid geometry, such as a length below the numeric resolution.
     #[error("{axis}: {error}")]
     Path {
         /// Name of the axis.
         axis: String,
-        /// What is wrong.
+        /// Error of the geometry.
         error: PathError,
     },
     /// Legs that cannot be planned.
@@ -91,7 +95,7 @@ pub enum CampaignError {
     Plan {
         /// Name of the axis.
         axis: String,
-        /// Why.
+        /// Error of the planner.
         error: PlanError,
     },
 }

@@ -1,11 +1,11 @@
-//! What feedforward acts while an axis is recorded.
+//! Feedforward mode of a recording.
 
-use virtual_axes_core::config::{Assignment, AxisConfig, Parameters, Source, Value};
+use virtual_axes_core::config::{Assignment, AxisConfig, Parameters, Value, ValueSource};
 
-/// What feedforward an axis was recorded with.
+/// Feedforward that was active during a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FeedforwardMode {
-    /// None.
+    /// No feedforward.
     Off,
     /// Velocity feedforward.
     Velocity,
@@ -14,11 +14,11 @@ pub enum FeedforwardMode {
 }
 
 impl FeedforwardMode {
-    /// All of them, in the order in which they are recorded.
+    /// All modes in recording order.
     pub const ALL: [FeedforwardMode; 3] =
         [FeedforwardMode::Off, FeedforwardMode::Velocity, FeedforwardMode::Both];
 
-    /// As on the command line.
+    /// Returns the name used on the command line.
     pub fn name(self) -> &'static str {
         match self {
             FeedforwardMode::Off => "off",
@@ -27,7 +27,7 @@ impl FeedforwardMode {
         }
     }
 
-    /// An axis with this much of its feedforward; friction is never compensated.
+    /// Returns a copy of an axis with this feedforward mode; friction compensation is off.
     pub(super) fn of(self, axis: &AxisConfig) -> AxisConfig {
         let mut axis = axis.clone();
         axis.feedforward.friction = 0.0;
@@ -40,8 +40,8 @@ impl FeedforwardMode {
         axis
     }
 
-    /// What to set on `axis` before it is recorded so: the feedforward, as `parameters` have it or 0, and the
-    /// cascade if the axis has another controller. Friction is never compensated.
+    /// Returns the assignments that prepare `axis` for a recording in this mode: feedforward weights of
+    /// `parameters` or 0, cascade controller, friction compensation off.
     pub fn assignments(self, parameters: &Parameters, axis: &str) -> Vec<Assignment> {
         let of_key = |(key, value): (String, Value)| {
             let name = key.strip_prefix(axis)?.strip_prefix('.')?;
@@ -54,7 +54,7 @@ impl FeedforwardMode {
                 }
                 None => return None,
             };
-            Some(Assignment { key, value, source: Source::named("campaign") })
+            Some(Assignment { key, value, source: ValueSource::named("campaign") })
         };
         parameters.iter().filter_map(of_key).collect()
     }

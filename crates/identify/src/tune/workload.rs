@@ -1,20 +1,20 @@
-//! A path that is run many times: its setpoints, read once.
+//! Workload of a tuning problem: setpoints in memory for repeated simulation.
 
 use std::io;
 use std::sync::Arc;
 
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::path::Program;
-use virtual_axes_core::trajectory::Request;
+use virtual_axes_core::trajectory::TrajectoryRequest;
 use virtual_axes_core::trial::{
-    self, Figures, GridSource, Outcome, Setpoints, SourceError, Tick, Trial, TrialError,
+    self, Figures, GridSource, SetpointSource, SourceError, Tick, Trial, TrialError, TrialOutcome,
 };
 use virtual_axes_core::units::Nanoseconds;
 
-/// Setpoints in memory, with the path behind them if it is known. They serve machines of the same joints,
-/// strokes and periods, whatever their controllers.
+/// Setpoints in memory with their path, if known. They are valid for machines with the same joints, travel
+/// limits and periods, with any controller.
 #[derive(Debug, Clone)]
-pub struct Course {
+pub struct Workload {
     name: String,
     program: Option<Arc<Program>>,
     content: Content,
@@ -22,25 +22,25 @@ pub struct Course {
 
 #[derive(Debug, Clone)]
 enum Content {
-    /// PSEC of `joints` at one position instant after the other.
+    /// PSEC of `joints`, row by row for each position cycle.
     Rows { joints: Vec<usize>, rows: Vec<f64> },
-    /// Trajectories with the times at which they arrive, ns.
-    Requests(Vec<(Nanoseconds, Request)>),
+    /// Trajectories with arrival times, ns.
+    Requests(Vec<(Nanoseconds, TrajectoryRequest)>),
 }
 
-impl Course {
-    /// Reads `setpoints` to their end; `go_on` is asked at every row.
+impl Workload {
+    /// Reads all `setpoints`; calls `go_on` for every row.
     ///
     /// # Errors
-    /// Those of the setpoints, and of `go_on`.
+    /// [`SourceError`] of the setpoints or of `go_on`.
     pub fn read(
         name: &str,
         program: Option<Arc<Program>>,
-        setpoints: Setpoints<'_>,
+        setpoints: SetpointSource<'_>,
         go_on: impl Fn() -> io::Result<()>,
     ) -> Result<Self, SourceError> {
         let content = match setpoints {
-            Setpoints::Grid(mut source) => {
+            SetpointSource::Grid(mut source) => {
                 let joints = source.joints().to_vec();
                 let mut row = vec![0.0; joints.len()];
                 let mut rows = Vec::new();
@@ -50,37 +50,38 @@ impl Course {
                 }
                 Content::Rows { joints, rows }
             }
-            Setpoints::Requests(requests) => Content::Requests(requests.collect::<Result<_, _>>()?),
+            SetpointSource::Requests(requests) => Content::Requests(requests.collect::<Result<_, _>>()?),
         };
-        Ok(Course { name: name.to_owned(), program, content })
+        Ok(Workload { name: name.to_owned(), program, content })
     }
 
-    /// Name of the scenario or the file.
+    /// Returns the name of the scenario or file.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Runs it on `machine`, as [`trial::run`].
+    /// Runs the workload on `machine` with [`trial::run`].
     ///
     /// # Errors
-    /// [`TrialError`].
+    /// [`TrialError`] if the machine cannot run the setpoints.
     pub fn run(
         &self,
         machine: &MachineConfig,
         allow_nonzero_end_velocity: bool,
         record: bool,
         watch: impl FnMut(Tick<'_>) -> io::Result<()>,
-    ) -> Result<Outcome, TrialError> {
+    ) -> Result<TrialOutcome, TrialError> {
         let program = self.program.clone();
         let trial = Trial { machine, program, allow_nonzero_end_velocity, record };
         trial::run(&trial, self.setpoints(), watch)
     }
 
-    /// Runs it on `variants` of `machine` that have axes at `own` of their own, as [`trial::run_together`].
+    /// Runs the workload on `variants` of `machine` that differ in the axes `own`, with
+    /// [`trial::run_variants`].
     ///
     /// # Errors
-    /// [`TrialError`].
-    pub fn run_together(
+    /// [`TrialError`] if the machine cannot run the setpoints.
+    pub fn run_variants(
         &self,
         machine: &MachineConfig,
         variants: &[MachineConfig],
@@ -90,20 +91,20 @@ impl Course {
     ) -> Result<Vec<Figures>, TrialError> {
         let program = self.program.clone();
         let trial = Trial { machine, program, allow_nonzero_end_velocity, record: false };
-        trial::run_together(&trial, self.setpoints(), variants, own, watch)
+        trial::run_variants(&trial, self.setpoints(), variants, own, watch)
     }
 
-    fn setpoints(&self) -> Setpoints<'_> {
+    fn setpoints(&self) -> SetpointSource<'_> {
         match &self.content {
-            Content::Rows { joints, rows } => Setpoints::Grid(Box::new(Rows { joints, rows })),
+            Content::Rows { joints, rows } => SetpointSource::Grid(Box::new(Rows { joints, rows })),
             Content::Requests(requests) => {
-                Setpoints::Requests(Box::new(requests.iter().map(|request| Ok(request.clone()))))
+                SetpointSource::Requests(Box::new(requests.iter().map(|request| Ok(request.clone()))))
             }
         }
     }
 }
 
-/// What is left of the rows.
+/// Remaining rows.
 struct Rows<'a> {
     joints: &'a [usize],
     rows: &'a [f64],

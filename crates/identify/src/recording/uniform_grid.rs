@@ -1,68 +1,69 @@
-//! From stamps to an even grid: which sample was taken at which multiple of the period.
+//! Assignment of stamped samples to a uniform time grid.
 //!
-//! A controller samples evenly; what jitters is the logger's stamp. A sample that comes late and is caught up
-//! with by a burst of short intervals was taken on time; where nothing catches up, samples are missing.
+//! A controller samples uniformly; the stamps of the logger jitter. Late samples followed by a burst of short
+//! intervals were taken in time; a long interval without a burst means missing samples.
 
 use std::ops::Range;
 
-use super::order::{Ordered, median, quantile};
-use super::sampling::{REGULAR, check_period, coarse_step, nominal};
-use super::{Finding, RecordingFault};
+use super::ordering::OrderedSamples;
+use super::sampling::{REGULAR, check_period, coarse_step, estimate_period};
+use super::{ConditioningError, Finding};
 use virtual_axes_core::config::Periods;
+use virtual_axes_core::statistics::{median, quantile, rms};
 
-/// Longest run of missing samples that is bridged: cubic interpolation over it is harmless.
+/// Longest run of missing samples that is interpolated by a cubic.
 pub(super) const MAX_BRIDGED: usize = 2;
-/// An interval longer than this many periods is looked at: half a period of jitter at both ends stays below.
+/// Interval in periods above which an event is analyzed; half a period of jitter at both ends stays below.
 const LONG: f64 = 1.7;
-/// An interval shorter than this many periods is that of a repeated stamp.
+/// Interval in periods below which a stamp is repeated.
 const REPEATED: f64 = 0.02;
-/// Part of repeated stamps from which on the clock of the logger is coarser than its sampling.
+/// Share of repeated stamps above which the clock of the logger is coarser than its sampling.
 const COARSE: f64 = 0.1;
-/// While the mean of the next few intervals is below this many periods, a burst catches up.
+/// Mean interval in periods below which a burst continues.
 const BURST: f64 = 0.85;
-/// How many intervals that mean takes.
+/// Number of intervals in that mean.
 const BURST_MEAN: usize = 4;
-/// Samples from which the lateness before and behind an event is taken: with jitter of half a period at most
-/// their median is out by a tenth of one.
+/// Samples that determine the lateness before and behind an event; with jitter of at most half a period their
+/// median deviates by a tenth of it.
 const LEVEL: usize = 31;
 /// Fewest such samples behind an event.
 const FEWEST_LEVEL: usize = 3;
-/// A sample later than this many periods counts as stalled.
+/// Lateness in periods above which a sample is stalled.
 const STALL: f64 = 2.5;
-/// Most periods that a gap is counted in; longer ones have their own phase anyway.
+/// Longest gap that is counted in periods; longer gaps are limited to it.
 const LONGEST_GAP: f64 = 1e12;
-/// A period is rounded to a decimal if that moves no sample by more than this part of it.
+/// Largest shift of any sample, in periods, by rounding of the period to a decimal.
 const ROUNDING: f64 = 0.02;
-/// Jitter below this part of a period is not worth a word.
+/// Jitter in periods below which no finding is reported.
 const ON_GRID: f64 = 0.01;
-/// Wandering (median distance from the grid, periods) from which on the sampling itself is irregular.
+/// Median distance from the grid, in periods, above which the sampling is irregular.
 const WANDERING: f64 = 0.5;
-/// Part of intervals that nothing catches up with, from which on the sampling itself is irregular.
+/// Share of long intervals without a burst above which the sampling is irregular.
 const UNCAUGHT: f64 = 0.25;
 
-/// Samples with their place on a grid of `period`.
+/// Samples assigned to a uniform grid.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Placed {
+pub(super) struct UniformGrid {
     /// Sampling period, s.
     pub period: f64,
-    /// Whether the samples are on the grid; otherwise they were taken when they are stamped.
-    pub even: bool,
-    /// What lies between gaps that are too long to be bridged.
-    pub blocks: Vec<Block>,
+    /// True if the samples are on the grid; false if they were taken at their stamps.
+    pub is_uniform: bool,
+    /// Blocks between gaps that are too long to be interpolated.
+    pub blocks: Vec<SampleBlock>,
 }
 
-/// Samples that follow each other without a long gap.
+/// Consecutive samples without a long gap.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Block {
+pub(super) struct SampleBlock {
     /// Time of slot 0, s.
     pub start: f64,
-    /// Where each sample is in the recording.
+    /// Row of each sample in the recording.
     pub rows: Vec<usize>,
-    /// Its stamp, s.
+    /// Stamp of each sample, s.
     pub stamps: Vec<f64>,
-    /// Its place on the grid.
+    /// Slot of each sample on the grid.
     pub slots: Vec<usize>,
-    /// Whether its stamp is late by a stall of the logger.
+    /// True for samples whose stamp is late by a stall of the logger.
     pub late: Vec<bool>,
 }
 
@@ -70,53 +71,54 @@ struct Slots {
     slot: Vec<i64>,
     keep: Vec<bool>,
     late: Vec<bool>,
-    /// Begin and length, s.
+    /// Start and length of each stall, s.
     stalls: Vec<(f64, f64)>,
-    /// Long intervals that nothing caught up with.
+    /// Number of long intervals without a burst.
     gaps: usize,
-    /// Samples left out since their stamp is repeated.
+    /// Number of samples dropped because of a repeated stamp.
     dropped: usize,
 }
 
-/// Places the samples; `stamped_smoother` tells from the position whether they were rather taken when stamped.
+/// Assigns samples to a uniform grid. `stamped_smoother` decides from the position if the samples were taken
+/// at their stamps instead.
 ///
 /// # Errors
-/// [`RecordingFault::TimeUnit`] if the period is not that of a drive.
-pub(super) fn place(
+/// [`ConditioningError::TimeUnit`] if the sampling period is not plausible for a drive.
+pub(super) fn assign_to_grid(
     name: &str,
-    ordered: &Ordered,
+    ordered: &OrderedSamples,
     periods: &Periods,
-    stamped_smoother: impl Fn(&Placed) -> bool,
+    stamped_smoother: impl Fn(&UniformGrid) -> bool,
     findings: &mut Vec<Finding>,
-) -> Result<Placed, RecordingFault> {
+) -> Result<UniformGrid, ConditioningError> {
     let stamps = &ordered.stamps;
     let intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let repeated = intervals.iter().filter(|d| **d == 0.0).count();
     let coarse = repeated as f64 > COARSE * intervals.len() as f64;
-    let first = nominal(&intervals, coarse);
+    let first = estimate_period(&intervals, coarse);
     check_period(name, first, periods)?;
-    // The second pass sees the period that the first has found.
-    let mut placed = Placed { period: first, even: true, blocks: Vec::new() };
-    let mut slots = assign(stamps, first, coarse);
+    // The second pass uses the period found by the first.
+    let mut placed = UniformGrid { period: first, is_uniform: true, blocks: Vec::new() };
+    let mut slots = count_slots(stamps, first, coarse);
     for pass in 0..2 {
         if pass > 0 {
-            slots = assign(stamps, placed.period, coarse);
+            slots = count_slots(stamps, placed.period, coarse);
         }
-        placed.blocks = blocks(ordered, &slots, placed.period);
-        placed.period = rounded(fitted(&placed.blocks, placed.period), &placed.blocks);
+        placed.blocks = split_blocks(ordered, &slots, placed.period);
+        placed.period = round_period(fit_period(&placed.blocks, placed.period), &placed.blocks);
         set_starts(&mut placed);
     }
     let distance = distances(&placed);
-    // A clock coarser than the sampling lets every stamp wander by its own step.
+    // A clock coarser than the sampling moves each stamp by up to its step.
     let step = if coarse { coarse_step(stamps) } else { 0.0 };
-    let wandering = median(&mut distance.iter().map(|d| d.abs()).collect::<Vec<_>>());
+    let wandering = median(&mut distance.iter().map(|d| d.abs()).collect::<Vec<_>>()).unwrap_or(0.0);
     let uncaught = slots.gaps as f64 > UNCAUGHT * intervals.len() as f64;
     let smoother = || !coarse && stamped_smoother(&placed);
     if wandering > WANDERING + step / placed.period || uncaught || smoother() {
-        placed = irregular(ordered, placed.period.max(step));
-        let spread = |at| quantile(&mut intervals.clone(), at) * 1e3;
+        placed = keep_stamps(ordered, placed.period.max(step));
+        let spread = |at| quantile(&mut intervals.clone(), at).unwrap_or(0.0) * 1e3;
         let what = format!(
-            "{name}: the sampling is irregular ({:.3} … {:.3} ms, 5th to 95th percentile); it is interpolated to {:.3} ms",
+            "{name}: irregular sampling ({:.3} … {:.3} ms, 5th to 95th percentile), interpolated to {:.3} ms",
             spread(0.05),
             spread(0.95),
             placed.period * 1e3
@@ -124,32 +126,32 @@ pub(super) fn place(
         findings.push(Finding::warning("irregular", what, "record with the clock of the controller"));
         return Ok(placed);
     }
-    tell(name, &slots, &distance, placed.period, findings);
+    report_grid(name, &slots, &distance, placed.period, findings);
     Ok(placed)
 }
 
-fn tell(name: &str, slots: &Slots, distance: &[f64], period: f64, findings: &mut Vec<Finding>) {
+fn report_grid(name: &str, slots: &Slots, distance: &[f64], period: f64, findings: &mut Vec<Finding>) {
     if slots.dropped > 0 {
-        let what = format!("{name}: {} samples whose stamp is repeated are left out", slots.dropped);
+        let what = format!("{name}: {} samples with repeated stamps dropped", slots.dropped);
         findings.push(Finding::note("duplicate-stamps", what));
     }
     if let Some((begin, _)) = slots.stalls.first() {
         let longest = slots.stalls.iter().map(|(_, length)| *length).fold(0.0, f64::max);
         let what = format!(
             "{name}: {} stalls of the logger, the first at {begin:.3} s, the longest of {:.1} ms; \
-             the samples stamped late are put back on the grid of {:.4} ms",
+             late samples are moved to the grid of {:.4} ms",
             slots.stalls.len(),
             longest * 1e3,
             period * 1e3
         );
         findings.push(Finding::note("stall", what));
     }
-    let rms = (distance.iter().map(|d| d * d).sum::<f64>() / distance.len().max(1) as f64).sqrt();
+    let rms = rms(distance.iter().copied()).unwrap_or(0.0);
     let largest = distance.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
     if rms > ON_GRID || largest > 5.0 * ON_GRID {
         let what = format!(
-            "{name}: the stamps jitter by {:.3} ms RMS, {:.3} ms at most, about an even grid of {:.4} ms; \
-             the samples are put on it",
+            "{name}: the stamps jitter by {:.3} ms RMS, {:.3} ms at most; \
+             the samples are moved to the grid of {:.4} ms",
             rms * period * 1e3,
             largest * period * 1e3,
             period * 1e3
@@ -159,7 +161,7 @@ fn tell(name: &str, slots: &Slots, distance: &[f64], period: f64, findings: &mut
 }
 
 /// Counts the samples through jitter, stalls, gaps and repeated stamps.
-fn assign(stamps: &[f64], period: f64, coarse: bool) -> Slots {
+fn count_slots(stamps: &[f64], period: f64, coarse: bool) -> Slots {
     let count = stamps.len();
     let mut s = Slots {
         slot: vec![0; count],
@@ -180,10 +182,10 @@ fn assign(stamps: &[f64], period: f64, coarse: bool) -> Slots {
             continue;
         }
         let before = level_before(stamps, &s, n, period);
-        let (settled, window, largest) = burst(stamps, n, period, long);
+        let (settled, window, largest) = find_burst_end(stamps, n, period, long);
         let base = s.slot[n - 1];
         let lateness = |j: usize| stamps[j] - (base + 1 + (j - n) as i64) as f64 * period - before;
-        let after = median(&mut window.map(lateness).collect::<Vec<_>>());
+        let after = median(&mut window.map(lateness).collect::<Vec<_>>()).unwrap_or(0.0);
         let missing = (after / period).round().clamp(-LONGEST_GAP, LONGEST_GAP) as i64;
         let mut surplus = (-missing).max(0);
         let mut slot = base;
@@ -214,19 +216,19 @@ fn assign(stamps: &[f64], period: f64, coarse: bool) -> Slots {
     s
 }
 
-/// Lateness of the samples before sample n, s.
+/// Returns the median lateness of the samples before sample `n`, s.
 fn level_before(stamps: &[f64], s: &Slots, n: usize, period: f64) -> f64 {
     let calm = (0..n).rev().take(4 * LEVEL).filter(|&j| s.keep[j] && !s.late[j]).take(LEVEL);
     let mut levels: Vec<f64> = calm.map(|j| stamps[j] - s.slot[j] as f64 * period).collect();
     if levels.is_empty() {
         return stamps[n - 1] - s.slot[n - 1] as f64 * period;
     }
-    median(&mut levels)
+    median(&mut levels).unwrap_or(0.0)
 }
 
-/// Where the burst behind the interval that ends at n is over, the calm samples from there on, and the sample at
-/// the end of the longest interval meanwhile.
-fn burst(stamps: &[f64], n: usize, period: f64, long: f64) -> (usize, Range<usize>, usize) {
+/// Finds the end of the burst behind the interval that ends at `n`. Returns the first settled sample, the
+/// settled samples from there, and the end of the longest interval.
+fn find_burst_end(stamps: &[f64], n: usize, period: f64, long: f64) -> (usize, Range<usize>, usize) {
     let last = stamps.len() - 1;
     let interval = |j: usize| stamps[j] - stamps[j - 1];
     let (mut settled, mut largest) = (n, n);
@@ -244,7 +246,7 @@ fn burst(stamps: &[f64], n: usize, period: f64, long: f64) -> (usize, Range<usiz
         }
         let limit = (settled + LEVEL).min(stamps.len());
         let end = (settled + 1..limit).find(|&j| interval(j) > long).unwrap_or(limit);
-        // A burst that another stall interrupts goes on behind it.
+        // A burst that is interrupted by another stall continues behind it.
         let interrupted = settled > from && end < limit && end - settled < FEWEST_LEVEL;
         if !interrupted {
             return (settled, settled..end, largest);
@@ -256,26 +258,26 @@ fn burst(stamps: &[f64], n: usize, period: f64, long: f64) -> (usize, Range<usiz
     }
 }
 
-fn blocks(ordered: &Ordered, slots: &Slots, period: f64) -> Vec<Block> {
-    let mut blocks: Vec<Block> = Vec::new();
+fn split_blocks(ordered: &OrderedSamples, slots: &Slots, period: f64) -> Vec<SampleBlock> {
+    let mut blocks: Vec<SampleBlock> = Vec::new();
     let (mut first, mut before) = (0, i64::MIN);
     for n in (0..ordered.rows.len()).filter(|&n| slots.keep[n]) {
         let slot = slots.slot[n];
         if blocks.is_empty() || slot - before > MAX_BRIDGED as i64 + 1 {
             first = slot;
-            blocks.push(Block { start: ordered.stamps[n], ..Block::default() });
+            blocks.push(SampleBlock { start: ordered.stamps[n], ..SampleBlock::default() });
         }
         before = slot;
         if let Some(block) = blocks.last_mut() {
             block.push(ordered.rows[n], ordered.stamps[n], (slot - first) as usize, slots.late[n]);
         }
     }
-    let mut placed = Placed { period, even: true, blocks };
+    let mut placed = UniformGrid { period, is_uniform: true, blocks };
     set_starts(&mut placed);
     placed.blocks
 }
 
-impl Block {
+impl SampleBlock {
     fn push(&mut self, row: usize, stamp: f64, slot: usize, late: bool) {
         self.rows.push(row);
         self.stamps.push(stamp);
@@ -283,43 +285,44 @@ impl Block {
         self.late.push(late);
     }
 
-    /// Slot and stamp of the samples that are not late.
-    fn timely(&self) -> impl Iterator<Item = (f64, f64)> {
+    /// Returns slot and stamp of the samples that are not late.
+    fn on_time(&self) -> impl Iterator<Item = (f64, f64)> {
         let all = self.slots.iter().zip(&self.stamps).zip(&self.late);
         all.filter(|(_, late)| !**late).map(|((slot, stamp), _)| (*slot as f64, *stamp))
     }
 }
 
-fn set_starts(placed: &mut Placed) {
+fn set_starts(placed: &mut UniformGrid) {
     for block in &mut placed.blocks {
-        let mut starts: Vec<f64> = block.timely().map(|(slot, stamp)| stamp - slot * placed.period).collect();
+        let mut starts: Vec<f64> =
+            block.on_time().map(|(slot, stamp)| stamp - slot * placed.period).collect();
         if !starts.is_empty() {
-            block.start = median(&mut starts);
+            block.start = median(&mut starts).unwrap_or(0.0);
         }
     }
 }
 
-/// Slope of the stamps over the slots by least squares, all blocks together, s.
-fn fitted(blocks: &[Block], otherwise: f64) -> f64 {
+/// Fits the period, s, as slope of the stamps over the slots by least squares over all blocks.
+fn fit_period(blocks: &[SampleBlock], otherwise: f64) -> f64 {
     let (mut cross, mut square) = (0.0, 0.0);
     for block in blocks {
-        let count = block.timely().count().max(1) as f64;
-        let (sum_slot, sum_stamp) = block.timely().fold((0.0, 0.0), |(slots, stamps), (slot, stamp)| {
+        let count = block.on_time().count().max(1) as f64;
+        let (sum_slot, sum_stamp) = block.on_time().fold((0.0, 0.0), |(slots, stamps), (slot, stamp)| {
             (slots + slot, stamps + (stamp - block.start))
         });
-        for (slot, stamp) in block.timely() {
+        for (slot, stamp) in block.on_time() {
             let slot = slot - sum_slot / count;
             cross += slot * (stamp - block.start - sum_stamp / count);
             square += slot * slot;
         }
     }
     let slope = cross / square;
-    // Far from the guess the slots themselves are wrong.
+    // A slope far from the estimate means wrong slots.
     if (slope / otherwise - 1.0).abs() < REGULAR { slope } else { otherwise }
 }
 
-/// The shortest decimal that is the same period for all that the stamps can tell.
-fn rounded(period: f64, blocks: &[Block]) -> f64 {
+/// Returns the shortest decimal period that is consistent with the stamps.
+fn round_period(period: f64, blocks: &[SampleBlock]) -> f64 {
     let longest = blocks.iter().filter_map(|block| block.slots.last()).max().copied().unwrap_or(0).max(1);
     let decimals = (3..=9).map(|digits| {
         let scale = 10_f64.powi(digits);
@@ -329,23 +332,23 @@ fn rounded(period: f64, blocks: &[Block]) -> f64 {
     decimals.into_iter().find(same).unwrap_or(period)
 }
 
-/// Distance of each timely sample from its place on the grid, periods.
-fn distances(placed: &Placed) -> Vec<f64> {
-    let of = |block: &Block| {
+/// Returns the distance of each timely sample from its slot, periods.
+fn distances(placed: &UniformGrid) -> Vec<f64> {
+    let of = |block: &SampleBlock| {
         let (start, period) = (block.start, placed.period);
-        block.timely().map(|(slot, stamp)| (stamp - start) / period - slot).collect::<Vec<_>>()
+        block.on_time().map(|(slot, stamp)| (stamp - start) / period - slot).collect::<Vec<_>>()
     };
     placed.blocks.iter().flat_map(of).collect()
 }
 
-/// The samples where they are stamped, parted at what is too long to be interpolated.
-fn irregular(ordered: &Ordered, period: f64) -> Placed {
+/// Splits the samples at their stamps into blocks without long gaps.
+fn keep_stamps(ordered: &OrderedSamples, period: f64) -> UniformGrid {
     let longest = (MAX_BRIDGED as f64 + 1.5) * period;
-    let mut blocks: Vec<Block> = Vec::new();
+    let mut blocks: Vec<SampleBlock> = Vec::new();
     let mut before = f64::NEG_INFINITY;
     for (&row, &stamp) in ordered.rows.iter().zip(&ordered.stamps) {
         if stamp - before > longest {
-            blocks.push(Block { start: stamp, ..Block::default() });
+            blocks.push(SampleBlock { start: stamp, ..SampleBlock::default() });
         } else if stamp - before <= REPEATED * period {
             continue;
         }
@@ -355,5 +358,5 @@ fn irregular(ordered: &Ordered, period: f64) -> Placed {
             block.push(row, stamp, slot, false);
         }
     }
-    Placed { period, even: false, blocks }
+    UniformGrid { period, is_uniform: false, blocks }
 }

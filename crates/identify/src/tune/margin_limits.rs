@@ -1,9 +1,9 @@
-//! Margins of the position loops of several axes.
+//! Limits of the stability margins of the position loops.
 
 use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{DesignError, Margins, PredictionModel, margins};
 
-/// What the worst axis of a tuning must keep.
+/// Smallest permitted margins of the worst axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarginLimits {
     /// Smallest modulus margin.
@@ -13,24 +13,24 @@ pub struct MarginLimits {
 }
 
 impl Default for MarginLimits {
-    /// 0.5 and 5 ms.
+    /// Returns a modulus margin of 0.5 and a delay margin of 5 ms.
     fn default() -> Self {
         MarginLimits { modulus: 0.5, delay: 5e-3 }
     }
 }
 
 impl MarginLimits {
-    /// Any stable loop will do.
+    /// Limits that every stable loop keeps.
     pub const STABLE: MarginLimits = MarginLimits { modulus: 0.0, delay: 0.0 };
 
-    /// Whether `margins` keep them.
-    pub fn are_kept_by(&self, margins: &Margins) -> bool {
+    /// Returns true if `margins` are within the limits.
+    pub fn allows(&self, margins: &Margins) -> bool {
         margins.modulus >= self.modulus && margins.delay >= self.delay
     }
 }
 
-/// The least of each margin over the loops; none if one is unstable or is no loop.
-pub(super) fn worst<'a>(
+/// Returns the smallest margins over the loops; none if a loop is unstable or has no design.
+pub(super) fn worst_margins<'a>(
     loops: impl IntoIterator<Item = (&'a PredictionModel, Result<Rst, DesignError>)>,
 ) -> Option<Margins> {
     let mut worst: Option<Margins> = None;

@@ -1,0 +1,237 @@
+//! Findings about an identification result.
+
+use super::closed_loop::{Experiment, SimulatedExperiment};
+use super::delays::DelayParameter;
+use super::friction::{friction_current, speed_unit};
+use super::gravity::GravityCurrent;
+use super::identification::{Identification, IdentificationInput};
+use super::inertia::fit_inertia;
+use super::refine::RefinedParameter;
+use super::segments::{MotionSegment, find_segments};
+use crate::recording::{Finding, GaussianFilter, SignalSpan, Signals};
+use virtual_axes_core::config::AxisKind;
+use virtual_axes_core::statistics::median;
+use virtual_axes_core::units::DEGREE;
+
+/// R² of the current below which the model does not describe the recording.
+const LEAST_DETERMINATION: f64 = 0.9;
+/// Largest relative difference between refined and measured friction.
+const DISAGREEING: f64 = 0.05;
+/// Largest position residual of a valid model, twice that of the paper, m and rad.
+const DEVIATING: f64 = 20e-6;
+const DEVIATING_ANGLE: f64 = 20e-3 * DEGREE;
+/// Sampling period, relative to the position period, above which the current between setpoints is not
+/// resolved.
+const COARSE: f64 = 0.34;
+/// Largest relative difference between eq. 5 and the refined inertia without a finding.
+const UNSEEN: f64 = 0.03;
+
+/// Reports delays that were not identified, with the reason.
+pub(super) fn report_delays(experiments: &[Experiment], found: &mut Identification) {
+    for which in [DelayParameter::Alpha, DelayParameter::Beta, DelayParameter::Gamma] {
+        if let Some(fit) = found.delays.iter().find(|fit| fit.delay == which) {
+            if fit.is_at_end {
+                found.findings.push(Finding::warning(
+                    "delay-at-end",
+                    format!("the interval of {} ends at the longest permitted delay", which.name()),
+                    "check the gains of the machine file and the active feedforward",
+                ));
+            }
+            continue;
+        }
+        let name = which.name();
+        let recorded = experiments.iter().any(|e| e.mode == which.feedforward_mode());
+        let weights = &found.axis.feedforward;
+        let without_effect = match which {
+            DelayParameter::Alpha => false,
+            DelayParameter::Beta => weights.velocity == 0.0,
+            DelayParameter::Gamma => weights.torque == 0.0,
+        };
+        found.findings.push(if without_effect {
+            Finding::note(
+                "unseen-delay",
+                format!("{name} is unchanged: its feedforward weight is 0, so it has no effect"),
+            )
+        } else if recorded {
+            Finding::warning(
+                "unseen-delay",
+                format!("{name} is unchanged: the axis cannot be simulated with delays near it"),
+                "check the machine file",
+            )
+        } else {
+            Finding::warning(
+                "unseen-delay",
+                format!("{name} is unchanged: no recording identifies it"),
+                format!(
+                    "record with feedforward {} (`virtual_axes psec campaign --part {}`)",
+                    which.feedforward_mode().name(),
+                    which.feedforward_mode().name()
+                ),
+            )
+        });
+    }
+}
+
+/// Returns eq. 5 applied to the simulated axis with the same filter and steps; none without simulation.
+pub(super) fn inertia_of_simulation(
+    inputs: &[IdentificationInput<'_>],
+    found: &Identification,
+) -> Option<f64> {
+    let friction = found.friction.as_ref().filter(|_| found.inertia.is_some())?;
+    let replayed: Vec<Signals> = inputs
+        .iter()
+        .zip(&found.agreements)
+        .flat_map(|(input, agreement)| {
+            let pairs = agreement.experiments.iter().zip(&agreement.simulated);
+            pairs.map(|(e, s)| simulated_signals(input.signals, e, s))
+        })
+        .collect();
+    let segments: Vec<Vec<MotionSegment>> = replayed.iter().map(find_segments).collect();
+    let pairs: Vec<(&Signals, &[MotionSegment])> =
+        replayed.iter().zip(segments.iter().map(Vec::as_slice)).collect();
+    let weight = found.gravity.as_ref().map_or_else(GravityCurrent::default, |g| g.model);
+    fit_inertia(&pairs, &found.axis, &friction.law, &weight, &mut Vec::new()).map(|again| again.value)
+}
+
+/// Creates a recording from a simulation.
+fn simulated_signals(signals: &Signals, experiment: &Experiment, simulated: &SimulatedExperiment) -> Signals {
+    let filter = GaussianFilter::new(signals.cutoff, experiment.period());
+    let motion = filter.apply(&simulated.position);
+    let span = SignalSpan {
+        start: experiment.start,
+        position: simulated.position.clone(),
+        velocity: motion.first,
+        acceleration: motion.second,
+        smooth_current: Some(filter.apply(&simulated.current).value),
+        current: Some(simulated.current.clone()),
+        ..SignalSpan::default()
+    };
+    Signals { name: signals.name.clone(), current_lag: 0.0, spans: vec![span], ..*signals }
+}
+
+/// Reports low R², parameters at bounds, correlations, and disagreements of the result.
+pub(super) fn report_result(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mut Identification) {
+    report_positions(inputs, found);
+    report_inertia(inputs, tsp, found);
+    report_friction(found);
+    for (input, agreement) in inputs.iter().zip(&found.agreements) {
+        if let Some(r2) = agreement.current_r_squared().filter(|r2| *r2 < LEAST_DETERMINATION) {
+            found.findings.push(Finding::warning(
+                "poor-current",
+                format!("{}: the model explains {:.1} % of the current", input.signals.name, 100.0 * r2),
+                "check units, torque constant and transmission; record without cutting forces",
+            ));
+        }
+    }
+    let Some(refinement) = &found.refinement else { return };
+    for refined in refinement.parameters.iter().filter(|p| p.is_at_bound) {
+        found.findings.push(Finding::warning(
+            "at-bound",
+            format!("{} ends at its bound {:.4}", refined.parameter, refined.value),
+            "record motions that excite it more, or exclude it from the refinement",
+        ));
+    }
+    for (a, b, rho) in refinement.correlated_pairs() {
+        found.findings.push(Finding::note(
+            "correlated",
+            format!(
+                "{a} and {b} are strongly correlated ({rho:.3}): only their combination is identified well"
+            ),
+        ));
+    }
+}
+
+/// Reports recordings whose simulated position deviates from the recorded one.
+fn report_positions(inputs: &[IdentificationInput<'_>], found: &mut Identification) {
+    let (limit, unit, name) = match found.axis.kind() {
+        AxisKind::Linear => (DEVIATING, 1e-6, "µm"),
+        AxisKind::Rotary => (DEVIATING_ANGLE, 1e-3 * DEGREE, "mdeg"),
+    };
+    for (input, agreement) in inputs.iter().zip(&found.agreements) {
+        let deviations = agreement.comparisons.iter().flat_map(|c| [c.constant_velocity, c.elsewhere]);
+        let worst = deviations.flatten().map(|d| d.max).fold(0.0, f64::max);
+        if worst > limit {
+            found.findings.push(Finding::warning(
+                "poor-position",
+                format!(
+                    "{}: the simulated position deviates by up to {:.0} {name}: all closed-loop results are unreliable",
+                    input.signals.name,
+                    worst / unit
+                ),
+                "check position_loop.gain, the other gains and the periods of the machine file, the active \
+                 feedforward, and that PSEC and position have the same zero",
+            ));
+        }
+    }
+}
+
+/// Reports an inertia by eq. 5 that misses a part of the current.
+fn report_inertia(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mut Identification) {
+    let refined = found
+        .refinement
+        .as_ref()
+        .is_some_and(|r| r.parameters.iter().any(|p| p.parameter == RefinedParameter::Inertia));
+    if refined {
+        // The refinement identified what the step did not.
+        found.findings.retain(|finding| finding.code != "negative-inertia");
+    }
+    let Some(by_steps) = &found.inertia else { return };
+    let with_current =
+        inputs.iter().filter(|input| input.signals.spans.iter().any(|span| span.current.is_some()));
+    let mut parts = Vec::new();
+    let mut coarse = false;
+    for (number, input) in with_current.enumerate() {
+        let of_it = by_steps.instants.iter().filter(|instant| instant.0 == number);
+        let mut values: Vec<f64> = of_it.map(|instant| instant.2).collect();
+        if !values.is_empty() {
+            coarse |= input.signals.period > COARSE * tsp;
+            parts.push((median(&mut values).unwrap_or(f64::NAN), input.signals.name.as_str()));
+        }
+    }
+    let truth = found.axis.motor.inertia;
+    let differs = |a: f64, b: f64| (a / b - 1.0).abs() > UNSEEN;
+    let told = if refined { differs(by_steps.value, truth) } else { coarse };
+    if !told {
+        return;
+    }
+    let values: Vec<String> = parts.iter().map(|(value, name)| format!("{value:.4} ({name})")).collect();
+    let what = format!(
+        "the current varies within a position cycle, and the recording samples one phase of it only: \
+         Prévost eq. 5 gives an inertia of {}",
+        values.join(", ")
+    );
+    found.findings.push(if refined {
+        let again = found
+            .replayed_inertia
+            .map_or_else(String::new, |again| format!(", {again:.4} on the simulated axis"));
+        Finding::note("unseen-current", format!("{what}{again}; the refined value {truth:.4} is used"))
+    } else {
+        Finding::warning(
+            "unseen-current",
+            format!("{what}; the error can exceed 50 %"),
+            "record PSEC for the closed-loop refinement, or sample the current every millisecond",
+        )
+    });
+}
+
+/// Reports a refined friction that differs from the friction at constant velocity.
+fn report_friction(found: &mut Identification) {
+    let Some(friction) = found.friction.as_ref().filter(|_| found.refinement.is_some()) else { return };
+    let unit = speed_unit(&found.axis);
+    let part = |velocity: f64| {
+        let v = velocity / unit;
+        (friction_current(&found.axis.friction, v) / friction.law.at(v) - 1.0).abs()
+    };
+    let worst = found.steady.levels.iter().map(|level| part(level.velocity)).fold(0.0, f64::max);
+    if worst > DISAGREEING {
+        found.findings.push(Finding::warning(
+            "friction-disagrees",
+            format!(
+                "the refined friction differs by {:.1} % from the friction at constant velocity: another parameter \
+                 of the closed loop is wrong",
+                100.0 * worst
+            ),
+            "check the gains and periods of the machine file and the active feedforward; record VFFWS and TFFWS",
+        ));
+    }
+}

@@ -1,0 +1,308 @@
+//! Tuning problem: a machine, a workload and a cost on which tunings are evaluated.
+
+use rayon::prelude::*;
+
+use super::cost::Cost;
+use super::margin_limits::{MarginLimits, worst_margins};
+use super::tuning::Tuning;
+use super::workload::Workload;
+use super::{Progress, TuneError};
+use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
+use virtual_axes_core::control::Rst;
+use virtual_axes_core::design::{DesignError, Margins, PredictionModel, gpc};
+use virtual_axes_core::machine::{MachineError, design_controller, prediction_model};
+use virtual_axes_core::trial::{Figures, TrialOutcome};
+use virtual_axes_core::units::POSITION_GAIN;
+
+/// Tunings simulated side by side: enough to fill SIMD vectors, few enough for the caches.
+const CHUNK: usize = 32;
+
+/// Evaluated tuning.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TuningCandidate {
+    /// Tuning.
+    pub tuning: Tuning,
+    /// Margins of the worst axis; none if a loop is unstable.
+    pub margins: Option<Margins>,
+    /// Cost.
+    pub cost: f64,
+    /// True if speed, current or voltage of an axis reached its limit.
+    pub is_saturated: bool,
+    /// Figures of the run; tunings simulated side by side lack circles.
+    pub figures: Figures,
+}
+
+/// Result of a search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchResult {
+    /// Candidate with the lowest cost.
+    pub best: TuningCandidate,
+    /// Candidates within the limits in order of rising cost.
+    pub tried: Vec<TuningCandidate>,
+    /// Number of designs.
+    pub designs: usize,
+    /// Number of runs.
+    pub runs: usize,
+}
+
+/// Machine on a workload with a cost; the axes that move on it are tuned.
+pub struct TuningProblem<'a> {
+    parameters: &'a Parameters,
+    workload: &'a Workload,
+    cost: &'a Cost,
+    progress: &'a dyn Progress,
+    config: MachineConfig,
+    /// Indices of the moving axes.
+    moving: Vec<usize>,
+    joints: Vec<String>,
+    /// Prediction models of the moving axes.
+    models: Vec<PredictionModel>,
+    present: TuningCandidate,
+}
+
+impl<'a> TuningProblem<'a> {
+    /// Creates a tuning problem and runs the present tuning.
+    ///
+    /// # Errors
+    /// [`TuneError`] if the machine cannot be run or no axis moves.
+    pub fn new(
+        parameters: &'a Parameters,
+        course: &'a Workload,
+        cost: &'a Cost,
+        watch: &'a dyn Progress,
+    ) -> Result<Self, TuneError> {
+        let config = parameters.machine_config()?;
+        watch.begin("as it is", 1);
+        let figures = run(parameters, course, watch, false)?.figures;
+        watch.finish_run();
+        let moving: Vec<usize> = (0..config.axes().len()).filter(|&axis| figures.axes[axis].moves).collect();
+        if moving.is_empty() {
+            return Err(TuneError::NothingMoves);
+        }
+        let axes: Vec<&AxisConfig> = moving.iter().map(|&axis| &config.axes()[axis]).collect();
+        let model = |axis: &&AxisConfig| {
+            prediction_model(axis, &config.periods())
+                .map_err(|source| MachineError::Axis { axis: axis.name().to_owned(), source })
+        };
+        let models = axes.iter().map(model).collect::<Result<Vec<_>, _>>()?;
+        let margins = worst_margins(
+            models.iter().zip(&axes).map(|(model, axis)| (model, design_controller(axis, model))),
+        );
+        let joints = axes.iter().map(|axis| axis.name().to_owned()).collect();
+        let present = candidate(Tuning::Present, margins, figures, cost, &config);
+        Ok(TuningProblem {
+            parameters,
+            workload: course,
+            cost,
+            progress: watch,
+            config,
+            moving,
+            joints,
+            models,
+            present,
+        })
+    }
+
+    /// Returns the present tuning of the machine.
+    pub fn present(&self) -> &TuningCandidate {
+        &self.present
+    }
+
+    /// Returns the names of the moving axes.
+    pub fn joints(&self) -> &[String] {
+        &self.joints
+    }
+
+    /// Returns the machine configuration.
+    pub fn config(&self) -> &MachineConfig {
+        &self.config
+    }
+
+    /// Returns the parameters with the present tuning.
+    pub fn parameters(&self) -> &Parameters {
+        self.parameters
+    }
+
+    /// Returns the cost.
+    pub fn cost(&self) -> &Cost {
+        self.cost
+    }
+
+    /// Returns the workload.
+    pub fn workload(&self) -> &Workload {
+        self.workload
+    }
+
+    pub(super) fn progress(&self) -> &dyn Progress {
+        self.progress
+    }
+
+    /// Returns the configurations of the moving axes.
+    pub(super) fn axes(&self) -> impl Iterator<Item = &AxisConfig> {
+        self.moving.iter().filter_map(|&axis| self.config.axes().get(axis))
+    }
+
+    /// Returns the margins of the worst axis with `tuning`; none if a loop is unstable or has no design.
+    pub fn margins(&self, tuning: &Tuning) -> Option<Margins> {
+        match tuning {
+            Tuning::Present => self.present.margins,
+            Tuning::Gpc { .. } => {
+                let design = tuning.gpc()?;
+                worst_margins(self.models.iter().map(|model| (model, gpc(model, &design))))
+            }
+            Tuning::Cascade(axes) => {
+                worst_margins(self.models.iter().zip(axes).map(|(model, (_, gains))| {
+                    (model, Rst::proportional(gains.gain * POSITION_GAIN).map_err(DesignError::from))
+                }))
+            }
+        }
+    }
+
+    /// Runs `tuning` on the workload; `margins` is the result of [`Self::margins`].
+    ///
+    /// # Errors
+    /// [`TuneError`] if the tuning cannot be applied or the run fails.
+    pub fn run(&self, tuning: &Tuning, margins: Option<Margins>) -> Result<TuningCandidate, TuneError> {
+        let tuned = tuning.apply(self.parameters, &self.joints)?;
+        let figures = run(&tuned, self.workload, self.progress, false)?.figures;
+        self.progress.finish_run();
+        Ok(candidate(tuning.clone(), margins, figures, self.cost, &self.config))
+    }
+
+    /// Runs `candidate` again by itself on `course`, which gives complete figures.
+    pub(super) fn with_complete_figures(
+        &self,
+        course: &Workload,
+        candidate: &TuningCandidate,
+    ) -> Result<TuningCandidate, TuneError> {
+        let tuned = candidate.tuning.apply(self.parameters, &self.joints)?;
+        let figures = run(&tuned, course, self.progress, false)?.figures;
+        Ok(TuningCandidate { figures, ..candidate.clone() })
+    }
+
+    /// Runs `tuning` on another workload with a recording.
+    ///
+    /// # Errors
+    /// [`TuneError`] if the tuning cannot be applied or the run fails.
+    pub fn record_on(&self, course: &Workload, tuning: &Tuning) -> Result<TrialOutcome, TuneError> {
+        run(&tuning.apply(self.parameters, &self.joints)?, course, self.progress, true)
+    }
+
+    /// Runs `tuning` on another workload; the tuned axes are those that move on the workload of the problem.
+    ///
+    /// # Errors
+    /// [`TuneError`] if the tuning cannot be applied or the run fails.
+    pub fn run_on(&self, course: &Workload, tuning: &Tuning) -> Result<TuningCandidate, TuneError> {
+        let tuned = tuning.apply(self.parameters, &self.joints)?;
+        let figures = run(&tuned, course, self.progress, false)?.figures;
+        self.progress.finish_run();
+        Ok(candidate(tuning.clone(), self.margins(tuning), figures, self.cost, &self.config))
+    }
+
+    /// Runs `tunings` on a workload in parallel, in their order.
+    pub(super) fn runs_on(
+        &self,
+        course: &Workload,
+        tunings: Vec<Tuning>,
+    ) -> Result<Vec<TuningCandidate>, TuneError> {
+        let with_margins = |tuning: Tuning| {
+            let margins = self.margins(&tuning);
+            (tuning, margins)
+        };
+        self.progress.begin("both paths", tunings.len());
+        self.run_all(course, tunings.into_par_iter().map(with_margins).collect())
+    }
+
+    /// Computes the margins of `tunings` in parallel.
+    pub(super) fn designs(&self, tunings: Vec<Tuning>) -> Vec<(Tuning, Option<Margins>)> {
+        let with_margins = |tuning: Tuning| {
+            let margins = self.margins(&tuning);
+            (tuning, margins)
+        };
+        tunings.into_par_iter().map(with_margins).collect()
+    }
+
+    /// Runs `designs` on the workload in parallel, in their order.
+    pub(super) fn runs(
+        &self,
+        part: &'static str,
+        designs: Vec<(Tuning, Margins)>,
+    ) -> Result<Vec<TuningCandidate>, TuneError> {
+        self.progress.begin(part, designs.len());
+        let with_margins = designs.into_iter().map(|(tuning, margins)| (tuning, Some(margins)));
+        self.run_all(self.workload, with_margins.collect())
+    }
+
+    /// Runs tunings in parallel, in chunks that are simulated side by side.
+    fn run_all(
+        &self,
+        course: &Workload,
+        tunings: Vec<(Tuning, Option<Margins>)>,
+    ) -> Result<Vec<TuningCandidate>, TuneError> {
+        // `with_max_len` lets idle cores take single chunks.
+        let some = tunings.par_chunks(CHUNK).with_max_len(1).map(|tunings| self.run_chunk(course, tunings));
+        Ok(some.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
+    }
+
+    fn run_chunk(
+        &self,
+        course: &Workload,
+        tunings: &[(Tuning, Option<Margins>)],
+    ) -> Result<Vec<TuningCandidate>, TuneError> {
+        let tuned =
+            |(tuning, _): &_| Ok(Tuning::apply(tuning, self.parameters, &self.joints)?.machine_config()?);
+        let variants = tunings.iter().map(tuned).collect::<Result<Vec<_>, TuneError>>()?;
+        let allow = self.parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
+        let go_on = || self.progress.check_interrupt();
+        let figures = course.run_variants(&self.config, &variants, &self.moving, allow, go_on)?;
+        let candidates = tunings.iter().zip(figures).map(|((tuning, margins), figures)| {
+            self.progress.finish_run();
+            candidate(tuning.clone(), *margins, figures, self.cost, &self.config)
+        });
+        Ok(candidates.collect())
+    }
+}
+
+/// Returns the `designs` within `limits`.
+pub(super) fn within_limits(
+    designs: Vec<(Tuning, Option<Margins>)>,
+    limits: &MarginLimits,
+) -> Vec<(Tuning, Margins)> {
+    let kept = designs.into_iter().filter_map(|(tuning, margins)| Some((tuning, margins?)));
+    kept.filter(|(_, margins)| limits.allows(margins)).collect()
+}
+
+/// Removes saturated candidates and sorts the others by cost; the sort is stable.
+pub(super) fn ranked(mut candidates: Vec<TuningCandidate>) -> Vec<TuningCandidate> {
+    candidates.retain(|candidate| !candidate.is_saturated && candidate.cost.is_finite());
+    candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    candidates
+}
+
+/// Runs a machine on a workload.
+fn run(
+    parameters: &Parameters,
+    course: &Workload,
+    watch: &dyn Progress,
+    record: bool,
+) -> Result<TrialOutcome, TuneError> {
+    let config = parameters.machine_config()?;
+    let allow = parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
+    Ok(course.run(&config, allow, record, |_| watch.check_interrupt())?)
+}
+
+fn candidate(
+    tuning: Tuning,
+    margins: Option<Margins>,
+    figures: Figures,
+    cost: &Cost,
+    config: &MachineConfig,
+) -> TuningCandidate {
+    TuningCandidate {
+        tuning,
+        margins,
+        cost: cost.of(&figures, config),
+        is_saturated: figures.axes.iter().any(|axis| axis.report.saturation_time > 0.0),
+        figures,
+    }
+}
