@@ -10,6 +10,7 @@
 //! Each part starts and ends at rest at [`Campaign::start`], on the grid of Tsp.
 
 mod error;
+mod options;
 mod planner;
 mod travel_limits;
 
@@ -19,6 +20,7 @@ use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
 pub use error::CampaignError;
+pub use options::CampaignOptions;
 
 use planner::CampaignPlanner;
 use travel_limits::TravelLimits;
@@ -29,15 +31,6 @@ use super::feedforward_mode::FeedforwardMode;
 const PAUSE: f64 = 3.0;
 /// Longest duration of a part, s.
 const LONGEST: f64 = 3600.0;
-
-/// Limits of a campaign in addition to the axis limits.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct CampaignOptions {
-    /// Permitted setpoint range, m or rad; the travel limits by default.
-    pub range: Option<[f64; 2]>,
-    /// Highest speed, m/s or rad/s; by default 20 m/min or 20 rev/min, limited by the axis.
-    pub max_feed: Option<f64>,
-}
 
 /// Part of a campaign within its setpoints.
 #[derive(Debug, Clone, PartialEq)]

@@ -17,6 +17,7 @@ mod friction;
 mod gravity;
 mod identification;
 mod inertia;
+mod options;
 mod refine;
 mod segments;
 mod setpoints;
@@ -32,11 +33,11 @@ pub use friction::{Breakaway, FrictionFit, FrictionLaw, LawFit, fit_friction};
 pub use gravity::{
     GravityCurrent, GravityFit, GravitySource, Standstill, SteadyCurrent, SteadyMeasurements, fit_gravity,
 };
-pub use identification::{
-    Identification, IdentificationInput, IdentificationOptions, RefinementScope, identify,
-};
+pub use identification::Identification;
 pub use inertia::{InertiaFit, fit_inertia};
+pub use options::{IdentificationInput, IdentificationOptions, RefinementScope};
 pub use refine::{RefinedParameter, RefinedValue, Refinement, refine};
 pub use segments::{MotionSegment, SegmentKind, find_segments};
+pub use steps::identify;
 pub use validate::{Agreement, ExperimentComparison, InverseDynamics, ResidualStatistics, validate};
 pub use values::{IdentifiedValue, update_parameters};

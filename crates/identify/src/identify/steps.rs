@@ -9,8 +9,9 @@ use super::feedforward_mode::FeedforwardMode;
 use super::findings::{inertia_of_simulation, report_delays, report_result};
 use super::friction::{Breakaway, FrictionLaw, fit_friction};
 use super::gravity::{GravityCurrent, SteadyMeasurements, fit_gravity};
-use super::identification::{Identification, IdentificationInput, IdentificationOptions, RefinementScope};
+use super::identification::Identification;
 use super::inertia::fit_inertia;
+use super::options::{IdentificationInput, IdentificationOptions, RefinementScope};
 use super::refine::{RefinedParameter, refine, with_parameters};
 use super::segments::{MotionSegment, SegmentKind, find_segments};
 use super::setpoints::stride;
@@ -25,8 +26,22 @@ const NUISANCE: f64 = 1e-2;
 /// sampling.
 const LADDER: [f64; 13] = [0.06, 0.12, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
 
+/// Identifies `axis` from recordings, starting from the parameters of its machine file.
+pub fn identify(
+    inputs: &[IdentificationInput<'_>],
+    axis: &AxisConfig,
+    periods: &Periods,
+    options: &IdentificationOptions,
+) -> Identification {
+    let mut steps = IdentificationSteps::new(inputs, axis, periods, options);
+    steps.fit_plant();
+    steps.fit_feedforward_weights();
+    steps.fit_closed_loop();
+    steps.finish()
+}
+
 /// Identification in progress.
-pub(super) struct IdentificationSteps<'a> {
+struct IdentificationSteps<'a> {
     inputs: &'a [IdentificationInput<'a>],
     periods: &'a Periods,
     options: &'a IdentificationOptions,
@@ -38,7 +53,7 @@ pub(super) struct IdentificationSteps<'a> {
 }
 
 impl<'a> IdentificationSteps<'a> {
-    pub(super) fn new(
+    fn new(
         inputs: &'a [IdentificationInput<'a>],
         axis: &AxisConfig,
         periods: &'a Periods,
@@ -79,7 +94,7 @@ impl<'a> IdentificationSteps<'a> {
 
     /// Fits gravity, friction and inertia in two passes; the second corrects for residual accelerations with
     /// the inertia.
-    pub(super) fn fit_plant(&mut self) {
+    fn fit_plant(&mut self) {
         let found = &mut self.found;
         if !self.segments.iter().flatten().any(|segment| segment.kind == SegmentKind::Static) {
             found.findings.push(Finding::warning(
@@ -132,7 +147,7 @@ impl<'a> IdentificationSteps<'a> {
         }
     }
 
-    pub(super) fn fit_feedforward_weights(&mut self) {
+    fn fit_feedforward_weights(&mut self) {
         let found = &mut self.found;
         let signals: Vec<&Signals> = self.inputs.iter().map(|input| input.signals).collect();
         let (tsp, ratio) = (seconds(self.periods.position), found.axis.transmission_ratio);
@@ -152,7 +167,7 @@ impl<'a> IdentificationSteps<'a> {
     }
 
     /// Fits delays and refines parameters in closed loop.
-    pub(super) fn fit_closed_loop(&mut self) {
+    fn fit_closed_loop(&mut self) {
         let (axis, default) = (&self.found.axis, FeedforwardMode::Both);
         let experiments: Vec<Experiment> = self
             .inputs
@@ -323,7 +338,7 @@ impl<'a> IdentificationSteps<'a> {
         }
     }
 
-    pub(super) fn finish(mut self) -> Identification {
+    fn finish(mut self) -> Identification {
         for (number, input) in self.inputs.iter().enumerate() {
             let segments = self.segments.get(number).cloned().unwrap_or_default();
             let of_it = |e: &&Experiment| e.recording == number;

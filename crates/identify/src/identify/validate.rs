@@ -5,7 +5,7 @@ use super::closed_loop::{Experiment, SimulatedExperiment, find_experiments, simu
 use super::feedforward_mode::FeedforwardMode;
 use super::fit::r_squared;
 use super::friction::{friction_current, speed_unit};
-use super::identification::IdentificationInput;
+use super::options::IdentificationInput;
 use super::segments::{MotionSegment, SegmentKind, find_segments};
 use crate::recording::Signals;
 use virtual_axes_core::config::{AxisConfig, Periods};

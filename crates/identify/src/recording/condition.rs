@@ -1,11 +1,11 @@
 //! Conditioning of a raw recording: time grid, gaps, zero-phase filter, plausibility, current lag.
 
 use super::current_lag::{self, HIGHEST_LAG, LOWEST_LAG};
-use super::filter::{FilteredSignal, GaussianFilter, MAX_CUTOFF_PERIOD, default_cutoff, deviation};
+use super::filter::{GaussianFilter, MAX_CUTOFF_PERIOD, default_cutoff, deviation};
+use super::filtered_section::FilteredSection;
 use super::ordering::{drop_copies, sort_samples};
 use super::spans::{
-    CHANNELS, CURRENT, NAMES, POSITION, PSEC, RecordingSection, TORQUE_FEEDFORWARD, VELOCITY,
-    VELOCITY_FEEDFORWARD, channels, extract_sections, is_smoother_over_stamps, usable_columns,
+    CHANNELS, CURRENT, NAMES, POSITION, channels, extract_sections, is_smoother_over_stamps, usable_columns,
 };
 use super::uniform_grid::{UniformGrid, assign_to_grid};
 use super::{ConditioningError, Finding, RawRecording, SignalSpan, Signals, plausibility};
@@ -30,53 +30,6 @@ pub struct Conditioning {
     /// Lag of the current behind the motion, s, −0.010 … 0.020; compensated as given. Without a value the lag
     /// is estimated, and compensated only if it is significant.
     pub current_lag: Option<f64>,
-}
-
-/// Section of a recording after filtering.
-pub(super) struct FilteredSection<'a> {
-    pub filter: &'a GaussianFilter,
-    pub piece: RecordingSection,
-    /// Filtered position and its derivatives.
-    pub motion: FilteredSignal,
-    pub smooth_current: Option<Vec<f64>>,
-}
-
-impl<'a> FilteredSection<'a> {
-    fn new(piece: RecordingSection, filter: &'a GaussianFilter) -> Self {
-        let apply = |channel: usize| piece.columns[channel].as_ref().map(|values| filter.apply(values));
-        let motion = apply(POSITION).unwrap_or_default();
-        let smooth_current = apply(CURRENT).map(|current| current.value);
-        FilteredSection { filter, piece, motion, smooth_current }
-    }
-
-    /// Keeps the samples of `range`.
-    pub fn cut(&mut self, range: std::ops::Range<usize>, period: f64) {
-        let motion = &mut self.motion;
-        for signal in [&mut motion.value, &mut motion.first, &mut motion.second]
-            .into_iter()
-            .chain(self.smooth_current.as_mut())
-        {
-            signal.truncate(range.end);
-            signal.drain(..range.start.min(signal.len()));
-        }
-        self.piece.cut(range, period);
-    }
-
-    fn into_span(self) -> SignalSpan {
-        let mut columns = self.piece.columns;
-        SignalSpan {
-            start: self.piece.start,
-            psec: columns[PSEC].take(),
-            position: columns[POSITION].take().unwrap_or_default(),
-            velocity: self.motion.first,
-            acceleration: self.motion.second,
-            recorded_velocity: columns[VELOCITY].take(),
-            current: columns[CURRENT].take(),
-            smooth_current: self.smooth_current,
-            velocity_feedforward: columns[VELOCITY_FEEDFORWARD].take(),
-            torque_feedforward: columns[TORQUE_FEEDFORWARD].take(),
-        }
-    }
 }
 
 /// Conditions a recording of `axis`: checks it, resamples it to a uniform time grid and filters it without
@@ -120,13 +73,13 @@ pub fn condition(
         return Err(nothing_left());
     }
     let mut parts: Vec<FilteredSection> =
-        pieces.into_iter().map(|piece| FilteredSection::new(piece, &filter)).collect();
+        pieces.into_iter().map(|section| FilteredSection::new(section, &filter)).collect();
     plausibility::check(&raw.name, &parts, axis, period, deviation(cutoff))?;
     let current_lag =
         select_current_lag(&raw.name, &parts, axis, periods, (period, cutoff), options, &mut findings)?;
     if current_lag != 0.0 {
         current_lag::compensate(&mut parts, current_lag, period);
-        parts.retain(|part| part.piece.len() > 0);
+        parts.retain(|part| part.section.len() > 0);
         if parts.is_empty() {
             return Err(nothing_left());
         }
@@ -220,9 +173,9 @@ fn select_current_lag(
     }
     // A narrower filter prevents matching the ripple at the position period with the neighboring period.
     let filter = GaussianFilter::new(current_lag::max_cutoff(periods).min(cutoff), period);
-    let long = parts.iter().filter(|part| part.piece.len() > 2 * filter.radius());
+    let long = parts.iter().filter(|part| part.section.len() > 2 * filter.radius());
     let smooth: Vec<FilteredSection> =
-        long.map(|part| FilteredSection::new(part.piece.clone(), &filter)).collect();
+        long.map(|part| FilteredSection::new(part.section.clone(), &filter)).collect();
     let Some(lag) = current_lag::estimate(&smooth, axis.kind(), period) else { return Ok(0.0) };
     let milliseconds = lag.lag * 1e3;
     if lag.is_better && lag.is_at_end {

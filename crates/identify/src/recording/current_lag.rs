@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::condition::FilteredSection;
+use super::filtered_section::FilteredSection;
 use super::regression::LeastSquares;
 use super::spans::CURRENT;
 use virtual_axes_core::config::{AxisKind, Periods};
@@ -164,10 +164,10 @@ pub(super) fn compensate(parts: &mut [FilteredSection], lag: f64, period: f64) {
     let exact = lag / period;
     let shift = if (exact - exact.round()).abs() < WHOLE { exact.round() } else { exact };
     for part in parts {
-        let count = part.piece.len();
+        let count = part.section.len();
         let (before, behind) = ((-shift).max(0.0).ceil() as usize, shift.max(0.0).ceil() as usize);
         let range = before.min(count)..count.saturating_sub(behind).max(before.min(count));
-        let currents = [part.piece.columns[CURRENT].as_mut(), part.smooth_current.as_mut()];
+        let currents = [part.section.columns[CURRENT].as_mut(), part.smooth_current.as_mut()];
         for current in currents.into_iter().flatten() {
             let old = std::mem::take(current);
             *current = (0..count).map(|n| interpolate_cubic(&old, n as f64 + shift)).collect();

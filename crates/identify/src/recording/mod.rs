@@ -8,6 +8,7 @@ mod condition;
 mod current_lag;
 mod error;
 mod filter;
+mod filtered_section;
 mod finding;
 mod ordering;
 mod plausibility;

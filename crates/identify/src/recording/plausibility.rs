@@ -4,8 +4,8 @@
 //! The limits are wide enough for an approximate machine file, a differently tuned axis and noisy signals.
 
 use super::ConditioningError;
-use super::condition::FilteredSection;
 use super::current_lag::MovingSamples;
+use super::filtered_section::FilteredSection;
 use super::regression::{LeastSquares, correlation};
 use super::spans::{CURRENT, POSITION, PSEC, VELOCITY};
 use virtual_axes_core::config::{AxisConfig, AxisKind};
@@ -91,13 +91,13 @@ impl<'a> PlausibilityCheck<'a> {
             parts.iter().map(of).collect::<Option<Vec<_>>>().map(|all| all.concat())
         };
         let columns = [POSITION, PSEC, VELOCITY, CURRENT]
-            .map(|channel| joined(&|part| part.piece.columns[channel].clone()));
+            .map(|channel| joined(&|part| part.section.columns[channel].clone()));
         let velocity: Vec<f64> = parts.iter().flat_map(|part| part.motion.first.iter().copied()).collect();
         let top_speed =
             quantile(&mut velocity.iter().map(|v| v.abs()).collect::<Vec<_>>(), 0.99).unwrap_or(0.0);
         let range = columns[POSITION].as_ref().map_or(0.0, |position| travel(position));
         let filtered =
-            |part: &FilteredSection| Some(part.filter.apply(part.piece.columns[VELOCITY].as_ref()?));
+            |part: &FilteredSection| Some(part.filter.apply(part.section.columns[VELOCITY].as_ref()?));
         let recorded =
             joined(&|part| Some(filtered(part)?.value)).zip(joined(&|part| Some(filtered(part)?.first)));
         PlausibilityCheck {

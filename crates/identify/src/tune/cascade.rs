@@ -7,7 +7,7 @@ use std::f64::consts::LN_10;
 use cobyla::{Func, RhoBeg, StopTols, minimize};
 use rayon::prelude::*;
 
-use super::TuneError;
+use super::error::TuneError;
 use super::margin_limits::MarginLimits;
 use super::problem::{SearchResult, TuningCandidate, TuningProblem, ranked};
 use super::tuning::{AxisGains, Tuning, round_significant, torque_key};

@@ -1,6 +1,6 @@
 //! Tunings that are better than the present one on one path and worse on another.
 
-use super::TuneError;
+use super::error::TuneError;
 use super::gpc::design_grid;
 use super::margin_limits::MarginLimits;
 use super::problem::{TuningCandidate, TuningProblem, within_limits};

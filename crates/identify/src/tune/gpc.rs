@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::TuneError;
+use super::error::TuneError;
 use super::margin_limits::MarginLimits;
 use super::problem::{SearchResult, TuningCandidate, TuningProblem, ranked, within_limits};
 use super::tuning::{Tuning, round_significant};

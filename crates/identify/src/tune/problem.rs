@@ -3,10 +3,11 @@
 use rayon::prelude::*;
 
 use super::cost::Cost;
+use super::error::TuneError;
 use super::margin_limits::{MarginLimits, worst_margins};
+use super::progress::Progress;
 use super::tuning::Tuning;
 use super::workload::Workload;
-use super::{Progress, TuneError};
 use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{DesignError, Margins, PredictionModel, gpc};

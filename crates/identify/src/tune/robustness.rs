@@ -3,9 +3,10 @@
 use rayon::prelude::*;
 
 use super::cost::Cost;
+use super::error::TuneError;
 use super::margin_limits::worst_margins;
+use super::progress::Progress;
 use super::workload::Workload;
-use super::{Progress, TuneError};
 use virtual_axes_core::config::{Assignment, MachineConfig, Parameters, Value, ValueSource};
 use virtual_axes_core::design::Margins;
 use virtual_axes_core::machine::{MachineError, design_controller, deviating_plant_model, prediction_model};

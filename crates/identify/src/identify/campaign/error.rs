@@ -1,9 +1,9 @@
 //! Errors of planning a campaign.
 
 use virtual_axes_core::path::{PathError, PlanError};
-
-use super::travel_limits::SPEED_RESERVE;
 use virtual_axes_core::units::Rounded;
+
+use super::options::SPEED_RESERVE;
 
 /// Error of [`Campaign::plan`](super::Campaign::plan). Values are in mm and m/min, or ° and rev/min.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

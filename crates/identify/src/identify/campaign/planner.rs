@@ -5,7 +5,7 @@ use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::path::{Block, Frame, Move, PathLimits, Program};
 use virtual_axes_core::trajectory::JointLimits;
 
-use super::CampaignError;
+use super::error::CampaignError;
 use super::travel_limits::{CONSTANT, CampaignUnits, MOVING_ACCELERATION, ROUNDING, SWEEPS, TravelLimits};
 
 /// Lowest speed, m/min or rev/min; at a resolution of 1 µm or 1 mdeg still hundreds of increments per second.

@@ -3,12 +3,11 @@
 use virtual_axes_core::config::{AxisConfig, AxisKind, LimitsConfig, MachineConfig};
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, REVOLUTION, RPM, seconds};
 
-use super::{CampaignError, CampaignOptions};
+use super::error::CampaignError;
+use super::options::{CampaignOptions, SPEED_RESERVE};
 
 /// Distance of the setpoints from each end of the range, relative to the range, as margin for overshoot.
 const MARGIN: f64 = 0.05;
-/// Share of Vmax and of the motor speed that is used; the rest is control reserve.
-pub(super) const SPEED_RESERVE: f64 = 0.95;
 /// Default highest speed, m/min or rev/min: the range of the friction law (Prévost Appendix 2).
 const HIGHEST_SPEED: f64 = 20.0;
 /// Constant-speed time of a leg after settling, s.
