@@ -6,12 +6,13 @@ use super::super::chart::{Band, Chart, ChartAxis, ChartSeries, Panel, SeriesStyl
 use super::super::document::Section;
 use super::super::table::Table;
 use super::super::unit::DisplayUnit;
-use super::format::{columns, determination, optional, with_unit};
+use super::format::{columns, format_r_squared, optional, with_unit};
 use super::recordings::{bands, over_time, single_recording};
 use super::{IdentificationPage, Step, ValidationRecording};
 use virtual_axes_core::units::{MILLIMETER, seconds};
 use virtual_axes_identify::identify::{
-    Agreement, Comparison, Deviation, Experiment, Input, SegmentKind, Simulated,
+    Agreement, Experiment, ExperimentComparison, IdentificationInput, ResidualStatistics, SegmentKind,
+    SimulatedExperiment,
 };
 
 /// Duration above which one move has a plot of its own, s.
@@ -29,7 +30,8 @@ const LARGE_ERROR: f64 = MILLIMETER;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let mut section = page.step("Measured and simulated", Step::Agreement);
-    let pairs: Vec<(&Input, &Agreement)> = page.inputs.iter().zip(&page.identification.agreements).collect();
+    let pairs: Vec<(&IdentificationInput, &Agreement)> =
+        page.inputs.iter().zip(&page.identification.agreements).collect();
     section.paragraphs.push(
         "Simulation of the identified axis in closed loop with the recorded setpoints (Prévost fig. 6). Deviations are simulated \
          minus measured."
@@ -48,7 +50,7 @@ pub(super) fn validation_section(page: &IdentificationPage, check: &ValidationRe
     section
 }
 
-fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Input, &Agreement)]) {
+fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&IdentificationInput, &Agreement)]) {
     for (input, agreement) in pairs {
         if agreement.experiments.is_empty() {
             let name = &input.signals.name;
@@ -96,22 +98,27 @@ fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Input, &Agr
 }
 
 /// Returns the name of a part of a recording, numbered if there are several parts.
-fn name(input: &Input, experiment: &Experiment, i: usize, count: usize) -> String {
+fn name(input: &IdentificationInput, experiment: &Experiment, i: usize, count: usize) -> String {
     let (name, mode) = (&input.signals.name, experiment.mode.name());
     let part = if count > 1 { format!(", part {}", i + 1) } else { String::new() };
     format!("{name}{part}, feedforward {mode}")
 }
 
-fn rows(page: &IdentificationPage, input: &Input, agreement: &Agreement) -> Vec<Vec<String>> {
+fn rows(page: &IdentificationPage, input: &IdentificationInput, agreement: &Agreement) -> Vec<Vec<String>> {
     let (error, velocity) = (page.error_unit(), page.velocity_unit());
     let count = agreement.experiments.len();
     let pairs = agreement.experiments.iter().zip(&agreement.comparisons).enumerate();
     pairs
         .map(|(i, (experiment, comparison))| {
-            let Comparison { constant_velocity, elsewhere, velocity: v, current, current_determination } =
-                comparison;
+            let ExperimentComparison {
+                constant_velocity,
+                elsewhere,
+                velocity: v,
+                current,
+                current_r_squared,
+            } = comparison;
             let mut row = vec![name(input, experiment, i, count)];
-            let mut put = |deviation: &Option<Deviation>, unit: &DisplayUnit| {
+            let mut put = |deviation: &Option<ResidualStatistics>, unit: &DisplayUnit| {
                 row.push(optional(deviation.map(|d| d.max), unit, 3));
                 row.push(optional(deviation.map(|d| d.rms), unit, 3));
             };
@@ -119,7 +126,7 @@ fn rows(page: &IdentificationPage, input: &Input, agreement: &Agreement) -> Vec<
             put(elsewhere, &error);
             put(v, &velocity);
             put(current, &DisplayUnit::AMPERE);
-            row.push(current_determination.map_or_else(String::new, determination));
+            row.push(current_r_squared.map_or_else(String::new, format_r_squared));
             row
         })
         .collect()
@@ -142,24 +149,24 @@ fn table(page: &IdentificationPage, rows: Vec<Vec<String>>) -> Table {
     Table { caption: "Simulated minus measured".to_owned(), columns: columns(heads), rows }
 }
 
-fn inverse_row(input: &Input, agreement: &Agreement) -> Option<Vec<String>> {
+fn inverse_row(input: &IdentificationInput, agreement: &Agreement) -> Option<Vec<String>> {
     let inverse = agreement.inverse.as_ref()?;
     let of = |value: f64| optional(Some(value), &DisplayUnit::AMPERE, 3);
     Some(vec![
         input.signals.name.clone(),
         of(inverse.current.max),
         of(inverse.current.rms),
-        determination(inverse.r_squared),
+        format_r_squared(inverse.r_squared),
     ])
 }
 
 /// A part of a recording with its simulation.
 struct Run<'a> {
     page: &'a IdentificationPage<'a>,
-    input: &'a Input<'a>,
+    input: &'a IdentificationInput<'a>,
     agreement: &'a Agreement,
     experiment: &'a Experiment,
-    simulated: &'a Simulated,
+    simulated: &'a SimulatedExperiment,
 }
 
 impl Run<'_> {
@@ -255,7 +262,11 @@ fn largest_of(panels: &[Panel]) -> f64 {
 }
 
 /// Creates the plot of measured current and current by inverse dynamics.
-fn inverse_chart(page: &IdentificationPage, input: &Input, agreement: &Agreement) -> Option<Chart> {
+fn inverse_chart(
+    page: &IdentificationPage,
+    input: &IdentificationInput,
+    agreement: &Agreement,
+) -> Option<Chart> {
     let (signals, inverse) = (input.signals, agreement.inverse.as_ref()?);
     let mut modeled = Vec::new();
     let mut deviation = Vec::new();
@@ -289,7 +300,7 @@ fn inverse_chart(page: &IdentificationPage, input: &Input, agreement: &Agreement
         ),
     ];
     Some(Chart {
-        note: format!("R² {}", determination(inverse.r_squared)),
+        note: format!("R² {}", format_r_squared(inverse.r_squared)),
         bands: bands(signals, &agreement.segments),
         ..Chart::new(
             format!("{}: current by inverse dynamics", signals.name),

@@ -4,16 +4,16 @@ use super::super::chart::{Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
 use super::super::document::Section;
 use super::super::scale::Extent;
 use super::super::unit::DisplayUnit;
-use super::format::{determination, digits, exact};
+use super::format::{digits, exact, format_r_squared};
 use super::{IdentificationPage, Step};
-use virtual_axes_identify::identify::Regression;
+use virtual_axes_identify::identify::FeedforwardRegression;
 
 /// Velocity or torque feedforward weight.
 struct Weight<'a> {
     name: &'static str,
     title: &'static str,
     equation: u32,
-    found: Option<&'a Regression>,
+    found: Option<&'a FeedforwardRegression>,
     /// Unit of the weight.
     unit: &'static str,
     /// Quantity and unit of the derivative of PSEC.
@@ -94,13 +94,13 @@ impl Weight<'_> {
             "{name} = {} ± {} (eq. {equation}), R² {}; {name}S lags the derivative by {} … {} ms.",
             digits(found.value, 5),
             format!("{} {unit}", digits(found.error, 2)).trim_end(),
-            determination(found.determination),
+            format_r_squared(found.r_squared),
             exact(low * 1e3),
             exact(high * 1e3)
         )
     }
 
-    fn chart(&self, found: &Regression) -> Chart {
+    fn chart(&self, found: &FeedforwardRegression) -> Chart {
         let points = found.points.iter().map(|(x, y)| [*x, *y]).collect();
         let line = Extent::of(found.points.iter().map(|point| point.0))
             .map_or_else(Vec::new, |e| [e.min, e.max].map(|x| [x, found.value * x]).to_vec());
@@ -110,7 +110,7 @@ impl Weight<'_> {
         ];
         let axis = |(quantity, unit): (&str, DisplayUnit)| ChartAxis::new(quantity, unit);
         Chart {
-            note: format!("R² {}", determination(found.determination)),
+            note: format!("R² {}", format_r_squared(found.r_squared)),
             ..Chart::new(self.title, axis(self.x), vec![Panel::new(axis(self.y), series)])
         }
     }

@@ -7,20 +7,20 @@ use super::IdentificationPage;
 use virtual_axes_core::config::AxisKind;
 
 /// Magnitude below which numbers have an exponent.
-const SMALL: f64 = 1e-4;
+const SMALLEST_PLAIN: f64 = 1e-4;
 /// Magnitude from which numbers have an exponent.
-const LARGE: f64 = 1e7;
+const LARGEST_PLAIN: f64 = 1e7;
 /// Significant digits of exact numbers.
-const EXACT: usize = 6;
+const EXACT_DIGITS: usize = 6;
 /// Maximum number of decimals of R².
-const DETERMINATION: usize = 6;
+const R_SQUARED_DECIMALS: usize = 6;
 
 /// Formats a number with `count` significant digits; a dash if it is not finite.
 pub(super) fn digits(value: f64, count: usize) -> String {
     if !value.is_finite() {
         return "–".to_owned();
     }
-    if value != 0.0 && !(SMALL..LARGE).contains(&value.abs()) {
+    if value != 0.0 && !(SMALLEST_PLAIN..LARGEST_PLAIN).contains(&value.abs()) {
         return format!("{value:.*e}", count.saturating_sub(1)).replace('-', "−");
     }
     if value == 0.0 {
@@ -32,7 +32,7 @@ pub(super) fn digits(value: f64, count: usize) -> String {
 
 /// Formats an exact number with up to six significant digits, without trailing zeros.
 pub(super) fn exact(value: f64) -> String {
-    let text = digits(value, EXACT);
+    let text = digits(value, EXACT_DIGITS);
     if text.contains('.') && !text.contains('e') {
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
     } else {
@@ -44,7 +44,7 @@ pub(super) fn exact(value: f64) -> String {
 pub(super) fn full(value: f64) -> String {
     if !value.is_finite() {
         "–".to_owned()
-    } else if value != 0.0 && value.abs() < SMALL {
+    } else if value != 0.0 && value.abs() < SMALLEST_PLAIN {
         format!("{value:e}")
     } else {
         format!("{value}")
@@ -72,11 +72,12 @@ pub(super) fn percent(part: f64) -> String {
 }
 
 /// Formats R² with four decimals, or up to six if needed to distinguish it from 1.
-pub(super) fn determination(r2: f64) -> String {
+pub(super) fn format_r_squared(r2: f64) -> String {
     if !r2.is_finite() {
         return "–".to_owned();
     }
-    let decimals = (4..DETERMINATION).find(|d| number(r2, *d) != number(1.0, *d)).unwrap_or(DETERMINATION);
+    let decimals =
+        (4..R_SQUARED_DECIMALS).find(|d| number(r2, *d) != number(1.0, *d)).unwrap_or(R_SQUARED_DECIMALS);
     number(r2, decimals)
 }
 
@@ -135,8 +136,8 @@ mod tests {
 
     #[test]
     fn r_squared_near_one_is_distinguished_from_one() {
-        assert_eq!(determination(0.995), "0.9950");
-        assert_eq!(determination(0.999_987), "0.99999");
-        assert_eq!(determination(1.0), "1.000000");
+        assert_eq!(format_r_squared(0.995), "0.9950");
+        assert_eq!(format_r_squared(0.999_987), "0.99999");
+        assert_eq!(format_r_squared(1.0), "1.000000");
     }
 }

@@ -4,11 +4,11 @@ use super::super::chart::{Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesSty
 use super::super::document::Section;
 use super::super::table::Table;
 use super::super::unit::DisplayUnit;
-use super::format::{columns, determination, digits, percent, plain};
+use super::format::{columns, digits, format_r_squared, percent, plain};
 use super::{IdentificationPage, Step};
 use virtual_axes_core::config::FrictionConfig;
 use virtual_axes_core::drive;
-use virtual_axes_identify::identify::{Friction, FrictionLaw, LawFit, Level};
+use virtual_axes_identify::identify::{FrictionFit, FrictionLaw, LawFit, SteadyCurrent};
 
 /// Number of points of the line of the law in each direction.
 const LINE_POINTS: usize = 200;
@@ -42,9 +42,9 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     section
 }
 
-fn text(page: &IdentificationPage, friction: &Friction) -> String {
+fn text(page: &IdentificationPage, friction: &FrictionFit) -> String {
     let (law, unit) = (&friction.law, page.velocity_unit().symbol);
-    let r2 = determination(law.determination);
+    let r2 = format_r_squared(law.r_squared);
     let mut text = match law.line() {
         Some((level, slope)) => format!(
             "A Coulomb level and a viscous slope are fitted, because the speeds do not determine the four parameters of \
@@ -80,11 +80,15 @@ fn describe(page: &IdentificationPage, law: &FrictionConfig) -> String {
 }
 
 /// Returns the law of the refined axis if it differs visibly from the fitted one at the measured speeds.
-fn refined(page: &IdentificationPage, friction: &Friction, levels: &[Level]) -> Option<drive::Friction> {
+fn refined(
+    page: &IdentificationPage,
+    friction: &FrictionFit,
+    levels: &[SteadyCurrent],
+) -> Option<drive::Friction> {
     // Gear ratio 1 and torque constant 1: torque equals current.
     let law = |config| drive::Friction::new(config, page.kind(), 1.0, 1.0);
     let (fitted, now) = (law(friction.law.config), law(page.axis().friction));
-    let differ = |level: &Level| {
+    let differ = |level: &SteadyCurrent| {
         let (fitted, now) = (fitted.bound(level.velocity), now.bound(level.velocity));
         (now - fitted).abs() > VISIBLE * fitted
     };
@@ -93,13 +97,13 @@ fn refined(page: &IdentificationPage, friction: &Friction, levels: &[Level]) -> 
 
 fn chart(
     page: &IdentificationPage,
-    friction: &Friction,
+    friction: &FrictionFit,
     refined: Option<&drive::Friction>,
-    levels: &[Level],
+    levels: &[SteadyCurrent],
 ) -> Chart {
     let unit = page.velocity_unit();
     let measured = |label: &str, group: usize, sign: f64| {
-        let of_it: Vec<&Level> = levels.iter().filter(|l| l.velocity.signum() == sign).collect();
+        let of_it: Vec<&SteadyCurrent> = levels.iter().filter(|l| l.velocity.signum() == sign).collect();
         let points = of_it.iter().map(|l| [l.velocity, l.friction]).collect();
         ChartSeries::new(label, SeriesStyle::Points(group), points)
             .with_errors(of_it.iter().map(|l| l.error).collect())
@@ -131,14 +135,14 @@ fn chart(
         ..Panel::new(ChartAxis::new("Friction current", DisplayUnit::AMPERE), series)
     };
     Chart {
-        note: format!("{kind}, R² {}; bars: standard error", determination(friction.law.determination)),
+        note: format!("{kind}, R² {}; bars: standard error", format_r_squared(friction.law.r_squared)),
         ..Chart::new("Friction law", ChartAxis::new("Velocity", unit), vec![panel])
     }
 }
 
-fn table(page: &IdentificationPage, friction: &Friction, levels: &[Level]) -> Table {
+fn table(page: &IdentificationPage, friction: &FrictionFit, levels: &[SteadyCurrent]) -> Table {
     let unit = page.velocity_unit();
-    let row = |level: &Level| {
+    let row = |level: &SteadyCurrent| {
         let v = level.velocity / unit.size;
         let difference = |law: &LawFit| percent((law.at(v) - level.friction) / level.friction);
         let own = friction.directions[usize::from(level.velocity < 0.0)].as_ref();

@@ -9,7 +9,7 @@ use super::format::{columns, digits};
 use super::{IdentificationPage, Step};
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::DEGREE;
-use virtual_axes_identify::identify::{Gravity, GravityCurrent, GravitySource, Rest};
+use virtual_axes_identify::identify::{GravityCurrent, GravityFit, GravitySource, Standstill};
 
 /// Number of points of the line of the gravity model.
 const LINE_POINTS: usize = 181;
@@ -46,7 +46,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
 }
 
 /// Returns a sentence with the gravity in the units of the machine file.
-fn sentence(page: &IdentificationPage, gravity: &Gravity) -> String {
+fn sentence(page: &IdentificationPage, gravity: &GravityFit) -> String {
     let pair = |value: f64, error: f64| format!("{} ± {}", digits(value, 4), digits(error, 2));
     if gravity.model == GravityCurrent::default() {
         return "It is not significant; the model has no gravity.".to_owned();
@@ -78,7 +78,7 @@ fn sentence(page: &IdentificationPage, gravity: &Gravity) -> String {
     format!("This gives {}{more}.", parts.join(", "))
 }
 
-fn chart(page: &IdentificationPage, gravity: &Gravity, rests: &[Rest]) -> Chart {
+fn chart(page: &IdentificationPage, gravity: &GravityFit, rests: &[Standstill]) -> Chart {
     let approached = |label: &str, group: usize, sign: f64| {
         let of_it = rests.iter().filter(|rest| rest.approach == sign);
         ChartSeries::new(label, SeriesStyle::Points(group), of_it.map(|r| [r.position, r.current]).collect())
@@ -114,7 +114,7 @@ fn chart(page: &IdentificationPage, gravity: &Gravity, rests: &[Rest]) -> Chart 
     }
 }
 
-fn table(kind: AxisKind, gravity: &Gravity) -> Table {
+fn table(kind: AxisKind, gravity: &GravityFit) -> Table {
     let part = |name: &str, of: fn(&GravityCurrent) -> f64| {
         let pair = |pair: Option<(&GravityCurrent, &GravityCurrent)>| {
             pair.map_or_else(

@@ -6,7 +6,7 @@ use super::super::scale::Extent;
 use super::super::unit::DisplayUnit;
 use super::format::{counted, digits, percent};
 use super::{IdentificationPage, Step};
-use virtual_axes_identify::identify::Inertia;
+use virtual_axes_identify::identify::InertiaFit;
 
 /// Fraction of the smallest and of the largest values that the plot may cut off.
 const OUTLIERS: f64 = 0.02;
@@ -55,7 +55,7 @@ fn with_unit(page: &IdentificationPage, inertia: f64) -> String {
     format!("{}\u{a0}{}", digits(inertia, 4), page.inertia_unit().symbol)
 }
 
-fn chart(page: &IdentificationPage, inertia: &Inertia) -> Chart {
+fn chart(page: &IdentificationPage, inertia: &InertiaFit) -> Chart {
     let found = page.identification;
     // Samples are numbered by the recordings that have a current.
     let has_current = |signals: &virtual_axes_identify::recording::Signals| {

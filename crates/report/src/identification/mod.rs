@@ -14,7 +14,9 @@ mod summary;
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, Periods};
 use virtual_axes_core::units::seconds;
-use virtual_axes_identify::identify::{Agreement, FeedforwardMode, Identification, IdentifiedValue, Input};
+use virtual_axes_identify::identify::{
+    Agreement, FeedforwardMode, Identification, IdentificationInput, IdentifiedValue,
+};
 use virtual_axes_identify::recording::Finding;
 
 use super::document::{Document, Section};
@@ -29,7 +31,7 @@ pub struct IdentificationPage<'a> {
     /// Sampling periods of the position, velocity and current loops.
     pub periods: Periods,
     /// Recordings, as passed to [`identify`](virtual_axes_identify::identify::identify).
-    pub inputs: &'a [Input<'a>],
+    pub inputs: &'a [IdentificationInput<'a>],
     /// Findings of reading and conditioning of each recording; can be shorter than `inputs`.
     pub findings: &'a [Vec<Finding>],
     /// Result of the identification.
@@ -44,7 +46,7 @@ pub struct IdentificationPage<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct ValidationRecording<'a> {
     /// Recording, as passed to [`validate`](virtual_axes_identify::identify::validate).
-    pub input: Input<'a>,
+    pub input: IdentificationInput<'a>,
     /// Findings of reading and conditioning.
     pub findings: &'a [Finding],
     /// Deviations between simulation and recording.
@@ -92,7 +94,7 @@ impl IdentificationPage<'_> {
                 [position, velocity, current].map(ms).join(", "),
             ),
         ];
-        let name = |what: &str, input: &Input| (what.to_owned(), input.signals.name.clone());
+        let name = |what: &str, input: &IdentificationInput| (what.to_owned(), input.signals.name.clone());
         facts.extend(self.inputs.iter().map(|input| name("identified from", input)));
         facts.extend(self.validations.iter().map(|check| name("validated on", &check.input)));
         facts
@@ -122,7 +124,7 @@ impl IdentificationPage<'_> {
 }
 
 /// Returns the distinct feedforward modes of the parts of a recording, separated by commas.
-fn modes(agreement: &Agreement, input: &Input) -> String {
+fn modes(agreement: &Agreement, input: &IdentificationInput) -> String {
     let mut modes: Vec<FeedforwardMode> = agreement.experiments.iter().map(|e| e.mode).collect();
     modes.sort();
     modes.dedup();

@@ -7,11 +7,11 @@ use super::super::table::Table;
 use super::super::unit::DisplayUnit;
 use super::format::{columns, digits, exact};
 use super::{IdentificationPage, modes, notices};
-use virtual_axes_identify::identify::{Agreement, Input, Segment, SegmentKind};
-use virtual_axes_identify::recording::{Finding, Signals, Span};
+use virtual_axes_identify::identify::{Agreement, IdentificationInput, MotionSegment, SegmentKind};
+use virtual_axes_identify::recording::{Finding, SignalSpan, Signals};
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let pairs: Vec<(&Input, Option<&Agreement>)> = page
+    let pairs: Vec<(&IdentificationInput, Option<&Agreement>)> = page
         .inputs
         .iter()
         .enumerate()
@@ -31,7 +31,11 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
 }
 
 /// Creates a section with the notices and the table of one recording.
-pub(super) fn single_recording(input: &Input, findings: &[Finding], agreement: &Agreement) -> Section {
+pub(super) fn single_recording(
+    input: &IdentificationInput,
+    findings: &[Finding],
+    agreement: &Agreement,
+) -> Section {
     Section {
         notices: findings.iter().map(notices::notice).collect(),
         tables: vec![table(&[(input, Some(agreement))])],
@@ -39,7 +43,7 @@ pub(super) fn single_recording(input: &Input, findings: &[Finding], agreement: &
     }
 }
 
-fn table(pairs: &[(&Input, Option<&Agreement>)]) -> Table {
+fn table(pairs: &[(&IdentificationInput, Option<&Agreement>)]) -> Table {
     let heads = [
         ("recording", ""),
         ("samples", ""),
@@ -59,7 +63,7 @@ fn table(pairs: &[(&Input, Option<&Agreement>)]) -> Table {
     }
 }
 
-fn row(input: &Input, agreement: Option<&Agreement>) -> Vec<String> {
+fn row(input: &IdentificationInput, agreement: Option<&Agreement>) -> Vec<String> {
     let signals = input.signals;
     let samples: usize = signals.spans.iter().map(|span| span.position.len()).sum();
     let duration = |kind: SegmentKind| {
@@ -83,7 +87,7 @@ fn row(input: &Input, agreement: Option<&Agreement>) -> Vec<String> {
 
 /// Creates the plot of velocity and current over time.
 fn chart(page: &IdentificationPage, signals: &Signals, agreement: Option<&Agreement>) -> Chart {
-    let line = |label: &str, style, channel: &dyn Fn(&Span) -> Option<Vec<f64>>| {
+    let line = |label: &str, style, channel: &dyn Fn(&SignalSpan) -> Option<Vec<f64>>| {
         ChartSeries::new(label, style, over_time(signals, channel))
     };
     let velocity = vec![line("", SeriesStyle::Measured, &|span| Some(span.velocity.clone()))];
@@ -106,7 +110,10 @@ fn chart(page: &IdentificationPage, signals: &Signals, agreement: Option<&Agreem
 }
 
 /// Returns the points of a channel over time, with gaps between spans.
-pub(super) fn over_time(signals: &Signals, channel: &dyn Fn(&Span) -> Option<Vec<f64>>) -> Vec<[f64; 2]> {
+pub(super) fn over_time(
+    signals: &Signals,
+    channel: &dyn Fn(&SignalSpan) -> Option<Vec<f64>>,
+) -> Vec<[f64; 2]> {
     let mut points = Vec::new();
     for span in &signals.spans {
         let values = channel(span).unwrap_or_default();
@@ -118,8 +125,8 @@ pub(super) fn over_time(signals: &Signals, channel: &dyn Fn(&Span) -> Option<Vec
 }
 
 /// Returns the segments of the motion as bands over the time of the recording.
-pub(super) fn bands(signals: &Signals, segments: &[Segment]) -> Vec<Band> {
-    let band = |segment: &Segment| {
+pub(super) fn bands(signals: &Signals, segments: &[MotionSegment]) -> Vec<Band> {
+    let band = |segment: &MotionSegment| {
         let span = signals.spans.get(segment.span)?;
         let time = |i: usize| span.start + i as f64 * signals.period;
         let class = match segment.kind {

@@ -6,7 +6,7 @@ use super::super::text::{listed, number};
 use super::super::unit::DisplayUnit;
 use super::format::{columns, digits, percent, with_unit};
 use super::{IdentificationPage, Step};
-use virtual_axes_identify::identify::{Parameter, Refined, Refinement};
+use virtual_axes_identify::identify::{RefinedParameter, RefinedValue, Refinement};
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let mut section = page.step("Refinement in closed loop", Step::Refinement);
@@ -66,17 +66,20 @@ fn text(page: &IdentificationPage, refinement: &Refinement) -> String {
     )
 }
 
-fn row(page: &IdentificationPage, refined: &Refined) -> Vec<String> {
+fn row(page: &IdentificationPage, refined: &RefinedValue) -> Vec<String> {
     let unit = match refined.parameter {
-        Parameter::Inertia | Parameter::TorqueFeedforward => page.inertia_unit().symbol.to_owned(),
-        Parameter::FrictionA | Parameter::FrictionC | Parameter::Coulomb | Parameter::Breakaway => {
-            "A".to_owned()
+        RefinedParameter::Inertia | RefinedParameter::TorqueFeedforward => {
+            page.inertia_unit().symbol.to_owned()
         }
-        Parameter::FrictionB | Parameter::FrictionD => page.exponent_unit().to_owned(),
-        Parameter::Viscous => format!("A/({})", page.velocity_unit().symbol),
-        Parameter::Weight => "N".to_owned(),
-        Parameter::TiltSine | Parameter::TiltCosine => "N·m".to_owned(),
-        Parameter::VelocityFeedforward => String::new(),
+        RefinedParameter::FrictionA
+        | RefinedParameter::FrictionC
+        | RefinedParameter::Coulomb
+        | RefinedParameter::Breakaway => "A".to_owned(),
+        RefinedParameter::FrictionB | RefinedParameter::FrictionD => page.exponent_unit().to_owned(),
+        RefinedParameter::Viscous => format!("A/({})", page.velocity_unit().symbol),
+        RefinedParameter::Weight => "N".to_owned(),
+        RefinedParameter::TiltSine | RefinedParameter::TiltCosine => "N·m".to_owned(),
+        RefinedParameter::VelocityFeedforward => String::new(),
     };
     vec![
         refined.parameter.to_string(),
@@ -85,7 +88,7 @@ fn row(page: &IdentificationPage, refined: &Refined) -> Vec<String> {
         digits(refined.error, 2),
         unit,
         percent((refined.value - refined.before) / refined.before.abs()),
-        if refined.at_bound { "yes" } else { "" }.to_owned(),
+        if refined.is_at_bound { "yes" } else { "" }.to_owned(),
     ]
 }
 

@@ -1,4 +1,4 @@
-//! TODO
+//! Tests of report pages.
 
 mod report_common;
 mod report_compare;

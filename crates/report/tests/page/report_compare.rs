@@ -1,4 +1,4 @@
-//! Pages of several runs: paths that lie apart, long names.
+//! Pages of several runs: paths at different positions, long names.
 
 use crate::report_common::{between, picture, points, report_run};
 use virtual_axes_core::assess::{SignalRecording, ToolTrace};
@@ -15,7 +15,7 @@ fn page(runs: Vec<ReportRun>) -> String {
     String::from_utf8(bytes).expect("UTF-8")
 }
 
-/// Two turns of radius 20 mm that rise 10 mm from `start`, 20 µm outside of the path.
+/// Returns a helix of two turns with radius 20 mm and height 10 mm from `start`, 20 µm outside the path.
 fn helix(start: [f64; 3]) -> SignalRecording {
     let at = |i: u32, radius: f64| {
         let part = f64::from(i) / f64::from(STEPS);
@@ -32,7 +32,7 @@ fn helix(start: [f64; 3]) -> SignalRecording {
     SignalRecording { time, tool: Some(tool), ..SignalRecording::default() }
 }
 
-/// Width and height of a run's path in its picture, pixels.
+/// Returns width and height of a run's path in its plot, pixels.
 fn size(page: &str, title: &str) -> [f64; 2] {
     let path = points(between(picture(page, title), "<path class=\"reference\" d=\"", "\"")[0]);
     [0, 1].map(|i| {
@@ -42,8 +42,8 @@ fn size(page: &str, title: &str) -> [f64; 2] {
 }
 
 #[test]
-fn a_path_elsewhere_does_not_choose_the_plane() {
-    // A tool 100 mm shorter: the whole path is that much lower.
+fn an_offset_path_does_not_change_the_projection_plane() {
+    // A tool that is 100 mm shorter lowers the whole path.
     let (high, low) = (helix([0.0; 3]), helix([0.0, 0.0, -0.1]));
     let page = page(vec![report_run("long", &high), report_run("short", &low)]);
     let [long, short] = ["X–Y path, long<", "X–Y path, short<"].map(|title| size(&page, title));
@@ -52,7 +52,7 @@ fn a_path_elsewhere_does_not_choose_the_plane() {
 }
 
 #[test]
-fn paths_that_lie_apart_have_one_scale_and_their_own_range() {
+fn distant_paths_have_one_scale_and_separate_ranges() {
     let (near, far) = (helix([0.0; 3]), helix([0.0, 0.5, 0.0]));
     let page = page(vec![report_run("near", &near), report_run("far", &far)]);
     let alone = self::page(vec![report_run("near", &near)]);

@@ -1,4 +1,4 @@
-//! A page of charts: what stands in it, and what must never.
+//! Pages of charts: contents, escaping, decimation, and robustness to invalid values.
 
 use crate::report_common::charts::{axis, example, noise, validation};
 use crate::report_common::{between, picture, pictures, points};
@@ -10,7 +10,7 @@ use virtual_axes_report::{
 
 fn page(document: &Document) -> String {
     let mut bytes = Vec::new();
-    document.write(&mut bytes).expect("memory takes it");
+    document.write(&mut bytes).expect("memory can be written");
     String::from_utf8(bytes).expect("UTF-8")
 }
 
@@ -19,7 +19,7 @@ fn page_of(charts: Vec<Chart>) -> String {
     page(&Document { title: "charts".to_owned(), sections: vec![section], ..Document::default() })
 }
 
-/// Elements are closed in the order in which they were opened, and every bracket is one of a tag.
+/// Asserts that elements are nested correctly, and that every bracket belongs to a tag.
 fn assert_well_formed(page: &str) {
     let mut open: Vec<&str> = Vec::new();
     let mut rest = page.strip_prefix("<!DOCTYPE html>").expect("a document type");
@@ -39,7 +39,7 @@ fn assert_well_formed(page: &str) {
     assert!(open.is_empty() && rest.trim().is_empty(), "{open:?} {rest}");
 }
 
-/// The height of a picture's only area and its top, pixels.
+/// Returns left, top, width and height of the plot area of a plot with one panel, pixels.
 fn area(picture: &str) -> [f64; 4] {
     let area = between(picture, "<rect class=\"area\"", "/>")[0];
     ["x", "y", "width", "height"]
@@ -47,11 +47,11 @@ fn area(picture: &str) -> [f64; 4] {
 }
 
 #[test]
-fn the_page_is_well_formed_and_needs_nothing_from_elsewhere() {
+fn the_page_is_well_formed_and_self_contained() {
     let page = page(&example());
-    // For a look at it.
+    // The page is kept for inspection.
     std::fs::write(concat!(env!("CARGO_TARGET_TMPDIR"), "/document.html"), &page)
-        .expect("a folder of its own");
+        .expect("the folder is writable");
     assert_well_formed(&page);
     for forbidden in ["http:", "https:", "src=", "url(", "@import", "<link", "<script", "href"] {
         assert!(!page.contains(forbidden), "{forbidden}");
@@ -59,7 +59,7 @@ fn the_page_is_well_formed_and_needs_nothing_from_elsewhere() {
     for wanted in ["<html lang=\"en\">", "charset=\"utf-8\"", "name=\"viewport\"", "<h2>Delays</h2>"] {
         assert!(page.contains(wanted), "{wanted}");
     }
-    // Values under one name stand together; a table's numbers have a true minus sign.
+    // Values with equal names share a row; table numbers have a minus sign (U+2212).
     assert!(page.contains("off.csv, both.csv") && page.contains("<td class=\"number\">−0.4</td>"));
     for level in ["Note", "Warning", "Missing"] {
         assert!(page.contains(&format!("<strong>{level}</strong>")), "{level}");
@@ -72,28 +72,28 @@ fn the_same_document_gives_the_same_bytes() {
 }
 
 #[test]
-fn text_from_users_is_inert() {
-    let evil = "</title><script>alert(1)</script><img src=x onerror=alert(2)> \" ' &amp;";
-    let text = || evil.to_owned();
+fn untrusted_text_is_escaped() {
+    let hostile = "</title><script>alert(1)</script><img src=x onerror=alert(2)> \" ' &amp;";
+    let text = || hostile.to_owned();
     let chart = |points: Vec<[f64; 2]>| {
         let panel = Panel {
-            bands: vec![Band::interval(evil, 0.0, 1.0)],
-            lines: vec![Guide::new(0.5, evil)],
+            bands: vec![Band::interval(hostile, 0.0, 1.0)],
+            lines: vec![Guide::new(0.5, hostile)],
             ..Panel::new(
-                axis(evil, DisplayUnit::AMPERE),
-                vec![ChartSeries::new(evil, SeriesStyle::Points(0), points)],
+                axis(hostile, DisplayUnit::AMPERE),
+                vec![ChartSeries::new(hostile, SeriesStyle::Points(0), points)],
             )
         };
         Chart {
             note: text(),
-            bands: vec![Band::interval(evil, 0.0, 1.0)],
-            lines: vec![Guide::new(0.5, evil)],
-            ..Chart::new(evil, axis(evil, DisplayUnit::SECOND), vec![panel])
+            bands: vec![Band::interval(hostile, 0.0, 1.0)],
+            lines: vec![Guide::new(0.5, hostile)],
+            ..Chart::new(hostile, axis(hostile, DisplayUnit::SECOND), vec![panel])
         }
     };
     let table = Table {
         caption: text(),
-        columns: vec![TableColumn::new(evil, evil); 2],
+        columns: vec![TableColumn::new(hostile, hostile); 2],
         rows: vec![vec![text(); 2]],
     };
     let page = page(&Document {
@@ -103,7 +103,7 @@ fn text_from_users_is_inert() {
         sections: vec![Section {
             heading: text(),
             paragraphs: vec![text()],
-            notices: vec![Notice::new(NoticeLevel::Warning, evil)],
+            notices: vec![Notice::new(NoticeLevel::Warning, hostile)],
             tables: vec![table],
             charts: vec![chart(vec![[0.0, 1.0]]), chart(Vec::new())],
         }],
@@ -115,7 +115,7 @@ fn text_from_users_is_inert() {
 }
 
 #[test]
-fn values_stand_where_the_units_say() {
+fn values_are_plotted_in_the_unit_of_the_axis() {
     // 2…4 ms over −30…30 µm, with round ticks at the corners of the area.
     let series =
         vec![ChartSeries::new("a", SeriesStyle::Measured, vec![[2e-3, -3e-5], [3e-3, 1.5e-5], [4e-3, 3e-5]])];
@@ -135,12 +135,12 @@ fn values_stand_where_the_units_say() {
             "{point:?} {wanted:?}"
         );
     }
-    assert!(picture.contains("a from −30.0\u{a0}µm to 30.0\u{a0}µm"), "the description says the range");
-    assert!(!page.contains("outside the picture"));
+    assert!(picture.contains("a from −30.0\u{a0}µm to 30.0\u{a0}µm"), "the description contains the range");
+    assert!(!page.contains("outside the plot"));
 }
 
 #[test]
-fn every_chart_says_what_and_in_which_unit() {
+fn every_chart_has_labels_with_units() {
     let page = page(&example());
     let pictures = pictures(&page);
     assert_eq!(pictures.len(), 5);
@@ -151,12 +151,12 @@ fn every_chart_says_what_and_in_which_unit() {
         assert_eq!(between(picture, "aria-labelledby=\"", "\""), [ids.join(" ")]);
     }
     for unit in ["(m/min)", "(A)", "(kg)", "(m/s²)", "(ms)", "(µm²)", "(µm)", "Time (s)"] {
-        assert!(page.contains(&format!("{unit}</text>")), "{unit} is nowhere");
+        assert!(page.contains(&format!("{unit}</text>")), "{unit} is missing");
     }
 }
 
 #[test]
-fn panels_stand_in_line_with_their_bands() {
+fn panels_are_aligned_with_their_bands() {
     let page = page_of(vec![validation(8000)]);
     let picture = picture(&page, "Measured");
     let lines: Vec<_> =
@@ -167,7 +167,7 @@ fn panels_stand_in_line_with_their_bands() {
         let (first, last) = (line[0][0], line[line.len() - 1][0]);
         assert!((first - left).abs() < 0.05 && (last - left - width).abs() < 0.05, "{first}…{last}");
     }
-    // Each class in each panel, and once in the legend with its name.
+    // Each class is in each panel, and once in the legend.
     for class in ["static", "constant", "accelerating"] {
         assert_eq!(picture.matches(&format!("<path class=\"band {class}\"")).count(), 3, "{class}");
         assert_eq!(page.matches(&format!("<rect class=\"band {class}\"")).count(), 1, "{class}");
@@ -182,7 +182,7 @@ fn panels_stand_in_line_with_their_bands() {
 }
 
 #[test]
-fn an_error_bar_has_its_length() {
+fn an_error_bar_has_the_length_of_the_error() {
     let series = ChartSeries::new("a", SeriesStyle::Points(0), vec![[0.0, 1.0], [1.0, 3.0]])
         .with_errors(vec![0.5, f64::NAN]);
     let y = axis("Current", DisplayUnit::AMPERE).within(0.0, 4.0);
@@ -194,7 +194,7 @@ fn an_error_bar_has_its_length() {
     let picture = picture(&page, "Bars");
     let [_, top, _, height] = area(picture);
     let bar = points(between(picture, "<path class=\"error run-1\" d=\"", "\"")[0]);
-    // One upright with two ends: what is no number has none.
+    // One bar with two end caps: NaN has no bar.
     assert_eq!(bar.len(), 6);
     let length = (bar[0][1] - bar[1][1]).abs();
     assert!((length - height / 4.0).abs() < 0.21, "{length} of {height}");
@@ -202,18 +202,18 @@ fn an_error_bar_has_its_length() {
 }
 
 #[test]
-fn what_lies_outside_is_told_and_not_drawn() {
+fn values_outside_the_range_are_reported_and_not_drawn() {
     let values = [1.0, 2.0, 90.0, 1.5, -80.0, 1.0];
     let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
     let y = axis("Current", DisplayUnit::AMPERE).within(0.0, 4.0);
     let series = vec![ChartSeries::from_xy("a", SeriesStyle::Measured, &time, &values)];
     let page =
         page_of(vec![Chart::new("Part", axis("Time", DisplayUnit::SECOND), vec![Panel::new(y, series)])]);
-    assert!(page.contains("<span class=\"note\">2 values lie outside the picture</span>"));
+    assert!(page.contains("<span class=\"note\">2 values lie outside the plot</span>"));
     let picture = picture(&page, "Part");
     let line = between(picture, "<path class=\"line run-1\" d=\"", "\"")[0];
     assert_eq!(line.matches('M').count(), 3, "{line}");
-    // A window of time is no loss, and the range of values is that of the window.
+    // Points outside a window of time are not reported and do not affect the range of values.
     let series = vec![ChartSeries::from_xy("a", SeriesStyle::Measured, &time, &values)];
     let window = axis("Time", DisplayUnit::SECOND).within(2.5, 3.5);
     let page = page_of(vec![Chart::new(
@@ -225,7 +225,7 @@ fn what_lies_outside_is_told_and_not_drawn() {
 }
 
 #[test]
-fn not_a_number_breaks_a_line_and_a_staircase() {
+fn nan_breaks_lines_and_step_plots() {
     let points = vec![[0.0, 1.0], [1.0, 2.0], [2.0, f64::NAN], [3.0, 1.0], [4.0, 2.0]];
     for (style, parts) in [(SeriesStyle::Measured, 2), (SeriesStyle::Steps(0), 2)] {
         let panel =
@@ -247,23 +247,19 @@ fn lines_and_points_differ_by_more_than_color() {
     };
     let dashes: Vec<String> = (1..=6).map(dash).collect();
     for (i, one) in dashes.iter().enumerate() {
-        assert!(!dashes[..i].contains(one), "lines {} are dashed as others: {one}", i + 1);
+        assert!(!dashes[..i].contains(one), "line {} has the dash pattern of another one: {one}", i + 1);
     }
     let series =
         (0..4).map(|g| ChartSeries::new(format!("g{g}"), SeriesStyle::Points(g), vec![[g as f64, 1.0]]));
     let panel = Panel::new(axis("v", DisplayUnit::NONE), series.collect());
     let page = page_of(vec![Chart::new("Groups", axis("x", DisplayUnit::NONE), vec![panel])]);
     for shape in ["round", "square", "cross", "plus"] {
-        assert_eq!(
-            page.matches(&format!("class=\"points {shape} ")).count(),
-            2,
-            "{shape}: picture and legend"
-        );
+        assert_eq!(page.matches(&format!("class=\"points {shape} ")).count(), 2, "{shape}: plot and legend");
     }
 }
 
 #[test]
-fn a_single_sample_among_many_is_seen() {
+fn a_single_peak_among_many_samples_is_kept() {
     const LONG: usize = 100_000;
     let mut values = vec![0.0; LONG];
     values[34_567] = 3e-6;
@@ -280,13 +276,13 @@ fn a_single_sample_among_many_is_seen() {
         let top = line.iter().map(|p| p[1]).fold(f64::MAX, f64::min);
         let bottom = line.iter().map(|p| p[1]).fold(f64::MIN, f64::max);
         assert!(bottom - top > 0.8 * height, "{top}…{bottom} of {height}");
-        let spike = line.iter().find(|p| p[1] == top).expect("it is there");
+        let spike = line.iter().find(|p| p[1] == top).expect("it is present");
         assert!(((spike[0] - left) / width - 0.345_67).abs() < 1e-3, "at {}", spike[0]);
     }
 }
 
 #[test]
-fn long_series_make_no_large_page() {
+fn the_page_size_of_long_series_is_bounded() {
     const LONG: usize = 100_000;
     const MOST_BYTES_PER_SERIES: usize = 400_000;
     let (x, y) = (noise(LONG, 1), noise(LONG, 2));
@@ -320,7 +316,7 @@ fn long_series_make_no_large_page() {
 }
 
 #[test]
-fn what_is_empty_breaks_nothing() {
+fn empty_documents_and_charts_are_valid() {
     let empty = page(&Document::default());
     assert_well_formed(&empty);
     let panel = |series| Panel::new(axis("v", DisplayUnit::AMPERE), series);
@@ -335,7 +331,7 @@ fn what_is_empty_breaks_nothing() {
     assert!(page.contains("nothing: no values"));
 }
 
-/// Values that a division or a failed fit may leave, and ordinary ones.
+/// Generates values of failed divisions or fits, and ordinary ones.
 fn any_value() -> impl Strategy<Value = f64> {
     prop_oneof![
         Just(f64::NAN),

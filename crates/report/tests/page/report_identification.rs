@@ -1,4 +1,4 @@
-//! The page of an identification: every step is told, and what is missing is told as missing.
+//! The page of an identification: results of every step, and notices on missing results.
 
 use std::sync::LazyLock;
 
@@ -17,19 +17,19 @@ use virtual_axes_verification::fixtures::recordings::{Disturbance, axis_index, r
 
 /// Headings of the sections, in their order.
 const SECTIONS: [&str; 9] = [
-    "What was found",
+    "Identified parameters",
     "Recordings",
     "Gravity",
     "Friction law",
     "Equivalent inertia",
     "Feedforward",
     "Delays",
-    "Refinement on the closed loop",
-    "Measured against simulated",
+    "Refinement in closed loop",
+    "Measured and simulated",
 ];
 
-/// An axis with its recordings.
-struct Bench {
+/// An axis with recordings of its campaign.
+struct TestCase {
     parameters: Parameters,
     machine: MachineConfig,
     axis: String,
@@ -37,7 +37,7 @@ struct Bench {
     findings: Vec<Vec<Finding>>,
 }
 
-impl Bench {
+impl TestCase {
     fn new(
         parameters: Parameters,
         axis: &str,
@@ -56,7 +56,7 @@ impl Bench {
             recordings.push((mode, signals));
             findings.push(found);
         }
-        Bench { machine, axis: axis.to_owned(), recordings, findings, parameters }
+        TestCase { machine, axis: axis.to_owned(), recordings, findings, parameters }
     }
 
     fn config(&self) -> &AxisConfig {
@@ -101,10 +101,10 @@ impl Bench {
     }
 }
 
-/// X over a short stroke, all parts, refined; validated on the recording with velocity feedforward, and on the
-/// same without PSEC.
+/// X over a short range, all parts, refined; validated with the recording with velocity feedforward, and with the
+/// same recording without PSEC.
 struct Whole {
-    bench: Bench,
+    case: TestCase,
     found: Identification,
     values: Vec<IdentifiedValue>,
     blind: Signals,
@@ -112,28 +112,28 @@ struct Whole {
 }
 
 static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
-    // A machine file that is off, so that there is something to find.
+    // The initial machine deviates from the recorded one.
     let truth = parameters::<&str>(&[]);
     let course = Course { range: Some([0.0, 0.3]), max_feed: Some(12.0 * M_MIN) };
-    let mut bench = Bench::new(truth, "x", &FeedforwardMode::ALL, &course, |_| {});
+    let mut case = TestCase::new(truth, "x", &FeedforwardMode::ALL, &course, |_| {});
     let off = parameters(&[("x.motor.inertia_kg_m2", 0.024), ("x.friction.a", 1.4)]);
-    bench.machine = off.machine_config().expect("valid");
-    bench.parameters = off;
-    let (found, values) = bench.identify(true);
-    let mut blind = bench.recordings[1].1.clone();
+    case.machine = off.machine_config().expect("valid");
+    case.parameters = off;
+    let (found, values) = case.identify(true);
+    let mut blind = case.recordings[1].1.clone();
     blind.name = "blind".to_owned();
     blind.spans.iter_mut().for_each(|span| span.psec = None);
     let check = |signals| {
         let input = IdentificationInput { signals, feedforward: Some(FeedforwardMode::Velocity) };
-        validate(&input, found.axis(), &bench.machine.periods()).expect("it can be simulated")
+        validate(&input, found.axis(), &case.machine.periods()).expect("it can be simulated")
     };
-    let validations = vec![check(&bench.recordings[1].1), check(&blind)];
-    Whole { bench, found, values, blind, validations }
+    let validations = vec![check(&case.recordings[1].1), check(&blind)];
+    Whole { case, found, values, blind, validations }
 });
 
 impl Whole {
     fn document(&self) -> Document {
-        let signals = [&self.bench.recordings[1].1, &self.blind];
+        let signals = [&self.case.recordings[1].1, &self.blind];
         let checks: Vec<ValidationRecording> = signals
             .iter()
             .zip(&self.validations)
@@ -143,20 +143,20 @@ impl Whole {
                 agreement,
             })
             .collect();
-        self.bench.checked(&self.found, &self.values, &checks)
+        self.case.checked(&self.found, &self.values, &checks)
     }
 }
 
 fn page(document: &Document) -> String {
     let mut bytes = Vec::new();
-    document.write(&mut bytes).expect("memory takes it");
+    document.write(&mut bytes).expect("memory can be written");
     String::from_utf8(bytes).expect("UTF-8")
 }
 
-/// For a look at it.
+/// Keeps a page for inspection.
 fn keep(name: &str, page: &str) {
     let path = format!("{}/identification_{name}.html", env!("CARGO_TARGET_TMPDIR"));
-    std::fs::write(path, page).expect("a folder of its own");
+    std::fs::write(path, page).expect("the folder is writable");
 }
 
 fn headings(document: &Document) -> Vec<&str> {
@@ -194,7 +194,7 @@ fn value(cell: &str) -> f64 {
     plain.replace('−', "-").parse().unwrap_or_else(|_| panic!("{cell} is no number"))
 }
 
-/// Elements are closed in the order in which they were opened.
+/// Asserts that elements are nested correctly.
 fn assert_well_formed(page: &str) {
     let mut open: Vec<&str> = Vec::new();
     let mut rest = page.strip_prefix("<!DOCTYPE html>").expect("a document type");
@@ -220,7 +220,7 @@ fn assert_sound(page: &str) {
 }
 
 #[test]
-fn every_step_is_told_with_its_picture() {
+fn every_step_has_a_section_with_its_plots() {
     let document = WHOLE.document();
     let text_of_page = page(&document);
     keep("x", &text_of_page);
@@ -246,9 +246,9 @@ fn the_same_identification_gives_the_same_bytes() {
 }
 
 #[test]
-fn every_value_stands_in_the_first_table() {
+fn all_identified_values_are_in_the_first_table() {
     let document = WHOLE.document();
-    let found = table(section(&document, "What was found"), "Identified values");
+    let found = table(section(&document, "Identified parameters"), "Identified values");
     assert!(WHOLE.values.len() >= 9, "{:?}", WHOLE.values);
     for (row, wanted) in found.rows.iter().zip(&WHOLE.values) {
         assert_eq!(row[0], wanted.key);
@@ -271,18 +271,18 @@ fn the_friction_table_compares_each_speed_with_the_law() {
     for row in rows {
         let cells: Vec<f64> = row.iter().map(|cell| value(cell)).collect();
         let (v, part, law) = (cells[0], cells[2], cells[4]);
-        // The law of X (Prévost Appendix 2), V in m/min.
+        // Friction law of X (Prévost appendix 2), V in m/min.
         let speed = v.abs();
         let truth = 1.576 * (0.019_65 * speed).exp() - 0.5332 * (-0.2801 * speed).exp();
         assert!((law - truth.copysign(v)).abs() < 0.03 * truth, "{row:?}: {truth}");
         let difference = 100.0 * (law - part) / part;
-        // Half a unit in the last digit of all three.
+        // Half a unit in the last digit of the three numbers.
         let rounding = 0.05 + 100.0 * 2.0 * 0.5e-3 / part.abs();
         assert!((cells[5] - difference).abs() <= rounding, "{row:?}: {difference}");
     }
-    // Points in the picture are those of the table, in m/s and A.
+    // The plot has the points of the table, in m/s and A.
     let picture = chart(friction, "Friction law");
-    let minus = series(picture, "Friction current", "measured towards minus");
+    let minus = series(picture, "Friction current", "measured, negative direction");
     assert!(minus.points.iter().all(|[v, i]| *v < 0.0 && *i < 0.0));
     assert_eq!(minus.points.len(), rows.iter().filter(|row| value(&row[0]) < 0.0).count());
     assert_eq!(minus.errors.len(), minus.points.len());
@@ -291,9 +291,9 @@ fn the_friction_table_compares_each_speed_with_the_law() {
 }
 
 #[test]
-fn pictures_show_simulated_minus_measured_and_a_fast_move_of_the_long_one() {
+fn plots_show_deviations_and_a_fast_move_of_a_long_recording() {
     let document = WHOLE.document();
-    let compared = section(&document, "Measured against simulated");
+    let compared = section(&document, "Measured and simulated");
     let whole = chart(compared, "off, feedforward off");
     let (experiment, simulated) =
         (&WHOLE.found.agreements[0].experiments[0], &WHOLE.found.agreements[0].simulated[0]);
@@ -303,7 +303,7 @@ fn pictures_show_simulated_minus_measured_and_a_fast_move_of_the_long_one() {
         assert!((time - experiment.start - i as f64 * TSP).abs() < 1e-9);
         assert_eq!(*value, simulated.position[i] - experiment.position[i]);
     }
-    for quantity in ["Tracking error", "Velocity", "Current"] {
+    for quantity in ["Following error", "Velocity", "Current"] {
         for label in ["measured", "simulated"] {
             assert_eq!(series(whole, quantity, label).points.len(), deviation.points.len());
         }
@@ -312,7 +312,7 @@ fn pictures_show_simulated_minus_measured_and_a_fast_move_of_the_long_one() {
     assert_eq!(rows.len(), 3);
     // Without feedforward X lags by V/Kp, 25 s⁻¹, and by α, whose 9 ms are two position periods.
     let window = chart(compared, "off, feedforward off: a fast move");
-    let errors = series(window, "Tracking error", "measured");
+    let errors = series(window, "Following error", "measured");
     let lag = errors.points.iter().map(|point| point[1].abs()).fold(0.0, f64::max);
     assert!((lag / (12.0 * M_MIN * (1.0 / 25.0 + 2.0 * TSP)) - 1.0).abs() < 0.01, "{lag}");
     assert!(errors.points.len() < deviation.points.len() / 20);
@@ -332,14 +332,14 @@ fn a_recording_without_setpoints_is_compared_by_inverse_dynamics() {
 }
 
 #[test]
-fn what_is_missing_is_told() {
+fn missing_results_are_reported() {
     let course = Course { range: Some([0.0, 0.1]), max_feed: Some(5.0 * M_MIN) };
-    let bench = Bench::new(parameters::<&str>(&[]), "y", &[FeedforwardMode::Velocity], &course, |raw| {
+    let case = TestCase::new(parameters::<&str>(&[]), "y", &[FeedforwardMode::Velocity], &course, |raw| {
         (raw.psec, raw.current, raw.velocity_feedforward, raw.torque_feedforward) = (None, None, None, None);
     });
-    let (found, values) = bench.identify(true);
+    let (found, values) = case.identify(true);
     assert!(values.is_empty());
-    let document = bench.document(&found, &values);
+    let document = case.document(&found, &values);
     let text_of_page = page(&document);
     keep("y", &text_of_page);
     assert_sound(&text_of_page);
@@ -347,33 +347,33 @@ fn what_is_missing_is_told() {
     for (heading, wanted) in [
         ("Gravity", "record the motor current"),
         ("Delays", "record the position setpoints"),
-        ("What was found", "no parameter"),
-        ("What was found", "record the motor current"),
-        ("What was found", "record the position setpoints"),
+        ("Identified parameters", "no parameter"),
+        ("Identified parameters", "record the motor current"),
+        ("Identified parameters", "record the position setpoints"),
         ("Gravity", "not identified"),
         ("Friction law", "No friction law"),
         ("Equivalent inertia", "not identified"),
         ("Feedforward", "VFFW was not identified"),
         ("Delays", "No delay"),
-        ("Refinement on the closed loop", "There is none"),
-        ("Measured against simulated", "nothing to compare"),
+        ("Refinement in closed loop", "was not run"),
+        ("Measured and simulated", "no comparison is possible"),
     ] {
-        let told = text(section(&document, heading));
-        assert!(told.contains(wanted), "{heading}: {told}");
+        let text = text(section(&document, heading));
+        assert!(text.contains(wanted), "{heading}: {text}");
     }
-    // What it does when is still seen.
+    // The segmentation of the recording is still plotted.
     assert_eq!(section(&document, "Recordings").charts.len(), 1);
-    assert!(section(&document, "Measured against simulated").charts.is_empty());
+    assert!(section(&document, "Measured and simulated").charts.is_empty());
 }
 
 #[test]
-fn a_tilting_axis_is_told_in_degrees() {
+fn a_rotary_axis_is_reported_in_degrees() {
     let parts = [FeedforwardMode::Both];
     let course = Course { range: None, max_feed: None };
-    let bench = Bench::new(parameters::<&str>(&[]), "a", &parts, &course, |_| {});
-    assert_eq!(bench.config().kind(), AxisKind::Rotary);
-    let (found, values) = bench.identify(false);
-    let document = bench.document(&found, &values);
+    let case = TestCase::new(parameters::<&str>(&[]), "a", &parts, &course, |_| {});
+    assert_eq!(case.config().kind(), AxisKind::Rotary);
+    let (found, values) = case.identify(false);
+    let document = case.document(&found, &values);
     let text_of_page = page(&document);
     keep("a", &text_of_page);
     assert_sound(&text_of_page);
@@ -386,12 +386,12 @@ fn a_tilting_axis_is_told_in_degrees() {
 }
 
 #[test]
-fn a_linear_motor_has_a_mass() {
+fn the_inertia_of_a_linear_motor_is_a_mass() {
     let course = Course { range: None, max_feed: None };
     let machine = Parameters::builtin("linear_motor_center").expect("it is shipped");
-    let bench = Bench::new(machine, "x", &[FeedforwardMode::Both], &course, |_| {});
-    let (found, values) = bench.identify(false);
-    let document = bench.document(&found, &values);
+    let case = TestCase::new(machine, "x", &[FeedforwardMode::Both], &course, |_| {});
+    let (found, values) = case.identify(false);
+    let document = case.document(&found, &values);
     let text_of_page = page(&document);
     keep("linear_motor", &text_of_page);
     assert_sound(&text_of_page);

@@ -1,20 +1,21 @@
-//! The report as a whole: what stands in it, and what must never.
+//! Report pages: contents, escaping, decimation, and robustness to invalid values.
 
 use std::sync::LazyLock;
 
 use crate::report_common::{
-    NO_FEEDFORWARD, PERIOD, ballbar, between, empty_axis, five_axes, picture, pictures, points, report_run,
+    NO_FEEDFORWARD, POSITION_CYCLE, ballbar, between, empty_axis, five_axes, picture, pictures, points,
+    report_run,
 };
 use virtual_axes_core::assess::{AxisTrace, CircleTrace, SignalRecording, ToolTrace};
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_report::{Report, ReportRun, Table, TableColumn};
 
 static BALLBAR: LazyLock<[SignalRecording; 2]> =
-    LazyLock::new(|| [ballbar(&[], PERIOD, false), ballbar(&NO_FEEDFORWARD, PERIOD, false)]);
+    LazyLock::new(|| [ballbar(&[], POSITION_CYCLE, false), ballbar(&NO_FEEDFORWARD, POSITION_CYCLE, false)]);
 
 fn page(title: &str, runs: Vec<ReportRun>) -> String {
     let mut bytes = Vec::new();
-    Report { title, description: "", runs }.write(&mut bytes).expect("memory takes it");
+    Report { title, description: "", runs }.write(&mut bytes).expect("memory can be written");
     String::from_utf8(bytes).expect("UTF-8")
 }
 
@@ -27,7 +28,7 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !c.is_alphanumeric())
 }
 
-/// A run of one axis whose every signal is `values`.
+/// Returns a run of one axis whose signals all equal `values`.
 fn run_of(values: &[f64]) -> SignalRecording {
     let x = AxisTrace {
         psec: values.to_vec(),
@@ -57,7 +58,7 @@ fn run_of(values: &[f64]) -> SignalRecording {
     SignalRecording { time, axes: vec![x], tool: Some(tool), circles: vec![circle] }
 }
 
-/// Noise in −1…1 (an xorshift generator).
+/// Returns noise in −1 … 1 (xorshift generator).
 fn noise(length: usize, seed: u64) -> Vec<f64> {
     let mut state = seed;
     let next = || {
@@ -70,33 +71,33 @@ fn noise(length: usize, seed: u64) -> Vec<f64> {
 }
 
 #[test]
-fn names_from_users_are_inert() {
-    let evil = "</title><script>alert(1)</script><img src=x onerror=alert(2)> \" ' &amp;";
+fn untrusted_names_are_escaped() {
+    let hostile = "</title><script>alert(1)</script><img src=x onerror=alert(2)> \" ' &amp;";
     let mut recording = run_of(&[0.0, 1e-3, 2e-3]);
-    recording.axes[0].name = evil.to_owned();
-    recording.circles[0].plane[0] = evil.to_owned();
-    let mut standing = AxisTrace { moves: false, ..empty_axis(evil, AxisKind::Rotary) };
+    recording.axes[0].name = hostile.to_owned();
+    recording.circles[0].plane[0] = hostile.to_owned();
+    let mut standing = AxisTrace { moves: false, ..empty_axis(hostile, AxisKind::Rotary) };
     standing.psec = vec![0.0; 3];
     recording.axes.push(standing);
     let table = Table {
-        caption: evil.to_owned(),
-        columns: vec![TableColumn::new(evil, evil); 2],
-        rows: vec![vec![evil.to_owned(); 2]],
+        caption: hostile.to_owned(),
+        columns: vec![TableColumn::new(hostile, hostile); 2],
+        rows: vec![vec![hostile.to_owned(); 2]],
     };
     let run = || ReportRun {
-        title: evil,
-        facts: vec![(evil.to_owned(), evil.to_owned())],
+        title: hostile,
+        facts: vec![(hostile.to_owned(), hostile.to_owned())],
         tables: vec![table.clone()],
         recording: &recording,
     };
     let mut bytes = Vec::new();
-    let report = Report { title: evil, description: evil, runs: vec![run(), run()] };
-    report.write(&mut bytes).expect("memory takes it");
+    let report = Report { title: hostile, description: hostile, runs: vec![run(), run()] };
+    report.write(&mut bytes).expect("memory can be written");
     let page = String::from_utf8(bytes).expect("UTF-8");
     for tag in ["<script", "<img", "alert(1)</script>", "onerror=alert(2)>", "&amp;amp;amp;"] {
         assert!(!page.contains(tag), "{tag}");
     }
-    // Wherever the text stands, it stands in full.
+    // All occurrences are escaped.
     let escaped = "&lt;/title&gt;&lt;script&gt;alert(1)&lt;/script&gt;&lt;img src=x onerror=alert(2)&gt; &quot; &#39; &amp;amp;";
     assert_eq!(page.matches("alert(2)").count(), page.matches(escaped).count());
     assert!(page.matches(escaped).count() > 20);
@@ -108,7 +109,7 @@ fn the_same_input_gives_the_same_bytes() {
 }
 
 #[test]
-fn the_page_needs_nothing_from_elsewhere() {
+fn the_page_is_self_contained() {
     let page = page("ballbar", two_runs());
     for forbidden in ["http:", "https:", "src=", "url(", "@import", "<link", "<script", "href"] {
         assert!(!page.contains(forbidden), "{forbidden}");
@@ -119,7 +120,7 @@ fn the_page_needs_nothing_from_elsewhere() {
 }
 
 #[test]
-fn no_signal_breaks_the_page() {
+fn any_signal_gives_a_valid_page() {
     let (nan, inf) = (f64::NAN, f64::INFINITY);
     let cases: [&[f64]; 10] = [
         &[],
@@ -137,24 +138,24 @@ fn no_signal_breaks_the_page() {
         let mut recording = run_of(values);
         for lengthen in [false, true] {
             if lengthen {
-                // Lists that are not as long as they should be.
+                // Lists of inconsistent lengths.
                 recording.time.extend([nan, 3.0, inf, 4.0]);
                 recording.axes[0].current.clear();
                 recording.circles[0].angle.push(nan);
             }
-            // Figures are given as text, whatever they say: this is about the plots.
+            // Only the plots are checked, not the tables.
             let run = |title| ReportRun { tables: Vec::new(), ..report_run(title, &recording) };
             let page = page("broken", vec![run("one"), run("two")]);
             let bad = words(&page).find(|w| ["nan", "inf", "infinity"].contains(&w.to_lowercase().as_str()));
-            let place = bad.and_then(|word| page.find(word)).unwrap_or(0);
+            let position = bad.and_then(|word| page.find(word)).unwrap_or(0);
             assert_eq!(
                 bad,
                 None,
                 "{values:?}: …{}",
-                &page[place.saturating_sub(200)..].chars().take(300).collect::<String>()
+                &page[position.saturating_sub(200)..].chars().take(300).collect::<String>()
             );
             let most = pictures(&page).iter().map(|p| p.matches("<text").count()).max();
-            assert!(most.unwrap_or(0) < 40, "{most:?} texts in a picture of {values:?}");
+            assert!(most.unwrap_or(0) < 40, "{most:?} texts in a plot of {values:?}");
         }
     }
     assert!(
@@ -165,8 +166,8 @@ fn no_signal_breaks_the_page() {
 }
 
 #[test]
-fn every_plot_says_what_and_in_which_unit() {
-    let five = five_axes(PERIOD);
+fn every_plot_has_labels_with_units() {
+    let five = five_axes(POSITION_CYCLE);
     let mut runs = two_runs();
     runs.push(report_run("five", &five));
     let page = page("all", runs);
@@ -174,7 +175,7 @@ fn every_plot_says_what_and_in_which_unit() {
     for picture in pictures(&page) {
         let labels = between(picture, "<text class=\"label\"", "</text>");
         if picture.contains("class=\"nominal\"") {
-            // A polar plot: directions of the axes, rings with their unit.
+            // A polar plot has the directions of the axes and rings with units.
             assert!(labels.len() == 4 && picture.contains("µm</text>"), "{labels:?}");
         } else {
             let named =
@@ -185,17 +186,17 @@ fn every_plot_says_what_and_in_which_unit() {
         assert!(!between(picture, "<desc", "</desc>")[0].is_empty());
     }
     for unit in units {
-        assert!(page.contains(&format!("{unit}</text>")), "{unit} is nowhere");
+        assert!(page.contains(&format!("{unit}</text>")), "{unit} is missing");
     }
 }
 
 #[test]
-fn a_single_sample_among_many_is_seen() {
+fn a_single_peak_among_many_samples_is_kept() {
     let mut values = vec![0.0; 60_000];
     values[34_567] = 3e-6;
     let recording = run_of(&values);
     let page = page("spike", vec![report_run("one", &recording)]);
-    let picture = picture(&page, "X axis: tracking error");
+    let picture = picture(&page, "X axis: following error");
     let line = points(between(picture, "<path class=\"line run-1\" d=\"", "\"")[0]);
     let heights: Vec<f64> = line.iter().map(|p| p[1]).collect();
     let (top, bottom) = heights.iter().fold((f64::MAX, f64::MIN), |(t, b), y| (t.min(*y), b.max(*y)));
@@ -205,15 +206,15 @@ fn a_single_sample_among_many_is_seen() {
         .and_then(|rest| rest.split('"').next()?.parse().ok())
         .expect("an area");
     assert!(bottom - top > 0.8 * area, "{top}…{bottom} of {area}");
-    let spike = line.iter().find(|p| p[1] == top).expect("it is there");
-    // Where it was: the line runs from the first to the last sample.
+    let spike = line.iter().find(|p| p[1] == top).expect("it is present");
+    // The line extends from the first to the last sample.
     let (first, last) = (line[0][0], line[line.len() - 1][0]);
     let share = (spike[0] - first) / (last - first);
     assert!((share - 34_567.0 / 59_999.0).abs() < 1e-3, "at {share}");
 }
 
 #[test]
-fn a_long_run_makes_no_large_page() {
+fn the_page_size_of_a_long_run_is_bounded() {
     const LONG: usize = 60_000;
     const MOST_BYTES: usize = 2_000_000;
     let mut recording =
@@ -261,25 +262,25 @@ fn runs_are_compared_at_one_scale() {
     let page = page("ballbar", two_runs());
     let ticks = |title: &str| between(picture(&page, title), "<text class=\"tick", "</text>").join(" ");
     for (one, other) in [
-        ("X axis: current and its parts, cascade<", "X axis: current and its parts, cascade-noff<"),
+        ("X axis: current and its components, cascade<", "X axis: current and its components, cascade-noff<"),
         ("X–Y circle, R 150\u{a0}mm, cascade<", "X–Y circle, R 150\u{a0}mm, cascade-noff<"),
         ("X–Y path, cascade<", "X–Y path, cascade-noff<"),
     ] {
         assert_eq!(ticks(one), ticks(other), "{one}");
     }
-    // 64 µm beside 9980 µm would be a straight line: it is shown once more.
+    // 64 µm is invisible at the scale of 9980 µm: it has a second plot.
     let errors =
-        pictures(&page).iter().filter(|p| p.contains(">X axis: synchronized tracking error<")).count();
+        pictures(&page).iter().filter(|p| p.contains(">X axis: delay-compensated following error<")).count();
     assert_eq!(errors, 2);
     assert_eq!(pictures(&page).iter().filter(|p| p.contains(">X axis: velocity<")).count(), 1);
-    assert!(page.contains("Z (largest tracking error") && page.contains("stand still."));
+    assert!(page.contains("Z (largest following error") && page.contains("are stationary."));
 }
 
 #[test]
-fn the_circle_is_drawn_where_its_deviation_is() {
+fn the_circle_is_drawn_at_its_deviation() {
     let page = page("ballbar", vec![report_run("cascade", &BALLBAR[0])]);
     let polar = picture(&page, "X–Y circle");
-    // Rings every 20 µm from 0 to 80: their radii give the scale.
+    // Rings every 20 µm from 0 to 80 µm give the scale.
     let radii: Vec<f64> = ["<circle class=\"nominal\"", "<circle class=\"ring\""]
         .into_iter()
         .flat_map(|circle| between(polar, circle, "/>"))
@@ -291,13 +292,13 @@ fn the_circle_is_drawn_where_its_deviation_is() {
     let center = 230.0;
     let deviation = |p: &[f64; 2]| ((p[0] - center).hypot(p[1] - center) - radii[0]) / per_micrometer;
     let (low, high) = line.iter().map(deviation).fold((f64::MAX, f64::MIN), |(l, h), d| (l.min(d), h.max(d)));
-    // The extremes of the reference trial, and what a line of tenths of a pixel can show.
+    // Extremes of the reference trial, within the resolution of a tenth of a pixel.
     assert!((low - 47.7).abs() < 1.0 && (high - 68.6).abs() < 1.0, "{low:.1}…{high:.1} µm");
 }
 
 #[test]
-fn the_error_of_a_path_is_magnified_as_the_caption_says() {
-    // 100 mm along X, 50 µm off towards +Y: a round factor that makes at most 15 % of the path of it.
+fn the_path_error_is_magnified_by_the_factor_of_the_caption() {
+    // 100 mm along X with an error of 50 µm in +Y: the magnified error is at most 15 % of the path.
     let reference: Vec<[f64; 3]> = (0..=100).map(|i| [f64::from(i) * 1e-3, 0.0, 0.0]).collect();
     let position = reference.iter().map(|[x, ..]| [*x, 5e-5, 0.0]).collect();
     let contour_error = vec![5e-5; 101];
@@ -313,27 +314,27 @@ fn the_error_of_a_path_is_magnified_as_the_caption_says() {
     let (reference, tip) =
         (line("<path class=\"reference\" d=\""), line("<path class=\"line solid run-1\" d=\""));
     let per_millimeter = (reference[reference.len() - 1][0] - reference[0][0]) / 100.0;
-    // Up on the page is towards smaller coordinates; 200 × 50 µm.
+    // SVG coordinates decrease upwards; 200 × 50 µm.
     let shown = (reference[0][1] - tip[0][1]) / per_millimeter;
     assert!((shown - 10.0).abs() < 0.1, "{shown} mm");
 }
 
 #[test]
-fn figures_of_like_runs_stand_row_by_row() {
+fn figures_of_comparable_runs_share_rows() {
     let page_of_two = page("two", two_runs());
     assert_eq!(page_of_two.matches("<caption>Axes</caption>").count(), 1);
     assert!(page_of_two.contains("<th scope=\"rowgroup\" rowspan=\"2\">x</th>"));
     let mut runs = two_runs();
     runs[1].tables[0].rows.pop();
-    let unlike = page("two", runs);
-    assert_eq!(unlike.matches("<caption>Axes</caption>").count(), 2);
-    // Several values under one name stand together.
+    let different = page("two", runs);
+    assert_eq!(different.matches("<caption>Axes</caption>").count(), 2);
+    // Values with equal names share a cell.
     let mut runs = two_runs();
     for change in ["x.position_loop.gain=2", "y.position_loop.gain=2"] {
         runs[1].facts.push(("set".to_owned(), change.to_owned()));
     }
     let changed = page("two", runs);
     assert!(changed.contains("<td></td><td>x.position_loop.gain=2, y.position_loop.gain=2</td>"));
-    // What all runs share stands once.
+    // Equal values of all runs are merged.
     assert!(page_of_two.contains("<td class=\"same\" colspan=\"2\">mikron_ucp710</td>"));
 }

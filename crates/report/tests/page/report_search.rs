@@ -1,11 +1,11 @@
-//! Pictures of a search in a report.
+//! Scatter plots of a search in a report.
 
 use virtual_axes_report::{PointGroup, PointStyle, Report, Scatter};
 
 fn page(scatters: &[Scatter]) -> String {
     let mut bytes = Vec::new();
     let report = Report { title: "search", description: "", runs: Vec::new() };
-    report.write_with(scatters, &mut bytes).expect("memory takes it");
+    report.write_with(scatters, &mut bytes).expect("memory can be written");
     String::from_utf8(bytes).expect("UTF-8")
 }
 
@@ -25,9 +25,9 @@ fn scatter(points: Vec<[f64; 2]>) -> Scatter {
 }
 
 #[test]
-fn each_point_is_drawn_in_its_style_and_text_is_inert() {
+fn points_are_drawn_in_their_style_and_text_is_escaped() {
     let text = page(&[scatter(vec![[1.0, 0.5], [2.0, 0.6], [3.0, 0.8]])]);
-    // Three dots and the one of the legend.
+    // Three dots and the sample of the legend.
     assert_eq!(text.matches("<circle class=\"dot\"").count(), 4);
     assert_eq!(text.matches("<circle class=\"mark run-2\"").count(), 2);
     assert!(text.contains("Cost &lt;&amp;&gt;") && !text.contains("<&>"));
@@ -35,11 +35,11 @@ fn each_point_is_drawn_in_its_style_and_text_is_inert() {
 }
 
 #[test]
-fn a_front_is_a_staircase() {
+fn a_pareto_front_is_a_step_plot() {
     let text = page(&[scatter(vec![[1.0, 0.5], [2.0, 0.6]])]);
     let (_, path) = text.split_once("<path class=\"line solid front\" d=\"M1 6h32").expect("the legend");
     let (_, path) = path.split_once("<path class=\"line solid front\" d=\"").expect("the line");
-    // Across to the next point first, then up.
+    // Horizontal to the next point first, then vertical.
     let path = path.split('"').next().unwrap_or_default();
     let (_, steps) = path.split_once('l').expect("a line");
     let (across, up) = steps.split_once(" 0 0-").expect("level, then upright");
@@ -47,9 +47,9 @@ fn a_front_is_a_staircase() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_left_out() {
-    let evil = vec![[f64::NAN, 1.0], [1.0, f64::INFINITY], [1e300, -1e300], [2.0, 2.0]];
-    for points in [evil, Vec::new()] {
+fn undrawable_points_are_omitted() {
+    let hostile = vec![[f64::NAN, 1.0], [1.0, f64::INFINITY], [1e300, -1e300], [2.0, 2.0]];
+    for points in [hostile, Vec::new()] {
         let text = page(&[scatter(points)]);
         assert!(!text.contains("NaN") && !text.contains("inf\""), "{text}");
     }

@@ -1,4 +1,4 @@
-//! A page of charts with made-up values.
+//! A page of charts with synthetic values.
 
 use std::f64::consts::PI;
 
@@ -11,12 +11,12 @@ const KILOGRAM: DisplayUnit = DisplayUnit::new("kg", 1.0, 1e-3);
 /// m/s in a meter per minute.
 const METER_PER_MINUTE: f64 = 1.0 / 60.0;
 
-/// An axis of a chart.
+/// Returns an axis of a chart.
 pub fn axis(quantity: &str, unit: DisplayUnit) -> ChartAxis {
     ChartAxis::new(quantity, unit)
 }
 
-/// Noise in −1…1 (an xorshift generator).
+/// Returns noise in −1 … 1 (xorshift generator).
 pub fn noise(length: usize, seed: u64) -> Vec<f64> {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let next = || {
@@ -28,7 +28,7 @@ pub fn noise(length: usize, seed: u64) -> Vec<f64> {
     std::iter::repeat_with(next).take(length).collect()
 }
 
-/// A law of friction, A over m/s.
+/// Returns a friction current, A, for a velocity in m/s.
 fn friction(velocity: f64) -> f64 {
     let v = velocity.abs() / METER_PER_MINUTE;
     velocity.signum() * (2.4 + 1.6 * (-v / 0.8).exp() + 0.12 * v)
@@ -58,9 +58,10 @@ fn friction_law() -> Chart {
         ..Panel::new(
             axis("Current", DisplayUnit::AMPERE),
             vec![
-                ChartSeries::new("measured, forward", SeriesStyle::Points(0), fast)
+                ChartSeries::new("measured, positive direction", SeriesStyle::Points(0), fast)
                     .with_errors(errors.clone()),
-                ChartSeries::new("measured, backward", SeriesStyle::Points(1), slow).with_errors(errors),
+                ChartSeries::new("measured, negative direction", SeriesStyle::Points(1), slow)
+                    .with_errors(errors),
                 ChartSeries::new("fitted law", SeriesStyle::Simulated, fitted),
             ],
         )
@@ -80,7 +81,7 @@ fn inertia() -> Chart {
         lines: vec![Guide::new(95.1, "robust mean 95.1 kg")],
         ..Panel::new(
             axis("Equivalent inertia", KILOGRAM).within(80.0, 110.0),
-            vec![ChartSeries::new("instants", SeriesStyle::Points(0), dots.collect())],
+            vec![ChartSeries::new("samples", SeriesStyle::Points(0), dots.collect())],
         )
     };
     Chart::new("Equivalent inertia", axis("Time", DisplayUnit::SECOND), vec![panel])
@@ -108,7 +109,7 @@ fn delay() -> Chart {
         (0..=60).map(|i| f64::from(i) * 1e-4).map(|d| [d, 2e-10 + 8e-5 * (d - 2.4e-3).powi(2)]).collect();
     let unit = DisplayUnit::new("µm²", 1e-12, 1.0);
     let series = vec![
-        ChartSeries::new("simulated against recorded", SeriesStyle::Measured, sums.clone()),
+        ChartSeries::new("simulated − recorded", SeriesStyle::Measured, sums.clone()),
         ChartSeries::new(
             "at the comparator",
             SeriesStyle::Steps(2),
@@ -126,7 +127,7 @@ fn delay() -> Chart {
     }
 }
 
-/// Deviation, velocity and current of moves there and back, 1 kHz.
+/// Returns a chart of deviation, velocity and current of reciprocating moves, sampled at 1 kHz.
 pub fn validation(length: usize) -> Chart {
     let time: Vec<f64> = (0..length).map(|i| i as f64 * 1e-3).collect();
     let n = noise(length, 77);
@@ -168,7 +169,7 @@ pub fn validation(length: usize) -> Chart {
     }
 }
 
-/// A page with each kind of chart, as an identification has them.
+/// Returns a page with each kind of chart of an identification.
 pub fn example() -> Document {
     let table = Table {
         caption: "Parameters".to_owned(),
@@ -190,13 +191,13 @@ pub fn example() -> Document {
         ],
         sections: vec![
             Section {
-                paragraphs: vec!["Currents at constant velocity, gravity taken away.".to_owned()],
+                paragraphs: vec!["Currents at constant velocity without gravity.".to_owned()],
                 notices: vec![
-                    Notice::new(NoticeLevel::Note, "forward and backward differ by 2 %"),
-                    Notice::new(NoticeLevel::Warning, "the current is saturated in 12 instants"),
+                    Notice::new(NoticeLevel::Note, "the directions differ by 2 %"),
+                    Notice::new(NoticeLevel::Warning, "the current is saturated in 12 samples"),
                     Notice::new(
                         NoticeLevel::Missing,
-                        "γ cannot be seen without torque feedforward; record with both",
+                        "γ cannot be identified without torque feedforward; record with both",
                     ),
                 ],
                 tables: vec![table],

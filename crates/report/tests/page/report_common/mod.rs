@@ -1,4 +1,4 @@
-//! Recordings of simulated runs, for reports.
+//! Recordings of simulated runs and helpers to parse pages.
 
 pub mod charts;
 
@@ -17,12 +17,12 @@ const JOINTS: [(&str, AxisKind); AXES] = [
     ("c", AxisKind::Rotary),
 ];
 
-/// A position period of the default machine, ticks.
-pub const PERIOD: u64 = 48;
-/// Ticks between two points of a circle.
+/// Position cycle of the default machine in ticks of the current cycle.
+pub const POSITION_CYCLE: u64 = 48;
+/// Number of ticks between two points of a circle.
 const CIRCLE_TICKS: u64 = 4;
 
-/// Velocity feedforward of X and Y off.
+/// Parameters that disable the feedforward of X and Y.
 pub const NO_FEEDFORWARD: [(&str, f64); 4] = [
     ("x.feedforward.velocity", 0.0),
     ("y.feedforward.velocity", 0.0),
@@ -30,7 +30,7 @@ pub const NO_FEEDFORWARD: [(&str, f64); 4] = [
     ("y.feedforward.torque_kg_m2", 0.0),
 ];
 
-/// An axis without samples.
+/// Returns an axis without samples.
 pub fn empty_axis(name: &str, kind: AxisKind) -> AxisTrace {
     let none = Vec::new;
     AxisTrace {
@@ -50,7 +50,7 @@ pub fn empty_axis(name: &str, kind: AxisKind) -> AxisTrace {
     }
 }
 
-/// Every `every`th tick of a motion; `nearest` finds the point of the path that a tip is nearest to.
+/// Records every `every`-th tick of a motion; `nearest` returns the point of the path that is nearest to the tool tip.
 pub fn record(
     changes: &[(&str, f64)],
     duration: f64,
@@ -99,7 +99,7 @@ pub fn record(
     recording
 }
 
-/// The ballbar trial, counterclockwise and, unless `one_way`, clockwise as well.
+/// Records the ballbar trial, counterclockwise and, unless `one_way`, clockwise.
 pub fn ballbar(changes: &[(&str, f64)], every: u64, one_way: bool) -> SignalRecording {
     let trial = Ballbar::paper();
     let radius = trial.radius;
@@ -108,7 +108,7 @@ pub fn ballbar(changes: &[(&str, f64)], every: u64, one_way: bool) -> SignalReco
         [radius * (angle.cos() - 1.0), radius * angle.sin(), 0.0]
     };
     let mut recording = record(changes, trial.duration(), |t| trial.psec(t), nearest, every);
-    // A circle is judged at every tick; a few are enough to draw it.
+    // A few ticks are sufficient to plot a circle.
     let finer = record(changes, trial.duration(), |t| trial.psec(t), nearest, CIRCLE_TICKS);
     recording.circles.push(circle(&finer, trial, true));
     if !one_way {
@@ -122,7 +122,7 @@ pub fn ballbar(changes: &[(&str, f64)], every: u64, one_way: bool) -> SignalReco
     recording
 }
 
-/// The steady part.
+/// Returns the circle at steady feed.
 fn circle(recording: &SignalRecording, trial: Ballbar, counterclockwise: bool) -> CircleTrace {
     let window = trial.window();
     let tool = recording.tool.as_ref().expect("it has a tool");
@@ -138,7 +138,7 @@ fn circle(recording: &SignalRecording, trial: Ballbar, counterclockwise: bool) -
     }
 }
 
-/// The nearest point of a motion's tip, sought forward from the last one.
+/// Returns a function to the nearest point of a path, which searches forward from the previous point.
 fn nearest_on(psec: impl Fn(f64) -> [f64; AXES], duration: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
     let step = 2e-4;
     let count = (duration / step).ceil() as u32;
@@ -153,21 +153,21 @@ fn nearest_on(psec: impl Fn(f64) -> [f64; AXES], duration: f64) -> impl Fn([f64;
         let distance = |i: usize| (0..3).map(|k| (path[i][k] - tip[k]).powi(2)).sum::<f64>();
         let from = last.get();
         let near = from..(from + 300).min(path.len());
-        // Of equal ones the last: the motion goes on from a rest.
+        // The last of equally distant points: the motion continues after a rest.
         let best = near.rev().min_by(|&i, &j| distance(i).total_cmp(&distance(j))).unwrap_or(from);
         last.set(best);
         path[best]
     }
 }
 
-/// All five axes swing, each at its own tempo.
+/// Records a motion of all five axes with different frequencies.
 pub fn five_axes(every: u64) -> SignalRecording {
     let amplitudes = [0.05, -0.03, 0.02, 0.4, 1.0];
     let duration = 7.5;
     let psec = |t: f64| {
         let mut values = amplitudes;
         for (i, value) in values.iter_mut().enumerate() {
-            // From rest to rest: a turn of a cosine whose argument starts and ends at rest.
+            // Cosine whose argument starts and ends at rest.
             let phase = (t / duration).clamp(0.0, 1.0);
             let turns = [1.0, 2.0, 3.0, 1.0, 2.0][i];
             let smooth = phase * phase * (3.0 - 2.0 * phase);
@@ -183,10 +183,10 @@ pub fn five_axes(every: u64) -> SignalRecording {
     recording
 }
 
-/// Figures of the axes that move, as on a terminal.
+/// Returns the table of figures of the moving axes.
 pub fn figures(recording: &SignalRecording) -> Table {
     let peak = |values: &[f64]| values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    let columns = [("axis", ""), ("largest synchronized error", "µm, mdeg"), ("peak current", "A")];
+    let columns = [("axis", ""), ("largest delay-compensated error", "µm, mdeg"), ("peak current", "A")];
     let rows = recording.axes.iter().filter(|a| a.moves).map(|a| {
         let unit = if a.kind == AxisKind::Linear { 1e6 } else { 180e3 / std::f64::consts::PI };
         let error = peak(&a.delay_compensated_following_error) * unit;
@@ -199,25 +199,25 @@ pub fn figures(recording: &SignalRecording) -> Table {
     }
 }
 
-/// A run of a report with its figures.
+/// Returns a run of a report with its figures.
 pub fn report_run<'a>(title: &'a str, recording: &'a SignalRecording) -> ReportRun<'a> {
     let facts = [("machine", "mikron_ucp710"), ("controller", title)];
     let facts = facts.map(|(name, value)| (name.to_owned(), value.to_owned())).to_vec();
     ReportRun { title, facts, tables: vec![figures(recording)], recording }
 }
 
-/// The pictures of a page.
+/// Returns the SVG plots of a page.
 pub fn pictures(page: &str) -> Vec<&str> {
     let pictures = page.split("<svg role=\"img\"").skip(1);
     pictures.map(|rest| rest.split_once("</svg>").expect("it ends").0).collect()
 }
 
-/// What stands between `before` and `after`, each time.
+/// Returns all texts between `before` and `after`.
 pub fn between<'a>(text: &'a str, before: &'a str, after: &'a str) -> Vec<&'a str> {
     text.split(before).skip(1).map(|rest| rest.split_once(after).expect("it ends").0).collect()
 }
 
-/// Points of a path, pixels.
+/// Returns the points of an SVG path, pixels.
 pub fn points(path: &str) -> Vec<[f64; 2]> {
     let mut spaced = String::new();
     for c in path.chars() {
@@ -245,8 +245,8 @@ pub fn points(path: &str) -> Vec<[f64; 2]> {
     points
 }
 
-/// A picture whose title starts so.
+/// Returns the plot whose title starts with `title`.
 pub fn picture<'a>(page: &'a str, title: &str) -> &'a str {
     let found = pictures(page).into_iter().find(|p| p.contains(&format!("-t\">{title}")));
-    found.unwrap_or_else(|| panic!("no picture {title}"))
+    found.unwrap_or_else(|| panic!("no plot {title}"))
 }
