@@ -1,18 +1,19 @@
-//! Controllers of one feed drive. Knows no plant.
+//! Controllers of one feed drive, independent of the plant.
 //!
-//! (Prévost fig. 3) Three nested loops, position → velocity → current, with velocity and torque
-//! feedforward of the delayed setpoint; the outer one can be any linear controller that reads
-//! setpoints ahead (Prévost eq. 9).
+//! Three nested loops, position → velocity → current, with velocity and torque feedforward of the delayed setpoint
+//! (Prévost fig. 3). The position controller is proportional or any linear controller in RST form with preview
+//! (Prévost eq. 9). The PI controllers of velocity and current have an output limit and anti-windup; a change of the
+//! position controller is a bumpless transfer.
 
+mod bumpless_transfer;
 mod pi;
 mod position;
 mod rst;
 mod setpoint;
-mod transfer;
 
+pub use bumpless_transfer::{BumplessTransfer, BumplessTransferState};
 pub use pi::{Pi, PiState};
-pub use position::{Guard, PositionController, PositionState};
+pub use position::{FallbackController, PositionController, PositionState};
 pub(crate) use rst::INTEGRATOR_TOLERANCE;
 pub use rst::{MAX_COEFFICIENTS, MAX_PREVIEW, Rst, RstError};
-pub use setpoint::{Delays, Feedforward, Reach, SetpointHistory, Shift};
-pub use transfer::{Transfer, TransferState};
+pub use setpoint::{Delays, Feedforward, SetpointHistory, SetpointWindow, TickDelay};

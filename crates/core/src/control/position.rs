@@ -1,169 +1,176 @@
-//! Position controllers: setpoints and position in, velocity setpoint out.
+//! Position controllers: proportional or RST, with fallback controller and bumpless transfer.
 
+use super::bumpless_transfer::{BumplessTransfer, BumplessTransferState};
 use super::rst::{MAX_COEFFICIENTS, Rst};
-use super::transfer::{Transfer, TransferState};
 
-/// How far an axis may creep in a position period to count as stopped, relative to the error with which it
-/// may rest.
-const STOPPED: f64 = 1e-3;
+/// Largest movement per position cycle of an axis at standstill, relative to the standstill tolerance.
+const CREEP_TOLERANCE: f64 = 1e-3;
 
-/// A position controller; works in motor units (rad, rad/s).
+/// Position controller with fallback controller and bumpless transfer, in motor units (rad, rad/s).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionController {
-    law: Law,
-    guard: Option<Guard>,
-    transfer: Transfer,
+    law: ControlLaw,
+    fallback: Option<FallbackController>,
+    transfer: BumplessTransfer,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Law {
+enum ControlLaw {
     /// `Ω* = Kp (θ* − θ)`.
     Proportional { gain: f64 },
     /// `S Ω* = −R θ + T θ*` (Prévost eq. 9).
     Rst(Rst),
 }
 
-/// The proportional law with velocity feedforward that takes over from an RST controller
+/// Fallback controller: proportional control with velocity feedforward that replaces an RST controller with integral
+/// action at standstill and during current saturation.
 ///
-/// - where the setpoint has stood still for a while over the whole horizon, until motion comes into it:
-///   integral action on top of that of the velocity loop hunts against Coulomb friction for ever, while a
-///   proportional law lets the axis creep to where it should be, and friction keeps it there;
-/// - where the motor's current has been at its limit, until it has not been there for a while: a linear law
-///   that is faster than the motor can accelerate swings about its setpoint for ever.
+/// - Standstill: the setpoint has been constant over the whole preview and lookback for more than
+///   `standstill_cycles`. Two integrals, of the RST controller and of the velocity loop, cause a limit cycle (hunting)
+///   with Coulomb friction; under proportional control the axis creeps to its setpoint and friction stops it.
+/// - Current saturation: the motor current has been at its limit within the last preview of the controller. A linear
+///   controller that is faster than the saturated motor oscillates about its setpoint.
 ///
 /// ```text
-/// Ω* = Kp (θ*(k) − θ(k)) + (θ*(k+1) − θ*(k)) / Tsp      0 where friction has stopped the axis close enough
+/// Ω* = Kp (θ*(k) − θ(k)) + (θ*(k+1) − θ*(k)) / Tsp
+/// Ω* = 0  if θ*(k+1) = θ*(k), |θ*(k) − θ(k)| ≤ standstill_tolerance, and friction has stopped the axis
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Guard {
+pub struct FallbackController {
     /// Kp, s⁻¹.
     pub gain: f64,
     /// Tsp, s.
     pub period: f64,
-    /// Position periods of standstill that the controller is given to finish a move by itself.
-    pub rest_after: u32,
-    /// Error with which an axis that friction has stopped may rest, rad: the integral of the velocity loop
-    /// would tear it loose for less than is worth it.
-    pub rest_error: f64,
+    /// Position cycles of constant setpoint before the fallback controller is active.
+    pub standstill_cycles: u32,
+    /// Following error that is not corrected at standstill, rad: correcting it would break the axis away from static
+    /// friction.
+    pub standstill_tolerance: f64,
 }
 
-/// What a position controller remembers: what it has seen and what has been asked for.
+/// State of a position controller: past positions and commands.
 ///
-/// It is kept whatever the law is, so that one takes over from another with the past as it was.
+/// It is recorded for every control law, so that a new controller starts from the actual past (bumpless transfer).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionState {
     /// θ(k), θ(k − 1), …
-    angles: Past,
-    /// Ω*(k − 1), Ω*(k − 2), …: as limited, with the velocity feedforward.
-    commands: Past,
-    /// Position instants since which the setpoint has stood still over the whole horizon of this controller.
-    still: u32,
-    /// Position instants since the motor's current was at its limit.
-    unlimited: u32,
-    transfer: TransferState,
+    angles: SignalHistory,
+    /// Ω*(k − 1) + VFFWS(k − 1), Ω*(k − 2) + VFFWS(k − 2), …, after the limit of Ω*.
+    commands: SignalHistory,
+    /// Position cycles for which the setpoint has been constant over preview and lookback of the controller.
+    standstill_cycles: u32,
+    /// Position cycles since the motor current was at its limit.
+    cycles_since_saturation: u32,
+    transfer: BumplessTransferState,
 }
 
 impl PositionState {
-    /// At rest at `angle`, rad.
+    /// Creates the state of an axis at rest at `angle`, rad.
     pub fn at_rest(angle: f64) -> Self {
         PositionState {
-            angles: Past::of(angle),
-            commands: Past::of(0.0),
-            still: u32::MAX,
-            unlimited: u32::MAX,
-            transfer: TransferState::default(),
+            angles: SignalHistory::new(angle),
+            commands: SignalHistory::new(0.0),
+            standstill_cycles: u32::MAX,
+            cycles_since_saturation: u32::MAX,
+            transfer: BumplessTransferState::default(),
         }
     }
 
-    /// Takes down what the velocity loop is asked for until the next position instant, rad/s of the
-    /// motor: the limited Ω* and the velocity feedforward together.
+    /// Records the setpoint of the velocity loop for this position cycle, rad/s of the motor: limited Ω* plus VFFWS.
     ///
-    /// The recursion goes on from what was really asked for: with the unlimited value a saturated
+    /// Anti-windup of the RST recursion: it continues from the limited value; with the unlimited value a saturated
     /// controller diverges.
     #[inline]
     pub fn record(&mut self, command: f64) {
         self.commands.push(command);
     }
 
-    /// Takes down that the axis reached `speed` instead, rad/s: the motor's current was at its limit, and
-    /// a recursion that went on from what was asked for would wind up.
+    /// Replaces the last command by the reached `speed`, rad/s, after current saturation.
+    ///
+    /// Anti-windup of the RST recursion: it continues from the speed that the saturated motor reached.
     #[inline]
-    pub fn correct(&mut self, speed: f64) {
-        self.commands.correct(speed);
-        self.unlimited = 0;
+    pub fn record_saturated(&mut self, speed: f64) {
+        self.commands.replace_newest(speed);
+        self.cycles_since_saturation = 0;
     }
 
-    /// Another controller takes over at the next position instant.
-    pub fn hand_over(&mut self) {
-        self.transfer.pending = true;
-        self.still = 0;
+    /// Starts a bumpless transfer to another controller at the next position cycle.
+    pub fn begin_transfer(&mut self) {
+        self.transfer.is_pending = true;
+        self.standstill_cycles = 0;
     }
 }
 
-/// The last values of a signal, as many as any controller reads.
+/// Last [`MAX_COEFFICIENTS`] values of a signal.
 #[derive(Debug, Clone, PartialEq)]
-struct Past {
+struct SignalHistory {
     ring: [f64; MAX_COEFFICIENTS],
     newest: usize,
 }
 
-impl Past {
-    /// A signal that always was `value`.
-    fn of(value: f64) -> Self {
-        Past { ring: [value; MAX_COEFFICIENTS], newest: 0 }
+impl SignalHistory {
+    /// Creates the history of a constant signal.
+    fn new(value: f64) -> Self {
+        SignalHistory { ring: [value; MAX_COEFFICIENTS], newest: 0 }
     }
 
     #[inline]
     fn push(&mut self, value: f64) {
         self.newest = (self.newest + 1) % MAX_COEFFICIENTS;
-        self.correct(value);
+        self.replace_newest(value);
     }
 
-    /// Puts another value in the place of the newest.
+    /// Replaces the newest value.
     #[inline]
-    fn correct(&mut self, value: f64) {
+    fn replace_newest(&mut self, value: f64) {
         self.ring[self.newest] = value;
     }
 
-    /// The value `back` instants before the newest.
+    /// Returns the value `lag` cycles before the newest one.
     #[inline]
-    fn before(&self, back: usize) -> f64 {
-        self.ring[(self.newest + MAX_COEFFICIENTS - back) % MAX_COEFFICIENTS]
+    fn lagged(&self, lag: usize) -> f64 {
+        self.ring[(self.newest + MAX_COEFFICIENTS - lag) % MAX_COEFFICIENTS]
     }
 }
 
 impl PositionController {
-    /// `Ω* = Kp (θ* − θ)` with `gain` Kp, s⁻¹.
-    pub fn proportional(gain: f64, transfer: Transfer) -> Self {
-        PositionController { law: Law::Proportional { gain }, guard: None, transfer }
+    /// Creates the proportional controller `Ω* = Kp (θ* − θ)` with `gain` Kp, s⁻¹.
+    pub fn proportional(gain: f64, transfer: BumplessTransfer) -> Self {
+        PositionController { law: ControlLaw::Proportional { gain }, fallback: None, transfer }
     }
 
-    /// `S Ω* = −R θ + T θ*` (Prévost eq. 9); `guard` is for controllers with integral action, the others
-    /// neither hunt nor wind up.
-    pub fn rst(rst: Rst, guard: Guard, transfer: Transfer) -> Self {
-        let guard = rst.has_integral_action().then_some(guard);
-        PositionController { law: Law::Rst(rst), guard, transfer }
+    /// Creates the controller `S Ω* = −R θ + T θ*` (Prévost eq. 9); `fallback` is used with integral action only, other
+    /// controllers neither hunt nor wind up.
+    pub fn rst(rst: Rst, fallback: FallbackController, transfer: BumplessTransfer) -> Self {
+        let fallback = rst.has_integral_action().then_some(fallback);
+        PositionController { law: ControlLaw::Rst(rst), fallback, transfer }
     }
 
-    /// The furthest setpoint that the controller reads, position periods ahead of the delayed one.
+    /// Returns the preview: furthest setpoint that the controller reads, position cycles ahead of the delayed one.
     pub fn preview(&self) -> i64 {
         match &self.law {
-            Law::Proportional { .. } => 0,
-            // The guard reads one.
-            Law::Rst(rst) => rst.preview().max(i64::from(self.guard.is_some())),
+            ControlLaw::Proportional { .. } => 0,
+            // The fallback controller reads one.
+            ControlLaw::Rst(rst) => rst.preview().max(i64::from(self.fallback.is_some())),
         }
     }
 
-    /// The oldest setpoint that the controller reads, position periods behind the delayed one.
+    /// Returns the lookback: oldest setpoint that the controller reads, position cycles behind the delayed one.
     pub fn lookback(&self) -> i64 {
         match &self.law {
-            Law::Proportional { .. } => 0,
-            Law::Rst(rst) => rst.lookback(),
+            ControlLaw::Proportional { .. } => 0,
+            ControlLaw::Rst(rst) => rst.lookback(),
         }
     }
 
-    /// Ω* before the limit of the motor's speed, rad/s; `setpoint(j)` is θ*(k + j), rad, `angle` θ(k), and
-    /// `feedforward` what the velocity loop will be asked for on top, rad/s.
+    /// Steps the controller by one position cycle; returns Ω* before the limit of the motor speed, rad/s.
+    ///
+    /// `setpoint(j)` returns θ*(k + j) in rad, `angle` is θ(k) in rad, `feedforward` is VFFWS in rad/s.
+    ///
+    /// ```text
+    /// Ω*(k) = Kp (θ*(k) − θ(k))                                                  proportional (Prévost fig. 3)
+    /// Ω*(k) = Σ tⱼ θ*(k + j) − Σ rᵢ θ(k − i) − Σ sᵢ (Ω* + VFFWS)(k − i), i ≥ 1 in S     RST (Prévost eq. 9)
+    /// ```
     #[inline]
     pub fn update(
         &self,
@@ -173,54 +180,56 @@ impl PositionController {
         feedforward: f64,
     ) -> f64 {
         s.angles.push(angle);
-        s.unlimited = s.unlimited.saturating_add(1);
-        if self.guard.is_some() {
-            let is_still = (-self.lookback()..=self.preview()).all(|j| setpoint(j) == setpoint(0));
-            s.still = if is_still { s.still.saturating_add(1) } else { 0 };
+        s.cycles_since_saturation = s.cycles_since_saturation.saturating_add(1);
+        if self.fallback.is_some() {
+            let is_constant = (-self.lookback()..=self.preview()).all(|j| setpoint(j) == setpoint(0));
+            s.standstill_cycles = if is_constant { s.standstill_cycles.saturating_add(1) } else { 0 };
         }
-        if s.transfer.pending {
-            let excess = self.output(s, &setpoint, angle) + feedforward - s.commands.before(0);
-            let excess = excess - excess.clamp(-self.transfer.step, self.transfer.step);
-            match &self.guard {
+        if s.transfer.is_pending {
+            let excess = self.output(s, &setpoint, angle) + feedforward - s.commands.lagged(0);
+            let excess = excess - excess.clamp(-self.transfer.max_step, self.transfer.max_step);
+            match &self.fallback {
                 _ if excess == 0.0 => s.transfer.end(),
                 Some(_) => s.transfer.begin(0.0, setpoint(0) - angle),
                 None => s.transfer.begin(-excess, 0.0),
             }
         }
-        let (command, error) = s.transfer.next(&self.transfer);
+        let (command, error) = s.transfer.advance(&self.transfer);
         self.output(s, |j| setpoint(j) - error, angle) + command
     }
 
     #[inline]
     fn output(&self, s: &PositionState, setpoint: impl Fn(i64) -> f64, angle: f64) -> f64 {
-        match (&self.law, &self.guard) {
-            (Law::Proportional { gain }, _) => gain * (setpoint(0) - angle),
-            (Law::Rst(_), Some(guard)) if self.is_guarded(s, guard) => {
+        match (&self.law, &self.fallback) {
+            (ControlLaw::Proportional { gain }, _) => gain * (setpoint(0) - angle),
+            (ControlLaw::Rst(_), Some(fallback)) if self.is_fallback_active(s, fallback) => {
                 let error = setpoint(0) - angle;
-                let asked = setpoint(1) - setpoint(0);
-                let crept = (angle - s.angles.before(1)).abs();
-                if asked == 0.0 && error.abs() <= guard.rest_error && crept <= STOPPED * guard.rest_error {
+                let increment = setpoint(1) - setpoint(0);
+                let creep = (angle - s.angles.lagged(1)).abs();
+                let tolerance = fallback.standstill_tolerance;
+                if increment == 0.0 && error.abs() <= tolerance && creep <= CREEP_TOLERANCE * tolerance {
                     return 0.0;
                 }
-                guard.gain * error + asked / guard.period
+                fallback.gain * error + increment / fallback.period
             }
-            (Law::Rst(rst), _) => {
-                let asked = weighted(rst.t(), |i| setpoint(rst.t_first() + i as i64));
-                let seen = weighted(rst.r(), |i| s.angles.before(i));
-                let done = weighted(&rst.s()[1..], |i| s.commands.before(i));
-                asked - seen - done
+            (ControlLaw::Rst(rst), _) => {
+                let t = weighted_sum(rst.t(), |i| setpoint(rst.t_first() + i as i64));
+                let r = weighted_sum(rst.r(), |i| s.angles.lagged(i));
+                let s = weighted_sum(&rst.s()[1..], |i| s.commands.lagged(i));
+                t - r - s
             }
         }
     }
 
-    fn is_guarded(&self, s: &PositionState, guard: &Guard) -> bool {
-        // As long as the controller's own horizon, and the instant that the limit was seen at.
-        let recovered_after = self.preview() + 1;
-        s.still > guard.rest_after || i64::from(s.unlimited) <= recovered_after
+    fn is_fallback_active(&self, s: &PositionState, fallback: &FallbackController) -> bool {
+        // Preview of the controller, and the cycle that detected the saturation.
+        let recovery_cycles = self.preview() + 1;
+        s.standstill_cycles > fallback.standstill_cycles
+            || i64::from(s.cycles_since_saturation) <= recovery_cycles
     }
 }
 
 #[inline]
-fn weighted(weights: &[f64], value: impl Fn(usize) -> f64) -> f64 {
+fn weighted_sum(weights: &[f64], value: impl Fn(usize) -> f64) -> f64 {
     weights.iter().enumerate().map(|(i, weight)| weight * value(i)).sum()
 }

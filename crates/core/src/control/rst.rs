@@ -1,67 +1,70 @@
 //! Linear position controllers in RST form.
 
-use crate::config::{MAX_HORIZON, RST_TERMS};
-use crate::units::Told;
+use crate::config::{MAX_HORIZON, MAX_RST_TERMS};
+use crate::units::Rounded;
 
-/// Most coefficients of R and of S.
-pub const MAX_COEFFICIENTS: usize = RST_TERMS;
-/// Furthest setpoint that T may read, in position periods ahead (and, of its first, behind).
+/// Largest number of coefficients of R and of S.
+pub const MAX_COEFFICIENTS: usize = MAX_RST_TERMS;
+/// Largest preview and lookback of T, position cycles.
 pub const MAX_PREVIEW: i64 = MAX_HORIZON;
-/// Largest coefficient, relative to s₀: as large as a gain may be.
+/// Largest |coefficient|, relative to s₀; equal to the largest allowed gain.
 const MAX_COEFFICIENT: f64 = 1e9;
-/// How far T(1) may be from R(1), relative: 35 nm over a stroke of 350 mm.
+/// Largest relative difference of T(1) and R(1): 35 nm over a travel of 350 mm.
 const GAIN_TOLERANCE: f64 = 1e-7;
-/// |S(1)| up to which S contains the factor 1 − q⁻¹, relative to the sum of its |sᵢ|.
+/// |S(1)|, relative to Σ |sᵢ|, up to which S contains the factor 1 − q⁻¹.
 pub(crate) const INTEGRATOR_TOLERANCE: f64 = 1e-9;
 
-/// Why three polynomials are no position controller.
+/// Error of three polynomials that do not form a position controller.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RstError {
-    /// A polynomial without coefficients, or with too many.
+    /// Number of coefficients out of range.
     #[error("{polynomial} has {count} coefficients; it must have 1 … {max}")]
     Count {
-        /// r, s or t.
+        /// Name of the polynomial: r, s or t.
         polynomial: &'static str,
-        /// How many there are.
+        /// Number of coefficients.
         count: usize,
-        /// How many there may be.
+        /// Largest allowed number.
         max: usize,
     },
-    /// A coefficient that is not finite.
+    /// Coefficient that is not finite.
     #[error("{polynomial}[{index}] = {value} is not finite")]
     NotFinite {
-        /// r, s or t.
+        /// Name of the polynomial: r, s or t.
         polynomial: &'static str,
-        /// Place, from 0.
+        /// Index of the coefficient, from 0.
         index: usize,
-        /// What stands there.
+        /// Coefficient.
         value: f64,
     },
-    /// A coefficient that is too large relative to s₀.
-    #[error("{polynomial}[{index}] is {value:e} times s[0]; it must be at most {max:e} times", max = MAX_COEFFICIENT)]
+    /// Coefficient that is too large relative to s₀.
+    #[error(
+        "{polynomial}[{index}] is {} times s[0]; it must be at most {max:e} times",
+        Rounded(*value), max = MAX_COEFFICIENT
+    )]
     TooLarge {
-        /// r, s or t.
+        /// Name of the polynomial: r, s or t.
         polynomial: &'static str,
-        /// Place, from 0.
+        /// Index of the coefficient, from 0.
         index: usize,
         /// Coefficient divided by s₀.
         value: f64,
     },
-    /// S cannot be solved for Ω*(k).
-    #[error("s[0] = 0; it must not be zero, since Ω* is divided by it")]
+    /// s₀ = 0, by which Ω*(k) is divided.
+    #[error("s[0] = 0; it must not be 0, since Ω* is divided by it")]
     LeadingZero,
-    /// T reads setpoints too far ahead or behind.
-    #[error("t reads setpoints {first} … {last} periods ahead; it may read -{max} … {max}", max = MAX_PREVIEW)]
+    /// Preview or lookback of T beyond the allowed range.
+    #[error("t reads setpoints {first} … {last} position cycles ahead; allowed are -{max} … {max}", max = MAX_PREVIEW)]
     Preview {
         /// Exponent of the first coefficient.
         first: i64,
-        /// Exponent of the last one.
+        /// Exponent of the last coefficient.
         last: i64,
     },
-    /// The axis would not go where it is told to.
+    /// Static gain other than 1: T(1) ≠ R(1).
     #[error(
-        "T(1) = {} and R(1) = {} differ; they must be equal, or the axis does not go where it is told to",
-        Told(*t), Told(*r)
+        "T(1) = {} and R(1) = {} differ; they must be equal, or the axis does not reach its setpoint",
+        Rounded(*t), Rounded(*r)
     )]
     Gain {
         /// T(1).
@@ -69,20 +72,20 @@ pub enum RstError {
         /// R(1).
         r: f64,
     },
-    /// The position is not controlled.
-    #[error("R(1) = 0; it must not be zero, or nothing holds the position")]
+    /// R(1) = 0: no position feedback at standstill.
+    #[error("R(1) = 0; it must not be 0, or the position is not controlled")]
     NoGain,
 }
 
-/// A linear position controller in RST form (Prévost eq. 9).
+/// Linear position controller in RST form (Prévost eq. 9).
 ///
 /// ```text
 /// S(q⁻¹) Ω*(k) = −R(q⁻¹) θ(k) + T(q) θ*(k)          T(1) = R(1)
 /// ```
 ///
-/// R and S are in rising powers of q⁻¹, T in rising powers of q from `q^t_first` on: a T with positive
-/// powers reads setpoints ahead. Units of the motor: θ and θ* in rad, Ω* in rad/s; S is scaled so that
-/// s₀ = 1, then R and T are in s⁻¹.
+/// R and S are in rising powers of q⁻¹, T in rising powers of q from `q^t_first` on; positive powers read future
+/// setpoints (preview). Units are those of the motor: θ and θ* in rad, Ω* in rad/s. S is scaled to s₀ = 1; R and T are
+/// in s⁻¹ then.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rst {
     r: Vec<f64>,
@@ -92,10 +95,11 @@ pub struct Rst {
 }
 
 impl Rst {
-    /// The controller with these coefficients; `t_first` is the exponent of q of `t[0]`.
+    /// Creates a controller from its coefficients; `t_first` is the exponent of q of `t[0]`.
     ///
     /// # Errors
-    /// [`RstError`].
+    /// [`RstError`] if a number of coefficients, a coefficient or an exponent is out of range, or if R(1) = 0 or
+    /// T(1) ≠ R(1).
     pub fn new(r: &[f64], s: &[f64], t: &[f64], t_first: i64) -> Result<Self, RstError> {
         check_polynomial("r", r, MAX_COEFFICIENTS)?;
         check_polynomial("s", s, MAX_COEFFICIENTS)?;
@@ -126,7 +130,7 @@ impl Rst {
         Ok(Rst { r: scaled(r), s: scaled(s), t: scaled(t), t_first })
     }
 
-    /// The proportional controller `Ω* = Kp (θ* − θ)` with `gain` Kp, s⁻¹.
+    /// Creates the proportional controller `Ω* = Kp (θ* − θ)` with `gain` Kp, s⁻¹.
     ///
     /// # Errors
     /// [`RstError`] for a gain that is 0, too large or not finite.
@@ -134,37 +138,37 @@ impl Rst {
         Rst::new(&[gain], &[1.0], &[gain], 0)
     }
 
-    /// R, in rising powers of q⁻¹, s⁻¹.
+    /// Returns R, in rising powers of q⁻¹, s⁻¹.
     pub fn r(&self) -> &[f64] {
         &self.r
     }
 
-    /// S, in rising powers of q⁻¹; the first is 1.
+    /// Returns S, in rising powers of q⁻¹; the first coefficient is 1.
     pub fn s(&self) -> &[f64] {
         &self.s
     }
 
-    /// T, in rising powers of q from [`t_first`](Self::t_first) on, s⁻¹.
+    /// Returns T, in rising powers of q from [`t_first`](Self::t_first) on, s⁻¹.
     pub fn t(&self) -> &[f64] {
         &self.t
     }
 
-    /// Exponent of q of the first coefficient of T.
+    /// Returns the exponent of q of the first coefficient of T.
     pub fn t_first(&self) -> i64 {
         self.t_first
     }
 
-    /// The furthest setpoint that T reads, position periods ahead; not below 0.
+    /// Returns the preview of T: furthest setpoint ahead, position cycles, at least 0.
     pub fn preview(&self) -> i64 {
         (self.t_first + self.t.len() as i64 - 1).max(0)
     }
 
-    /// The oldest setpoint that T reads, position periods back; not below 0.
+    /// Returns the lookback of T: oldest setpoint, position cycles back, at least 0.
     pub fn lookback(&self) -> i64 {
         (-self.t_first).max(0)
     }
 
-    /// Whether S contains the factor 1 − q⁻¹.
+    /// Returns true if S contains the factor 1 − q⁻¹.
     pub fn has_integral_action(&self) -> bool {
         let scale: f64 = self.s.iter().map(|c| c.abs()).sum();
         self.s.iter().sum::<f64>().abs() <= INTEGRATOR_TOLERANCE * scale

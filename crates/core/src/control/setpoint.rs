@@ -1,23 +1,23 @@
-//! The staircase of position setpoints: delays and derivatives.
+//! Zero-order-held position setpoints: history, preview, delays α, β, γ, and feedforward of their derivatives.
 
 use crate::config::{DelaysConfig, FeedforwardConfig};
 use crate::units::Nanoseconds;
 
-/// Delays of the setpoint in ticks.
+/// Delays of the setpoint, ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Delays {
-    /// α, before the position comparator.
+    /// α, in front of the position comparator.
     pub position: u64,
-    /// β, behind the velocity feedforward.
+    /// β, after the velocity feedforward.
     pub velocity: u64,
-    /// γ, behind the torque feedforward.
+    /// γ, after the torque feedforward.
     pub torque: u64,
-    /// Shift of the friction compensation.
+    /// Delay of the friction compensation.
     pub friction: u64,
 }
 
 impl Delays {
-    /// Delays rounded to the nearest tick of `tick` ns.
+    /// Creates delays, rounded to the nearest tick of `tick` ns.
     pub fn new(config: &DelaysConfig, tick: Nanoseconds) -> Self {
         let ticks = |delay: Nanoseconds| ((delay.max(0) + tick / 2) / tick) as u64;
         Delays {
@@ -28,163 +28,164 @@ impl Delays {
         }
     }
 
-    /// The longest of them, ticks.
+    /// Returns the longest delay, ticks.
     pub fn longest(&self) -> u64 {
         self.position.max(self.velocity).max(self.torque).max(self.friction)
     }
 }
 
-/// A delay on the grid of position periods: whole ones, and ticks of another.
+/// Delay of a zero-order-held setpoint, divided into whole position cycles and ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shift {
-    periods: i64,
+pub struct TickDelay {
+    cycles: i64,
     ticks: u64,
 }
 
-impl Shift {
-    /// A delay of `ticks` where a position period has `ticks_per_setpoint`.
+impl TickDelay {
+    /// Creates a delay of `ticks`; a position cycle has `ticks_per_setpoint` ticks.
     pub fn new(ticks: u64, ticks_per_setpoint: u64) -> Self {
-        Shift { periods: (ticks / ticks_per_setpoint) as i64, ticks: ticks % ticks_per_setpoint }
+        TickDelay { cycles: (ticks / ticks_per_setpoint) as i64, ticks: ticks % ticks_per_setpoint }
     }
 
-    /// The tick of a position period at which the staircase behind the delay moves on.
+    /// Returns the tick of a position cycle at which the delayed setpoint switches.
     #[inline]
-    pub fn step(self) -> u64 {
+    pub fn switch_tick(self) -> u64 {
         self.ticks
     }
 
-    /// Index of the setpoint that it shows in position period k from [`step`](Self::step) on; before, it
-    /// is the one before.
+    /// Returns the index of the delayed setpoint in position cycle k from [`switch_tick`](Self::switch_tick) on; before
+    /// that tick the index is one less.
     #[inline]
-    pub fn index(self, k: i64) -> i64 {
-        k - self.periods
+    pub fn index_after_switch(self, k: i64) -> i64 {
+        k - self.cycles
     }
 
-    /// Index of the setpoint that it shows at the first tick of position period k.
+    /// Returns the index of the delayed setpoint at the first tick of position cycle k.
     #[inline]
-    pub fn index_at_instant(self, k: i64) -> i64 {
-        self.index(k) - i64::from(self.ticks > 0)
+    pub fn index_at_cycle_start(self, k: i64) -> i64 {
+        self.index_after_switch(k) - i64::from(self.ticks > 0)
     }
 }
 
-/// How far from the present one setpoints are read.
+/// Setpoint range that the controllers access, relative to the present index.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Reach {
-    /// The longest delay, ticks.
+pub struct SetpointWindow {
+    /// Longest delay, ticks.
     pub delay: u64,
-    /// Setpoints behind the delay.
+    /// Setpoints read behind the delayed one.
     pub lookback: usize,
-    /// Setpoints ahead of the present one.
-    pub ahead: usize,
+    /// Preview: setpoints read ahead of the present one.
+    pub preview: usize,
 }
 
-/// PSEC as the staircase that the drive sees: value k holds on [k·Tsp, (k+1)·Tsp).
+/// Zero-order-held position setpoints PSEC, past and preview: value k holds on [k·Tsp, (k+1)·Tsp).
 ///
-/// Before the first setpoint PSEC has its first value; what is not known of the future yet is its last.
+/// Before the first setpoint PSEC has its first value. Unknown future setpoints have the value of the last known one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetpointHistory {
-    /// Setpoint k stands at k modulo half its length, and half its length behind that: setpoints that
-    /// follow each other can be read as they stand, wherever they begin.
+    /// Ring buffer that contains setpoint k twice, at k modulo half its length and half its length further, so that
+    /// consecutive setpoints are always a contiguous slice.
     ring: Box<[f64]>,
     ticks_per_setpoint: u64,
-    /// How many setpoints have been pushed.
+    /// Number of setpoints that have been pushed.
     count: u64,
-    /// Setpoints that stand in the ring behind those.
-    ahead: usize,
+    /// Number of previewed setpoints after those.
+    preview: usize,
 }
 
 impl SetpointHistory {
-    /// A history in which setpoints within `reach` can be read, and two more for the second derivative.
-    pub fn new(initial: f64, ticks_per_setpoint: u64, reach: Reach) -> Self {
+    /// Creates a history for setpoints within `window`, and two more for the second difference.
+    pub fn new(initial: f64, ticks_per_setpoint: u64, window: SetpointWindow) -> Self {
         SetpointHistory {
-            ring: vec![initial; 2 * Self::length(ticks_per_setpoint, reach)].into_boxed_slice(),
+            ring: vec![initial; 2 * Self::length(ticks_per_setpoint, window)].into_boxed_slice(),
             ticks_per_setpoint,
             count: 0,
-            ahead: reach.ahead,
+            preview: window.preview,
         }
     }
 
-    /// Setpoints to hold: those that the delay spans, the present one, and two for the derivatives; a
-    /// power of two, so that no division finds a place.
-    fn length(ticks_per_setpoint: u64, reach: Reach) -> usize {
-        let needed = reach.delay.div_ceil(ticks_per_setpoint) as usize + 3 + reach.lookback + reach.ahead;
+    /// Returns the number of setpoints to store: delay, lookback and preview, the present one, and two for the second
+    /// difference, rounded up to a power of two, so that a mask gives the ring index.
+    fn length(ticks_per_setpoint: u64, window: SetpointWindow) -> usize {
+        let needed =
+            window.delay.div_ceil(ticks_per_setpoint) as usize + 3 + window.lookback + window.preview;
         needed.next_power_of_two()
     }
 
-    fn place(&self, k: i64) -> usize {
+    fn ring_index(&self, k: i64) -> usize {
         k as usize & (self.ring.len() / 2 - 1)
     }
 
-    /// Makes room for another reach; setpoints that are no longer known read as the oldest known one,
-    /// those ahead are known from the next period on.
-    pub fn adopt(&mut self, reach: Reach) {
-        let (length, old) = (Self::length(self.ticks_per_setpoint, reach), self.ring.len() / 2);
-        let ahead = std::mem::replace(&mut self.ahead, reach.ahead);
-        if length == old && ahead == reach.ahead {
+    /// Changes the window. Setpoints older than the stored ones read as the oldest stored one; a longer preview is
+    /// known from the next position cycle on.
+    pub fn set_window(&mut self, window: SetpointWindow) {
+        let (length, old) = (Self::length(self.ticks_per_setpoint, window), self.ring.len() / 2);
+        let preview = std::mem::replace(&mut self.preview, window.preview);
+        if length == old && preview == window.preview {
             return;
         }
         let count = self.count as i64;
-        // Before the first setpoint stands its value.
-        let oldest = count + ahead as i64 - old as i64;
-        let mut grown = SetpointHistory {
+        // Setpoints before the first one have its value.
+        let oldest = count + preview as i64 - old as i64;
+        let mut resized = SetpointHistory {
             ring: vec![0.0; 2 * length].into_boxed_slice(),
             ticks_per_setpoint: self.ticks_per_setpoint,
             count: self.count,
-            ahead: reach.ahead,
+            preview: window.preview,
         };
         for k in count - length as i64..count {
-            grown.put(k, self.at(k.max(oldest)));
+            resized.store(k, self.at(k.max(oldest)));
         }
-        *self = grown;
+        *self = resized;
     }
 
-    /// Adds the setpoint of the next position instant.
+    /// Appends the setpoint of the next position cycle.
     #[inline]
     pub fn push(&mut self, psec: f64) {
         if self.count == 0 {
             self.ring.fill(psec);
         }
-        self.put(self.count as i64, psec);
+        self.store(self.count as i64, psec);
         self.count += 1;
     }
 
-    /// The setpoints behind the last one that was pushed, as they are known now.
+    /// Sets the preview: known setpoints after the last pushed one.
     #[inline]
-    pub fn foresee(&mut self, ahead: &[f64]) {
-        let mut last = self.at(self.present());
-        for j in 0..self.ahead {
-            last = ahead.get(j).copied().unwrap_or(last);
-            self.put((self.count + j as u64) as i64, last);
+    pub fn set_preview(&mut self, preview: &[f64]) {
+        let mut last = self.at(self.present_index());
+        for j in 0..self.preview {
+            last = preview.get(j).copied().unwrap_or(last);
+            self.store((self.count + j as u64) as i64, last);
         }
     }
 
     #[inline]
-    fn put(&mut self, k: i64, psec: f64) {
-        let place = self.place(k);
-        self.ring[place] = psec;
-        self.ring[place + self.ring.len() / 2] = psec;
+    fn store(&mut self, k: i64, psec: f64) {
+        let index = self.ring_index(k);
+        self.ring[index] = psec;
+        self.ring[index + self.ring.len() / 2] = psec;
     }
 
-    /// Index of the setpoint of this position period; -1 before the first.
+    /// Returns the index of the setpoint of the present position cycle; -1 before the first setpoint.
     #[inline]
-    pub fn present(&self) -> i64 {
+    pub fn present_index(&self) -> i64 {
         self.count as i64 - 1
     }
 
-    /// PSEC_k; the first value for k before the first setpoint.
+    /// Returns PSEC_k; the first setpoint for negative k.
     #[inline]
     pub fn at(&self, k: i64) -> f64 {
-        self.ring[self.place(k)]
+        self.ring[self.ring_index(k)]
     }
 
-    /// `count` setpoints from PSEC_k on, at most as many as the reach spans.
+    /// Returns `count` consecutive setpoints from PSEC_k on, at most as many as the window contains.
     #[inline]
-    pub fn from(&self, k: i64, count: usize) -> &[f64] {
-        &self.ring[self.place(k)..][..count]
+    pub fn slice(&self, k: i64, count: usize) -> &[f64] {
+        &self.ring[self.ring_index(k)..][..count]
     }
 }
 
-/// Velocity and torque feedforward (Prévost eqs. 6 to 8), motor units.
+/// Velocity and torque feedforward in motor units (Prévost eqs. 6 to 8).
 ///
 /// ```text
 /// VFFWS = VFFW (PSEC_k − PSEC_{k−1}) / Tsp / r
@@ -197,7 +198,7 @@ pub struct Feedforward {
 }
 
 impl Feedforward {
-    /// Feedforward with position period `period` (s) behind a transmission of ratio r.
+    /// Creates a feedforward for position period `period` (s) and transmission ratio r.
     pub fn new(config: &FeedforwardConfig, period: f64, transmission_ratio: f64) -> Self {
         Feedforward {
             velocity: config.velocity / period / transmission_ratio,
@@ -205,13 +206,13 @@ impl Feedforward {
         }
     }
 
-    /// VFFWS of setpoint k, rad/s of the motor.
+    /// Returns VFFWS of setpoint k, rad/s of the motor.
     #[inline]
     pub fn velocity(&self, psec: &SetpointHistory, k: i64) -> f64 {
         self.velocity * (psec.at(k) - psec.at(k - 1))
     }
 
-    /// TFFWS of setpoint k, N·m at the motor.
+    /// Returns TFFWS of setpoint k, N·m at the motor.
     #[inline]
     pub fn torque(&self, psec: &SetpointHistory, k: i64) -> f64 {
         self.torque * ((psec.at(k) - psec.at(k - 1)) - (psec.at(k - 1) - psec.at(k - 2)))
@@ -224,30 +225,33 @@ mod tests {
     use crate::units::{MICROSECOND_NS, MILLISECOND_NS};
 
     #[test]
-    fn a_delay_of_one_and_a_half_periods_reads_two_set_points_back_at_position_instants() {
-        let shift = Shift::new(72, 48);
-        assert_eq!(shift.index_at_instant(9), 7);
-        // In mid-period the staircase behind the delay moves on.
-        assert_eq!((shift.step(), shift.index(9)), (24, 8));
-        let whole = Shift::new(96, 48);
-        assert_eq!((whole.index_at_instant(9), whole.step(), whole.index(9)), (7, 0, 7));
+    fn a_delay_of_1_5_cycles_reads_two_setpoints_back_at_the_start_of_a_cycle() {
+        let delay = TickDelay::new(72, 48);
+        assert_eq!(delay.index_at_cycle_start(9), 7);
+        // The delayed setpoint switches in the middle of the position cycle.
+        assert_eq!((delay.switch_tick(), delay.index_after_switch(9)), (24, 8));
+        let whole = TickDelay::new(96, 48);
+        assert_eq!(
+            (whole.index_at_cycle_start(9), whole.switch_tick(), whole.index_after_switch(9)),
+            (7, 0, 7)
+        );
     }
 
     #[test]
-    fn set_points_in_a_row_are_read_as_they_stand() {
-        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 96, lookback: 1, ahead: 3 });
+    fn consecutive_setpoints_are_a_slice() {
+        let mut h = SetpointHistory::new(0.0, 48, SetpointWindow { delay: 96, lookback: 1, preview: 3 });
         for k in 0..40 {
             h.push(f64::from(k));
-            h.foresee(&[1, 2, 3].map(|j| f64::from(k + j)));
+            h.set_preview(&[1, 2, 3].map(|j| f64::from(k + j)));
             let first = (k - 4).max(0);
             let wanted: Vec<f64> = (first..=k + 3).map(f64::from).collect();
-            assert_eq!(h.from(i64::from(first), wanted.len()), wanted);
+            assert_eq!(h.slice(i64::from(first), wanted.len()), wanted);
         }
     }
 
     #[test]
-    fn before_the_first_set_point_psec_has_its_first_value() {
-        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 72, ..Reach::default() });
+    fn psec_before_the_first_setpoint_is_the_first_setpoint() {
+        let mut h = SetpointHistory::new(0.0, 48, SetpointWindow { delay: 72, ..SetpointWindow::default() });
         h.push(5.0);
         assert_eq!(h.at(-1), 5.0);
         let f = Feedforward { velocity: 1.0, torque: 1.0 };
@@ -255,30 +259,30 @@ mod tests {
     }
 
     #[test]
-    fn a_longer_delay_finds_the_set_points_that_are_known() {
-        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 48, ..Reach::default() });
+    fn a_longer_delay_reads_the_stored_setpoints() {
+        let mut h = SetpointHistory::new(0.0, 48, SetpointWindow { delay: 48, ..SetpointWindow::default() });
         for k in 0..10 {
             h.push(f64::from(k));
         }
-        h.adopt(Reach { delay: 6 * 48, ..Reach::default() });
+        h.set_window(SetpointWindow { delay: 6 * 48, ..SetpointWindow::default() });
         assert_eq!((h.at(9), h.at(6), h.at(5), h.at(1)), (9.0, 6.0, 6.0, 6.0));
         h.push(10.0);
         assert_eq!(h.at(10), 10.0);
     }
 
     #[test]
-    fn set_points_ahead_are_read_and_what_is_not_known_is_the_last_one() {
-        let mut h = SetpointHistory::new(0.0, 48, Reach { delay: 72, lookback: 1, ahead: 3 });
+    fn unknown_preview_is_the_last_known_setpoint() {
+        let mut h = SetpointHistory::new(0.0, 48, SetpointWindow { delay: 72, lookback: 1, preview: 3 });
         for k in 0..10 {
             h.push(f64::from(k));
-            h.foresee(&[f64::from(k) + 1.0, f64::from(k) + 2.0]);
+            h.set_preview(&[f64::from(k) + 1.0, f64::from(k) + 2.0]);
         }
         assert_eq!([9, 10, 11, 12].map(|k| h.at(k)), [9.0, 10.0, 11.0, 11.0]);
         assert_eq!([6, 7, 8].map(|k| h.at(k)), [6.0, 7.0, 8.0]);
-        h.adopt(Reach { delay: 72, lookback: 1, ahead: 5 });
+        h.set_window(SetpointWindow { delay: 72, lookback: 1, preview: 5 });
         assert_eq!([6, 7, 8, 9].map(|k| h.at(k)), [6.0, 7.0, 8.0, 9.0]);
         h.push(10.0);
-        h.foresee(&[]);
+        h.set_preview(&[]);
         assert_eq!([10, 11, 15].map(|k| h.at(k)), [10.0; 3]);
     }
 

@@ -1,4 +1,4 @@
-//! Generalized predictive control in RST form.
+//! Generalized predictive control (GPC) in RST form.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,12 +6,12 @@ use super::polynomial::product;
 use super::{DesignError, PredictionModel};
 use crate::control::{MAX_PREVIEW, Rst};
 
-/// Weight of the control increments in the criterion.
+/// Weight λ of the control increments in the GPC criterion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Weight {
-    /// λ itself, s².
+pub enum ControlWeight {
+    /// λ, s².
     Absolute(f64),
-    /// λ_rel = λ / trace(GᵀG).
+    /// Relative weight λ_rel = λ / trace(GᵀG).
     Relative(f64),
 }
 
@@ -24,15 +24,15 @@ pub struct GpcTuning {
     pub n2: usize,
     /// Nu, periods of the control horizon.
     pub nu: usize,
-    /// λ.
-    pub weight: Weight,
+    /// Weight λ of the control increments.
+    pub weight: ControlWeight,
 }
 
 impl GpcTuning {
     fn check(&self) -> Result<(), DesignError> {
         let max = MAX_PREVIEW as usize;
         let within = |name, value: usize, last: usize| {
-            let refused = DesignError::OutOfRange {
+            let error = DesignError::OutOfRange {
                 name,
                 value: value as f64,
                 allowed: match name {
@@ -40,14 +40,14 @@ impl GpcTuning {
                     _ => format!("lie in 1 … n2 = {last}"),
                 },
             };
-            if (1..=last).contains(&value) { Ok(()) } else { Err(refused) }
+            if (1..=last).contains(&value) { Ok(()) } else { Err(error) }
         };
         within("n2", self.n2, max)?;
         within("n1", self.n1, self.n2)?;
         within("nu", self.nu, self.n2)?;
         let (name, value) = match self.weight {
-            Weight::Absolute(value) => ("lambda", value),
-            Weight::Relative(value) => ("lambda_rel", value),
+            ControlWeight::Absolute(value) => ("lambda", value),
+            ControlWeight::Relative(value) => ("lambda_rel", value),
         };
         if value.is_finite() && value >= 0.0 {
             return Ok(());
@@ -56,7 +56,7 @@ impl GpcTuning {
     }
 }
 
-/// The controller that minimizes the GPC criterion over the receding horizon (Prévost section 5, eq. 9).
+/// Designs the RST controller that minimizes the GPC criterion over the receding horizon (Prévost section 5, eq. 9).
 ///
 /// ```text
 /// 1 = Eⱼ Δ A + q⁻ʲ Fⱼ      Eⱼ B = Gⱼ + q⁻ʲ Hⱼ      k = first row of (GᵀG + λI)⁻¹ Gᵀ,  j = N1 … N2
@@ -64,27 +64,28 @@ impl GpcTuning {
 /// ```
 ///
 /// ```
-/// use virtual_axes::design::{GpcTuning, PredictionModel, Weight, gpc};
+/// use virtual_axes_core::design::{GpcTuning, PredictionModel, ControlWeight, gpc};
 ///
 /// let model = PredictionModel::new(vec![1.0, -0.8], vec![0.0, 0.4], 0.006)?;
-/// let rst = gpc(&model, &GpcTuning { n1: 1, n2: 4, nu: 1, weight: Weight::Absolute(0.1) })?;
+/// let rst = gpc(&model, &GpcTuning { n1: 1, n2: 4, nu: 1, weight: ControlWeight::Absolute(0.1) })?;
 /// assert!((rst.r()[0] - 2.98449263).abs() < 1e-8 && (rst.r()[1] + 1.93600542).abs() < 1e-8);
 /// assert_eq!((rst.t_first(), rst.preview()), (1, 4));
-/// # Ok::<(), virtual_axes::design::DesignError>(())
+/// # Ok::<(), virtual_axes_core::design::DesignError>(())
 /// ```
 ///
 /// # Errors
-/// [`DesignError::OutOfRange`] naming the parameter, [`DesignError::Singular`].
+/// [`DesignError::OutOfRange`] with the name of the parameter, [`DesignError::Singular`] if GᵀG + λI is singular,
+/// [`DesignError::Rst`] if the polynomials do not form a controller.
 pub fn gpc(model: &PredictionModel, tuning: &GpcTuning) -> Result<Rst, DesignError> {
     tuning.check()?;
     let GpcTuning { n1, n2, nu, weight } = *tuning;
-    // B = q⁻¹ B': Eⱼ B' is what the control increments from u(k + j − 1) backwards add to θ(k + j).
+    // B = q⁻¹ B': Eⱼ B' is the response of θ(k + j) to the control increments from u(k + j − 1) backwards.
     let b = &model.b()[1..];
     let delta_a = product(&[1.0, -1.0], model.a());
     let order = delta_a.len() - 1;
     let mut f: Vec<Vec<f64>> = Vec::with_capacity(n2);
     let mut e = Vec::with_capacity(n2);
-    // 1 = E₀ΔA + F₀ with E₀ = 0, F₀ = 1; each step divides once more by ΔA.
+    // 1 = E₀ΔA + F₀ with E₀ = 0, F₀ = 1; each step divides by ΔA once more.
     let mut remainder = vec![0.0; order];
     remainder[0] = 1.0;
     for _ in 0..n2 {
@@ -96,7 +97,7 @@ pub fn gpc(model: &PredictionModel, tuning: &GpcTuning) -> Result<Rst, DesignErr
         }
         f.push(remainder.clone());
     }
-    // Eⱼ has the first j coefficients of e, so that the step response stands in the first j of Eⱼ B'.
+    // Eⱼ has the first j coefficients of e, so that the first j coefficients of Eⱼ B' are the step response.
     let step = product(&e, b);
     let rows = n2 - n1 + 1;
     let g = DMatrix::from_fn(rows, nu, |row, column| match (n1 + row).checked_sub(column + 1) {
@@ -104,9 +105,9 @@ pub fn gpc(model: &PredictionModel, tuning: &GpcTuning) -> Result<Rst, DesignErr
         None => 0.0,
     });
     let lambda = match weight {
-        Weight::Absolute(lambda) => lambda,
+        ControlWeight::Absolute(lambda) => lambda,
         // trace(GᵀG)
-        Weight::Relative(lambda) => lambda * g.norm_squared(),
+        ControlWeight::Relative(lambda) => lambda * g.norm_squared(),
     };
     let gains = first_row(&g, lambda).ok_or(DesignError::Singular { n1, n2, nu, lambda })?;
     let mut r = vec![0.0; order];
@@ -125,9 +126,9 @@ pub fn gpc(model: &PredictionModel, tuning: &GpcTuning) -> Result<Rst, DesignErr
     Ok(Rst::new(&r, &s, gains.as_slice(), n1 as i64)?)
 }
 
-/// First row of (GᵀG + λI)⁻¹ Gᵀ; none if the matrix cannot be inverted.
+/// Computes the first row of (GᵀG + λI)⁻¹ Gᵀ; `None` if the matrix is singular.
 ///
-/// From the QR decomposition of G above √λ I: to form GᵀG would lose half the digits.
+/// Uses the QR decomposition of G stacked on √λ I: forming GᵀG would lose half of the digits.
 fn first_row(g: &DMatrix<f64>, lambda: f64) -> Option<DVector<f64>> {
     let (rows, size) = g.shape();
     let mut stacked = g.clone().resize_vertically(rows + size, 0.0);
@@ -135,10 +136,10 @@ fn first_row(g: &DMatrix<f64>, lambda: f64) -> Option<DVector<f64>> {
         stacked[(rows + column, column)] = lambda.sqrt();
     }
     let (q, r) = stacked.qr().unpack();
-    // A pivot of GᵀG + λI that is rounding error is no pivot.
+    // Pivots of GᵀG + λI within rounding error count as 0.
     let smallest = r.diagonal().iter().fold(f64::INFINITY, |m, d| m.min(d * d));
-    let regular = smallest > size as f64 * f64::EPSILON * g.norm_squared();
-    if !regular {
+    let is_regular = smallest > size as f64 * f64::EPSILON * g.norm_squared();
+    if !is_regular {
         return None;
     }
     let mut first = DVector::zeros(size);

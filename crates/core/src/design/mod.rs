@@ -1,40 +1,41 @@
-//! Design of position controllers from a prediction model: pure mathematics, no axis.
+//! Design of position controllers from a prediction model: P, PI, PID, pole placement, generalized predictive control
+//! (GPC), stability and margins.
 
-mod classic;
 mod gpc;
 mod margins;
 mod model;
+mod pid;
 mod pole_placement;
 mod poles;
 pub(crate) mod polynomial;
 
-pub use classic::{MAX_GAIN, Pid, p, pi, pid};
-pub use gpc::{GpcTuning, Weight, gpc};
+pub use gpc::{ControlWeight, GpcTuning, gpc};
 pub use margins::{Margins, margins};
 pub use model::PredictionModel;
+pub use pid::{MAX_GAIN, PidTuning, p_controller, pi_controller, pid_controller};
 pub use pole_placement::{PolePlacement, pole_pair, pole_placement};
-pub use poles::{accept, check_stable, poles};
+pub use poles::{check_stable, poles, require_stable};
 
 use crate::control::RstError;
-use crate::units::Told;
+use crate::units::Rounded;
 
-/// Why there is no controller.
+/// Error of a controller design.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DesignError {
-    /// A tuning parameter out of its range.
-    #[error("{name} = {} must {allowed}", Told(*value))]
+    /// Tuning parameter out of range.
+    #[error("{name} = {} must {allowed}", Rounded(*value))]
     OutOfRange {
         /// Name of the parameter, in SI units.
         name: &'static str,
-        /// What was given.
+        /// Value found.
         value: f64,
-        /// What is allowed, after "must".
+        /// Allowed range, worded to follow "must".
         allowed: String,
     },
-    /// GᵀG + λI cannot be inverted.
+    /// Singular matrix GᵀG + λI.
     #[error(
-        "the matrix GᵀG + λI of n1 = {n1}, n2 = {n2}, nu = {nu} is singular with lambda = {lambda}; take \
+        "the matrix GᵀG + λI of n1 = {n1}, n2 = {n2}, nu = {nu} is singular with lambda = {lambda}; use \
          lambda > 0 or a smaller nu"
     )]
     Singular {
@@ -47,47 +48,47 @@ pub enum DesignError {
         /// λ.
         lambda: f64,
     },
-    /// The prediction model is no model.
+    /// Invalid prediction model.
     #[error("prediction model: {0}")]
     Model(String),
-    /// A pole of the closed loop lies on or outside the unit circle.
+    /// Pole of the closed loop on or outside the unit circle.
     #[error(
         "the closed loop is unstable: its pole {} has the modulus {modulus:.9}; it must be below 1 − 10⁻⁶",
-        complex(*re, *im)
+        format_complex(*re, *im)
     )]
     Unstable {
         /// Real part.
         re: f64,
         /// Imaginary part.
         im: f64,
-        /// Distance from 0.
+        /// Modulus.
         modulus: f64,
     },
-    /// The poles of the closed loop cannot be computed.
+    /// Poles of the closed loop that cannot be computed.
     #[error("the poles of the closed loop cannot be computed from these polynomials")]
     NoPoles,
-    /// A pole to be placed where a stable loop has none.
-    #[error("the wanted pole {} has the modulus {modulus}; it must be below 1 − 10⁻⁶", complex(*re, *im))]
+    /// Desired pole on or outside the unit circle.
+    #[error("the wanted pole {} has the modulus {modulus}; it must be below 1 − 10⁻⁶", format_complex(*re, *im))]
     PoleOutside {
         /// Real part.
         re: f64,
         /// Imaginary part.
         im: f64,
-        /// Distance from 0.
+        /// Modulus.
         modulus: f64,
     },
-    /// A pole to be placed off the real axis, alone.
-    #[error("the wanted pole {} must come with its conjugate {}", complex(*re, *im), complex(*re, -im))]
+    /// Complex desired pole without its conjugate.
+    #[error("the wanted pole {} must come with its conjugate {}", format_complex(*re, *im), format_complex(*re, -im))]
     NoConjugate {
         /// Real part.
         re: f64,
         /// Imaginary part.
         im: f64,
     },
-    /// A and B have a root in common, which no controller moves.
+    /// Common root of A and B, which no controller can move.
     #[error(
         "poles cannot be placed: A and B of the prediction model share the root {} or nearly so",
-        complex(*re, *im)
+        format_complex(*re, *im)
     )]
     SharedRoot {
         /// Real part.
@@ -95,14 +96,14 @@ pub enum DesignError {
         /// Imaginary part.
         im: f64,
     },
-    /// The polynomials that came out are no controller.
+    /// Designed polynomials that do not form a controller.
     #[error(transparent)]
     Rst(#[from] RstError),
 }
 
-/// A complex number for people.
-fn complex(re: f64, im: f64) -> String {
-    // Beyond, digits behind the point say nothing.
+/// Formats a complex number for messages.
+fn format_complex(re: f64, im: f64) -> String {
+    // Larger numbers are printed with an exponent.
     const LARGE: f64 = 1e6;
     if re.abs() > LARGE || im.abs() > LARGE {
         return format!("{re:e} {} {:e}j", if im < 0.0 { '−' } else { '+' }, im.abs());

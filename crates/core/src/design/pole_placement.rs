@@ -2,43 +2,44 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::classic::{check_feedforward, with_feedforward};
-use super::poles::inside;
+use super::pid::{check_feedforward, with_feedforward};
+use super::poles::is_stable_pole;
 use super::polynomial::{product, roots, sum};
 use super::{DesignError, PredictionModel};
 use crate::control::Rst;
 
-/// How near the conjugate of a wanted pole must be.
+/// Largest distance between a desired pole and the conjugate of another that count as a pair.
 const SAME_POLE: f64 = 1e-9;
-/// Least ratio of the pivots of the Sylvester matrix: with less, fewer than three digits of the
-/// coefficients are left.
-const LEAST_PIVOT: f64 = 1e-13;
-/// How far A S + B R may be from what is wanted, relative to the sum of its |cᵢ|.
-const RESIDUAL: f64 = 1e-9;
+/// Smallest ratio of the pivots of a regular Sylvester matrix: below it, the coefficients have fewer than three correct
+/// digits.
+const MIN_PIVOT_RATIO: f64 = 1e-13;
+/// Largest residual of A S + B R, relative to Σ |cᵢ|.
+const MAX_RESIDUAL: f64 = 1e-9;
 
-/// What a loop by pole placement is to be.
+/// Specification of a closed loop for pole placement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolePlacement {
-    /// The wanted poles in z, each off the real axis with its conjugate; what is left over lies at 0.
+    /// Desired poles in z, complex ones with their conjugates; the remaining poles are at 0.
     pub poles: Vec<Complex<f64>>,
-    /// Whether S contains the factor 1 − q⁻¹, so that no constant torque leaves an error.
+    /// True if S contains the factor 1 − q⁻¹, so that a constant torque causes no position error.
     pub integrator: bool,
-    /// Weight of the velocity feedforward; 0: none.
+    /// Weight of the velocity feedforward; 0 disables it.
     pub velocity_feedforward: f64,
 }
 
-/// The controller of least degree that gives the closed loop the wanted poles: A S + B R = Π (1 − pᵢ q⁻¹).
+/// Designs the controller of lowest degree with A S + B R = Π (1 − pᵢ q⁻¹) for the desired poles pᵢ.
 ///
-/// T is R(1), so that setpoints do not meet the zeros of R, and the feedforward.
+/// T is R(1), so that setpoints are not filtered by the zeros of R, plus the feedforward.
 ///
 /// # Errors
-/// [`DesignError::OutOfRange`] for more poles than the model and the controller have,
-/// [`DesignError::PoleOutside`], [`DesignError::NoConjugate`], [`DesignError::SharedRoot`].
+/// [`DesignError::OutOfRange`] for more poles than the closed loop has, [`DesignError::PoleOutside`] for an unstable
+/// one, [`DesignError::NoConjugate`] for a complex one without its conjugate, [`DesignError::SharedRoot`] if A and B
+/// have a common root.
 pub fn pole_placement(model: &PredictionModel, wanted: &PolePlacement) -> Result<Rst, DesignError> {
     check_feedforward(wanted.velocity_feedforward)?;
     let factor: &[f64] = if wanted.integrator { &[1.0, -1.0] } else { &[1.0] };
     let mut a = product(trimmed(model.a()), factor);
-    // An A of degree 0 leaves no R; with a zero at its end there is a gain.
+    // A of degree 0 would leave R empty; a trailing 0 leaves one coefficient.
     a.resize(a.len().max(2), 0.0);
     let b = trimmed(model.b());
     let (order_a, order_b) = (a.len() - 1, b.len() - 1);
@@ -50,7 +51,7 @@ pub fn pole_placement(model: &PredictionModel, wanted: &PolePlacement) -> Result
             allowed: format!("be at most {unknowns} in number, the order of this loop"),
         });
     }
-    let mut target = polynomial(&wanted.poles)?;
+    let mut target = polynomial_from_poles(&wanted.poles)?;
     target.resize(unknowns + 1, 0.0);
     // Unknowns: s₁ … of degree order_b − 1, then r₀ … of degree order_a − 1; rows: q⁻¹ … q^−unknowns.
     let shifted = |p: &[f64], row: usize, shift: usize| {
@@ -62,7 +63,7 @@ pub fn pole_placement(model: &PredictionModel, wanted: &PolePlacement) -> Result
             Some(lag) => shifted(b, row + 1, lag),
         });
     let right = DVector::from_fn(unknowns, |row, _| target[row + 1] - shifted(&a, row + 1, 0));
-    // B is far smaller than A: columns of one length, so that pivots tell of shared roots only.
+    // B is much smaller than A: columns of equal length, so that small pivots indicate common roots only.
     let lengths: Vec<f64> = sylvester.column_iter().map(|column| column.norm()).collect();
     for (mut column, length) in sylvester.column_iter_mut().zip(&lengths) {
         column /= *length;
@@ -73,15 +74,15 @@ pub fn pole_placement(model: &PredictionModel, wanted: &PolePlacement) -> Result
     let r: Vec<f64> = (order_b - 1..unknowns).map(coefficient).collect();
     let found = sum(&product(&a, &s), &product(b, &r));
     let scale: f64 = found.iter().chain(&target).map(|c| c.abs()).sum();
-    if !found.iter().zip(&target).all(|(f, t)| (f - t).abs() <= RESIDUAL * scale) {
+    if !found.iter().zip(&target).all(|(f, t)| (f - t).abs() <= MAX_RESIDUAL * scale) {
         return Err(shared_root(&a, b));
     }
     let gain: f64 = r.iter().sum();
     with_feedforward(&r, &product(&s, factor), &[gain], wanted.velocity_feedforward, model.period())
 }
 
-/// The poles in z of a pair with this bandwidth (natural frequency, rad/s) and damping, sampled every
-/// `period` s: exp(s Tsp). From a damping of 1 on both are real.
+/// Computes the pole pair exp(s Tsp) in z for a bandwidth (natural frequency, rad/s) and a damping ratio, sampled every
+/// `period` s. Both poles are real for a damping ratio of at least 1.
 ///
 /// # Errors
 /// [`DesignError::OutOfRange`] unless 0 < bandwidth ≤ π/period and 0 < damping.
@@ -96,19 +97,19 @@ pub fn pole_pair(bandwidth: f64, damping: f64, period: f64) -> Result<[Complex<f
         return Err(DesignError::OutOfRange { name: "damping", value: damping, allowed });
     }
     let turn = Complex::new(damping * damping - 1.0, 0.0).sqrt();
-    // The product of the two is ω², which gives the slow one without a difference.
+    // The product of both is ω²: the slow one is computed without cancellation.
     let fast = -(turn + damping) * bandwidth;
     let slow = Complex::new(bandwidth * bandwidth, 0.0) / fast;
     let exact = |s: Complex<f64>| if damping < 1.0 { s } else { s.re.into() };
     Ok([exact(slow), exact(fast)].map(|s| (s * period).exp()))
 }
 
-/// Π (1 − pᵢ q⁻¹).
-fn polynomial(poles: &[Complex<f64>]) -> Result<Vec<f64>, DesignError> {
+/// Expands Π (1 − pᵢ q⁻¹).
+fn polynomial_from_poles(poles: &[Complex<f64>]) -> Result<Vec<f64>, DesignError> {
     let mut polynomial = vec![1.0];
     let mut left = poles.to_vec();
     while let Some(pole) = left.pop() {
-        if !inside(pole) {
+        if !is_stable_pole(pole) {
             return Err(DesignError::PoleOutside { re: pole.re, im: pole.im, modulus: pole.norm() });
         }
         if pole.im == 0.0 {
@@ -124,24 +125,24 @@ fn polynomial(poles: &[Complex<f64>]) -> Result<Vec<f64>, DesignError> {
     Ok(polynomial)
 }
 
-/// The polynomial without zeros at its end.
+/// Returns the polynomial without trailing zeros.
 fn trimmed(polynomial: &[f64]) -> &[f64] {
     let end = polynomial.iter().rposition(|c| *c != 0.0).map_or(0, |last| last + 1);
     &polynomial[..end]
 }
 
-/// The solution of a square system; none if its matrix is singular.
+/// Solves a square system; `None` if its matrix is singular.
 fn solve(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let decomposition = matrix.full_piv_lu();
     let pivots = decomposition.u().diagonal().abs();
-    // Of a NaN it is not.
-    let regular = pivots.min() > LEAST_PIVOT * pivots.max();
-    if regular { decomposition.solve(right) } else { None }
+    // False for NaN.
+    let is_regular = pivots.min() > MIN_PIVOT_RATIO * pivots.max();
+    if is_regular { decomposition.solve(right) } else { None }
 }
 
-/// The refusal that names the root of A which is nearest to one of B.
+/// Returns the error with the root of A that is nearest to a root of B.
 fn shared_root(a: &[f64], b: &[f64]) -> DesignError {
-    // B without its delay, so that its first coefficient is none.
+    // B without its delay, so that its first coefficient is not 0.
     let leading = b.iter().position(|c| *c != 0.0).unwrap_or(0);
     let (Some(of_a), Some(of_b)) = (roots(a), roots(&b[leading..])) else {
         return DesignError::NoPoles;

@@ -6,10 +6,10 @@ use nalgebra::{Complex, DMatrix, DVector, Schur};
 
 use crate::control::INTEGRATOR_TOLERANCE;
 
-/// Steps of the QR iteration for each root; it needs two or three.
+/// Largest number of QR iterations per root; two or three are usual.
 const ITERATIONS_PER_ROOT: usize = 40;
 
-/// Product of two polynomials.
+/// Computes the product of two polynomials.
 pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
     for (i, x) in a.iter().enumerate() {
@@ -20,39 +20,39 @@ pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     product
 }
 
-/// Sum of two polynomials.
+/// Computes the sum of two polynomials.
 pub(super) fn sum(a: &[f64], b: &[f64]) -> Vec<f64> {
     let at = |p: &[f64], i: usize| p.get(i).copied().unwrap_or(0.0);
     (0..a.len().max(b.len())).map(|i| at(a, i) + at(b, i)).collect()
 }
 
-/// The value at q⁻¹ = `x`.
+/// Evaluates a polynomial at q⁻¹ = `x`.
 pub(super) fn value(polynomial: &[f64], x: Complex<f64>) -> Complex<f64> {
     polynomial.iter().rev().fold(Complex::new(0.0, 0.0), |sum, c| sum * x + c)
 }
 
-/// Roots in z = q, largest modulus first; a polynomial of degree n in q⁻¹ has n, some of them 0. None
-/// if the iteration does not end. The first coefficient must not be 0.
+/// Computes the roots in z = q, largest modulus first, as eigenvalues of the companion matrix.
 ///
-/// The eigenvalues of the companion matrix.
+/// A polynomial of degree n in q⁻¹ has n roots, some of them may be 0. The first coefficient must not be 0. Returns
+/// `None` if the iteration does not converge.
 pub(super) fn roots(polynomial: &[f64]) -> Option<Vec<Complex<f64>>> {
     let leading = *polynomial.first()?;
     let largest = polynomial.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
-    // What is below the rounding of the others is none: those roots are 0.
+    // Trailing coefficients within rounding error count as 0: their roots are 0.
     let significant = polynomial.iter().rposition(|c| c.abs() > f64::EPSILON * largest)?;
     let mut roots = eigenvalues(significant, |i| -polynomial[i + 1] / leading)?;
     roots.resize(polynomial.len() - 1, Complex::new(0.0, 0.0));
     roots.sort_by(|a, b| {
-        // Pairs stand together, the one above the real axis first.
+        // Conjugate pairs are adjacent, positive imaginary part first.
         let by_modulus = b.norm().partial_cmp(&a.norm()).unwrap_or(Ordering::Equal);
         by_modulus.then(b.im.partial_cmp(&a.im).unwrap_or(Ordering::Equal))
     });
     Some(roots)
 }
 
-/// Whether all roots in z lie inside the circle of this radius (recursion of Schur and Cohn): far quicker
-/// than to compute them.
-pub(super) fn roots_within(polynomial: &[f64], radius: f64) -> bool {
+/// Returns true if all roots in z are inside the circle of this radius (Schur–Cohn recursion, without computing the
+/// roots).
+pub(super) fn has_roots_within(polynomial: &[f64], radius: f64) -> bool {
     let mut scale = 1.0;
     let mut left: Vec<f64> = Vec::with_capacity(polynomial.len());
     for c in polynomial {
@@ -63,9 +63,9 @@ pub(super) fn roots_within(polynomial: &[f64], radius: f64) -> bool {
     while left.len() > 1 {
         let last = left.len() - 1;
         let reflection = left[last] / left[0];
-        // A NaN is not.
-        let inside = reflection.abs() < 1.0;
-        if !inside {
+        // False for NaN.
+        let is_inside = reflection.abs() < 1.0;
+        if !is_inside {
             return false;
         }
         next.clear();
@@ -75,7 +75,7 @@ pub(super) fn roots_within(polynomial: &[f64], radius: f64) -> bool {
     true
 }
 
-/// The polynomial without its factors 1 − q⁻¹.
+/// Divides a polynomial by all of its factors 1 − q⁻¹.
 pub(super) fn without_integrators(polynomial: &[f64]) -> Vec<f64> {
     let mut left = polynomial.to_vec();
     let size: f64 = left.iter().map(|c| c.abs()).sum();
@@ -91,7 +91,7 @@ pub(super) fn without_integrators(polynomial: &[f64]) -> Vec<f64> {
     left
 }
 
-/// Eigenvalues of the companion matrix with this first row.
+/// Computes the eigenvalues of the companion matrix with this first row; `None` without convergence.
 fn eigenvalues(size: usize, first_row: impl Fn(usize) -> f64) -> Option<Vec<Complex<f64>>> {
     if size == 0 {
         return Some(Vec::new());
@@ -105,13 +105,13 @@ fn eigenvalues(size: usize, first_row: impl Fn(usize) -> f64) -> Option<Vec<Comp
     }
     let limit = ITERATIONS_PER_ROOT * size;
     let schur = |matrix| Schur::try_new(matrix, f64::EPSILON, limit);
-    // The iteration stands still on matrices such as that of zⁿ − 1; mirrored, they are as any other.
-    let schur = schur(companion.clone()).or_else(|| schur(mirrored(companion)))?;
+    // The QR iteration stalls on matrices such as that of zⁿ − 1; a Householder similarity transformation avoids it.
+    let schur = schur(companion.clone()).or_else(|| schur(householder_transformed(companion)))?;
     Some(schur.complex_eigenvalues().iter().copied().collect())
 }
 
-/// H M H with a Householder matrix H of no symmetry.
-fn mirrored(matrix: DMatrix<f64>) -> DMatrix<f64> {
+/// Computes H M H with a Householder matrix H of an asymmetric normal.
+fn householder_transformed(matrix: DMatrix<f64>) -> DMatrix<f64> {
     let size = matrix.nrows();
     let normal = DVector::from_fn(size, |i, _| 1.0 / (i + 1) as f64).normalize();
     let mirror = DMatrix::identity(size, size) - &normal * normal.transpose() * 2.0;
@@ -123,12 +123,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn roots_on_a_circle_do_not_hold_the_iteration() {
+    fn roots_on_a_circle_do_not_stall_the_iteration() {
         for size in 1..=24 {
             let mut polynomial = vec![0.0; size + 1];
             polynomial[0] = 2.0;
             polynomial[size] = -2.0;
-            let found = roots(&polynomial).expect("it ends");
+            let found = roots(&polynomial).expect("convergence");
             assert_eq!(found.len(), size);
             for root in found {
                 let power = root.powu(size as u32);
@@ -138,18 +138,18 @@ mod tests {
     }
 
     #[test]
-    fn the_recursion_tells_inside_from_outside() {
+    fn schur_cohn_recursion_detects_roots_outside_the_circle() {
         for radius in [0.2, 0.7, 1.0, 1.5] {
             for (size, inside) in [(0.999_f64, true), (1.001, false)] {
                 let (re, square) = (0.6 * size * radius, (size * radius).powi(2));
                 let pair = [1.0, -2.0 * re, square];
-                assert_eq!(roots_within(&pair, radius), inside);
+                assert_eq!(has_roots_within(&pair, radius), inside);
                 let more =
                     product(&product(&pair, &[2.0, -0.1 * radius]), &[1.0, 0.0, 0.3 * radius * radius]);
-                assert_eq!(roots_within(&more, radius), inside);
+                assert_eq!(has_roots_within(&more, radius), inside);
             }
         }
-        assert!(roots_within(&[1.0, -0.5, 0.0], 0.6) && !roots_within(&[1.0, f64::NAN], 1.0));
+        assert!(has_roots_within(&[1.0, -0.5, 0.0], 0.6) && !has_roots_within(&[1.0, f64::NAN], 1.0));
     }
 
     #[test]

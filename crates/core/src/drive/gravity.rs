@@ -1,50 +1,51 @@
-//! What weight asks of the motor.
+//! Gravity torque of vertical and tilting axes.
 //!
-//! From tick to tick an axis turns little. The torque at one angle gives those near it by a short polynomial, which
-//! takes the sine out of the chain from one tick to the next.
+//! The angle changes little from tick to tick. A short polynomial around one angle gives the torque near it and removes
+//! the sine from the dependency chain between ticks.
 
 use std::f64::consts::FRAC_PI_2;
 
 use super::elementary::sine;
 use crate::config::GravityConfig;
-use crate::simd::{Number, numbers};
+use crate::simd::{SimdReal, soa_struct};
 
-/// Largest |x| for which the polynomials are sine and cosine, rad.
-const REACH: f64 = 1.0 / 128.0;
-/// Where the middle of a new one is, in reaches from the angle that has left the one before: an axis is likely to go
-/// on in its direction.
-const AHEAD: f64 = 0.9;
-/// cos x for |x| ≤ [`REACH`], by powers of x²: the series with its x⁶ in the next lower polynomials of Chebyshev.
-/// Error 2e-17.
+/// Largest |x| for which the polynomials approximate sine and cosine, rad.
+const RANGE: f64 = 1.0 / 128.0;
+/// Distance of the center of a new expansion from the angle that left the previous one, in units of [`RANGE`], in the
+/// direction of the change.
+const CENTER_OFFSET: f64 = 0.9;
+/// Coefficients of cos x for |x| ≤ [`RANGE`] in powers of x²: Taylor series with x⁶ economized by Chebyshev polynomials;
+/// error 2e-17.
 const COSINE: [f64; 3] = {
     const X6: f64 = -1.0 / 720.0;
-    const SQUARE: f64 = REACH * REACH;
+    const SQUARE: f64 = RANGE * RANGE;
     [1.0, -0.5 - X6 * 9.0 / 16.0 * SQUARE * SQUARE, 1.0 / 24.0 + X6 * 1.5 * SQUARE]
 };
-/// sin x/x there, by powers of x²: the series. Error 5e-17.
+/// Coefficients of sin x/x for |x| ≤ [`RANGE`] in powers of x²: Taylor series; error 5e-17.
 const SINE: [f64; 3] = [1.0, -1.0 / 6.0, 1.0 / 120.0];
 
-numbers! {
-    /// `C_gravity = r (W + k sin(SP + φ))`, N·m at the motor, positive against motion towards plus.
+soa_struct! {
+    /// Gravity torque `C_gravity = r (W + k sin(SP + φ))`, N·m at the motor, positive against motion towards plus.
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct Gravity {
         /// r W, N·m.
         weight: N,
         /// r k, N·m.
         tilt: N,
+        /// φ, rad.
         phase: N,
-        /// r of an axis that tilts; 0 of another, whose angle does not matter.
-        turn: N,
-        /// From an angle of the motor that leaves a polynomial to the middle of the next, rad.
-        ahead: N,
+        /// r for a tilting axis, else 0.
+        angle_ratio: N,
+        /// Distance from a motor angle that leaves an expansion to the center of the next one, rad.
+        center_offset: N,
     }
 }
 
-numbers! {
-    /// The torque near one angle of the motor: a polynomial in how far the axis has turned from there.
+soa_struct! {
+    /// Polynomial of the gravity torque in the rotation of the axis from one motor angle.
     #[derive(Debug, Clone, Copy, PartialEq)]
-    pub(crate) struct Incline {
-        /// That angle, rad.
+    pub(crate) struct GravityExpansion {
+        /// Motor angle of expansion, rad.
         center: N,
         c0: N,
         c1: N,
@@ -56,7 +57,7 @@ numbers! {
 }
 
 impl Gravity {
-    /// Gravity of an axis behind a transmission of ratio r (m or rad per rad of the motor).
+    /// Creates the gravity of an axis with a transmission ratio r (m or rad per rad of the motor).
     pub fn new(gravity: &GravityConfig, transmission_ratio: f64) -> Self {
         let tilt = transmission_ratio * gravity.tilt;
         let tilting = tilt != 0.0;
@@ -64,71 +65,72 @@ impl Gravity {
             weight: transmission_ratio * gravity.weight,
             tilt,
             phase: gravity.phase,
-            turn: if tilting { transmission_ratio } else { 0.0 },
-            ahead: if tilting { AHEAD * REACH / transmission_ratio } else { 0.0 },
+            angle_ratio: if tilting { transmission_ratio } else { 0.0 },
+            center_offset: if tilting { CENTER_OFFSET * RANGE / transmission_ratio } else { 0.0 },
         }
     }
 
-    /// Whether the torque depends on where the axis stands.
-    pub fn is_tilting(&self) -> bool {
+    /// Returns true if the torque depends on the position (tilting axis).
+    pub fn is_position_dependent(&self) -> bool {
         self.tilt != 0.0
     }
 }
 
-impl<N: Number> Gravity<N> {
-    /// Torque of an axis that does not tilt, N·m at the motor.
+impl<N: SimdReal> Gravity<N> {
+    /// Returns the torque of an axis that does not tilt, N·m at the motor.
     #[inline(always)]
-    pub(super) fn weight(&self) -> N {
+    pub(super) fn weight_torque(&self) -> N {
         self.weight
     }
 
-    /// Torque at the axis position `position` (m or rad), N·m at the motor.
+    /// Returns the torque at the axis position `position` (m or rad), N·m at the motor.
     #[inline(always)]
     pub fn torque(&self, position: N) -> N {
         self.tilt.mul_add(sine(position + self.phase), self.weight)
     }
 
-    /// The torque near the motor angle `angle`, rad.
+    /// Expands the torque near the motor angle `angle`, rad.
     #[inline(always)]
-    pub(crate) fn near(&self, angle: N) -> Incline<N> {
-        let x = angle.mul_add(self.turn, self.phase);
-        let (along, across) = (self.tilt * sine(x), self.tilt * sine(x + x.constant(FRAC_PI_2)));
-        let number = |value: f64| x.constant(value);
-        Incline {
+    pub(crate) fn expand(&self, angle: N) -> GravityExpansion<N> {
+        let x = angle.mul_add(self.angle_ratio, self.phase);
+        let (value, slope) = (self.tilt * sine(x), self.tilt * sine(x + x.splat(FRAC_PI_2)));
+        let splat = |value: f64| x.splat(value);
+        GravityExpansion {
             center: angle,
-            c0: along + self.weight,
-            c1: across,
-            c2: along * number(COSINE[1]),
-            c3: across * number(SINE[1]),
-            c4: along * number(COSINE[2]),
-            c5: across * number(SINE[2]),
+            c0: value + self.weight,
+            c1: slope,
+            c2: value * splat(COSINE[1]),
+            c3: slope * splat(SINE[1]),
+            c4: value * splat(COSINE[2]),
+            c5: slope * splat(SINE[2]),
         }
     }
 
-    /// Torque at the motor angle `angle` (rad), N·m at the motor. Where the polynomial at hand does not hold it is
-    /// renewed, and nowhere else.
+    /// Returns the torque at the motor angle `angle` (rad), N·m at the motor, from `expansion`.
+    ///
+    /// Renews the expansion in the lanes whose angle is out of its range, and only there.
     #[inline(always)]
-    pub(crate) fn torque_near(&self, near: &mut Incline<N>, angle: N) -> N {
-        let mut turned = self.turned(near, angle);
-        if turned.abs().exceeds(REACH) {
-            let nothing = turned.constant(0.0);
-            let step = self.ahead.select(nothing.less(turned), -self.ahead);
-            let left = turned.constant(REACH).less(turned.abs());
-            *near = near.or(self.near(angle + step), left);
-            turned = self.turned(near, angle);
+    pub(crate) fn torque_with_expansion(&self, expansion: &mut GravityExpansion<N>, angle: N) -> N {
+        let mut rotation = self.rotation(expansion, angle);
+        if rotation.abs().any_gt(RANGE) {
+            let zero = rotation.splat(0.0);
+            let step = self.center_offset.select(zero.simd_lt(rotation), -self.center_offset);
+            let out_of_range = rotation.splat(RANGE).simd_lt(rotation.abs());
+            *expansion = self.expand(angle + step).select(out_of_range, *expansion);
+            rotation = self.rotation(expansion, angle);
         }
-        near.at(turned)
+        expansion.at(rotation)
     }
 
-    /// How far the axis has turned from the middle of a polynomial, rad.
+    /// Returns the rotation of the axis from the center of an expansion, rad.
     #[inline(always)]
-    fn turned(&self, near: &Incline<N>, angle: N) -> N {
-        (angle - near.center) * self.turn
+    fn rotation(&self, expansion: &GravityExpansion<N>, angle: N) -> N {
+        (angle - expansion.center) * self.angle_ratio
     }
 }
 
-impl<N: Number> Incline<N> {
-    /// The torque where the axis has turned by `x`, rad.
+impl<N: SimdReal> GravityExpansion<N> {
+    /// Returns the torque at a rotation `x`, rad.
     #[inline(always)]
     fn at(&self, x: N) -> N {
         let x2 = x * x;
@@ -143,24 +145,24 @@ impl<N: Number> Incline<N> {
 mod tests {
     use super::*;
 
-    /// An axis that tilts behind a gear, and its torque as it is printed.
+    /// Returns the gravity of a tilting axis behind a gear, and its torque by the definition.
     fn tilting(ratio: f64, phase: f64) -> (Gravity, impl Fn(f64) -> f64) {
         let law = GravityConfig { weight: 300.0, tilt: 200.0, phase };
-        let printed = move |angle: f64| ratio * (300.0 + 200.0 * (ratio * angle + phase).sin());
-        (Gravity::new(&law, ratio), printed)
+        let defined = move |angle: f64| ratio * (300.0 + 200.0 * (ratio * angle + phase).sin());
+        (Gravity::new(&law, ratio), defined)
     }
 
     #[test]
-    fn the_torque_near_an_angle_is_the_one_that_is_printed() {
+    fn expanded_torque_equals_the_definition() {
         for (ratio, phase) in [(1.0, 0.0), (1.0 / 90.0, 0.4), (1.0 / 90.0, -3.0), (2e-3, 1.5)] {
-            let (gravity, printed) = tilting(ratio, phase);
-            let mut near = gravity.near(0.0);
-            // Over 9 rad to either side, in small steps and in large ones.
+            let (gravity, defined) = tilting(ratio, phase);
+            let mut expansion = gravity.expand(0.0);
+            // Over ±9 rad, in small and in large steps.
             let slow = (0..300_000).map(|k| 9.0 * (1e-4 * f64::from(k)).sin());
             let jumping = (0..10_000).map(|k| 9.0 * (0.37 * f64::from(k)).sin());
             for position in slow.chain(jumping) {
                 let angle = position / ratio;
-                let (found, exact) = (gravity.torque_near(&mut near, angle), printed(angle));
+                let (found, exact) = (gravity.torque_with_expansion(&mut expansion, angle), defined(angle));
                 // Half a unit in the last place of an angle of 12 rad, and a few of the torque.
                 assert!((found - exact).abs() <= 2e-15 * 500.0 * ratio, "{found} at {position}, not {exact}");
             }
@@ -168,22 +170,22 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_that_does_not_tilt_weighs_the_same_everywhere() {
+    fn gravity_without_tilt_is_constant() {
         let law = GravityConfig { weight: 300.0, tilt: 0.0, phase: 0.4 };
         let gravity = Gravity::new(&law, 0.01);
-        let mut near = gravity.near(0.0);
+        let mut expansion = gravity.expand(0.0);
         for angle in [0.0, -3.0, 1e6, -1e300] {
-            assert_eq!(gravity.torque_near(&mut near, angle), gravity.weight());
-            assert_eq!(near, gravity.near(0.0));
+            assert_eq!(gravity.torque_with_expansion(&mut expansion, angle), gravity.weight_torque());
+            assert_eq!(expansion, gravity.expand(0.0));
         }
     }
 
     #[test]
-    fn the_torque_of_an_axis_that_has_flown_off_is_no_larger_than_elsewhere() {
+    fn torque_at_huge_angles_is_bounded() {
         let (gravity, _) = tilting(0.01, 0.4);
-        let mut near = gravity.near(0.0);
+        let mut expansion = gravity.expand(0.0);
         for angle in [1e12, -7.1e15, 3.7e18, 1e40, -1e300, f64::MAX] {
-            let torque = gravity.torque_near(&mut near, angle);
+            let torque = gravity.torque_with_expansion(&mut expansion, angle);
             assert!((0.999..=5.001).contains(&torque), "{torque} at {angle}");
         }
     }

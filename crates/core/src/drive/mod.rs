@@ -1,6 +1,6 @@
-//! Physics of one feed drive: motor, friction, gravity, load. Knows no controller.
+//! Plant of one feed drive: motor, friction, gravity and load, independent of the controllers.
 //!
-//! (Prévost eq. 1)
+//! Equations of motion (Prévost eq. 1):
 //!
 //! ```text
 //! L di/dt = u − R i − Ke ω
@@ -9,46 +9,48 @@
 //! ```
 
 mod elementary;
-mod expansion;
 mod friction;
+mod friction_expansion;
 mod gravity;
 mod motor;
 mod plant;
 mod response;
 
-pub(crate) use expansion::Expansion;
 pub use friction::Friction;
+pub(crate) use friction_expansion::FrictionExpansion;
 pub use gravity::Gravity;
-pub(crate) use gravity::Incline;
+pub(crate) use gravity::GravityExpansion;
 pub use motor::{Motor, MotorState};
 pub use plant::{Plant, Torques};
 
-/// Why a plant cannot be built from its parameters.
+use crate::units::Rounded;
+
+/// Error of building a plant from its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum DriveError {
-    /// The zero-order-hold discretization is not made of numbers.
+    /// Zero-order-hold discretization that is not finite.
     #[error(
-        "the motor cannot be stepped over {period_s} s: the response of its speed to a torque over one \
-         period is {speed_per_torque} (rad/s)/(N·m), which must be positive and finite; mend inertia, \
-         motor.resistance_ohm and motor.inductance_mh"
+        "the motor cannot be discretized over {} s: the change of its speed per torque over one current cycle is {} \
+         (rad/s)/(N·m); it must be positive and finite; change inertia, motor.resistance_ohm or motor.inductance_mh",
+        Rounded(*period_s), Rounded(*speed_per_torque)
     )]
     Discretization {
-        /// Current-loop period, s.
+        /// Period of the current loop, s.
         period_s: f64,
-        /// Change of ω over one period per torque, (rad/s)/(N·m).
+        /// Change of ω over one current cycle per torque, (rad/s)/(N·m).
         speed_per_torque: f64,
     },
-    /// Current and speed swing against each other within one period.
+    /// Underdamped motor whose speed response to a torque changes its sign within one current cycle.
     #[error(
-        "the motor cannot be stepped over {period_s} s: without a controller current and speed swing at \
-         {frequency_hz:.6e} Hz, so little damped that a torque would turn the motor against its own direction \
-         within the period; shorten periods.current_us, or mend inertia, motor.inductance_mh and \
-         motor.resistance_ohm"
+        "the motor cannot be discretized over {} s: without a controller current and speed oscillate at {} Hz with so \
+         little damping that a torque would reverse the motor within one current cycle; shorten periods.current_us, or \
+         change inertia, motor.inductance_mh or motor.resistance_ohm",
+        Rounded(*period_s), Rounded(*frequency_hz)
     )]
-    Swings {
-        /// Current-loop period, s.
+    Oscillates {
+        /// Period of the current loop, s.
         period_s: f64,
-        /// Frequency of the damped swinging, Hz.
+        /// Frequency of the damped oscillation, Hz.
         frequency_hz: f64,
     },
 }

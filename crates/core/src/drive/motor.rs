@@ -1,19 +1,19 @@
-//! The motor between two ticks, stepped without discretization error.
+//! Motor stepped by exact zero-order-hold discretization (matrix exponential), without discretization error.
 
 use std::f64::consts::TAU;
 
 use nalgebra::SMatrix;
 
 use super::DriveError;
-use super::response::Response;
+use super::response::SecondOrderResponse;
 use crate::config::MotorConfig;
-use crate::simd::{Number, limited, numbers};
+use crate::simd::{SimdReal, clamp_abs, soa_struct};
 
-/// Largest entry of the system matrix times the tick with which a motor is slow: no interval is halved.
-const SLOW: f64 = 0.5;
+/// Largest entry of system matrix × tick for which the Padé approximant needs no scaling and squaring.
+const MAX_PADE_ENTRY: f64 = 0.5;
 
-numbers! {
-    /// State of a motor: what the differential equation integrates.
+soa_struct! {
+    /// State of a motor (Prévost eq. 1).
     #[derive(Debug, Clone, Copy, Default, PartialEq)]
     pub struct MotorState {
         /// i, A.
@@ -25,34 +25,35 @@ numbers! {
     }
 }
 
-numbers! {
+soa_struct! {
     /// Zero-order-hold discretization of Prévost eq. 1 over one tick.
     ///
-    /// With voltage u and torque τ (everything but Kt·i) held,
+    /// Voltage u and torque τ (all torques except Kt·i) are held over the tick:
     ///
     /// ```text
     /// [i ω]ₙ₊₁ = Φ [i ω]ₙ + Γu u + Γτ τ
     ///   θₙ₊₁   = θₙ + φ [i ω]ₙ + γu u + γτ τ
     /// ```
     ///
-    /// where Φ, Γ are blocks of the exponential of the augmented system matrix times the tick.
+    /// Φ and Γ are blocks of the exponential of the augmented system matrix times the tick.
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct Motor {
-        current: Row<N>,
-        speed: Row<N>,
-        angle: Row<N>,
+        current: TransitionRow<N>,
+        speed: TransitionRow<N>,
+        angle: TransitionRow<N>,
         /// Torque per change of ω over one tick, (N·m)/(rad/s).
         torque_per_speed: N,
-        /// What a torque that changes ω by 1 rad/s over one tick changes i and θ by, A and rad.
+        /// Change of i by a torque that changes ω by 1 rad/s over one tick, A/(rad/s).
         current_per_speed: N,
+        /// Change of θ by a torque that changes ω by 1 rad/s over one tick, rad/(rad/s).
         angle_per_speed: N,
     }
 }
 
-numbers! {
-    /// One row of the discretized system: the weights of i, ω, u and τ.
+soa_struct! {
+    /// One row of the discretized system: weights of i, ω, u and τ.
     #[derive(Debug, Clone, Copy, PartialEq)]
-    pub(super) struct Row {
+    pub(super) struct TransitionRow {
         current: N,
         speed: N,
         voltage: N,
@@ -60,23 +61,23 @@ numbers! {
     }
 }
 
-impl<N: Number> Row<N> {
+impl<N: SimdReal> TransitionRow<N> {
     #[inline(always)]
     fn apply(&self, s: &MotorState<N>, voltage: N, torque: N) -> N {
-        // The voltage is known last.
+        // The voltage is the last operand to be computed.
         let rest = self.current.mul_add(s.current, self.speed.mul_add(s.speed, self.torque * torque));
         self.voltage.mul_add(voltage, rest)
     }
 }
 
-impl Row {
+impl TransitionRow {
     fn is_finite(&self) -> bool {
         [self.current, self.speed, self.voltage, self.torque].iter().all(|weight| weight.is_finite())
     }
 }
 
-/// The system matrix: states i, ω, θ, then the held inputs u and τ.
-fn system(m: &MotorConfig) -> SMatrix<f64, 5, 5> {
+/// Returns the augmented system matrix: states i, ω, θ, then the held inputs u and τ.
+fn system_matrix(m: &MotorConfig) -> SMatrix<f64, 5, 5> {
     let mut a = SMatrix::zeros();
     a[(0, 0)] = -m.resistance / m.inductance;
     a[(0, 1)] = -m.emf_constant / m.inductance;
@@ -87,20 +88,25 @@ fn system(m: &MotorConfig) -> SMatrix<f64, 5, 5> {
     a
 }
 
-/// The rows of a slow motor, by the approximant of Padé that nalgebra takes where it need not halve.
-fn approximant(system: &SMatrix<f64, 5, 5>) -> [Row; 3] {
+/// Computes the rows of a slow motor by the Padé approximant of nalgebra, without scaling and squaring.
+fn pade_rows(system: &SMatrix<f64, 5, 5>) -> [TransitionRow; 3] {
     let e = system.exp();
-    [0, 1, 2].map(|k| Row { current: e[(k, 0)], speed: e[(k, 1)], voltage: e[(k, 3)], torque: e[(k, 4)] })
+    [0, 1, 2].map(|k| TransitionRow {
+        current: e[(k, 0)],
+        speed: e[(k, 1)],
+        voltage: e[(k, 3)],
+        torque: e[(k, 4)],
+    })
 }
 
-/// The rows of any motor.
-fn closed_form(m: &MotorConfig, response: &Response) -> [Row; 3] {
-    let Response { impulse, step, ramp, slope, held, .. } = *response;
+/// Computes the rows of any motor in closed form.
+fn closed_form_rows(m: &MotorConfig, response: &SecondOrderResponse) -> [TransitionRow; 3] {
+    let SecondOrderResponse { impulse, step, ramp, slope, speed_decay, .. } = *response;
     let damping = m.resistance / m.inductance;
     let (per_current, per_speed) = (m.torque_constant / m.inertia, -m.emf_constant / m.inductance);
     // g′ + a g, integrated once and twice.
     let (once, twice) = (impulse + damping * step, step + damping * ramp);
-    let row = |current, speed, voltage: f64, torque: f64| Row {
+    let row = |current, speed, voltage: f64, torque: f64| TransitionRow {
         current,
         speed,
         voltage: voltage / m.inductance,
@@ -108,7 +114,7 @@ fn closed_form(m: &MotorConfig, response: &Response) -> [Row; 3] {
     };
     [
         row(slope, per_speed * impulse, impulse, per_speed * step),
-        row(per_current * impulse, held, per_current * step, once),
+        row(per_current * impulse, speed_decay, per_current * step, once),
         row(per_current * step, once, per_current * ramp, twice),
     ]
 }
@@ -117,22 +123,23 @@ impl Motor {
     /// Discretizes the motor over `period` seconds.
     ///
     /// # Errors
-    /// [`DriveError::Discretization`] if the step is not finite; [`DriveError::Swings`] if it is so long that a
-    /// torque would turn the motor against its own direction within it (friction could not be resolved then).
+    /// [`DriveError::Discretization`] if a coefficient is not finite; [`DriveError::Oscillates`] if the period is so
+    /// long that the speed response to a torque changes its sign within it, so that friction cannot be computed.
     pub fn new(motor: &MotorConfig, period: f64) -> Result<Self, DriveError> {
         let damping = motor.resistance / motor.inductance;
         let stiffness = motor.emf_constant / motor.inductance * (motor.torque_constant / motor.inertia);
-        let response = Response::new(damping, stiffness, period);
-        let system = system(motor) * period;
-        let slow = system.iter().all(|entry| entry.abs() <= SLOW);
-        let [current, speed, angle] = if slow { approximant(&system) } else { closed_form(motor, &response) };
+        let response = SecondOrderResponse::new(damping, stiffness, period);
+        let system = system_matrix(motor) * period;
+        let is_slow = system.iter().all(|entry| entry.abs() <= MAX_PADE_ENTRY);
+        let [current, speed, angle] =
+            if is_slow { pade_rows(&system) } else { closed_form_rows(motor, &response) };
         let torque_per_speed = 1.0 / speed.torque;
-        if ![current, speed, angle].iter().all(Row::is_finite) || !torque_per_speed.is_finite() {
+        if ![current, speed, angle].iter().all(TransitionRow::is_finite) || !torque_per_speed.is_finite() {
             return Err(DriveError::Discretization { period_s: period, speed_per_torque: speed.torque });
         }
-        if !response.keeps_direction {
+        if !response.has_constant_sign {
             let frequency_hz = (stiffness - damping * damping / 4.0).max(0.0).sqrt() / TAU;
-            return Err(DriveError::Swings { period_s: period, frequency_hz });
+            return Err(DriveError::Oscillates { period_s: period, frequency_hz });
         }
         Ok(Motor {
             current,
@@ -144,14 +151,14 @@ impl Motor {
         })
     }
 
-    /// Change of ω over a tick per torque that acts over it, (rad/s)/(N·m).
+    /// Returns the change of ω over one tick per torque, (rad/s)/(N·m).
     pub(super) fn speed_per_torque(&self) -> f64 {
         self.speed.torque
     }
 }
 
-impl<N: Number> Motor<N> {
-    /// State at the end of the tick under `voltage` and a held `torque`.
+impl<N: SimdReal> Motor<N> {
+    /// Returns the state at the end of the tick for a held `voltage` (V) and `torque` (N·m).
     #[inline(always)]
     pub fn step(&self, s: &MotorState<N>, voltage: N, torque: N) -> MotorState<N> {
         MotorState {
@@ -161,30 +168,32 @@ impl<N: Number> Motor<N> {
         }
     }
 
-    /// State at the end of the tick, and what friction takes from ω over it (rad/s): what ends the tick at
-    /// standstill, limited to `slowing` (rad/s, not negative). Where it is not limited ω is 0.0 exactly, and
-    /// rounding never turns ω round: what friction takes away is never more than there is.
+    /// Returns the state at the end of the tick with friction, and the speed drop by friction over the tick, rad/s.
+    ///
+    /// Friction is the torque that gives ω = 0 at the end of the tick, limited so that the speed drop is at most
+    /// `max_speed_drop` (rad/s, not negative). Within the limit ω is exactly 0.0. Friction never reverses ω, also not
+    /// by rounding: the speed drop never exceeds the speed.
     #[inline(always)]
     pub(super) fn step_with_friction(
         &self,
         s: &MotorState<N>,
         voltage: N,
         external: N,
-        slowing: N,
+        max_speed_drop: N,
     ) -> (MotorState<N>, N) {
         let free = self.step(s, voltage, external);
-        let taken = limited(free.speed, slowing);
+        let speed_drop = clamp_abs(free.speed, max_speed_drop);
         let state = MotorState {
-            current: taken.mul_add(-self.current_per_speed, free.current),
-            speed: free.speed - taken,
-            angle: taken.mul_add(-self.angle_per_speed, free.angle),
+            current: speed_drop.mul_add(-self.current_per_speed, free.current),
+            speed: free.speed - speed_drop,
+            angle: speed_drop.mul_add(-self.angle_per_speed, free.angle),
         };
-        (state, taken)
+        (state, speed_drop)
     }
 
-    /// The friction torque that takes `taken` from ω over a tick (rad/s), N·m.
+    /// Returns the friction torque for a speed drop over one tick (rad/s), N·m.
     #[inline(always)]
-    pub(super) fn torque_taking(&self, taken: N) -> N {
-        taken * self.torque_per_speed
+    pub(super) fn torque_from_speed_drop(&self, speed_drop: N) -> N {
+        speed_drop * self.torque_per_speed
     }
 }

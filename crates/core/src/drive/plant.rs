@@ -1,10 +1,10 @@
-//! Motor, friction, gravity and load together.
+//! Plant of one axis: motor, friction, gravity and load.
 
-use super::{DriveError, Friction, Gravity, Incline, Motor, MotorState};
+use super::{DriveError, Friction, Gravity, GravityExpansion, Motor, MotorState};
 use crate::config::{AxisConfig, MotorConfig};
-use crate::simd::{Number, numbers};
+use crate::simd::{SimdReal, soa_struct};
 
-/// Torques that acted over a tick, N·m at the motor (N for a linear motor).
+/// Torques over one tick, N·m at the motor (N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Torques {
     /// Friction, positive against motion towards plus.
@@ -15,42 +15,43 @@ pub struct Torques {
     pub load: f64,
 }
 
-numbers! {
-    /// One axis without its controllers.
+soa_struct! {
+    /// Plant of one axis, stepped by ticks (Prévost eq. 1).
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct Plant {
         pub(crate) motor: Motor<N>,
-        /// Friction in the change of ω that it makes over a tick, rad/s.
-        pub(crate) slowing: Friction<N>,
+        /// Friction law scaled to the speed change per tick, rad/s.
+        pub(crate) friction_speed_drop: Friction<N>,
         pub(crate) gravity: Gravity<N>,
-        ratio: N,
+        transmission_ratio: N,
+        /// Kt of the plant with its deviation, N·m/A.
         torque_constant: N,
     }
 }
 
 impl Plant {
-    /// The plant of `axis`, with what it deviates by, stepped by `period` seconds.
+    /// Discretizes the plant of `axis` with its deviation over `period` seconds.
     ///
     /// # Errors
     /// [`DriveError`] if the motor cannot be discretized over the period.
     pub fn new(axis: &AxisConfig, period: f64) -> Result<Self, DriveError> {
         let (r, deviation) = (axis.transmission_ratio, &axis.deviation);
-        let motor = Self::motor(axis);
-        // The law gives amperes of the motor as it is reckoned with: its torque does not follow Kt.
+        let motor = Self::deviating_motor(axis);
+        // The friction law is in amperes of the nominal motor: its torque does not change with the deviation of Kt.
         let friction_constant = axis.motor.torque_constant * deviation.friction;
-        let stepped = Motor::new(&motor, period)?;
-        let slowing = friction_constant * stepped.speed_per_torque();
+        let discretized = Motor::new(&motor, period)?;
+        let friction_speed_drop = friction_constant * discretized.speed_per_torque();
         Ok(Plant {
-            slowing: Friction::new(axis.friction, axis.kind, r, slowing),
+            friction_speed_drop: Friction::new(axis.friction, axis.kind, r, friction_speed_drop),
             gravity: Gravity::new(&axis.gravity, r),
-            ratio: r,
+            transmission_ratio: r,
             torque_constant: motor.torque_constant,
-            motor: stepped,
+            motor: discretized,
         })
     }
 
-    /// The motor of `axis` as it is: with what its inertia and Kt deviate by.
-    pub fn motor(axis: &AxisConfig) -> MotorConfig {
+    /// Returns the motor of `axis` with the deviations of inertia and Kt.
+    pub fn deviating_motor(axis: &AxisConfig) -> MotorConfig {
         MotorConfig {
             inertia: axis.motor.inertia * axis.deviation.inertia,
             torque_constant: axis.motor.torque_constant * axis.deviation.torque_constant,
@@ -58,79 +59,88 @@ impl Plant {
         }
     }
 
-    /// Whether the friction law is extrapolated at a motor speed ω (rad/s).
+    /// Returns true if the friction law is extrapolated at a motor speed ω (rad/s).
     #[inline]
-    pub fn friction_is_extrapolated(&self, speed: f64) -> bool {
-        self.slowing.is_extrapolated(speed)
+    pub fn is_friction_extrapolated(&self, speed: f64) -> bool {
+        self.friction_speed_drop.is_extrapolated(speed)
     }
 
-    /// Moves the plant by one tick under `voltage` (V) and an external `load` (N or N·m at the axis).
+    /// Steps the plant by one tick under `voltage` (V) and an external `load` (N or N·m at the axis); returns the
+    /// torques over the tick.
     ///
-    /// Friction is the torque that ends the tick at standstill, limited to its bound: it stops the
-    /// axis and never reverses it, `C_friction · ω_end ≥ 0`, and an axis that it stops has ω = 0.0.
+    /// Friction is the torque that gives standstill at the end of the tick, limited to its bound. It stops the axis
+    /// and never reverses it: `C_friction · ω_end ≥ 0`, and an axis stopped by friction has ω = 0.0.
     pub fn step(&self, s: &mut MotorState, voltage: f64, load: f64) -> Torques {
-        let (gravity, load) = (self.gravity_at(s.angle), self.load_torque(load));
-        let taken = self.step_under(s, voltage, load - gravity, self.slowing.bound(s.speed));
-        let friction = self.friction_taking(taken);
+        let (gravity, load) = (self.gravity_torque(s.angle), self.load_torque(load));
+        let speed_drop =
+            self.step_with_torques(s, voltage, load - gravity, self.friction_speed_drop.bound(s.speed));
+        let friction = self.torque_from_speed_drop(speed_drop);
         Torques { friction, gravity, load }
     }
 }
 
-impl<N: Number> Plant<N> {
-    /// Kt as it is, N·m/A.
+impl<N: SimdReal> Plant<N> {
+    /// Returns Kt with its deviation, N·m/A.
     #[inline(always)]
     pub fn torque_constant(&self) -> N {
         self.torque_constant
     }
 
-    /// Axis position at a motor angle θ (rad), m or rad.
+    /// Returns the axis position at a motor angle θ (rad), m or rad.
     #[inline(always)]
     pub fn position(&self, angle: N) -> N {
-        angle * self.ratio
+        angle * self.transmission_ratio
     }
 
-    /// Axis velocity at a motor speed ω (rad/s), m/s or rad/s.
+    /// Returns the axis velocity at a motor speed ω (rad/s), m/s or rad/s.
     #[inline(always)]
     pub fn velocity(&self, speed: N) -> N {
-        speed * self.ratio
+        speed * self.transmission_ratio
     }
 
-    /// Gravity torque at a motor angle θ (rad), N·m at the motor.
+    /// Returns the gravity torque at a motor angle θ (rad), N·m at the motor.
     #[inline(always)]
-    pub fn gravity_at(&self, angle: N) -> N {
+    pub fn gravity_torque(&self, angle: N) -> N {
         self.gravity.torque(self.position(angle))
     }
 
-    /// Gravity torque at a motor angle θ (rad) by the polynomial at hand, which follows it, N·m at the motor.
+    /// Returns the gravity torque at a motor angle θ (rad) from an expansion that follows the angle, N·m at the motor.
     #[inline(always)]
-    pub(crate) fn gravity_near(&self, near: &mut Incline<N>, angle: N) -> N {
-        self.gravity.torque_near(near, angle)
+    pub(crate) fn gravity_torque_with_expansion(&self, expansion: &mut GravityExpansion<N>, angle: N) -> N {
+        self.gravity.torque_with_expansion(expansion, angle)
     }
 
-    /// Gravity torque where it does not depend on the position, N·m at the motor.
+    /// Returns the gravity torque of an axis that does not tilt, N·m at the motor.
     #[inline(always)]
-    pub(crate) fn weight(&self) -> N {
-        self.gravity.weight()
+    pub(crate) fn weight_torque(&self) -> N {
+        self.gravity.weight_torque()
     }
 
-    /// What an external `load` (N or N·m at the axis) is at the motor, N·m.
+    /// Converts an external `load` (N or N·m at the axis) to N·m at the motor.
     #[inline(always)]
     pub fn load_torque(&self, load: N) -> N {
-        self.ratio * load
+        self.transmission_ratio * load
     }
 
-    /// Moves the plant by one tick with what is known already: gravity and load together as `external` torque
-    /// (N·m at the motor), and the bound of `slowing`. What friction takes from ω comes back, rad/s.
+    /// Steps the plant by one tick with known torques; returns the speed drop by friction, rad/s.
+    ///
+    /// `external` is load minus gravity, N·m at the motor; `max_speed_drop` is the bound of friction, rad/s.
     #[inline(always)]
-    pub(crate) fn step_under(&self, s: &mut MotorState<N>, voltage: N, external: N, slowing: N) -> N {
-        let (state, taken) = self.motor.step_with_friction(s, voltage, external, slowing);
+    pub(crate) fn step_with_torques(
+        &self,
+        s: &mut MotorState<N>,
+        voltage: N,
+        external: N,
+        max_speed_drop: N,
+    ) -> N {
+        let (state, speed_drop) = self.motor.step_with_friction(s, voltage, external, max_speed_drop);
         *s = state;
-        taken
+        speed_drop
     }
 
-    /// The friction torque that takes `taken` from ω over a tick (rad/s), N·m.
+    /// Returns the friction torque for a speed drop over one tick (rad/s), N·m.
     #[inline(always)]
-    pub(crate) fn friction_taking(&self, taken: N) -> N {
-        self.motor.torque_taking(taken)
+    pub(crate) fn torque_from_speed_drop(&self, speed_drop: N) -> N {
+        self.motor.torque_from_speed_drop(speed_drop)
     }
 }

@@ -1,32 +1,35 @@
-//! One axis: a plant, its cascade, and what of their state does not go on from tick to tick.
+//! One axis of a machine: parameters, position controller, feedforward and samples.
+//!
+//! [`inner_loops`](super::inner_loops) runs the inner loops and the plant.
 
 use crate::config::{AxisConfig, Periods};
 use crate::control::{
-    Delays, Feedforward, Pi, PiState, PositionController, PositionState, Reach, SetpointHistory, Shift,
+    Delays, Feedforward, Pi, PiState, PositionController, PositionState, SetpointHistory, SetpointWindow,
+    TickDelay,
 };
 use crate::drive::{MotorState, Plant};
 use crate::units::seconds;
 
-use super::block::{Demand, Done, Loops, LoopsState, Stair};
 use super::compensation::FrictionCompensation;
-use super::controller::{feedforward, position_controller};
+use super::controller::{create_position_controller, feedforward_config};
+use super::inner_loops::{InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord, ZeroOrderHold};
 use super::{AxisError, AxisSample};
 
-/// Everything immutable about one axis.
+/// Immutable parameters of one axis: plant, controllers and delays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisParameters {
-    pub(super) loops: Loops,
+    pub(super) loops: InnerLoops,
     position: PositionController,
     controller: &'static str,
     feedforward: Feedforward,
     pub(super) compensation: Option<FrictionCompensation>,
     delays: Delays,
-    position_shift: Shift,
-    velocity_shift: Shift,
-    torque_shift: Shift,
-    ratio: f64,
+    position_delay: TickDelay,
+    velocity_delay: TickDelay,
+    torque_delay: TickDelay,
+    transmission_ratio: f64,
     inverse_ratio: f64,
-    /// Kt that the drive reckons with.
+    /// Kt that the drive assumes, without the deviation of the plant, N·m/A.
     torque_constant: f64,
     max_current: f64,
     resistance: f64,
@@ -36,41 +39,41 @@ pub struct AxisParameters {
 }
 
 impl AxisParameters {
-    /// The longest delay of a setpoint, ticks.
+    /// Returns the longest delay of a setpoint, ticks.
     pub fn longest_delay(&self) -> u64 {
         self.delays.longest()
     }
 
-    /// Setpoints ahead of the present one that the position controller reads.
-    pub fn horizon(&self) -> usize {
-        self.reach().ahead
+    /// Returns the preview: number of future setpoints that the controllers read.
+    pub fn preview_length(&self) -> usize {
+        self.setpoint_window().preview
     }
 
-    fn reach(&self) -> Reach {
+    fn setpoint_window(&self) -> SetpointWindow {
         let delay = self.delays.position.div_ceil(self.ticks_per_position) as i64;
-        let compensated = self.compensation.as_ref().map_or(0, FrictionCompensation::preview);
-        Reach {
+        let compensation = self.compensation.as_ref().map_or(0, FrictionCompensation::preview);
+        SetpointWindow {
             delay: self.delays.longest(),
             lookback: self.position.lookback() as usize,
-            ahead: (self.position.preview() - delay).max(compensated).max(0) as usize,
+            preview: (self.position.preview() - delay).max(compensation).max(0) as usize,
         }
     }
 
     /// Discretizes an axis and designs its position controller.
     ///
     /// # Errors
-    /// [`AxisError`].
+    /// [`AxisError`] if the motor cannot be discretized or the position controller cannot be designed.
     pub fn new(axis: &AxisConfig, periods: &Periods) -> Result<Self, AxisError> {
         let motor = &axis.motor;
         let (tick, ticks) = (seconds(periods.current), periods.ticks_per_position());
-        let (position, controller) = position_controller(axis, periods)?;
+        let (position, controller) = create_position_controller(axis, periods)?;
         let delays = Delays::new(&axis.delays, periods.current);
         let compensation = FrictionCompensation::new(axis, periods, delays.friction);
-        // A shift of nothing delays nothing.
+        // Without friction compensation its delay does not count.
         let delays = Delays { friction: if compensation.is_some() { delays.friction } else { 0 }, ..delays };
         let velocity_scale = 1.0 / motor.torque_constant;
         Ok(AxisParameters {
-            loops: Loops {
+            loops: InnerLoops {
                 plant: Plant::new(axis, tick)?,
                 velocity: Pi::new(
                     &axis.velocity_loop,
@@ -83,16 +86,16 @@ impl AxisParameters {
             position,
             controller,
             feedforward: Feedforward::new(
-                &feedforward(axis),
+                &feedforward_config(axis),
                 seconds(periods.position),
                 axis.transmission_ratio,
             ),
             compensation,
-            position_shift: Shift::new(delays.position, ticks),
-            velocity_shift: Shift::new(delays.velocity, ticks),
-            torque_shift: Shift::new(delays.torque, ticks),
+            position_delay: TickDelay::new(delays.position, ticks),
+            velocity_delay: TickDelay::new(delays.velocity, ticks),
+            torque_delay: TickDelay::new(delays.torque, ticks),
             delays,
-            ratio: axis.transmission_ratio,
+            transmission_ratio: axis.transmission_ratio,
             inverse_ratio: 1.0 / axis.transmission_ratio,
             torque_constant: motor.torque_constant,
             max_current: motor.max_current,
@@ -103,69 +106,76 @@ impl AxisParameters {
         })
     }
 
-    /// A feedforward over a position period, from its values before and behind its step.
-    fn stair(&self, shift: Shift, before: f64, behind: f64) -> Stair {
-        Stair { before, behind, step: shift.step().div_ceil(self.ticks_per_velocity) as f64 }
+    /// Returns a feedforward over one position cycle, from its values before and after the delayed setpoint switches.
+    fn zero_order_hold(&self, delay: TickDelay, before: f64, after: f64) -> ZeroOrderHold {
+        ZeroOrderHold { before, after, step: delay.switch_tick().div_ceil(self.ticks_per_velocity) as f64 }
     }
 }
 
-/// State of one axis, but for what goes on from tick to tick.
+/// State of one axis outside the inner loops, and its last sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// N or N·m.
+    /// External load at the axis, N or N·m.
     load: f64,
     psec: SetpointHistory,
     position: PositionState,
-    /// What the axis was asked for in this position period.
-    demand: Demand,
-    /// Load torque over the tick before the position instant, N·m at the motor.
-    load_before: f64,
+    /// Inputs to the inner loops in the present position cycle.
+    inputs: InnerLoopInputs,
+    /// Load torque over the last tick of the previous position cycle, N·m at the motor.
+    previous_load: f64,
     sample: AxisSample,
 }
 
 impl Axis {
-    /// At rest at `position` (m or rad), held against gravity.
-    pub(super) fn at_rest(p: &AxisParameters, position: f64) -> (Self, LoopsState) {
-        let angle = position / p.ratio;
+    /// Creates an axis at rest at `position` (m or rad), with the motor current that holds it against gravity.
+    pub(super) fn at_rest(p: &AxisParameters, position: f64) -> (Self, InnerLoopState) {
+        let angle = position / p.transmission_ratio;
         let plant = &p.loops.plant;
-        let gravity = plant.gravity_at(angle);
+        let gravity = plant.gravity_torque(angle);
         let current = gravity / plant.torque_constant();
-        // What the drive takes that current for.
+        // The drive assumes its own Kt.
         let torque = gravity * (p.torque_constant / plant.torque_constant());
         let voltage = p.resistance * current;
-        let state = LoopsState {
+        let state = InnerLoopState {
             motor: MotorState { current, speed: 0.0, angle },
             velocity: PiState { integral: torque, excess: 0.0 },
             current: PiState { integral: voltage, excess: 0.0 },
             current_setpoint: current,
             gravity,
-            ..LoopsState::default()
+            ..InnerLoopState::default()
         };
         let mut axis = Axis {
             load: 0.0,
-            psec: SetpointHistory::new(position, p.ticks_per_position, p.reach()),
+            psec: SetpointHistory::new(position, p.ticks_per_position, p.setpoint_window()),
             position: PositionState::at_rest(angle),
-            demand: Demand::default(),
-            load_before: 0.0,
+            inputs: InnerLoopInputs::default(),
+            previous_load: 0.0,
             sample: AxisSample { psec: position, delayed_psec: position, ..AxisSample::default() },
         };
-        let done = Done { current_setpoint: current, voltage, gravity, ..Done::default() };
-        axis.observe(p, 0, &state.motor, &done);
+        let record = TickRecord { current_setpoint: current, voltage, gravity, ..TickRecord::default() };
+        axis.update_sample(p, 0, &state.motor, &record);
         (axis, state)
     }
 
-    /// Takes over changed parameters in the place of `old`; the state goes on.
+    /// Replaces the parameters `old` by `p` and keeps the state (bumpless transfer).
     ///
-    /// The velocity loop's integral takes over what TFFWS gives up.
-    pub(super) fn adopt(&mut self, old: &AxisParameters, p: &AxisParameters, state: &mut LoopsState) {
-        // At the last tick of the period.
-        let torque =
-            |p: &AxisParameters| p.feedforward.torque(&self.psec, p.torque_shift.index(self.psec.present()));
+    /// The integral of the velocity loop changes by the difference of TFFWS, so that the torque does not jump. A new
+    /// position controller or feedforward starts a transfer of Ω*.
+    pub(super) fn update_parameters(
+        &mut self,
+        old: &AxisParameters,
+        p: &AxisParameters,
+        state: &mut InnerLoopState,
+    ) {
+        // TFFWS at the last tick of the position cycle.
+        let torque = |p: &AxisParameters| {
+            p.feedforward.torque(&self.psec, p.torque_delay.index_after_switch(self.psec.present_index()))
+        };
         let limit = p.torque_constant * p.max_current;
         state.velocity.integral += (torque(old) - torque(p)).clamp(-limit, limit);
-        self.psec.adopt(p.reach());
+        self.psec.set_window(p.setpoint_window());
         if (&old.position, &old.feedforward) != (&p.position, &p.feedforward) {
-            self.position.hand_over();
+            self.position.begin_transfer();
         }
         self.sample.controller = p.controller;
     }
@@ -174,85 +184,110 @@ impl Axis {
         self.load = load;
     }
 
-    /// The position instant: takes the setpoint of the period that begins, and those behind it as far as
-    /// they are known, and says what is asked of the inner loops until the next one.
-    pub(super) fn control_position(
+    /// Executes the position loop at the start of a position cycle: returns the inputs to the inner loops.
+    ///
+    /// `psec` is the setpoint of the cycle, `preview` contains the known setpoints after it.
+    ///
+    /// ```text
+    /// Ω* = clamp(position controller(PSEC delayed by α / r, θ), ±Ωmax)             (Prévost fig. 3, eq. 9)
+    /// VFFWS from PSEC delayed by β, TFFWS from PSEC delayed by γ, zero-order hold  (Prévost eqs. 6 to 8)
+    /// ```
+    pub(super) fn execute_position_loop(
         &mut self,
         p: &AxisParameters,
-        state: &LoopsState,
+        state: &InnerLoopState,
         psec: f64,
-        ahead: &[f64],
-    ) -> Demand {
+        preview: &[f64],
+    ) -> InnerLoopInputs {
         self.psec.push(psec);
-        self.psec.foresee(ahead);
-        let present = self.psec.present();
+        self.psec.set_preview(preview);
+        let present = self.psec.present_index();
         let (history, motor) = (&self.psec, &state.motor);
-        let k = p.position_shift.index_at_instant(present);
+        let k = p.position_delay.index_at_cycle_start(present);
         self.sample.psec = psec;
         self.sample.delayed_psec = history.at(k);
-        if state.current_excess > 0.0 {
-            self.position.correct(motor.speed);
+        if state.max_current_excess > 0.0 {
+            self.position.record_saturated(motor.speed);
         }
-        let staircase = |shift: Shift, value: &dyn Fn(i64) -> f64| {
-            let behind = shift.index(present);
-            p.stair(shift, value(behind - 1), value(behind))
+        let hold = |delay: TickDelay, value: &dyn Fn(i64) -> f64| {
+            let after = delay.index_after_switch(present);
+            p.zero_order_hold(delay, value(after - 1), value(after))
         };
-        let velocity = staircase(p.velocity_shift, &|k| p.feedforward.velocity(history, k));
-        let torque = staircase(p.torque_shift, &|k| p.feedforward.torque(history, k));
+        let velocity = hold(p.velocity_delay, &|k| p.feedforward.velocity(history, k));
+        let torque = hold(p.torque_delay, &|k| p.feedforward.torque(history, k));
         let feedforward = velocity.at(0.0);
         let setpoint = |j| history.at(k + j) * p.inverse_ratio;
-        let wanted = p.position.update(&mut self.position, setpoint, motor.angle, feedforward);
-        // Coefficients that are forced can make it overflow: an axis that is asked for nothing stops.
-        let asked = if wanted.is_finite() { wanted } else { 0.0 };
-        let velocity_setpoint = asked.clamp(-p.max_speed, p.max_speed);
+        let unlimited = p.position.update(&mut self.position, setpoint, motor.angle, feedforward);
+        // An unstable RST controller (allow_unstable) can overflow: the axis stops then.
+        let finite = if unlimited.is_finite() { unlimited } else { 0.0 };
+        let velocity_setpoint = finite.clamp(-p.max_speed, p.max_speed);
         self.position.record(velocity_setpoint + feedforward);
-        self.load_before = self.demand.load;
-        self.demand = Demand {
+        self.previous_load = self.inputs.load;
+        self.inputs = InnerLoopInputs {
             velocity_setpoint,
-            velocity_excess: if wanted.is_finite() { wanted - velocity_setpoint } else { f64::INFINITY },
+            velocity_excess: if unlimited.is_finite() {
+                unlimited - velocity_setpoint
+            } else {
+                f64::INFINITY
+            },
             velocity,
             torque,
             load: p.loops.plant.load_torque(self.load),
         };
-        self.demand
+        self.inputs
     }
 
-    /// The torque with which friction is compensated at an instant of the velocity loop, N·m.
-    pub(super) fn compensation(&self, of: &FrictionCompensation, p: &AxisParameters, instant: usize) -> f64 {
-        // Before the first setpoint there is nothing to compensate.
-        let Ok(period) = u64::try_from(self.psec.present()) else { return 0.0 };
-        of.torque(&self.psec, period * p.ticks_per_position + instant as u64 * p.ticks_per_velocity)
+    /// Returns the torque of the friction compensation in a velocity cycle, N·m at the motor.
+    pub(super) fn compensation_torque(
+        &self,
+        compensation: &FrictionCompensation,
+        p: &AxisParameters,
+        velocity_cycle: usize,
+    ) -> f64 {
+        // No compensation before the first setpoint.
+        let Ok(period) = u64::try_from(self.psec.present_index()) else { return 0.0 };
+        let tick = period * p.ticks_per_position + velocity_cycle as u64 * p.ticks_per_velocity;
+        compensation.torque(&self.psec, tick)
     }
 
-    /// Makes the sample of a tick of this position period.
-    pub(super) fn observe(&mut self, p: &AxisParameters, tick: usize, motor: &MotorState, done: &Done) {
+    /// Sets the sample to a tick of the present position cycle.
+    pub(super) fn update_sample(
+        &mut self,
+        p: &AxisParameters,
+        tick: usize,
+        motor: &MotorState,
+        record: &TickRecord,
+    ) {
         let plant = &p.loops.plant;
         let torque_constant = plant.torque_constant();
-        let instant = tick / p.ticks_per_velocity as usize;
-        let compensation = p.compensation.as_ref().map_or(0.0, |of| self.compensation(of, p, instant));
-        let load = if tick == 0 { self.load_before } else { self.demand.load };
+        let velocity_cycle = tick / p.ticks_per_velocity as usize;
+        let compensation = p
+            .compensation
+            .as_ref()
+            .map_or(0.0, |compensation| self.compensation_torque(compensation, p, velocity_cycle));
+        let load = if tick == 0 { self.previous_load } else { self.inputs.load };
         self.sample = AxisSample {
             position: plant.position(motor.angle),
             velocity: plant.velocity(motor.speed),
             current: motor.current,
-            current_setpoint: done.current_setpoint,
-            voltage: done.voltage,
-            velocity_setpoint: self.demand.velocity_setpoint,
-            velocity_feedforward: self.demand.velocity.at(instant as f64),
-            torque_feedforward: self.demand.torque.at(instant as f64) + compensation,
-            friction_current: done.friction / torque_constant,
-            gravity_current: done.gravity / torque_constant,
+            current_setpoint: record.current_setpoint,
+            voltage: record.voltage,
+            velocity_setpoint: self.inputs.velocity_setpoint,
+            velocity_feedforward: self.inputs.velocity.at(velocity_cycle as f64),
+            torque_feedforward: self.inputs.torque.at(velocity_cycle as f64) + compensation,
+            friction_current: record.friction / torque_constant,
+            gravity_current: record.gravity / torque_constant,
             load_current: -load / torque_constant,
             effort: torque_constant * motor.current * p.inverse_ratio,
             controller: p.controller,
-            saturated: done.saturated > 0.0,
-            friction_extrapolated: plant.friction_is_extrapolated(motor.speed),
+            saturated: record.saturated > 0.0,
+            friction_extrapolated: plant.is_friction_extrapolated(motor.speed),
             ..self.sample
         };
     }
 
-    /// The signals of the position instant of the period that was computed last, or of the tick that is
-    /// being shown.
+    /// Returns the signals at the start of the last position cycle, or at the tick that
+    /// [`Machine::advance_with`](super::Machine::advance_with) reports.
     pub fn sample(&self) -> &AxisSample {
         &self.sample
     }

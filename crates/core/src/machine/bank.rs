@@ -1,79 +1,84 @@
-//! The lanes of a machine: as many blocks as its axes fill.
+//! SIMD blocks that hold the inner loops of all axes of a machine; selection of block size and SIMD width.
 
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
-use super::block::{Block, Demand, Done, Loops, LoopsState, Row, Tally, Timing};
+use super::inner_loops::{
+    Aligned, AxisBlock, CycleStatistics, CycleTicks, InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord,
+};
 use crate::drive::MotorState;
 
-/// Lanes of a block of few axes, where the processor has no vector of more: one of four, or less.
-const FEW: usize = 4;
-/// Lanes of a block of some: a vector of eight, or two of four of which one is worked on while the other waits for
-/// itself.
-const SOME: usize = 8;
-/// Lanes of a block of many: two vectors of eight.
-const MANY: usize = 16;
+/// Lanes of the smallest block, used for up to four axes if the widest vector of the processor has at most four lanes.
+const X4: usize = 4;
+/// Lanes of the middle block: one vector of eight lanes, or two interleaved vectors of four lanes, so that the
+/// latencies of one overlap with the operations of the other.
+const X8: usize = 8;
+/// Lanes of the largest block: two interleaved vectors of eight lanes.
+const X16: usize = 16;
 
-/// How wide the processor's vectors are used. The results are the same bits whatever the width.
+/// SIMD width that the inner loops run with. The results are bit-identical for every width.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Width {
-    /// As wide as this processor has them.
+pub enum SimdWidth {
+    /// Widest vectors that the processor supports, detected at run time.
     #[default]
     Widest,
-    /// As wide as this processor has them, but four numbers at most.
+    /// Widest vectors that the processor supports, with at most four lanes.
     Four,
-    /// As every processor of its kind has them. Where multiplication and addition are not fused by the
-    /// hardware this is far slower.
+    /// Instruction set that every processor of the architecture supports. Without hardware fused multiply-add this
+    /// is much slower.
     Baseline,
 }
 
-/// Inner loops and plants of any number of axes.
+/// Inner loops and plants of all axes of a machine in SIMD blocks.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Bank {
-    blocks: Blocks,
-    timing: Timing,
-    width: Width,
+pub(super) struct AxisBank {
+    blocks: AxisBlocks,
+    ticks: CycleTicks,
+    width: SimdWidth,
 }
 
-/// Blocks of one size, in the order of the axes.
+/// Blocks of equal size, in the order of the axes.
 #[derive(Debug, Clone, PartialEq)]
-enum Blocks {
-    Few(Vec<Block<FEW>>),
-    Some(Vec<Block<SOME>>),
-    Many(Vec<Block<MANY>>),
+enum AxisBlocks {
+    X4(Vec<AxisBlock<X4>>),
+    X8(Vec<AxisBlock<X8>>),
+    X16(Vec<AxisBlock<X16>>),
 }
 
-/// `$act` on the block and the lane of an axis, whatever the size of the blocks.
-macro_rules! at {
-    ($blocks:expr, $axis:expr, $iter:ident, |$block:ident, $lane:ident| $act:expr) => {
+/// Evaluates `$body` with the block and the lane of an axis, for any block size.
+macro_rules! with_lane {
+    ($blocks:expr, $axis:expr, $find:ident, |$block:ident, $lane:ident| $body:expr) => {
         match $blocks {
-            Blocks::Few(blocks) => {
-                let ($block, $lane) = $iter(blocks, $axis);
-                $act
+            AxisBlocks::X4(blocks) => {
+                let ($block, $lane) = $find(blocks, $axis);
+                $body
             }
-            Blocks::Some(blocks) => {
-                let ($block, $lane) = $iter(blocks, $axis);
-                $act
+            AxisBlocks::X8(blocks) => {
+                let ($block, $lane) = $find(blocks, $axis);
+                $body
             }
-            Blocks::Many(blocks) => {
-                let ($block, $lane) = $iter(blocks, $axis);
-                $act
+            AxisBlocks::X16(blocks) => {
+                let ($block, $lane) = $find(blocks, $axis);
+                $body
             }
         }
     };
 }
 
-fn of<const L: usize>(blocks: &[Block<L>], axis: usize) -> (&Block<L>, usize) {
+fn block_and_lane<const L: usize>(blocks: &[AxisBlock<L>], axis: usize) -> (&AxisBlock<L>, usize) {
     (&blocks[axis / L], axis % L)
 }
 
-fn of_mut<const L: usize>(blocks: &mut [Block<L>], axis: usize) -> (&mut Block<L>, usize) {
+fn block_and_lane_mut<const L: usize>(
+    blocks: &mut [AxisBlock<L>],
+    axis: usize,
+) -> (&mut AxisBlock<L>, usize) {
     (&mut blocks[axis / L], axis % L)
 }
 
-/// Blocks of the axes `loops`; lanes that stand for no axis do as the first one of their block does.
-fn filled<const L: usize>(loops: &[Loops], timing: Timing) -> Vec<Block<L>> {
-    let block = |axes: &[Loops]| {
-        let mut block = Block::new(&axes[0], timing);
+/// Creates the blocks for the axes `loops`; unused lanes repeat the first axis of their block.
+fn create_blocks<const L: usize>(loops: &[InnerLoops], ticks: CycleTicks) -> Vec<AxisBlock<L>> {
+    let block = |axes: &[InnerLoops]| {
+        let mut block = AxisBlock::new(&axes[0], ticks);
         for (lane, loops) in axes.iter().enumerate() {
             block.set_loops(lane, loops);
         }
@@ -82,100 +87,103 @@ fn filled<const L: usize>(loops: &[Loops], timing: Timing) -> Vec<Block<L>> {
     loops.chunks(L).map(block).collect()
 }
 
-impl Bank {
-    /// A bank of the axes `loops`.
-    pub fn new(loops: &[Loops], timing: Timing) -> Self {
+impl AxisBank {
+    /// Creates a bank of the axes `loops`; their number and the SIMD width of the processor select the block size.
+    pub fn new(loops: &[InnerLoops], ticks: CycleTicks) -> Self {
         let blocks = match loops.len() {
-            ..=FEW if Arch::new().dispatch(Lanes) <= FEW => Blocks::Few(filled(loops, timing)),
-            ..=SOME => Blocks::Some(filled(loops, timing)),
-            _ => Blocks::Many(filled(loops, timing)),
+            ..=X4 if Arch::new().dispatch(LaneCount) <= X4 => AxisBlocks::X4(create_blocks(loops, ticks)),
+            ..=X8 => AxisBlocks::X8(create_blocks(loops, ticks)),
+            _ => AxisBlocks::X16(create_blocks(loops, ticks)),
         };
-        Bank { blocks, timing, width: Width::default() }
+        AxisBank { blocks, ticks, width: SimdWidth::default() }
     }
 
-    /// How wide vectors are used from now on.
-    pub fn set_width(&mut self, width: Width) {
+    /// Sets the SIMD width of the following position cycles.
+    pub fn set_simd_width(&mut self, width: SimdWidth) {
         self.width = width;
     }
 
-    /// Gives an axis other parameters.
-    pub fn set_loops(&mut self, axis: usize, loops: &Loops) {
-        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_loops(lane, loops));
+    /// Sets the parameters of an axis.
+    pub fn set_loops(&mut self, axis: usize, loops: &InnerLoops) {
+        with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| block.set_loops(lane, loops));
     }
 
-    /// Where an axis is.
-    pub fn state(&self, axis: usize) -> LoopsState {
-        at!(&self.blocks, axis, of, |block, lane| block.state(lane))
+    /// Returns the state of an axis.
+    pub fn state(&self, axis: usize) -> InnerLoopState {
+        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.state(lane))
     }
 
-    /// Puts an axis there.
-    pub fn set_state(&mut self, axis: usize, state: &LoopsState) {
-        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_state(lane, state));
+    /// Sets the state of an axis.
+    pub fn set_state(&mut self, axis: usize, state: &InnerLoopState) {
+        with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| block.set_state(lane, state));
     }
 
-    /// What is asked of an axis in the next position period.
-    pub fn set_demand(&mut self, axis: usize, demand: &Demand) {
-        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_demand(lane, demand));
+    /// Sets the inputs of an axis for the next position cycle.
+    pub fn set_inputs(&mut self, axis: usize, inputs: &InnerLoopInputs) {
+        with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| block.set_inputs(lane, inputs));
     }
 
-    /// The torque with which friction of an axis is compensated, N·m, by the instant of the velocity loop.
+    /// Sets the friction compensation of an axis; `torque` returns N·m at the motor for each velocity cycle.
     pub fn set_compensation(&mut self, axis: usize, torque: impl Fn(usize) -> f64) {
-        let timing = self.timing;
-        at!(&mut self.blocks, axis, of_mut, |block, lane| block.set_compensation(lane, timing, torque));
-    }
-
-    /// The motor of an axis at a tick of the last position period.
-    #[inline]
-    pub fn motor(&self, axis: usize, tick: usize) -> MotorState {
-        at!(&self.blocks, axis, of, |block, lane| block.seen[tick].0.lane(lane))
-    }
-
-    /// Motor angles of an axis at the ticks of the last position period, rad.
-    #[inline]
-    pub fn angles(&self, axis: usize, angles: &mut [f64]) {
-        at!(&self.blocks, axis, of, |block, lane| {
-            angles.iter_mut().zip(&block.seen).for_each(|(angle, row)| *angle = row.0.angle[lane]);
+        let ticks = self.ticks;
+        with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| {
+            block.set_compensation(lane, ticks, torque);
         });
     }
 
-    /// What the controllers of an axis made of it.
-    pub fn done(&self, axis: usize, tick: usize) -> Done {
-        at!(&self.blocks, axis, of, |block, lane| block.done[tick].0.lane(lane))
-    }
-
-    /// What the ticks of the last position period come to for an axis.
+    /// Returns the motor state of an axis at the start of a tick of the last position cycle.
     #[inline]
-    pub fn tally(&self, axis: usize) -> Tally {
-        at!(&self.blocks, axis, of, |block, lane| block.tally.0.lane(lane))
+    pub fn motor(&self, axis: usize, tick: usize) -> MotorState {
+        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.motors[tick].0.lane(lane))
     }
 
-    /// Runs a position period; `traced` keeps what the controllers did at every tick, not only at the first.
-    pub fn run(&mut self, traced: bool) {
-        let timing = self.timing;
+    /// Writes the motor angles of an axis at the ticks of the last position cycle to `angles`, rad.
+    #[inline]
+    pub fn angles(&self, axis: usize, angles: &mut [f64]) {
+        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| {
+            angles.iter_mut().zip(&block.motors).for_each(|(angle, row)| *angle = row.0.angle[lane]);
+        });
+    }
+
+    /// Returns the record of an axis at a tick of the last position cycle.
+    pub fn record(&self, axis: usize, tick: usize) -> TickRecord {
+        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.records[tick].0.lane(lane))
+    }
+
+    /// Returns the statistics of an axis over the last position cycle.
+    #[inline]
+    pub fn statistics(&self, axis: usize) -> CycleStatistics {
+        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.statistics.0.lane(lane))
+    }
+
+    /// Runs one position cycle; `record_all` records every tick, otherwise the first one only.
+    pub fn run(&mut self, record_all: bool) {
+        let ticks = self.ticks;
         match &mut self.blocks {
-            Blocks::Few(blocks) => run_all(self.width, Period { blocks, timing, traced }),
-            Blocks::Some(blocks) => run_all(self.width, Period { blocks, timing, traced }),
-            Blocks::Many(blocks) => run_all(self.width, Period { blocks, timing, traced }),
+            AxisBlocks::X4(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, record_all }),
+            AxisBlocks::X8(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, record_all }),
+            AxisBlocks::X16(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, record_all }),
         }
     }
 }
 
-fn run_all<const L: usize>(width: Width, period: Period<'_, L>) {
-    if period.traced {
-        let row = || Row(Done::default().fill());
-        period.blocks.iter_mut().for_each(|b| b.done.resize_with(period.timing.ticks_per_position, row));
+/// Runs one position cycle with the selected SIMD width.
+fn run_blocks<const L: usize>(width: SimdWidth, run: BlockRun<'_, L>) {
+    if run.record_all {
+        let record = || Aligned(TickRecord::default().fill());
+        run.blocks.iter_mut().for_each(|block| block.records.resize_with(run.ticks.position, record));
     }
     match width {
-        Width::Widest if L > FEW => Arch::new().dispatch(period),
-        Width::Widest | Width::Four => four_at_most(period),
-        Width::Baseline => Scalar::new().vectorize(period),
+        SimdWidth::Widest if L > X4 => Arch::new().dispatch(run),
+        SimdWidth::Widest | SimdWidth::Four => dispatch_up_to_four_lanes(run),
+        SimdWidth::Baseline => Scalar::new().vectorize(run),
     }
 }
 
-/// How many numbers the processor reckons with at a time.
-struct Lanes;
+/// Operation that returns the number of lanes of a SIMD vector.
+struct LaneCount;
 
-impl WithSimd for Lanes {
+impl WithSimd for LaneCount {
     type Output = usize;
 
     #[inline(always)]
@@ -184,30 +192,30 @@ impl WithSimd for Lanes {
     }
 }
 
-/// `act` with vectors as wide as the processor has them, but four numbers at most.
-fn four_at_most<A: WithSimd>(act: A) -> A::Output {
+/// Runs `operation` with the widest vectors of the processor that have at most four lanes.
+fn dispatch_up_to_four_lanes<A: WithSimd>(operation: A) -> A::Output {
     match Arch::new() {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-        Arch::V4(eight) => Simd::vectorize(*eight, act),
-        arch => arch.dispatch(act),
+        Arch::V4(eight) => Simd::vectorize(*eight, operation),
+        arch => arch.dispatch(operation),
     }
 }
 
-/// A position period to be run.
-struct Period<'a, const L: usize> {
-    blocks: &'a mut [Block<L>],
-    timing: Timing,
-    traced: bool,
+/// Operation that runs one position cycle of blocks.
+struct BlockRun<'a, const L: usize> {
+    blocks: &'a mut [AxisBlock<L>],
+    ticks: CycleTicks,
+    record_all: bool,
 }
 
-impl<const L: usize> WithSimd for Period<'_, L> {
+impl<const L: usize> WithSimd for BlockRun<'_, L> {
     type Output = ();
 
-    /// Compiled once for each width: what is inlined here is made of the vectors that it has.
+    /// Runs the blocks; compiled once per SIMD width, with everything inlined.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         for block in self.blocks {
-            block.run(simd, self.timing, self.traced);
+            block.run(simd, self.ticks, self.record_all);
         }
     }
 }
@@ -220,46 +228,48 @@ mod tests {
     use crate::config::Parameters;
     use crate::machine::{Machine, MachineParameters};
 
-    /// Positions of every tick and what the axes have come to, as bits, over motions that differ by axis.
-    fn seen(machine: &mut Machine) -> Vec<u64> {
+    /// Returns the bits of positions and statistics of all ticks, over motions that differ by axis.
+    fn bits_of_run(machine: &mut Machine) -> Vec<u64> {
         let axes = machine.axis_count();
         machine.reset(&vec![0.1; axes]);
-        let mut seen = Vec::new();
+        let mut bits = Vec::new();
         for k in 0..100 {
             let psec = |axis: usize| 0.1 + 0.02 * (1.0 - (0.05 * (1 + axis) as f64 * f64::from(k)).cos());
             machine.advance(&Vec::from_iter((0..axes).map(psec)), &[]);
             for axis in 0..axes {
-                seen.extend(
+                bits.extend(
                     (0..machine.ticks_per_period()).map(|tick| machine.position(axis, tick).to_bits()),
                 );
                 let activity = machine.activity(axis);
-                seen.extend([activity.peak_current.to_bits(), activity.saturated_ticks]);
+                bits.extend([activity.peak_current.to_bits(), activity.saturated_ticks]);
             }
         }
-        seen
+        bits
     }
 
-    /// Which size of blocks a machine gets depends on the processor; what comes out must not.
     #[test]
-    fn blocks_of_each_size_give_the_same_bits_at_each_width() {
+    fn results_are_bit_identical_for_every_block_size_and_simd_width() {
         let config = Parameters::embedded_default().and_then(|p| p.machine_config()).expect("valid");
         for first in 0..5 {
-            let places = Vec::from_iter(first..5);
-            let parameters = MachineParameters::of_axes(&config, &places).expect("can be discretized");
-            let loops: Vec<Loops> = parameters.axes.iter().map(|axis| axis.loops).collect();
-            let timing = parameters.timing();
+            let indices = Vec::from_iter(first..5);
+            let parameters = MachineParameters::from_axes(&config, &indices).expect("can be discretized");
+            let loops: Vec<InnerLoops> = parameters.axes.iter().map(|axis| axis.loops).collect();
+            let ticks = parameters.cycle_ticks();
             let mut machine = Machine::new(Arc::new(parameters));
-            let wanted = seen(&mut machine);
+            let wanted = bits_of_run(&mut machine);
             let sizes = [
-                Blocks::Few(filled(&loops, timing)),
-                Blocks::Some(filled(&loops, timing)),
-                Blocks::Many(filled(&loops, timing)),
+                AxisBlocks::X4(create_blocks(&loops, ticks)),
+                AxisBlocks::X8(create_blocks(&loops, ticks)),
+                AxisBlocks::X16(create_blocks(&loops, ticks)),
             ];
             for (size, blocks) in sizes.into_iter().enumerate() {
                 machine.bank.blocks = blocks;
-                for width in [Width::Widest, Width::Four, Width::Baseline] {
-                    machine.set_width(width);
-                    assert!(seen(&mut machine) == wanted, "axes from {first} on, size {size}, {width:?}");
+                for width in [SimdWidth::Widest, SimdWidth::Four, SimdWidth::Baseline] {
+                    machine.set_simd_width(width);
+                    assert!(
+                        bits_of_run(&mut machine) == wanted,
+                        "axes from {first} on, size {size}, {width:?}"
+                    );
                 }
             }
         }

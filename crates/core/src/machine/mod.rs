@@ -1,21 +1,20 @@
-//! Plants and controllers joined into axes, and axes into a machine.
+//! Simulated machine: axes of plant and controllers, stepped by position cycles.
 //!
-//! The same [`Machine`] runs in the node, in the offline command and in the benchmarks. Time is an
-//! integer count of ticks of the current loop; nothing here knows the wall clock.
+//! The same [`Machine`] runs in the node, in the command line and in the benchmarks. Time is an integer count of
+//! ticks (current cycles), independent of the wall clock.
 
 mod axis;
 mod bank;
-mod block;
 mod compensation;
 mod controller;
+mod inner_loops;
 mod prediction;
 mod sample;
 
 pub use axis::{Axis, AxisParameters};
-pub use bank::Width;
-pub use controller::REST_AFTER;
-pub use controller::designed;
-pub use prediction::{deviating_model, prediction_model};
+pub use bank::SimdWidth;
+pub use controller::{FALLBACK_DELAY, design_controller};
+pub use prediction::{deviating_plant_model, prediction_model};
 pub use sample::AxisSample;
 
 use std::sync::Arc;
@@ -25,37 +24,39 @@ use crate::design::DesignError;
 use crate::drive::DriveError;
 use crate::units::Nanoseconds;
 
-use bank::Bank;
-use block::{Loops, Timing};
+use bank::AxisBank;
+use inner_loops::{CycleTicks, InnerLoops};
 
-/// Why a machine cannot be built or changed.
+/// Error of building a machine or changing its parameters.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MachineError {
-    /// An axis cannot be built.
+    /// Invalid parameters of an axis.
     #[error("axis {axis}: {source}")]
     Axis {
         /// Name of the axis.
         axis: String,
-        /// What is wrong with it.
+        /// Error of the axis.
         source: AxisError,
     },
-    /// Parameters of another machine cannot be taken over while running.
-    #[error("the new parameters have other joints or periods than the machine that runs")]
+    /// Different number of joints or different periods, which a running machine cannot change.
+    #[error(
+        "the new parameters have a different number of joints or different periods; restart to change them"
+    )]
     AnotherMachine,
 }
 
-/// Why an axis cannot be built.
+/// Error of building an axis.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AxisError {
-    /// Its motor cannot be stepped over the current period.
+    /// Motor that cannot be discretized over the current cycle.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// It has no such position controller.
+    /// Position controller that cannot be designed.
     #[error("position_loop: {0}")]
     Design(#[from] DesignError),
 }
 
-/// Everything immutable about a machine, discretized and ready to run.
+/// Immutable parameters of a machine, discretized.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MachineParameters {
     periods: Periods,
@@ -66,70 +67,69 @@ impl MachineParameters {
     /// Discretizes every axis of `config`.
     ///
     /// # Errors
-    /// [`MachineError::Axis`] naming the axis that cannot be built.
+    /// [`MachineError::Axis`] with the name of the first axis that cannot be built.
     pub fn new(config: &MachineConfig) -> Result<Self, MachineError> {
-        Self::of_axes(config, &Vec::from_iter(0..config.axes.len()))
+        Self::from_axes(config, &Vec::from_iter(0..config.axes.len()))
     }
 
-    /// Discretizes the axes of `config` at `places` only; places that there are not are left out.
+    /// Discretizes the axes of `config` at `indices` only; indices without an axis are ignored.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
-    pub fn of_axes(config: &MachineConfig, places: &[usize]) -> Result<Self, MachineError> {
+    /// [`MachineError::Axis`] with the name of the first axis that cannot be built.
+    pub fn from_axes(config: &MachineConfig, indices: &[usize]) -> Result<Self, MachineError> {
         let axis = |axis: &AxisConfig| {
             AxisParameters::new(axis, &config.periods)
                 .map_err(|source| MachineError::Axis { axis: axis.name.clone(), source })
         };
-        let axes = places.iter().filter_map(|&place| config.axes.get(place));
+        let axes = indices.iter().filter_map(|&index| config.axes.get(index));
         Ok(MachineParameters { periods: config.periods, axes: axes.map(axis).collect::<Result<_, _>>()? })
     }
 
-    /// Sampling periods.
+    /// Returns the periods of the control loops.
     pub fn periods(&self) -> Periods {
         self.periods
     }
 
-    /// Several machines as one: their axes one behind the other. None if there is none, or their periods
-    /// differ.
-    pub fn together(machines: &[Arc<MachineParameters>]) -> Option<Self> {
+    /// Concatenates the axes of several machines into one machine; `None` without machines or if their periods differ.
+    pub fn concatenate(machines: &[Arc<MachineParameters>]) -> Option<Self> {
         let periods = machines.first()?.periods;
-        let same = machines.iter().all(|machine| machine.periods == periods);
+        let is_same = machines.iter().all(|machine| machine.periods == periods);
         let axes = machines.iter().flat_map(|machine| machine.axes.iter().cloned());
-        same.then(|| MachineParameters { periods, axes: axes.collect() })
+        is_same.then(|| MachineParameters { periods, axes: axes.collect() })
     }
 
-    fn timing(&self) -> Timing {
-        Timing {
-            ticks_per_position: self.periods.ticks_per_position() as usize,
-            ticks_per_velocity: self.periods.ticks_per_velocity() as usize,
+    fn cycle_ticks(&self) -> CycleTicks {
+        CycleTicks {
+            position: self.periods.ticks_per_position() as usize,
+            velocity: self.periods.ticks_per_velocity() as usize,
         }
     }
 
-    fn bank(&self) -> Bank {
-        let loops: Vec<Loops> = self.axes.iter().map(|axis| axis.loops).collect();
-        Bank::new(&loops, self.timing())
+    fn bank(&self) -> AxisBank {
+        let loops: Vec<InnerLoops> = self.axes.iter().map(|axis| axis.loops).collect();
+        AxisBank::new(&loops, self.cycle_ticks())
     }
 }
 
-/// What an axis did in a position period, over all of its ticks.
+/// Statistics of one axis over the ticks of one position cycle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Activity {
     /// Largest |i|, A.
     pub peak_current: f64,
     /// Ticks with speed, current or voltage setpoint at its limit.
     pub saturated_ticks: u64,
-    /// Whether the friction law was used beyond the range that it was fitted for.
+    /// True if the friction law was extrapolated beyond its fitted range.
     pub friction_extrapolated: bool,
 }
 
-/// A machine: axes that move on one grid of ticks.
+/// Simulated machine: axes with common periods.
 ///
 /// ```
-/// use virtual_axes::{config::Parameters, machine::{Machine, MachineParameters}};
+/// use virtual_axes_core::{config::Parameters, machine::{Machine, MachineParameters}};
 ///
 /// let config = Parameters::embedded_default()?.machine_config()?;
 /// let mut machine = Machine::new(MachineParameters::new(&config)?.into());
-/// // 1 mm in X, then a second of standstill: the axis arrives, but for what friction holds.
+/// // A step of 1 mm in X, simulated for 1 s: the axis arrives up to the position error held by friction.
 /// for _ in 0..167 {
 ///     machine.advance(&[0.001, 0.0, 0.0, 0.0, 0.0], &[]);
 /// }
@@ -141,12 +141,12 @@ pub struct Activity {
 pub struct Machine {
     parameters: Arc<MachineParameters>,
     axes: Vec<Axis>,
-    bank: Bank,
+    bank: AxisBank,
     tick: u64,
 }
 
 impl Machine {
-    /// A machine at rest at home (0 on every axis).
+    /// Creates a machine at rest at home (0 on every axis).
     pub fn new(parameters: Arc<MachineParameters>) -> Self {
         let (axes, states): (Vec<_>, Vec<_>) = parameters.axes.iter().map(|p| Axis::at_rest(p, 0.0)).unzip();
         let mut bank = parameters.bank();
@@ -156,170 +156,174 @@ impl Machine {
         Machine { axes, bank, parameters, tick: 0 }
     }
 
-    /// Back to rest at `positions` (m or rad, one per axis), at tick 0.
+    /// Resets the machine to rest at `positions` (m or rad, one per axis) and tick 0.
     pub fn reset(&mut self, positions: &[f64]) {
-        for (place, ((axis, p), &position)) in
+        for (index, ((axis, p), &position)) in
             self.axes.iter_mut().zip(&self.parameters.axes).zip(positions).enumerate()
         {
             let (at_rest, state) = Axis::at_rest(p, position);
             *axis = at_rest;
-            self.bank.set_state(place, &state);
+            self.bank.set_state(index, &state);
         }
         self.tick = 0;
     }
 
-    /// How wide the processor's vectors are used from now on; the results are the same.
-    pub fn set_width(&mut self, width: Width) {
-        self.bank.set_width(width);
+    /// Sets the SIMD width of the following position cycles; the results are bit-identical.
+    pub fn set_simd_width(&mut self, width: SimdWidth) {
+        self.bank.set_simd_width(width);
     }
 
-    /// Takes over changed gains, weights, delays or physics; states go on as they are.
+    /// Reindexs gains, weights, delays or plant parameters between two position cycles and keeps the states (bumpless
+    /// transfer).
     ///
-    /// To be called between two position periods. Another reach of delays and preview makes a new history
-    /// of setpoints, which is the only case that allocates.
+    /// Allocates only if the longest delay or the preview changes the length of the setpoint history.
     ///
     /// # Errors
-    /// [`MachineError::AnotherMachine`] if number of axes or periods differ; nothing is changed then.
-    pub fn adopt(&mut self, parameters: Arc<MachineParameters>) -> Result<(), MachineError> {
-        let same = parameters.axes.len() == self.axes.len() && parameters.periods == self.parameters.periods;
-        if !same {
+    /// [`MachineError::AnotherMachine`] if the number of axes or the periods differ; nothing is changed then.
+    pub fn update_parameters(&mut self, parameters: Arc<MachineParameters>) -> Result<(), MachineError> {
+        let is_same =
+            parameters.axes.len() == self.axes.len() && parameters.periods == self.parameters.periods;
+        if !is_same {
             return Err(MachineError::AnotherMachine);
         }
         let changed = self.parameters.axes.iter().zip(&parameters.axes);
-        for (place, (axis, (old, p))) in self.axes.iter_mut().zip(changed).enumerate() {
-            let mut state = self.bank.state(place);
-            axis.adopt(old, p, &mut state);
-            self.bank.set_state(place, &state);
-            self.bank.set_loops(place, &p.loops);
+        for (index, (axis, (old, p))) in self.axes.iter_mut().zip(changed).enumerate() {
+            let mut state = self.bank.state(index);
+            axis.update_parameters(old, p, &mut state);
+            self.bank.set_state(index, &state);
+            self.bank.set_loops(index, &p.loops);
             if old.compensation.is_some() {
-                self.bank.set_compensation(place, |_| 0.0);
+                self.bank.set_compensation(index, |_| 0.0);
             }
         }
         self.parameters = parameters;
         Ok(())
     }
 
-    /// Number of axes.
+    /// Returns the number of axes.
     pub fn axis_count(&self) -> usize {
         self.axes.len()
     }
 
-    /// One axis, by its place in `joints`.
+    /// Returns an axis by its index in `joints`.
     ///
     /// # Panics
-    /// If there is no such place.
+    /// Panics if the index is out of range.
     pub fn axis(&self, index: usize) -> &Axis {
         &self.axes[index]
     }
 
-    /// All axes, in the order of `joints`.
+    /// Returns all axes, in the order of `joints`.
     pub fn axes(&self) -> &[Axis] {
         &self.axes
     }
 
-    /// Ticks since the start.
+    /// Returns the number of ticks since the start.
     pub fn tick(&self) -> u64 {
         self.tick
     }
 
-    /// Time since the start, ns.
+    /// Returns the simulated time since the start, ns.
     pub fn time(&self) -> Nanoseconds {
         self.tick as Nanoseconds * self.parameters.periods.current
     }
 
-    /// Sampling periods.
+    /// Returns the periods of the control loops.
     pub fn periods(&self) -> Periods {
         self.parameters.periods
     }
 
-    /// The longest delay of a setpoint on any axis, ticks.
+    /// Returns the longest delay of a setpoint on any axis, ticks.
     pub fn longest_delay(&self) -> u64 {
         self.parameters.axes.iter().map(AxisParameters::longest_delay).max().unwrap_or(0)
     }
 
-    /// Setpoints ahead of the present one that the position controllers read, the most of any axis.
-    pub fn horizon(&self) -> usize {
-        self.parameters.axes.iter().map(AxisParameters::horizon).max().unwrap_or(0)
+    /// Returns the preview: number of future setpoints that the controllers read, the largest of all axes.
+    pub fn preview_length(&self) -> usize {
+        self.parameters.axes.iter().map(AxisParameters::preview_length).max().unwrap_or(0)
     }
 
-    /// External force or torque on one axis (N or N·m, positive towards plus) from the next tick on.
+    /// Sets the external load of one axis (N or N·m, positive towards plus) from the next position cycle on.
     pub fn set_load(&mut self, axis: usize, load: f64) {
         if let Some(axis) = self.axes.get_mut(axis) {
             axis.set_load(load);
         }
     }
 
-    /// One position period with the setpoints `psec` (m or rad, one per axis).
+    /// Advances by one position cycle with the setpoints `psec` (m or rad, one per axis).
     ///
-    /// `ahead` holds the setpoints of the next periods, as many for each axis, one axis behind the other;
-    /// beyond them, up to the [`horizon`](Self::horizon), the last one is taken. With none the future is
-    /// not known: controllers that read ahead find the present one.
+    /// `preview` contains the setpoints of the next position cycles, an equal number per axis, axis by axis. Beyond
+    /// them, up to the [`preview_length`](Self::preview_length), the controllers read the last one; with an empty
+    /// preview they read the present setpoint.
     ///
-    /// The samples of the axes are those of the position instant then; [`position`](Self::position) and
-    /// [`activity`](Self::activity) tell what happened at every tick.
-    pub fn advance(&mut self, psec: &[f64], ahead: &[f64]) {
-        self.begin_period(psec, ahead);
+    /// Afterwards the samples of the axes are those at the start of the position cycle;
+    /// [`position`](Self::position) and [`activity`](Self::activity) return data of all ticks.
+    pub fn advance(&mut self, psec: &[f64], preview: &[f64]) {
+        self.execute_position_loops(psec, preview);
         self.bank.run(false);
-        self.observe(0);
+        self.update_samples(0);
         self.tick += self.parameters.periods.ticks_per_position();
     }
 
-    /// Likewise, showing the machine to `observe` at every tick: after the controllers have acted on the
-    /// tick's state and before the plant moves. The first call is the position instant. The samples of the
-    /// axes are those of the tick then, and those of the position instant in the end.
-    pub fn advance_with(&mut self, psec: &[f64], ahead: &[f64], mut observe: impl FnMut(&Machine)) {
-        self.begin_period(psec, ahead);
+    /// Advances by one position cycle like [`advance`](Self::advance) and calls `observe` at each tick.
+    ///
+    /// During a call the samples of the axes are those of the tick: state before the plant moves, controller outputs
+    /// of the tick. Afterwards they are those at the start of the position cycle.
+    pub fn advance_with(&mut self, psec: &[f64], preview: &[f64], mut observe: impl FnMut(&Machine)) {
+        self.execute_position_loops(psec, preview);
         self.bank.run(true);
         for tick in 0..self.parameters.periods.ticks_per_position() {
-            self.observe(tick as usize);
+            self.update_samples(tick as usize);
             observe(self);
             self.tick += 1;
         }
-        self.observe(0);
+        self.update_samples(0);
     }
 
-    /// What the axes are asked for in the next position period.
-    fn begin_period(&mut self, psec: &[f64], ahead: &[f64]) {
-        let known = ahead.len() / self.axes.len().max(1);
+    /// Executes the position loops of all axes and sets the inputs to their inner loops.
+    fn execute_position_loops(&mut self, psec: &[f64], preview: &[f64]) {
+        let known = preview.len() / self.axes.len().max(1);
         let parameters = &*self.parameters;
-        for (place, ((axis, p), &setpoint)) in
+        for (index, ((axis, p), &setpoint)) in
             self.axes.iter_mut().zip(&parameters.axes).zip(psec).enumerate()
         {
-            let state = self.bank.state(place);
-            let demand = axis.control_position(p, &state, setpoint, &ahead[place * known..][..known]);
-            self.bank.set_demand(place, &demand);
-            if let Some(of) = &p.compensation {
-                self.bank.set_compensation(place, |instant| axis.compensation(of, p, instant));
+            let state = self.bank.state(index);
+            let known_setpoints = &preview[index * known..][..known];
+            let inputs = axis.execute_position_loop(p, &state, setpoint, known_setpoints);
+            self.bank.set_inputs(index, &inputs);
+            if let Some(compensation) = &p.compensation {
+                let torque = |velocity_cycle| axis.compensation_torque(compensation, p, velocity_cycle);
+                self.bank.set_compensation(index, torque);
             }
         }
     }
 
-    /// Ticks of a position period.
+    /// Returns the number of ticks per position cycle.
     pub fn ticks_per_period(&self) -> usize {
-        self.parameters.timing().ticks_per_position
+        self.parameters.cycle_ticks().position
     }
 
-    /// Makes the samples of a tick of the position period.
-    fn observe(&mut self, tick: usize) {
-        for (place, (axis, p)) in self.axes.iter_mut().zip(&self.parameters.axes).enumerate() {
-            axis.observe(p, tick, &self.bank.motor(place, tick), &self.bank.done(place, tick));
+    /// Sets the samples of all axes to a tick of the last position cycle.
+    fn update_samples(&mut self, tick: usize) {
+        for (index, (axis, p)) in self.axes.iter_mut().zip(&self.parameters.axes).enumerate() {
+            axis.update_sample(p, tick, &self.bank.motor(index, tick), &self.bank.record(index, tick));
         }
     }
 
-    /// Position of an axis at a tick of the position period that was computed last, m or rad.
+    /// Returns the position of an axis at a tick of the last position cycle, m or rad.
     ///
     /// # Panics
-    /// If there is no such axis or tick.
+    /// Panics if the axis or the tick is out of range.
     #[inline]
     pub fn position(&self, axis: usize, tick: usize) -> f64 {
         self.parameters.axes[axis].loops.plant.position(self.bank.motor(axis, tick).angle)
     }
 
-    /// Puts the positions of an axis at the ticks of the position period that was computed last, m or rad,
-    /// into `positions`, as far as it goes.
+    /// Writes the positions of an axis at the ticks of the last position cycle to `positions`, m or rad, up to its
+    /// length.
     ///
     /// # Panics
-    /// If there is no such axis.
+    /// Panics if the axis is out of range.
     #[inline]
     pub fn positions(&self, axis: usize, positions: &mut [f64]) {
         let plant = &self.parameters.axes[axis].loops.plant;
@@ -327,28 +331,27 @@ impl Machine {
         positions.iter_mut().for_each(|value| *value = plant.position(*value));
     }
 
-    /// Current of an axis at that tick of the position period that was computed last where it is largest in
-    /// size, A.
+    /// Returns the current of an axis, with its sign, at the tick of the last position cycle with the largest |i|, A.
     ///
     /// # Panics
-    /// If there is no such axis.
-    pub fn largest_current(&self, axis: usize) -> f64 {
+    /// Panics if the axis is out of range.
+    pub fn signed_peak_current(&self, axis: usize) -> f64 {
         let currents = (0..self.ticks_per_period()).map(|tick| self.bank.motor(axis, tick).current);
         currents
             .fold(0.0, |largest: f64, current| if current.abs() > largest.abs() { current } else { largest })
     }
 
-    /// What an axis did in the position period that was computed last.
+    /// Returns the statistics of an axis over the last position cycle.
     ///
     /// # Panics
-    /// If there is no such axis.
+    /// Panics if the axis is out of range.
     pub fn activity(&self, axis: usize) -> Activity {
-        let tally = self.bank.tally(axis);
+        let statistics = self.bank.statistics(axis);
         let plant = &self.parameters.axes[axis].loops.plant;
         Activity {
-            peak_current: tally.peak_current,
-            saturated_ticks: tally.saturated_ticks as u64,
-            friction_extrapolated: plant.friction_is_extrapolated(tally.peak_speed),
+            peak_current: statistics.peak_current,
+            saturated_ticks: statistics.saturated_ticks as u64,
+            friction_extrapolated: plant.is_friction_extrapolated(statistics.peak_speed),
         }
     }
 }

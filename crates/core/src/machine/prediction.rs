@@ -1,4 +1,4 @@
-//! The linear inner loops of an axis over one position period, as a transfer function.
+//! Prediction model: linear inner loops of an axis over one position cycle as a discrete transfer function.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
@@ -11,49 +11,54 @@ use crate::units::seconds;
 
 use super::AxisError;
 
-/// Growth of the steps of θ after which nothing is left of the digits of the first one.
-const RUNAWAY: f64 = 1e9;
-/// What goes on from one position instant to the next: i, ω, the two integrals, and θ.
+/// Growth of the Markov parameters beyond which the inner loops count as unstable: the first parameter is lost to
+/// rounding.
+const MAX_GROWTH: f64 = 1e9;
+/// States from one position cycle to the next: i, ω, the two integrals, and θ.
 const STATES: usize = 5;
-/// What of that the steps of θ depend on: all but θ itself.
+/// States that the increments of θ depend on: all but θ.
 const VELOCITY_STATES: usize = STATES - 1;
-/// Hankel singular values of the velocity, relative to the largest, up to which the states behind them
-/// are left out: their part of θ is far below 1e-9 of the whole.
-const NEGLIGIBLE: f64 = 1e-12;
+/// Hankel singular values of the velocity, relative to the largest, up to which states are left out: their share of θ
+/// is far below 1e-9.
+const NEGLIGIBLE_SINGULAR_VALUE: f64 = 1e-12;
 
-/// The exact discrete transfer from Ω* to θ over one Tsp, `A(q⁻¹) θ = B(q⁻¹) Ω*` (Prévost section 5).
+/// Computes the exact discrete transfer from Ω* to θ over one Tsp, `A(q⁻¹) θ = B(q⁻¹) Ω*` (Prévost section 5).
 ///
-/// The loops of current and velocity and the motor are run through one position period as the simulation
-/// runs them, without friction, gravity, load and limits: what comes out is linear in state and Ω*. States
-/// whose Hankel singular values are negligible are left out.
+/// Velocity loop, current loop and motor are stepped through one position cycle as in the simulation, without
+/// friction, gravity, load and limits: the result is linear in state and Ω*. States whose Hankel singular values are
+/// negligible are left out.
 ///
 /// # Errors
-/// [`AxisError`] if the motor cannot be discretized, or nothing moves.
+/// [`AxisError`] if the motor cannot be discretized, or the inner loops are unstable or have no gain.
 pub fn prediction_model(axis: &AxisConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
-    model(axis, &axis.motor, periods)
+    model_with_motor(axis, &axis.motor, periods)
 }
 
-/// The same of the plant as it is, with what it deviates by; the controllers inside know nothing of that.
+/// Computes the prediction model of the plant with its deviation, under inner loops tuned for the nominal plant.
 ///
 /// # Errors
-/// As [`prediction_model`].
-pub fn deviating_model(axis: &AxisConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
-    model(axis, &Plant::motor(axis), periods)
+/// [`AxisError`] if the motor cannot be discretized, or the inner loops are unstable or have no gain.
+pub fn deviating_plant_model(axis: &AxisConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
+    model_with_motor(axis, &Plant::deviating_motor(axis), periods)
 }
 
-/// The loops of `axis` about a motor.
-fn model(axis: &AxisConfig, motor: &MotorConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
-    let loops = InnerLoops::new(axis, motor, periods)?;
-    let (transition, input) = loops.over_one_period();
+/// Computes the prediction model of `axis` with another motor.
+fn model_with_motor(
+    axis: &AxisConfig,
+    motor: &MotorConfig,
+    periods: &Periods,
+) -> Result<PredictionModel, AxisError> {
+    let loops = LinearInnerLoops::new(axis, motor, periods)?;
+    let (transition, input) = loops.state_space();
     // θ(k + 1) − θ(k) = C x(k) + D Ω*(k) has no integrator.
-    let markov = step_markov(&transition, &input, 2 * VELOCITY_STATES + 1);
-    let (poles, numerator) = minimal(&markov)?;
+    let markov = increment_markov_parameters(&transition, &input, 2 * VELOCITY_STATES + 1);
+    let (poles, numerator) = minimal_realization(&markov)?;
     let a = product(&[1.0, -1.0], &poles);
     Ok(PredictionModel::new(a, numerator, seconds(periods.position))?)
 }
 
-/// The loops inside the position loop, without their limits.
-struct InnerLoops {
+/// Inner loops without limits, and the motor.
+struct LinearInnerLoops {
     motor: Motor,
     velocity: Pi,
     current: Pi,
@@ -61,16 +66,16 @@ struct InnerLoops {
     ticks_per_velocity: u64,
 }
 
-/// Iterations for the singular values of a matrix of four rows; it takes some ten.
+/// Largest number of iterations of the singular value decomposition (4×4); about ten are usual.
 const SVD_ITERATIONS: usize = 1000;
 
 type State = SVector<f64, STATES>;
 
-impl InnerLoops {
+impl LinearInnerLoops {
     fn new(axis: &AxisConfig, motor: &MotorConfig, periods: &Periods) -> Result<Self, AxisError> {
         let tick = seconds(periods.current);
         let (unlimited, torque_constant) = (f64::INFINITY, axis.motor.torque_constant);
-        Ok(InnerLoops {
+        Ok(LinearInnerLoops {
             motor: Motor::new(motor, tick)?,
             velocity: Pi::new(
                 &axis.velocity_loop,
@@ -84,15 +89,16 @@ impl InnerLoops {
         })
     }
 
-    /// The state after one position period under `setpoint` (Ω*, rad/s).
-    fn after_one_period(&self, state: &State, setpoint: f64) -> State {
+    /// Returns the state after one position cycle under `setpoint` (Ω*, rad/s).
+    fn state_after_cycle(&self, state: &State, setpoint: f64) -> State {
         let mut motor = MotorState { current: state[0], speed: state[1], angle: state[4] };
         let mut velocity = PiState { integral: state[2], excess: 0.0 };
         let mut current = PiState { integral: state[3], excess: 0.0 };
         let mut current_setpoint = 0.0;
         for tick in 0..self.ticks_per_position {
             if tick.is_multiple_of(self.ticks_per_velocity) {
-                current_setpoint = self.velocity.update_with(&mut velocity, setpoint - motor.speed, 0.0);
+                current_setpoint =
+                    self.velocity.update_with_feedforward(&mut velocity, setpoint - motor.speed, 0.0);
             }
             let voltage = self.current.update(&mut current, current_setpoint - motor.current);
             motor = self.motor.step(&motor, voltage, 0.0);
@@ -100,15 +106,19 @@ impl InnerLoops {
         State::new(motor.current, motor.speed, velocity.integral, current.integral, motor.angle)
     }
 
-    /// Φ and Γ of `x(k + 1) = Φ x(k) + Γ Ω*(k)`.
-    fn over_one_period(&self) -> (SMatrix<f64, STATES, STATES>, State) {
-        let column = |k: usize| self.after_one_period(&State::ith(k, 1.0), 0.0);
-        (SMatrix::from_columns(&[0, 1, 2, 3, 4].map(column)), self.after_one_period(&State::zeros(), 1.0))
+    /// Returns Φ and Γ of `x(k + 1) = Φ x(k) + Γ Ω*(k)` over one position cycle.
+    fn state_space(&self) -> (SMatrix<f64, STATES, STATES>, State) {
+        let column = |k: usize| self.state_after_cycle(&State::ith(k, 1.0), 0.0);
+        (SMatrix::from_columns(&[0, 1, 2, 3, 4].map(column)), self.state_after_cycle(&State::zeros(), 1.0))
     }
 }
 
-/// The first `count` Markov parameters of the steps of θ, θ(k) − θ(k − 1).
-fn step_markov(transition: &SMatrix<f64, STATES, STATES>, input: &State, count: usize) -> Vec<f64> {
+/// Computes the first `count` Markov parameters of the increments θ(k) − θ(k − 1).
+fn increment_markov_parameters(
+    transition: &SMatrix<f64, STATES, STATES>,
+    input: &State,
+    count: usize,
+) -> Vec<f64> {
     let mut state = *input;
     let mut angle = 0.0;
     let mut markov = Vec::with_capacity(count);
@@ -120,24 +130,26 @@ fn step_markov(transition: &SMatrix<f64, STATES, STATES>, input: &State, count: 
     markov
 }
 
-/// Denominator and numerator, in rising powers of q⁻¹, of the smallest system with these Markov
-/// parameters: the first is the feedthrough, the others are realized after Ho and Kalman from the singular
-/// values of their Hankel matrix. The numerator has one more q⁻¹, since the step ends a period later.
-fn minimal(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
+/// Computes denominator and numerator, in rising powers of q⁻¹, of the minimal realization of Markov parameters.
+///
+/// The first parameter is the feedthrough; the others are realized by the Ho–Kalman algorithm from the singular value
+/// decomposition of their Hankel matrix. The numerator contains one more q⁻¹, since an increment ends one position
+/// cycle later.
+fn minimal_realization(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
     const SIZE: usize = VELOCITY_STATES;
     let hankel = |shift: usize| DMatrix::from_fn(SIZE, SIZE, |i, j| markov[i + j + shift]);
     if !markov.iter().all(|h| h.is_finite()) {
-        return Err(DesignError::Model("the inner loops diverge within a position period".to_owned()));
+        return Err(DesignError::Model("the inner loops diverge within a position cycle".to_owned()));
     }
     if markov.iter().all(|h| *h == 0.0) {
-        let still = "nothing moves: with velocity_loop.gain or current_loop.gain 0 the drive does not answer";
-        return Err(DesignError::Model(still.to_owned()));
+        let no_gain = "velocity_loop.gain or current_loop.gain is 0; both must be above 0";
+        return Err(DesignError::Model(no_gain.to_owned()));
     }
     let (first, largest) = (markov[0].abs(), markov.iter().fold(0.0, |m: f64, h| m.max(h.abs())));
-    if largest > RUNAWAY * first {
+    if largest > MAX_GROWTH * first {
         return Err(DesignError::Model(format!(
-            "the inner loops are unstable: what they make of a step of Ω* grows {:.1e} times within {} position \
-             periods; mend velocity_loop, current_loop or the periods",
+            "the inner loops are unstable: their response to Ω* grows by a factor of {:.1e} within {} position \
+             cycles; change velocity_loop, current_loop or the periods",
             largest / first,
             markov.len()
         )));
@@ -148,7 +160,7 @@ fn minimal(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
     let (u, vt) = (decomposition.u.ok_or_else(no_model)?, decomposition.v_t.ok_or_else(no_model)?);
     let values = decomposition.singular_values;
     let largest = values.max();
-    let kept: Vec<usize> = (0..SIZE).filter(|&k| values[k] > NEGLIGIBLE * largest).collect();
+    let kept: Vec<usize> = (0..SIZE).filter(|&k| values[k] > NEGLIGIBLE_SINGULAR_VALUE * largest).collect();
     let root = DVector::from_iterator(kept.len(), kept.iter().map(|&k| values[k].sqrt()));
     let (left, right) = (u.select_columns(&kept), vt.select_rows(&kept));
     let mut transition = left.transpose() * hankel(2) * right.transpose();
@@ -158,13 +170,13 @@ fn minimal(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
         }
     }
     let denominator = characteristic_polynomial(&transition);
-    // A·(h₀ + h₁q⁻¹ + …) ends after as many terms as there are states.
+    // A·(h₀ + h₁q⁻¹ + …) has as many terms as the realization has states, and one more.
     let coefficient = |k: usize| (0..=k).map(|i| denominator[i] * markov[k - i]).sum();
     let numerator = std::iter::once(0.0).chain((0..=kept.len()).map(coefficient)).collect();
     Ok((denominator, numerator))
 }
 
-/// det(I − q⁻¹ A) in rising powers of q⁻¹ (recursion of Faddeev and Le Verrier).
+/// Computes det(I − q⁻¹ A) in rising powers of q⁻¹ (Faddeev–LeVerrier algorithm).
 fn characteristic_polynomial(a: &DMatrix<f64>) -> Vec<f64> {
     let n = a.nrows();
     let mut polynomial = vec![1.0];

@@ -1,55 +1,55 @@
-//! What can be seen of an axis at an instant.
+//! Signals of an axis at one tick.
 
 /// Signals of one axis at one tick (Prévost fig. 3).
 ///
 /// Axis quantities are in m or rad, motor quantities in rad and N·m (m and N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AxisSample {
-    /// PSEC, the setpoint of this position period, m or rad.
+    /// PSEC, position setpoint at the entrance of the controller in this position cycle, m or rad.
     pub psec: f64,
-    /// The setpoint that the position controller was asked to follow, `PSEC_floor(k − α/Tsp)`, m or rad.
+    /// Setpoint at the input of the position controller, delayed by α: `PSEC_floor(k − α/Tsp)`, m or rad.
     pub delayed_psec: f64,
-    /// SP, m or rad.
+    /// SP, simulated position, m or rad.
     pub position: f64,
-    /// SV, m/s or rad/s.
+    /// SV, simulated velocity, m/s or rad/s.
     pub velocity: f64,
-    /// SMC, A.
+    /// SMC, simulated motor current i, A.
     pub current: f64,
-    /// Setpoint of the current loop after its limit, A.
+    /// i*, setpoint of the current loop after its limit, A.
     pub current_setpoint: f64,
-    /// Voltage after its limit, V.
+    /// u, voltage after its limit, V.
     pub voltage: f64,
     /// Ω* after its limit, rad/s of the motor.
     pub velocity_setpoint: f64,
-    /// VFFWS behind its delay, rad/s of the motor.
+    /// VFFWS, velocity feedforward after its delay β, rad/s of the motor.
     pub velocity_feedforward: f64,
-    /// TFFWS behind its delay, N·m at the motor.
+    /// TFFWS, torque feedforward after its delay γ, and friction compensation, N·m at the motor.
     pub torque_feedforward: f64,
-    /// Friction over the tick before, as motor current, A.
+    /// Friction over the previous tick, as motor current, A.
     pub friction_current: f64,
-    /// Gravity over the tick before, as motor current, A.
+    /// Gravity over the previous tick, as motor current, A.
     pub gravity_current: f64,
-    /// What the load over the tick before asks of the motor, A: like friction and gravity positive
-    /// when it opposes motion towards plus.
+    /// External load over the previous tick, as motor current, A; positive against motion towards plus, like
+    /// friction and gravity.
     pub load_current: f64,
-    /// What the motor exerts at the axis, `Kt i / r`, N or N·m.
+    /// Motor force or torque at the axis, `Kt i / r`, N or N·m.
     pub effort: f64,
-    /// Name of the position controller that is active.
+    /// Name of the active position controller.
     pub controller: &'static str,
-    /// Whether speed, current or voltage setpoint is at its limit.
+    /// True if speed, current or voltage setpoint is at its limit.
     pub saturated: bool,
-    /// Whether the friction law is used beyond the range that it was fitted for.
+    /// True if the friction law is extrapolated beyond its fitted range.
     pub friction_extrapolated: bool,
 }
 
 impl AxisSample {
-    /// `PSEC_k − SP`, m or rad; contains the pure delay.
-    pub fn tracking_error(&self) -> f64 {
+    /// Returns the following error `PSEC_k − SP`, m or rad; it contains the pure delay α.
+    pub fn following_error(&self) -> f64 {
         self.psec - self.position
     }
 
-    /// `PSEC_floor(k − α/Tsp) − SP`, m or rad: what the controller is asked to follow.
-    pub fn synchronized_tracking_error(&self) -> f64 {
+    /// Returns the delay-compensated following error `PSEC_floor(k − α/Tsp) − SP`, m or rad.
+    pub fn delay_compensated_following_error(&self) -> f64 {
         self.delayed_psec - self.position
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::Complex;
 use proptest::prelude::*;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::control::Rst;
-use virtual_axes_core::design::{GpcTuning, PredictionModel, Weight, gpc};
+use virtual_axes_core::design::{GpcTuning, PredictionModel, ControlWeight, gpc};
 use virtual_axes_core::machine::prediction_model;
 
 /// Position period of the default machine, s.
@@ -24,7 +24,7 @@ pub fn axes() -> Vec<(String, PredictionModel)> {
 }
 
 pub fn relative(n1: usize, n2: usize, nu: usize, lambda: f64) -> GpcTuning {
-    GpcTuning { n1, n2, nu, weight: Weight::Relative(lambda) }
+    GpcTuning { n1, n2, nu, weight: ControlWeight::Relative(lambda) }
 }
 
 /// R and T times `factor`.

@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use proptest::prelude::*;
 use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{
-    DesignError, Pid, PolePlacement, check_stable, p, pi, pid, pole_pair, pole_placement, poles,
+    DesignError, PidTuning, PolePlacement, check_stable, p_controller, pi_controller, pid_controller, pole_pair, pole_placement, poles,
 };
 
 /// Ω* of the triple for these signals, by its difference equation.
@@ -39,7 +39,7 @@ fn assert_run(rst: &Rst, wanted: impl Fn(&[f64], &[f64]) -> Vec<f64>) {
 }
 
 /// The controller of the doc comment, written with its states.
-fn textbook(tuning: Pid) -> impl Fn(&[f64], &[f64]) -> Vec<f64> {
+fn textbook(tuning: PidTuning) -> impl Fn(&[f64], &[f64]) -> Vec<f64> {
     move |setpoints, angles| {
         let (mut integral, mut derivative, mut speeds) = (0.0, 0.0, Vec::new());
         let (mut last_setpoint, mut last_angle) = (0.0, 0.0);
@@ -59,35 +59,35 @@ fn textbook(tuning: Pid) -> impl Fn(&[f64], &[f64]) -> Vec<f64> {
 
 #[test]
 fn the_triples_do_what_the_textbook_s_controllers_do() {
-    let full = Pid {
+    let full = PidTuning {
         gain: 25.0,
         integral_time: 0.2,
         derivative_time: 0.01,
         filter_time: 0.005,
         velocity_feedforward: 0.9,
     };
-    assert_run(&pid(&full, TSP).expect("a PID"), textbook(full));
-    let unfiltered = Pid { filter_time: 0.0, ..full };
-    assert_run(&pid(&unfiltered, TSP).expect("a PID"), textbook(unfiltered));
-    let no_derivative = Pid { derivative_time: 0.0, ..full };
-    let pi = pi(25.0, 0.2, 0.9, TSP).expect("a PI");
+    assert_run(&pid_controller(&full, TSP).expect("a PID"), textbook(full));
+    let unfiltered = PidTuning { filter_time: 0.0, ..full };
+    assert_run(&pid_controller(&unfiltered, TSP).expect("a PID"), textbook(unfiltered));
+    let no_derivative = PidTuning { derivative_time: 0.0, ..full };
+    let pi = pi_controller(25.0, 0.2, 0.9, TSP).expect("a PI");
     assert_run(&pi, textbook(no_derivative));
-    assert_eq!(pid(&no_derivative, TSP), Ok(pi));
-    let proportional = Pid { derivative_time: 0.0, integral_time: f64::INFINITY, ..full };
-    assert_run(&p(25.0, 0.9, TSP).expect("a P"), textbook(proportional));
+    assert_eq!(pid_controller(&no_derivative, TSP), Ok(pi));
+    let proportional = PidTuning { derivative_time: 0.0, integral_time: f64::INFINITY, ..full };
+    assert_run(&p_controller(25.0, 0.9, TSP).expect("a P"), textbook(proportional));
 }
 
 #[test]
 fn a_gain_alone_is_three_numbers() {
-    let rst = p(25.0, 0.0, TSP).expect("a P");
+    let rst = p_controller(25.0, 0.0, TSP).expect("a P");
     assert_eq!((rst.r(), rst.s(), rst.t(), rst.t_first()), (&[25.0][..], &[1.0][..], &[25.0][..], 0));
     assert!(!rst.has_integral_action());
-    assert!(pi(25.0, 0.1, 0.0, TSP).expect("a PI").has_integral_action());
+    assert!(pi_controller(25.0, 0.1, 0.0, TSP).expect("a PI").has_integral_action());
 }
 
 #[test]
 fn bad_gains_and_times_are_refused_by_name() {
-    let good = Pid {
+    let good = PidTuning {
         gain: 25.0,
         integral_time: 0.2,
         derivative_time: 0.01,
@@ -96,21 +96,21 @@ fn bad_gains_and_times_are_refused_by_name() {
     };
     for bad in [f64::NAN, f64::INFINITY, -1.0] {
         let tunings = [
-            ("gain", Pid { gain: bad, ..good }),
-            ("integral_time", Pid { integral_time: bad, ..good }),
-            ("derivative_time", Pid { derivative_time: bad, ..good }),
-            ("filter_time", Pid { filter_time: bad, ..good }),
-            ("velocity_feedforward", Pid { velocity_feedforward: bad, ..good }),
+            ("gain", PidTuning { gain: bad, ..good }),
+            ("integral_time", PidTuning { integral_time: bad, ..good }),
+            ("derivative_time", PidTuning { derivative_time: bad, ..good }),
+            ("filter_time", PidTuning { filter_time: bad, ..good }),
+            ("velocity_feedforward", PidTuning { velocity_feedforward: bad, ..good }),
         ];
         for (wanted, tuning) in tunings {
-            match pid(&tuning, TSP) {
+            match pid_controller(&tuning, TSP) {
                 Err(DesignError::OutOfRange { name, .. }) => assert_eq!(name, wanted),
                 other => panic!("{wanted} = {bad}: {other:?}"),
             }
         }
-        assert!(matches!(p(25.0, 0.0, bad), Err(DesignError::OutOfRange { name: "period", .. })));
+        assert!(matches!(p_controller(25.0, 0.0, bad), Err(DesignError::OutOfRange { name: "period", .. })));
     }
-    let message = pi(0.0, 0.2, 0.0, TSP).expect_err("no gain").to_string();
+    let message = pi_controller(0.0, 0.2, 0.0, TSP).expect_err("no gain").to_string();
     assert_eq!(message, "gain = 0 must be above 0 and at most 10000 s⁻¹");
 }
 

@@ -7,7 +7,7 @@ use crate::design_common::{TSP, axes, delayed, louder, model, models, open_loop,
 use proptest::prelude::*;
 use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{
-    DesignError, Margins, PredictionModel, check_stable, gpc, margins, p, poles,
+    DesignError, Margins, PredictionModel, check_stable, gpc, margins, p_controller, poles,
 };
 
 #[track_caller]
@@ -24,7 +24,7 @@ fn an_integrator_under_a_gain() {
     // L = K q⁻¹/(1 − q⁻¹), K = Kp Tsp: L(e^{jx}) = K e^{−jx/2}/(2j sin x/2).
     for loop_gain in [0.001, 0.1, 0.3, 1.0, 1.2, 1.9] {
         let integrator = model(&[1.0, -1.0], &[0.0, TSP]);
-        let found = margins_of(&integrator, &p(loop_gain / TSP, 0.0, TSP).expect("a controller"));
+        let found = margins_of(&integrator, &p_controller(loop_gain / TSP, 0.0, TSP).expect("a controller"));
         // |L| = 1 at 2 sin x/2 = K, where the phase is −π/2 − x/2; real and negative at π only.
         let crossover = 2.0 * (loop_gain / 2.0).asin();
         assert_close(found.phase, (PI - crossover) / 2.0, 1e-9);
@@ -41,7 +41,7 @@ fn a_lag_under_a_gain_that_crosses_nothing() {
     // L = K q⁻¹ (1 − a)/(1 − a q⁻¹): from K at 0 to −K (1 − a)/(1 + a) at π, |L| < 1 for K < 1.
     let (pole, gain) = (0.8, 0.5);
     let lag = model(&[1.0, -pole], &[0.0, 1.0 - pole]);
-    let found = margins_of(&lag, &p(gain, 0.0, TSP).expect("a controller"));
+    let found = margins_of(&lag, &p_controller(gain, 0.0, TSP).expect("a controller"));
     assert_eq!((found.phase, found.delay), (f64::INFINITY, f64::INFINITY));
     assert_close(found.gain, (1.0 + pole) / (1.0 - pole) / gain, 1e-12);
     // |1 + L|² is a quotient of two lines in cos x, and those are monotonic.
@@ -52,7 +52,7 @@ fn a_lag_under_a_gain_that_crosses_nothing() {
 fn a_plant_that_needs_its_gain_has_a_margin_downwards() {
     // Pole at 1.2 by b = 1: the loop's pole is 1.2 − k, stable for 0.2 < k < 2.2.
     let runaway = model(&[1.0, -1.2], &[0.0, 1.0]);
-    let found = margins_of(&runaway, &p(1.0, 0.0, TSP).expect("a controller"));
+    let found = margins_of(&runaway, &p_controller(1.0, 0.0, TSP).expect("a controller"));
     assert_close(found.gain_reduction, 0.2, 1e-12);
     assert_close(found.gain, 2.2, 1e-12);
 }
@@ -125,7 +125,7 @@ fn a_narrow_resonance_of_the_controller_is_seen() {
 #[test]
 fn an_unstable_loop_has_no_margins_but_a_pole() {
     let integrator = model(&[1.0, -1.0], &[0.0, 1.0]);
-    let refused = margins(&integrator, &p(2.5, 0.0, TSP).expect("a controller"));
+    let refused = margins(&integrator, &p_controller(2.5, 0.0, TSP).expect("a controller"));
     assert_eq!(refused, Err(DesignError::Unstable { re: -1.5, im: 0.0, modulus: 1.5 }));
 }
 

@@ -4,7 +4,7 @@ use crate::design_common::{TSP, axes, model, models, predictive, relative, times
 use nalgebra::Complex;
 use proptest::prelude::*;
 use virtual_axes_core::control::Rst;
-use virtual_axes_core::design::{DesignError, PredictionModel, accept, check_stable, margins, p, poles};
+use virtual_axes_core::design::{DesignError, PredictionModel, require_stable, check_stable, margins, p_controller, poles};
 
 /// Every wanted pole has a found one within the tolerance, each taken once.
 #[track_caller]
@@ -23,7 +23,7 @@ fn assert_poles(found: &[Complex<f64>], wanted: &[Complex<f64>], tolerance: f64)
 fn an_integrator_with_dead_time() {
     // z^(d+1) − z^d + K: at K = dᵈ/(d+1)^(d+1) two poles meet at d/(d+1); for d = 1 the rest is known.
     let plant = model(&[1.0, -1.0], &[0.0, 0.0, 1.0]);
-    let loop_with = |gain| poles(&plant, &p(gain, 0.0, TSP).expect("a controller")).expect("poles");
+    let loop_with = |gain| poles(&plant, &p_controller(gain, 0.0, TSP).expect("a controller")).expect("poles");
     let root = (0.25_f64 - 0.16).sqrt();
     assert_poles(&loop_with(0.16), &[(0.5 + root).into(), (0.5 - root).into()], 1e-14);
     let pair = Complex::new(0.5, (0.5_f64 - 0.25).sqrt());
@@ -35,7 +35,7 @@ fn an_integrator_with_dead_time() {
 fn poles_come_by_modulus_and_pairs_together() {
     // A = (1 − 0.3q⁻¹)(1 − 1.2q⁻¹ + 0.72q⁻²)(1 + 0.9q⁻¹) and next to no controller.
     let a = times(&times(&[1.0, -0.3], &[1.0, -1.2, 0.72]), &[1.0, 0.9]);
-    let found = poles(&model(&a, &[0.0, 1e-13]), &p(1e-3, 0.0, TSP).expect("a controller")).expect("poles");
+    let found = poles(&model(&a, &[0.0, 1e-13]), &p_controller(1e-3, 0.0, TSP).expect("a controller")).expect("poles");
     let wanted = [(-0.9).into(), Complex::new(0.6, 0.6), Complex::new(0.6, -0.6), 0.3.into()];
     for (f, w) in found.iter().zip(wanted) {
         assert!((f - w).norm() < 1e-12, "{found:?}");
@@ -46,7 +46,7 @@ fn poles_come_by_modulus_and_pairs_together() {
 fn delays_bring_poles_at_zero() {
     let plant = model(&[1.0, -0.5, 0.0, 0.0], &[0.0, 0.2]);
     assert_poles(
-        &poles(&plant, &p(1.0, 0.0, TSP).expect("a controller")).expect("poles"),
+        &poles(&plant, &p_controller(1.0, 0.0, TSP).expect("a controller")).expect("poles"),
         &[0.3.into(), 0.0.into(), 0.0.into()],
         1e-15,
     );
@@ -55,9 +55,9 @@ fn delays_bring_poles_at_zero() {
 #[test]
 fn an_unstable_loop_is_refused_with_its_pole_unless_forced() {
     let plant = model(&[1.0, -1.0], &[0.0, 0.0, 1.0]);
-    let rst = p(1.25, 0.0, TSP).expect("a controller");
+    let rst = p_controller(1.25, 0.0, TSP).expect("a controller");
     // z² − z + 1.25 = 0
-    match accept(&plant, rst.clone(), false) {
+    match require_stable(&plant, rst.clone(), false) {
         Err(DesignError::Unstable { re, im, modulus }) => {
             assert!((re - 0.5).abs() < 1e-12 && (im - 1.0).abs() < 1e-12, "{re} {im}");
             assert!((modulus - 1.25_f64.sqrt()).abs() < 1e-12, "{modulus}");
@@ -69,7 +69,7 @@ fn an_unstable_loop_is_refused_with_its_pole_unless_forced() {
         message,
         "the closed loop is unstable: its pole 0.500000 + 1.000000j has the modulus 1.118033989; it must be below 1 − 10⁻⁶"
     );
-    assert_eq!(accept(&plant, rst.clone(), true), Ok(rst));
+    assert_eq!(require_stable(&plant, rst.clone(), true), Ok(rst));
 }
 
 #[test]
@@ -113,7 +113,7 @@ proptest! {
 
     #[test]
     fn stable_is_what_settles(model in models(), gain in 1e-3..3.0_f64) {
-        let rst = p(gain, 0.0, TSP).expect("a controller");
+        let rst = p_controller(gain, 0.0, TSP).expect("a controller");
         let largest = poles(&model, &rst).expect("poles")[0].norm();
         // Near the circle a run of some seconds does not tell.
         prop_assume!((largest - 1.0).abs() > 5e-3);

@@ -4,7 +4,7 @@ use crate::design_common::{axes, models, predictive, relative};
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use virtual_axes_core::control::Rst;
-use virtual_axes_core::design::{DesignError, GpcTuning, PredictionModel, Weight, gpc};
+use virtual_axes_core::design::{DesignError, GpcTuning, PredictionModel, ControlWeight, gpc};
 
 fn assert_near(found: &[f64], wanted: &[f64], tolerance: f64) {
     assert_eq!(found.len(), wanted.len(), "{found:?} against {wanted:?}");
@@ -16,7 +16,7 @@ fn assert_near(found: &[f64], wanted: &[f64], tolerance: f64) {
 #[test]
 fn the_check_vector_of_the_model_page() {
     let model = PredictionModel::new(vec![1.0, -0.8], vec![0.0, 0.4], 0.006).expect("a model");
-    let tuning = GpcTuning { n1: 1, n2: 4, nu: 1, weight: Weight::Absolute(0.1) };
+    let tuning = GpcTuning { n1: 1, n2: 4, nu: 1, weight: ControlWeight::Absolute(0.1) };
     let rst = gpc(&model, &tuning).expect("a controller");
     assert_near(rst.r(), &[2.98449263, -1.93600542], 5e-9);
     assert_near(rst.s(), &[1.0, -1.0], 1e-15);
@@ -66,8 +66,8 @@ impl Situation {
         let free = self.response(model, &[], n2)[n1 - 1..].to_vec();
         let forced = forced(model, tuning);
         let lambda = match weight {
-            Weight::Absolute(lambda) => lambda,
-            Weight::Relative(lambda) => lambda * sum_of_squares(&forced),
+            ControlWeight::Absolute(lambda) => lambda,
+            ControlWeight::Relative(lambda) => lambda * sum_of_squares(&forced),
         };
         // The residuals e = w − J ΔΩ* are least where Jᵀ e = 0; both are the unknowns of one system.
         let (rows, all) = (n2 - n1 + 1, n2 - n1 + 1 + nu);
@@ -142,8 +142,8 @@ proptest! {
         let size: f64 = rst.r().iter().chain(rst.t()).chain(rst.s()).map(|c| c.abs()).sum();
         prop_assert!((found - wanted).abs() <= 1e-9 * size, "{found} against {wanted}");
         // The same λ, given as such.
-        let Weight::Relative(lambda) = tuning.weight else { unreachable!("the tunings are relative") };
-        let weight = Weight::Absolute(lambda * sum_of_squares(&forced(&model, &tuning)));
+        let ControlWeight::Relative(lambda) = tuning.weight else { unreachable!("the tunings are relative") };
+        let weight = ControlWeight::Absolute(lambda * sum_of_squares(&forced(&model, &tuning)));
         let found = situation.by(&gpc(&model, &GpcTuning { weight, ..tuning }).expect("a controller"));
         prop_assert!((found - wanted).abs() <= 1e-9 * size, "{found} against {wanted}");
     }
@@ -172,7 +172,7 @@ fn assert_refused(tuning: GpcTuning, words: &str) {
 #[test]
 fn tunings_out_of_range_are_refused_by_name() {
     let tuning = |n1, n2, nu, weight| GpcTuning { n1, n2, nu, weight };
-    let light = Weight::Absolute(0.1);
+    let light = ControlWeight::Absolute(0.1);
     assert_refused(tuning(5, 4, 1, light), "n1 = 5 must lie in 1 … n2 = 4");
     assert_refused(tuning(0, 4, 1, light), "n1 = 0 must lie in 1 … n2 = 4");
     assert_refused(tuning(1, 4, 5, light), "nu = 5 must lie in 1 … n2 = 4");
@@ -180,10 +180,10 @@ fn tunings_out_of_range_are_refused_by_name() {
     assert_refused(tuning(1, 0, 1, light), "n2 = 0 must lie in 1 … 200");
     assert_refused(tuning(1, 201, 1, light), "n2 = 201 must lie in 1 … 200");
     for (weight, name) in [
-        (Weight::Absolute(-0.1), "lambda = -0.1"),
-        (Weight::Relative(-0.1), "lambda_rel = -0.1"),
-        (Weight::Absolute(f64::NAN), "lambda = NaN"),
-        (Weight::Relative(f64::INFINITY), "lambda_rel = inf"),
+        (ControlWeight::Absolute(-0.1), "lambda = -0.1"),
+        (ControlWeight::Relative(-0.1), "lambda_rel = -0.1"),
+        (ControlWeight::Absolute(f64::NAN), "lambda = NaN"),
+        (ControlWeight::Relative(f64::INFINITY), "lambda_rel = inf"),
     ] {
         assert_refused(tuning(1, 4, 1, weight), &format!("{name} must be finite and not negative"));
     }
@@ -194,7 +194,7 @@ fn a_matrix_without_inverse_is_refused_by_name() {
     // Two periods of dead time: within three periods nothing but the first increment shows.
     let late = PredictionModel::new(vec![1.0, -0.8], vec![0.0, 0.0, 0.0, 0.4], 0.006).expect("a model");
     let of = |n2, nu, weight| gpc(&late, &GpcTuning { n1: 1, n2, nu, weight });
-    for weight in [Weight::Absolute(0.0), Weight::Relative(0.0)] {
+    for weight in [ControlWeight::Absolute(0.0), ControlWeight::Relative(0.0)] {
         assert!(of(3, 1, weight).is_ok());
         assert_eq!(of(3, 2, weight), Err(DesignError::Singular { n1: 1, n2: 3, nu: 2, lambda: 0.0 }));
         let message = of(2, 1, weight).expect_err("nothing can be reached").to_string();
@@ -203,5 +203,5 @@ fn a_matrix_without_inverse_is_refused_by_name() {
             "{message}"
         );
     }
-    assert!(of(3, 2, Weight::Absolute(0.1)).is_ok());
+    assert!(of(3, 2, ControlWeight::Absolute(0.1)).is_ok());
 }

@@ -6,7 +6,7 @@ use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::machine::{AxisSample, prediction_model};
 use virtual_axes_core::trial::{Figures, Tick};
 use virtual_axes_core::units::seconds;
-use virtual_axes_verification::fixtures::common::*;
+use virtual_axes_verification::fixtures::machines::*;
 
 const MACHINES: [&str; 2] = ["mikron_ucp710", "linear_motor_center"];
 const DEFAULT: &str = MACHINES[0];
@@ -197,13 +197,13 @@ fn a_proportional_controller_by_its_polynomials_is_the_cascade_without_feedforwa
 
 #[test]
 fn the_axis_does_not_know_whether_a_controller_is_predictive() {
-    use virtual_axes_core::design::{GpcTuning, Weight, gpc};
+    use virtual_axes_core::design::{GpcTuning, ControlWeight, gpc};
 
     let config = configured(DEFAULT, &[GPC]);
     let x = &config.axes()[0];
     assert_eq!(x.kind(), AxisKind::Linear);
     let model = prediction_model(x, &config.periods()).expect("a model");
-    let tuning = GpcTuning { n1: 1, n2: 14, nu: 12, weight: Weight::Relative(0.005) };
+    let tuning = GpcTuning { n1: 1, n2: 14, nu: 12, weight: ControlWeight::Relative(0.005) };
     let rst = gpc(&model, &tuning).expect("a controller");
     let list = |numbers: &[f64]| {
         let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();

@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig};
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, RPM, seconds};
-use virtual_axes_verification::fixtures::common::*;
+use virtual_axes_verification::fixtures::machines::*;
 
 const MACHINES: [&str; 2] = ["mikron_ucp710", "linear_motor_center"];
 const GPC: &str = "position_loop.controller=gpc";
@@ -20,7 +20,7 @@ fn periods_in(config: &MachineConfig, time: f64) -> i64 {
 }
 
 /// A line of 100 mm or 90° at a third of the axis's speed.
-fn line(axis: &AxisConfig) -> Profile {
+fn line(axis: &AxisConfig) -> RestToRestProfile {
     let limits = axis.limits();
     let (length, velocity) = match axis.kind() {
         AxisKind::Linear => (0.1, 10.0 * METER_PER_MINUTE),
@@ -28,7 +28,7 @@ fn line(axis: &AxisConfig) -> Profile {
     };
     // Where the velocity is reached before the acceleration is, less of that.
     let acceleration = limits.acceleration.min(0.9 * (velocity * limits.jerk).sqrt());
-    Profile::new(length, velocity, acceleration, limits.jerk)
+    RestToRestProfile::new(length, velocity, acceleration, limits.jerk)
 }
 
 #[test]
@@ -59,10 +59,10 @@ fn comes_to_rest(name: &str, config: &MachineConfig, place: usize, friction: &st
             if k >= end + periods_in(config, 2.0) {
                 let s = m.axis(place).sample();
                 assert!(
-                    s.tracking_error().abs() <= tolerance(axis),
+                    s.following_error().abs() <= tolerance(axis),
                     "{name} {} {friction}: {} off",
                     axis.name(),
-                    s.tracking_error()
+                    s.following_error()
                 );
                 range = [
                     range[0].min(s.position),
@@ -94,7 +94,7 @@ fn after(
             let s = m.axis(place).sample();
             saturated |= s.saturated;
             if k > last - periods_in(config, 1.0) {
-                worst = worst.max(s.synchronized_tracking_error().abs());
+                worst = worst.max(s.delay_compensated_following_error().abs());
             }
         });
     }

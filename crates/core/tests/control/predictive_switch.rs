@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters};
-use virtual_axes_verification::fixtures::common::*;
+use virtual_axes_verification::fixtures::machines::*;
 
 const MACHINE: &str = "mikron_ucp710";
 const CASCADE: &[&str] = &[];
@@ -26,7 +26,7 @@ fn parameters_of(changes: &[&str]) -> Arc<MachineParameters> {
 /// One position period of the ballbar trial, with the setpoints that are read ahead.
 fn advance(machine: &mut Machine, ballbar: &Ballbar, k: i64, observe: impl FnMut(&Machine)) {
     let psec = |k: i64| ballbar.psec(k as f64 * TSP);
-    let horizon = machine.horizon() as i64;
+    let horizon = machine.preview_length() as i64;
     let ahead: Vec<f64> = (0..AXES).flat_map(|axis| (1..=horizon).map(move |j| psec(k + j)[axis])).collect();
     machine.advance_with(&psec(k), &ahead, observe);
 }
@@ -116,7 +116,7 @@ fn cascade_to_predictive_and_back_on_a_circle_is_not_felt() {
         undisturbed.until(first);
         let mut run = undisturbed.clone();
         for (parameters, before) in [(&to_gpc, cascade), (&to_cascade, gpc)] {
-            run.machine.adopt(Arc::clone(parameters)).expect("the same machine");
+            run.machine.update_parameters(Arc::clone(parameters)).expect("the same machine");
             let seen = run.until(run.next + 80);
             assert!(!seen.saturated);
             assert!(seen.change <= 2.0 * before.change, "{first}: {} and {}", seen.change, before.change);
@@ -142,7 +142,7 @@ fn no_controller_takes_over_from_another_with_a_bump() {
                 let mut run = Run::new(&ballbar, parameters_of(from));
                 run.until(first);
                 let before = run.last;
-                run.machine.adopt(parameters_of(to)).expect("the same machine");
+                run.machine.update_parameters(parameters_of(to)).expect("the same machine");
                 run.until(first + 1);
                 let step = (0..2).map(|i| (run.last[i] - before[i]).abs()).fold(0.0, f64::max);
                 assert!(step <= allowed + 1.5, "{from:?} to {to:?} at {first}: {step} rad/s at once");

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use virtual_axes_core::config::MotorConfig;
 use virtual_axes_core::control::{Pi, PiState};
 use virtual_axes_core::drive::{Motor, MotorState, Plant};
-use virtual_axes_verification::fixtures::common::{friction_of_x, machine, parameters};
+use virtual_axes_verification::fixtures::machines::{friction_of_x, machine, parameters};
 
 const TICK: f64 = 125e-6;
 const RELATIVE: f64 = 1e-9;

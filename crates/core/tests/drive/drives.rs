@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::machine::{Machine, MachineParameters};
-use virtual_axes_verification::fixtures::common::{Profile, assert_near, machine, parameters};
+use virtual_axes_verification::fixtures::machines::{RestToRestProfile, assert_near, machine, parameters};
 
 const X: usize = 0;
 const Z: usize = 2;
@@ -63,7 +63,7 @@ fn single_axis(direct: bool) -> Machine {
 
 #[test]
 fn a_linear_motor_that_equals_a_screw_drive_moves_as_it_does() {
-    let profile = Profile::new(0.2, 10.0 / 60.0, 2.5, 50.0);
+    let profile = RestToRestProfile::new(0.2, 10.0 / 60.0, 2.5, 50.0);
     let (mut screw, mut linear) = (single_axis(false), single_axis(true));
     let mut largest: f64 = 0.0;
     for k in 0..300 {
@@ -135,7 +135,7 @@ fn gains_changed_at_rest_move_nothing() {
     }
     let changes = [("z.velocity_loop.gain", 3.0), ("z.position_loop.gain", 1.0), ("z.delays.alpha_ms", 40.0)];
     let config = parameters(&changes).machine_config().expect("valid");
-    m.adopt(Arc::new(MachineParameters::new(&config).expect("can be discretized"))).expect("same machine");
+    m.update_parameters(Arc::new(MachineParameters::new(&config).expect("can be discretized"))).expect("same machine");
     for _ in 0..100 {
         m.advance(&[0.0; 5], &[]);
     }
@@ -149,7 +149,7 @@ fn parameters_of_another_machine_are_not_adopted() {
     let before = m.clone();
     let config = parameters(&[("periods.position_ms", 3.0)]).machine_config().expect("valid");
     let parameters = Arc::new(MachineParameters::new(&config).expect("can be discretized"));
-    assert!(m.adopt(parameters).is_err());
+    assert!(m.update_parameters(parameters).is_err());
     assert_eq!(m, before);
     assert_eq!(other.axis_count(), 1);
 }

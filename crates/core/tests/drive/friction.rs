@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use virtual_axes_core::drive::{MotorState, Plant};
-use virtual_axes_verification::fixtures::common::{friction_of_x, parameters};
+use virtual_axes_verification::fixtures::machines::{friction_of_x, parameters};
 
 const TICK: f64 = 125e-6;
 const X: usize = 0;
@@ -60,6 +60,6 @@ proptest! {
 fn friction_beyond_the_fitted_range_is_said() {
     let plant = plant(LAW);
     let at = |meters_per_minute: f64| meters_per_minute / 60.0 / RATIO;
-    assert!(!plant.friction_is_extrapolated(at(19.99)));
-    assert!(plant.friction_is_extrapolated(at(-20.01)));
+    assert!(!plant.is_friction_extrapolated(at(19.99)));
+    assert!(plant.is_friction_extrapolated(at(-20.01)));
 }

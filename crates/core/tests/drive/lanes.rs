@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use virtual_axes_core::assess::{Deviations, PathTracker};
+use virtual_axes_core::assess::{PathDeviations, PathTracker};
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::Kinematics;
-use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters, Width};
-use virtual_axes_core::trial::{Figures, Trial, run, run_together, trace};
+use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters, SimdWidth};
+use virtual_axes_core::trial::{Figures, Trial, run, run_variants, trace};
 use virtual_axes_core::units::seconds;
-use virtual_axes_verification::fixtures::common::{
+use virtual_axes_verification::fixtures::machines::{
     AXES, TSP, configured, configured_with, program, setpoints, watch_scenario,
 };
 
@@ -46,7 +46,7 @@ fn seen(machine: &mut Machine, first: usize, count: usize) -> Vec<u64> {
     let axes = machine.axis_count();
     let start: Vec<f64> = (0..axes).map(|axis| psec(axis % AXES, 0)).collect();
     machine.reset(&start);
-    let horizon = machine.horizon();
+    let horizon = machine.preview_length();
     let mut seen = Vec::new();
     for k in 0..PERIODS {
         for axis in 0..axes {
@@ -84,8 +84,8 @@ fn every_width_gives_the_same_bits() {
     for config in machines() {
         let mut machine = Machine::new(parameters(&config));
         let widest = seen(&mut machine, 0, AXES);
-        for width in [Width::Four, Width::Baseline] {
-            machine.set_width(width);
+        for width in [SimdWidth::Four, SimdWidth::Baseline] {
+            machine.set_simd_width(width);
             assert!(widest == seen(&mut machine, 0, AXES), "{width:?}");
         }
     }
@@ -94,7 +94,7 @@ fn every_width_gives_the_same_bits() {
 #[test]
 fn an_axis_does_the_same_alone_and_beside_any_others() {
     let all: Vec<_> = machines().iter().map(parameters).collect();
-    let together = MachineParameters::together(&all).expect("alike in their periods");
+    let together = MachineParameters::concatenate(&all).expect("alike in their periods");
     let mut together = Machine::new(Arc::new(together));
     for (place, one) in all.iter().enumerate() {
         let mut alone = Machine::new(Arc::clone(one));
@@ -105,11 +105,11 @@ fn an_axis_does_the_same_alone_and_beside_any_others() {
 #[test]
 fn machines_of_other_periods_do_not_go_together() {
     let slow = configured("mikron_ucp710", &[]);
-    let fast = virtual_axes_verification::fixtures::common::parameters(&[("periods.current_us", 62.5)])
+    let fast = virtual_axes_verification::fixtures::machines::parameters(&[("periods.current_us", 62.5)])
         .machine_config()
         .expect("valid");
-    assert!(MachineParameters::together(&[parameters(&slow), parameters(&fast)]).is_none());
-    assert!(MachineParameters::together(&[]).is_none());
+    assert!(MachineParameters::concatenate(&[parameters(&slow), parameters(&fast)]).is_none());
+    assert!(MachineParameters::concatenate(&[]).is_none());
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn variants_that_are_run_together_have_the_figures_that_each_has_alone() {
         };
         let setpoints = |machine| setpoints(scenario, Arc::clone(&program), machine);
         let together =
-            run_together(&trial(&base), setpoints(&base), &variants, &[x, y], || Ok(())).expect("a run");
+            run_variants(&trial(&base), setpoints(&base), &variants, &[x, y], || Ok(())).expect("a run");
         assert_eq!(together.len(), variants.len());
         for (variant, figures) in variants.iter().zip(&together) {
             let alone = run(&trial(variant), setpoints(variant), |_| Ok(())).expect("a run").figures;
@@ -210,9 +210,9 @@ fn a_period_of_poses_is_as_far_from_the_path_as_each_of_them() {
             for period in seen.chunks(ticks) {
                 let until = |tick: usize| program.progress(period[tick].0) + 5e-3;
                 let axes = (0..AXES).flat_map(|axis| period.iter().map(move |(_, joints)| joints[axis]));
-                kinematics.forward_all(&mut turned, &axes.collect::<Vec<_>>(), period.len(), &mut poses);
+                kinematics.forward_batch(&mut turned, &axes.collect::<Vec<_>>(), period.len(), &mut poses);
                 let followed = at_once.follow(&poses, until, &mut found).expect("poses");
-                let mut expected = Deviations::default();
+                let mut expected = PathDeviations::default();
                 let mut first = None;
                 for (tick, (_, joints)) in period.iter().enumerate() {
                     let pose = kinematics.forward(joints);

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
 use virtual_axes_core::config::{
-    Assignment, Definition, Kind, MachineConfig, MotorConfig, Parameters, Scope, Source, Value,
+    Assignment, ParameterDefinition, ParameterKind, MachineConfig, MotorConfig, Parameters, Scope, ValueSource, Value,
 };
 use virtual_axes_core::drive::{Motor, MotorState, Plant};
 use virtual_axes_core::machine::{Machine, MachineParameters, prediction_model};
@@ -237,7 +237,7 @@ fn is_a_reason(refusal: &str) -> bool {
 /// The default machine with other numbers.
 fn config_with(changes: &[(String, f64)]) -> Result<MachineConfig, String> {
     let mut parameters = Parameters::embedded_default().expect("shipped");
-    let source = Source::named("test");
+    let source = ValueSource::named("test");
     let change = |(key, value): &(String, f64)| Assignment {
         key: key.clone(),
         value: Value::Double(*value),
@@ -291,8 +291,8 @@ fn run_hard(machine: &mut Machine, what: &dyn Fn() -> String) {
 /// The parameters of the X, A and C axes and the periods that are numbers, with their edges.
 fn edges() -> Vec<(String, f64, f64)> {
     let parameters = Parameters::embedded_default().expect("shipped");
-    let number = |(key, definition): (String, &'static Definition)| match definition.kind {
-        Kind::Number { min, max } if definition.scope != Scope::Node => Some((key, min, max)),
+    let number = |(key, definition): (String, &'static ParameterDefinition)| match definition.kind {
+        ParameterKind::Number { min, max } if definition.scope != Scope::Node => Some((key, min, max)),
         _ => None,
     };
     let is_meant = |(key, ..): &(String, f64, f64)| {
@@ -344,7 +344,7 @@ fn stops_and_never_reverses(config: &MachineConfig) {
     let tick = seconds(config.periods().current);
     for axis in config.axes() {
         let plant = Plant::new(axis, tick).expect("the machine has been built");
-        let motor = Motor::new(&Plant::motor(axis), tick).expect("likewise");
+        let motor = Motor::new(&Plant::deviating_motor(axis), tick).expect("likewise");
         for speed in [0.0, 1e-300, 1e-9, -1e-3, 1.0, -50.0, 1e3, -1e6] {
             for (current, voltage) in [(0.0, 0.0), (1.0, 10.0), (-1e4, 1e5), (1e4, -1e5)] {
                 let start = MotorState { current, speed, angle: 0.1 };

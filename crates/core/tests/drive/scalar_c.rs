@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 use serde_json::Value;
 use virtual_axes_core::assess::{AxisAssessor, AxisReport};
 use virtual_axes_core::units::{DEGREE, REVOLUTION, RPM, seconds};
-use virtual_axes_verification::fixtures::common::*;
+use virtual_axes_verification::fixtures::machines::*;
 
 const MICROMETER: f64 = 1e-6;
 const JOINTS: [&str; AXES] = ["x", "y", "z", "a", "c"];
@@ -103,8 +103,8 @@ fn figure(figures: &Value, path: &str) -> f64 {
 
 #[test]
 fn the_c_loop_keeps_the_lines_and_rotations_of_the_models_page() {
-    let line = |acceleration| Profile::new(0.200, 10.0 * M_MIN, acceleration, 50.0);
-    let turn = Profile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
+    let line = |acceleration| RestToRestProfile::new(0.200, 10.0 * M_MIN, acceleration, 50.0);
+    let turn = RestToRestProfile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
     for (joint, profile, unit, error, current) in [
         ("x", line(2.5), MICROMETER, 218.9, 14.40),
         ("y", line(2.5), MICROMETER, 230.5, 12.40),
@@ -161,10 +161,10 @@ fn assert_library_agrees(setpoints: &Setpoints) -> Vec<AxisReport> {
     let figures = setpoints.figures(&[]);
     for (joint, report) in JOINTS.iter().zip(&reports) {
         for (key, found, tolerance) in [
-            ("max_tracking_error", report.max_tracking_error, ROUNDING),
-            ("rms_tracking_error", report.rms_tracking_error, ROUNDING),
-            ("max_synchronized_tracking_error", report.max_synchronized_tracking_error, ROUNDING),
-            ("rms_synchronized_tracking_error", report.rms_synchronized_tracking_error, ROUNDING),
+            ("max_tracking_error", report.max_following_error, ROUNDING),
+            ("rms_tracking_error", report.rms_following_error, ROUNDING),
+            ("max_synchronized_tracking_error", report.max_delay_compensated_following_error, ROUNDING),
+            ("rms_synchronized_tracking_error", report.rms_delay_compensated_following_error, ROUNDING),
             // Amperes are some thousand times what the axis moves: motor radians, then gains.
             ("peak_current", report.peak_current, 1e3 * ROUNDING),
             ("control_activity", report.control_activity, 1e3 * ROUNDING),
@@ -179,11 +179,11 @@ fn assert_library_agrees(setpoints: &Setpoints) -> Vec<AxisReport> {
 
 #[test]
 fn five_axes_at_once_agree_with_the_c_loop() {
-    let line = Profile::new(0.200, 10.0 * M_MIN, 2.1, 50.0);
-    let turn = Profile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
+    let line = RestToRestProfile::new(0.200, 10.0 * M_MIN, 2.1, 50.0);
+    let turn = RestToRestProfile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
     // There and back: every axis reverses, and stops twice.
     let shuttle =
-        |profile: Profile, pause: f64, t: f64| profile.at(t) - profile.at(t - profile.duration() - pause);
+        |profile: RestToRestProfile, pause: f64, t: f64| profile.at(t) - profile.at(t - profile.duration() - pause);
     let setpoints = Setpoints::new("five-axis", &JOINTS, 2.0 * turn.duration() + 0.5, |t| {
         vec![
             shuttle(line, 0.0, t),

@@ -1,0 +1,399 @@
+//! Inner loops (velocity and current PI controllers with anti-windup) and plants of several axes in SIMD lanes,
+//! stepped through one position cycle.
+//!
+//! [`AxisBlock::run`] is the only code that runs the recurrence of an axis: one generic function over [`SimdReal`],
+//! compiled once per SIMD width. Its documentation lists the equations.
+
+use std::hint::black_box;
+
+use pulp::Simd;
+
+use crate::control::{Pi, PiState};
+use crate::drive::{FrictionExpansion, GravityExpansion, MotorState, Plant};
+use crate::simd::{SimdLoad, SimdReal, Unroll2, Vector, soa_struct};
+
+soa_struct! {
+    /// Parameters of one axis inside its position loop: plant, velocity controller, current controller.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub(super) struct InnerLoops {
+        pub plant: Plant<N>,
+        pub velocity: Pi<N>,
+        pub current: Pi<N>,
+    }
+}
+
+soa_struct! {
+    /// State of one axis that the inner loops carry from tick to tick.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct InnerLoopState {
+        pub motor: MotorState<N>,
+        pub velocity: PiState<N>,
+        pub current: PiState<N>,
+        /// i*, A.
+        pub current_setpoint: N,
+        /// Friction torque over the last tick, N·m.
+        pub friction: N,
+        /// Gravity torque over the last tick, N·m.
+        pub gravity: N,
+        /// Largest amount by which i* exceeded its limit since the start of the position cycle, A.
+        pub max_current_excess: N,
+    }
+}
+
+soa_struct! {
+    /// Inputs to the inner loops for one position cycle.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct InnerLoopInputs {
+        /// Ω* after its limit, rad/s of the motor.
+        pub velocity_setpoint: N,
+        /// Amount by which Ω* exceeded its limit, rad/s.
+        pub velocity_excess: N,
+        /// VFFWS, rad/s of the motor.
+        pub velocity: ZeroOrderHold<N>,
+        /// TFFWS, N·m at the motor.
+        pub torque: ZeroOrderHold<N>,
+        /// Load torque, N·m at the motor, positive towards plus.
+        pub load: N,
+    }
+}
+
+soa_struct! {
+    /// Zero-order-held input that switches once per position cycle, at velocity cycle `step`.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct ZeroOrderHold {
+        /// Value before the switch.
+        pub before: N,
+        /// Value from the switch on.
+        pub after: N,
+        /// First velocity cycle with the second value, counted from the start of the position cycle.
+        pub step: N,
+    }
+}
+
+impl<N: SimdReal> ZeroOrderHold<N> {
+    /// Returns the value in a velocity cycle, counted from the start of the position cycle.
+    #[inline(always)]
+    pub fn at(&self, velocity_cycle: f64) -> N {
+        self.before.select(self.step.splat(velocity_cycle).simd_lt(self.step), self.after)
+    }
+}
+
+soa_struct! {
+    /// Controller outputs of one tick and torques over the tick before.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct TickRecord {
+        /// i*, A.
+        pub current_setpoint: N,
+        /// u, V.
+        pub voltage: N,
+        /// Friction torque, N·m.
+        pub friction: N,
+        /// Gravity torque, N·m.
+        pub gravity: N,
+        /// 1 if speed, current or voltage setpoint is at its limit, else 0.
+        pub saturated: N,
+    }
+}
+
+soa_struct! {
+    /// Statistics over the ticks of one position cycle.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub(super) struct CycleStatistics {
+        /// Largest |i|, A.
+        pub peak_current: N,
+        /// Largest |ω|, rad/s.
+        pub peak_speed: N,
+        /// Ticks with speed, current or voltage setpoint at its limit.
+        pub saturated_ticks: N,
+    }
+}
+
+/// Value aligned to a cache line of 64 bytes, the size of the largest SIMD vector.
+#[derive(Debug, Clone, PartialEq)]
+#[repr(align(64))]
+pub(super) struct Aligned<T>(pub T);
+
+/// Aligns the stack frame of the calling function to 64 bytes; returns the address of a local aligned that way.
+///
+/// The compiler aligns a stack frame as its most aligned local requires. SIMD vectors that are spilled to an aligned
+/// frame do not cross cache lines (docs/performance.md lists the gain). [`black_box`] keeps the local from being
+/// optimized away. The function is always inlined: a call would align only its own frame.
+#[inline(always)]
+fn align_stack_frame() -> usize {
+    std::ptr::from_mut(black_box(&mut Aligned(0_u8))).addr()
+}
+
+/// Lengths of the control cycles in ticks; a tick is one current cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct CycleTicks {
+    /// Ticks per position cycle.
+    pub position: usize,
+    /// Ticks per velocity cycle.
+    pub velocity: usize,
+}
+
+impl CycleTicks {
+    /// Returns the number of velocity cycles per position cycle.
+    fn velocity_cycles(self) -> usize {
+        self.position / self.velocity
+    }
+}
+
+/// Parameters, inputs, state and results of `L` axes, one per SIMD lane.
+#[derive(Debug, Clone, PartialEq)]
+#[repr(align(64))]
+pub(super) struct AxisBlock<const L: usize> {
+    loops: Aligned<InnerLoops<[f64; L]>>,
+    state: Aligned<InnerLoopState<[f64; L]>>,
+    inputs: Aligned<InnerLoopInputs<[f64; L]>>,
+    /// Expansions of the friction laws near the present speeds.
+    friction_expansion: Aligned<FrictionExpansion<[f64; L]>>,
+    /// Expansions of gravity near the present angles.
+    gravity_expansion: Aligned<GravityExpansion<[f64; L]>>,
+    pub statistics: Aligned<CycleStatistics<[f64; L]>>,
+    /// True if gravity of any axis depends on its position.
+    has_tilting_axis: bool,
+    /// Friction compensation of each velocity cycle, N·m at the motor; empty without compensation.
+    compensation: Vec<Aligned<[f64; L]>>,
+    /// Motor states at the start of each tick.
+    pub motors: Vec<Aligned<MotorState<[f64; L]>>>,
+    /// Record of the first tick, or of each tick if all are recorded.
+    pub records: Vec<Aligned<TickRecord<[f64; L]>>>,
+}
+
+impl<const L: usize> AxisBlock<L> {
+    /// Creates a block with `loops` in every lane.
+    pub fn new(loops: &InnerLoops, ticks: CycleTicks) -> Self {
+        AxisBlock {
+            loops: Aligned(loops.fill()),
+            state: Aligned(InnerLoopState::default().fill()),
+            inputs: Aligned(InnerLoopInputs::default().fill()),
+            friction_expansion: Aligned(loops.plant.friction_speed_drop.expand(0.0).fill()),
+            gravity_expansion: Aligned(loops.plant.gravity.expand(0.0).fill()),
+            statistics: Aligned(CycleStatistics::default().fill()),
+            has_tilting_axis: loops.plant.gravity.is_position_dependent(),
+            compensation: Vec::new(),
+            motors: vec![Aligned(MotorState::default().fill()); ticks.position],
+            records: vec![Aligned(TickRecord::default().fill())],
+        }
+    }
+
+    /// Returns the state in a lane.
+    pub fn state(&self, lane: usize) -> InnerLoopState {
+        self.state.0.lane(lane)
+    }
+
+    /// Sets the state in a lane.
+    pub fn set_state(&mut self, lane: usize, state: &InnerLoopState) {
+        self.state.0.set_lane(lane, state);
+        self.expand(lane);
+    }
+
+    /// Sets the inputs of a lane for the next position cycle.
+    pub fn set_inputs(&mut self, lane: usize, inputs: &InnerLoopInputs) {
+        self.inputs.0.set_lane(lane, inputs);
+    }
+
+    /// Sets the parameters of a lane.
+    pub fn set_loops(&mut self, lane: usize, loops: &InnerLoops) {
+        self.loops.0.set_lane(lane, loops);
+        self.expand(lane);
+        self.has_tilting_axis =
+            (0..L).any(|lane| self.loops.0.lane(lane).plant.gravity.is_position_dependent());
+    }
+
+    /// Expands friction and gravity of a lane at its present speed and angle.
+    fn expand(&mut self, lane: usize) {
+        let (plant, motor) = (&self.loops.0.plant, &self.state.0.motor);
+        self.friction_expansion
+            .0
+            .set_lane(lane, &plant.friction_speed_drop.lane(lane).expand(motor.speed[lane]));
+        self.gravity_expansion.0.set_lane(lane, &plant.gravity.lane(lane).expand(motor.angle[lane]));
+    }
+
+    /// Sets the friction compensation of a lane; `torque` returns N·m at the motor for each velocity cycle.
+    pub fn set_compensation(&mut self, lane: usize, ticks: CycleTicks, torque: impl Fn(usize) -> f64) {
+        self.compensation.resize_with(ticks.velocity_cycles(), || Aligned([0.0; L]));
+        for (velocity_cycle, row) in self.compensation.iter_mut().enumerate() {
+            row.0[lane] = torque(velocity_cycle);
+        }
+    }
+
+    /// Runs one position cycle; `record_all` records every tick, otherwise the first one only.
+    ///
+    /// Each velocity cycle (period Tsv) executes the velocity PI controller with feedforward, current limit and
+    /// anti-windup (Prévost fig. 3 and eqs. 6 to 8):
+    ///
+    /// ```text
+    /// e = Ω* + VFFWS − ω                    J = Iv + (Kv Tsv/Tv) e
+    /// w = (Kv e + J + TFFWS + C_comp)/Kt    i* = clamp(w, ±imax)         Iv ← Iv if (w − i*) e > 0, else J
+    /// ```
+    ///
+    /// Each tick (current cycle, period Tsi) executes the current PI controller with voltage limit and anti-windup,
+    /// then steps the plant by its zero-order-hold discretization (Prévost eq. 1), with the friction law of
+    /// Prévost eq. 3:
+    ///
+    /// ```text
+    /// e = i* − i                            J = Ii + (Ki Tsi/Ti) e
+    /// w = Ki e + J                          u = clamp(w, ±umax)          Ii ← Ii if (w − u) e > 0, else J
+    /// τ = r F_load − C_gravity(θₙ) − C_friction
+    /// [i ω]ₙ₊₁ = Φ [i ω]ₙ + Γu u + Γτ τ     θₙ₊₁ = θₙ + φ [i ω]ₙ + γu u + γτ τ
+    /// C_friction: torque that gives ωₙ₊₁ = 0, clamped to ±Kt i_f(|ωₙ|)
+    /// ```
+    #[inline(always)]
+    pub fn run<S: Simd>(&mut self, simd: S, ticks: CycleTicks, record_all: bool) {
+        if L.is_multiple_of(Unroll2::<Vector<S>>::LANES) {
+            self.run_chunks::<S, Unroll2<Vector<S>>>(simd, ticks, record_all);
+        } else {
+            self.run_chunks::<S, Vector<S>>(simd, ticks, record_all);
+        }
+    }
+
+    #[inline(always)]
+    fn run_chunks<S: Simd, N: SimdLoad<S>>(&mut self, simd: S, ticks: CycleTicks, record_all: bool) {
+        assert!(L.is_multiple_of(N::LANES), "a vector is no wider than a block");
+        for index in 0..L / N::LANES {
+            if self.has_tilting_axis {
+                self.run_chunk::<S, N, true>(simd, index, ticks, record_all);
+            } else {
+                self.run_chunk::<S, N, false>(simd, index, ticks, record_all);
+            }
+        }
+    }
+
+    /// Runs one position cycle of the lanes `index`·`N::LANES` … (`index` + 1)·`N::LANES` − 1; see [`run`](Self::run).
+    #[inline(always)]
+    fn run_chunk<S: Simd, N: SimdLoad<S>, const HAS_TILTING_AXIS: bool>(
+        &mut self,
+        simd: S,
+        index: usize,
+        ticks: CycleTicks,
+        record_all: bool,
+    ) {
+        align_stack_frame();
+        let loops: InnerLoops<N> = self.loops.0.load(simd, index);
+        let inputs: InnerLoopInputs<N> = self.inputs.0.load(simd, index);
+        let mut friction_expansion: FrictionExpansion<N> = self.friction_expansion.0.load(simd, index);
+        let mut state: InnerLoopState<N> = self.state.0.load(simd, index);
+        let zero = state.friction.splat(0.0);
+        let one = zero.splat(1.0);
+        state.max_current_excess = zero;
+        let mut saturated_ticks = zero;
+        let mut gravity_expansion: GravityExpansion<N> = self.gravity_expansion.0.load(simd, index);
+        let mut gravity = match HAS_TILTING_AXIS {
+            true => loops.plant.gravity_torque_with_expansion(&mut gravity_expansion, state.motor.angle),
+            false => loops.plant.weight_torque(),
+        };
+        let mut external = inputs.load - gravity;
+        // Speed drop by friction over the previous tick, rad/s.
+        let mut speed_drop = zero;
+        for velocity_cycle in 0..ticks.velocity_cycles() {
+            let compensation = match self.compensation.get(velocity_cycle) {
+                Some(row) => N::load(simd, &row.0, index),
+                None => zero,
+            };
+            let excess = loops.control_velocity(&inputs, &mut state, velocity_cycle as f64, compensation);
+            let first = velocity_cycle * ticks.velocity;
+            for tick in first..first + ticks.velocity {
+                let max_speed_drop = loops
+                    .plant
+                    .friction_speed_drop
+                    .bound_with_expansion(&mut friction_expansion, state.motor.speed);
+                self.motors[tick].0.store(index, &state.motor);
+                if tick > 0 && (record_all || HAS_TILTING_AXIS) {
+                    state.friction = loops.plant.torque_from_speed_drop(speed_drop);
+                    state.gravity = gravity;
+                    if HAS_TILTING_AXIS {
+                        gravity = loops
+                            .plant
+                            .gravity_torque_with_expansion(&mut gravity_expansion, state.motor.angle);
+                        external = inputs.load - gravity;
+                    }
+                }
+                let (voltage, saturated) = loops.control_current(&mut state, excess);
+                saturated_ticks = (saturated_ticks + one).select(saturated, saturated_ticks);
+                speed_drop =
+                    loops.plant.step_with_torques(&mut state.motor, voltage, external, max_speed_drop);
+                if record_all || tick == 0 {
+                    let InnerLoopState { current_setpoint, friction, gravity, .. } = state;
+                    let saturated = one.select(saturated, zero);
+                    let record = TickRecord { current_setpoint, voltage, friction, gravity, saturated };
+                    self.records[tick].0.store(index, &record);
+                }
+            }
+        }
+        state.friction = loops.plant.torque_from_speed_drop(speed_drop);
+        state.gravity = gravity;
+        self.friction_expansion.0.store(index, &friction_expansion);
+        if HAS_TILTING_AXIS {
+            self.gravity_expansion.0.store(index, &gravity_expansion);
+        }
+        self.state.0.store(index, &state);
+        // A loop of its own: the loop above uses all registers.
+        let mut statistics = CycleStatistics { peak_current: zero, peak_speed: zero, saturated_ticks };
+        for row in &self.motors {
+            let motor: MotorState<N> = row.0.load(simd, index);
+            statistics.peak_current = motor.current.abs().max(statistics.peak_current);
+            statistics.peak_speed = motor.speed.abs().max(statistics.peak_speed);
+        }
+        self.statistics.0.store(index, &statistics);
+    }
+}
+
+impl<N: SimdReal> InnerLoops<N> {
+    /// Executes the velocity loop: sets i* and returns the amounts by which the speed and current setpoints exceeded
+    /// their limits, added up.
+    #[inline(always)]
+    fn control_velocity(
+        &self,
+        inputs: &InnerLoopInputs<N>,
+        state: &mut InnerLoopState<N>,
+        velocity_cycle: f64,
+        compensation: N,
+    ) -> N {
+        let setpoint = inputs.velocity_setpoint + inputs.velocity.at(velocity_cycle);
+        let torque = inputs.torque.at(velocity_cycle) + compensation;
+        let error = setpoint - state.motor.speed;
+        state.current_setpoint = self.velocity.update_with_feedforward(&mut state.velocity, error, torque);
+        let excess = state.velocity.excess.abs();
+        state.max_current_excess = excess.max(state.max_current_excess);
+        excess + inputs.velocity_excess.abs()
+    }
+
+    /// Executes the current loop: returns the voltage, and a mask that is set where a setpoint is at its limit.
+    /// `excess` is the amount by which the setpoints of the outer loops exceeded their limits.
+    #[inline(always)]
+    fn control_current(&self, state: &mut InnerLoopState<N>, excess: N) -> (N, N::Mask) {
+        let error = state.current_setpoint - state.motor.current;
+        let voltage = self.current.update(&mut state.current, error);
+        let zero = excess.splat(0.0);
+        (voltage, zero.simd_lt(excess + state.current.excess.abs()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Aligns the frame behind `depth` calls with a local of one byte each.
+    fn aligned_behind(depth: usize) -> usize {
+        let local = black_box(depth as u8);
+        if local == 0 { align_stack_frame() } else { aligned_behind(depth - 1) }
+    }
+
+    #[test]
+    fn stack_frames_are_aligned_to_a_cache_line() {
+        for depth in 0..100 {
+            assert_eq!(aligned_behind(depth) % 64, 0, "depth {depth}");
+        }
+    }
+
+    #[test]
+    fn zero_order_hold_switches_at_its_velocity_cycle() {
+        let input = ZeroOrderHold { before: 1.0, after: 2.0, step: 3.0 };
+        assert_eq!(
+            [0.0, 2.0, 3.0, 23.0].map(|velocity_cycle| input.at(velocity_cycle)),
+            [1.0, 1.0, 2.0, 2.0]
+        );
+    }
+}
