@@ -1,4 +1,18 @@
-//! The ROS 2 node of the virtual machine-tool axes: validation of its inputs and the node itself.
+//! ROS 2 node that simulates the axes of a machine tool.
+//!
+//! [`ingress`] converts and validates command-line arguments and incoming messages. [`ros`] holds the node: topics,
+//! services, the action, parameters and pacing; `ros::node::run` runs it until a signal ends it. The simulation
+//! itself is in `virtual_axes_core` and needs no ROS.
+//!
+//! ```
+//! use virtual_axes::ingress::args::Command;
+//!
+//! let arguments = ["--ros-args", "-r", "__ns:=/cell", "-r", "psec:=setpoints"];
+//! let Command::Run(args) = Command::parse(arguments, "virtual_axes")? else { unreachable!() };
+//! assert_eq!(args.node().to_string(), "/cell/virtual_axes");
+//! assert_eq!(args.resolve_topic("psec")?, "/cell/setpoints");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]

@@ -12,7 +12,7 @@ from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, own_mb, stamp
 
 TOPIC = "/joint_states"
 MANY = 1 << 19
-"""Samples after which a topic gets another writer (src/ros/writers.rs)."""
+"""Samples after which a topic gets another writer (src/ros/writer_rotation.rs)."""
 MORE = 5_000
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 JOINING = 200

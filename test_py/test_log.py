@@ -46,7 +46,7 @@ def refuse(drive: Drive) -> None:
 def lines(process: Node) -> list[re.Match[str]]:
     """The log on the terminal; nothing else may follow the screen at the start."""
     text = process.output()
-    log = text[text.index("stop it with Ctrl-C") :].splitlines()[1:]
+    log = text[text.index("stop with Ctrl-C") :].splitlines()[1:]
     found = [LINE.fullmatch(line) for line in log]
     assert None not in found, text
     return [match for match in found if match]

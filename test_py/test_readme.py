@@ -176,7 +176,7 @@ def test_the_screen_at_the_start(seen: tuple[Run, Drive]):
             break
         label = line[2:13].strip() or label
         listed.setdefault(label, set()).add(line[13:].strip())
-    assert listed.pop("listens to") == set(types_of(run.expected("in")))
+    assert listed.pop("subscribes") == set(types_of(run.expected("in")))
     assert listed.pop("publishes") == set(types_of(run.expected("out"))) - EVERY_NODE_HAS
     served = {name for name in types_of(run.expected("service", "action")) if "parameter" not in name}
     assert set().union(*listed.values()) == served
@@ -222,7 +222,7 @@ def kinds_of(joint: str, given: dict[str, Any]) -> set[str]:
     """What the column "for" may call the joint."""
     axis = given[f"{joint}.type"]
     linear_motor = axis == "linear" and given.get(f"{joint}.transmission.direct") is True
-    return {"axis", f"{axis} axis", "linear motor" if linear_motor else "rotating motor"}
+    return {"axis", f"{axis} axis", "linear motor" if linear_motor else "rotary motor"}
 
 
 def test_parameter_names(seen: tuple[Run, Drive], machine: Machine):

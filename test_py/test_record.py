@@ -361,9 +361,9 @@ def test_what_it_cannot_record_to_is_refused(tmp_path: Path):
     assert f"record: {existing} exists already" in refusal(existing)
     assert existing.read_text() == "kept"
     missing = tmp_path / "missing" / "new.mcap"
-    assert f"cannot be made in the folder {missing.parent}: No such file" in refusal(missing)
-    assert f"cannot be made in the folder {existing}: Not a directory" in refusal(existing / "new.mcap")
+    assert f"in the folder {missing.parent}: No such file" in refusal(missing)
+    assert f"in the folder {existing}: Not a directory" in refusal(existing / "new.mcap")
     # A folder that takes no file of anybody's.
-    assert "cannot be made in the folder /proc: " in refusal("/proc/new.mcap")
+    assert "in the folder /proc: " in refusal("/proc/new.mcap")
     assert f"record: {tmp_path / 'new.csv'}: a recording is an MCAP file" in refusal(tmp_path / "new.csv")
     assert list(tmp_path.iterdir()) == [existing]

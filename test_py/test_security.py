@@ -46,13 +46,13 @@ def test_a_node_that_cannot_be_secured_does_not_start_where_that_is_enforced():
     """One line, status 2, nothing on the network; otherwise it runs open and says so."""
     with Node(env=secured(None)) as node:
         assert node.wait(20) == 2
-        assert node.output().startswith("virtual_axes_node: ROS_SECURITY_ENABLE is true, and ")
+        assert node.output().startswith("virtual_axes_node: ROS_SECURITY_ENABLE is true, but ")
         assert node.output().count("\n") == 1
     with Node(env=secured(None, "Permissive")) as node:
         deadline = time.monotonic() + 20
-        while "listens to" not in node.output() and time.monotonic() < deadline:
+        while "subscribes" not in node.output() and time.monotonic() < deadline:
             time.sleep(0.05)
-        assert "nothing of what this node says or hears is protected: ROS_SECURITY_ENABLE" in node.output()
+        assert "communication of this node is not protected: ROS_SECURITY_ENABLE" in node.output()
         assert node.poll() is None
 
 

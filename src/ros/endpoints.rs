@@ -1,4 +1,4 @@
-//! Topics of the node under their resolved names, with their QoS profiles.
+//! Publishers and subscriptions of the node under their resolved names, with their QoS profiles.
 
 use std::collections::HashMap;
 
@@ -10,48 +10,48 @@ use rustdds::policy::ResourceLimits;
 use rustdds::{DomainParticipant, QosPolicies, QosPolicyBuilder, Topic, TopicKind};
 
 use super::args::RosArgs;
-use super::recorder::{Direction, Recorder, Tap};
+use super::recorder::{Direction, Tap, TopicRecorder};
 use serde::Serialize;
 
 use virtual_axes_core::config::{Parameters, QosConfig, TimeMode};
 use virtual_axes_io::messages::Recorded;
 
-/// A publisher of a topic that is recorded.
+/// Publisher with its tap for the recording.
 pub struct Publisher<M: Serialize> {
-    /// To the network.
+    /// Publisher of ros2-client.
     pub network: ros2_client::Publisher<M>,
-    /// To the recording.
+    /// Tap that records the messages.
     pub tap: Tap<M>,
-    /// Its topic.
+    /// DDS topic.
     pub topic: Topic,
-    /// Whether readers that come later do not want what was sent before: a message that nobody hears is not made.
-    pub volatile: bool,
-    /// Samples that the middleware keeps for readers that have not acknowledged them; then it waits.
-    pub kept: usize,
+    /// True if durability is volatile: messages without matched subscriptions need not be built.
+    pub is_volatile: bool,
+    /// Number of unacknowledged samples at which the middleware blocks.
+    pub max_unacknowledged: usize,
 }
 
 impl<M: Serialize> Publisher<M> {
-    /// One whose messages are not recorded, and are made whoever listens.
-    pub fn unrecorded(network: ros2_client::Publisher<M>, topic: Topic, kept: usize) -> Self {
-        Publisher { network, tap: Tap::none(), topic, volatile: false, kept }
+    /// Creates a publisher whose messages are not recorded and are always built.
+    pub fn unrecorded(network: ros2_client::Publisher<M>, topic: Topic, max_unacknowledged: usize) -> Self {
+        Publisher { network, tap: Tap::none(), topic, is_volatile: false, max_unacknowledged }
     }
 }
 
-/// A topic's name in DDS.
-pub(super) fn topic_of(name: &str) -> String {
+/// Returns the DDS name of a ROS topic.
+pub(super) fn dds_topic_name(name: &str) -> String {
     format!("rt{name}")
 }
 
-/// A subscription of a topic that is recorded.
+/// Subscription with its tap for the recording.
 pub struct Subscription<M> {
     network: ros2_client::Subscription<M>,
     tap: Tap<M>,
 }
 
 impl<M: Message + Recorded + Send + Sync + 'static> Subscription<M> {
-    /// The messages in the order in which they came, recorded so.
+    /// Returns the messages in order of reception and records them.
     pub fn async_stream(&self) -> impl Stream<Item = ReadResult<(M, MessageInfo)>> + '_ {
-        in_order_of_arrival(self.network.async_stream()).then(async |received| {
+        in_reception_order(self.network.async_stream()).then(async |received| {
             if let Ok((message, _)) = &received {
                 self.tap.record(message).await;
             }
@@ -60,11 +60,11 @@ impl<M: Message + Recorded + Send + Sync + 'static> Subscription<M> {
     }
 }
 
-/// Messages that wait at a time and are put in order.
+/// Largest number of waiting messages that are sorted at a time.
 const BATCH: usize = 64;
 
-/// What waits, by the time at which it came: RustDDS gives out what waits publisher by publisher.
-fn in_order_of_arrival<M>(
+/// Sorts waiting messages by reception time, because RustDDS returns them publisher by publisher.
+fn in_reception_order<M>(
     messages: impl Stream<Item = ReadResult<(M, MessageInfo)>>,
 ) -> impl Stream<Item = ReadResult<(M, MessageInfo)>> {
     messages.ready_chunks(BATCH).flat_map(|mut batch| {
@@ -73,42 +73,44 @@ fn in_order_of_arrival<M>(
     })
 }
 
-/// A topic that could not be created.
+/// Failure to create a topic.
 #[derive(Debug, thiserror::Error)]
 pub enum EndpointError {
-    /// The middleware refuses it.
+    /// The middleware or the schema does not provide the topic.
     #[error("topic {name} cannot be created: {reason}")]
-    Refused {
-        /// Its name.
+    NotCreated {
+        /// Name of the topic.
         name: String,
-        /// Why not.
+        /// Reason.
         reason: String,
     },
-    /// It is remapped to a topic of another type.
-    #[error("-r: topics {first} ({carried}) and {name} ({wanted}) would both be {resolved}")]
-    TwoTypes {
-        /// The name in the graph.
+    /// Two topics of different types are remapped to one name.
+    #[error(
+        "-r: topics {first} ({carried}) and {name} ({wanted}) would both be named {resolved}; remap one of them"
+    )]
+    TopicTypeConflict {
+        /// Resolved name.
         resolved: String,
-        /// Own name of the topic that has it.
+        /// Own name of the first topic.
         first: &'static str,
-        /// Its type.
+        /// Type of the first topic.
         carried: String,
-        /// Own name of the other.
+        /// Own name of the second topic.
         name: &'static str,
-        /// Its type.
+        /// Type of the second topic.
         wanted: String,
     },
 }
 
-/// The profile of a topic as it is configured.
+/// Returns the QoS profile of a configured topic.
 fn profile(qos: QosConfig) -> QosProfile {
-    // A task of its own publishes each topic, and may wait for slow readers.
-    let reliability = if qos.reliable {
+    // Each topic is published by a task of its own, which may wait for slow readers.
+    let reliability = if qos.is_reliable {
         Reliability::Reliable { when_full: WhenFull::Block }
     } else {
         Reliability::BestEffort
     };
-    let durability = if qos.transient_local { Durability::TransientLocal } else { Durability::Volatile };
+    let durability = if qos.is_transient_local { Durability::TransientLocal } else { Durability::Volatile };
     QosProfile {
         reliability,
         durability,
@@ -117,100 +119,106 @@ fn profile(qos: QosConfig) -> QosProfile {
     }
 }
 
-/// So many samples that a reader has not acknowledged RustDDS keeps where nothing is said (`DEFAULT_WRITER_MAX_SAMPLES`).
-pub const KEPT: usize = 8192;
-/// So many are under way where the axes wait for their readers anyway: what several topics send at a time fits into the
-/// socket of a reader (some 200 kB), so that nothing is lost. Fast DDS may never get over a loss (see `deaf`).
-pub const WINDOW: usize = 64;
+/// Number of unacknowledged samples at which a RustDDS writer blocks by default (`DEFAULT_WRITER_MAX_SAMPLES`).
+pub const MAX_UNACKNOWLEDGED: usize = 8192;
+/// Number of unacknowledged samples at which a writer blocks where the axes wait for subscribers.
+///
+/// The samples in flight of several topics fit into the receive buffer of a reader (about 200 kB), so that none is
+/// lost. Fast DDS may stall permanently after a loss (see [`super::stalled_readers`]).
+pub const BLOCKING_WINDOW: usize = 64;
 
-/// How many samples may be under way of a topic for whose readers the axes wait.
-fn window(qos: QosConfig) -> usize {
-    WINDOW.max(if qos.transient_local { qos.depth } else { 0 })
+/// Returns the number of unacknowledged samples of a topic for whose readers the axes wait.
+fn blocking_window(qos: QosConfig) -> usize {
+    BLOCKING_WINDOW.max(if qos.is_transient_local { qos.depth } else { 0 })
 }
 
-/// The profile of a publisher that keeps so many samples for readers that have not acknowledged them, and, if it keeps
-/// any for readers that come later, while it has no reader.
-pub(super) fn keeping(profile: &QosProfile, kept: usize) -> QosPolicies {
-    let most = i32::try_from(kept).unwrap_or(i32::MAX);
-    let limits = ResourceLimits { max_samples: most, max_instances: 1, max_samples_per_instance: most };
+/// Returns the QoS of a publisher that blocks at `max_unacknowledged` samples.
+///
+/// The limit includes samples that a transient-local publisher keeps for late joiners.
+pub(super) fn with_sample_limit(profile: &QosProfile, max_unacknowledged: usize) -> QosPolicies {
+    let limit = i32::try_from(max_unacknowledged).unwrap_or(i32::MAX);
+    let limits = ResourceLimits { max_samples: limit, max_instances: 1, max_samples_per_instance: limit };
     QosPolicies::from(profile).modify_by(&QosPolicyBuilder::new().resource_limits(limits).build())
 }
 
-/// The topic of a resolved name, or why the middleware refuses it.
-pub(super) fn topic(
+/// Creates the DDS topic of a resolved name.
+///
+/// # Errors
+/// Reason of the middleware.
+pub(super) fn create_topic(
     participant: &DomainParticipant,
     resolved: &str,
     type_name: &MessageTypeName,
     qos: &QosPolicies,
 ) -> Result<Topic, String> {
     participant
-        .create_topic(topic_of(resolved), type_name.dds_msg_type(), qos, TopicKind::NoKey)
+        .create_topic(dds_topic_name(resolved), type_name.dds_msg_type(), qos, TopicKind::NoKey)
         .map_err(|e| e.to_string())
 }
 
-/// Topics that are created elsewhere, with their types.
+/// Topics created by other modules or by ros2-client, with their types.
 const OTHER_TOPICS: [(&str, &str); 2] =
     [("/rosout", "rcl_interfaces/msg/Log"), ("/parameter_events", "rcl_interfaces/msg/ParameterEvent")];
 
-/// Creates topics on a node.
+/// Factory for the topics of a node.
 pub struct Endpoints<'a> {
     node: &'a mut Node,
     participant: &'a DomainParticipant,
     args: &'a RosArgs,
     parameters: &'a Parameters,
-    recorder: &'a mut Recorder,
-    /// Whether the axes wait for slow readers.
-    waits: bool,
-    /// Own name and type of each topic so far, by its resolved name.
+    recorder: &'a mut TopicRecorder,
+    /// True if the axes wait for slow readers.
+    is_blocking: bool,
+    /// Own name and type of each topic created so far, by resolved name.
     known: HashMap<String, (&'static str, String)>,
 }
 
 impl<'a> Endpoints<'a> {
-    /// On `node`, which belongs to `participant`; `args` resolve their names, `parameters` say their quality of service,
-    /// and `recorder` records their messages.
+    /// Creates a factory for topics of `node`, which belongs to `participant`.
+    ///
+    /// `args` resolve the names, `parameters` define the QoS, and `recorder` records the messages.
     pub fn new(
         node: &'a mut Node,
         participant: &'a DomainParticipant,
         args: &'a RosArgs,
         parameters: &'a Parameters,
-        recorder: &'a mut Recorder,
+        recorder: &'a mut TopicRecorder,
     ) -> Self {
-        let waits = parameters.node_config().time != TimeMode::Real;
-        // Those that are made elsewhere.
+        let is_blocking = parameters.node_config().time != TimeMode::Real;
         let known = OTHER_TOPICS.iter().filter_map(|&(name, type_name)| {
             Some((args.resolve_topic(name).ok()?, (name, type_name.to_owned())))
         });
-        Endpoints { node, participant, args, parameters, recorder, waits, known: known.collect() }
+        Endpoints { node, participant, args, parameters, recorder, is_blocking, known: known.collect() }
     }
 
     fn configured(&self, name: &str) -> Result<QosConfig, EndpointError> {
         let own_name = name.trim_start_matches(['~', '/']);
-        self.parameters.qos(own_name).ok_or_else(|| EndpointError::Refused {
+        self.parameters.qos(own_name).ok_or_else(|| EndpointError::NotCreated {
             name: name.to_owned(),
-            reason: "it is not in the schema".to_owned(),
+            reason: "the parameter schema has no QoS for it".to_owned(),
         })
     }
 
-    /// A topic under its resolved name, which can carry one type only.
+    /// Creates a topic under its resolved name, which can carry one type only.
     fn topic(
         &mut self,
         name: &'static str,
         type_name: &MessageTypeName,
         qos: &QosPolicies,
     ) -> Result<(Topic, String), EndpointError> {
-        let failed = |reason: String| EndpointError::Refused { name: name.to_owned(), reason };
+        let failed = |reason: String| EndpointError::NotCreated { name: name.to_owned(), reason };
         let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
         let wanted = format!("{}/msg/{}", type_name.package_name(), type_name.type_name());
         let (first, carried) = self.known.entry(resolved.clone()).or_insert_with(|| (name, wanted.clone()));
         if *carried != wanted {
             let carried = carried.clone();
-            return Err(EndpointError::TwoTypes { resolved, first, carried, name, wanted });
+            return Err(EndpointError::TopicTypeConflict { resolved, first, carried, name, wanted });
         }
-        let topic = topic(self.participant, &resolved, type_name, qos).map_err(failed)?;
+        let topic = create_topic(self.participant, &resolved, type_name, qos).map_err(failed)?;
         Ok((topic, resolved))
     }
 
-    /// A publisher, and the name that it publishes under.
+    /// Creates a publisher; returns it with its resolved name.
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
@@ -220,19 +228,20 @@ impl<'a> Endpoints<'a> {
         type_name: MessageTypeName,
     ) -> Result<(Publisher<M>, String), EndpointError> {
         let qos = self.configured(name)?;
-        let kept = if self.waits { window(qos) } else { KEPT };
-        let (topic, resolved) = self.topic(name, &type_name, &keeping(&profile(qos), kept))?;
+        let max_unacknowledged = if self.is_blocking { blocking_window(qos) } else { MAX_UNACKNOWLEDGED };
+        let (topic, resolved) =
+            self.topic(name, &type_name, &with_sample_limit(&profile(qos), max_unacknowledged))?;
         let network = self
             .node
             .create_publisher(&topic, None)
-            .map_err(|e| EndpointError::Refused { name: name.to_owned(), reason: e.to_string() })?;
+            .map_err(|e| EndpointError::NotCreated { name: name.to_owned(), reason: e.to_string() })?;
         let tap = self.recorder.tap(&resolved, qos, Direction::Out);
-        let volatile = !qos.transient_local;
-        let publisher = Publisher { network, tap, topic, volatile, kept };
+        let is_volatile = !qos.is_transient_local;
+        let publisher = Publisher { network, tap, topic, is_volatile, max_unacknowledged };
         Ok((publisher, resolved))
     }
 
-    /// A subscription, and the name that it listens to.
+    /// Creates a subscription; returns it with its resolved name.
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
@@ -241,14 +250,14 @@ impl<'a> Endpoints<'a> {
         name: &'static str,
         type_name: MessageTypeName,
     ) -> Result<(Subscription<M>, String), EndpointError> {
-        self.subscription_of(name, type_name, self.configured(name)?)
+        self.subscription_with_qos(name, type_name, self.configured(name)?)
     }
 
-    /// Likewise, of a quality that is not a parameter.
+    /// Creates a subscription with a QoS that is not a parameter; returns it with its resolved name.
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
-    pub fn subscription_of<M: Message + Recorded + 'static>(
+    pub fn subscription_with_qos<M: Message + Recorded + 'static>(
         &mut self,
         name: &'static str,
         type_name: MessageTypeName,
@@ -258,7 +267,7 @@ impl<'a> Endpoints<'a> {
         let network = self
             .node
             .create_subscription(&topic, None)
-            .map_err(|e| EndpointError::Refused { name: name.to_owned(), reason: e.to_string() })?;
+            .map_err(|e| EndpointError::NotCreated { name: name.to_owned(), reason: e.to_string() })?;
         let tap = self.recorder.tap(&resolved, qos, Direction::In);
         Ok((Subscription { network, tap }, resolved))
     }

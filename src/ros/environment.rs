@@ -1,41 +1,39 @@
-//! The ROS 2 environment variables that say whom a node may meet.
+//! ROS 2 environment variables for domain and discovery.
 //!
-//! The DDS crates read none of them, so they are read here, once, into an [`Environment`], with the
-//! meaning that ROS 2 Jazzy gives them:
+//! The DDS crates read none of them. They are read here once into an [`Environment`], with the meaning of ROS 2 Jazzy:
 //!
 //! | variable | values | unset |
 //! |---|---|---|
 //! | `ROS_DOMAIN_ID` | 0 to 232 | 0 |
-//! | `ROS_LOCALHOST_ONLY` | 1: as `LOCALHOST` below, whatever the next two say (deprecated) | 0 |
+//! | `ROS_LOCALHOST_ONLY` | 1: as `LOCALHOST` below, overrides the next two (deprecated) | 0 |
 //! | `ROS_AUTOMATIC_DISCOVERY_RANGE` | `OFF`, `LOCALHOST`, `SUBNET`, `SYSTEM_DEFAULT` | `SUBNET` |
 //! | `ROS_STATIC_PEERS` | hosts, separated by semicolons | none |
 //!
-//! RustDDS announces itself to multicast and to this machine, and to no host by name, so a node
-//! cannot go and look for its static peers. It does answer a host that looks for it: with
-//! `SUBNET`, naming this machine in the `ROS_STATIC_PEERS` of the others is enough, and a warning
-//! says so.
+//! RustDDS announces itself by multicast and to this host, and to no other host by name, so a node cannot discover
+//! its static peers. It does respond to a host that discovers it: with `SUBNET`, an entry for this host in the
+//! `ROS_STATIC_PEERS` of the others is enough. A warning reports this.
 
 use std::net::{IpAddr, Ipv4Addr};
 
 use rustdds::DomainParticipantBuilder;
 
-/// The largest domain whose ports still fit below 65536 (7400 + 250·domain + offsets).
+/// Largest domain id with ports below 65536 (7400 + 250·domain + offsets).
 const LAST_DOMAIN: u16 = 232;
 
-/// Receive buffer of each socket: a trajectory of 100 000 points arrives in one burst of fragments,
-/// and the kernel's default loses some of them.
+/// Receive buffer of each socket, bytes. A trajectory of 100 000 points arrives in one burst of fragments, which
+/// overflows the kernel's default buffer.
 const RECEIVE_BUFFER_BYTES: usize = 4 << 20;
 
-/// How far a node looks for others.
+/// Network range of discovery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DiscoveryRange {
-    /// Announces itself to nobody.
+    /// No discovery.
     Off,
-    /// This machine, over the loopback interface and nothing else.
+    /// This host, by the loopback interface only.
     Localhost,
-    /// Whatever multicast reaches on each interface.
+    /// All hosts reached by multicast on any interface.
     Subnet,
-    /// What the middleware does of its own accord; for RustDDS the same as [`Self::Subnet`].
+    /// Default of the middleware; for RustDDS the same as [`Self::Subnet`].
     SystemDefault,
 }
 
@@ -47,7 +45,7 @@ impl DiscoveryRange {
         ("SYSTEM_DEFAULT", Self::SystemDefault),
     ];
 
-    /// The interfaces to use, by address; `None` is all of them.
+    /// Returns the addresses of the interfaces to use; `None` means all.
     pub(super) fn networks(self) -> Option<Vec<IpAddr>> {
         match self {
             Self::Off => Some(Vec::new()),
@@ -57,19 +55,19 @@ impl DiscoveryRange {
     }
 }
 
-/// An environment variable that cannot be used.
+/// Invalid value of an environment variable.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{variable} is '{found}'; allowed is {allowed}")]
 pub struct EnvironmentError {
-    /// The variable's name.
+    /// Name of the variable.
     pub variable: &'static str,
-    /// Its value.
+    /// Value of the variable.
     pub found: String,
-    /// What it may be.
+    /// Allowed values.
     pub allowed: &'static str,
 }
 
-/// What the environment variables say, after the rules about which of them wins.
+/// Discovery settings from the environment variables, after the rules of precedence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Environment {
     domain_id: u16,
@@ -81,15 +79,15 @@ impl Environment {
     /// Reads the variables of this process.
     ///
     /// # Errors
-    /// As [`Self::from_lookup`].
+    /// [`EnvironmentError`] if `ROS_DOMAIN_ID` is not an integer from 0 to 232.
     pub fn from_process() -> Result<Self, EnvironmentError> {
         Self::from_lookup(|name| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned()))
     }
 
-    /// Reads the variables through `lookup`, which gives a variable's value or `None`.
+    /// Reads the variables through `lookup`, which returns the value of a variable or `None`.
     ///
     /// # Errors
-    /// `ROS_DOMAIN_ID` that is not a whole number from 0 to 232.
+    /// [`EnvironmentError`] if `ROS_DOMAIN_ID` is not an integer from 0 to 232.
     ///
     /// ```
     /// use virtual_axes::ros::environment::{DiscoveryRange, Environment};
@@ -132,8 +130,8 @@ impl Environment {
                 None => DiscoveryRange::Subnet,
                 Some(text) => parse_range(text.trim()).unwrap_or_else(|| {
                     warnings.push(format!(
-                        "ROS_AUTOMATIC_DISCOVERY_RANGE is '{text}', which is none of OFF, LOCALHOST, SUBNET, \
-                         SYSTEM_DEFAULT; taken as LOCALHOST, as ROS does"
+                        "ROS_AUTOMATIC_DISCOVERY_RANGE is '{text}'; allowed is OFF, LOCALHOST, SUBNET or \
+                         SYSTEM_DEFAULT; LOCALHOST is used, as in ROS"
                     ));
                     DiscoveryRange::Localhost
                 }),
@@ -147,25 +145,25 @@ impl Environment {
         Ok(Self { domain_id, range, warnings })
     }
 
-    /// The DDS domain, 0 to 232.
+    /// Returns the DDS domain id, 0 to 232.
     #[must_use]
     pub fn domain_id(&self) -> u16 {
         self.domain_id
     }
 
-    /// How far to look for other nodes.
+    /// Returns the network range of discovery.
     #[must_use]
     pub fn range(&self) -> DiscoveryRange {
         self.range
     }
 
-    /// Sentences for the log about variables that do not do what they say.
+    /// Returns warnings for the log about ignored or unsupported variables.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// A participant builder that is set up accordingly.
+    /// Returns a participant builder with these settings.
     #[must_use]
     pub fn participant_builder(&self) -> DomainParticipantBuilder {
         let builder = DomainParticipantBuilder::new(self.domain_id)
@@ -182,7 +180,7 @@ fn parse_domain(text: &str) -> Result<u16, EnvironmentError> {
     text.trim().parse::<u16>().ok().filter(|domain| *domain <= LAST_DOMAIN).ok_or_else(|| EnvironmentError {
         variable: "ROS_DOMAIN_ID",
         found: text.to_owned(),
-        allowed: "a whole number from 0 to 232",
+        allowed: "an integer from 0 to 232",
     })
 }
 
@@ -200,12 +198,12 @@ fn static_peers_warning(range: DiscoveryRange, peers: &[String]) -> Option<Strin
             format!("ROS_STATIC_PEERS ({list}) is ignored, because ROS_AUTOMATIC_DISCOVERY_RANGE is OFF")
         }
         DiscoveryRange::Localhost => format!(
-            "ROS_STATIC_PEERS ({list}) is not supported by this node's middleware, and with LOCALHOST it meets \
-             this machine only; use SUBNET, and name this machine in the ROS_STATIC_PEERS of the others"
+            "ROS_STATIC_PEERS ({list}) is not supported by this node's middleware, and LOCALHOST restricts discovery \
+             to this host; use SUBNET, and add this host to the ROS_STATIC_PEERS of the others"
         ),
         _ => format!(
-            "ROS_STATIC_PEERS ({list}) is not supported by this node's middleware, which cannot go and look for \
-             a host; name this machine in the ROS_STATIC_PEERS of the others instead"
+            "ROS_STATIC_PEERS ({list}) is not supported by this node's middleware; add this host to the \
+             ROS_STATIC_PEERS of the others instead"
         ),
     })
 }
@@ -221,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_environment_is_domain_zero_and_the_subnet() {
+    fn an_empty_environment_gives_domain_0_and_subnet() {
         let environment = read(&[]).unwrap();
         assert_eq!(environment.domain_id(), 0);
         assert_eq!(environment.range(), DiscoveryRange::Subnet);
@@ -234,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_domain_outside_0_to_232_is_refused_with_its_value() {
+    fn a_domain_id_outside_0_to_232_is_an_error_with_its_value() {
         for (text, domain) in [("0", 0), ("232", 232), (" 7 ", 7), ("007", 7)] {
             assert_eq!(read(&[("ROS_DOMAIN_ID", text)]).unwrap().domain_id(), domain);
         }
@@ -264,14 +262,14 @@ mod tests {
     }
 
     #[test]
-    fn a_misspelt_range_stays_on_this_machine_and_says_so() {
+    fn an_invalid_range_falls_back_to_localhost_with_a_warning() {
         let environment = read(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "subnet")]).unwrap();
         assert_eq!(environment.range(), DiscoveryRange::Localhost);
         assert!(environment.warnings()[0].contains("'subnet'"));
     }
 
     #[test]
-    fn localhost_only_wins_over_range_and_peers() {
+    fn localhost_only_overrides_range_and_peers() {
         let environment = read(&[
             ("ROS_LOCALHOST_ONLY", "1"),
             ("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"),
@@ -287,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn static_peers_are_not_passed_over_in_silence() {
+    fn static_peers_cause_a_warning() {
         let environment = read(&[("ROS_STATIC_PEERS", " 192.168.0.1 ;;robot.local; ")]).unwrap();
         assert_eq!(environment.warnings().len(), 1);
         assert!(environment.warnings()[0].contains("(192.168.0.1, robot.local)"));

@@ -1,141 +1,139 @@
-//! Responses of more than some thousand octets, in a form that reaches its client.
+//! Delivery of service responses that RustDDS would send in malformed fragments.
 //!
-//! RustDDS 0.15 sends a sample that exceeds the path's MTU in fragments (DATA_FRAG), and its
-//! fragments are malformed when they carry inline QoS: an octet too many stands before the parameter
-//! list. A response has inline QoS, the identity of its request; readers drop every such fragment,
-//! and being reliable, wait for that sample before they give out any later one. Samples of topics
-//! have no inline QoS and come through at any size.
+//! RustDDS 0.15 sends a sample that exceeds the path's MTU in fragments (DATA_FRAG). A fragment with inline QoS is
+//! malformed: it has an extra octet in front of the parameter list. A response has inline QoS, the identity of its
+//! request. Readers discard every such fragment and, being reliable, deliver no later sample before that one. Samples
+//! of topics have no inline QoS and are delivered at any size.
 //!
-//! So a response that may be fragmented is sent twice: by RustDDS, which keeps the books (sequence
-//! numbers, heartbeats), and from here as one well-formed DATA submessage in one datagram, in the
-//! name of the same writer and under the same sequence number:
+//! A response that may be fragmented is therefore sent twice: by RustDDS, which handles sequence numbers and
+//! heartbeats, and by this module as one well-formed DATA submessage in one datagram, for the same writer and with
+//! the same sequence number:
 //!
 //! ```text
 //! RTPS header (20) | INFO_TS (4 + 8) | DATA (4 + 20): response writer, sequence number |
 //!     PID_RELATED_SAMPLE_IDENTITY, by both its numbers | PID_SENTINEL | CDR_LE | response
 //! ```
 //!
-//! A reader takes the first copy that it can read, acknowledges it, and passes over the others. The
-//! datagram goes to every client of the service, for each has to account for each sample. It is
-//! given several times over some seconds, for RustDDS cannot repair its loss, and a GAP in the end
-//! lets those go on whom it never reached: they miss one response, not all that follow. On a network
-//! with a smaller MTU, IP fragments it.
+//! A reader accepts the first copy that it can read, acknowledges it, and ignores the others. The datagram goes to
+//! every client of the service, because each client has to account for each sample. It is repeated for some seconds,
+//! because RustDDS cannot repair its loss. A final GAP releases clients that never received it: they lose one
+//! response instead of all later ones. On a network with a smaller MTU, IP fragments the datagram.
 //!
-//! The limit is [`LARGEST_DATAGRAM`]. A longer response must not be handed to RustDDS either, or its
-//! fragments would block the clients for good.
+//! The size limit is [`LARGEST_DATAGRAM`]. A longer response is rejected before RustDDS gets it, because its fragments
+//! would block the clients permanently.
 
-use std::collections::BTreeSet;
 use std::time::{Duration, SystemTime};
 
-use ros2_client::Context;
-use ros2_client::entities_info::ParticipantEntitiesInfo;
 use ros2_client::service::RmwRequestId;
 use rustdds::{RepresentationIdentifier, serialization};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::readers::Readers;
 use super::rtps::{CDR_LE, Data, Guid, Message, entity, is_secured, sequence_number};
 
-/// Fast DDS's UDP transport reads no more of a datagram.
+/// Largest datagram that Fast DDS's UDP transport reads, octets.
 const LARGEST_DATAGRAM: usize = 65_500;
-/// RustDDS sends this many octets unfragmented wherever the MTU is 700 or more.
+/// Largest payload that RustDDS sends unfragmented if the MTU is at least 700, octets.
 const NEVER_FRAGMENTED: usize = 512;
-/// The longest response of a secured participant, octets: RustDDS sends it unfragmented, with what protects it,
-/// wherever the MTU is 1500. In a datagram of our own it would be readable for all.
+/// Largest response under DDS Security, octets. RustDDS sends it encrypted and unfragmented if the MTU is at least
+/// 1500; a datagram of this module would be readable by everyone.
 const LARGEST_PROTECTED: usize = 1024;
-/// From one datagram to the next of a service: what a client's socket can hold, some 200 KB by
-/// default, must not overflow with this and the useless fragments.
+/// Time between two datagrams of a service. A burst of them, together with the malformed fragments, must not overflow
+/// the receive buffer of a client, about 200 kB by default.
 const PACE: Duration = Duration::from_millis(2);
-/// When the datagram is given again, after the time before.
-const REPEATS: [Duration; 5] = [
+/// Delays of the repetitions of a datagram, each after the previous transmission.
+const REPETITION_DELAYS: [Duration; 5] = [
     Duration::from_millis(10),
     Duration::from_millis(40),
     Duration::from_millis(200),
     Duration::from_millis(800),
     Duration::from_secs(2),
 ];
-/// After those: when a client that still waits for the sample is told to go on without it.
-const GIVE_UP: [Duration; 3] = [Duration::from_secs(1), Duration::from_secs(2), Duration::from_secs(4)];
+/// Delays of the GAPs after the last repetition, each after the previous transmission.
+const GAP_DELAYS: [Duration; 3] = [Duration::from_secs(1), Duration::from_secs(2), Duration::from_secs(4)];
 
-/// RTPS 2.5, 9.6.4: PID_RELATED_SAMPLE_IDENTITY,
+/// PID_RELATED_SAMPLE_IDENTITY (RTPS 2.5, 9.6.4).
 const PID_RELATED_SAMPLE_IDENTITY: u16 = 0x0083;
-/// and the number that eProsima gave it before that.
+/// Number that eProsima used for PID_RELATED_SAMPLE_IDENTITY before its standardization.
 const PID_RELATED_SAMPLE_IDENTITY_EPROSIMA: u16 = 0x800f;
 
-/// Why a response cannot be delivered.
+/// Reason why a response cannot be delivered.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum LargeResponseError {
-    #[error("it cannot be encoded: {0}")]
+    #[error("the response cannot be encoded: {0}")]
     Encoding(String),
-    #[error("it is {0} octets long, and {1} is the most that can be delivered; ask for less at once")]
+    #[error("the response has {0} octets; the limit is {1}; request fewer items at a time")]
     TooLong(usize, usize),
 }
 
-/// Sends the datagrams of one response writer.
+/// Sender of the datagrams of one response writer.
 #[derive(Debug)]
 pub(super) struct LargeResponses(Readers);
 
 impl LargeResponses {
-    /// To the readers of that writer.
+    /// Creates a sender to the readers of the response writer.
     pub(super) fn new(readers: Readers) -> Self {
         Self(readers)
     }
 
-    /// Encodes a response, to be given to [`Self::datagram`] once RustDDS has written it; `None` when
-    /// it is so small that RustDDS delivers it.
+    /// Encodes a response for [`Self::datagram`]. Returns `None` if it is small enough for RustDDS alone.
     ///
     /// # Errors
-    /// [`LargeResponseError`] when it can be delivered by nobody: then RustDDS must not have it.
+    /// [`LargeResponseError`] if the response cannot be encoded or is too long; RustDDS must not get it then.
     pub(super) fn encode<A: Serialize>(response: &A) -> Result<Option<Vec<u8>>, LargeResponseError> {
         let mut payload = Vec::new();
         serialization::to_writer_with_rep_id(&mut payload, response, RepresentationIdentifier::CDR_LE)
             .map_err(|error| LargeResponseError::Encoding(error.to_string()))?;
-        // The overhead does not depend on what identifies the sample.
+        // The overhead does not depend on the identity of the request.
         let identity = [0; 24];
-        let secured = is_secured();
-        let most = if secured {
+        let is_secured = is_secured();
+        let limit = if is_secured {
             LARGEST_PROTECTED
         } else {
             LARGEST_DATAGRAM - data(&[0; 16], 0, &inline_qos(&identity), &[]).overhead()
         };
-        if payload.len() > most {
-            return Err(LargeResponseError::TooLong(payload.len(), most));
+        if payload.len() > limit {
+            return Err(LargeResponseError::TooLong(payload.len(), limit));
         }
-        Ok((payload.len() > NEVER_FRAGMENTED && !secured).then_some(payload))
+        Ok((payload.len() > NEVER_FRAGMENTED && !is_secured).then_some(payload))
     }
 
-    /// The datagram of the response that RustDDS wrote as sample `number`.
+    /// Returns the datagram of the response that RustDDS wrote as sample `number`.
     pub(super) fn datagram(&self, request: &RmwRequestId, number: i64, payload: &[u8]) -> Vec<u8> {
         datagram(&self.0.writer, number, request, payload, SystemTime::now())
     }
 
-    /// Sends a datagram for the first time, and gives its readers the time to take it in.
+    /// Sends a datagram for the first time and waits for [`PACE`].
     pub(super) async fn send(&self, datagram: &[u8]) {
         self.0.send(datagram);
         tokio::time::sleep(PACE).await;
     }
 
-    /// Sends the datagram of sample `number` again, as often as it takes; then frees whoever never
-    /// got it.
+    /// Repeats the datagram of sample `number`, then sends GAPs to clients that did not receive it.
     pub(super) async fn repeat(&self, datagram: Vec<u8>, number: i64) {
-        for wait in REPEATS {
+        for wait in REPETITION_DELAYS {
             tokio::time::sleep(wait).await;
-            // The clients are looked up anew: one may have come that has to account for this sample.
+            // The set of clients is read again: a new one has to account for this sample, too.
             self.0.send(&datagram);
         }
         drop(datagram);
-        let gap = Message::from(&self.0.writer).gap(entity(&self.0.writer), number, number + 1);
-        for wait in GIVE_UP {
+        let gap = Message::from_participant(&self.0.writer).gap(entity(&self.0.writer), number, number + 1);
+        for wait in GAP_DELAYS {
             tokio::time::sleep(wait).await;
             self.0.send(&gap);
         }
     }
 }
 
-/// The whole datagram.
+/// Returns the datagram of a response.
 fn datagram(writer: &Guid, number: i64, request: &RmwRequestId, payload: &[u8], time: SystemTime) -> Vec<u8> {
     let identity = identity(request);
-    Message::from(writer).timestamp(time).data(&data(writer, number, &inline_qos(&identity), payload))
+    Message::from_participant(writer).timestamp(time).data(&data(
+        writer,
+        number,
+        &inline_qos(&identity),
+        payload,
+    ))
 }
 
 fn data<'a>(
@@ -151,7 +149,7 @@ fn inline_qos(identity: &[u8; 24]) -> [(u16, &[u8]); 2] {
     [(PID_RELATED_SAMPLE_IDENTITY, identity), (PID_RELATED_SAMPLE_IDENTITY_EPROSIMA, identity)]
 }
 
-/// The request's sample identity: GUID, then sequence number (DDS-RPC 1.0, 7.5.1.1.1).
+/// Returns the sample identity of a request: GUID, then sequence number (DDS-RPC 1.0, 7.5.1.1.1).
 fn identity(request: &RmwRequestId) -> [u8; 24] {
     let mut octets = [0; 24];
     octets[..16].copy_from_slice(&request.writer_gid.to_bytes16());
@@ -159,47 +157,11 @@ fn identity(request: &RmwRequestId) -> [u8; 24] {
     octets
 }
 
-/// `rmw_dds_common/msg/ParticipantEntitiesInfo`, which the crate hands out closed.
-#[derive(Deserialize)]
-struct Entities {
-    #[serde(rename = "gid")]
-    _participant: Guid,
-    #[serde(rename = "node_entities_info_seq")]
-    nodes: Vec<NodeEntities>,
-}
-
-#[derive(Deserialize)]
-struct NodeEntities {
-    #[serde(rename = "node_namespace")]
-    _namespace: String,
-    #[serde(rename = "node_name")]
-    _name: String,
-    #[serde(rename = "reader_gid_seq")]
-    _readers: Vec<Guid>,
-    #[serde(rename = "writer_gid_seq")]
-    writers: Vec<Guid>,
-}
-
-/// The writers that `context` announces at present.
-pub(super) fn writers(context: &Context) -> BTreeSet<Guid> {
-    announced(&context.participant_entities_info()).unwrap_or_default()
-}
-
-fn announced(info: &ParticipantEntitiesInfo) -> Option<BTreeSet<Guid>> {
-    let encoding = RepresentationIdentifier::CDR_LE;
-    let mut octets = Vec::new();
-    serialization::to_writer_with_rep_id(&mut octets, info, encoding).ok()?;
-    let (entities, _) =
-        serialization::deserialize_from_cdr_with_rep_id::<Entities>(&octets, encoding).ok()?;
-    Some(entities.nodes.into_iter().flat_map(|node| node.writers).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use std::time::UNIX_EPOCH;
 
-    use ros2_client::entities_info::NodeEntitiesInfo;
-    use ros2_client::{Gid, NodeName};
+    use ros2_client::Gid;
 
     use super::*;
 
@@ -227,24 +189,15 @@ mod tests {
     }
 
     #[test]
-    fn what_is_small_is_left_to_the_crate_and_what_is_too_long_to_nobody() {
+    fn small_responses_are_sent_by_rustdds_only_and_too_long_ones_are_rejected() {
         // A string is encoded as its length, itself, and a zero.
         let text = |length: usize| "a".repeat(length - 5);
         assert!(matches!(LargeResponses::encode(&text(NEVER_FRAGMENTED)), Ok(None)));
         let large = LargeResponses::encode(&text(NEVER_FRAGMENTED + 1));
         assert!(matches!(large, Ok(Some(payload)) if payload.len() == NEVER_FRAGMENTED + 1));
-        let most = LARGEST_DATAGRAM - 120;
-        assert!(matches!(LargeResponses::encode(&text(most)), Ok(Some(_))));
-        let error = LargeResponses::encode(&text(most + 1)).unwrap_err();
+        let limit = LARGEST_DATAGRAM - 120;
+        assert!(matches!(LargeResponses::encode(&text(limit)), Ok(Some(_))));
+        let error = LargeResponses::encode(&text(limit + 1)).unwrap_err();
         assert!(error.to_string().contains("65381 octets"), "{error}");
-    }
-
-    #[test]
-    fn announced_writers_are_read_from_the_closed_message() {
-        let mut node = NodeEntitiesInfo::new(NodeName::new("/cell", "axes").unwrap());
-        node.add_reader(Gid::from(CLIENT));
-        node.add_writer(Gid::from(WRITER));
-        let info = ParticipantEntitiesInfo::new(Gid::from([7; 16]), vec![node]);
-        assert_eq!(announced(&info), Some(BTreeSet::from([WRITER])));
     }
 }

@@ -1,45 +1,58 @@
-//! The ROS 2 side: the door through which messages come in, and the thread that paces the machine.
+//! ROS 2 interface of the node: topics, services, the action, parameters, log and clock.
 //!
-//! `pace` owns the simulation and the clock and never waits for the network in real time; the rest
-//! runs on tokio and talks to it through bounded channels.
+//! `pace` runs the thread that owns the simulation and the clock; in real time it never waits for the network.
+//! Everything else runs on tokio and exchanges data with that thread through bounded channels.
+//!
+//! Workarounds for interoperability with Fast DDS and for limits of RustDDS, each described in its module
+//! (overview: docs/middleware.md):
+//!
+//! | module | RTPS submessage | purpose |
+//! |---|---|---|
+//! | `first_sample_nack` | NACK_FRAG | requests the first sample of a publisher that was matched late |
+//! | `stalled_readers` | GAP | unblocks a writer whose reader sends no ACKNACK |
+//! | `dispose` | DATA with PID_KEY_HASH | disposes of the participant or a writer |
+//! | `large_response` | DATA, GAP | delivers service responses longer than the path's MTU |
+//! | `writer_rotation` | – | bounds the memory of a volatile writer |
 
 mod action;
-mod ask_again;
+mod announced_writers;
+mod arc_pool;
 mod clock;
 mod convert;
-mod deaf;
 mod diagnostics;
+mod dispose;
+mod duplicate_node_name;
 mod endpoints;
 pub mod environment;
 mod fan_out;
-mod footprint;
-mod goodbye;
-mod heard;
+mod first_sample_nack;
 mod inputs;
 mod large_response;
 pub mod log;
-mod namesake;
+mod matched_subscriptions;
 pub mod node;
 mod outputs;
 mod pace;
 mod parameter_host;
 pub mod parameter_services;
 pub mod participant;
+mod process_memory;
 mod readers;
 mod recorder;
+mod remote_endpoints;
+mod response_limiter;
 mod results;
-mod reused;
 pub mod rosout;
 mod rtps;
 pub mod security;
 mod service;
 mod setpoints;
+mod stalled_readers;
 mod stream;
 mod throttle;
 mod tool;
 mod topics;
 mod trigger;
-mod unsent;
-mod writers;
+mod writer_rotation;
 
-use crate::door::{args, names};
+use crate::ingress::{args, names};

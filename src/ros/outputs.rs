@@ -1,6 +1,7 @@
-//! What the node publishes: at once while the middleware has room, otherwise through one queue and one
-//! task per topic, so that a subscriber that is slow on one topic delays no other, and none delays the
-//! machine.
+//! Outgoing messages: written at once while the middleware has space, otherwise through one queue and one task per
+//! topic.
+//!
+//! A slow subscriber of one topic therefore delays no other topic, and in real time no subscriber delays the axes.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -16,174 +17,178 @@ use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::endpoints::Publisher;
-use super::heard::{Heard, Listeners};
+use super::matched_subscriptions::{MatchedSubscriptionTracker, MatchedSubscriptions};
 use super::recorder::Tap;
-use super::writers::{Renewals, Succession, Writer};
+use super::writer_rotation::{RotatedTopics, Writer, WriterRotation};
 
-/// What happens when a queue is full because its subscribers are slow.
+/// Policy for a queue that is full because its subscribers are slow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WhenFull {
-    /// The message is dropped and counted: the machine is in step with the wall clock.
+pub enum OverflowPolicy {
+    /// The message is dropped and counted; used where the axes follow the wall clock.
     Drop,
-    /// The sender waits: the machine runs as fast as its subscribers can take it.
-    Wait,
-    /// The sender waits for subscribers that are slow, but not for one that stands still: after [`PATIENCE`]
-    /// messages are dropped and counted until there is room again.
-    WaitForAWhile,
+    /// The sender waits; used where the axes run as fast as subscribers can receive.
+    Block,
+    /// The sender waits for at most [`BLOCK_TIMEOUT`]. After a timeout messages are dropped and counted until the
+    /// queue has space again, so that a stalled subscriber is waited for only once.
+    BlockWithTimeout,
 }
 
-/// Messages that a queue holds in front of the middleware when it may drop: 1.5 s at the default rate.
+/// Length of a queue that drops: 1.5 s of messages at the default rate.
 const DROPPING_QUEUE: usize = 256;
-/// Messages that a queue holds when its sender waits instead.
-const WAITING_QUEUE: usize = 8;
-/// How long a sender waits for room in a queue that does not move.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Length of a queue whose sender waits.
+const BLOCKING_QUEUE: usize = 8;
+/// Longest time for which a sender waits for space in a queue.
+const BLOCK_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// How long a reader may acknowledge nothing, once the middleware keeps no more for it, before it is told to do without
-/// some of what it lacks. Where messages are dropped meanwhile, that is 50 s of them at the default rate already; where
-/// nothing is to be lost, it may be in a debugger.
-fn longest_wait(when_full: WhenFull) -> Duration {
-    match when_full {
-        WhenFull::Drop | WhenFull::WaitForAWhile => Duration::from_secs(5),
-        WhenFull::Wait => Duration::from_secs(30),
+/// Returns the time without acknowledgment after which a reader counts as stalled and gets a GAP.
+///
+/// If messages are dropped, the middleware already holds 50 s of them at the default rate when it blocks, so the time
+/// is short. Where no message may be lost, it is longer: the subscriber may be paused in a debugger.
+fn stall_timeout(overflow: OverflowPolicy) -> Duration {
+    match overflow {
+        OverflowPolicy::Drop | OverflowPolicy::BlockWithTimeout => Duration::from_secs(5),
+        OverflowPolicy::Block => Duration::from_secs(30),
     }
 }
 
-/// Length of a queue.
-pub fn queue_length(when_full: WhenFull) -> usize {
-    match when_full {
-        WhenFull::Drop => DROPPING_QUEUE,
-        WhenFull::Wait | WhenFull::WaitForAWhile => WAITING_QUEUE,
+/// Returns the queue length of a policy, in messages.
+pub fn queue_length(overflow: OverflowPolicy) -> usize {
+    match overflow {
+        OverflowPolicy::Drop => DROPPING_QUEUE,
+        OverflowPolicy::Block | OverflowPolicy::BlockWithTimeout => BLOCKING_QUEUE,
     }
 }
 
-/// A message on its way to the middleware.
+/// Pending write of a message to the middleware.
 type Write = Pin<Box<dyn Future<Output = ()> + Send>>;
 
-/// The sending end of a topic.
+/// Output of a topic.
 pub struct Output<M: Serialize> {
-    writers: Arc<Succession<Writer<M>>>,
+    writers: Arc<WriterRotation<Writer<M>>>,
     queue: Queue,
     tap: Tap<M>,
-    heard: Heard,
+    matched: MatchedSubscriptions,
 }
 
-/// Messages that the middleware had no room for, in order.
+/// Queue of writes for which the middleware had no space, in order.
 struct Queue {
     writes: mpsc::Sender<Write>,
-    /// How many those are, the one that waits for room among them.
-    behind: Arc<AtomicUsize>,
-    when_full: WhenFull,
-    /// Whether the last sender's patience came to an end.
-    stands_still: AtomicBool,
+    /// Number of queued writes, including the one in progress.
+    pending: Arc<AtomicUsize>,
+    overflow: OverflowPolicy,
+    /// True after the last sender has timed out.
+    is_stalled: AtomicBool,
     dropped: Arc<AtomicU64>,
 }
 
 impl Queue {
-    /// The queue, and the task that empties it, which ends when the queue is dropped; it says so when a write has waited
-    /// for another `longest`.
+    /// Creates the queue and the task that empties it, which ends when the queue is dropped.
+    ///
+    /// The task calls `on_stall` each time a write has waited for another `timeout_after`.
     fn new(
-        when_full: WhenFull,
+        overflow: OverflowPolicy,
         dropped: &Arc<AtomicU64>,
-        longest: Duration,
-        stuck: impl Fn() + Send + 'static,
+        timeout_after: Duration,
+        on_stall: impl Fn() + Send + 'static,
     ) -> (Self, impl Future<Output = ()> + Send + 'static) {
-        let (writes, mut queued) = mpsc::channel::<Write>(queue_length(when_full));
-        let behind = Arc::new(AtomicUsize::new(0));
-        let left = Arc::clone(&behind);
+        let (writes, mut queued) = mpsc::channel::<Write>(queue_length(overflow));
+        let pending = Arc::new(AtomicUsize::new(0));
+        let remaining = Arc::clone(&pending);
         let task = async move {
             while let Some(mut write) = queued.recv().await {
-                while timeout(longest, &mut write).await.is_err() {
-                    stuck();
+                while timeout(timeout_after, &mut write).await.is_err() {
+                    on_stall();
                 }
-                left.fetch_sub(1, Ordering::Release);
+                remaining.fetch_sub(1, Ordering::Release);
             }
         };
         let dropped = Arc::clone(dropped);
-        (Queue { writes, behind, when_full, stands_still: AtomicBool::new(false), dropped }, task)
+        (Queue { writes, pending, overflow, is_stalled: AtomicBool::new(false), dropped }, task)
     }
 
-    /// Writes at once where nothing waits, so that a period wakes no task for each of its topics; queues otherwise.
+    /// Writes at once if nothing is queued, so that a position cycle wakes no task per topic; queues otherwise.
     async fn write(&self, mut write: Write) {
-        if self.behind.load(Ordering::Acquire) == 0 && (&mut write).now_or_never().is_some() {
+        if self.pending.load(Ordering::Acquire) == 0 && (&mut write).now_or_never().is_some() {
             return;
         }
-        self.behind.fetch_add(1, Ordering::AcqRel);
+        self.pending.fetch_add(1, Ordering::AcqRel);
         if !self.push(write).await {
-            self.behind.fetch_sub(1, Ordering::AcqRel);
+            self.pending.fetch_sub(1, Ordering::AcqRel);
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Whether there was room, or came to be. The task that makes it ends only after this queue has been dropped.
+    /// Queues a write. Returns false if the queue is full and the policy forbids waiting, or the wait timed out.
     async fn push(&self, write: Write) -> bool {
-        let may_wait = match self.when_full {
-            WhenFull::Drop => false,
-            WhenFull::Wait => return self.writes.send(write).await.is_ok(),
-            WhenFull::WaitForAWhile => !self.stands_still.load(Ordering::Relaxed),
+        let may_block = match self.overflow {
+            OverflowPolicy::Drop => false,
+            OverflowPolicy::Block => return self.writes.send(write).await.is_ok(),
+            OverflowPolicy::BlockWithTimeout => !self.is_stalled.load(Ordering::Relaxed),
         };
-        let is_queued = if may_wait {
-            self.writes.send_timeout(write, PATIENCE).await.is_ok()
+        let is_queued = if may_block {
+            self.writes.send_timeout(write, BLOCK_TIMEOUT).await.is_ok()
         } else {
             self.writes.try_send(write).is_ok()
         };
-        self.stands_still.store(!is_queued, Ordering::Relaxed);
+        self.is_stalled.store(!is_queued, Ordering::Relaxed);
         is_queued
     }
 }
 
-/// Starts the tasks that publish, one for each topic.
+/// Starts the publishing tasks, one per topic.
 pub struct Publishing<'a> {
-    /// Whose readers they are.
+    /// Participant of the node.
     pub participant: &'a DomainParticipant,
-    /// Counts what is dropped, of all topics.
+    /// Number of dropped messages of all topics.
     pub dropped: &'a Arc<AtomicU64>,
-    /// Who listens to what.
-    pub listeners: &'a mut Listeners,
-    /// Where the tasks run.
+    /// Tracker of matched subscriptions.
+    pub tracker: &'a mut MatchedSubscriptionTracker,
+    /// Set of the started tasks.
     pub tasks: &'a mut JoinSet<()>,
-    /// Renews the writers.
-    pub renewals: &'a mut Renewals,
+    /// Topics whose writers are rotated.
+    pub rotated: &'a mut RotatedTopics,
 }
 
 impl Publishing<'_> {
-    /// Starts the task that waits for slow subscribers; it ends when the output is dropped.
+    /// Starts the task that writes queued messages of a topic; it ends when the output is dropped.
     pub fn start<M: Serialize + Send + Sync + 'static>(
         &mut self,
         publisher: Publisher<M>,
-        when_full: WhenFull,
+        overflow: OverflowPolicy,
     ) -> Output<M> {
-        let Publisher { network, tap, topic, volatile, kept } = publisher;
-        let heard = if volatile && !tap.records() {
-            self.listeners.of(network.guid(), topic.name())
+        let Publisher { network, tap, topic, is_volatile, max_unacknowledged } = publisher;
+        let matched = if is_volatile && !tap.is_recording() {
+            self.tracker.add(network.guid(), topic.name())
         } else {
-            Heard::always()
+            MatchedSubscriptions::always()
         };
-        let writers = Arc::new(Succession::new(Writer::new(network, &topic, kept, self.participant)));
-        let longest = longest_wait(when_full);
-        let stuck = Arc::clone(&writers);
-        let (queue, task) = Queue::new(when_full, self.dropped, longest, move || {
-            stuck.current().deaf.give_up(longest.as_secs())
+        let writers =
+            Arc::new(WriterRotation::new(Writer::new(network, &topic, max_unacknowledged, self.participant)));
+        let stall_timeout = stall_timeout(overflow);
+        let stalled = Arc::clone(&writers);
+        let (queue, task) = Queue::new(overflow, self.dropped, stall_timeout, move || {
+            stalled.current().readers.send_gap(stall_timeout.as_secs())
         });
         self.tasks.spawn(task);
         if topic.qos().is_volatile() {
-            self.renewals.add(Arc::clone(&writers), topic, kept, self.participant.clone());
+            self.rotated.add(Arc::clone(&writers), topic, max_unacknowledged, self.participant.clone());
         }
-        Output { writers, queue, tap, heard }
+        Output { writers, queue, tap, matched }
     }
 }
 
 impl<M: Serialize + Send + Sync + 'static> Output<M> {
-    /// Whether anybody listens or will get to know it: a message that nobody hears need not be made.
-    pub fn is_heard(&self) -> bool {
-        self.heard.is()
+    /// Returns true if the topic has a matched subscription, is transient local, or is recorded; otherwise the
+    /// message need not be built.
+    pub fn has_subscriptions(&self) -> bool {
+        self.matched.has_any()
     }
 
-    /// Hands a message over, to the recording first: a subscriber that is slow leaves no gap there.
+    /// Records a message and publishes it. A slow subscriber causes no gap in the recording.
     pub async fn send(&self, message: M) {
         self.tap.record(&message).await;
         let writers = Arc::clone(&self.writers);
-        let write = Box::pin(async move { writers.turn(Instant::now).write(message).await });
+        let write = Box::pin(async move { writers.advance(Instant::now).write(message).await });
         self.queue.write(write).await;
     }
 }
@@ -194,7 +199,7 @@ mod tests {
     use futures::future::pending;
     use tokio::sync::watch;
 
-    /// Where writes go to while `open`, counted.
+    /// Test subscriber that receives writes while `open`, counted.
     struct Reader {
         open: watch::Sender<bool>,
         read: Arc<AtomicUsize>,
@@ -216,10 +221,10 @@ mod tests {
         }
     }
 
-    /// A queue with a reader that stands still, full, and how long it then takes to write `more`.
+    /// Fills the queue of a stalled reader. Returns the time that `more` further writes take.
     async fn fill(queue: &Queue, reader: &Reader, more: usize) -> Duration {
         // One more than the queue holds is being written.
-        for _ in 0..WAITING_QUEUE + 1 {
+        for _ in 0..BLOCKING_QUEUE + 1 {
             queue.write(reader.write()).await;
             tokio::task::yield_now().await;
         }
@@ -230,33 +235,33 @@ mod tests {
         began.elapsed()
     }
 
-    /// Who writes results reads commands next: a stop that follows a refusal was not heard.
+    /// The task that publishes results handles commands next, so a stalled reader must not delay a stop.
     #[tokio::test]
-    async fn a_reader_of_results_that_stands_still_is_not_waited_for_again_and_again() {
+    async fn a_stalled_reader_of_results_is_waited_for_only_once() {
         const MORE: u32 = 1000;
         let (reader, dropped) = (Reader::new(), Arc::new(AtomicU64::new(0)));
-        let (queue, task) = Queue::new(WhenFull::WaitForAWhile, &dropped, PATIENCE, || {});
+        let (queue, task) = Queue::new(OverflowPolicy::BlockWithTimeout, &dropped, BLOCK_TIMEOUT, || {});
         let task = tokio::spawn(task);
         let waited = fill(&queue, &reader, MORE as usize).await;
-        assert!(waited >= PATIENCE && waited < PATIENCE * MORE / 10, "{waited:?}");
+        assert!(waited >= BLOCK_TIMEOUT && waited < BLOCK_TIMEOUT * MORE / 10, "{waited:?}");
         assert_eq!(dropped.load(Ordering::Relaxed), u64::from(MORE));
         reader.open.send_replace(true);
-        while queue.behind.load(Ordering::Relaxed) > 0 {
+        while queue.pending.load(Ordering::Relaxed) > 0 {
             tokio::task::yield_now().await;
         }
-        assert_eq!(reader.read.load(Ordering::Relaxed), WAITING_QUEUE + 1);
-        // It is waited for again when it has gone on.
+        assert_eq!(reader.read.load(Ordering::Relaxed), BLOCKING_QUEUE + 1);
+        // The queue waits again after the reader has resumed.
         reader.open.send_replace(false);
-        assert!(fill(&queue, &reader, 1).await >= PATIENCE);
+        assert!(fill(&queue, &reader, 1).await >= BLOCK_TIMEOUT);
         drop(queue);
         reader.open.send_replace(true);
         task.await.expect("it ends");
     }
 
     #[tokio::test]
-    async fn a_reader_that_is_slow_misses_nothing_where_it_is_waited_for() {
+    async fn a_blocking_queue_loses_no_message_of_a_slow_reader() {
         let (reader, dropped) = (Reader::new(), Arc::new(AtomicU64::new(0)));
-        let (queue, task) = Queue::new(WhenFull::Wait, &dropped, PATIENCE, || {});
+        let (queue, task) = Queue::new(OverflowPolicy::Block, &dropped, BLOCK_TIMEOUT, || {});
         let task = tokio::spawn(task);
         let opener = reader.open.clone();
         let opens = tokio::spawn(async move {
@@ -265,35 +270,35 @@ mod tests {
                 tokio::time::sleep(Duration::from_millis(1)).await;
             }
         });
-        for _ in 0..10 * WAITING_QUEUE {
+        for _ in 0..10 * BLOCKING_QUEUE {
             queue.write(reader.write()).await;
         }
         drop(queue);
         task.await.expect("it ends");
         opens.abort();
         let counts = (reader.read.load(Ordering::Relaxed), dropped.load(Ordering::Relaxed));
-        assert_eq!(counts, (10 * WAITING_QUEUE, 0));
+        assert_eq!(counts, (10 * BLOCKING_QUEUE, 0));
     }
 
     #[tokio::test]
-    async fn a_reader_that_takes_nothing_is_told_to_do_without_until_it_goes_on() {
+    async fn a_stalled_reader_is_reported_repeatedly_until_it_resumes() {
         let (reader, dropped) = (Reader::new(), Arc::new(AtomicU64::new(0)));
-        let (told, is_told) = (Arc::new(AtomicUsize::new(0)), Arc::new(tokio::sync::Notify::new()));
-        let (count, notify) = (Arc::clone(&told), Arc::clone(&is_told));
-        let stuck = move || {
+        let (stalls, is_stalled) = (Arc::new(AtomicUsize::new(0)), Arc::new(tokio::sync::Notify::new()));
+        let (count, notify) = (Arc::clone(&stalls), Arc::clone(&is_stalled));
+        let on_stall = move || {
             count.fetch_add(1, Ordering::Relaxed);
             notify.notify_one();
         };
-        let (queue, task) = Queue::new(WhenFull::Wait, &dropped, Duration::from_millis(5), stuck);
+        let (queue, task) = Queue::new(OverflowPolicy::Block, &dropped, Duration::from_millis(5), on_stall);
         let task = tokio::spawn(task);
         queue.write(reader.write()).await;
         for _ in 0..3 {
-            is_told.notified().await;
+            is_stalled.notified().await;
         }
         reader.open.send_replace(true);
         drop(queue);
         task.await.expect("it ends");
         assert_eq!(reader.read.load(Ordering::Relaxed), 1);
-        assert!(told.load(Ordering::Relaxed) >= 3);
+        assert!(stalls.load(Ordering::Relaxed) >= 3);
     }
 }

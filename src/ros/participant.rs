@@ -1,4 +1,4 @@
-//! The DDS participant: opened as the environment asks, closed so that everybody notices.
+//! DDS participant of the node: domain, network range and security from the environment; dispose at shutdown.
 
 use std::time::{Duration, Instant};
 
@@ -10,32 +10,32 @@ use rustdds::DomainParticipantSecurityConfigFiles;
 use super::environment::{DiscoveryRange, Environment};
 #[cfg(not(feature = "security"))]
 use super::security::SecurityError;
-use super::{goodbye::Goodbye, security::Security};
+use super::{dispose::DisposeMessage, security::Security};
 
-/// The node could not join the network.
+/// Failure to join the network.
 #[derive(Debug, thiserror::Error)]
 pub enum ParticipantError {
-    /// No participant: no free port, mostly.
+    /// The participant could not be created, mostly because no port is free.
     #[error("cannot open a DDS participant in domain {domain_id}: {reason}")]
     Open {
-        /// The domain asked for.
+        /// Domain id.
         domain_id: u16,
-        /// The middleware's own words.
+        /// Reason of the middleware.
         reason: String,
     },
-    /// The participant is there, but the ROS layer on it is not.
+    /// The ROS context on the participant could not be created.
     #[error("cannot set up ROS on the DDS participant: {reason}")]
     Context {
-        /// The middleware's own words.
+        /// Reason of the middleware.
         reason: String,
     },
 }
 
-/// Owns the DDS participant and says goodbye for it when it goes.
+/// Owner of the DDS participant, which is disposed of on drop.
 ///
-/// Drop publishers, subscriptions, the node and the [`Context`] first, then call
-/// [`Self::shutdown`]; dropping the guard does the same. A clone of the participant that lives on
-/// elsewhere keeps announcing it, and it would be discovered again after the goodbye.
+/// Drop publishers, subscriptions, the node and the [`Context`] first, then call [`Self::shutdown`] or drop this
+/// value. A remaining clone of the participant continues to announce it, and it would be discovered again after the
+/// dispose.
 #[derive(Debug)]
 pub struct Participant {
     participant: Option<DomainParticipant>,
@@ -46,24 +46,24 @@ impl Participant {
     /// Opens a participant in the domain and on the networks that `environment` names, without DDS Security.
     ///
     /// # Errors
-    /// [`ParticipantError::Open`] when the sockets or threads cannot be had.
+    /// [`ParticipantError::Open`] if sockets or threads are not available.
     pub fn open(environment: &Environment) -> Result<Self, ParticipantError> {
         Self::open_with(environment, &Security::Off)
     }
 
-    /// Likewise, secured as `security` says.
+    /// Opens a participant in the domain and on the networks that `environment` names, with the given DDS Security.
     ///
     /// # Errors
-    /// Also where this build has no DDS Security, or the files of the enclave do not allow it to take part in the
-    /// domain.
+    /// [`ParticipantError::Open`] if sockets or threads are not available, if this build has no DDS Security, or if
+    /// the files of the enclave do not permit the domain.
     pub fn open_with(environment: &Environment, security: &Security) -> Result<Self, ParticipantError> {
         let builder = environment.participant_builder();
         #[cfg(feature = "security")]
         let builder = match security {
-            Security::Off | Security::Open(_) => builder,
+            Security::Off | Security::Unprotected(_) => builder,
             Security::Enclave(folder) => {
-                super::rtps::secure();
-                // SROS2 keeps keys without a password.
+                super::rtps::set_secured();
+                // Private keys of SROS2 have no password.
                 let files =
                     DomainParticipantSecurityConfigFiles::with_ros_default_names(folder, String::new());
                 builder.builtin_security(files)
@@ -74,8 +74,8 @@ impl Participant {
             let reason = SecurityError::NotBuilt.to_string();
             return Err(ParticipantError::Open { domain_id: environment.domain_id(), reason });
         }
-        if let Security::Open(reason) = security {
-            tracing::warn!("nothing of what this node says or hears is protected: {reason}");
+        if let Security::Unprotected(reason) = security {
+            tracing::warn!("communication of this node is not protected: {reason}");
         }
         let participant = builder.build().map_err(|error| ParticipantError::Open {
             domain_id: environment.domain_id(),
@@ -84,10 +84,10 @@ impl Participant {
         Ok(Self { participant: Some(participant), environment: environment.clone() })
     }
 
-    /// A ROS context on this participant.
+    /// Creates a ROS context on this participant.
     ///
     /// # Errors
-    /// [`ParticipantError::Context`] when the middleware refuses its own topics.
+    /// [`ParticipantError::Context`] if the participant is shut down or the context cannot be created.
     pub fn context(&self) -> Result<Context, ParticipantError> {
         let participant = self
             .participant
@@ -97,24 +97,24 @@ impl Participant {
             .map_err(|error| ParticipantError::Context { reason: error.to_string() })
     }
 
-    /// Where it is known.
+    /// Returns the network range in which the participant is announced.
     pub fn range(&self) -> DiscoveryRange {
         self.environment.range()
     }
 
-    /// Leaves the network: disposes of the participant and tells everybody who may know it.
-    /// Returns the time that it took, some 40 ms.
+    /// Disposes of the participant and sends the dispose message to all participants that may know it. Returns the time
+    /// taken, about 40 ms.
     pub fn shutdown(mut self) -> Duration {
-        self.leave()
+        self.dispose()
     }
 
-    fn leave(&mut self) -> Duration {
+    fn dispose(&mut self) -> Duration {
         let start = Instant::now();
         if let Some(participant) = self.participant.take() {
-            let goodbye = Goodbye::of(&participant, self.environment.range());
-            // The other way round, RustDDS might announce itself once more after the goodbye.
+            let message = DisposeMessage::for_participant(&participant, self.environment.range());
+            // Dropped first, because RustDDS could announce the participant again after the dispose.
             drop(participant);
-            goodbye.send();
+            message.send();
         }
         start.elapsed()
     }
@@ -122,6 +122,6 @@ impl Participant {
 
 impl Drop for Participant {
     fn drop(&mut self) {
-        self.leave();
+        self.dispose();
     }
 }

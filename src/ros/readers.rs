@@ -1,4 +1,4 @@
-//! The readers of one of our topics, for what RustDDS does not tell them.
+//! Datagrams to the readers of a topic of this node, beside those of RustDDS.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -8,38 +8,38 @@ use rustdds::DomainParticipant;
 
 use super::rtps::Guid;
 
-/// Who reads what one of our writers writes.
+/// Readers of a local writer, with a socket to send them datagrams.
 #[derive(Debug)]
 pub(super) struct Readers {
-    /// The writer.
+    /// GUID of the writer.
     pub writer: Guid,
-    /// Its topic's name in DDS.
+    /// Name of the topic in DDS.
     pub topic: String,
     participant: DomainParticipant,
     socket: UdpSocket,
 }
 
 impl Readers {
-    /// Those of the writer with this GUID on this DDS topic.
+    /// Creates the socket for the readers of `writer` on the DDS topic `topic`.
     ///
     /// # Errors
-    /// What the system says when it gives no socket.
+    /// Error of the operating system if it provides no socket.
     pub(super) fn new(writer: Guid, topic: String, participant: DomainParticipant) -> io::Result<Self> {
         let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
         Ok(Self { writer, topic, participant, socket })
     }
 
-    /// Sends them a datagram, each time to those that are known then.
+    /// Sends a datagram to all readers discovered so far. Send errors are logged.
     pub(super) fn send(&self, datagram: &[u8]) {
         for reader in self.addresses() {
             if let Err(error) = self.socket.send_to(datagram, reader) {
                 let (length, topic) = (datagram.len(), &self.topic);
-                tracing::warn!("a message of {length} octets on {topic} cannot go to {reader}: {error}");
+                tracing::warn!("cannot send a datagram of {length} octets on {topic} to {reader}: {error}");
             }
         }
     }
 
-    /// Where they listen.
+    /// Returns the unicast addresses of the discovered readers.
     fn addresses(&self) -> BTreeSet<SocketAddr> {
         self.participant
             .discovered_readers()

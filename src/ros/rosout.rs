@@ -1,6 +1,6 @@
-//! The node's own log messages on `/rosout`.
+//! Publication of the node's log messages on `/rosout`.
 //!
-//! The crate's own publisher keeps one message for late joiners; this one keeps as many as rcl's.
+//! The publisher of ros2-client keeps one message for late joiners; this one keeps as many as rcl's.
 
 use std::time::Duration;
 
@@ -12,36 +12,37 @@ use rustdds::DomainParticipant;
 use tokio::sync::mpsc;
 
 use super::args::{LogLevel, RosArgs};
-use super::endpoints::{EndpointError, Publisher, keeping, topic};
+use super::endpoints::{EndpointError, Publisher, create_topic, with_sample_limit};
 use super::log::LogRecord;
-use super::recorder::{Direction, Recorder};
+use super::recorder::{Direction, TopicRecorder};
 use virtual_axes_core::config::QosConfig;
 
-/// Messages that may wait; more are dropped, so that logging never waits.
+/// Capacity of the queue, in messages. Further messages are dropped, so that logging never blocks.
 pub const QUEUE: usize = 256;
 
-/// The topic.
+/// Name of the topic.
 const NAME: &str = "/rosout";
-/// Depth and lifespan of rcl's publisher (`rcl_qos_profile_rosout_default`).
+/// Depth of rcl's publisher (`rcl_qos_profile_rosout_default`).
 const DEPTH: usize = 1000;
+/// Lifespan of rcl's publisher.
 const LIFESPAN: Duration = Duration::from_secs(10);
-/// How long a message may wait for a slow reader.
+/// Longest time for which a write waits for a slow reader.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 
-/// The publisher, where the arguments want one: reliable, transient local, as rcl's.
+/// Creates the publisher, reliable and transient local as in rcl. Returns `None` if the arguments disable `/rosout`.
 ///
 /// # Errors
-/// [`EndpointError`] when the middleware refuses it.
+/// [`EndpointError`] if the middleware cannot create the topic.
 pub(super) fn publisher(
     node: &mut Node,
     participant: &DomainParticipant,
     args: &RosArgs,
-    recorder: &mut Recorder,
+    recorder: &mut TopicRecorder,
 ) -> Result<Option<Publisher<Log>>, EndpointError> {
     if !args.log_sinks().rosout {
         return Ok(None);
     }
-    let failed = |reason: String| EndpointError::Refused { name: NAME.to_owned(), reason };
+    let failed = |reason: String| EndpointError::NotCreated { name: NAME.to_owned(), reason };
     let resolved = args.resolve_topic(NAME).map_err(|e| failed(e.to_string()))?;
     let profile = QosProfile {
         durability: Durability::TransientLocal,
@@ -50,19 +51,20 @@ pub(super) fn publisher(
         ..QosProfile::publisher_default().reliability_reliable(WhenFull::Wait(WRITE_TIMEOUT))
     };
     let type_name = MessageTypeName::new("rcl_interfaces", "Log");
-    let topic = topic(participant, &resolved, &type_name, &keeping(&profile, DEPTH)).map_err(failed)?;
+    let topic = create_topic(participant, &resolved, &type_name, &with_sample_limit(&profile, DEPTH))
+        .map_err(failed)?;
     let network = node.create_publisher(&topic, None).map_err(|e| failed(e.to_string()))?;
-    let qos = QosConfig { reliable: true, transient_local: true, depth: DEPTH };
+    let qos = QosConfig { is_reliable: true, is_transient_local: true, depth: DEPTH };
     let tap = recorder.tap(&resolved, qos, Direction::Out);
-    Ok(Some(Publisher { network, tap, topic, volatile: false, kept: DEPTH }))
+    Ok(Some(Publisher { network, tap, topic, is_volatile: false, max_unacknowledged: DEPTH }))
 }
 
-/// Publishes what comes until the log is closed.
+/// Publishes log records until the log is closed.
 pub(super) async fn publish(publisher: Publisher<Log>, mut records: mpsc::Receiver<LogRecord>) {
     while let Some(record) = records.recv().await {
         let message = message(record);
         publisher.tap.record(&message).await;
-        // To log a failure here would make the next one.
+        // A failure is not logged: the log record would fail in turn.
         let _ = publisher.network.async_publish(message).await;
     }
 }
@@ -97,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_are_those_of_the_interface_file() {
+    fn log_levels_match_rcl_interfaces() {
         for (level, number) in [
             (LogLevel::Debug, 10),
             (LogLevel::Info, 20),

@@ -1,66 +1,66 @@
-//! RTPS messages, as far as this node writes them itself: header, INFO_TS, INFO_DST, NACK_FRAG, GAP,
+//! Encoding of the RTPS messages that this node sends beside RustDDS: header, INFO_TS, INFO_DST, NACK_FRAG, GAP and
 //! DATA with inline QoS.
 //!
-//! Everything is little endian. Sections are those of RTPS 2.5.
+//! All fields are little endian. Section numbers refer to RTPS 2.5.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// 8.3.3.1.2, 9.4.4: what RustDDS speaks.
+/// Protocol version of RustDDS (8.3.3.1.2, 9.4.4).
 const PROTOCOL_VERSION: [u8; 2] = [2, 4];
-/// RustDDS, in whose name all of this is sent.
+/// Vendor id of RustDDS, whose participant sends these messages.
 const VENDOR: [u8; 2] = [0x01, 0x12];
 
-/// 9.4.5.1.1: kinds of submessages.
+// Kinds of submessages (9.4.5.1.1).
 const SUBMESSAGE_GAP: u8 = 0x08;
 const SUBMESSAGE_INFO_TS: u8 = 0x09;
 const SUBMESSAGE_INFO_DST: u8 = 0x0e;
 const SUBMESSAGE_NACK_FRAG: u8 = 0x12;
 const SUBMESSAGE_DATA: u8 = 0x15;
-/// 9.4.5.1.2, and 9.4.5.3.1 for those of DATA.
+// Flags of submessages (9.4.5.1.2), and of DATA (9.4.5.3.1).
 const FLAG_LITTLE_ENDIAN: u8 = 0x01;
 const FLAG_INLINE_QOS: u8 = 0x02;
 const FLAG_DATA: u8 = 0x04;
-/// 9.4.5.3: from the field itself to the inline QoS: reader id, writer id, sequence number.
+/// Octets from this field to the inline QoS: reader id, writer id, sequence number (9.4.5.3).
 const OCTETS_TO_INLINE_QOS: u16 = 16;
-/// 9.4.2.11: the end of a parameter list.
+/// End of a parameter list (9.4.2.11).
 const PID_SENTINEL: u16 = 0x0001;
 
-/// 10.2: the encapsulation CDR_LE, with options 0.
+/// Encapsulation header CDR_LE with options 0 (10.2).
 pub(super) const CDR_LE: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 
 const HEADER: usize = 20;
 const SUBMESSAGE_HEADER: usize = 4;
 const PARAMETER_HEADER: usize = 4;
 
-/// Whether the participant of this process is secured: no message of ours is encrypted or signed.
+/// True if the participant of this process uses DDS Security. Messages of this module are neither encrypted nor signed.
 static SECURED: AtomicBool = AtomicBool::new(false);
 
-/// From now on, nothing but what tells that the participant leaves is sent from here.
+/// Restricts this module to the dispose message of the participant, for a participant with DDS Security.
 #[cfg(feature = "security")]
-pub(super) fn secure() {
+pub(super) fn set_secured() {
     SECURED.store(true, Ordering::Relaxed);
 }
 
-/// Whether what is sent must be protected, which only RustDDS can do.
+/// Returns true if messages must be protected, which only RustDDS can do.
 pub(super) fn is_secured() -> bool {
     SECURED.load(Ordering::Relaxed)
 }
 
-/// 9.3.1: a participant's prefix, then the entity.
+/// GUID: prefix of the participant, then entity id (9.3.1).
 pub(super) type Guid = [u8; 16];
-/// 9.3.1.2
+/// Entity id (9.3.1.2).
 pub(super) type EntityId = [u8; 4];
 
-/// 9.3.1.3: no reader in particular.
+/// Entity id for all readers (9.3.1.3).
 pub(super) const ANY_READER: EntityId = [0, 0, 0, 0];
 
-/// The entity of a GUID.
+/// Returns the entity id of a GUID.
 pub(super) fn entity(guid: &Guid) -> EntityId {
     [guid[12], guid[13], guid[14], guid[15]]
 }
 
-/// 9.4.2.5: two words, the high one first.
+/// Encodes a sequence number: two words, the high one first (9.4.2.5).
 pub(super) fn sequence_number(number: i64) -> [u8; 8] {
     let mut octets = [0; 8];
     octets[..4].copy_from_slice(&((number >> 32) as u32).to_le_bytes());
@@ -68,21 +68,21 @@ pub(super) fn sequence_number(number: i64) -> [u8; 8] {
     octets
 }
 
-/// One DATA submessage (8.3.8.2), to any reader of the writer.
+/// DATA submessage to all readers of the writer (8.3.8.2).
 #[derive(Debug)]
 pub(super) struct Data<'a> {
-    /// Who wrote the sample.
+    /// Writer of the sample.
     pub writer: EntityId,
-    /// Which sample of that writer.
+    /// Sequence number of the sample.
     pub sequence_number: i64,
-    /// Parameters, without the sentinel; the lengths are multiples of 4.
+    /// Parameters without the sentinel; lengths are multiples of 4.
     pub inline_qos: &'a [(u16, &'a [u8])],
-    /// With its encapsulation header; a sample may go without.
+    /// Encapsulation header and payload, if the sample has one.
     pub payload: Option<(&'a [u8; 4], &'a [u8])>,
 }
 
 impl Data<'_> {
-    /// Octets that come before the payload's own in a message of INFO_TS and this.
+    /// Returns the number of octets in front of the payload in a message of INFO_TS and this DATA.
     pub(super) fn overhead(&self) -> usize {
         let qos: usize = self.inline_qos.iter().map(|(_, value)| PARAMETER_HEADER + value.len()).sum();
         HEADER
@@ -97,13 +97,13 @@ impl Data<'_> {
     }
 }
 
-/// A message that is being written.
+/// RTPS message under construction.
 #[derive(Debug)]
 pub(super) struct Message(Vec<u8>);
 
 impl Message {
-    /// The header of a message from the participant of `guid` (8.3.3.1).
-    pub(super) fn from(guid: &Guid) -> Self {
+    /// Creates a message with the header of the participant of `guid` (8.3.3.1).
+    pub(super) fn from_participant(guid: &Guid) -> Self {
         let mut octets = Vec::with_capacity(128);
         octets.extend(b"RTPS");
         octets.extend(PROTOCOL_VERSION);
@@ -112,7 +112,7 @@ impl Message {
         Message(octets)
     }
 
-    /// When the samples that follow were made: INFO_TS (8.3.8.11), in seconds and 2⁻³² s (9.3.2.1).
+    /// Appends INFO_TS: source time of the samples that follow (8.3.8.11), in seconds and 2⁻³² s (9.3.2.1).
     pub(super) fn timestamp(mut self, time: SystemTime) -> Self {
         let since = time.duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO);
         let fraction = (u64::from(since.subsec_nanos()) << 32) / 1_000_000_000;
@@ -122,29 +122,29 @@ impl Message {
         self
     }
 
-    /// The last submessage: there is nothing, or no more, to be had of the samples of `writer` from `from` on up to
-    /// that before `before` (GAP, 8.3.8.4). A reader that has them keeps them.
-    pub(super) fn gap(mut self, writer: EntityId, from: i64, before: i64) -> Vec<u8> {
+    /// Appends a GAP as last submessage and returns the octets: samples `first` to `end` − 1 of `writer` are irrelevant
+    /// (8.3.8.4). Readers that have received them keep them.
+    pub(super) fn gap(mut self, writer: EntityId, first: i64, end: i64) -> Vec<u8> {
         let octets = &mut self.0;
         octets.extend([SUBMESSAGE_GAP, FLAG_LITTLE_ENDIAN, 28, 0]);
         octets.extend(ANY_READER);
         octets.extend(writer);
-        octets.extend(sequence_number(from));
-        // A set that begins behind the gap, of no numbers (9.4.2.6).
-        octets.extend(sequence_number(before));
+        octets.extend(sequence_number(first));
+        // Empty set that begins behind the gap (9.4.2.6).
+        octets.extend(sequence_number(end));
         octets.extend([0; 4]);
         self.0
     }
 
-    /// For which participant that follows: that of `guid`, INFO_DST (8.3.8.7).
+    /// Appends INFO_DST: the submessages that follow are for the participant of `guid` (8.3.8.7).
     pub(super) fn to(mut self, guid: &Guid) -> Self {
         self.0.extend([SUBMESSAGE_INFO_DST, FLAG_LITTLE_ENDIAN, 12, 0]);
         self.0.extend(&guid[..12]);
         self
     }
 
-    /// The last submessage: `reader` lacks the first fragment of that sample of `writer`
-    /// (8.3.8.10); `count` says how many of these it has sent.
+    /// Appends a NACK_FRAG as last submessage and returns the octets: `reader` requests the first fragment of sample
+    /// `sample` of `writer` (8.3.8.10). `count` numbers the NACK_FRAGs of the reader.
     pub(super) fn nack_frag(
         mut self,
         reader: EntityId,
@@ -157,14 +157,16 @@ impl Message {
         octets.extend(reader);
         octets.extend(writer);
         octets.extend(sequence_number(sample));
-        // 9.4.2.8, a set: its base, how many bits, the bits from the highest on.
+        // Fragment number set: base, number of bits, bits from the highest on (9.4.2.8); then the count.
         for word in [1, 1, 1 << 31, count] {
             octets.extend(u32::to_le_bytes(word));
         }
         self.0
     }
 
-    /// The last submessage. Its length is right up to 65 535 octets, more than a datagram holds.
+    /// Appends a DATA as last submessage and returns the octets.
+    ///
+    /// The length field is valid up to 65 535 octets, more than a datagram holds.
     pub(super) fn data(mut self, data: &Data<'_>) -> Vec<u8> {
         let octets = &mut self.0;
         let flags = FLAG_INLINE_QOS | data.payload.map_or(0, |_| FLAG_DATA);
@@ -198,7 +200,7 @@ mod tests {
     const GUID: Guid = [1, 0x12, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0, 0x0f, 0x03];
 
     #[test]
-    fn a_sample_is_written_as_the_specification_draws_it() {
+    fn a_data_submessage_has_the_layout_of_the_specification() {
         let data = Data {
             writer: entity(&GUID),
             sequence_number: (1 << 32) + 7,
@@ -206,7 +208,7 @@ mod tests {
             payload: Some((&CDR_LE, &[1, 2, 3, 4, 5])),
         };
         let time = UNIX_EPOCH + Duration::from_millis(3_500);
-        let message = Message::from(&GUID).timestamp(time).data(&data);
+        let message = Message::from_participant(&GUID).timestamp(time).data(&data);
         let mut expected = b"RTPS\x02\x04\x01\x12".to_vec();
         expected.extend(&GUID[..12]);
         // INFO_TS of 8 octets: 3 s and one half.
@@ -223,9 +225,10 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_fragment_is_written_as_the_specification_draws_it() {
+    fn a_nack_frag_has_the_layout_of_the_specification() {
         let writer = [1, 0x0f, 21, 22, 23, 24, 25, 26, 0, 0, 0, 0, 0, 0, 0x13, 3];
-        let message = Message::from(&GUID).to(&writer).nack_frag([0, 0, 3, 4], entity(&writer), 1, 7);
+        let message =
+            Message::from_participant(&GUID).to(&writer).nack_frag([0, 0, 3, 4], entity(&writer), 1, 7);
         assert_eq!(message[20..24], [0x0e, 1, 12, 0]);
         assert_eq!(message[24..36], writer[..12]);
         assert_eq!(message[36..48], [0x12, 1, 32, 0, 0, 0, 3, 4, 0, 0, 0x13, 3]);
@@ -237,25 +240,25 @@ mod tests {
     #[test]
     fn a_sample_without_payload_has_no_data_flag() {
         let data = Data { writer: [0, 1, 0, 0xc2], sequence_number: 1, inline_qos: &[], payload: None };
-        let message = Message::from(&GUID).data(&data);
+        let message = Message::from_participant(&GUID).data(&data);
         assert_eq!(message[20..24], [0x15, 0x03, 24, 0]);
         // The sequence number, then nothing but the sentinel.
         assert_eq!(message[36..], [0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
     }
 
     #[test]
-    fn a_gap_ends_before_a_sample() {
-        let message = Message::from(&GUID).gap(entity(&GUID), 9, 10);
+    fn a_gap_has_the_layout_of_the_specification() {
+        let message = Message::from_participant(&GUID).gap(entity(&GUID), 9, 10);
         assert_eq!(message[20..32], [0x08, 0x01, 28, 0, 0, 0, 0, 0, 0, 0, 0x0f, 0x03]);
         assert_eq!(message[32..], [0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0, 10, 0, 0, 0, 0, 0, 0, 0]);
     }
 
     #[test]
-    fn the_longest_datagram_has_its_length() {
+    fn the_length_field_is_valid_for_the_longest_datagram() {
         let payload = vec![0; 65_380];
         let data =
             Data { writer: [0; 4], sequence_number: 1, inline_qos: &[], payload: Some((&CDR_LE, &payload)) };
-        let message = Message::from(&GUID).data(&data);
+        let message = Message::from_participant(&GUID).data(&data);
         let length = u16::from_le_bytes([message[22], message[23]]);
         assert_eq!(usize::from(length), message.len() - 24);
     }

@@ -1,12 +1,12 @@
-//! What the environment says about DDS Security, by the rules of rcl: `ROS_SECURITY_ENABLE`,
+//! DDS Security settings from the environment, by the rules of rcl: `ROS_SECURITY_ENABLE`,
 //! `ROS_SECURITY_STRATEGY`, `ROS_SECURITY_KEYSTORE`, `ROS_SECURITY_ENCLAVE_OVERRIDE` and `--enclave`.
 //!
-//! A node that is told to enforce security and cannot have it does not start.
+//! A node does not start if security is to be enforced and is not available.
 
 use std::path::{Path, PathBuf};
 
-/// What an enclave consists of, by the names of SROS2 (rmw_dds_common's `get_security_files`).
-pub const FILES: [&str; 6] = [
+/// Files of an enclave, named as in SROS2 (`get_security_files` of rmw_dds_common).
+pub const ENCLAVE_FILES: [&str; 6] = [
     "identity_ca.cert.pem",
     "cert.pem",
     "key.pem",
@@ -15,57 +15,57 @@ pub const FILES: [&str; 6] = [
     "permissions.p7s",
 ];
 
-/// Whether this build can do it.
+/// True if this build has DDS Security.
 pub const AVAILABLE: bool = cfg!(feature = "security");
 
-/// Why a node that is to be secured cannot be.
+/// Reason why DDS Security is not available.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SecurityError {
-    /// The node is built without it.
+    /// The program is built without DDS Security.
     #[error(
-        "ROS_SECURITY_ENABLE is true, and this program is built without DDS Security; build it with \
+        "ROS_SECURITY_ENABLE is true, but this program is built without DDS Security; build it with \
          `--features security`, or set ROS_SECURITY_ENABLE to false"
     )]
     NotBuilt,
-    /// Nobody says where the enclaves are.
+    /// `ROS_SECURITY_KEYSTORE` is not set.
     #[error(
-        "ROS_SECURITY_ENABLE is true, and ROS_SECURITY_KEYSTORE is not set; it must be the keystore's folder"
+        "ROS_SECURITY_ENABLE is true, but ROS_SECURITY_KEYSTORE is not set; set it to the folder of the keystore"
     )]
     NoKeystore,
-    /// A name that is none.
-    #[error("the enclave '{found}' is not a name of one: {reason}")]
+    /// The name of the enclave is invalid.
+    #[error("'{found}' is not a valid enclave name: {reason}")]
     Name {
-        /// The name.
+        /// Given name.
         found: String,
-        /// What is wrong with it.
+        /// Reason.
         reason: String,
     },
-    /// The enclave is not there, or not all of it.
-    #[error("the enclave {enclave} cannot be used: {path} is not there; an enclave has {files}", files = FILES.join(", "))]
+    /// A file of the enclave is missing.
+    #[error("enclave {enclave}: file {path} not found; an enclave consists of {files}", files = ENCLAVE_FILES.join(", "))]
     Missing {
-        /// Its name.
+        /// Name of the enclave.
         enclave: String,
-        /// The file that is not there.
+        /// Path of the missing file.
         path: String,
     },
 }
 
-/// What is to be done.
+/// Security mode of the participant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Security {
-    /// Nothing is protected, and nobody asked for it.
+    /// Security is not enabled.
     Off,
-    /// It is wanted and cannot be had, but need not be enforced: nothing is protected.
-    Open(SecurityError),
-    /// The folder of the enclave, with all of its files.
+    /// Security is enabled but not available, and need not be enforced: communication is not protected.
+    Unprotected(SecurityError),
+    /// Security is enabled, with the folder of the enclave.
     Enclave(PathBuf),
 }
 
 impl Security {
-    /// What the variables ask for, read through `lookup`; `argument` is that of `--enclave`.
+    /// Determines the mode from the variables, read through `lookup`; `argument` is the value of `--enclave`.
     ///
     /// # Errors
-    /// [`SecurityError`] if `ROS_SECURITY_STRATEGY` is `Enforce` and it cannot be had.
+    /// [`SecurityError`] if `ROS_SECURITY_STRATEGY` is `Enforce` and security is not available.
     pub fn from_lookup(
         lookup: impl Fn(&str) -> Option<String>,
         argument: Option<&str>,
@@ -79,12 +79,12 @@ impl Security {
         match enclave(get("ROS_SECURITY_KEYSTORE"), name) {
             Ok(folder) => Ok(Security::Enclave(folder)),
             Err(error) if get("ROS_SECURITY_STRATEGY").as_deref() == Some("Enforce") => Err(error),
-            Err(error) => Ok(Security::Open(error)),
+            Err(error) => Ok(Security::Unprotected(error)),
         }
     }
 }
 
-/// The folder of an enclave.
+/// Returns the folder of an enclave after a check of its files.
 fn enclave(keystore: Option<String>, name: &str) -> Result<PathBuf, SecurityError> {
     if !AVAILABLE {
         return Err(SecurityError::NotBuilt);
@@ -93,7 +93,7 @@ fn enclave(keystore: Option<String>, name: &str) -> Result<PathBuf, SecurityErro
     super::names::check_namespace(name)
         .map_err(|error| SecurityError::Name { found: name.to_owned(), reason: error.to_string() })?;
     let folder = Path::new(&keystore).join("enclaves").join(name.trim_start_matches('/'));
-    match FILES.map(|file| folder.join(file)).into_iter().find(|path| !path.is_file()) {
+    match ENCLAVE_FILES.map(|file| folder.join(file)).into_iter().find(|path| !path.is_file()) {
         None => Ok(folder),
         Some(path) => {
             Err(SecurityError::Missing { enclave: name.to_owned(), path: path.display().to_string() })
@@ -115,7 +115,7 @@ mod tests {
     const ENFORCE: (&str, &str) = ("ROS_SECURITY_STRATEGY", "Enforce");
 
     #[test]
-    fn only_the_word_true_asks_for_it() {
+    fn only_the_value_true_enables_security() {
         for value in ["false", "True", "1", "on", ""] {
             let variables = [("ROS_SECURITY_ENABLE", value), ENFORCE];
             assert_eq!(read(&variables, None), Ok(Security::Off), "{value}");
@@ -124,30 +124,30 @@ mod tests {
     }
 
     #[test]
-    fn what_is_to_be_enforced_and_cannot_be_had_is_refused() {
+    fn enforced_security_that_is_not_available_is_an_error() {
         let nowhere = ("ROS_SECURITY_KEYSTORE", "/nowhere");
-        let refused = read(&[ON, ENFORCE, nowhere], Some("/mill")).expect_err("must be refused");
+        let error = read(&[ON, ENFORCE, nowhere], Some("/mill")).expect_err("must fail");
         let open = read(&[ON, ("ROS_SECURITY_STRATEGY", "enforce"), nowhere], Some("/mill"));
-        assert_eq!(open, Ok(Security::Open(refused.clone())));
+        assert_eq!(open, Ok(Security::Unprotected(error.clone())));
         if AVAILABLE {
-            let text = refused.to_string();
+            let text = error.to_string();
             assert!(text.contains("/nowhere/enclaves/mill/identity_ca.cert.pem"), "{text}");
             assert_eq!(read(&[ON, ENFORCE], None), Err(SecurityError::NoKeystore));
             let named = read(&[ON, ENFORCE, nowhere], Some("/../mill"));
             assert!(matches!(named, Err(SecurityError::Name { .. })), "{named:?}");
         } else {
-            assert_eq!(refused, SecurityError::NotBuilt);
+            assert_eq!(error, SecurityError::NotBuilt);
         }
     }
 
     #[cfg(feature = "security")]
     #[test]
-    fn an_enclave_is_the_folder_of_its_name_unless_the_environment_has_another() {
+    fn the_environment_overrides_the_enclave_of_the_arguments() {
         let keystore = std::env::temp_dir().join(format!("virtual_axes_keystore_{}", std::process::id()));
         let folders = ["cell/mill", "other", ""].map(|name| keystore.join("enclaves").join(name));
         for folder in &folders {
             std::fs::create_dir_all(folder).expect("a folder");
-            FILES.iter().for_each(|file| std::fs::write(folder.join(file), "").expect("a file"));
+            ENCLAVE_FILES.iter().for_each(|file| std::fs::write(folder.join(file), "").expect("a file"));
         }
         let path = keystore.display().to_string();
         let store = ("ROS_SECURITY_KEYSTORE", path.as_str());
@@ -162,6 +162,6 @@ mod tests {
         std::fs::remove_file(folders[0].join("key.pem")).expect("it was there");
         let missing = found(&[ON, ENFORCE, store], Some("/cell/mill"));
         std::fs::remove_dir_all(&keystore).expect("its own folder");
-        assert!(missing.is_err_and(|error| error.to_string().contains("mill/key.pem is not there")));
+        assert!(missing.is_err_and(|error| error.to_string().contains("mill/key.pem not found")));
     }
 }

@@ -1,5 +1,7 @@
-//! Services under their resolved names, whose responses wait for the client to be known and reach it
-//! at (almost) any length.
+//! Services under their resolved names.
+//!
+//! A response is sent when the response reader of its client has been discovered, and is delivered at any length up to
+//! some 65 kB (see [`super::large_response`]).
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -20,107 +22,112 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use tokio::sync::Mutex;
 
+use super::announced_writers::announced_writers;
 use super::args::RosArgs;
-use super::large_response::{self, LargeResponses};
+use super::large_response::LargeResponses;
 use super::readers::Readers;
+use super::response_limiter::ResponsePermit;
 use super::rtps::Guid;
-use super::unsent::Place;
 
-/// How long a write may wait for a slow reader.
+/// Longest time for which a write waits for a slow reader.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
-/// A client's request can arrive before its response reader is known here, and a response that is
-/// written then reaches nobody. So long a response is held back,
+/// Longest time for which a response waits for the discovery of its client. A request can arrive before the client's
+/// response reader is discovered, and a response written then would be lost.
 const CLIENT_TIMEOUT: Duration = Duration::from_secs(1);
-/// and so often it is looked whether the reader has come.
+/// Period at which the discovery of the client is checked.
 const CLIENT_POLL: Duration = Duration::from_millis(5);
-/// From a reader's discovery until the writer serves it.
+/// Time from the discovery of a reader until the writer serves it.
 const CLIENT_SETTLE: Duration = Duration::from_millis(10);
 
-/// A service, or a topic that goes with one, could not be created.
+/// Failure to create a service or one of its topics.
 #[derive(Debug, thiserror::Error)]
 #[error("service {name} cannot be created: {reason}")]
 pub struct ServiceError {
-    /// Its name.
+    /// Name of the service.
     pub name: String,
-    /// Why not.
+    /// Reason.
     pub reason: String,
 }
 
-/// Two services that are remapped to one name: a request would reach both.
+/// Conflict of two services that are remapped to one name; a request would reach both.
 #[derive(Debug, thiserror::Error)]
-#[error("-r: services ~/{first} and ~/{second} would both be {resolved}")]
-pub struct TwoServices {
-    /// One of them.
+#[error("-r: services ~/{first} and ~/{second} would both be named {resolved}; remap one of them")]
+pub struct ServiceNameConflict {
+    /// Label of the first service.
     pub first: &'static str,
-    /// The other.
+    /// Label of the second service.
     pub second: &'static str,
-    /// The name in the graph.
+    /// Resolved name.
     pub resolved: String,
 }
 
-/// Refuses two of the services `~/label` under one name.
+/// Checks that no two services `~/label` have the same resolved name.
 ///
 /// # Errors
-/// [`TwoServices`]. A name that cannot be resolved is refused when its service is made.
+/// [`ServiceNameConflict`] for the first conflict. A name that cannot be resolved fails when its service is created.
 pub fn check_names(
     args: &RosArgs,
     labels: impl IntoIterator<Item = &'static str>,
-) -> Result<(), TwoServices> {
+) -> Result<(), ServiceNameConflict> {
     let mut known: HashMap<String, &'static str> = HashMap::new();
     for second in labels {
         let Ok(resolved) = args.resolve_service(&format!("~/{second}")) else { continue };
         match known.entry(resolved) {
             Entry::Vacant(free) => _ = free.insert(second),
             Entry::Occupied(taken) => {
-                return Err(TwoServices { first: taken.get(), second, resolved: taken.key().clone() });
+                return Err(ServiceNameConflict {
+                    first: taken.get(),
+                    second,
+                    resolved: taken.key().clone(),
+                });
             }
         }
     }
     Ok(())
 }
 
-/// How much the middleware keeps of what every reader has acknowledged and nobody asks for again; what a reader has
-/// not acknowledged it keeps whatever is said here. A list of all parameters has 20 kB.
-pub const ACKNOWLEDGED: usize = 1;
+/// Depth of response writers, which limits acknowledged samples only: the middleware keeps unacknowledged samples at
+/// any depth. A list of all parameters has 20 kB.
+pub const RESPONSE_DEPTH: usize = 1;
 
-/// Reliable, volatile, keep last `depth`.
+/// Returns the QoS profile of a service: reliable, volatile, keep last `depth`.
 pub fn profile(depth: usize) -> QosProfile {
     QosProfile::publisher_default()
         .reliability_reliable(WhenFull::Wait(WRITE_TIMEOUT))
         .history(History::KeepLast { depth })
 }
 
-/// Message of a service, for which ros2-client requires a trait of its own that other crates' types do not have.
+/// Wrapper that implements the message trait of ros2-client for a type of another crate.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(transparent)]
 struct Wire<M>(M);
 
 impl<M: Serialize + DeserializeOwned> Message for Wire<M> {}
 
-/// The two ends of a service.
-enum Ends<Q: Serialize + DeserializeOwned, A: Serialize + DeserializeOwned> {
-    /// The crate's.
+/// Request reader and response writer of a service.
+enum ServiceEndpoints<Q: Serialize + DeserializeOwned, A: Serialize + DeserializeOwned> {
+    /// Server of ros2-client.
     Server(Server<Wire<Q>, Wire<A>>),
-    /// Of a type that the crate cannot name: a subscription and a writer.
+    /// Subscription and writer, for types that ros2-client cannot name.
     Topics { requests: Subscription<Q>, responses: DataWriterCdr<A> },
 }
 
-/// One service: its server, and the DDS topic on which its responses go out.
+/// Service with its response writer.
 pub struct Service<Q: Serialize + DeserializeOwned, A: Serialize + DeserializeOwned> {
     label: &'static str,
-    ends: Ends<Q, A>,
+    endpoints: ServiceEndpoints<Q, A>,
     response_topic: String,
     participant: DomainParticipant,
-    large: LargeResponses,
-    /// How many responses the server has written: the sequence number of the last one.
+    large_responses: LargeResponses,
+    /// Sequence number of the last response, 0 before the first.
     written: Mutex<i64>,
 }
 
 impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned + 'static> Service<Q, A> {
-    /// The service `~/label`; `context` is the one that `node` lives in.
+    /// Creates the service `~/label` of `node`, which belongs to `context`.
     ///
     /// # Errors
-    /// [`ServiceError`] when the middleware refuses it.
+    /// [`ServiceError`] if the name cannot be resolved or the middleware cannot create the service.
     pub fn new(
         node: &mut Node,
         context: &Context,
@@ -134,14 +141,14 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
     {
         let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
         let resolved = args.resolve_service(&format!("~/{label}")).map_err(|e| failed(e.to_string()))?;
-        Self::named(node, context, &resolved, label, type_name, depth)
+        Self::with_name(node, context, &resolved, label, type_name, depth)
     }
 
-    /// The service of this name in the graph, called `label` in the log.
+    /// Creates a service with a resolved name; `label` is its name in log messages.
     ///
     /// # Errors
-    /// [`ServiceError`] when the middleware refuses it.
-    pub fn named(
+    /// [`ServiceError`] if the name cannot be resolved or the middleware cannot create the service.
+    pub fn with_name(
         node: &mut Node,
         context: &Context,
         resolved: &str,
@@ -154,24 +161,33 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
     {
         let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
         let name = Name::parse(resolved).map_err(|e| failed(e.to_string()))?;
-        let before = large_response::writers(context);
+        let before = announced_writers(context);
         let server = node
-            .create_server(ServiceMapping::Enhanced, &name, type_name, profile(depth), profile(ACKNOWLEDGED))
+            .create_server(
+                ServiceMapping::Enhanced,
+                &name,
+                type_name,
+                profile(depth),
+                profile(RESPONSE_DEPTH),
+            )
             .map_err(|e| failed(e.to_string()))?;
         let response_topic = format!("rr{resolved}Reply");
         let participant = context.domain_participant();
-        // A server has one writer, and keeps its GUID to itself.
-        let writer = large_response::writers(context).difference(&before).next().copied();
-        let writer = writer.ok_or_else(|| failed("its response writer is not announced".to_owned()))?;
-        Self::of_ends(Ends::Server(server), writer, label, response_topic, participant)
+        // A server has one writer and does not return its GUID.
+        let writer = announced_writers(context).difference(&before).next().copied();
+        let writer =
+            writer.ok_or_else(|| failed("ros2-client does not list its response writer".to_owned()))?;
+        Self::with_endpoints(ServiceEndpoints::Server(server), writer, label, response_topic, participant)
     }
 
-    /// Likewise, of a type that an action brings with it, whose name in DDS `type_name` begins:
-    /// `package::action::dds_::Action_SendGoal`. The crate has names for types of `srv` only.
+    /// Creates a service of an action with a resolved name; `label` is its name in log messages.
+    ///
+    /// `type_name` is the beginning of the DDS type name, `package::action::dds_::Action_SendGoal`. ros2-client
+    /// supports types of `srv` only.
     ///
     /// # Errors
-    /// [`ServiceError`] when the middleware refuses it.
-    pub fn of_action(
+    /// [`ServiceError`] if the name cannot be resolved or the middleware cannot create the service.
+    pub fn for_action(
         node: &mut Node,
         context: &Context,
         resolved: &str,
@@ -181,7 +197,7 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
     ) -> Result<Self, ServiceError> {
         let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
         let participant = context.domain_participant();
-        let qos = QosPolicies::from(&profile(ACKNOWLEDGED));
+        let qos = QosPolicies::from(&profile(RESPONSE_DEPTH));
         let topic = |name: &str, kind: &str| {
             participant
                 .create_topic(name.to_owned(), format!("{type_name}_{kind}_"), &qos, TopicKind::NoKey)
@@ -197,40 +213,46 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
             .and_then(|publisher| publisher.create_datawriter_no_key_cdr(&responses, Some(qos.clone())))
             .map_err(|e| failed(e.to_string()))?;
         let writer = responses.guid().to_bytes();
-        Self::of_ends(Ends::Topics { requests, responses }, writer, label, response_topic, participant)
+        Self::with_endpoints(
+            ServiceEndpoints::Topics { requests, responses },
+            writer,
+            label,
+            response_topic,
+            participant,
+        )
     }
 
-    fn of_ends(
-        ends: Ends<Q, A>,
+    fn with_endpoints(
+        endpoints: ServiceEndpoints<Q, A>,
         writer: Guid,
         label: &'static str,
         response_topic: String,
         participant: DomainParticipant,
     ) -> Result<Self, ServiceError> {
         let clients = Readers::new(writer, response_topic.clone(), participant.clone());
-        let large = clients.map(LargeResponses::new).map_err(|error| ServiceError {
+        let large_responses = clients.map(LargeResponses::new).map_err(|error| ServiceError {
             name: label.to_owned(),
             reason: format!("no socket: {error}"),
         })?;
-        Ok(Service { label, ends, response_topic, participant, large, written: Mutex::new(0) })
+        Ok(Service { label, endpoints, response_topic, participant, large_responses, written: Mutex::new(0) })
     }
 
-    /// Requests as they come, or why one could not be read.
+    /// Returns the requests in order of reception. An item is an error if a request could not be decoded.
     pub fn requests(&self) -> BoxStream<'_, Result<(RmwRequestId, Q), String>>
     where
         Q: Send + Sync,
         A: Send + Sync,
     {
         let label = self.label;
-        let unreadable = move |error| format!("a request to {label} could not be read: {error:?}");
-        match &self.ends {
-            Ends::Server(server) => {
+        let unreadable = move |error| format!("cannot decode a request to {label}: {error:?}");
+        match &self.endpoints {
+            ServiceEndpoints::Server(server) => {
                 let requests = server.receive_request_stream();
                 requests
                     .map(move |received| received.map(|(id, Wire(q))| (id, q)).map_err(unreadable))
                     .boxed()
             }
-            Ends::Topics { requests, .. } => requests
+            ServiceEndpoints::Topics { requests, .. } => requests
                 .async_stream()
                 .map(move |received| match received {
                     Ok((request, info)) => Ok((request_id(&info), request)),
@@ -240,7 +262,7 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
         }
     }
 
-    /// Likewise, each made one of the requests that several services share.
+    /// Returns the requests, each converted by `wrap` to a type that several services share.
     pub fn requests_as<'a, R: 'a>(
         &'a self,
         wrap: impl Fn(RmwRequestId, Q) -> R + Send + 'a,
@@ -252,8 +274,8 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
         self.requests().map(move |received| received.map(|(id, request)| wrap(id, request))).boxed()
     }
 
-    /// Sends the response to a request, once its client is known; its place is free again then.
-    pub fn respond<'a>(&'a self, id: RmwRequestId, response: A, place: Place) -> BoxFuture<'a, ()>
+    /// Sends the response to a request as soon as its client is discovered, then releases `permit`.
+    pub fn respond<'a>(&'a self, id: RmwRequestId, response: A, permit: ResponsePermit) -> BoxFuture<'a, ()>
     where
         Q: Send + Sync,
         A: Send + Sync,
@@ -262,40 +284,39 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
             let large = match LargeResponses::encode(&response) {
                 Ok(large) => large,
                 Err(error) => {
-                    tracing::error!("the response of {} is not sent: {error}", self.label);
+                    tracing::error!("no response of {} is sent: {error}", self.label);
                     return;
                 }
             };
             self.wait_for_client(&id).await;
             match self.write(id, response, large).await {
                 Ok(None) => {}
-                // Kept until it need not be said again.
-                Ok(Some((datagram, number))) => self.large.repeat(datagram, number).await,
+                // The permit is held during the repetitions.
+                Ok(Some((datagram, number))) => self.large_responses.repeat(datagram, number).await,
                 Err(reason) => {
                     tracing::warn!("the response of {} could not be sent: {reason}", self.label);
                 }
             }
-            drop(place);
+            drop(permit);
         }
         .boxed()
     }
 
-    /// Hands a response to RustDDS, and sends it ourselves when it is `large`; comes back with the
-    /// datagram of that and its sequence number.
+    /// Writes a response by RustDDS and, if it is `large`, as a datagram of this node. Returns that datagram and its
+    /// sequence number.
     async fn write(
         &self,
         id: RmwRequestId,
         response: A,
         large: Option<Vec<u8>>,
     ) -> Result<Option<(Vec<u8>, i64)>, String> {
-        // Held while writing, so that the count keeps the order of the writer, and while a large one
-        // is sent, so that many of them do not come at once.
+        // The lock keeps the count in the order of the writer and spaces large datagrams.
         let mut written = self.written.lock().await;
-        match &self.ends {
-            Ends::Server(server) => {
+        match &self.endpoints {
+            ServiceEndpoints::Server(server) => {
                 server.async_send_response(id, Wire(response)).await.map_err(|error| format!("{error:?}"))?;
             }
-            Ends::Topics { responses, .. } => {
+            ServiceEndpoints::Topics { responses, .. } => {
                 let options = WriteOptionsBuilder::new()
                     .source_timestamp(Timestamp::now())
                     .related_sample_identity(SampleIdentity::from(id));
@@ -305,20 +326,20 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
         }
         *written += 1;
         let Some(payload) = large else { return Ok(None) };
-        let datagram = self.large.datagram(&id, *written, &payload);
-        self.large.send(&datagram).await;
+        let datagram = self.large_responses.datagram(&id, *written, &payload);
+        self.large_responses.send(&datagram).await;
         Ok(Some((datagram, *written)))
     }
 
-    /// Waits until the response reader of the client behind `id` is known.
+    /// Waits until the response reader of the client of request `id` is discovered.
     async fn wait_for_client(&self, id: &RmwRequestId) {
-        if self.knows_client(id) {
+        if self.is_client_discovered(id) {
             return;
         }
         let deadline = tokio::time::Instant::now() + CLIENT_TIMEOUT;
-        while !self.knows_client(id) {
+        while !self.is_client_discovered(id) {
             if tokio::time::Instant::now() >= deadline {
-                tracing::debug!("the client of {} is gone, or never was discovered", self.label);
+                tracing::debug!("the client of {} has left or was not discovered", self.label);
                 return;
             }
             tokio::time::sleep(CLIENT_POLL).await;
@@ -326,9 +347,9 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
         tokio::time::sleep(CLIENT_SETTLE).await;
     }
 
-    fn knows_client(&self, id: &RmwRequestId) -> bool {
-        // Requests carry an endpoint of the client: its writer, or with Fast DDS its response reader.
-        // What they have in common is the participant.
+    fn is_client_discovered(&self, id: &RmwRequestId) -> bool {
+        // A request contains an endpoint of the client: its writer, or with Fast DDS its response reader. Both have the
+        // GUID prefix of the participant.
         let client = id.writer_gid.to_bytes16();
         self.participant.discovered_readers().iter().any(|reader| {
             reader.subscription_topic_data.topic_name() == &self.response_topic
@@ -337,11 +358,11 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
     }
 }
 
-/// The identity of a request, which its response repeats.
+/// Returns the identity of a request, which its response repeats.
 fn request_id(info: &MessageInfo) -> RmwRequestId {
     let own = RmwRequestId { writer_gid: info.publisher_gid(), sequence_number: info.sequence_number() };
     match info.related_request_id() {
-        // Fast DDS names its response reader there, and leaves the number to the sample.
+        // Fast DDS puts its response reader there, and the number only into the sample.
         Some(id) if id.sequence_number == i64::from(SequenceNumber::UNKNOWN) => {
             RmwRequestId { sequence_number: own.sequence_number, ..id }
         }

@@ -1,38 +1,40 @@
-//! A log that is not flooded.
+//! Rate limit of log messages: one per second for each subject.
 
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
-/// How often the log tells of the same thing at most.
+/// Shortest time between two log messages about the same subject, ns.
 const LOG_PERIOD: Nanoseconds = SECOND_NS;
-/// Things that are remembered; of more, the oldest is told again.
-const MOST_THINGS: usize = 64;
+/// Largest number of remembered subjects; the oldest is forgotten for a new one.
+const MAX_SUBJECTS: usize = 64;
 
-/// What was told when; `T` says what it is about.
+/// Times of the last log messages by subject `T`.
 #[derive(Debug)]
 pub struct Throttle<T> {
-    told: Vec<(T, Nanoseconds)>,
+    logged: Vec<(T, Nanoseconds)>,
 }
 
 impl<T> Default for Throttle<T> {
     fn default() -> Self {
-        Throttle { told: Vec::new() }
+        Throttle { logged: Vec::new() }
     }
 }
 
 impl<T: PartialEq> Throttle<T> {
-    /// Whether `thing` has not been told for a second at `now` (ns); it counts as told then. A clock
-    /// that was set back tells anew.
-    pub fn is_due(&mut self, thing: T, now: Nanoseconds) -> bool {
-        let Some((_, told)) = self.told.iter_mut().find(|(known, _)| *known == thing) else {
-            if self.told.len() == MOST_THINGS {
-                self.told.remove(0);
+    /// Returns true if no message about `subject` was logged in the second before `now` (ns), and records it as
+    /// logged then.
+    ///
+    /// Also returns true if the clock was set back.
+    pub fn is_due(&mut self, subject: T, now: Nanoseconds) -> bool {
+        let Some((_, logged)) = self.logged.iter_mut().find(|(known, _)| *known == subject) else {
+            if self.logged.len() == MAX_SUBJECTS {
+                self.logged.remove(0);
             }
-            self.told.push((thing, now));
+            self.logged.push((subject, now));
             return true;
         };
-        let is_due = now - *told >= LOG_PERIOD || now < *told;
+        let is_due = now - *logged >= LOG_PERIOD || now < *logged;
         if is_due {
-            *told = now;
+            *logged = now;
         }
         is_due
     }
@@ -43,22 +45,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_thing_is_told_once_a_second() {
+    fn each_subject_is_logged_once_per_second() {
         let mut log = Throttle::default();
         assert!(log.is_due("jump", 0));
         assert!(!log.is_due("jump", SECOND_NS - 1));
-        assert!(log.is_due("stroke", SECOND_NS - 1));
+        assert!(log.is_due("limit", SECOND_NS - 1));
         assert!(log.is_due("jump", SECOND_NS));
         assert!(!log.is_due("jump", 2 * SECOND_NS - 1));
         assert!(log.is_due("jump", 0), "the clock was set back");
     }
 
     #[test]
-    fn things_without_end_do_not_fill_the_memory() {
+    fn the_number_of_remembered_subjects_is_bounded() {
         let mut log = Throttle::default();
-        for thing in 0..10 * MOST_THINGS {
-            assert!(log.is_due(thing, 0));
+        for subject in 0..10 * MAX_SUBJECTS {
+            assert!(log.is_due(subject, 0));
         }
-        assert_eq!(log.told.len(), MOST_THINGS);
+        assert_eq!(log.logged.len(), MAX_SUBJECTS);
     }
 }

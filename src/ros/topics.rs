@@ -1,4 +1,4 @@
-//! The node's topics, all of them, and what it says about itself when it starts.
+//! Topics of the node, and the summary that it prints at start.
 
 use std::io::Write;
 
@@ -15,52 +15,52 @@ use virtual_axes_io::messages::{
     CONTROL_PACKAGE, DriveStates, JointTrajectoryControllerState, MotorCurrents, PACKAGE, TrajectoryResult,
 };
 
-/// Publishers of `/clock` may be reliable or not, and of what they say only the newest counts; the
-/// depth is for several of them.
-const CLOCK_QOS: QosConfig = QosConfig { reliable: false, transient_local: false, depth: 10 };
+/// QoS of the `/clock` subscription. Best effort matches reliable and best-effort publishers; the depth allows for
+/// several publishers.
+const CLOCK_QOS: QosConfig = QosConfig { is_reliable: false, is_transient_local: false, depth: 10 };
 
-/// Every topic of the node.
+/// Publishers and subscriptions of the node.
 pub struct Topics {
-    /// `psec`.
+    /// Subscription `psec`.
     pub psec: Subscription<JointTrajectory>,
-    /// `psec_stream`.
+    /// Subscription `psec_stream`.
     pub psec_stream: Subscription<JointState>,
-    /// `load`.
+    /// Subscription `load`.
     pub load: Subscription<JointState>,
-    /// `joint_states`.
+    /// Publisher `joint_states`.
     pub joint_states: Publisher<JointState>,
-    /// `~/motor_currents`.
+    /// Publisher `~/motor_currents`.
     pub motor_currents: Publisher<MotorCurrents>,
-    /// `~/drive_states`.
+    /// Publisher `~/drive_states`.
     pub drive_states: Publisher<DriveStates>,
-    /// `~/controller_state`.
+    /// Publisher `~/controller_state`.
     pub controller_state: Publisher<JointTrajectoryControllerState>,
-    /// `~/trajectory_result`.
+    /// Publisher `~/trajectory_result`.
     pub results: Publisher<TrajectoryResult>,
-    /// `/diagnostics`.
+    /// Publisher `/diagnostics`.
     pub diagnostics: Publisher<DiagnosticArray>,
-    /// `/clock`, in `fast`.
+    /// Publisher `/clock`, in `fast` only.
     pub clock: Option<Publisher<Clock>>,
-    /// `/clock` of others and its resolved name, in `fast` and with `use_sim_time`.
+    /// Subscription `/clock` and its resolved name, in `fast` and with `use_sim_time`.
     pub clock_input: Option<(Subscription<Clock>, String)>,
     /// Resolved names.
-    pub names: Names,
+    pub names: GraphNames,
 }
 
-/// Names in the graph.
-pub struct Names {
+/// Resolved names for the summary at start.
+pub struct GraphNames {
     subscribed: Vec<String>,
     published: Vec<String>,
     served: Vec<String>,
-    /// Actions.
-    pub goals_on: Vec<String>,
+    /// Names of the actions.
+    pub actions: Vec<String>,
 }
 
 impl Topics {
-    /// Creates them; `/clock` not in real time, and its publisher only in `fast`.
+    /// Creates all topics. In real time there is no `/clock`; its publisher exists in `fast` only.
     ///
     /// # Errors
-    /// [`EndpointError`] naming the topic that the middleware refuses.
+    /// [`EndpointError`] naming the topic that cannot be created.
     pub fn create(
         endpoints: &mut Endpoints<'_>,
         args: &RosArgs,
@@ -90,11 +90,11 @@ impl Topics {
         };
         let clock_input = match time {
             TimeMode::Fast | TimeMode::SimTime => {
-                Some(endpoints.subscription_of("/clock", clock_type(), CLOCK_QOS)?)
+                Some(endpoints.subscription_with_qos("/clock", clock_type(), CLOCK_QOS)?)
             }
             TimeMode::Real => None,
         };
-        let names = Names {
+        let names = GraphNames {
             subscribed: [psec_name, stream_name, load_name]
                 .into_iter()
                 .chain(clock_input.iter().map(|(_, name)| name.clone()))
@@ -111,7 +111,7 @@ impl Topics {
             .chain(clock.iter().map(|(_, name)| name.clone()))
             .collect(),
             served: ["~/reset", "~/stop"].iter().filter_map(|s| args.resolve_service(s).ok()).collect(),
-            goals_on: Vec::new(),
+            actions: Vec::new(),
         };
         Ok(Topics {
             psec,
@@ -130,32 +130,32 @@ impl Topics {
     }
 }
 
-impl Names {
-    /// Names that are published beside those of [`Topics`].
-    pub fn also_publishes(&mut self, names: &[String]) {
+impl GraphNames {
+    /// Adds names of publishers that are not in [`Topics`].
+    pub fn add_published(&mut self, names: &[String]) {
         self.published.extend_from_slice(names);
     }
 
-    /// One screen for whoever started the node.
+    /// Prints the summary to stdout.
     pub fn print(&self, args: &RosArgs, machine: &str, time: TimeMode) {
         let time = match time {
-            TimeMode::Fast => "as fast as subscribers take it",
-            TimeMode::SimTime => "of /clock",
+            TimeMode::Fast => "fast (limited by subscribers)",
+            TimeMode::SimTime => "/clock",
             TimeMode::Real => "real",
         };
         let mut screen = format!("{}: {machine}, time: {time}\n", args.node());
-        for (what, names) in [
-            ("listens to", &self.subscribed),
+        for (label, names) in [
+            ("subscribes", &self.subscribed),
             ("publishes", &self.published),
-            ("serves", &self.served),
-            ("goals on", &self.goals_on),
+            ("services", &self.served),
+            ("actions", &self.actions),
         ] {
-            for (place, name) in names.iter().enumerate() {
-                screen += &format!("  {:<11}{name}\n", if place == 0 { what } else { "" });
+            for (index, name) in names.iter().enumerate() {
+                screen += &format!("  {:<11}{name}\n", if index == 0 { label } else { "" });
             }
         }
-        screen += "  and the parameter services; stop it with Ctrl-C\n";
-        // The node runs as well without anybody who reads it.
+        screen += "  and the parameter services; stop with Ctrl-C\n";
+        // A closed stdout does not stop the node.
         let _ = std::io::stdout().write_all(screen.as_bytes());
     }
 }

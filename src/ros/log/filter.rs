@@ -1,33 +1,33 @@
-//! Which messages are shown.
+//! Filter of log messages by target and level.
 
 use tracing::{Event, Metadata, Subscriber, level_filters::LevelFilter, subscriber::Interest};
 use tracing_subscriber::layer::{Context, Filter};
 
 use super::{super::args::LogLevel, EventText};
 
-/// The crates of which this program consists: the library and the node.
+/// Crates of this program: library and node.
 const OWN: [&str; 2] = ["virtual_axes", "virtual_axes_node"];
 
-/// What is shown of others unless the arguments say otherwise.
+/// Default levels of other crates.
 const DEFAULTS: [(&str, LevelFilter); 3] = [
     ("", LevelFilter::WARN),
-    // The middleware warns about readers without locators and the like, all through discovery.
+    // The middleware logs warnings during normal discovery, such as readers without locators.
     ("rustdds", LevelFilter::ERROR),
     ("ros2_client", LevelFilter::ERROR),
 ];
 
-/// Errors that are none: target, and how the message begins.
+/// Error messages about normal events: target, and beginning of the message.
 const NOISE: [(&str, &str); 4] = [
-    // Gaps of more than 256 samples are cut to what fits into one message, and asked for again.
+    // A gap of more than 256 samples is truncated to one message and requested again.
     ("rustdds::structure::sequence_number", ""),
-    // At shutdown, endpoints find the participant's threads gone already.
+    // At shutdown the threads of the participant end before its endpoints.
     ("rustdds::dds::pubsub", "Cannot remove Reader"),
     ("rustdds::dds::pubsub", "Cannot remove Writer"),
-    // It leaves by the default interface the group that it joined on another.
+    // RustDDS leaves the multicast group by the default interface, not by the one it joined on.
     ("rustdds::network::udp_listener", "leave_multicast_group"),
 ];
 
-/// Whether `target` is a part of this program.
+/// Returns true if `target` is a module of this program.
 pub(super) fn is_own(target: &str) -> bool {
     OWN.iter().any(|own| is_under(target, own))
 }
@@ -37,16 +37,18 @@ fn is_under(target: &str, prefix: &str) -> bool {
         || target.strip_prefix(prefix).is_some_and(|rest| rest.is_empty() || rest.starts_with("::"))
 }
 
-/// Levels by the beginning of the target, longest first.
+/// Levels by target prefix, longest first.
 pub(super) struct LoggerLevels {
     levels: Vec<(String, LevelFilter)>,
-    /// Targets for which the arguments ask, noise included.
-    asked_for: Vec<String>,
+    /// Targets named in the arguments, for which noise is shown.
+    requested: Vec<String>,
 }
 
 impl LoggerLevels {
-    /// `level` is for this program, `loggers` for the loggers that they name: `own_logger` is this
-    /// program too, anything else is a crate or module, parted by dots or double colons.
+    /// Creates the levels from the arguments.
+    ///
+    /// `level` applies to this program, `loggers` to the loggers that they name: `own_logger` is this program,
+    /// anything else a crate or module, separated by dots or double colons.
     pub(super) fn new(own_logger: &str, level: Option<LogLevel>, loggers: &[(String, LogLevel)]) -> Self {
         let general = filter_of(level.unwrap_or(LogLevel::Unset));
         let mut levels: Vec<(String, LevelFilter)> = DEFAULTS
@@ -54,7 +56,7 @@ impl LoggerLevels {
             .chain(OWN.map(|own| (own, general)))
             .map(|(target, filter)| (target.to_owned(), filter))
             .collect();
-        let mut asked_for = Vec::new();
+        let mut requested = Vec::new();
         for (logger, level) in loggers {
             let targets = if logger == own_logger {
                 OWN.map(str::to_owned).to_vec()
@@ -64,11 +66,11 @@ impl LoggerLevels {
             for target in targets {
                 levels.retain(|(known, _)| *known != target);
                 levels.push((target.clone(), filter_of(*level)));
-                asked_for.push(target);
+                requested.push(target);
             }
         }
         levels.sort_by_key(|(target, _)| std::cmp::Reverse(target.len()));
-        Self { levels, asked_for }
+        Self { levels, requested }
     }
 
     fn level_of(&self, target: &str) -> LevelFilter {
@@ -84,7 +86,7 @@ impl LoggerLevels {
 
     fn is_noise(&self, target: &str, message: &str) -> bool {
         NOISE.iter().any(|(noisy, start)| target == *noisy && message.starts_with(start))
-            && !self.asked_for.iter().any(|asked| is_under(target, asked))
+            && !self.requested.iter().any(|requested| is_under(target, requested))
     }
 }
 
@@ -94,7 +96,7 @@ impl<S: Subscriber> Filter<S> for LoggerLevels {
     }
 
     fn callsite_enabled(&self, metadata: &'static Metadata<'static>) -> Interest {
-        // What comes through `log` shares one callsite for all targets.
+        // Records of `log` share one callsite for all targets.
         if metadata.target() == "log" {
             Interest::sometimes()
         } else if self.shows(metadata) {
@@ -108,7 +110,7 @@ impl<S: Subscriber> Filter<S> for LoggerLevels {
         if is_own(event.metadata().target()) {
             return true;
         }
-        let text = EventText::of(event);
+        let text = EventText::from_event(event);
         !self.is_noise(text.target(event), &text.message)
     }
 
@@ -123,7 +125,7 @@ fn filter_of(level: LogLevel) -> LevelFilter {
         LogLevel::Debug => LevelFilter::DEBUG,
         LogLevel::Warn => LevelFilter::WARN,
         LogLevel::Error => LevelFilter::ERROR,
-        // Nothing here logs as fatal: a program that cannot go on ends with its message.
+        // This program logs no fatal messages; it exits with an error message instead.
         LogLevel::Fatal => LevelFilter::OFF,
     }
 }
@@ -133,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_longest_target_decides() {
+    fn the_longest_matching_target_determines_the_level() {
         let loggers = [("rustdds.rtps".to_owned(), LogLevel::Debug), ("mill".to_owned(), LogLevel::Error)];
         let levels = LoggerLevels::new("mill", Some(LogLevel::Debug), &loggers);
         for (target, level) in [
@@ -151,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_hidden_until_somebody_asks_for_it() {
+    fn noise_is_hidden_unless_its_target_is_requested() {
         let target = "rustdds::network::udp_listener";
         let message = "leave_multicast_group: Os { code: 99 }";
         let quiet = LoggerLevels::new("mill", Some(LogLevel::Debug), &[]);

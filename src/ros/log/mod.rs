@@ -1,17 +1,17 @@
-//! The node's log, as ROS users know it: one line on stderr, and `/rosout` for whoever wants it.
+//! Logging in the format of rcl: one line per message on stderr, and `/rosout`.
 //!
 //! ```text
-//! [INFO] [1700000000.123456789] [virtual_axes]: listens on /psec
+//! [INFO] [1700000000.123456789] [virtual_axes]: SIGINT: shutting down
 //! ```
 //!
-//! The program logs with `tracing`; the DDS crates log with `log`, which arrives here too. They
-//! report much as errors that is none (a participant's own shutdown, gaps in sequence numbers), so
-//! from them only errors are shown, less the known noise. `--log-level rustdds:=debug` shows all.
+//! The program logs with `tracing`. Records of the DDS crates, which use `log`, are received here, too. Those crates
+//! log normal events as errors (their own shutdown, gaps in sequence numbers), so only their errors are shown, except
+//! known noise. `--log-level rustdds:=debug` shows all.
 //!
-//! Of the lines of one kind 50 a second are shown, but of debugging.
+//! Except for debug messages, at most 50 lines of one kind are shown per second.
 
 mod filter;
-mod limit;
+mod rate_limit;
 mod terminal;
 
 use std::{
@@ -31,91 +31,94 @@ use tracing_subscriber::{
 };
 
 use self::filter::LoggerLevels;
-use self::limit::{Limiter, Verdict};
+use self::rate_limit::{LineRateLimiter, RateDecision};
 use self::terminal::Terminal;
 use super::args::{LogLevel, RosArgs};
-use virtual_axes_core::config::breaks_line;
+use virtual_axes_core::text::is_control;
 
-/// How long the end of the program waits for whoever reads its log.
+/// Longest time for which the end of the program waits for a slow reader of stderr.
 const LAST_WAIT: Duration = Duration::from_millis(500);
 
-/// One message of this program, for `/rosout`.
+/// Log message of this program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogRecord {
-    /// When, since 1970.
+    /// Time since the Unix epoch.
     pub stamp: Duration,
-    /// How severe.
+    /// Severity.
     pub level: LogLevel,
-    /// The node's logger.
+    /// Name of the logger.
     pub logger: String,
-    /// What.
+    /// Text.
     pub message: String,
-    /// The source file, if known.
+    /// Source file, if known.
     pub file: Option<&'static str>,
-    /// The line in it, if known.
+    /// Line in the source file, if known.
     pub line: Option<u32>,
 }
 
-/// The log could not be set up.
+/// Failure to set up the log.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
-    /// There is one already.
+    /// The process has a log already.
     #[error("the log is set up already: {0}")]
-    Twice(#[from] TryInitError),
-    /// The operating system gives no thread.
+    AlreadySet(#[from] TryInitError),
+    /// The thread cannot be started.
     #[error("cannot start the thread that writes the log: {0}")]
     Thread(#[from] std::io::Error),
 }
 
-/// The log of this process.
+/// Log of this process.
 #[derive(Debug)]
 pub struct Log {
     terminal: Terminal,
 }
 
 impl Log {
-    /// Writes a line that is no message, and waits (not for long) until all that was logged is written.
+    /// Writes a plain line and waits up to 0.5 s until all log lines are written.
     pub fn finish(self, line: Option<String>) {
         self.terminal.finish(line.map(|line| line + "\n"), LAST_WAIT);
     }
 }
 
-/// Sets up the log of this process as `args` ask. Messages of this program (not the middleware's)
-/// also go into `rosout`; when that is full, or nobody reads stderr, they are dropped, so that logging never waits.
+/// Sets up the log of this process from the arguments.
+///
+/// Messages of this program, not those of the middleware, also go into `rosout`. Messages are dropped if that queue
+/// or the queue of the terminal is full, so that logging never blocks.
 ///
 /// # Errors
-/// [`LogError`] when the process has a log already, or can have no thread more.
+/// [`LogError`] if the process has a log already, or the thread cannot be started.
 pub fn init(args: &RosArgs, rosout: Option<mpsc::Sender<LogRecord>>) -> Result<Log, LogError> {
     let logger = logger_name(&args.node().to_string());
     let levels = LoggerLevels::new(&logger, args.log_level(), args.logger_levels());
     let sinks = args.log_sinks();
     let rosout = rosout.filter(|_| sinks.rosout);
-    let of = logger.clone();
-    let terminal = Terminal::start(std::io::stderr(), move |lines| terminal_line(&missed(&of, lines)))?;
+    let own = logger.clone();
+    let terminal =
+        Terminal::start(std::io::stderr(), move |lines| terminal_line(&dropped_lines(&own, lines)))?;
     let shown = sinks.stdout.then(|| terminal.clone());
-    let layer = RosLayer { logger, terminal: shown, rosout, limiter: Limiter::default() };
+    let layer = RosLayer { logger, terminal: shown, rosout, limiter: LineRateLimiter::default() };
     tracing_subscriber::registry().with(layer.with_filter(levels)).try_init()?;
     Ok(Log { terminal })
 }
 
-/// What stands in the place of lines that were left out.
-fn missed(logger: &str, lines: u64) -> LogRecord {
+/// Returns the message that replaces dropped lines.
+fn dropped_lines(logger: &str, lines: u64) -> LogRecord {
     LogRecord {
         stamp: now(),
         level: LogLevel::Warn,
         logger: logger.to_owned(),
-        message: format!("nobody read this log for a while: {lines} lines are left out here"),
+        message: format!("stderr was blocked: {lines} lines of this log were dropped here"),
         file: None,
         line: None,
     }
 }
 
-/// Since 1970.
+/// Returns the time since the Unix epoch.
 fn now() -> Duration {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
 }
 
-/// rcl's name for the logger of a node: `/cell/mill` has `cell.mill`.
+/// Returns the logger name of a node as in rcl: `cell.mill` for `/cell/mill`.
 fn logger_name(node: &str) -> String {
     node.trim_start_matches('/').replace('/', ".")
 }
@@ -124,28 +127,28 @@ struct RosLayer {
     logger: String,
     terminal: Option<Terminal>,
     rosout: Option<mpsc::Sender<LogRecord>>,
-    limiter: Limiter,
+    limiter: LineRateLimiter,
 }
 
 impl RosLayer {
-    /// What is shown of an event; nothing when there are too many of its kind.
+    /// Returns the text to show for an event, or `None` if the rate limit suppresses it.
     fn limited(&self, event: &Event<'_>, text: EventText) -> Option<String> {
         if *event.metadata().level() > Level::INFO {
             return Some(text.message);
         }
         let kind = (event.metadata().callsite(), text.log_target.unwrap_or_default());
-        match self.limiter.judge(kind, Instant::now()) {
-            Verdict::Shown => Some(text.message),
-            Verdict::ShownAfter(left_out) => Some(limit::ends(left_out, &text.message)),
-            Verdict::FirstLeftOut => Some(limit::begins(&text.message)),
-            Verdict::LeftOut => None,
+        match self.limiter.check(kind, Instant::now()) {
+            RateDecision::Shown => Some(text.message),
+            RateDecision::ShownAfter(left_out) => Some(rate_limit::resumed(left_out, &text.message)),
+            RateDecision::FirstLeftOut => Some(rate_limit::suppressed(&text.message)),
+            RateDecision::LeftOut => None,
         }
     }
 }
 
 impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for RosLayer {
     fn on_event(&self, event: &Event<'_>, _context: Context<'_, S>) {
-        let text = EventText::of(event);
+        let text = EventText::from_event(event);
         let own = filter::is_own(text.target(event));
         let logger = if own { self.logger.clone() } else { text.target(event).replace("::", ".") };
         let Some(message) = self.limited(event, text) else { return };
@@ -175,8 +178,10 @@ fn severity(level: Level) -> LogLevel {
     }
 }
 
-/// The line for the terminal. Control characters are escaped: parts of a message may come from
-/// other nodes, and must neither clear the screen nor look like a line of their own.
+/// Formats a line for the terminal.
+///
+/// Control characters are escaped: parts of a message may come from other nodes and must neither clear the screen nor
+/// forge a line.
 fn terminal_line(record: &LogRecord) -> String {
     let mut line = format!(
         "[{}] [{}.{:09}] [{}]: ",
@@ -186,7 +191,7 @@ fn terminal_line(record: &LogRecord) -> String {
         record.logger
     );
     for character in record.message.chars() {
-        if breaks_line(character) && character != '\t' {
+        if is_control(character) && character != '\t' {
             line.extend(character.escape_default());
         } else {
             line.push(character);
@@ -196,7 +201,7 @@ fn terminal_line(record: &LogRecord) -> String {
     line
 }
 
-/// The fields of an event as text: the message, then `name=value` for the others.
+/// Fields of an event as text: the message, then `name=value` for the others.
 #[derive(Default)]
 struct EventText {
     message: String,
@@ -205,7 +210,7 @@ struct EventText {
 }
 
 impl EventText {
-    fn of(event: &Event<'_>) -> Self {
+    fn from_event(event: &Event<'_>) -> Self {
         let mut text = Self::default();
         event.record(&mut text);
         let fields = std::mem::take(&mut text.fields);
@@ -213,7 +218,7 @@ impl EventText {
         text
     }
 
-    /// What has come through `log` carries its target in a field.
+    /// Returns the target of an event. Records of `log` contain it in a field.
     fn target<'a>(&'a self, event: &Event<'a>) -> &'a str {
         self.log_target.as_deref().unwrap_or_else(|| event.metadata().target())
     }
@@ -229,7 +234,7 @@ impl Visit for EventText {
     }
 
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
-        // Writing to a String cannot fail.
+        // Writing to a String does not fail.
         let _ = match field.name() {
             "message" => write!(self.message, "{value:?}"),
             name if name.starts_with("log.") => Ok(()),
@@ -248,7 +253,7 @@ mod tests {
         log: impl FnOnce(),
     ) -> Vec<LogRecord> {
         let (sender, mut receiver) = mpsc::channel(16);
-        let (logger, limiter) = ("cell.mill".to_owned(), Limiter::default());
+        let (logger, limiter) = ("cell.mill".to_owned(), LineRateLimiter::default());
         let layer = RosLayer { logger, terminal: None, rosout: Some(sender), limiter };
         let levels = LoggerLevels::new("cell.mill", level, loggers);
         let subscriber = tracing_subscriber::registry().with(layer.with_filter(levels));
@@ -257,21 +262,21 @@ mod tests {
     }
 
     #[test]
-    fn messages_carry_level_logger_and_fields() {
+    fn messages_contain_level_logger_and_fields() {
         let records = capture(None, &[], || {
-            tracing::warn!(axis = "x", limit = 3, "outside {}", "stroke");
+            tracing::warn!(axis = "x", limit = 3, "outside {}", "limits");
             tracing::debug!("not shown by default");
         });
         assert_eq!(records.len(), 1);
         assert_eq!(records[0].level, LogLevel::Warn);
         assert_eq!(records[0].logger, "cell.mill");
-        assert_eq!(records[0].message, "outside stroke axis=\"x\" limit=3");
+        assert_eq!(records[0].message, "outside limits axis=\"x\" limit=3");
     }
 
     #[test]
-    fn the_middleware_does_not_get_into_rosout() {
+    fn middleware_messages_are_not_published_on_rosout() {
         let records = capture(Some(LogLevel::Debug), &[], || {
-            tracing::error!(target: "rustdds::rtps::writer", "loud");
+            tracing::error!(target: "rustdds::rtps::writer", "error");
             tracing::debug!("ours");
         });
         assert_eq!(records.len(), 1);
@@ -279,14 +284,14 @@ mod tests {
     }
 
     #[test]
-    fn a_level_for_the_nodes_logger_wins_over_the_general_one() {
+    fn the_level_of_the_node_logger_overrides_the_general_level() {
         let loggers = [("cell.mill".to_owned(), LogLevel::Error)];
         let records = capture(Some(LogLevel::Debug), &loggers, || tracing::warn!("hidden"));
         assert!(records.is_empty());
     }
 
     #[test]
-    fn a_full_rosout_drops_instead_of_waiting() {
+    fn a_full_rosout_queue_drops_messages() {
         let records = capture(None, &[], || {
             for _ in 0..100 {
                 tracing::info!("again");
@@ -296,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_from_outside_cannot_forge_a_line() {
+    fn control_characters_of_a_message_are_escaped() {
         let record = LogRecord {
             stamp: Duration::new(1_700_000_000, 123_456_789),
             level: LogLevel::Info,

@@ -1,5 +1,5 @@
-//! Lines for the terminal, written by a thread of their own: a reader of stderr that stands still (a pipe that nobody
-//! empties, a terminal after Ctrl-S) must not stop the axes.
+//! Log output to stderr by a separate thread, so that a blocked reader (a full pipe, a terminal after Ctrl-S) does
+//! not stop the axes.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -8,69 +8,68 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender, TrySendError
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Lines that wait for the reader, several times what a start with `--log-level debug` says at once; at some
-/// 200 bytes a line 200 kB.
+/// Capacity of the queue, lines: several times the burst of a start with `--log-level debug`; about 200 kB.
 const QUEUE: usize = 1024;
-/// How often it looks then whether there is room.
+/// Period at which a full queue is checked.
 const POLL: Duration = Duration::from_millis(1);
 
-/// The sending end: it never waits.
+/// Sender of log lines that never blocks.
 #[derive(Debug, Clone)]
 pub(super) struct Terminal {
     queue: SyncSender<Item>,
-    left_out: Arc<AtomicU64>,
+    dropped: Arc<AtomicU64>,
 }
 
 #[derive(Debug)]
 struct Item {
-    /// Lines that were left out before it.
-    missed: u64,
+    /// Number of lines dropped before this one.
+    dropped: u64,
     line: Option<String>,
-    /// Who waits until it, and everything before it, has been written.
-    waits: Option<SyncSender<()>>,
+    /// Signal that this item and all before it have been written.
+    written: Option<SyncSender<()>>,
 }
 
 impl Terminal {
-    /// Starts the thread that writes to `out`; `missed` is the line that says how many were left out.
+    /// Starts the thread that writes to `out`. `report` formats the line that reports a number of dropped lines.
     ///
     /// # Errors
-    /// Those of the operating system that gives no thread.
+    /// Error of the operating system if the thread cannot be started.
     pub(super) fn start(
         out: impl Write + Send + 'static,
-        missed: impl Fn(u64) -> String + Send + 'static,
+        report: impl Fn(u64) -> String + Send + 'static,
     ) -> io::Result<Self> {
         let (queue, items) = mpsc::sync_channel(QUEUE);
-        let left_out = Arc::new(AtomicU64::new(0));
-        let counted = Arc::clone(&left_out);
-        thread::Builder::new().name("log".into()).spawn(move || write(out, &items, &counted, missed))?;
-        Ok(Terminal { queue, left_out })
+        let dropped = Arc::new(AtomicU64::new(0));
+        let counter = Arc::clone(&dropped);
+        thread::Builder::new().name("log".into()).spawn(move || write(out, &items, &counter, report))?;
+        Ok(Terminal { queue, dropped })
     }
 
-    /// Hands a line, with its end, over; if as many wait as may, it is left out and counted.
+    /// Queues a line that ends with a newline. The line is dropped and counted if the queue is full.
     pub(super) fn line(&self, line: String) {
-        if self.push(Item { missed: 0, line: Some(line), waits: None }).is_err() {
-            self.left_out.fetch_add(1, Ordering::Relaxed);
+        if self.push(Item { dropped: 0, line: Some(line), written: None }).is_err() {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Hands an item over with the count of what was left out before it; it comes back if as many wait as may.
+    /// Queues an item with the number of lines dropped before it. Returns the item if the queue is full.
     fn push(&self, item: Item) -> Result<(), Item> {
-        let missed = self.left_out.swap(0, Ordering::Relaxed);
-        match self.queue.try_send(Item { missed, ..item }) {
-            // The thread ends after all senders.
+        let dropped = self.dropped.swap(0, Ordering::Relaxed);
+        match self.queue.try_send(Item { dropped, ..item }) {
+            // The thread ends only after all senders are dropped.
             Ok(()) | Err(TrySendError::Disconnected(_)) => Ok(()),
             Err(TrySendError::Full(item)) => {
-                self.left_out.fetch_add(missed, Ordering::Relaxed);
+                self.dropped.fetch_add(dropped, Ordering::Relaxed);
                 Err(item)
             }
         }
     }
 
-    /// Waits until what was handed over is written, and `line` behind it, but not for longer than `patience`.
-    pub(super) fn finish(&self, line: Option<String>, patience: Duration) {
-        let until = Instant::now() + patience;
+    /// Queues `line` and waits until all queued lines are written, for at most `timeout`.
+    pub(super) fn finish(&self, line: Option<String>, timeout: Duration) {
+        let until = Instant::now() + timeout;
         let (written, is_written) = mpsc::sync_channel(1);
-        let mut last = Item { missed: 0, line, waits: Some(written) };
+        let mut last = Item { dropped: 0, line, written: Some(written) };
         while let Err(back) = self.push(last) {
             if Instant::now() >= until {
                 return;
@@ -78,29 +77,29 @@ impl Terminal {
             last = back;
             thread::sleep(POLL);
         }
-        // Late, or the thread has ended: there is nothing more to be done.
+        // A timeout, or the end of the thread, is ignored.
         let _: Result<(), RecvTimeoutError> =
             is_written.recv_timeout(until.saturating_duration_since(Instant::now()));
     }
 }
 
-/// Writes until all senders are gone. Nowhere is left to report that stderr is closed.
-fn write(mut out: impl Write, items: &Receiver<Item>, left_out: &AtomicU64, missed: impl Fn(u64) -> String) {
+/// Writes queued lines until all senders are dropped. Errors of stderr are ignored.
+fn write(mut out: impl Write, items: &Receiver<Item>, dropped: &AtomicU64, report: impl Fn(u64) -> String) {
     let mut put = |line: &str| drop(out.write_all(line.as_bytes()));
-    let gap = |lines: u64| if lines > 0 { missed(lines) } else { String::new() };
+    let gap = |lines: u64| if lines > 0 { report(lines) } else { String::new() };
     while let Ok(first) = items.recv() {
         let mut next = Some(first);
         while let Some(item) = next {
-            put(&gap(item.missed));
+            put(&gap(item.dropped));
             item.line.as_deref().into_iter().for_each(&mut put);
-            // Whoever waited may have given up.
-            if let Some(waits) = item.waits {
-                let _ = waits.try_send(());
+            // The receiver is dropped after a timeout.
+            if let Some(written) = item.written {
+                let _ = written.try_send(());
             }
             next = items.try_recv().ok();
         }
-        // What nothing has come after.
-        put(&gap(left_out.swap(0, Ordering::Relaxed)));
+        // Lines dropped after the last item.
+        put(&gap(dropped.swap(0, Ordering::Relaxed)));
     }
 }
 
@@ -108,9 +107,9 @@ fn write(mut out: impl Write, items: &Receiver<Item>, left_out: &AtomicU64, miss
 mod tests {
     use super::*;
 
-    const PATIENCE: Duration = Duration::from_secs(20);
+    const TIMEOUT: Duration = Duration::from_secs(20);
 
-    /// A reader that takes a line when it is allowed to.
+    /// Test output that writes a line when it is allowed to.
     struct Slow {
         begun: mpsc::Sender<()>,
         allowed: Receiver<()>,
@@ -130,7 +129,7 @@ mod tests {
         }
     }
 
-    /// The other ends of a slow reader.
+    /// Channels that control a slow output.
     struct Ends {
         begun: Receiver<()>,
         allow: mpsc::Sender<()>,
@@ -141,22 +140,22 @@ mod tests {
         let (has_begun, begun) = mpsc::channel();
         let (allow, allowed) = mpsc::channel();
         let (taken, lines) = mpsc::channel();
-        let missed = |lines| format!("missed {lines}\n");
-        let terminal = Terminal::start(Slow { begun: has_begun, allowed, taken }, missed).expect("a thread");
+        let report = |lines| format!("dropped {lines}\n");
+        let terminal = Terminal::start(Slow { begun: has_begun, allowed, taken }, report).expect("a thread");
         (terminal, Ends { begun, allow, lines })
     }
 
     #[test]
-    fn a_reader_that_stands_still_holds_nobody_up_and_is_told_what_it_missed() {
-        const MISSED: usize = 10;
+    fn a_blocked_reader_delays_no_sender_and_gets_the_number_of_dropped_lines() {
+        const DROPPED: usize = 10;
         let (terminal, ends) = slow();
         terminal.line("0\n".to_owned());
-        // It is being written, and not in the queue any more.
-        ends.begun.recv_timeout(PATIENCE).expect("it is begun");
+        // The line is being written and has left the queue.
+        ends.begun.recv_timeout(TIMEOUT).expect("it is begun");
         for _ in 0..QUEUE {
             terminal.line("1\n".to_owned());
         }
-        for _ in 0..MISSED {
+        for _ in 0..DROPPED {
             terminal.line("3\n".to_owned());
         }
         terminal.finish(None, Duration::ZERO);
@@ -165,44 +164,44 @@ mod tests {
         }
         let mut before = 0;
         loop {
-            let line = ends.lines.recv_timeout(PATIENCE).expect("a line");
-            if line.starts_with("missed") {
-                break assert_eq!(line, format!("missed {MISSED}\n"));
+            let line = ends.lines.recv_timeout(TIMEOUT).expect("a line");
+            if line.starts_with("dropped") {
+                break assert_eq!(line, format!("dropped {DROPPED}\n"));
             }
             assert_ne!(line, "3\n");
             before += 1;
         }
         assert_eq!(before, QUEUE + 1);
         terminal.line("4\n".to_owned());
-        assert_eq!(ends.lines.recv_timeout(PATIENCE).expect("a line"), "4\n");
+        assert_eq!(ends.lines.recv_timeout(TIMEOUT).expect("a line"), "4\n");
     }
 
     #[test]
-    fn the_end_waits_for_a_reader_that_reads() {
+    fn finish_waits_for_a_slow_reader() {
         let (terminal, ends) = slow();
         for n in 0..100 {
             terminal.line(format!("{n}\n"));
             ends.allow.send(()).expect("it writes");
         }
-        terminal.finish(None, PATIENCE);
+        terminal.finish(None, TIMEOUT);
         assert_eq!(ends.lines.try_iter().count(), 100);
     }
 
     #[test]
-    fn the_last_line_comes_after_a_gap_that_is_told() {
+    fn the_last_line_follows_the_report_of_dropped_lines() {
         let (terminal, ends) = slow();
         terminal.line("0\n".to_owned());
-        ends.begun.recv_timeout(PATIENCE).expect("it is begun");
+        ends.begun.recv_timeout(TIMEOUT).expect("it is begun");
         for _ in 0..QUEUE + 3 {
             terminal.line("1\n".to_owned());
         }
         let ender = terminal.clone();
-        let end = thread::spawn(move || ender.finish(Some("last\n".to_owned()), PATIENCE));
+        let end = thread::spawn(move || ender.finish(Some("last\n".to_owned()), TIMEOUT));
         for _ in 0..QUEUE + 3 {
             ends.allow.send(()).expect("it writes");
         }
         end.join().expect("it ends");
         let lines: Vec<String> = ends.lines.try_iter().collect();
-        assert_eq!(lines[QUEUE + 1..], ["missed 3\n", "last\n"]);
+        assert_eq!(lines[QUEUE + 1..], ["dropped 3\n", "last\n"]);
     }
 }

@@ -1,8 +1,8 @@
-//! The node's own recording: every topic, in and out, in one MCAP file (parameter `record`).
+//! Recording of all topics of the node, in and out, in one MCAP file (parameter `record`).
 //!
-//! Each topic has a [`Tap`], which makes bytes of its messages and puts them into a queue that is bounded in
-//! bytes; one thread writes them. In real time a full queue leaves messages out and counts them, in `fast`
-//! the taps wait. Whatever happens to the file, the axes go on.
+//! Each topic has a [`Tap`], which serializes its messages into a queue that is bounded in bytes; one thread writes
+//! them to the file. In real time messages are left out and counted when the queue is full; in `fast` the taps wait.
+//! A failure of the file does not stop the axes.
 
 mod status;
 mod tap;
@@ -20,100 +20,98 @@ use tracing::{info, warn};
 
 pub use self::status::RecordingStatus;
 use self::status::number;
-use self::tap::Clock;
+use self::tap::RecordingClock;
 pub use self::tap::{Direction, Tap};
-use self::thread::{Entry, Writing};
-use super::outputs::WhenFull;
+use self::thread::{RecordingEntry, Writing};
+use super::outputs::OverflowPolicy;
 use super::pace::Health;
 use virtual_axes_core::config::{NodeConfig, QosConfig};
 use virtual_axes_io::files::{BoundedRecording, RecordedTopic};
 use virtual_axes_io::messages::Recorded;
 
-/// Bytes that may wait to be written: more than a minute of all topics at the default rate.
+/// Capacity of the queue, bytes: more than a minute of all topics at the default rate.
 const QUEUE_BYTES: u32 = 64 << 20;
-/// How long the end of the file is waited for when the node shuts down.
+/// Longest time for which shutdown waits until the file is closed.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Why the node does not record as it should.
+/// Failure to start a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The name is that of another kind of file.
-    #[error("record: {path}: a recording is an MCAP file: .mcap")]
+    /// The file name has another extension than `.mcap`.
+    #[error("record: {path}: a recording is an MCAP file; use the extension .mcap")]
     Name {
-        /// The file.
+        /// Path of the file.
         path: String,
     },
-    /// The file is there.
-    #[error(
-        "record: {path} exists already, and a recording overwrites nothing: name a file that is not there"
-    )]
+    /// The file exists.
+    #[error("record: {path} exists already and is not overwritten; use a new file name")]
     Exists {
-        /// The file.
+        /// Path of the file.
         path: String,
     },
-    /// The file cannot be made.
-    #[error("record: {path} cannot be made in the folder {folder}: {source}")]
+    /// The file cannot be created.
+    #[error("record: cannot create {path} in the folder {folder}: {source}")]
     Create {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Where it was to be.
+        /// Folder of the file.
         folder: String,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// It cannot be begun.
-    #[error("record: {path}: {source}")]
-    Begin {
-        /// The file.
+    /// The header cannot be written or the thread cannot be started.
+    #[error("record: cannot start writing {path}: {source}")]
+    Start {
+        /// Path of the file.
         path: String,
-        /// What is wrong.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
-/// What the taps, the thread and the diagnostics share.
+/// State shared by the taps, the thread and the diagnostics.
 struct Shared {
     path: String,
-    entries: mpsc::Sender<Entry>,
-    /// Bytes that may still be queued; closed as soon as nothing more is written.
-    room: Arc<Semaphore>,
-    when_full: WhenFull,
-    clock: Clock,
-    /// Messages in the file.
+    entries: mpsc::Sender<RecordingEntry>,
+    /// Free bytes of the queue; closed when writing has ended.
+    free_bytes: Arc<Semaphore>,
+    overflow: OverflowPolicy,
+    clock: RecordingClock,
+    /// Number of messages in the file.
     messages: AtomicU64,
-    /// Bytes of the file.
+    /// Size of the file, bytes.
     bytes: AtomicU64,
-    /// Messages that are not in the file.
+    /// Number of messages that are not in the file.
     left_out: AtomicU64,
-    /// Why it ended before the node did.
-    ended: OnceLock<String>,
+    /// Reason why writing ended before shutdown.
+    end_reason: OnceLock<String>,
 }
 
-/// A recording before it begins; topics are added.
-pub struct Recorder {
-    begun: Option<Begun>,
+/// Recording before it starts, to which topics are added.
+pub struct TopicRecorder {
+    prepared: Option<Prepared>,
 }
 
-struct Begun {
+struct Prepared {
     path: PathBuf,
     file: File,
     bound: u64,
     topics: Vec<RecordedTopic>,
     shared: Arc<Shared>,
-    entries: mpsc::Receiver<Entry>,
+    entries: mpsc::Receiver<RecordingEntry>,
 }
 
-impl Recorder {
-    /// Makes the file that the parameters name, or records nothing if they name none.
+impl TopicRecorder {
+    /// Creates the file that the parameter `record` names; records nothing if it is not set.
     ///
     /// # Errors
-    /// [`RecordError`] if it is no name for a recording, exists or cannot be made.
+    /// [`RecordError`] if the extension is not `.mcap`, or the file exists or cannot be created.
     pub fn open(
         config: &NodeConfig,
-        when_full: WhenFull,
+        overflow: OverflowPolicy,
         health: &watch::Receiver<Health>,
     ) -> Result<Self, RecordError> {
-        let Some(path) = config.record.clone() else { return Ok(Recorder { begun: None }) };
+        let Some(path) = config.record.clone() else { return Ok(TopicRecorder { prepared: None }) };
         let name = path.display().to_string();
         if path.extension().is_some_and(|extension| !extension.eq_ignore_ascii_case("mcap")) {
             return Err(RecordError::Name { path: name });
@@ -129,86 +127,88 @@ impl Recorder {
         let shared = Shared {
             path: name,
             entries: sender,
-            room: Arc::new(Semaphore::new(QUEUE_BYTES as usize)),
-            when_full,
-            clock: Clock { time: config.time, health: health.clone() },
+            free_bytes: Arc::new(Semaphore::new(QUEUE_BYTES as usize)),
+            overflow,
+            clock: RecordingClock { time: config.time, health: health.clone() },
             messages: AtomicU64::new(0),
             bytes: AtomicU64::new(0),
             left_out: AtomicU64::new(0),
-            ended: OnceLock::new(),
+            end_reason: OnceLock::new(),
         };
         let shared = Arc::new(shared);
         let topics = Vec::new();
-        Ok(Recorder { begun: Some(Begun { path, file, bound: config.record_max, topics, shared, entries }) })
+        Ok(TopicRecorder {
+            prepared: Some(Prepared { path, file, bound: config.record_max, topics, shared, entries }),
+        })
     }
 
-    /// What records the messages of the topic `name`, which is offered with `qos`.
+    /// Adds the topic `name` with its QoS. Returns the tap that records its messages.
     pub fn tap<M: Recorded>(&mut self, name: &str, qos: QosConfig, direction: Direction) -> Tap<M> {
-        let Some(begun) = &mut self.begun else { return Tap::none() };
+        let Some(prepared) = &mut self.prepared else { return Tap::none() };
         let topic = RecordedTopic { name: name.to_owned(), schema: M::schema(), qos };
-        let place = begun.topics.iter().position(|known| *known == topic).unwrap_or_else(|| {
-            begun.topics.push(topic);
-            begun.topics.len() - 1
+        let index = prepared.topics.iter().position(|known| *known == topic).unwrap_or_else(|| {
+            prepared.topics.push(topic);
+            prepared.topics.len() - 1
         });
-        Tap::new(Arc::clone(&begun.shared), place, direction)
+        Tap::new(Arc::clone(&prepared.shared), index, direction)
     }
 
-    /// Starts the thread that writes; `None` if nothing is recorded.
+    /// Starts the writing thread. Returns `None` if nothing is recorded.
     ///
     /// # Errors
-    /// [`RecordError`] if the file cannot be begun or there is no thread.
-    pub fn start(mut self) -> Result<Option<Recording>, RecordError> {
-        let Some(begun) = self.begun.take() else { return Ok(None) };
-        let Begun { path, file, bound, topics, shared, entries } = begun;
+    /// [`RecordError`] if the file cannot be written or the thread cannot be started.
+    pub fn start(mut self) -> Result<Option<TopicRecording>, RecordError> {
+        let Some(prepared) = self.prepared.take() else { return Ok(None) };
+        let Prepared { path, file, bound, topics, shared, entries } = prepared;
         let failed = |source| {
-            // Nothing stands in it yet.
+            // The file is still empty.
             let _ = std::fs::remove_file(&path);
-            RecordError::Begin { path: path.display().to_string(), source }
+            RecordError::Start { path: path.display().to_string(), source }
         };
-        let cut = file.try_clone().map_err(failed)?;
+        let truncate = file.try_clone().map_err(failed)?;
         let recording = BoundedRecording::new(file, bound, &topics).map_err(failed)?;
         let (done, is_done) = oneshot::channel();
-        let writing = Writing { recording, entries, cut, shared: Arc::clone(&shared), done };
+        let writing = Writing { recording, entries, truncate, shared: Arc::clone(&shared), done };
         std::thread::Builder::new().name("recording".into()).spawn(move || writing.run()).map_err(failed)?;
         info!("recording {} topics in {}", topics.len(), shared.path);
-        Ok(Some(Recording { shared, is_done }))
+        Ok(Some(TopicRecording { shared, is_done }))
     }
 }
 
-impl Drop for Recorder {
+impl Drop for TopicRecorder {
     fn drop(&mut self) {
-        if let Some(begun) = &self.begun {
-            // The node did not start: nobody wants an empty file.
-            let _ = std::fs::remove_file(&begun.path);
+        if let Some(prepared) = &self.prepared {
+            // The node did not start; the file is empty.
+            let _ = std::fs::remove_file(&prepared.path);
         }
     }
 }
 
-/// The folder that a file is in.
+/// Returns the folder of a file.
 fn folder(path: &Option<PathBuf>) -> String {
     let parent = path.as_deref().and_then(Path::parent).filter(|parent| !parent.as_os_str().is_empty());
     parent.unwrap_or(Path::new(".")).display().to_string()
 }
 
-/// A recording that is being written.
-pub struct Recording {
+/// Recording in progress.
+pub struct TopicRecording {
     shared: Arc<Shared>,
     is_done: oneshot::Receiver<()>,
 }
 
-impl Recording {
-    /// What the diagnostics say about it.
+impl TopicRecording {
+    /// Creates the source of its diagnostics.
     pub fn status(&self) -> RecordingStatus {
         RecordingStatus::new(Arc::clone(&self.shared))
     }
 
-    /// Writes what is queued, and the end of the file.
+    /// Writes the queued messages and the footer, and closes the file.
     pub async fn close(self) {
-        // A thread that is gone has closed the file.
-        let _ = self.shared.entries.send(Entry::Close);
+        // If the thread has ended, it has closed the file.
+        let _ = self.shared.entries.send(RecordingEntry::Close);
         let path = &self.shared.path;
         if tokio::time::timeout(CLOSE_TIMEOUT, self.is_done).await.is_err() {
-            warn!("recording {path} was not closed in time; it can be read up to its last chunk");
+            warn!("recording {path} was not closed in time; it is readable up to its last chunk");
             return;
         }
         let (messages, left_out) = (number(&self.shared.messages), number(&self.shared.left_out));

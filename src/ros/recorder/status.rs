@@ -1,4 +1,4 @@
-//! What the diagnostics say about a recording.
+//! Diagnostics of a recording.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,18 +7,18 @@ use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::{DiagnosticStatus, KeyVal
 
 use super::Shared;
 
-/// Bytes of a megabyte.
+/// Bytes per megabyte.
 pub(super) const MEGABYTE: u64 = 1_000_000;
 
-/// A count as it is now.
+/// Returns the current value of a counter.
 pub(super) fn number(count: &AtomicU64) -> u64 {
     count.load(Ordering::Relaxed)
 }
 
-/// Looks at a recording from time to time.
+/// Source of the diagnostics of a recording.
 pub struct RecordingStatus {
     shared: Arc<Shared>,
-    /// Messages that had been left out when it was looked at before.
+    /// Number of messages left out at the previous call.
     left_out: u64,
 }
 
@@ -27,12 +27,12 @@ impl RecordingStatus {
         RecordingStatus { shared, left_out: 0 }
     }
 
-    /// How the recording is, on behalf of `node` and its machine.
+    /// Returns the diagnostic status of the recording, with the names of `node` and its machine.
     pub fn message(&mut self, node: &str, machine: &str) -> DiagnosticStatus {
         let shared = &self.shared;
         let left_out = number(&shared.left_out);
         let before = std::mem::replace(&mut self.left_out, left_out);
-        let ended = shared.ended.get();
+        let ended = shared.end_reason.get();
         let (level, message) = match ended {
             Some(reason) => (DiagnosticStatus::WARN, format!("recording has ended: {reason}")),
             None if left_out > before => {

@@ -1,4 +1,4 @@
-//! Where the messages of a topic enter the recording.
+//! Taps: input of the messages of a topic to the recording.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -7,39 +7,39 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::Serialize;
 use tokio::sync::watch;
 
-use super::thread::Entry;
+use super::thread::RecordingEntry;
 use super::{QUEUE_BYTES, Shared};
-use crate::ros::outputs::WhenFull;
+use crate::ros::outputs::OverflowPolicy;
 use crate::ros::pace::Health;
 use virtual_axes_core::config::TimeMode;
 use virtual_axes_core::units::Nanoseconds;
 use virtual_axes_io::files::encode;
 use virtual_axes_io::messages::Recorded;
 
-/// Bytes that a queued message takes beside its own.
+/// Overhead of a queued message, bytes.
 const ENTRY_BYTES: usize = 128;
 
-/// Whether the node publishes a topic or listens to it.
+/// Direction of a topic, seen from the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
-    /// It listens.
+    /// The node subscribes.
     In,
-    /// It publishes.
+    /// The node publishes.
     Out,
 }
 
-/// The node's clock.
-pub(super) struct Clock {
+/// Clock of the log times in the recording.
+pub(super) struct RecordingClock {
     pub(super) time: TimeMode,
     pub(super) health: watch::Receiver<Health>,
 }
 
-impl Clock {
-    /// ns since the Unix epoch; not before it.
+impl RecordingClock {
+    /// Returns the time since the Unix epoch, ns, not less than 0.
     fn now(&self) -> u64 {
         let health = self.health.borrow();
-        let begins_with_the_system = self.time == TimeMode::Fast && health.periods == 0;
-        if self.time == TimeMode::Real || begins_with_the_system {
+        let is_before_first_cycle = self.time == TimeMode::Fast && health.periods == 0;
+        if self.time == TimeMode::Real || is_before_first_cycle {
             let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
             return u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX);
         }
@@ -47,25 +47,25 @@ impl Clock {
     }
 }
 
-/// Records the messages of one topic, if there is a recording.
-pub struct Tap<M>(Option<Line<M>>);
+/// Recorder of the messages of one topic; does nothing if there is no recording.
+pub struct Tap<M>(Option<TopicTap<M>>);
 
-struct Line<M> {
+struct TopicTap<M> {
     shared: Arc<Shared>,
     topic: usize,
     direction: Direction,
-    /// What a message says its time is.
+    /// Function that returns the time stamp of a message, ns.
     time: fn(&M) -> Nanoseconds,
 }
 
 impl<M> Tap<M> {
-    /// Records nothing.
+    /// Creates a tap that records nothing.
     pub fn none() -> Self {
         Tap(None)
     }
 
-    /// Whether there is a recording.
-    pub fn records(&self) -> bool {
+    /// Returns true if there is a recording.
+    pub fn is_recording(&self) -> bool {
         self.0.is_some()
     }
 
@@ -73,56 +73,62 @@ impl<M> Tap<M> {
     where
         M: Recorded,
     {
-        Tap(Some(Line { shared, topic, direction, time: M::time }))
+        Tap(Some(TopicTap { shared, topic, direction, time: M::time }))
     }
 }
 
 impl<M: Serialize> Tap<M> {
-    /// Records a message that is published or has come in now; waits for room only where outputs wait.
+    /// Records a message that is being published or has just been received. Waits for a full queue only where outputs
+    /// wait.
     pub async fn record(&self, message: &M) {
-        let Some(line) = &self.0 else { return };
-        let shared = &line.shared;
-        let is_queued = match line.entry(message) {
-            Some((entry, size)) => line.queue(entry, size).await,
+        let Some(topic) = &self.0 else { return };
+        let shared = &topic.shared;
+        let is_queued = match topic.entry(message) {
+            Some((entry, size)) => topic.queue(entry, size).await,
             None => false,
         };
-        if !is_queued && shared.left_out.fetch_add(1, Ordering::Relaxed) == 0 && shared.ended.get().is_none()
+        if !is_queued
+            && shared.left_out.fetch_add(1, Ordering::Relaxed) == 0
+            && shared.end_reason.get().is_none()
         {
             tracing::warn!(
-                "recording {}: messages are left out, the file is written too slowly",
+                "recording {}: messages are left out because the file is written too slowly",
                 shared.path
             );
         }
     }
 }
 
-impl<M: Serialize> Line<M> {
-    /// The message as bytes with its times, and the room that it takes; `None` where nothing is written any more.
-    fn entry(&self, message: &M) -> Option<(Entry, u32)> {
-        if self.shared.room.is_closed() {
+impl<M: Serialize> TopicTap<M> {
+    /// Serializes a message with its times. Returns it with its size in the queue, bytes, or `None` if writing has
+    /// ended.
+    fn entry(&self, message: &M) -> Option<(RecordingEntry, u32)> {
+        if self.shared.free_bytes.is_closed() {
             return None;
         }
         let stamp = u64::try_from((self.time)(message)).unwrap_or(0);
         let now = self.shared.clock.now();
-        // In `fast` a message is made before the clock shows its instant.
+        // In `fast` a message is built before the clock reaches its time.
         let log = if self.direction == Direction::Out { now.max(stamp) } else { now };
         let publish = if stamp == 0 { log } else { stamp };
         let mut data = Vec::new();
         encode(message, &mut data).ok()?;
-        // What is longer than the queue takes all of it.
+        // A message longer than the queue takes the whole queue.
         let size = u32::try_from(data.len() + ENTRY_BYTES).map_or(QUEUE_BYTES, |size| size.min(QUEUE_BYTES));
-        Some((Entry::Message { topic: self.topic, log, publish, data, room: None }, size))
+        Some((RecordingEntry::Message { topic: self.topic, log, publish, data, permit: None }, size))
     }
 
-    async fn queue(&self, mut entry: Entry, size: u32) -> bool {
-        let room = Arc::clone(&self.shared.room);
-        let taken = match self.shared.when_full {
-            WhenFull::Wait | WhenFull::WaitForAWhile => room.acquire_many_owned(size).await.ok(),
-            WhenFull::Drop => room.try_acquire_many_owned(size).ok(),
+    async fn queue(&self, mut entry: RecordingEntry, size: u32) -> bool {
+        let free_bytes = Arc::clone(&self.shared.free_bytes);
+        let acquired = match self.shared.overflow {
+            OverflowPolicy::Block | OverflowPolicy::BlockWithTimeout => {
+                free_bytes.acquire_many_owned(size).await.ok()
+            }
+            OverflowPolicy::Drop => free_bytes.try_acquire_many_owned(size).ok(),
         };
-        let Some(taken) = taken else { return false };
-        if let Entry::Message { room, .. } = &mut entry {
-            *room = Some(taken);
+        let Some(acquired) = acquired else { return false };
+        if let RecordingEntry::Message { permit, .. } = &mut entry {
+            *permit = Some(acquired);
         }
         self.shared.entries.send(entry).is_ok()
     }

@@ -1,4 +1,4 @@
-//! The thread that writes the file.
+//! Thread that writes the recording.
 
 use std::fs::File;
 use std::io;
@@ -14,94 +14,97 @@ use super::Shared;
 use super::status::MEGABYTE;
 use virtual_axes_io::files::BoundedRecording;
 
-/// The longest that a message waits until it can be read from the file, whatever happens to the node.
+/// Longest time until a queued message is readable in the file, even if the node is killed.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 
-/// What the thread is told.
-pub(super) enum Entry {
-    /// A message.
+/// Entry of the queue to the thread.
+pub(super) enum RecordingEntry {
+    /// Message to be written.
     Message {
-        /// Place of its topic.
+        /// Index of its topic.
         topic: usize,
-        /// When it was recorded, ns.
+        /// Log time, ns.
         log: u64,
-        /// What it says its time is, ns.
+        /// Publish time: stamp of the message, ns.
         publish: u64,
-        /// CDR.
+        /// Message in CDR.
         data: Vec<u8>,
-        /// Its room in the queue, free again when it has been written.
-        room: Option<OwnedSemaphorePermit>,
+        /// Bytes of the queue, released when the message has been written.
+        permit: Option<OwnedSemaphorePermit>,
     },
-    /// The end of the file.
+    /// Request to close the file.
     Close,
 }
 
-/// Why nothing more is written.
-enum End {
+/// Reason why writing ends.
+enum WriteEnd {
     Closed,
-    Bound,
+    SizeLimit,
 }
 
-/// What the thread owns.
+/// State of the writing thread.
 pub(super) struct Writing {
     pub(super) recording: BoundedRecording<File>,
-    pub(super) entries: Receiver<Entry>,
-    /// The file, to cut off what could not be written whole.
-    pub(super) cut: File,
+    pub(super) entries: Receiver<RecordingEntry>,
+    /// Second handle of the file, to truncate a chunk that was written in part.
+    pub(super) truncate: File,
     pub(super) shared: Arc<Shared>,
-    /// Told when the file is closed.
+    /// Signal that the file is closed.
     pub(super) done: oneshot::Sender<()>,
 }
 
 impl Writing {
-    /// Writes until the file ends.
+    /// Writes entries until the file is closed, has reached its size limit, or fails.
     pub(super) fn run(mut self) {
         let written = self.write();
-        // From here on whoever waits for room leaves its message out.
-        self.shared.room.close();
-        let Writing { recording, entries, cut, shared, done } = self;
+        // Waiting taps leave their messages out from here on.
+        self.shared.free_bytes.close();
+        let Writing { recording, entries, truncate, shared, done } = self;
         let whole = recording.whole();
         let finished = written.and_then(|end| {
-            if matches!(end, End::Bound) {
-                _ = shared.ended.set(format!("it has reached {} MB", recording.bound() / MEGABYTE));
+            if matches!(end, WriteEnd::SizeLimit) {
+                _ = shared.end_reason.set(format!("it has reached {} MB", recording.bound() / MEGABYTE));
             }
             recording.finish()
         });
         match finished {
             Ok(file) => shared.bytes.store(file.metadata().map_or(0, |file| file.len()), Ordering::Relaxed),
             Err(error) => {
-                // The part of a chunk is of no use to readers; they go as far as they can if it stays.
-                let _ = cut.set_len(whole);
+                // An incomplete chunk would be an error for readers.
+                let _ = truncate.set_len(whole);
                 shared.bytes.store(whole, Ordering::Relaxed);
-                _ = shared.ended.set(error.to_string());
+                _ = shared.end_reason.set(error.to_string());
             }
         }
-        if let Some(reason) = shared.ended.get() {
+        if let Some(reason) = shared.end_reason.get() {
             warn!("recording {} has ended: {reason}; the axes go on", shared.path);
         }
-        let queued = entries.try_iter().filter(|entry| matches!(entry, Entry::Message { .. })).count();
+        let queued =
+            entries.try_iter().filter(|entry| matches!(entry, RecordingEntry::Message { .. })).count();
         shared.left_out.fetch_add(queued as u64, Ordering::Relaxed);
-        // The node may be gone already.
+        // The receiver is dropped if the close timed out.
         let _ = done.send(());
     }
 
-    /// Writes what comes.
-    fn write(&mut self) -> io::Result<End> {
+    /// Writes entries until the end; flushes every [`FLUSH_PERIOD`].
+    fn write(&mut self) -> io::Result<WriteEnd> {
         let mut flushed = Instant::now();
         loop {
             match self.entries.recv_timeout(FLUSH_PERIOD.saturating_sub(flushed.elapsed())) {
-                Ok(Entry::Message { topic, log, publish, data, room }) => {
+                Ok(RecordingEntry::Message { topic, log, publish, data, permit }) => {
                     let is_written = self.recording.write(topic, log, publish, &data);
-                    drop(room);
+                    drop(permit);
                     if !matches!(is_written, Ok(true)) {
                         self.shared.left_out.fetch_add(1, Ordering::Relaxed);
                     }
                     if !is_written? {
-                        return Ok(End::Bound);
+                        return Ok(WriteEnd::SizeLimit);
                     }
                     self.shared.messages.fetch_add(1, Ordering::Relaxed);
                 }
-                Ok(Entry::Close) | Err(RecvTimeoutError::Disconnected) => return Ok(End::Closed),
+                Ok(RecordingEntry::Close) | Err(RecvTimeoutError::Disconnected) => {
+                    return Ok(WriteEnd::Closed);
+                }
                 Err(RecvTimeoutError::Timeout) => {}
             }
             if flushed.elapsed() >= FLUSH_PERIOD {

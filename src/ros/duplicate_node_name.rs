@@ -1,7 +1,7 @@
-//! Tells when another node has this one's name.
+//! Detection of a duplicate node name.
 //!
-//! Nodes of one name work, and share topics, services and parameters: whoever asks for one gets an
-//! answer of either. Every participant says which nodes it has on `ros_discovery_info`.
+//! Nodes with the same name share topics, services and parameters, so a client gets the response of either. Every
+//! participant announces its nodes on `ros_discovery_info`.
 
 use futures::StreamExt;
 use rustdds::policy::{Durability, History, Reliability};
@@ -11,24 +11,25 @@ use tracing::{debug, warn};
 
 use super::names::NodeFqn;
 
-/// The topic, and its type, as rmw_dds_common has them.
+/// Discovery topic of rmw_dds_common.
 const TOPIC: &str = "ros_discovery_info";
+/// DDS type of the discovery topic.
 const TYPE: &str = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
 
-/// Messages that may wait. With `KEEP_ALL` RustDDS would remember when each came that has ever been taken.
+/// Depth of the reader. With `KEEP_ALL`, RustDDS would store the reception time of every message ever read.
 const DEPTH: i32 = 1024;
 
 type Gid = [u8; 16];
 
-/// `rmw_dds_common/msg/ParticipantEntitiesInfo`. The crate's own type refuses a whole message for
-/// one name that it does not like.
+/// Message `rmw_dds_common/msg/ParticipantEntitiesInfo`. The type of ros2-client rejects the whole message if one
+/// name is invalid.
 #[derive(Debug, Deserialize)]
 struct ParticipantEntitiesInfo {
     gid: Gid,
     nodes: Vec<NodeEntitiesInfo>,
 }
 
-/// `rmw_dds_common/msg/NodeEntitiesInfo`.
+/// Message `rmw_dds_common/msg/NodeEntitiesInfo`.
 #[derive(Debug, Deserialize)]
 struct NodeEntitiesInfo {
     namespace: String,
@@ -38,13 +39,13 @@ struct NodeEntitiesInfo {
 }
 
 impl ParticipantEntitiesInfo {
-    /// Whether another participant than `own` has a node of the name of `node`.
-    fn has_namesake(&self, own: Gid, node: &NodeFqn) -> bool {
+    /// Returns true if another participant than `own` announces a node with the name of `node`.
+    fn is_duplicate(&self, own: Gid, node: &NodeFqn) -> bool {
         self.gid != own && self.nodes.iter().any(|n| n.namespace == node.namespace() && n.name == node.name())
     }
 }
 
-/// Warns once, as soon as another participant has a node of the name of `node`.
+/// Logs one warning when another participant announces a node with the name of `node`.
 pub(super) async fn watch(participant: DomainParticipant, node: NodeFqn) {
     let qos = QosPolicyBuilder::new()
         .durability(Durability::TransientLocal)
@@ -60,16 +61,18 @@ pub(super) async fn watch(participant: DomainParticipant, node: NodeFqn) {
     let reader = match reader {
         Ok(reader) => reader,
         Err(error) => {
-            debug!("other nodes' names are not looked at: {error}");
+            debug!("duplicate node names are not detected: cannot subscribe to {TOPIC}: {error}");
             return;
         }
     };
     let own = participant.guid().to_bytes();
     let mut samples = reader.async_sample_stream();
     while let Some(sample) = samples.next().await {
-        // What cannot be read is no concern of this node.
-        if sample.is_ok_and(|sample| sample.value().has_namesake(own, &node)) {
-            warn!("another node in this domain is named {node}; give one of them another name (-r __node:=)");
+        // Samples that cannot be decoded are ignored.
+        if sample.is_ok_and(|sample| sample.value().is_duplicate(own, &node)) {
+            warn!(
+                "duplicate node name: another node in this domain is named {node}; rename one of them (-r __node:=NAME)"
+            );
             return;
         }
     }
@@ -80,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_same_full_name_elsewhere_is_a_namesake() {
+    fn only_the_same_full_name_in_another_participant_is_a_duplicate() {
         let info = |gid: Gid, namespace: &str, name: &str| ParticipantEntitiesInfo {
             gid,
             nodes: vec![NodeEntitiesInfo {
@@ -92,9 +95,9 @@ mod tests {
         };
         let (own, other) = ([1; 16], [2; 16]);
         let node = NodeFqn::new("/cell", "mill").unwrap();
-        assert!(info(other, "/cell", "mill").has_namesake(own, &node));
-        assert!(!info(own, "/cell", "mill").has_namesake(own, &node));
-        assert!(!info(other, "/", "mill").has_namesake(own, &node));
-        assert!(!info(other, "/cell", "lathe").has_namesake(own, &node));
+        assert!(info(other, "/cell", "mill").is_duplicate(own, &node));
+        assert!(!info(own, "/cell", "mill").is_duplicate(own, &node));
+        assert!(!info(other, "/", "mill").is_duplicate(own, &node));
+        assert!(!info(other, "/cell", "lathe").is_duplicate(own, &node));
     }
 }

@@ -1,15 +1,15 @@
-//! The last word of a participant or of a writer, in a form that Fast DDS understands.
+//! Dispose message of the participant or of a writer, in a form that Fast DDS understands.
 //!
-//! RustDDS disposes of its participant when it is dropped, with a DATA submessage that carries the
-//! key (the participant's GUID) as a parameter list of 28 octets. Fast DDS passes over any key-only
-//! payload of more than 16 octets, finds no PID_KEY_HASH among the inline QoS either, and so does
-//! not learn *who* left: the node stays in its graph until the lease ends, after about 50 s. The
-//! same holds for single endpoints. The datagram here says it with the key hash, which every
-//! implementation has to take (RTPS 2.5, 9.6.4.8):
+//! RustDDS disposes of its participant when it is dropped, with a DATA submessage that carries the key (the
+//! participant's GUID) as a parameter list of 28 octets. Fast DDS ignores key-only payloads of more than 16 octets,
+//! finds no PID_KEY_HASH among the inline QoS, and therefore cannot tell which participant left: the node stays in
+//! its graph until the lease expires, after about 50 s. Writers and readers are affected in the same way. The
+//! datagram sent here identifies the participant or writer by the key hash, which every implementation has to support
+//! (RTPS 2.5, 9.6.4.8):
 //!
 //! ```text
-//! RTPS header (20) | DATA (4 + 20): SPDP writer, sequence number |
-//!     PID_KEY_HASH: participant GUID | PID_STATUS_INFO: disposed, unregistered | PID_SENTINEL
+//! RTPS header (20) | DATA (4 + 20): SPDP or SEDP writer, sequence number |
+//!     PID_KEY_HASH: GUID | PID_STATUS_INFO: disposed, unregistered | PID_SENTINEL
 //! ```
 
 use std::{
@@ -24,59 +24,63 @@ use rustdds::{DomainParticipant, RTPSEntity};
 use super::environment::DiscoveryRange;
 use super::rtps::{Data, EntityId, Guid, Message};
 
-// RTPS 2.5, 9.6.2.3: the ports of a domain.
+// Ports of a domain (RTPS 2.5, 9.6.2.3).
 const PORT_BASE: u32 = 7400;
 const PORTS_PER_DOMAIN: u32 = 250;
 const DISCOVERY_UNICAST_OFFSET: u32 = 10;
 const PORTS_PER_PARTICIPANT: u32 = 2;
 const DISCOVERY_MULTICAST: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
-/// Participants on one machine: with more, the ports would run into the next domain's.
+/// Largest number of participants on one host; the ports of more would overlap the next domain.
 const PARTICIPANTS_PER_HOST: u32 = 120;
 
-/// 9.3.1.3: the writer of the announcements.
+/// Built-in writer of participant announcements (RTPS 2.5, 9.3.1.3).
 const SPDP_WRITER: EntityId = [0x00, 0x01, 0x00, 0xc2];
-/// That of announcements of writers.
+/// Built-in writer of writer announcements (RTPS 2.5, 9.3.1.3).
 const SEDP_PUBLICATIONS_WRITER: EntityId = [0x00, 0x00, 0x03, 0xc2];
 const PID_KEY_HASH: u16 = 0x0070;
 const PID_STATUS_INFO: u16 = 0x0071;
 const DISPOSED_AND_UNREGISTERED: [u8; 4] = [0, 0, 0, 3];
 
-/// Readers keep only what is newer than the last announcement; those count up from 1, one every
-/// few seconds.
+/// Sequence number of the participant's dispose message. Readers accept only numbers above the last announcement;
+/// announcements count up from 1, one every few seconds.
 const LAST_SEQUENCE_NUMBER: i64 = 1 << 32;
 
-/// Datagrams get lost: the word is given this many times, this far apart.
+/// Number of transmissions of the participant's dispose message, because datagrams can be lost.
 const ROUNDS: usize = 3;
+/// Time between two transmissions.
 const ROUND_PERIOD: Duration = Duration::from_millis(15);
 
-/// A goodbye that is ready to be sent, also when its participant is already gone.
+/// Dispose message with its destinations; can be sent after its participant has been dropped.
 #[derive(Debug, Clone)]
-pub(super) struct Goodbye {
+pub(super) struct DisposeMessage {
     datagram: Vec<u8>,
     destinations: BTreeSet<SocketAddr>,
-    /// One socket for each: the source address selects the interface of a multicast.
+    /// Source addresses, one socket each: the source address selects the interface of a multicast.
     sources: Vec<Ipv4Addr>,
 }
 
-impl Goodbye {
-    /// Notes who `participant` is, and whom it has met so far.
-    pub(super) fn of(participant: &DomainParticipant, range: DiscoveryRange) -> Self {
+impl DisposeMessage {
+    /// Creates the dispose message of `participant`, for the participants discovered so far.
+    pub(super) fn for_participant(participant: &DomainParticipant, range: DiscoveryRange) -> Self {
         let guid = participant.guid().to_bytes();
-        Self::with(dispose_datagram(&guid, SPDP_WRITER, LAST_SEQUENCE_NUMBER), participant, range)
+        Self::with_datagram(dispose_datagram(&guid, SPDP_WRITER, LAST_SEQUENCE_NUMBER), participant, range)
     }
 
-    /// Of one of its writers. RustDDS announces writers in samples that are numbered: `number` is that of the one in which
-    /// it disposes of this writer, which it is about to send. Who has this one takes that for a repetition.
-    pub(super) fn of_writer(
+    /// Creates the dispose message of one writer of `participant`.
+    ///
+    /// RustDDS announces writers by numbered samples. `number` is the sequence number of the sample in which RustDDS
+    /// is about to dispose of this writer ([`super::announced_writers`]). A participant that has received this
+    /// message takes the one of RustDDS for a repetition.
+    pub(super) fn for_writer(
         writer: &Guid,
         number: i64,
         participant: &DomainParticipant,
         range: DiscoveryRange,
     ) -> Self {
-        Self::with(dispose_datagram(writer, SEDP_PUBLICATIONS_WRITER, number), participant, range)
+        Self::with_datagram(dispose_datagram(writer, SEDP_PUBLICATIONS_WRITER, number), participant, range)
     }
 
-    fn with(datagram: Vec<u8>, participant: &DomainParticipant, range: DiscoveryRange) -> Self {
+    fn with_datagram(datagram: Vec<u8>, participant: &DomainParticipant, range: DiscoveryRange) -> Self {
         let endpoints: Vec<SocketAddr> = participant
             .discovered_readers()
             .iter()
@@ -102,7 +106,7 @@ impl Goodbye {
         }
     }
 
-    /// Sends it some times; takes about 30 ms. What cannot be reached is left alone: there is nobody to tell.
+    /// Sends the message [`ROUNDS`] times, which takes about 30 ms. Send errors are ignored.
     pub(super) fn send(&self) {
         for round in 0..ROUNDS {
             if round > 0 {
@@ -112,13 +116,13 @@ impl Goodbye {
         }
     }
 
-    /// Sends it once.
+    /// Sends the message once to each destination.
     pub(super) fn send_once(&self) {
         for source in &self.sources {
             if let Ok(socket) = UdpSocket::bind((*source, 0)) {
                 let from_loopback = socket.local_addr().is_ok_and(|from| from.ip().is_loopback());
                 for to in &self.destinations {
-                    // Nothing but multicast may go out by both.
+                    // Only multicast goes out by both sockets.
                     if to.ip().is_multicast() || to.ip().is_loopback() == from_loopback {
                         let _ = socket.send_to(&self.datagram, to);
                     }
@@ -128,9 +132,10 @@ impl Goodbye {
     }
 }
 
-/// The whole datagram for the participant or the endpoint with this GUID, as that sample of this writer of announcements.
+/// Returns the datagram that disposes of the participant or endpoint `guid`, as sample `sequence_number` of the
+/// built-in `writer`.
 fn dispose_datagram(guid: &Guid, writer: EntityId, sequence_number: i64) -> Vec<u8> {
-    Message::from(guid).data(&Data {
+    Message::from_participant(guid).data(&Data {
         writer,
         sequence_number,
         inline_qos: &[(PID_KEY_HASH, guid), (PID_STATUS_INFO, &DISPOSED_AND_UNREGISTERED)],
@@ -138,8 +143,8 @@ fn dispose_datagram(guid: &Guid, writer: EntityId, sequence_number: i64) -> Vec<
     })
 }
 
-/// Every place where a participant that may know us listens for discovery: the multicast group,
-/// each participant slot of this machine, and the slots of the endpoints that we have met.
+/// Returns the discovery addresses of all participants that may know this one: the multicast group, each participant
+/// slot of this host, and the slots of the discovered endpoints.
 fn destinations(domain_id: u16, range: DiscoveryRange, endpoints: &[SocketAddr]) -> BTreeSet<SocketAddr> {
     if range == DiscoveryRange::Off {
         return BTreeSet::new();
@@ -152,15 +157,15 @@ fn destinations(domain_id: u16, range: DiscoveryRange, endpoints: &[SocketAddr])
     let this_machine = (0..PARTICIPANTS_PER_HOST)
         .filter_map(|slot| address(Ipv4Addr::LOCALHOST.into(), first_unicast + PORTS_PER_PARTICIPANT * slot));
     // User traffic goes to the odd port just above the participant's discovery port.
-    let met = endpoints.iter().filter_map(|endpoint| {
+    let discovered = endpoints.iter().filter_map(|endpoint| {
         let user_port = u32::from(endpoint.port());
-        let in_a_slot = (first_unicast + 1..first_port + PORTS_PER_DOMAIN).contains(&user_port)
+        let is_in_slot = (first_unicast + 1..first_port + PORTS_PER_DOMAIN).contains(&user_port)
             && (user_port - first_unicast) % PORTS_PER_PARTICIPANT == 1;
-        let reachable =
+        let is_reachable =
             endpoint.is_ipv4() && (range != DiscoveryRange::Localhost || endpoint.ip().is_loopback());
-        (in_a_slot && reachable).then(|| address(endpoint.ip(), user_port - 1)).flatten()
+        (is_in_slot && is_reachable).then(|| address(endpoint.ip(), user_port - 1)).flatten()
     });
-    multicast.into_iter().chain(this_machine).chain(met).collect()
+    multicast.into_iter().chain(this_machine).chain(discovered).collect()
 }
 
 #[cfg(test)]
@@ -168,7 +173,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_datagram_carries_the_key_hash_that_fast_dds_looks_for() {
+    fn the_datagram_contains_the_key_hash_that_fast_dds_requires() {
         let guid: [u8; 16] = [1, 0x12, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0, 1, 0xc1];
         let datagram = dispose_datagram(&guid, SPDP_WRITER, LAST_SEQUENCE_NUMBER);
         assert_eq!(&datagram[..8], b"RTPS\x02\x04\x01\x12");
@@ -183,37 +188,37 @@ mod tests {
     }
 
     #[test]
-    fn localhost_never_leaves_the_machine() {
-        let met = ["192.0.2.7:17411".parse().unwrap(), "127.0.0.1:17413".parse().unwrap()];
-        let places = destinations(40, DiscoveryRange::Localhost, &met);
-        assert!(places.iter().all(|p| p.ip().is_loopback() || p.ip().is_multicast()));
-        assert_eq!(places.len(), 1 + 120);
-        assert!(places.contains(&"239.255.0.1:17400".parse().unwrap()));
-        assert!(places.contains(&"127.0.0.1:17410".parse().unwrap()));
-        assert!(destinations(40, DiscoveryRange::Off, &met).is_empty());
+    fn localhost_has_loopback_and_multicast_destinations_only() {
+        let discovered = ["192.0.2.7:17411".parse().unwrap(), "127.0.0.1:17413".parse().unwrap()];
+        let addresses = destinations(40, DiscoveryRange::Localhost, &discovered);
+        assert!(addresses.iter().all(|p| p.ip().is_loopback() || p.ip().is_multicast()));
+        assert_eq!(addresses.len(), 1 + 120);
+        assert!(addresses.contains(&"239.255.0.1:17400".parse().unwrap()));
+        assert!(addresses.contains(&"127.0.0.1:17410".parse().unwrap()));
+        assert!(destinations(40, DiscoveryRange::Off, &discovered).is_empty());
     }
 
     #[test]
-    fn hosts_that_were_met_are_told_at_their_discovery_port() {
-        let met: Vec<SocketAddr> = [
+    fn discovered_hosts_are_addressed_at_their_discovery_port() {
+        let discovered: Vec<SocketAddr> = [
             "192.0.2.7:17411",
             "192.0.2.7:17411",
-            "192.0.2.8:17416", // an even port is nobody's user port
+            "192.0.2.8:17416", // an even port is not a user port
             "192.0.2.9:50000", // not from the port formula
             "[2001:db8::1]:17411",
         ]
         .iter()
         .map(|text| text.parse().unwrap())
         .collect();
-        let places = destinations(40, DiscoveryRange::Subnet, &met);
-        assert_eq!(places.len(), 1 + 120 + 1);
-        assert!(places.contains(&"192.0.2.7:17410".parse().unwrap()));
+        let addresses = destinations(40, DiscoveryRange::Subnet, &discovered);
+        assert_eq!(addresses.len(), 1 + 120 + 1);
+        assert!(addresses.contains(&"192.0.2.7:17410".parse().unwrap()));
     }
 
     #[test]
     fn the_last_domain_does_not_overflow_the_ports() {
-        let places = destinations(232, DiscoveryRange::Subnet, &[]);
-        assert!(places.iter().all(|p| p.port() >= 65400));
-        assert!(places.len() > 60);
+        let addresses = destinations(232, DiscoveryRange::Subnet, &[]);
+        assert!(addresses.iter().all(|p| p.port() >= 65400));
+        assert!(addresses.len() > 60);
     }
 }

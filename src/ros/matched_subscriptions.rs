@@ -1,0 +1,131 @@
+//! Matched subscriptions of each topic: messages without subscribers are not built.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use futures::StreamExt;
+use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, RTPSEntity, StatusEvented};
+
+use super::first_sample_nack::FirstSampleNack;
+use super::remote_endpoints::{DiscoveredEndpoints, RemoteEndpoints};
+
+/// Period at which topics without readers are detected. A new reader is reported by an event at once.
+const POLL_PERIOD: Duration = Duration::from_secs(1);
+
+/// Shared flag: true if a topic has matched subscriptions.
+#[derive(Debug, Clone)]
+pub struct MatchedSubscriptions(Arc<AtomicBool>);
+
+impl MatchedSubscriptions {
+    /// Returns a flag that is always true, for a topic whose messages are always built.
+    pub fn always() -> Self {
+        MatchedSubscriptions(Arc::new(AtomicBool::new(true)))
+    }
+
+    /// Returns true if the topic has at least one matched subscription.
+    pub fn has_any(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    fn set(&self, has_any: bool) {
+        self.0.store(has_any, Ordering::Relaxed);
+    }
+}
+
+/// Topics whose matched subscriptions are tracked.
+#[derive(Debug, Default)]
+pub struct MatchedSubscriptionTracker(Vec<TrackedTopic>);
+
+#[derive(Debug)]
+struct TrackedTopic {
+    writer: GUID,
+    /// Name of the topic in DDS.
+    name: String,
+    matched: MatchedSubscriptions,
+}
+
+impl MatchedSubscriptionTracker {
+    /// Adds the topic `name` (its name in DDS) of `writer`. Returns its flag, which is false until a reader is matched.
+    pub fn add(&mut self, writer: GUID, name: String) -> MatchedSubscriptions {
+        let matched = MatchedSubscriptions(Arc::new(AtomicBool::new(false)));
+        self.0.push(TrackedTopic { writer, name, matched: matched.clone() });
+        matched
+    }
+
+    /// Records that a reader has been matched with `writer`. Returns false if the writer is unknown.
+    fn record_match(&self, writer: GUID) -> bool {
+        let topic = self.0.iter().find(|topic| topic.writer == writer);
+        topic.inspect(|topic| topic.matched.set(true)).is_some()
+    }
+
+    /// Updates all flags from the readers that `participant` has discovered.
+    fn poll(&self, participant: &DomainParticipant) {
+        let readers = participant.discovered_readers();
+        self.update(&readers.iter().map(|r| r.subscription_topic_data.topic_name().as_str()).collect());
+    }
+
+    /// Sets the flags of the topics in `names` and clears all others.
+    fn update(&self, names: &HashSet<&str>) {
+        self.0.iter().for_each(|topic| topic.matched.set(names.contains(topic.name.as_str())));
+    }
+}
+
+/// Handles the status events of the participant until the task is aborted: updates the matched subscriptions,
+/// requests the first sample of matched writers, and counts discovered endpoints.
+///
+/// A participant delivers each event to one listener only, so this task handles all of them.
+pub(super) async fn run(
+    participant: DomainParticipant,
+    tracker: MatchedSubscriptionTracker,
+    discovered: DiscoveredEndpoints,
+) {
+    let first_sample = FirstSampleNack::open();
+    let mut remote = RemoteEndpoints::new(participant.guid(), discovered);
+    let status = participant.status_listener();
+    let mut events = status.as_async_status_stream();
+    let mut timer = tokio::time::interval(POLL_PERIOD);
+    loop {
+        tokio::select! {
+            event = events.next() => match event {
+                Some(DomainParticipantStatusEvent::RemoteReaderMatched { local_writer, .. }) => {
+                    // The writer of a rotated topic is not in the list.
+                    if !tracker.record_match(local_writer) {
+                        tracker.poll(&participant);
+                    }
+                }
+                Some(DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer }) => {
+                    if let Some(nack) = &first_sample {
+                        nack.request_first_sample(&participant, local_reader, remote_writer);
+                    }
+                }
+                Some(event) => remote.update(&event),
+                None => return,
+            },
+            _ = timer.tick() => tracker.poll(&participant),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_topic_has_matched_subscriptions_from_its_first_reader_until_the_last_has_left() {
+        let writer = |n: u8| GUID::from_bytes([n; 16]);
+        let mut tracker = MatchedSubscriptionTracker::default();
+        let (states, pose) =
+            (tracker.add(writer(1), "rt/states".to_owned()), tracker.add(writer(2), "rt/pose".to_owned()));
+        assert_eq!((states.has_any(), pose.has_any()), (false, false));
+        tracker.record_match(writer(1));
+        assert_eq!((states.has_any(), pose.has_any()), (true, false));
+        tracker.update(&HashSet::from(["rt/states", "rt/pose"]));
+        assert_eq!((states.has_any(), pose.has_any()), (true, true));
+        tracker.update(&HashSet::from(["rt/pose"]));
+        assert_eq!((states.has_any(), pose.has_any()), (false, true));
+        tracker.update(&HashSet::new());
+        assert!(MatchedSubscriptions::always().has_any() && !pose.has_any());
+    }
+}

@@ -1,0 +1,239 @@
+//! Rotation of DataWriters: a volatile topic gets a new writer after 2¹⁹ samples, to bound RustDDS's gap sets.
+//!
+//! For each matched reader, a volatile writer of RustDDS builds a set of the sequence numbers of all samples that it
+//! has ever written, because they are irrelevant (GAP) to that reader. The set takes about 30 bytes per sample and is
+//! built in the thread that sends everything. It lives until the reader acknowledges, or until a best-effort reader
+//! leaves. A topic therefore gets a new writer, numbered from 1, after [`MAX_SAMPLES`] samples, and the previous
+//! writer is disposed of.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use ros2_client::{Context, Node};
+use rustdds::{DomainParticipant, Topic, TopicDescription};
+use serde::Serialize;
+use tracing::warn;
+
+use super::announced_writers::dispose_sequence_number;
+use super::dispose::DisposeMessage;
+use super::environment::DiscoveryRange;
+use super::rtps::{Guid, is_secured};
+use super::stalled_readers::StalledReaders;
+
+/// Number of samples after which a writer is replaced: 52 minutes at the default rate.
+const MAX_SAMPLES: i64 = 1 << 19;
+/// Time from the creation of a new writer until it is used, in which readers discover it.
+const DISCOVERY_TIME: Duration = Duration::from_secs(5);
+/// Time for which a replaced writer is kept for readers that have not acknowledged its last samples.
+const RETENTION_TIME: Duration = Duration::from_secs(30);
+/// Period at which the sample counts are checked.
+const POLL_PERIOD: Duration = Duration::from_secs(1);
+
+/// DataWriter of a topic, with the handling of its stalled readers.
+pub(super) struct Writer<M: Serialize> {
+    network: ros2_client::Publisher<M>,
+    /// Sample count, and GAP for readers that do not acknowledge.
+    pub(super) readers: StalledReaders,
+}
+
+impl<M: Serialize> Writer<M> {
+    /// Creates a writer of `topic`; `max_unacknowledged` is the number of unacknowledged samples at which it blocks.
+    pub(super) fn new(
+        network: ros2_client::Publisher<M>,
+        topic: &Topic,
+        max_unacknowledged: usize,
+        participant: &DomainParticipant,
+    ) -> Self {
+        let readers =
+            StalledReaders::new(network.guid(), topic.name(), max_unacknowledged, participant.clone());
+        Writer { network, readers }
+    }
+
+    /// Writes a message as soon as the middleware has space for it.
+    pub(super) async fn write(&self, message: M) {
+        match self.network.async_publish(message).await {
+            Ok(()) => self.readers.record_write(),
+            Err(_) => warn!("a message could not be published"),
+        }
+    }
+}
+
+/// Current writer of a topic and, during a rotation, the next or the previous one.
+#[derive(Debug)]
+pub(super) struct WriterRotation<W>(Mutex<Generations<W>>);
+
+#[derive(Debug)]
+struct Generations<W> {
+    current: Arc<W>,
+    /// Next writer, and the time of its creation.
+    next: Option<(Arc<W>, Instant)>,
+    /// Previous writer, and the time of its replacement.
+    previous: Option<(Arc<W>, Instant)>,
+}
+
+impl<W> WriterRotation<W> {
+    /// Creates a rotation that begins with `first`.
+    pub(super) fn new(first: W) -> Self {
+        WriterRotation(Mutex::new(Generations { current: Arc::new(first), next: None, previous: None }))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Generations<W>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the writer of the last sample.
+    pub(super) fn current(&self) -> Arc<W> {
+        Arc::clone(&self.lock().current)
+    }
+
+    /// Returns the writer of the next sample; switches to the new writer when [`DISCOVERY_TIME`] has passed.
+    pub(super) fn advance(&self, now: impl FnOnce() -> Instant) -> Arc<W> {
+        let mut generations = self.lock();
+        if let Some((_, since)) = generations.next {
+            let now = now();
+            if now.duration_since(since) >= DISCOVERY_TIME {
+                generations.replace_current(now);
+            }
+        }
+        Arc::clone(&generations.current)
+    }
+
+    /// Returns true if no rotation is in progress.
+    fn is_single(&self) -> bool {
+        let generations = self.lock();
+        generations.next.is_none() && generations.previous.is_none()
+    }
+
+    fn prepare(&self, next: W, now: Instant) {
+        self.lock().next = Some((Arc::new(next), now));
+    }
+
+    /// Takes out the previous writer when [`RETENTION_TIME`] has passed.
+    fn take_retired(&self, now: Instant) -> Option<Arc<W>> {
+        let retired = self.lock().previous.take_if(|(_, since)| now.duration_since(*since) >= RETENTION_TIME);
+        retired.map(|(writer, _)| writer)
+    }
+}
+
+impl<W> Generations<W> {
+    fn replace_current(&mut self, now: Instant) {
+        if let Some((next, _)) = self.next.take() {
+            self.previous = Some((std::mem::replace(&mut self.current, next), now));
+        }
+    }
+}
+
+/// Topics whose writers are rotated.
+#[derive(Default)]
+pub struct RotatedTopics(Vec<Box<dyn RotatedTopic>>);
+
+/// Node that owns the rotated writers.
+pub struct RotationContext {
+    /// Node of the writers.
+    pub node: Node,
+    /// ROS context of the node.
+    pub context: Context,
+    /// Network range in which the node is announced.
+    pub range: DiscoveryRange,
+}
+
+/// Number of writers that ros2-client does not list: the response writers of `send_goal` and `get_result`
+/// (`Service::for_action`).
+const WRITERS_OUTSIDE_NODES: usize = 2;
+
+/// Rotated topic of any message type.
+trait RotatedTopic: Send {
+    /// Creates the next writer if the current one has written [`MAX_SAMPLES`].
+    fn prepare_next(&self, node: &mut Node, now: Instant) -> Result<(), String>;
+    /// Drops the previous writer when its retention time has passed, after a call of `dispose` with its GUID.
+    fn retire(&self, now: Instant, dispose: &mut dyn FnMut(Guid));
+    /// Returns the name of the topic in DDS.
+    fn name(&self) -> String;
+}
+
+struct TypedTopic<M: Serialize> {
+    writers: Arc<WriterRotation<Writer<M>>>,
+    topic: Topic,
+    max_unacknowledged: usize,
+    participant: DomainParticipant,
+}
+
+impl<M: Serialize + Send + Sync + 'static> RotatedTopic for TypedTopic<M> {
+    fn prepare_next(&self, node: &mut Node, now: Instant) -> Result<(), String> {
+        if self.writers.is_single() && self.writers.current().readers.written() >= MAX_SAMPLES {
+            let network = node.create_publisher(&self.topic, None).map_err(|e| e.to_string())?;
+            let writer = Writer::new(network, &self.topic, self.max_unacknowledged, &self.participant);
+            self.writers.prepare(writer, now);
+        }
+        Ok(())
+    }
+
+    fn retire(&self, now: Instant, dispose: &mut dyn FnMut(Guid)) {
+        if let Some(retired) = self.writers.take_retired(now) {
+            dispose(retired.network.guid().to_bytes());
+        }
+    }
+
+    fn name(&self) -> String {
+        self.topic.name()
+    }
+}
+
+impl RotatedTopics {
+    /// Adds a topic with its current writer.
+    pub(super) fn add<M: Serialize + Send + Sync + 'static>(
+        &mut self,
+        writers: Arc<WriterRotation<Writer<M>>>,
+        topic: Topic,
+        max_unacknowledged: usize,
+        participant: DomainParticipant,
+    ) {
+        self.0.push(Box::new(TypedTopic { writers, topic, max_unacknowledged, participant }));
+    }
+
+    /// Rotates the writers until the task is aborted.
+    pub async fn run(self, mut owner: RotationContext) {
+        let mut timer = tokio::time::interval(POLL_PERIOD);
+        let mut disposed = 0;
+        loop {
+            timer.tick().await;
+            let now = Instant::now();
+            for topic in &self.0 {
+                topic.retire(now, &mut |writer| {
+                    if !is_secured() {
+                        let participant = owner.context.domain_participant();
+                        let number = dispose_sequence_number(&owner.context, WRITERS_OUTSIDE_NODES, disposed);
+                        DisposeMessage::for_writer(&writer, number, &participant, owner.range).send_once();
+                    }
+                    disposed += 1;
+                });
+                if let Err(reason) = topic.prepare_next(&mut owner.node, now) {
+                    let name = topic.name();
+                    warn!("cannot create a new writer for {}: {reason}", name.trim_start_matches("rt"));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_next_writer_is_used_after_the_discovery_time_and_the_previous_one_is_retained() {
+        let began = Instant::now();
+        let writers = WriterRotation::new("first");
+        let at = |seconds: u64| began + Duration::from_secs(seconds);
+        let advance = |seconds| *writers.advance(|| at(seconds));
+        assert_eq!((advance(0), writers.is_single()), ("first", true));
+        writers.prepare("second", at(10));
+        assert_eq!((advance(14), writers.is_single()), ("first", false));
+        // No sample has been written since the discovery time; the next one is written by the second.
+        assert_eq!(*writers.current(), "first");
+        assert_eq!((advance(100), *writers.current()), ("second", "second"));
+        assert_eq!((writers.take_retired(at(129)), writers.is_single()), (None, false));
+        assert_eq!((writers.take_retired(at(130)).as_deref(), writers.is_single()), (Some(&"first"), true));
+        assert_eq!(advance(200), "second");
+    }
+}
