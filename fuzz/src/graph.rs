@@ -7,10 +7,15 @@ use byteorder::{BigEndian, LittleEndian};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use virtual_axes::ingress::parameters::{
-    LiveNodeParameters, Settings, check_count, descriptor_to_wire, list, parameter_from_wire, result_to_wire,
-    type_number, value_to_wire,
+    LiveNodeParameters, ParameterStore, check_count, descriptor_to_wire, list_parameters,
+    parameter_from_wire, result_to_wire, type_number, value_to_wire,
 };
-use virtual_axes::ingress::{Candidate, Checks, GoalChecks, Order, Setpoints, loads, select};
+use virtual_axes::ingress::{
+    CancelCandidate, GoalValidator, ReorderFilter, StreamSetpoints, TrajectoryValidator, loads,
+    select_goals_to_cancel,
+};
+use virtual_axes_core::trajectory::MotionId;
+use virtual_axes_core::units::SECOND_NS;
 use virtual_axes_io::messages::action_msgs::srv::CancelGoalRequest;
 use virtual_axes_io::messages::rcl_interfaces::srv::{
     DescribeParametersRequest, GetParameterTypesRequest, GetParametersRequest, ListParametersRequest,
@@ -21,8 +26,6 @@ use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 use virtual_axes_io::messages::std_srvs::srv::TriggerRequest;
 use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectory;
 use virtual_axes_io::messages::{self, GetResultRequest, SendGoalRequest, nanoseconds};
-use virtual_axes_core::trajectory::MotionId;
-use virtual_axes_core::units::SECOND_NS;
 
 use crate::{JOINTS, MACHINE, ORIGIN, PARAMETERS, bounded, machine_at_rest, names, refused, step};
 
@@ -53,10 +56,15 @@ fn decode<T: DeserializeOwned + Serialize + PartialEq + Debug>(sample: &[u8]) ->
     Some(message)
 }
 
-fn checks() -> Checks {
+fn validator() -> TrajectoryValidator {
     let live = Arc::new(LiveNodeParameters::default());
     let config = PARAMETERS.node_config();
-    Checks { joints: JOINTS.clone(), period: MACHINE.periods().position, max_points: config.max_points, live }
+    TrajectoryValidator {
+        joints: JOINTS.clone(),
+        period: MACHINE.periods().position,
+        max_points: config.max_points,
+        live,
+    }
 }
 
 /// Times that are checked instant by instant take as long as they are.
@@ -71,7 +79,7 @@ pub fn cdr_psec(data: &[u8]) {
     bounded(data.len(), || {
         let Some(mut message) = decode::<JointTrajectory>(data) else { return };
         shorten_times(&mut message);
-        let trajectory = match checks().check(&message) {
+        let trajectory = match validator().validate(&message) {
             Ok(trajectory) => trajectory,
             Err(rejection) => return refused(&rejection.to_string()),
         };
@@ -79,7 +87,7 @@ pub fn cdr_psec(data: &[u8]) {
         let again = messages::joint_trajectory(&request);
         assert_eq!(messages::request(&again, usize::MAX).as_ref(), Ok(&request));
         let mut simulation = machine_at_rest();
-        if let Err(rejection) = simulation.offer(MotionId(1), Arc::new(trajectory)) {
+        if let Err(rejection) = simulation.submit(MotionId(1), Arc::new(trajectory)) {
             refused(&rejection.to_string());
         }
         step(&mut simulation, PERIODS);
@@ -92,14 +100,14 @@ pub fn cdr_joint_state(data: &[u8]) {
         let Some(message) = decode::<JointState>(data) else { return };
         let names = names();
         let mut simulation = machine_at_rest();
-        let mut order = Order::default();
+        let mut order = ReorderFilter::default();
         for publisher in [[1; 16], [1; 16], [2; 16]] {
-            let setpoints = Setpoints::in_order(&message, &names, publisher, &mut order);
-            assert!(!setpoints.overtaken, "the same stamp is not older");
+            let setpoints = StreamSetpoints::from_message_in_order(&message, &names, publisher, &mut order);
+            assert!(!setpoints.is_reordered, "the same stamp is not older");
             assert!(setpoints.positions.len() <= names.len());
-            setpoints.refused.iter().for_each(|rejection| refused(&rejection.to_string()));
+            setpoints.rejected.iter().for_each(|rejection| refused(&rejection.to_string()));
             for &(place, position) in &setpoints.positions {
-                if let Err(rejection) = simulation.stream_sent(place, position, setpoints.sent) {
+                if let Err(rejection) = simulation.submit_setpoint_stamped(place, position, setpoints.sent) {
                     refused(&rejection.to_string());
                 }
             }
@@ -118,13 +126,14 @@ pub fn cdr_goal(data: &[u8]) {
     bounded(data.len(), || {
         let Some(mut message) = decode::<SendGoalRequest>(data) else { return };
         shorten_times(&mut message.goal.trajectory);
-        let goals = GoalChecks { checks: Arc::new(checks()) };
-        match goals.check(&message.goal) {
+        let goals = GoalValidator { trajectories: Arc::new(validator()) };
+        match goals.validate(&message.goal) {
             Ok((trajectory, tolerances)) => {
                 let columns = trajectory.joints().len();
                 assert_eq!((tolerances.path.len(), tolerances.goal.len()), (columns, columns));
                 let mut simulation = machine_at_rest();
-                if let Err(rejection) = simulation.offer_within(MotionId(1), Arc::new(trajectory), tolerances)
+                if let Err(rejection) =
+                    simulation.submit_with_tolerances(MotionId(1), Arc::new(trajectory), tolerances)
                 {
                     refused(&rejection.to_string());
                 }
@@ -137,7 +146,7 @@ pub fn cdr_goal(data: &[u8]) {
 
 /// Requests to the parameter services; the last byte of the header says which.
 pub fn cdr_parameters(data: &[u8]) {
-    let settings = || Settings::new(PARAMETERS.clone(), Arc::default());
+    let settings = || ParameterStore::new(PARAMETERS.clone(), Arc::default());
     bounded(data.len(), || match data.get(HEADER - 1).copied().unwrap_or_default() % 6 {
         0 | 1 => {
             let parameters = match data.get(HEADER - 1).copied().unwrap_or_default() % 6 {
@@ -154,7 +163,7 @@ pub fn cdr_parameters(data: &[u8]) {
                 Err(reason) => return refused(&reason),
             };
             let mut settings = settings();
-            let result = settings.check(changes.clone()).map(|(changed, _)| settings.adopt(changed));
+            let result = settings.check(changes.clone()).map(|(changed, _)| settings.replace(changed));
             if let Err(reason) = &result {
                 refused(reason);
                 assert_eq!(settings.parameters(), &*PARAMETERS, "what is refused changes nothing");
@@ -192,7 +201,7 @@ pub fn cdr_parameters(data: &[u8]) {
         4 => {
             let Some(request) = decode::<ListParametersRequest>(data) else { return };
             let names = settings().names();
-            let found = list(&names, &request.prefixes, request.depth);
+            let found = list_parameters(&names, &request.prefixes, request.depth);
             assert!(found.names.iter().all(|name| names.contains(name)));
         }
         _ => {
@@ -217,12 +226,12 @@ pub fn cdr_other(data: &[u8]) {
         _ => {
             let Some(request) = decode::<CancelGoalRequest>(data) else { return };
             let asked = &request.goal_info;
-            let goals = (0..4u8).map(|n| Candidate {
+            let goals = (0..4u8).map(|n| CancelCandidate {
                 id: [n; 16],
                 stamp: ORIGIN + i64::from(n) * SECOND_NS,
-                cancelable: n != 2,
+                is_cancelable: n != 2,
             });
-            match select(&asked.goal_id.uuid, nanoseconds(&asked.stamp), goals) {
+            match select_goals_to_cancel(&asked.goal_id.uuid, nanoseconds(&asked.stamp), goals) {
                 Ok(ids) => assert!(ids.len() <= 3 && !ids.contains(&[2; 16])),
                 Err(code) => assert!(code > 0),
             }

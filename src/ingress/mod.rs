@@ -1,22 +1,24 @@
-//! The door: what comes in from a graph or on the command line of a node, as values that have been
-//! checked. It knows no network: the room `ros` receives, and hands over here.
+//! Ingress of the node: conversion and validation of ROS messages, goals, parameters and the command line.
+//!
+//! The module contains no network code. The module `ros` receives messages and passes them here; the results
+//! are validated values, rejections, or error texts.
 
+mod admission_control;
 pub mod args;
-mod cancel;
-mod checks;
-mod goal;
-mod held;
+mod cancel_selection;
+mod goal_validator;
 mod loads;
 pub mod names;
 pub mod parameters;
 mod stream;
+mod trajectory_validator;
 
-pub use cancel::{Candidate, select};
-pub use checks::Checks;
-pub use goal::GoalChecks;
-pub use held::Held;
+pub use admission_control::AdmissionControl;
+pub use cancel_selection::{CancelCandidate, select_goals_to_cancel};
+pub use goal_validator::GoalValidator;
 pub use loads::loads;
-pub use stream::{Order, Setpoints};
+pub use stream::{ReorderFilter, StreamSetpoints};
+pub use trajectory_validator::TrajectoryValidator;
 
-/// Names a goal; its client chose it.
+/// Identifier of an action goal (UUID), chosen by its client.
 pub type GoalId = [u8; 16];

@@ -1,21 +1,21 @@
-//! ROS names: which are valid, and what a name written in a program stands for in the graph.
+//! ROS names: validation, and expansion of relative and private names (`~/x`) to fully qualified names.
 
 use std::fmt;
 
-/// Longest fully qualified name that the middlewares take (255 less the prefixes that they add).
+/// Largest length of a fully qualified name (255 minus the prefixes added by the middleware).
 const MAX_NAME_LENGTH: usize = 247;
-/// Longest node name.
+/// Largest length of a node name.
 const MAX_NODE_NAME_LENGTH: usize = 255;
 
-/// A name that ROS does not allow.
+/// Invalid ROS name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("'{name}' is not a valid {kind}: {reason}")]
 pub struct NameError {
-    /// The name as it was given.
+    /// Name as given.
     pub name: String,
-    /// What it was meant to be.
+    /// Kind of name.
     pub kind: &'static str,
-    /// Which rule it breaks.
+    /// Violated rule.
     pub reason: &'static str,
 }
 
@@ -25,7 +25,7 @@ impl NameError {
     }
 }
 
-/// A node's name in the graph: namespace and base name, both valid.
+/// Fully qualified node name: namespace and base name, both valid.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NodeFqn {
     namespace: String,
@@ -33,34 +33,35 @@ pub struct NodeFqn {
 }
 
 impl NodeFqn {
-    /// `namespace` is absolute (`/` or `/cell/mill`), `name` a single token.
+    /// Creates the name from an absolute `namespace` (`/` or `/cell/mill`) and `name`, a single token.
     ///
     /// # Errors
-    /// Either of them breaks a rule.
+    /// [`NameError`] if either of them is invalid.
     pub fn new(namespace: &str, name: &str) -> Result<Self, NameError> {
         check_namespace(namespace)?;
         check_node_name(name)?;
         Ok(Self { namespace: namespace.to_owned(), name: name.to_owned() })
     }
 
-    /// The namespace, beginning with a slash.
+    /// Namespace, with a leading slash.
     #[must_use]
     pub fn namespace(&self) -> &str {
         &self.namespace
     }
 
-    /// The base name.
+    /// Base name.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The absolute name that a topic or service name in this node stands for: `/x` is itself,
-    /// `x` is in the node's namespace, `~/x` (and `~`) under the node's own name; `{node}`, `{ns}`
-    /// and `{namespace}` are replaced.
+    /// Expands a topic or service name of this node to its fully qualified name.
+    ///
+    /// `/x` is absolute, `x` is relative to the namespace of the node, `~/x` and `~` are private to the node;
+    /// `{node}`, `{ns}` and `{namespace}` are substituted.
     ///
     /// # Errors
-    /// The name breaks a rule of ROS names.
+    /// [`NameError`] if the name is invalid.
     ///
     /// ```
     /// use virtual_axes::ingress::names::NodeFqn;
@@ -96,10 +97,10 @@ impl NodeFqn {
         }
     }
 
-    /// Whether `pattern` before a parameter or a remapping rule means this node: its base name, or
-    /// its full name.
+    /// Returns true if `pattern`, the prefix of a parameter or remapping rule, matches this node by its base
+    /// name or its fully qualified name.
     #[must_use]
-    pub fn is_meant_by(&self, pattern: &str) -> bool {
+    pub fn matches(&self, pattern: &str) -> bool {
         pattern == self.name || pattern == self.to_string()
     }
 }
@@ -111,7 +112,7 @@ impl fmt::Display for NodeFqn {
     }
 }
 
-/// Checks a node's base name: letters, digits and underscores, not beginning with a digit.
+/// Checks the base name of a node: letters, digits and underscores, no leading digit.
 pub(super) fn check_node_name(name: &str) -> Result<(), NameError> {
     let bad = |reason| Err(NameError::new(name, "node name", reason));
     if name.is_empty() {
@@ -127,7 +128,7 @@ pub(super) fn check_node_name(name: &str) -> Result<(), NameError> {
     }
 }
 
-/// Checks a namespace: absolute, and without a slash at its end unless it is the root.
+/// Checks a namespace: absolute, and without a trailing slash unless it is the root.
 pub(crate) fn check_namespace(namespace: &str) -> Result<(), NameError> {
     let bad = |reason| Err(NameError::new(namespace, "namespace", reason));
     match namespace.strip_prefix('/') {
@@ -148,23 +149,23 @@ fn is_token_character(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_'
 }
 
-/// Tokens between slashes, without the leading one. On failure, the rule that is broken.
+/// Checks the tokens between slashes, without the leading slash; returns the violated rule.
 fn check_tokens(tokens: &str) -> Result<(), &'static str> {
     if tokens.is_empty() {
         return Err("it is empty");
     }
     for token in tokens.split('/') {
         if token.is_empty() {
-            return Err("a slash stands at its end or beside another slash");
+            return Err("it has a trailing slash or two adjacent slashes");
         }
         if token.starts_with(|c: char| c.is_ascii_digit()) {
             return Err("a part of it begins with a digit");
         }
         if !token.chars().all(is_token_character) {
-            return Err("allowed are letters, digits, underscores and slashes, and ~/ at its beginning");
+            return Err("allowed are letters, digits, underscores, slashes, and a leading ~/");
         }
         if token.contains("__") {
-            return Err("two underscores stand side by side");
+            return Err("it has two adjacent underscores");
         }
     }
     Ok(())
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_would_break_the_middleware_are_refused() {
+    fn invalid_names_are_rejected() {
         let node = NodeFqn::new("/", "mill").unwrap();
         for name in [
             "",

@@ -1,111 +1,117 @@
-//! Setpoints of a stream from messages, and which messages come too late.
+//! Streamed setpoints from `JointState` messages, and a filter of reordered (late) messages.
 
 use std::collections::VecDeque;
 
-use virtual_axes_core::trajectory::{Code, Rejection};
+use virtual_axes_core::trajectory::{Rejection, RejectionCode};
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 use virtual_axes_io::messages::nanoseconds;
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
-/// A message whose stamp is older than the one before by more than this comes from a clock that was
-/// set back; by less, it was overtaken on its way.
+/// Decrease of the stamp above which the clock of the publisher was set back, ns; below it, the message was
+/// reordered in the network.
 const CLOCK_SET_BACK: Nanoseconds = SECOND_NS;
-/// Refusals of one message that are kept; a message can name more joints than there are, and more than there
-/// is memory for.
-const MOST_REFUSED: usize = 16;
-/// Publishers whose last stamp is remembered.
-const MOST_PUBLISHERS: usize = 64;
+/// Largest number of stored rejections of one message, which can contain any number of unknown joints.
+const MAX_REJECTIONS: usize = 16;
+/// Largest number of publishers with a stored stamp.
+const MAX_PUBLISHERS: usize = 64;
 
-/// The setpoints of one message.
+/// Setpoints of one message.
 #[derive(Debug, Default)]
-pub struct Setpoints {
-    /// Place of the axis in `joints`, and position, m or rad.
+pub struct StreamSetpoints {
+    /// Index of the axis in `joints`, and position setpoint, m or rad.
     pub positions: Vec<(usize, f64)>,
-    /// What is refused without asking the axes.
-    pub refused: Vec<Rejection>,
-    /// How many more were refused.
-    pub refused_beside: u64,
-    /// When it was sent by the sender's clock, ns; none if it does not say.
+    /// Rejections that do not depend on the state of the axes.
+    pub rejected: Vec<Rejection>,
+    /// Number of further rejections, which are not stored.
+    pub unlisted_rejections: u64,
+    /// Source time stamp, ns; `None` if the stamp is 0.
     pub sent: Option<Nanoseconds>,
-    /// Whether a younger message of its publisher came before it.
-    pub overtaken: bool,
+    /// A later message of the same publisher arrived before this one, so it is ignored.
+    pub is_reordered: bool,
 }
 
-/// The youngest stamp of each publisher.
+/// Filter of reordered messages by the latest stamp of each publisher.
 #[derive(Debug, Default)]
-pub struct Order {
-    /// The publisher's id, and its youngest stamp, ns.
-    youngest: VecDeque<([u8; 16], Nanoseconds)>,
+pub struct ReorderFilter {
+    /// Publisher id and its latest stamp, ns.
+    latest: VecDeque<([u8; 16], Nanoseconds)>,
 }
 
-impl Order {
-    /// Whether a message of `publisher` that was sent at `sent` comes after a younger one.
-    pub fn is_overtaken(&mut self, publisher: [u8; 16], sent: Option<Nanoseconds>) -> bool {
+impl ReorderFilter {
+    /// Returns true if a later message of `publisher` arrived before the message with the stamp `sent`, ns.
+    pub fn is_reordered(&mut self, publisher: [u8; 16], sent: Option<Nanoseconds>) -> bool {
         let Some(sent) = sent else { return false };
-        let Some((_, youngest)) = self.youngest.iter_mut().find(|(known, _)| *known == publisher) else {
-            if self.youngest.len() == MOST_PUBLISHERS {
-                self.youngest.pop_front();
+        let Some((_, latest)) = self.latest.iter_mut().find(|(known, _)| *known == publisher) else {
+            if self.latest.len() == MAX_PUBLISHERS {
+                self.latest.pop_front();
             }
-            self.youngest.push_back((publisher, sent));
+            self.latest.push_back((publisher, sent));
             return false;
         };
-        let is_overtaken = sent < *youngest && *youngest - sent <= CLOCK_SET_BACK;
-        if !is_overtaken {
-            *youngest = sent;
+        let is_reordered = sent < *latest && *latest - sent <= CLOCK_SET_BACK;
+        if !is_reordered {
+            *latest = sent;
         }
-        is_overtaken
+        is_reordered
     }
 }
 
-impl Setpoints {
-    /// The setpoints of a message, joint by joint: what is wrong with one leaves the others.
+impl StreamSetpoints {
+    /// Creates the setpoints of a message; a rejection of one joint does not affect the others.
     ///
-    /// As ros2_control's topic-based hardware means it: NaN and a `position` shorter than `name` leave
-    /// the joint alone.
-    pub fn of(message: &JointState, joints: &[String]) -> Self {
+    /// NaN and a `position` shorter than `name` mean no setpoint for the joint, as in ros2_control's
+    /// topic-based hardware. Infinite setpoints are rejected by the simulation.
+    pub fn from_message(message: &JointState, joints: &[String]) -> Self {
         let sent = Some(nanoseconds(&message.header.stamp)).filter(|&stamp| stamp != 0);
         let mut setpoints = Self { sent, ..Self::default() };
         let (names, positions) = (&message.name, &message.position);
         if positions.len() > names.len() {
             let (found, wanted) = (positions.len(), names.len());
-            let text = format!("{found} positions for {wanted} joints; position has no more than name");
-            let rejection = Rejection::new(Code::WrongSize, text).numbers(found as f64, wanted as f64);
-            setpoints.refused.push(rejection);
+            let text =
+                format!("{found} positions for {wanted} joints; give at most one position for each name");
+            let rejection =
+                Rejection::new(RejectionCode::WrongSize, text).numbers(found as f64, wanted as f64);
+            setpoints.rejected.push(rejection);
             return setpoints;
         }
-        let mut refused = 0;
+        let mut count = 0;
         for (name, &position) in names.iter().zip(positions).filter(|(_, position)| !position.is_nan()) {
-            let place = joints.iter().position(|joint| joint == name);
-            match place.filter(|&place| setpoints.positions.iter().all(|&(taken, _)| taken != place)) {
-                Some(place) => setpoints.positions.push((place, position)),
+            let index = joints.iter().position(|joint| joint == name);
+            match index.filter(|&index| setpoints.positions.iter().all(|&(given, _)| given != index)) {
+                Some(index) => setpoints.positions.push((index, position)),
                 None => {
-                    refused += 1;
-                    if refused <= MOST_REFUSED {
-                        setpoints.refused.push(refusal(name, place.is_some(), joints));
+                    count += 1;
+                    if count <= MAX_REJECTIONS {
+                        setpoints.rejected.push(rejection(name, index.is_some(), joints));
                     }
                 }
             }
         }
-        setpoints.refused_beside = refused.saturating_sub(MOST_REFUSED) as u64;
+        setpoints.unlisted_rejections = count.saturating_sub(MAX_REJECTIONS) as u64;
         setpoints
     }
 
-    /// Likewise, of a message of `publisher`; one that was overtaken has none.
-    pub fn in_order(message: &JointState, joints: &[String], publisher: [u8; 16], order: &mut Order) -> Self {
-        let setpoints = Self::of(message, joints);
-        if order.is_overtaken(publisher, setpoints.sent) {
-            return Self { overtaken: true, ..Self::default() };
+    /// Creates the setpoints of a message of `publisher`; a reordered message has none.
+    pub fn from_message_in_order(
+        message: &JointState,
+        joints: &[String],
+        publisher: [u8; 16],
+        filter: &mut ReorderFilter,
+    ) -> Self {
+        let setpoints = Self::from_message(message, joints);
+        if filter.is_reordered(publisher, setpoints.sent) {
+            return Self { is_reordered: true, ..Self::default() };
         }
         setpoints
     }
 }
 
-/// Why a joint's setpoint is not taken: it has one already, or it is none of `joints`.
-fn refusal(name: &str, is_known: bool, joints: &[String]) -> Rejection {
+/// Returns the rejection of a setpoint of an unknown or repeated joint.
+fn rejection(name: &str, is_known: bool, joints: &[String]) -> Rejection {
     let (code, text) = if is_known {
-        (Code::DuplicateJoint, format!("joint {name} is named twice; the first counts"))
+        (RejectionCode::DuplicateJoint, format!("joint {name} is given twice; the first setpoint is used"))
     } else {
-        (Code::UnknownJoint, format!("unknown joint {name}; there are {}", joints.join(", ")))
+        (RejectionCode::UnknownJoint, format!("unknown joint {name}; the machine has {}", joints.join(", ")))
     };
     Rejection::new(code, text).joint(name)
 }
@@ -114,55 +120,58 @@ fn refusal(name: &str, is_known: bool, joints: &[String]) -> Rejection {
 mod tests {
     use super::*;
 
-    fn setpoints(name: &[&str], position: &[f64]) -> Setpoints {
+    fn setpoints(name: &[&str], position: &[f64]) -> StreamSetpoints {
         let joints = ["x", "y", "z"].map(str::to_owned);
         let name = name.iter().map(|&n| n.to_owned()).collect();
-        Setpoints::of(&JointState { name, position: position.to_vec(), ..JointState::default() }, &joints)
+        StreamSetpoints::from_message(
+            &JointState { name, position: position.to_vec(), ..JointState::default() },
+            &joints,
+        )
     }
 
     #[test]
-    fn nan_and_missing_positions_leave_a_joint_alone() {
+    fn nan_and_missing_positions_are_no_setpoint() {
         let found = setpoints(&["z", "x", "y"], &[f64::NAN, 0.1]);
         assert_eq!(found.positions, [(0, 0.1)]);
-        assert!(found.refused.is_empty());
+        assert!(found.rejected.is_empty());
         assert!(setpoints(&["x"], &[]).positions.is_empty());
     }
 
     #[test]
-    fn what_is_wrong_with_one_joint_leaves_the_others() {
+    fn a_rejected_joint_does_not_affect_the_others() {
         let found = setpoints(&["q", "x", "x", "y"], &[0.1, 0.2, 0.3, f64::INFINITY]);
         assert_eq!(found.positions, [(0, 0.2), (1, f64::INFINITY)]);
-        let codes: Vec<_> = found.refused.iter().map(|r| r.code).collect();
-        assert_eq!(codes, [Code::UnknownJoint, Code::DuplicateJoint]);
+        let codes: Vec<_> = found.rejected.iter().map(|r| r.code).collect();
+        assert_eq!(codes, [RejectionCode::UnknownJoint, RejectionCode::DuplicateJoint]);
     }
 
     #[test]
     fn a_message_of_many_unknown_joints_takes_no_memory_for_each() {
         let found = setpoints(&["q"; 10_000], &[0.1; 10_000]);
-        assert_eq!((found.refused.len(), found.refused_beside), (MOST_REFUSED, 10_000 - 16));
+        assert_eq!((found.rejected.len(), found.unlisted_rejections), (MAX_REJECTIONS, 10_000 - 16));
         let found = setpoints(&["x"; 10_000], &[0.1; 10_000]);
-        assert_eq!((found.positions.len(), found.refused.len()), (1, MOST_REFUSED));
-        assert_eq!(found.refused_beside, 10_000 - 1 - 16);
+        assert_eq!((found.positions.len(), found.rejected.len()), (1, MAX_REJECTIONS));
+        assert_eq!(found.unlisted_rejections, 10_000 - 1 - 16);
     }
 
     #[test]
-    fn more_positions_than_names_belong_to_nobody_knows_which() {
+    fn more_positions_than_names_are_rejected() {
         let found = setpoints(&["x"], &[0.1, 0.2]);
         assert!(found.positions.is_empty());
-        assert_eq!(found.refused[0].code, Code::WrongSize);
+        assert_eq!(found.rejected[0].code, RejectionCode::WrongSize);
     }
 
     #[test]
-    fn of_each_publisher_what_was_overtaken_is_left_out() {
-        let mut order = Order::default();
+    fn reordered_messages_of_each_publisher_are_detected() {
+        let mut filter = ReorderFilter::default();
         let (one, other) = ([1; 16], [2; 16]);
-        let mut is_overtaken = |publisher, sent| order.is_overtaken(publisher, sent);
-        assert!(!is_overtaken(one, Some(10 * SECOND_NS)));
-        assert!(!is_overtaken(one, Some(10 * SECOND_NS)), "twice the same");
-        assert!(is_overtaken(one, Some(10 * SECOND_NS - 1)));
-        assert!(!is_overtaken(one, None), "no stamp");
-        assert!(!is_overtaken(other, Some(9 * SECOND_NS)));
-        assert!(!is_overtaken(one, Some(8 * SECOND_NS)), "its clock was set back");
-        assert!(!is_overtaken(one, Some(8 * SECOND_NS + 1)));
+        let mut is_reordered = |publisher, sent| filter.is_reordered(publisher, sent);
+        assert!(!is_reordered(one, Some(10 * SECOND_NS)));
+        assert!(!is_reordered(one, Some(10 * SECOND_NS)), "same stamp");
+        assert!(is_reordered(one, Some(10 * SECOND_NS - 1)));
+        assert!(!is_reordered(one, None), "no stamp");
+        assert!(!is_reordered(other, Some(9 * SECOND_NS)));
+        assert!(!is_reordered(one, Some(8 * SECOND_NS)), "clock set back");
+        assert!(!is_reordered(one, Some(8 * SECOND_NS + 1)));
     }
 }

@@ -1,12 +1,12 @@
-//! Properties of what comes in from a graph: messages and requests of any content, and of any bytes.
+//! Property tests of the ingress: messages and requests with arbitrary content and arbitrary bytes.
 
 use std::sync::{Arc, LazyLock};
 
 use byteorder::{BigEndian, LittleEndian};
 use proptest::prelude::*;
-use virtual_axes::ingress::parameters::{LiveNodeParameters, ParameterValue, Settings};
-use virtual_axes::ingress::{Checks, GoalChecks, Order, Setpoints, loads};
-use virtual_axes_core::config::{Kind, Parameters};
+use virtual_axes::ingress::parameters::{LiveNodeParameters, ParameterStore, ParameterValue};
+use virtual_axes::ingress::{GoalValidator, ReorderFilter, StreamSetpoints, TrajectoryValidator, loads};
+use virtual_axes_core::config::{ParameterKind, Parameters};
 use virtual_axes_core::simulation::{self, Simulation};
 use virtual_axes_core::trajectory::{JointLimits, MotionId};
 use virtual_axes_core::units::SECOND_NS;
@@ -16,23 +16,25 @@ use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 use virtual_axes_io::messages::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
 use virtual_axes_io::messages::{FollowJointTrajectoryGoal, JointTolerance, SendGoalRequest};
 
-/// Longest refusal, bytes.
-const LONGEST_REFUSAL: usize = 2000;
+/// Largest length of a rejection text, bytes.
+const MAX_REJECTION_LENGTH: usize = 2000;
 
-static DEFAULT: LazyLock<Parameters> = LazyLock::new(|| Parameters::embedded_default().expect("shipped"));
+static DEFAULT: LazyLock<Parameters> =
+    LazyLock::new(|| Parameters::embedded_default().expect("default machine"));
 
 fn joints() -> Vec<JointLimits> {
-    simulation::joints(&DEFAULT.machine_config().expect("shipped"), "")
+    simulation::joint_limits(&DEFAULT.machine_config().expect("default machine"), "")
 }
 
-fn checks() -> Checks {
-    let config = DEFAULT.machine_config().expect("shipped");
+fn validator() -> TrajectoryValidator {
+    let config = DEFAULT.machine_config().expect("default machine");
     let live = Arc::new(LiveNodeParameters::default());
-    Checks { joints: joints(), period: config.periods().position, max_points: 1000, live }
+    TrajectoryValidator { joints: joints(), period: config.periods().position, max_points: 1000, live }
 }
 
 fn at_rest() -> Simulation {
-    Simulation::new(&DEFAULT.machine_config().expect("shipped"), joints(), SECOND_NS).expect("shipped")
+    Simulation::new(&DEFAULT.machine_config().expect("default machine"), joints(), SECOND_NS)
+        .expect("default machine")
 }
 
 fn is_finite(simulation: &mut Simulation) -> bool {
@@ -45,9 +47,9 @@ fn is_finite(simulation: &mut Simulation) -> bool {
     })
 }
 
-/// One short line that says something.
-fn is_told(text: &str) -> bool {
-    !text.is_empty() && text.len() < LONGEST_REFUSAL && !text.contains(char::is_control)
+/// Returns true for a non-empty, short, single line.
+fn is_one_line(text: &str) -> bool {
+    !text.is_empty() && text.len() < MAX_REJECTION_LENGTH && !text.contains(char::is_control)
 }
 
 fn joint() -> impl Strategy<Value = String> {
@@ -81,7 +83,7 @@ fn trajectory() -> impl Strategy<Value = JointTrajectory> {
     (prop::collection::vec(joint(), 0..4), prop::collection::vec(point, 0..5), any::<bool>()).prop_map(
         |(joint_names, mut points, even)| {
             if even {
-                // As many values as joints, in the order of time: often a good one.
+                // One value per joint, sorted by time: often a valid trajectory.
                 points.sort_by_key(|p| (p.time_from_start.sec, p.time_from_start.nanosec));
                 for point in &mut points {
                     point.positions.resize(joint_names.len(), 0.0);
@@ -104,7 +106,7 @@ fn tolerances() -> impl Strategy<Value = Vec<JointTolerance>> {
     prop::collection::vec(tolerance, 0..3)
 }
 
-/// A value of any kind, whole numbers and small ones more often.
+/// Parameter value of any type; integers and small numbers are more frequent.
 fn value() -> impl Strategy<Value = ParameterValue> {
     prop_oneof![
         any::<bool>().prop_map(ParameterValue::Bool),
@@ -121,43 +123,43 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     #[test]
-    fn any_trajectory_is_run_or_refused_in_a_line(message in trajectory()) {
-        match checks().check(&message) {
+    fn any_trajectory_is_executed_or_rejected_with_one_line(message in trajectory()) {
+        match validator().validate(&message) {
             Ok(trajectory) => {
                 let mut simulation = at_rest();
-                if let Err(rejection) = simulation.offer(MotionId(1), Arc::new(trajectory)) {
-                    prop_assert!(is_told(&rejection.text), "{}", rejection);
+                if let Err(rejection) = simulation.submit(MotionId(1), Arc::new(trajectory)) {
+                    prop_assert!(is_one_line(&rejection.text), "{}", rejection);
                 }
                 prop_assert!(is_finite(&mut simulation));
             }
             Err(rejection) => {
-                prop_assert!(is_told(&rejection.text), "{}", rejection);
-                prop_assert!(rejection.joint.is_none_or(|joint| joint.len() < LONGEST_REFUSAL));
+                prop_assert!(is_one_line(&rejection.text), "{}", rejection);
+                prop_assert!(rejection.joint.is_none_or(|joint| joint.len() < MAX_REJECTION_LENGTH));
             }
         }
     }
 
     #[test]
-    fn any_goal_has_tolerances_for_its_joints_or_is_refused_in_a_line(
+    fn any_goal_has_tolerances_for_its_joints_or_is_rejected_with_one_line(
         trajectory in trajectory(), path_tolerance in tolerances(), goal_tolerance in tolerances(), goal_time_tolerance in time(),
     ) {
         let goal = FollowJointTrajectoryGoal {
             trajectory, path_tolerance, goal_tolerance, goal_time_tolerance, ..Default::default()
         };
-        match (GoalChecks { checks: Arc::new(checks()) }).check(&goal) {
+        match (GoalValidator { trajectories: Arc::new(validator()) }).validate(&goal) {
             Ok((trajectory, tolerances)) => {
                 let columns = trajectory.joints().len();
                 prop_assert_eq!((tolerances.path.len(), tolerances.goal.len()), (columns, columns));
                 let mut simulation = at_rest();
-                let _ = simulation.offer_within(MotionId(1), Arc::new(trajectory), tolerances);
+                let _ = simulation.submit_with_tolerances(MotionId(1), Arc::new(trajectory), tolerances);
                 prop_assert!(is_finite(&mut simulation));
             }
-            Err(rejection) => prop_assert!(is_told(&rejection.text), "{}", rejection),
+            Err(rejection) => prop_assert!(is_one_line(&rejection.text), "{}", rejection),
         }
     }
 
     #[test]
-    fn any_set_points_and_loads_leave_the_axes_finite(
+    fn any_streamed_setpoints_and_loads_leave_the_axes_finite(
         name in prop::collection::vec(joint(), 0..40), position in numbers(), effort in numbers(), even: bool,
     ) {
         let mut message = JointState { name, position, effort, ..JointState::default() };
@@ -166,60 +168,60 @@ proptest! {
             message.effort.resize(message.name.len(), 5.0);
         }
         let names: Vec<String> = joints().into_iter().map(|joint| joint.name).collect();
-        let setpoints = Setpoints::in_order(&message, &names, [0; 16], &mut Order::default());
-        let told = setpoints.refused.len() as u64 + setpoints.refused_beside + setpoints.positions.len() as u64;
-        prop_assert!(told <= message.position.len().max(1) as u64);
-        prop_assert!(setpoints.refused.iter().all(|rejection| is_told(&rejection.text)));
+        let setpoints = StreamSetpoints::from_message_in_order(&message, &names, [0; 16], &mut ReorderFilter::default());
+        let count = setpoints.rejected.len() as u64 + setpoints.unlisted_rejections + setpoints.positions.len() as u64;
+        prop_assert!(count <= message.position.len().max(1) as u64);
+        prop_assert!(setpoints.rejected.iter().all(|rejection| is_one_line(&rejection.text)));
         let mut simulation = at_rest();
-        for (place, position) in setpoints.positions {
-            let _ = simulation.stream_sent(place, position, setpoints.sent);
+        for (joint, position) in setpoints.positions {
+            let _ = simulation.submit_setpoint_stamped(joint, position, setpoints.sent);
         }
         match loads(&message, &names) {
-            Ok(loads) => loads.into_iter().for_each(|(place, load)| simulation.set_load(place, load, SECOND_NS)),
-            Err(reason) => prop_assert!(is_told(&reason), "{}", reason),
+            Ok(loads) => loads.into_iter().for_each(|(axis, load)| simulation.set_load(axis, load, SECOND_NS)),
+            Err(reason) => prop_assert!(is_one_line(&reason), "{}", reason),
         }
         prop_assert!(is_finite(&mut simulation));
     }
 
     #[test]
-    fn any_set_of_parameters_is_taken_whole_or_not_at_all(
+    fn any_set_of_parameters_is_applied_as_a_whole_or_rejected(
         changes in prop::collection::vec((any::<prop::sample::Index>(), value(), any::<bool>()), 1..5),
     ) {
-        let mut settings = Settings::new(DEFAULT.clone(), Arc::default());
+        let mut store = ParameterStore::new(DEFAULT.clone(), Arc::default());
         let all: Vec<_> = DEFAULT.definitions().collect();
         let changes: Vec<_> = changes
             .into_iter()
             .map(|(index, value, fit)| {
                 let (name, definition) = &all[index.index(all.len())];
-                // Of the right kind and within its range, every other time.
+                // Correct type and range in half of the cases.
                 let value = match (definition.kind, fit) {
-                    (Kind::Number { min, max }, true) => ParameterValue::Double(1.0f64.clamp(min, max)),
-                    (Kind::Integer { min, max }, true) => ParameterValue::Integer(2_i64.clamp(min, max)),
-                    (Kind::Flag, true) => ParameterValue::Bool(true),
+                    (ParameterKind::Number { min, max }, true) => ParameterValue::Double(1.0f64.clamp(min, max)),
+                    (ParameterKind::Integer { min, max }, true) => ParameterValue::Integer(2_i64.clamp(min, max)),
+                    (ParameterKind::Flag, true) => ParameterValue::Bool(true),
                     _ => value,
                 };
                 (name.clone(), value)
             })
             .collect();
-        match settings.check(changes.clone()) {
+        match store.check(changes.clone()) {
             Ok((changed, _)) => {
                 prop_assert!(changed.machine_config().is_ok());
-                settings.adopt(changed);
-                let (name, value) = changes.last().expect("at least one");
-                let found = settings.get(name).expect("it has just been set");
+                store.replace(changed);
+                let (name, value) = changes.last().expect("at least one change");
+                let found = store.get(name).expect("parameter that was set");
                 prop_assert!(found == *value || matches!((value, &found),
                     (ParameterValue::Integer(i), ParameterValue::Double(d)) if *i as f64 == *d), "{:?}", found);
             }
             Err(reason) => {
-                prop_assert!(is_told(&reason), "{}", reason);
-                prop_assert_eq!(settings.parameters(), &*DEFAULT);
+                prop_assert!(is_one_line(&reason), "{}", reason);
+                prop_assert_eq!(store.parameters(), &*DEFAULT);
             }
         }
     }
 
-    /// What is on the wire is decoded as RustDDS does, whatever has become of it.
+    /// Decodes damaged messages in the same way as RustDDS.
     #[test]
-    fn any_damage_on_the_wire_is_survived(
+    fn damaged_messages_do_not_panic(
         message in trajectory(), tolerance in tolerances(),
         flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
         keep in prop_oneof![Just(1.0), 0.0..1.0f64],
@@ -232,11 +234,11 @@ proptest! {
         let mut bytes = match big {
             true => cdr_encoding::to_vec::<_, BigEndian>(&request),
             false => cdr_encoding::to_vec::<_, LittleEndian>(&request),
-        }.expect("a message can be written");
+        }.expect("message is encoded");
         let whole = bytes.len();
-        for &(place, value) in &flips {
-            let place = place.index(bytes.len());
-            bytes[place] = value;
+        for &(index, value) in &flips {
+            let index = index.index(bytes.len());
+            bytes[index] = value;
         }
         bytes.truncate((whole as f64 * keep) as usize);
         let found = match big {
@@ -246,14 +248,14 @@ proptest! {
         if let Ok((mut found, consumed)) = found {
             prop_assert!(consumed <= bytes.len());
             for point in &mut found.goal.trajectory.points {
-                // Each instant is looked at.
+                // Bounds the cost: every instant is checked.
                 point.time_from_start.sec = point.time_from_start.sec.min(100);
             }
-            if let Err(rejection) = (GoalChecks { checks: Arc::new(checks()) }).check(&found.goal) {
-                prop_assert!(is_told(&rejection.text), "{}", rejection);
+            if let Err(rejection) = (GoalValidator { trajectories: Arc::new(validator()) }).validate(&found.goal) {
+                prop_assert!(is_one_line(&rejection.text), "{}", rejection);
             }
         } else {
-            prop_assert!(!flips.is_empty() || keep < 1.0, "an intact message is read");
+            prop_assert!(!flips.is_empty() || keep < 1.0, "an undamaged message is decoded");
         }
         let _ = cdr_encoding::from_bytes::<SetParametersRequest, LittleEndian>(&bytes);
         let _ = cdr_encoding::from_bytes::<JointState, LittleEndian>(&bytes);

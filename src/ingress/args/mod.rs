@@ -1,20 +1,20 @@
-//! The command line of a ROS 2 node: `[--help | --version] [--ros-args … [--]]…`.
+//! Command line of a ROS 2 node: `[--help | --version] [--ros-args … [--]]…`.
 //!
-//! The grammar is rcl's, and so is its meaning:
+//! Grammar and semantics are those of rcl:
 //!
 //! | argument | effect |
 //! |---|---|
-//! | `-p`, `--param [node:]name:=value` | a parameter; the value is YAML; the last one wins |
-//! | `--params-file FILE` | parameters from a file; the last one wins |
-//! | `-r`, `--remap [node:]from:=to` | another name for a topic or service; the first one wins |
-//! | `-r [node:]__node:=name` (or `__name`), `-r [node:]__ns:=/namespace` | who the node is |
+//! | `-p`, `--param [node:]name:=value` | parameter with a YAML value; the last one applies |
+//! | `--params-file FILE` | parameters from a file; the last one applies |
+//! | `-r`, `--remap [node:]from:=to` | other name of a topic or service; the first one applies |
+//! | `-r [node:]__node:=name` (or `__name`), `-r [node:]__ns:=/namespace` | name and namespace of the node |
 //! | `--log-level [logger:=]LEVEL` | `DEBUG`, `INFO`, `WARN`, `ERROR`, `FATAL`, `UNSET`, in any case |
 //! | `--enable-X-logs`, `--disable-X-logs` | X is `rosout`, `stdout` or `external-lib` |
-//! | `-e`, `--enclave /path` | the enclave of the node; the last one wins |
-//! | `--log-file-name P`, `--log-config-file F` | taken, without effect |
+//! | `-e`, `--enclave /path` | enclave of the node; the last one applies |
+//! | `--log-file-name P`, `--log-config-file F` | accepted without effect |
 //!
-//! `from` may begin with `rostopic://` or `rosservice://`. What rcl leaves for the program to look
-//! at, this program refuses: it has no arguments of its own.
+//! `from` can begin with `rostopic://` or `rosservice://`. Arguments that rcl passes to the program are rejected,
+//! because the program has no arguments of its own.
 
 mod parse;
 #[cfg(test)]
@@ -24,20 +24,20 @@ use std::path::PathBuf;
 
 use super::names::{NameError, NodeFqn};
 
-/// Severity of a log message, in rcutils' order.
+/// Severity of a log message, in the order of rcutils.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LogLevel {
-    /// No choice made: as the parent logger, in the end `Info`.
+    /// Level of the parent logger; `Info` for the root logger.
     Unset,
-    /// Details for somebody who searches a fault.
+    /// Details for debugging.
     Debug,
-    /// What happens in normal operation.
+    /// Normal operation.
     Info,
-    /// Something is wrong that the node can live with.
+    /// Fault that does not affect the operation.
     Warn,
-    /// Something that was asked for cannot be done.
+    /// Failed request.
     Error,
-    /// The node cannot go on.
+    /// Fault that ends the node.
     Fatal,
 }
 
@@ -51,66 +51,66 @@ impl LogLevel {
         ("FATAL", Self::Fatal),
     ];
 
-    /// The level of this name, in capitals or not.
+    /// Returns the level with this name, case-insensitive.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, level)| *level)
     }
 
-    /// Its name in capitals.
+    /// Name in capitals.
     #[must_use]
     pub fn name(self) -> &'static str {
         Self::NAMES[self as usize].0
     }
 }
 
-/// One source of parameter values. Sources are in the order of the command line, and later ones
-/// win over earlier ones.
+/// Source of parameter values. Sources are in the order of the command line; later ones override earlier
+/// ones.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ParameterSource {
-    /// `-p [node:]name:=text`
+    /// Argument `-p [node:]name:=text`.
     Value {
-        /// The node that it is meant for; `None` is every node.
+        /// Node of the parameter; `None` is every node.
         node: Option<String>,
-        /// The parameter.
+        /// Parameter name.
         name: String,
-        /// Its value as it was written, in YAML, not empty.
+        /// Value as YAML text, not empty.
         text: String,
     },
-    /// `--params-file path`
+    /// Argument `--params-file path`.
     File(PathBuf),
 }
 
-/// What a remapping rule applies to.
+/// Kind of names to which a remapping rule applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NameKind {
     /// Publishers and subscriptions.
     Topic,
-    /// Services, also the ones of which an action consists.
+    /// Services, including those of actions.
     Service,
 }
 
-/// `-r [node:][rostopic://|rosservice://]from:=to`
+/// Remapping rule `-r [node:][rostopic://|rosservice://]from:=to`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RemapRule {
-    /// The node whose names it changes; `None` is every node.
+    /// Node of the rule; `None` is every node.
     pub node: Option<String>,
-    /// Only names of this kind; `None` is both.
+    /// Kind of names; `None` is both kinds.
     pub kind: Option<NameKind>,
-    /// The name in the program: absolute, relative or private.
+    /// Name in the program: absolute, relative or private.
     pub from: String,
-    /// The name to use: absolute, relative or private.
+    /// New name: absolute, relative or private.
     pub to: String,
 }
 
-/// Where log messages go besides the choice of level.
+/// Outputs of log messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogSinks {
-    /// Publish on `/rosout`.
+    /// Publication on `/rosout`.
     pub rosout: bool,
-    /// Write to the terminal.
+    /// Output to the terminal.
     pub stdout: bool,
-    /// Hand to a logging library; there is none here.
+    /// Output to an external logging library; not used by this node.
     pub external_lib: bool,
 }
 
@@ -120,65 +120,63 @@ impl Default for LogSinks {
     }
 }
 
-/// An argument that cannot be used.
+/// Invalid argument.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ArgsError {
-    /// Not text.
+    /// Argument that is not UTF-8.
     #[error("argument '{found}' is not UTF-8")]
     NotUtf8 {
-        /// The argument, with U+FFFD for what is none.
+        /// Argument, with U+FFFD in place of invalid bytes.
         found: String,
     },
-    /// Outside `--ros-args … --`.
-    #[error(
-        "argument '{found}' is not known; allowed are --help, --version, and ROS arguments after --ros-args"
-    )]
+    /// Unknown argument outside `--ros-args … --`.
+    #[error("unknown argument '{found}'; allowed are --help, --version, and ROS arguments after --ros-args")]
     Outside {
-        /// The argument.
+        /// Argument.
         found: String,
     },
-    /// Inside `--ros-args … --`, and no flag.
-    #[error("ROS argument '{found}' is not known; allowed are {allowed}")]
+    /// Unknown flag inside `--ros-args … --`.
+    #[error("unknown ROS argument '{found}'; allowed are {allowed}")]
     Unknown {
-        /// The argument.
+        /// Argument.
         found: String,
-        /// The flags that are known.
+        /// Known flags.
         allowed: &'static str,
     },
-    /// A flag at the end, or before another flag's place.
-    #[error("ROS argument '{flag}' lacks its value; expected is {allowed}")]
+    /// Flag without a value.
+    #[error("ROS argument '{flag}' lacks its value; expected {allowed}")]
     MissingValue {
-        /// The flag.
+        /// Flag.
         flag: String,
-        /// What must follow.
+        /// Expected value.
         allowed: &'static str,
     },
-    /// A flag with a value that it cannot use.
-    #[error("ROS argument '{flag} {found}': {reason}; expected is {allowed}")]
+    /// Flag with an invalid value.
+    #[error("ROS argument '{flag} {found}': {reason}; expected {allowed}")]
     BadValue {
-        /// The flag.
+        /// Flag.
         flag: String,
-        /// The value.
+        /// Value.
         found: String,
-        /// What is wrong with it.
+        /// Reason.
         reason: String,
-        /// What must follow.
+        /// Expected value.
         allowed: &'static str,
     },
 }
 
-/// What the command line asks the program to do.
+/// Command of the node program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Command {
     /// Run the node.
     Run(RosArgs),
-    /// Say how it is used.
+    /// Print the help.
     Help,
-    /// Say which version it is.
+    /// Print the version.
     Version,
 }
 
-/// The ROS arguments of a node, all of them valid.
+/// Validated ROS arguments of a node.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RosArgs {
     node: NodeFqn,
@@ -192,14 +190,14 @@ pub struct RosArgs {
 }
 
 impl RosArgs {
-    /// Who the node is, after `__ns` and `__node`.
+    /// Node name after remapping by `__ns` and `__node`.
     #[must_use]
     pub fn node(&self) -> &NodeFqn {
         &self.node
     }
 
-    /// Parameter values and files for this node, later ones winning. Values that are meant for
-    /// other nodes are left out.
+    /// Returns the parameter values and files of this node; later ones override earlier ones. Values for other
+    /// nodes are omitted.
     pub fn parameters(&self) -> impl Iterator<Item = &ParameterSource> {
         self.parameters.iter().filter(|source| match source {
             ParameterSource::Value { node, .. } => self.is_for_this_node(node.as_deref()),
@@ -207,59 +205,59 @@ impl RosArgs {
         })
     }
 
-    /// The remapping rules, in the order of the command line.
+    /// Remapping rules, in the order of the command line.
     #[must_use]
     pub fn remaps(&self) -> &[RemapRule] {
         &self.remaps
     }
 
-    /// The level for all loggers, if one was given.
+    /// Log level of all loggers, if given.
     #[must_use]
     pub fn log_level(&self) -> Option<LogLevel> {
         self.log_level
     }
 
-    /// Levels for single loggers.
+    /// Log levels of single loggers.
     #[must_use]
     pub fn logger_levels(&self) -> &[(String, LogLevel)] {
         &self.logger_levels
     }
 
-    /// Where log messages go.
+    /// Outputs of log messages.
     #[must_use]
     pub fn log_sinks(&self) -> LogSinks {
         self.log_sinks
     }
 
-    /// The enclave whose keys the node has, if one was given.
+    /// Security enclave of the node, if given.
     #[must_use]
     pub fn enclave(&self) -> Option<&str> {
         self.enclave.as_deref()
     }
 
-    /// Sentences for the log about arguments that were taken but have no effect.
+    /// Warnings about accepted arguments without effect, for the log.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// The name in the graph of a topic that the program calls `name`.
+    /// Returns the fully qualified name of the topic `name` after remapping.
     ///
     /// # Errors
-    /// As [`NodeFqn::expand`].
+    /// [`NameError`] if the name is invalid, see [`NodeFqn::expand`].
     pub fn resolve_topic(&self, name: &str) -> Result<String, NameError> {
         self.resolve(NameKind::Topic, name)
     }
 
-    /// The name in the graph of a service that the program calls `name`.
+    /// Returns the fully qualified name of the service `name` after remapping.
     ///
     /// # Errors
-    /// As [`NodeFqn::expand`].
+    /// [`NameError`] if the name is invalid, see [`NodeFqn::expand`].
     pub fn resolve_service(&self, name: &str) -> Result<String, NameError> {
         self.resolve(NameKind::Service, name)
     }
 
-    /// Expands `name`, then applies the first rule that fits it.
+    /// Expands `name`, then applies the first matching rule.
     fn resolve(&self, kind: NameKind, name: &str) -> Result<String, NameError> {
         let absolute = self.node.expand(name)?;
         for rule in &self.remaps {
@@ -274,6 +272,6 @@ impl RosArgs {
     }
 
     fn is_for_this_node(&self, node: Option<&str>) -> bool {
-        node.is_none_or(|pattern| self.node.is_meant_by(pattern))
+        node.is_none_or(|pattern| self.node.matches(pattern))
     }
 }

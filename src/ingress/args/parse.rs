@@ -1,4 +1,4 @@
-//! From the argument vector to [`Command`].
+//! Parser of the argument vector, which returns a [`Command`].
 
 use super::{
     super::names::{NodeFqn, check_namespace, check_node_name, check_rule_side},
@@ -15,11 +15,11 @@ const PREFIX: &str = "the beginning of a file's name";
 const ENCLAVE: &str = "an absolute path such as /cell/mill";
 
 impl Command {
-    /// Parses the arguments, without the program's name. The node is called `default_name` in the
-    /// root namespace unless the arguments say otherwise.
+    /// Parses the arguments, without the program name. The default node name is `default_name` in the root
+    /// namespace.
     ///
     /// # Errors
-    /// The first argument that cannot be used; also a `default_name` that is no node name.
+    /// [`ArgsError`] for the first invalid argument, or for a `default_name` that is not a valid node name.
     ///
     /// ```
     /// use virtual_axes::ingress::args::Command;
@@ -36,41 +36,41 @@ impl Command {
     ) -> Result<Self, ArgsError> {
         let arguments: Vec<S> = arguments.into_iter().collect();
         let mut arguments = arguments.iter().map(AsRef::as_ref);
-        let mut draft = Draft::default();
-        let mut asked_for = None;
+        let mut draft = ArgsDraft::default();
+        let mut command = None;
         let mut in_ros_args = false;
         while let Some(argument) = arguments.next() {
             match (in_ros_args, argument) {
                 (_, "--ros-args") => in_ros_args = true,
                 (true, "--") => in_ros_args = false,
-                (true, flag) => draft.take(flag, || arguments.next())?,
-                (false, "--help" | "-h") => asked_for = asked_for.or(Some(Self::Help)),
-                (false, "--version" | "-V") => asked_for = asked_for.or(Some(Self::Version)),
+                (true, flag) => draft.parse_flag(flag, || arguments.next())?,
+                (false, "--help" | "-h") => command = command.or(Some(Self::Help)),
+                (false, "--version" | "-V") => command = command.or(Some(Self::Version)),
                 (false, other) => {
                     return Err(ArgsError::Outside { found: other.to_owned() });
                 }
             }
         }
-        match asked_for {
+        match command {
             Some(command) => Ok(command),
             None => draft.finish(default_name).map(Self::Run),
         }
     }
 }
 
-/// A rule that changes who the node is.
-struct Identity {
+/// Remapping rule of the node name or namespace.
+struct NodeRemap {
     node: Option<String>,
     value: String,
 }
 
-/// Takes a flag and its value into the draft, or says what is wrong with the value.
-type Reader = fn(&mut Draft, &str, &str) -> Result<(), String>;
+/// Function that parses the value of a flag into the draft, or returns the reason why it is invalid.
+type ValueParser = fn(&mut ArgsDraft, &str, &str) -> Result<(), String>;
 
 #[derive(Default)]
-struct Draft {
-    names: Vec<Identity>,
-    namespaces: Vec<Identity>,
+struct ArgsDraft {
+    names: Vec<NodeRemap>,
+    namespaces: Vec<NodeRemap>,
     parameters: Vec<ParameterSource>,
     remaps: Vec<RemapRule>,
     log_level: Option<LogLevel>,
@@ -80,13 +80,17 @@ struct Draft {
     warnings: Vec<String>,
 }
 
-impl Draft {
-    fn take<'a>(&mut self, flag: &'a str, next: impl FnOnce() -> Option<&'a str>) -> Result<(), ArgsError> {
+impl ArgsDraft {
+    fn parse_flag<'a>(
+        &mut self,
+        flag: &'a str,
+        next: impl FnOnce() -> Option<&'a str>,
+    ) -> Result<(), ArgsError> {
         if let Some((sink, on)) = self.sink(flag) {
             *sink = on;
             return Ok(());
         }
-        let (allowed, read): (_, Reader) = match flag {
+        let (allowed, read): (_, ValueParser) = match flag {
             "-p" | "--param" => (PARAM, |draft, _, value| draft.parameter(value)),
             "--params-file" => (FILE, |draft, _, value| draft.parameters_file(value)),
             "-r" | "--remap" => (REMAP, |draft, _, value| draft.remap(value)),
@@ -100,7 +104,7 @@ impl Draft {
                 (PREFIX, |draft, flag, value| draft.ignore(flag, value, "this node writes no log file"))
             }
             "--log-config-file" => (FILE, |draft, flag, value| {
-                draft.ignore(flag, value, "this node uses no logging library with a file of its own")
+                draft.ignore(flag, value, "this node uses no external logging library")
             }),
             _ => {
                 return Err(ArgsError::Unknown { found: flag.to_owned(), allowed: FLAGS });
@@ -140,14 +144,14 @@ impl Draft {
     fn parameter(&mut self, rule: &str) -> Result<(), String> {
         let (left, text) = split_rule(rule)?;
         if text.trim().is_empty() {
-            return Err("there is no value after ':='; an empty string is ''".to_owned());
+            return Err("there is no value after ':='; write an empty string as ''".to_owned());
         }
         let (node, name) = split_node(left)?;
-        let is_fine = !name.is_empty()
+        let is_valid = !name.is_empty()
             && !name.starts_with(|c: char| c.is_ascii_digit())
             && name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '/'));
-        if !is_fine {
-            return Err(format!("'{name}' is not a parameter's name"));
+        if !is_valid {
+            return Err(format!("'{name}' is not a valid parameter name"));
         }
         self.parameters.push(ParameterSource::Value { node, name: name.to_owned(), text: text.to_owned() });
         Ok(())
@@ -163,18 +167,18 @@ impl Draft {
 
     fn remap(&mut self, rule: &str) -> Result<(), String> {
         let (left, to) = split_rule(rule)?;
-        // The colon of rostopic:// is not the one after a node's name.
+        // The colon of rostopic:// does not follow a node name.
         let (node, from) = if is_url(left) { (None, left) } else { split_node(left)? };
         match from {
             "__node" | "__name" => {
                 check_node_name(to).map_err(|error| error.to_string())?;
                 let value = to.to_owned();
-                self.names.push(Identity { node, value });
+                self.names.push(NodeRemap { node, value });
             }
             "__ns" => {
                 check_namespace(to).map_err(|error| error.to_string())?;
                 let value = to.to_owned();
-                self.namespaces.push(Identity { node, value });
+                self.namespaces.push(NodeRemap { node, value });
             }
             _ => {
                 let (kind, from) = if let Some(topic) = from.strip_prefix("rostopic://") {
@@ -185,7 +189,7 @@ impl Draft {
                     (None, from)
                 };
                 if from.contains('*') {
-                    return Err("wildcards are not supported, by rcl neither".to_owned());
+                    return Err("wildcards are not supported, as in rcl".to_owned());
                 }
                 for side in [from, to] {
                     check_rule_side(side).map_err(|error| error.to_string())?;
@@ -211,8 +215,8 @@ impl Draft {
     }
 
     fn finish(self, default_name: &str) -> Result<RosArgs, ArgsError> {
-        // As in rcl, the first rule wins, and a prefix means the name that the program gave.
-        let first = |rules: &[Identity]| {
+        // As in rcl, the first rule applies, and a prefix is compared with the default node name.
+        let first = |rules: &[NodeRemap]| {
             rules
                 .iter()
                 .find(|rule| rule.node.as_deref().is_none_or(|node| node == default_name))
@@ -247,7 +251,7 @@ fn is_url(name: &str) -> bool {
     name.starts_with("rostopic://") || name.starts_with("rosservice://")
 }
 
-/// Splits `node:name`.
+/// Splits `node:name` into node and name.
 fn split_node(left: &str) -> Result<(Option<String>, &str), String> {
     match left.split_once(':') {
         None => Ok((None, left)),

@@ -13,7 +13,7 @@ fn run(line: &str) -> RosArgs {
     }
 }
 
-fn refused(line: &str) -> String {
+fn rejection(line: &str) -> String {
     match parse(line) {
         Err(error) => error.to_string(),
         Ok(command) => panic!("{line}: {command:?}"),
@@ -32,28 +32,28 @@ fn without_arguments_the_node_has_its_default_name() {
 }
 
 #[test]
-fn help_and_version_count_outside_ros_args_only() {
+fn help_and_version_apply_outside_ros_args_only() {
     assert_eq!(parse("--help"), Ok(Command::Help));
     assert_eq!(parse("-h --version"), Ok(Command::Help));
     assert_eq!(parse("--ros-args -r a:=b -- --version"), Ok(Command::Version));
-    assert!(refused("--ros-args --help").contains("--help"));
+    assert!(rejection("--ros-args --help").contains("--help"));
 }
 
 #[test]
-fn strays_outside_ros_args_are_refused() {
+fn arguments_outside_ros_args_are_rejected() {
     for line in ["x", "-r a:=b", "a:=b", "--", "--ros-args -- x", "--ros-args -r a:=b -- --"] {
-        assert!(refused(line).contains("after --ros-args"), "{line}");
+        assert!(rejection(line).contains("after --ros-args"), "{line}");
     }
 }
 
 #[test]
-fn ros_args_may_come_in_several_blocks() {
+fn several_blocks_of_ros_args_are_accepted() {
     let args = run("--ros-args -p a:=1 -- --ros-args -p b:=2 --ros-args -p c:=3");
     assert_eq!(args.parameters().count(), 3);
 }
 
 #[test]
-fn parameters_keep_their_text_their_order_and_their_node() {
+fn parameters_keep_text_order_and_node() {
     use ParameterSource::{File, Value};
     let args = run("--ros-args -p x.gain:=4.5 --params-file p.yaml --param talker:a/b:=b:=c -p other:a:=1");
     let found: Vec<_> = args.parameters().cloned().collect();
@@ -76,17 +76,17 @@ fn a_parameter_for_this_node_applies_in_a_namespace_too() {
 }
 
 #[test]
-fn an_empty_string_as_a_parameter_needs_its_quotes() {
-    assert!(refused("--ros-args -p a:=").contains("''"));
+fn an_empty_string_parameter_requires_quotes() {
+    assert!(rejection("--ros-args -p a:=").contains("''"));
     assert_eq!(run("--ros-args -p a:=''").parameters().count(), 1);
 }
 
 #[test]
-fn wrong_arguments_are_refused_with_flag_value_and_what_is_allowed() {
+fn invalid_arguments_are_rejected_with_flag_value_and_expectation() {
     for (line, parts) in [
         ("--ros-args -p", ["'-p' lacks", "name:=value"]),
         ("--ros-args -p a", ["'-p a'", "no ':='"]),
-        ("--ros-args -p a:b:c:=1", ["'b:c'", "parameter's name"]),
+        ("--ros-args -p a:b:c:=1", ["'b:c'", "parameter name"]),
         ("--ros-args -p 1a:=2", ["'1a'", "name:=value"]),
         ("--ros-args -p a-b:=2", ["'a-b'", "name:=value"]),
         ("--ros-args -p :=2", ["''", "name:=value"]),
@@ -111,14 +111,14 @@ fn wrong_arguments_are_refused_with_flag_value_and_what_is_allowed() {
         ("--ros-args --disable-foo-logs", ["'--disable-foo-logs'", "rosout-logs"]),
         ("--ros-args --log-level=debug", ["'--log-level=debug'", "--log-level"]),
     ] {
-        let message = refused(line);
+        let message = rejection(line);
         for part in parts {
             assert!(message.contains(part), "{line}: {message}");
         }
     }
 }
 
-// The left column is what rclpy of Jazzy resolves with the same arguments.
+// Expected names: resolved by rclpy of Jazzy with the same arguments.
 #[test]
 fn names_resolve_as_in_rcl() {
     for (line, node, topics) in [
@@ -159,7 +159,7 @@ fn names_resolve_as_in_rcl() {
 }
 
 #[test]
-fn a_service_rule_leaves_topics_alone() {
+fn a_service_rule_does_not_apply_to_topics() {
     let args = run("--ros-args -r rosservice://~/reset:=/home -r rostopic://stop:=/halt");
     assert_eq!(args.resolve_service("~/reset").unwrap(), "/home");
     assert_eq!(args.resolve_topic("~/reset").unwrap(), "/talker/reset");
@@ -168,7 +168,7 @@ fn a_service_rule_leaves_topics_alone() {
 }
 
 #[test]
-fn log_arguments_are_kept_apart_by_logger() {
+fn log_arguments_are_stored_per_logger() {
     let args = run("--ros-args --log-level warn --log-level rustdds:=Debug --disable-rosout-logs \
          --disable-stdout-logs --enable-stdout-logs");
     assert_eq!(args.log_level(), Some(LogLevel::Warn));
@@ -177,13 +177,13 @@ fn log_arguments_are_kept_apart_by_logger() {
 }
 
 #[test]
-fn arguments_without_effect_say_so() {
+fn arguments_without_effect_cause_warnings() {
     let args = run("--ros-args --log-file-name a --log-config-file b");
     assert_eq!(args.warnings().len(), 2);
 }
 
 #[test]
-fn the_last_enclave_counts() {
+fn the_last_enclave_applies() {
     let args = run("--ros-args -e /x --enclave /cell/mill");
     assert_eq!(args.enclave(), Some("/cell/mill"));
     assert!(args.warnings().is_empty());
@@ -199,15 +199,15 @@ fn argument() -> impl Strategy<Value = String> {
     ]
 }
 
-/// Whether the middleware takes it for a name.
+/// Returns true if the middleware accepts the name.
 #[cfg(feature = "ros")]
-fn is_a_name(resolved: &str) -> bool {
+fn is_valid_name(resolved: &str) -> bool {
     ros2_client::Name::parse(resolved).is_ok()
 }
 
-/// Without the middleware: no part of it is empty.
+/// Returns true if no part of the name is empty; substitute without the middleware.
 #[cfg(not(feature = "ros"))]
-fn is_a_name(resolved: &str) -> bool {
+fn is_valid_name(resolved: &str) -> bool {
     resolved.strip_prefix('/').is_some_and(|parts| parts.split('/').all(|part| !part.is_empty()))
 }
 
@@ -222,7 +222,7 @@ proptest! {
             match result {
                 Ok(Command::Run(args)) => {
                     if let Ok(resolved) = args.resolve_topic(&name) {
-                        prop_assert!(is_a_name(&resolved), "{}", resolved);
+                        prop_assert!(is_valid_name(&resolved), "{}", resolved);
                     }
                     let _ = args.resolve_service(&name);
                 }

@@ -1,55 +1,54 @@
-//! Parameters as plain values, and what somebody must offer to have them served.
+//! Parameter values and descriptors, and the interface between a parameter host and its services.
 
-/// The kinds of value that ROS parameters know, with their numbers on the wire
-/// (rcl_interfaces/msg/ParameterType).
+/// Types of ROS parameters with their numbers in `rcl_interfaces/msg/ParameterType`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum ParameterType {
-    /// `true` or `false`
+    /// `true` or `false`.
     Bool = 1,
-    /// 64 bits, signed
+    /// Signed 64-bit integer.
     Integer = 2,
-    /// 64 bits, floating point
+    /// 64-bit floating-point number.
     Double = 3,
-    /// UTF-8
+    /// UTF-8 text.
     String = 4,
-    /// Octets
+    /// Array of octets.
     ByteArray = 5,
-    /// Several `Bool`
+    /// Array of `Bool`.
     BoolArray = 6,
-    /// Several `Integer`
+    /// Array of `Integer`.
     IntegerArray = 7,
-    /// Several `Double`
+    /// Array of `Double`.
     DoubleArray = 8,
-    /// Several `String`
+    /// Array of `String`.
     StringArray = 9,
 }
 
-/// A parameter's value.
+/// Value of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParameterValue {
-    /// `true` or `false`
+    /// `true` or `false`.
     Bool(bool),
-    /// 64 bits, signed
+    /// Signed 64-bit integer.
     Integer(i64),
-    /// 64 bits, floating point
+    /// 64-bit floating-point number.
     Double(f64),
-    /// UTF-8
+    /// UTF-8 text.
     String(String),
-    /// Octets
+    /// Array of octets.
     ByteArray(Vec<u8>),
-    /// Several `Bool`
+    /// Array of `Bool`.
     BoolArray(Vec<bool>),
-    /// Several `Integer`
+    /// Array of `Integer`.
     IntegerArray(Vec<i64>),
-    /// Several `Double`
+    /// Array of `Double`.
     DoubleArray(Vec<f64>),
-    /// Several `String`
+    /// Array of `String`.
     StringArray(Vec<String>),
 }
 
 impl ParameterValue {
-    /// Which kind of value it is.
+    /// Type of the value.
     #[must_use]
     pub fn kind(&self) -> ParameterType {
         match self {
@@ -66,64 +65,64 @@ impl ParameterValue {
     }
 }
 
-/// The values that a number may have, both ends included. A step of 0 allows every one between.
+/// Allowed range of a number, including both ends; a step of 0 allows all values between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Range {
-    /// For `Integer` and `IntegerArray`.
+pub enum ParameterRange {
+    /// Range of `Integer` and `IntegerArray`.
     Integer {
-        /// The smallest.
+        /// Smallest value.
         from: i64,
-        /// The largest.
+        /// Largest value.
         to: i64,
-        /// The distance between allowed values.
+        /// Distance between allowed values.
         step: u64,
     },
-    /// For `Double` and `DoubleArray`.
+    /// Range of `Double` and `DoubleArray`.
     Double {
-        /// The smallest.
+        /// Smallest value.
         from: f64,
-        /// The largest.
+        /// Largest value.
         to: f64,
-        /// The distance between allowed values.
+        /// Distance between allowed values.
         step: f64,
     },
 }
 
-/// What there is to know about a parameter besides its value.
+/// ParameterDescriptor of a parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Descriptor {
-    /// Its kind of value.
+pub struct ParameterDescriptor {
+    /// Type of its value.
     pub kind: ParameterType,
-    /// What it does, with its unit.
+    /// Description with unit.
     pub description: String,
-    /// Rules that a range cannot express, in words; may be empty.
+    /// Constraints that a range cannot express, as text; can be empty.
     pub additional_constraints: String,
-    /// It cannot be set while the node runs.
+    /// True if it cannot be set while the node runs.
     pub read_only: bool,
-    /// It may change its kind.
+    /// True if its type can change.
     pub dynamic_typing: bool,
-    /// The values that it may have.
-    pub range: Option<Range>,
+    /// Allowed range.
+    pub range: Option<ParameterRange>,
 }
 
-/// Somebody who has parameters. The services ask from one task, one call at a time; none of the
-/// calls may wait for the network.
+/// Owner of parameters. The parameter services call it from one task, one call at a time; no call waits for
+/// the network.
 pub trait ParameterHost: Send + 'static {
-    /// All parameters, in the order in which they are to be listed.
+    /// Returns the names of all parameters, in the order of listing.
     fn names(&self) -> Vec<String>;
 
-    /// A parameter's present value, or `None` when there is no such parameter.
+    /// Returns the present value of a parameter; `None` if it is unknown.
     fn get(&self, name: &str) -> Option<ParameterValue>;
 
-    /// A parameter's description, or `None` when there is no such parameter.
-    fn describe(&self, name: &str) -> Option<Descriptor>;
+    /// Returns the descriptor of a parameter; `None` if it is unknown.
+    fn describe(&self, name: &str) -> Option<ParameterDescriptor>;
 
-    /// Waits until changes can be taken, whoever else keeps the host busy.
+    /// Waits until the host can apply changes.
     fn ready(&mut self) -> impl Future<Output = ()> + Send;
 
-    /// Makes all of the changes, or none of them; call [`Self::ready`] first.
+    /// Applies all changes or none of them; call [`Self::ready`] first.
     ///
     /// # Errors
-    /// Why they cannot be made, in a sentence for whoever asked: name, value, what is allowed.
+    /// Text with name, value and allowed values of the first invalid change.
     fn set(&mut self, changes: Vec<(String, ParameterValue)>) -> Result<(), String>;
 }

@@ -1,14 +1,14 @@
-//! Between plain values and rcl_interfaces' messages.
+//! Conversion between parameter values and `rcl_interfaces` messages.
 
 use virtual_axes_io::messages::rcl_interfaces::msg;
 
-use super::types::{Descriptor, ParameterType, ParameterValue, Range};
-use virtual_axes_core::config::shortened;
+use super::types::{ParameterDescriptor, ParameterRange, ParameterType, ParameterValue};
+use virtual_axes_core::text::shortened;
 
-/// The type number of a parameter that does not exist.
+/// Type number of an unknown parameter.
 const NOT_SET: u8 = 0;
 
-/// A value as a message; none as that of a parameter that does not exist.
+/// Converts a value to a message; `None` becomes the value of an unknown parameter.
 pub fn value_to_wire(value: Option<ParameterValue>) -> msg::ParameterValue {
     let mut wire = msg::ParameterValue {
         type_: value.as_ref().map_or(NOT_SET, |value| value.kind() as u8),
@@ -29,10 +29,10 @@ pub fn value_to_wire(value: Option<ParameterValue>) -> msg::ParameterValue {
     wire
 }
 
-/// A parameter that somebody wants to set.
+/// Converts a parameter of a set request to its name and value.
 ///
 /// # Errors
-/// The reason, in a sentence that names the parameter.
+/// Text with the parameter name if its type is `NOT_SET` or unknown.
 pub fn parameter_from_wire(wire: msg::Parameter) -> Result<(String, ParameterValue), String> {
     let msg::Parameter { name, value } = wire;
     let value = match value.type_ {
@@ -47,20 +47,20 @@ pub fn parameter_from_wire(wire: msg::Parameter) -> Result<(String, ParameterVal
         9 => ParameterValue::StringArray(value.string_array_value),
         NOT_SET => {
             return Err(format!(
-                "parameter '{}' is to be removed; the parameters of this node cannot be",
+                "parameter '{}' has type 0 (not set); parameters of this node cannot be removed",
                 shortened(&name)
             ));
         }
         other => {
             let name = shortened(&name);
-            return Err(format!("parameter '{name}' comes with type number {other}; allowed is 1 to 9"));
+            return Err(format!("parameter '{name}' has type {other}; it must be 1 to 9"));
         }
     };
     Ok((name, value))
 }
 
-/// A description as a message; none as that of a parameter that does not exist.
-pub fn descriptor_to_wire(name: String, descriptor: Option<Descriptor>) -> msg::ParameterDescriptor {
+/// Converts a descriptor to a message; `None` becomes the descriptor of an unknown parameter.
+pub fn descriptor_to_wire(name: String, descriptor: Option<ParameterDescriptor>) -> msg::ParameterDescriptor {
     let Some(descriptor) = descriptor else {
         return msg::ParameterDescriptor { name, ..Default::default() };
     };
@@ -75,22 +75,22 @@ pub fn descriptor_to_wire(name: String, descriptor: Option<Descriptor>) -> msg::
     };
     match descriptor.range {
         None => {}
-        Some(Range::Integer { from, to, step }) => {
+        Some(ParameterRange::Integer { from, to, step }) => {
             wire.integer_range.push(msg::IntegerRange { from_value: from, to_value: to, step })
         }
-        Some(Range::Double { from, to, step }) => {
+        Some(ParameterRange::Double { from, to, step }) => {
             wire.floating_point_range.push(msg::FloatingPointRange { from_value: from, to_value: to, step });
         }
     }
     wire
 }
 
-/// What became of a request to set.
+/// Converts the result of a set request to a message.
 pub fn result_to_wire(result: Result<(), String>) -> msg::SetParametersResult {
     msg::SetParametersResult { successful: result.is_ok(), reason: result.err().unwrap_or_default() }
 }
 
-/// The type number of a value, or of none.
+/// Returns the type number of a parameter; 0 if it is unknown.
 pub fn type_number(kind: Option<ParameterType>) -> u8 {
     kind.map_or(NOT_SET, |kind| kind as u8)
 }
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_kind_of_value_survives_the_wire() {
+    fn every_value_type_is_unchanged_by_a_round_trip() {
         for value in [
             ParameterValue::Bool(true),
             ParameterValue::Integer(-3),
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn removal_and_unknown_types_are_refused_by_name() {
+    fn removal_and_unknown_types_are_rejected_with_the_name() {
         for type_ in [0, 10, 255] {
             let wire = msg::Parameter {
                 name: "x.gain".to_owned(),
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_without_end_does_not_come_back_in_the_refusal() {
+    fn a_long_name_is_truncated_in_the_rejection() {
         for type_ in [0, 77] {
             let value = msg::ParameterValue { type_, ..Default::default() };
             let reason =

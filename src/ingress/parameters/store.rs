@@ -1,57 +1,58 @@
-//! The schema's parameters as the parameter services see them, and what setting them makes.
+//! Parameter store of the node: present values, descriptors, validation of changes at run time.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::types::{Descriptor, ParameterType, ParameterValue, Range};
+use super::types::{ParameterDescriptor, ParameterRange, ParameterType, ParameterValue};
 use virtual_axes_core::config::{
-    Assignment, Definition, GoalDefaults, Kind, Parameters, Source, Value, shortened,
+    Assignment, GoalDefaults, ParameterDefinition, ParameterKind, Parameters, Value, ValueSource,
 };
 use virtual_axes_core::machine::MachineParameters;
+use virtual_axes_core::text::shortened;
 
-/// Most parameters of one request to set; a machine has a few hundred, and each set alone is checked with
-/// the whole machine.
-const MOST_CHANGES: usize = 1000;
+/// Largest number of parameters in one set request. A machine has a few hundred parameters, and each
+/// parameter set alone requires a validation of the whole machine.
+const MAX_CHANGES: usize = 1000;
 
-/// Refuses a request to set more parameters than there can be.
+/// Rejects a request with too many parameters.
 ///
 /// # Errors
-/// A sentence with the number found and what is allowed.
+/// Text with the number found and the largest number.
 pub fn check_count(found: usize) -> Result<(), String> {
-    if found <= MOST_CHANGES {
+    if found <= MAX_CHANGES {
         return Ok(());
     }
-    Err(format!("{found} parameters in one request; {MOST_CHANGES} are allowed"))
+    Err(format!("{found} parameters in one request; at most {MAX_CHANGES} are allowed"))
 }
 
-/// Node parameters that other tasks read while they can be set.
+/// Node parameters that can be set at run time and are read by other tasks.
 #[derive(Debug, Default)]
 pub struct LiveNodeParameters {
-    /// `allow_nonzero_velocity_at_trajectory_end`.
+    /// Parameter `allow_nonzero_velocity_at_trajectory_end`.
     pub allow_nonzero_end_velocity: AtomicBool,
     goal_defaults: Mutex<Arc<GoalDefaults>>,
 }
 
 impl LiveNodeParameters {
-    /// Tolerances of action goals that name none themselves.
+    /// Default path and goal tolerances of action goals.
     pub fn goal_defaults(&self) -> Arc<GoalDefaults> {
         Arc::clone(&self.goal_defaults.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-/// Parameters that can be asked for and set.
+/// Store of the parameter values served by the parameter services.
 #[derive(Debug)]
-pub struct Settings {
+pub struct ParameterStore {
     parameters: Parameters,
     live: Arc<LiveNodeParameters>,
 }
 
-impl Settings {
-    /// Those of `parameters`; what other tasks read of them is in `live`.
+impl ParameterStore {
+    /// Creates a store of `parameters`; `live` receives the values read by other tasks.
     pub fn new(parameters: Parameters, live: Arc<LiveNodeParameters>) -> Self {
-        let settings = Settings { parameters, live };
-        settings.update_live();
-        settings
+        let store = ParameterStore { parameters, live };
+        store.update_live();
+        store
     }
 
     fn update_live(&self) {
@@ -61,44 +62,44 @@ impl Settings {
         *self.live.goal_defaults.lock().unwrap_or_else(PoisonError::into_inner) = defaults;
     }
 
-    /// The present values.
+    /// Present values.
     pub fn parameters(&self) -> &Parameters {
         &self.parameters
     }
 
-    /// All names, in the order of the schema.
+    /// Returns all names, in the order of the schema.
     pub fn names(&self) -> Vec<String> {
         self.parameters.definitions().map(|(name, _)| name).collect()
     }
 
-    /// The present value of a parameter, if there is such a one.
+    /// Returns the present value of a parameter; `None` if it is unknown.
     pub fn get(&self, name: &str) -> Option<ParameterValue> {
         self.parameters.get(name).map(to_ros)
     }
 
-    /// The description of a parameter, if there is such a one.
-    pub fn describe(&self, name: &str) -> Option<Descriptor> {
+    /// Returns the descriptor of a parameter; `None` if it is unknown.
+    pub fn describe(&self, name: &str) -> Option<ParameterDescriptor> {
         self.parameters.definition(name).map(descriptor)
     }
 
-    /// The values after all of `changes`, and the machine that they make; nothing is changed here.
+    /// Validates `changes` and returns the changed values and the resulting machine, without applying them.
     ///
     /// # Errors
-    /// Why they cannot be made, in a sentence: name, value, what is allowed.
+    /// Text with name, value and allowed values of the first invalid change.
     pub fn check(
         &self,
         changes: Vec<(String, ParameterValue)>,
     ) -> Result<(Parameters, MachineParameters), String> {
-        let source = Source::named("parameter");
+        let source = ValueSource::named("parameter");
         let mut assignments = Vec::with_capacity(changes.len());
         for (key, value) in changes {
-            if self.parameters.definition(&key).is_some_and(|d| !d.live) {
+            if self.parameters.definition(&key).is_some_and(|d| !d.is_live) {
                 return Err(format!(
-                    "{key} cannot be set while the node runs; set it at the start, with -p or --params-file"
+                    "{key} cannot be set while the node runs; set it at the start with -p or --params-file"
                 ));
             }
             let value = from_ros(value).ok_or_else(|| {
-                format!("{}: empty lists and byte arrays are not parameters here", shortened(&key))
+                format!("{}: type is an empty list or byte array; neither is supported", shortened(&key))
             })?;
             assignments.push(Assignment { key, value, source: source.clone() });
         }
@@ -109,8 +110,8 @@ impl Settings {
         Ok((changed, machine))
     }
 
-    /// Makes `changed`, which [`check`](Self::check) has given, the present values.
-    pub fn adopt(&mut self, changed: Parameters) {
+    /// Replaces the present values by `changed`, a result of [`check`](Self::check).
+    pub fn replace(&mut self, changed: Parameters) {
         self.parameters = changed;
         self.update_live();
     }
@@ -143,18 +144,18 @@ fn from_ros(value: ParameterValue) -> Option<Value> {
     })
 }
 
-fn descriptor(definition: &Definition) -> Descriptor {
+fn descriptor(definition: &ParameterDefinition) -> ParameterDescriptor {
     let (kind, range) = match definition.kind {
-        Kind::Number { min, max } => {
-            (ParameterType::Double, Some(Range::Double { from: min, to: max, step: 0.0 }))
+        ParameterKind::Number { min, max } => {
+            (ParameterType::Double, Some(ParameterRange::Double { from: min, to: max, step: 0.0 }))
         }
-        Kind::Integer { min, max } => {
-            (ParameterType::Integer, Some(Range::Integer { from: min, to: max, step: 0 }))
+        ParameterKind::Integer { min, max } => {
+            (ParameterType::Integer, Some(ParameterRange::Integer { from: min, to: max, step: 0 }))
         }
-        Kind::Flag => (ParameterType::Bool, None),
-        Kind::Text | Kind::Choice(_) => (ParameterType::String, None),
-        Kind::TextList => (ParameterType::StringArray, None),
-        Kind::NumberList { .. } => (ParameterType::DoubleArray, None),
+        ParameterKind::Flag => (ParameterType::Bool, None),
+        ParameterKind::Text | ParameterKind::Choice(_) => (ParameterType::String, None),
+        ParameterKind::TextList => (ParameterType::StringArray, None),
+        ParameterKind::NumberList { .. } => (ParameterType::DoubleArray, None),
     };
     let description = if definition.unit.is_empty() {
         definition.description.to_owned()
@@ -162,14 +163,16 @@ fn descriptor(definition: &Definition) -> Descriptor {
         format!("{} Unit: {}.", definition.description, definition.unit)
     };
     let constraints = match definition.kind {
-        Kind::Choice(_) | Kind::NumberList { .. } => format!("must {}", definition.allowed()),
+        ParameterKind::Choice(_) | ParameterKind::NumberList { .. } => {
+            format!("must {}", definition.allowed())
+        }
         _ => String::new(),
     };
-    Descriptor {
+    ParameterDescriptor {
         kind,
         description,
         additional_constraints: constraints,
-        read_only: !definition.live,
+        read_only: !definition.is_live,
         dynamic_typing: false,
         range,
     }
@@ -179,23 +182,23 @@ fn descriptor(definition: &Definition) -> Descriptor {
 mod tests {
     use super::*;
 
-    fn settings() -> Settings {
-        Settings::new(Parameters::embedded_default().expect("shipped"), Arc::default())
+    fn store() -> ParameterStore {
+        ParameterStore::new(Parameters::embedded_default().expect("default machine"), Arc::default())
     }
 
     #[test]
-    fn a_name_without_end_does_not_come_back_in_the_refusal() {
+    fn a_long_name_is_truncated_in_the_rejection() {
         for value in [ParameterValue::ByteArray(vec![1]), ParameterValue::Integer(1)] {
-            let reason = settings().check(vec![("k\n".repeat(100_000), value)]).map(|_| ()).unwrap_err();
+            let reason = store().check(vec![("k\n".repeat(100_000), value)]).map(|_| ()).unwrap_err();
             assert!(reason.len() < 1000 && !reason.contains('\n'), "{} bytes", reason.len());
         }
     }
 
-    /// Each of them would be checked with the whole machine, and nobody else be answered meanwhile.
+    /// Each parameter requires a validation of the whole machine, which delays other requests.
     #[test]
-    fn more_parameters_in_a_request_than_there_can_be_are_refused_before_they_are_checked() {
-        assert!(settings().names().len() < MOST_CHANGES);
-        assert_eq!(check_count(MOST_CHANGES), Ok(()));
-        assert!(check_count(MOST_CHANGES + 1).unwrap_err().contains("1001"));
+    fn requests_with_too_many_parameters_are_rejected_before_validation() {
+        assert!(store().names().len() < MAX_CHANGES);
+        assert_eq!(check_count(MAX_CHANGES), Ok(()));
+        assert!(check_count(MAX_CHANGES + 1).unwrap_err().contains("1001"));
     }
 }

@@ -1,25 +1,27 @@
-//! Which parameters a list request asks for.
+//! Selection of parameters by prefix and depth for `rcl_interfaces/ListParameters`.
 
 use virtual_axes_io::messages::rcl_interfaces::msg::ListParametersResult;
 
 const SEPARATOR: char = '.';
 
-/// The names under any of `prefixes` (all of them when there is none), at most `depth` parts long
-/// (counted from below the prefix; 0 is any length), and the groups in which they are. As rclcpp
-/// does it: a name that equals a prefix is listed whatever the depth.
-pub fn list(names: &[String], prefixes: &[String], depth: u64) -> ListParametersResult {
-    let shallow = |rest: &str| depth == 0 || (rest.matches(SEPARATOR).count() as u64) < depth;
-    let is_asked_for = |name: &str| {
+/// Returns the names below any of `prefixes` (all names if it is empty) with at most `depth` parts below the
+/// prefix (0 is unlimited), and the prefixes of their groups.
+///
+/// A name equal to a prefix is listed for any depth, as in rclcpp.
+pub fn list_parameters(names: &[String], prefixes: &[String], depth: u64) -> ListParametersResult {
+    let is_within_depth = |rest: &str| depth == 0 || (rest.matches(SEPARATOR).count() as u64) < depth;
+    let is_selected = |name: &str| {
         if prefixes.is_empty() {
-            return shallow(name);
+            return is_within_depth(name);
         }
         prefixes.iter().any(|prefix| {
-            name.strip_prefix(prefix.as_str())
-                .is_some_and(|rest| rest.is_empty() || rest.strip_prefix(SEPARATOR).is_some_and(shallow))
+            name.strip_prefix(prefix.as_str()).is_some_and(|rest| {
+                rest.is_empty() || rest.strip_prefix(SEPARATOR).is_some_and(is_within_depth)
+            })
         })
     };
     let mut result = ListParametersResult::default();
-    for name in names.iter().filter(|name| is_asked_for(name)) {
+    for name in names.iter().filter(|name| is_selected(name)) {
         result.names.push(name.clone());
         if let Some((group, _)) = name.rsplit_once(SEPARATOR)
             && !result.prefixes.iter().any(|known| known == group)
@@ -49,7 +51,7 @@ mod tests {
             (vec![""], 0, vec![], vec![]),
         ] {
             let prefixes: Vec<String> = prefixes.into_iter().map(str::to_owned).collect();
-            let result = list(&names, &prefixes, depth);
+            let result = list_parameters(&names, &prefixes, depth);
             assert_eq!(result.names, expected, "{prefixes:?} {depth}");
             assert_eq!(result.prefixes, groups, "{prefixes:?} {depth}");
         }
