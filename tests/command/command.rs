@@ -1,4 +1,4 @@
-//! The command `virtual_axes` as a user runs it.
+//! The command `virtual_axes`: `run`, `check`, `pose`, `psec` and lists.
 
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use virtual_axes_verification::fixtures::folder::Folder;
+use virtual_axes_verification::fixtures::folder::TestFolder;
 
 fn run(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_virtual_axes")).args(arguments).output().expect("the command starts")
@@ -18,7 +18,7 @@ fn shipped(file: &str) -> String {
 }
 
 #[test]
-fn a_good_machine_file_is_valid() {
+fn a_valid_machine_file_is_accepted() {
     let output = run(&["check", &shipped("mikron_ucp710.yaml")]);
     assert!(output.status.success());
     assert_eq!(
@@ -30,7 +30,7 @@ fn a_good_machine_file_is_valid() {
 }
 
 #[test]
-fn a_bad_machine_file_gives_one_message_and_status_2() {
+fn a_missing_machine_file_gives_one_message_and_status_2() {
     let output = run(&["check", "no/such.yaml"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty());
@@ -51,13 +51,13 @@ fn machines_and_parameters_are_listed() {
     assert!(text.contains("| `<joint>.motor.inertia_kg_m2` | 1e-9 … 1e3 kg·m² |"), "{text}");
 }
 
-/// Paths in a test's folder as the command line takes them.
+/// Paths in the folder of a test, as command line arguments.
 trait Paths {
     fn path(&self, name: &str) -> String;
     fn text_file(&self, name: &str, text: &str) -> String;
 }
 
-impl Paths for Folder {
+impl Paths for TestFolder {
     fn path(&self, name: &str) -> String {
         self.0.join(name).to_string_lossy().into_owned()
     }
@@ -68,7 +68,7 @@ impl Paths for Folder {
 }
 
 #[track_caller]
-fn assert_refused(output: &Output, words: &[&str]) {
+fn assert_rejected(output: &Output, words: &[&str]) {
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(output.stdout.is_empty());
@@ -85,7 +85,7 @@ fn assert_runs(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// The figures of `virtual_axes run … --json`.
+/// Returns the figures of `virtual_axes run … --json`.
 #[track_caller]
 fn figures(arguments: &[&str]) -> Value {
     let arguments: Vec<&str> = ["run"].iter().chain(arguments).chain(&["--json"]).copied().collect();
@@ -93,8 +93,8 @@ fn figures(arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn set_points_are_run_and_traced() {
-    let folder = Folder::new("run");
+fn setpoints_are_simulated_and_traced() {
+    let folder = TestFolder::new("run");
     let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.6,0.01\n");
     let trace = folder.path("trace.csv");
     assert_runs(&["run", &psec, "--trace", &trace]);
@@ -105,8 +105,8 @@ fn set_points_are_run_and_traced() {
 }
 
 #[test]
-fn an_axis_that_left_its_stroke_is_told() {
-    let folder = Folder::new("stroke");
+fn an_axis_outside_its_travel_limits_is_reported() {
+    let folder = TestFolder::new("travel_limits");
     // To the stroke's end at nearly full speed, which no axis can end at once.
     let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.726,0.355\n");
     let trace = folder.path("trace.csv");
@@ -115,60 +115,44 @@ fn an_axis_that_left_its_stroke_is_told() {
     let positions = text.lines().skip(1).filter_map(|line| line.split(',').nth(2)?.parse::<f64>().ok());
     let outside = positions.filter(|position| *position > 0.356).count();
     assert!(outside > 0);
-    let told = &found["runs"][0]["axes"];
-    assert_eq!(told["x"]["outside_stroke_s"], outside as f64 * 0.006);
-    assert_eq!(told["y"]["outside_stroke_s"], 0.0);
-    let line = format!("x was outside of its stroke for {:.3} s", outside as f64 * 0.006);
+    let axes = &found["runs"][0]["axes"];
+    assert_eq!(axes["x"]["outside_travel_limits_s"], outside as f64 * 0.006);
+    assert_eq!(axes["y"]["outside_travel_limits_s"], 0.0);
+    let line = format!("x was outside its travel limits for {:.3} s", outside as f64 * 0.006);
     assert!(assert_runs(&["run", &psec]).contains(&line), "{line}");
 }
 
 #[test]
-fn trajectories_without_any_point_are_refused() {
-    let folder = Folder::new("no_points");
+fn trajectories_without_points_are_rejected() {
+    let folder = TestFolder::new("no_points");
     let file = folder.text_file("psec.yaml", "joint_names: [x]\n---\njoint_names: [y]\npoints: []\n");
-    assert_refused(&run(&["run", &file]), &["psec.yaml: there is no setpoint: no trajectory has points"]);
+    assert_rejected(&run(&["run", &file]), &["psec.yaml: no setpoints: no trajectory has points"]);
 }
 
 #[test]
-fn a_pose_beyond_a_stroke_is_told() {
-    assert!(!assert_runs(&["pose", "--joints", "x=0.1,z=-0.2"]).contains("stroke"));
-    assert_refused(
+fn a_pose_outside_the_travel_limits_is_reported() {
+    assert!(!assert_runs(&["pose", "--joints", "x=0.1,z=-0.2"]).contains("travel"));
+    assert_rejected(
         &run(&["pose", "--joints", "x=1e300"]),
         &["x is '1e300'", "from -1000000 to 1000000 m or rad"],
     );
     let beyond = assert_runs(&["pose", "--joints", "x=5,y=0.1,z=9"]);
-    assert!(beyond.ends_with("; outside the stroke: x, z\n"), "{beyond}");
+    assert!(beyond.ends_with("; outside the travel limits: x, z\n"), "{beyond}");
     let json: Value =
         serde_json::from_str(&assert_runs(&["pose", "--json", "--joints", "c=9"])).expect("JSON");
-    assert_eq!(json[0]["outside_stroke"], serde_json::json!([]));
+    assert_eq!(json[0]["outside_travel_limits"], serde_json::json!([]));
 }
 
 #[test]
-fn a_stress_that_nobody_waits_for_is_refused() {
-    for [name, number] in [
-        ["--count", "0"],
-        ["--first", "18446744073709551615"],
-        ["--threads", "0"],
-        ["--threads", "1025"],
-        ["--seed", "-1"],
-    ] {
-        let output = run(&["stress", name, number]);
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{message}");
-        assert!(message.contains(name) && message.contains(number), "{message}");
-    }
-}
-
-#[test]
-fn a_trace_has_a_row_per_trace_period() {
-    let folder = Folder::new("period");
+fn a_trace_has_one_row_per_trace_period() {
+    let folder = TestFolder::new("period");
     let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.6,0.01\n");
     let trace = folder.path("trace.csv");
     assert_runs(&["run", &psec, "--trace", &trace, "--trace-period", "125us"]);
     let text = std::fs::read_to_string(&trace).expect("readable");
     let times: Vec<&str> = text.lines().skip(1).take(3).filter_map(|line| line.split(',').next()).collect();
     assert_eq!(times, ["0", "0.000125", "0.00025"]);
-    assert_refused(
+    assert_rejected(
         &run(&["run", &psec, "--trace", &trace, "--trace-period", "130us"]),
         &["--trace-period", "130000 ns", "125000 ns"],
     );
@@ -177,8 +161,8 @@ fn a_trace_has_a_row_per_trace_period() {
 }
 
 #[test]
-fn bad_set_points_are_refused_with_file_and_line() {
-    let folder = Folder::new("refused");
+fn invalid_setpoints_are_rejected_with_file_and_line() {
+    let folder = TestFolder::new("rejected");
     let mut long = String::from("time,x\n");
     for line in 2..5000 {
         let x = if line == 4711 { "NaN" } else { "0.1" };
@@ -187,9 +171,9 @@ fn bad_set_points_are_refused_with_file_and_line() {
     for (name, text, words) in [
         ("nan.csv", "time,x\n0,0\n0.006,NaN\n", &["nan.csv:3", "x", "NaN"][..]),
         ("long.csv", &long, &["long.csv:4711", "x", "NaN"]),
-        ("far.csv", "time,x\n0,0\n10,2.5\n", &["far.csv", "x", "0.355", "stroke"]),
+        ("far.csv", "time,x\n0,0\n10,2.5\n", &["far.csv", "x", "0.355", "travel limits"]),
         ("fast.csv", "time,x\n0,0\n0.1,0.3\n", &["fast.csv", "x", "0.5"]),
-        ("eternal.csv", "time,x\n0,0\n1e300,0\n", &["eternal.csv:3", "time is 1e300 s"]),
+        ("endless.csv", "time,x\n0,0\n1e300,0\n", &["endless.csv:3", "time is 1e300 s"]),
         ("joint.csv", "time,q\n0,0\n", &["joint.csv", "q"]),
         ("columns.csv", "time,x,y\n0,0,0\n0.006,0\n", &["columns.csv", "3"]),
         ("notime.csv", "x,y\n0,0\n", &["notime.csv", "time"]),
@@ -197,7 +181,7 @@ fn bad_set_points_are_refused_with_file_and_line() {
     ] {
         let psec = folder.text_file(name, text);
         for (option, output) in [("--trace", "t.csv"), ("--trace", "t.mcap"), ("--report", "r.html")] {
-            assert_refused(&run(&["run", &psec, option, &folder.path(output)]), words);
+            assert_rejected(&run(&["run", &psec, option, &folder.path(output)]), words);
         }
         std::fs::remove_file(psec).expect("can be removed");
         assert!(folder.names().is_empty(), "{name} leaves {:?}", folder.names());
@@ -205,8 +189,8 @@ fn bad_set_points_are_refused_with_file_and_line() {
 }
 
 #[test]
-fn bad_scenarios_are_refused_with_file_and_line() {
-    let folder = Folder::new("scenarios");
+fn invalid_scenarios_are_rejected_with_file_and_line() {
+    let folder = TestFolder::new("scenarios");
     let moves = "moves:\n  - line: {x_mm: 50}\n";
     let of = |head: &str| format!("description: d\n{head}{moves}");
     for (name, text, words) in [
@@ -248,7 +232,7 @@ fn bad_scenarios_are_refused_with_file_and_line() {
         (
             "far.yaml",
             "description: d\nfeed_m_min: 1\nmoves:\n  - line: {x_mm: 5000}\n".to_owned(),
-            &["far.yaml", "move 1", "x", "0.355", "stroke"],
+            &["far.yaml", "move 1", "x", "0.355", "travel limits"],
         ),
         ("empty.yaml", "description: d\nmoves: []\n".to_owned(), &["empty.yaml", "0 moves"]),
         (
@@ -259,64 +243,64 @@ fn bad_scenarios_are_refused_with_file_and_line() {
     ] {
         let file = folder.text_file(name, &text);
         for (option, output) in [("--trace", "t.csv"), ("--report", "r.html")] {
-            assert_refused(&run(&["run", &file, option, &folder.path(output)]), words);
+            assert_rejected(&run(&["run", &file, option, &folder.path(output)]), words);
         }
-        assert_refused(&run(&["psec", &file, "--out", &folder.path("p.csv")]), words);
-        assert_refused(&run(&["check", &file]), words);
+        assert_rejected(&run(&["psec", &file, "--out", &folder.path("p.csv")]), words);
+        assert_rejected(&run(&["check", &file]), words);
         std::fs::remove_file(file).expect("can be removed");
         assert!(folder.names().is_empty(), "{name} leaves {:?}", folder.names());
     }
-    assert_refused(&run(&["run", "balbar"]), &["balbar", "ballbar", "corner-90"]);
+    assert_rejected(&run(&["run", "balbar"]), &["balbar", "ballbar", "corner-90"]);
 }
 
 #[test]
-fn a_trace_never_replaces_its_own_set_points_nor_other_files() {
-    let folder = Folder::new("replaced");
+fn a_trace_does_not_replace_its_input_or_other_files() {
+    let folder = TestFolder::new("replaced");
     let text = "time,x\n0,0\n0.06,0.001\n";
     let psec = folder.text_file("psec.csv", text);
     let other = folder.text_file("trace.partial", "keep");
-    assert_refused(&run(&["run", &psec, "--trace", &psec]), &["psec.csv", "replace"]);
-    assert_refused(&run(&["run", &psec, "--report", &psec]), &["psec.csv", "replace"]);
+    assert_rejected(&run(&["run", &psec, "--trace", &psec]), &["psec.csv", "replace"]);
+    assert_rejected(&run(&["run", &psec, "--report", &psec]), &["psec.csv", "replace"]);
     assert_runs(&["run", &psec, "--trace", &folder.path("trace.csv")]);
     assert_eq!(std::fs::read_to_string(psec).expect("readable"), text);
     assert_eq!(std::fs::read_to_string(other).expect("readable"), "keep");
 }
 
 #[test]
-fn a_full_disk_is_said() {
-    let folder = Folder::new("full");
+fn a_full_disk_is_reported() {
+    let folder = TestFolder::new("full");
     let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.06,0.001\n");
     for (command, option) in [("run", "--trace"), ("run", "--report")] {
         for extension in ["csv", "mcap"] {
             if (option, extension) == ("--report", "mcap") {
                 continue;
             }
-            // The name decides the format, the link decides where it goes.
+            // The file name selects the format, the link the destination.
             let link = folder.0.join(format!("full.{extension}"));
             std::os::unix::fs::symlink("/dev/full", &link).expect("a link can be made");
             let link = link.to_string_lossy().into_owned();
-            assert_refused(&run(&[command, &psec, option, &link]), &["full."]);
+            assert_rejected(&run(&[command, &psec, option, &link]), &["full."]);
             std::fs::remove_file(link).expect("can be removed");
         }
     }
     for extension in ["csv", "mcap", "yaml"] {
         let link = folder.0.join(format!("full.{extension}"));
         std::os::unix::fs::symlink("/dev/full", &link).expect("a link can be made");
-        assert_refused(&run(&["psec", "corner-90", "--out", &link.to_string_lossy()]), &["full."]);
+        assert_rejected(&run(&["psec", "corner-90", "--out", &link.to_string_lossy()]), &["full."]);
         std::fs::remove_file(link).expect("can be removed");
     }
     assert_eq!(folder.names(), ["psec.csv"]);
 }
 
 #[test]
-fn set_points_of_a_scenario_run_like_the_scenario() {
-    let folder = Folder::new("psec");
+fn setpoints_of_a_scenario_give_the_figures_of_the_scenario() {
+    let folder = TestFolder::new("psec");
     let scenario = figures(&["corner-90"]);
     for extension in ["csv", "mcap", "yaml"] {
         let file = folder.path(&format!("corner.{extension}"));
         assert_runs(&["psec", "corner-90", "--out", &file]);
         let found = figures(&[&file]);
-        // The same setpoints give the same axes, to the bit.
+        // Equal setpoints give bit-identical figures of the axes.
         let (expected, found) = (&scenario["runs"][0]["axes"], &found["runs"][0]["axes"]);
         assert_eq!(found, expected, "{extension}");
     }
@@ -327,7 +311,7 @@ fn several_runs_are_compared() {
     let runs = figures(&["x-constant", "--controller", "cascade,cascade-noff"]);
     let error = |run: usize| {
         let axis = &runs["runs"][run]["axes"]["x"];
-        axis["synchronized_tracking_error"]["max"].as_f64().expect("a number")
+        axis["delay_compensated_following_error"]["max"].as_f64().expect("a number")
     };
     // Prévost's feedforward against none: 218.9 and 6666.7 µm.
     assert!((error(0) - 218.9).abs() < 2.189, "{}", error(0));
@@ -336,29 +320,29 @@ fn several_runs_are_compared() {
     let compared = figures(&["x-constant", "--compare", "x.position_loop.gain=3,x.feedforward.velocity=0"]);
     assert_eq!(compared["runs"].as_array().map(Vec::len), Some(2));
     assert_eq!(compared["runs"][1]["changes"][0], "x.position_loop.gain=3");
-    assert_refused(
+    assert_rejected(
         &run(&["run", "x-constant", "--controller", "cascade,cascade-noff", "--trace", "t.csv"]),
         &["--trace", "2"],
     );
 }
 
 #[test]
-fn the_feed_of_a_scenario_can_be_replaced() {
+fn the_feed_of_a_scenario_can_be_overridden() {
     let lag = |feed: &[&str]| {
         let arguments: Vec<&str> =
             ["x-constant", "--controller", "cascade-noff"].iter().chain(feed).copied().collect();
         let found = figures(&arguments);
-        found["runs"][0]["axes"]["x"]["synchronized_tracking_error"]["max"].as_f64().expect("a number")
+        found["runs"][0]["axes"]["x"]["delay_compensated_following_error"]["max"].as_f64().expect("a number")
     };
-    // V/Kp, Kp = 25 s⁻¹: half the feed, half the lag.
+    // The lag is V/Kp with Kp = 25 s⁻¹: half the feed gives half the lag.
     assert!((lag(&["--feed", "5"]) - 5e6 / 60.0 / 25.0).abs() < 33.3);
-    assert_refused(&run(&["run", "c-two-speeds", "--feed", "5"]), &["--feed", "c-two-speeds"]);
-    assert_refused(&run(&["run", "x-constant", "--feed", "-5"]), &["--feed", "-5"]);
-    assert_refused(&run(&["run", "x-constant", "--feed", "nan"]), &["--feed", "NaN"]);
+    assert_rejected(&run(&["run", "c-two-speeds", "--feed", "5"]), &["--feed", "c-two-speeds"]);
+    assert_rejected(&run(&["run", "x-constant", "--feed", "-5"]), &["--feed", "-5"]);
+    assert_rejected(&run(&["run", "x-constant", "--feed", "nan"]), &["--feed", "NaN"]);
 }
 
 #[test]
-fn the_table_shows_what_json_holds() {
+fn table_and_json_contain_the_same_figures() {
     let table = assert_runs(&["run", "corner-90"]);
     let found = figures(&["corner-90"]);
     let corner = found["runs"][0]["corners"][0]["max_contour_error_um"].as_f64().expect("a number");
@@ -366,13 +350,13 @@ fn the_table_shows_what_json_holds() {
         let line = table.lines().find(|line| line.starts_with(begin));
         line.unwrap_or_else(|| panic!("no {begin} in {table}")).split_whitespace().collect()
     };
-    assert!(row("corner behind move 1, 90°").contains(&format!("{corner:.1}").as_str()), "{table}");
+    assert!(row("corner after move 1, 90°").contains(&format!("{corner:.1}").as_str()), "{table}");
     let x = found["runs"][0]["axes"]["x"]["peak_current_a"].as_f64().expect("a number");
     assert!(row("x ").contains(&format!("{x:.2}").as_str()), "{table}");
 }
 
 #[test]
-fn completions_know_the_commands() {
+fn completions_contain_the_subcommands() {
     for shell in ["bash", "zsh", "fish"] {
         let text = assert_runs(&["completions", shell]);
         for word in ["run", "psec", "scenarios", "trace-period"] {
@@ -381,8 +365,8 @@ fn completions_know_the_commands() {
     }
 }
 
-/// Peak resident memory of a run over a generated file of `seconds`, kB.
-fn peak_memory(folder: &Folder, seconds: u32) -> u64 {
+/// Returns the peak resident memory of a run over a generated file of `seconds`, kB.
+fn peak_memory(folder: &TestFolder, seconds: u32) -> u64 {
     let path = folder.path("long.csv");
     {
         let mut file = BufWriter::new(std::fs::File::create(&path).expect("a file can be made"));
@@ -393,7 +377,7 @@ fn peak_memory(folder: &Folder, seconds: u32) -> u64 {
         }
     }
     let program = env!("CARGO_BIN_EXE_virtual_axes");
-    // The shell's own peak is far below; `ulimit` and `/usr/bin/time` are not everywhere, /proc is.
+    // /proc is available everywhere, `ulimit` and `/usr/bin/time` are not.
     let mut child = Command::new(program)
         .args(["run", &path, "--json"])
         .stdout(Stdio::null())
@@ -413,17 +397,17 @@ fn peak_memory(folder: &Folder, seconds: u32) -> u64 {
 }
 
 #[test]
-fn memory_does_not_grow_with_the_length_of_the_set_points() {
-    let folder = Folder::new("memory");
+fn memory_is_independent_of_the_number_of_setpoints() {
+    let folder = TestFolder::new("memory");
     let (short, long) = (peak_memory(&folder, 60), peak_memory(&folder, 600));
     println!("{short} kB for a minute, {long} kB for ten");
     assert!(short > 0, "memory can be read");
-    // Held whole, ten minutes of five axes are 4 MB of setpoints and more of checks.
+    // In memory, ten minutes of five axes are 4 MB of setpoints.
     assert!(long < short + 1024, "{short} kB for a minute, {long} kB for ten");
 }
 
 #[test]
-fn the_readme_shows_what_is_printed() {
+fn the_readme_shows_the_printed_table() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
     let text = std::fs::read_to_string(path).expect("the README is there");
     let command = "`virtual_axes run corner-90` prints";
@@ -435,9 +419,9 @@ fn the_readme_shows_what_is_printed() {
 }
 
 #[test]
-fn an_interrupted_command_leaves_nothing_behind() {
+fn an_interrupted_command_leaves_no_file() {
     for signal in ["INT", "TERM"] {
-        let folder = Folder::new(&format!("interrupted_{signal}"));
+        let folder = TestFolder::new(&format!("interrupted_{signal}"));
         let psec = folder.text_file("psec.csv", "time,x\n0,0\n1000000,0.3\n");
         let mut child = Command::new(env!("CARGO_BIN_EXE_virtual_axes"))
             .args(["run", &psec, "--trace", &folder.path("trace.csv")])
@@ -447,7 +431,7 @@ fn an_interrupted_command_leaves_nothing_behind() {
             .expect("the command starts");
         let until = Instant::now() + Duration::from_secs(60);
         while folder.names().len() < 2 {
-            assert!(Instant::now() < until, "no trace is begun");
+            assert!(Instant::now() < until, "no trace was started");
             std::thread::sleep(Duration::from_millis(10));
         }
         let id = child.id().to_string();
@@ -460,30 +444,30 @@ fn an_interrupted_command_leaves_nothing_behind() {
 
 #[test]
 fn outputs_do_not_replace_each_other() {
-    let folder = Folder::new("outputs");
+    let folder = TestFolder::new("outputs");
     let (csv, page) = (folder.path("o.csv"), folder.path("o.html"));
-    assert_refused(
+    assert_rejected(
         &run(&["run", "corner-90", "--trace", &csv, "--report", &csv]),
         &["o.csv", "trace", "report"],
     );
-    assert_refused(&run(&["run", "corner-90", "--report", &csv]), &["o.csv", ".html"]);
-    assert_refused(&run(&["run", "corner-90", "--trace", &page]), &["o.html", ".csv", ".mcap"]);
+    assert_rejected(&run(&["run", "corner-90", "--report", &csv]), &["o.csv", ".html"]);
+    assert_rejected(&run(&["run", "corner-90", "--trace", &page]), &["o.html", ".csv", ".mcap"]);
     assert!(folder.names().is_empty(), "{:?}", folder.names());
 }
 
 #[test]
-fn a_full_standard_output_is_said() {
+fn a_full_standard_output_is_reported() {
     let full = std::fs::File::options().write(true).open("/dev/full").expect("it is there");
     let mut command = Command::new(env!("CARGO_BIN_EXE_virtual_axes"));
     let output = command.args(["run", "corner-90", "--json"]).stdout(full).output().expect("it runs");
-    assert_refused(&output, &["standard output"]);
+    assert_rejected(&output, &["standard output"]);
 }
 
 #[test]
-fn a_machine_without_a_tool_says_so() {
-    let folder = Folder::new("names");
+fn a_machine_without_a_tool_has_no_contour_error() {
+    let folder = TestFolder::new("names");
     let text = std::fs::read_to_string(shipped("mikron_ucp710.yaml")).expect("it is there");
-    // The joints x and y are called u and v, and nothing is called z.
+    // The joints are named u, v and w: none is x, y or z.
     let mut renamed = text.replace("\"x\", \"y\", \"z\"", "\"u\", \"v\", \"w\"");
     for (from, to) in [("\n    x:", "\n    u:"), ("\n    y:", "\n    v:"), ("\n    z:", "\n    w:")] {
         renamed = renamed.replace(from, to);
@@ -495,8 +479,8 @@ fn a_machine_without_a_tool_says_so() {
 }
 
 #[test]
-fn what_is_shipped_is_checked_by_its_name() {
+fn shipped_machines_and_scenarios_are_checked_by_name() {
     assert!(assert_runs(&["check", "linear_motor_center"]).contains("valid"));
     assert!(assert_runs(&["check", "corner-90"]).contains("valid"));
-    assert_refused(&run(&["check", "corner-91"]), &["corner-91", "corner-90", "linear_motor_center"]);
+    assert_rejected(&run(&["check", "corner-91"]), &["corner-91", "corner-90", "linear_motor_center"]);
 }

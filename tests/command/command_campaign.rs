@@ -1,12 +1,12 @@
-//! `virtual_axes psec campaign` as a user runs it.
+//! The command `virtual_axes psec campaign`.
 
 use std::fs;
 
-use crate::command_common::{assert_refused, json, printed, run};
+use crate::command_common::{assert_rejected, json, printed, run};
 use serde_json::Value;
-use virtual_axes_verification::fixtures::folder::Folder;
+use virtual_axes_verification::fixtures::folder::TestFolder;
 
-/// Times and positions of a CSV file of one joint, in m or rad.
+/// Returns times and positions of a CSV file of one joint, s and m or rad.
 fn rows(path: &str, joint: &str) -> Vec<(f64, f64)> {
     let text = fs::read_to_string(path).expect("readable");
     let mut lines = text.lines();
@@ -15,18 +15,18 @@ fn rows(path: &str, joint: &str) -> Vec<(f64, f64)> {
     numbers.map(|(t, x)| (t.parse().expect("a time"), x.parse().expect("a position"))).collect()
 }
 
-fn path(folder: &Folder, name: &str) -> String {
+fn path(folder: &TestFolder, name: &str) -> String {
     folder.0.join(name).to_string_lossy().into_owned()
 }
 
 #[test]
-fn the_timetable_says_what_stands_in_the_file() {
-    let folder = Folder::new("campaign_timetable");
+fn the_timetable_agrees_with_the_file() {
+    let folder = TestFolder::new("campaign_timetable");
     let file = path(&folder, "z.csv");
-    let told = json(&["psec", "campaign", "--axis", "z", "--out", &file, "--json"]);
+    let timetable = json(&["psec", "campaign", "--axis", "z", "--out", &file, "--json"]);
     let rows = rows(&file, "z");
-    assert_eq!(told["axis"], "z");
-    let parts = told["parts"].as_array().expect("a list");
+    assert_eq!(timetable["axis"], "z");
+    let parts = timetable["parts"].as_array().expect("a list");
     let names: Vec<&str> = parts.iter().filter_map(|part| part["part"].as_str()).collect();
     assert_eq!(names, ["off", "velocity", "both"]);
     assert_eq!(parts[1]["set"][0], "z.feedforward.velocity=1");
@@ -47,21 +47,21 @@ fn the_timetable_says_what_stands_in_the_file() {
         }
     }
     assert_eq!(rows.last().map(|row| row.0), Some(number(&parts[2], "to_s")));
-    let (low, high) = (told["range_mm"][0].as_f64(), told["range_mm"][1].as_f64());
-    assert_eq!((low, high, told["start_mm"].as_f64()), (Some(-225.0), Some(225.0), Some(0.0)));
+    let (low, high) = (timetable["range_mm"][0].as_f64(), timetable["range_mm"][1].as_f64());
+    assert_eq!((low, high, timetable["start_mm"].as_f64()), (Some(-225.0), Some(225.0), Some(0.0)));
 }
 
 #[test]
-fn a_part_alone_is_that_of_the_whole() {
-    let folder = Folder::new("campaign_parts");
+fn a_single_part_equals_the_part_of_the_whole_campaign() {
+    let folder = TestFolder::new("campaign_parts");
     let whole = path(&folder, "whole.csv");
-    let told = json(&["psec", "campaign", "--axis", "a", "--out", &whole, "--json"]);
+    let timetable = json(&["psec", "campaign", "--axis", "a", "--out", &whole, "--json"]);
     let whole = rows(&whole, "a");
     for (i, part) in ["off", "velocity", "both"].into_iter().enumerate() {
         let alone = path(&folder, "part.csv");
         printed(&["psec", "campaign", "--axis", "a", "--part", part, "--out", &alone]);
         let alone: Vec<f64> = rows(&alone, "a").into_iter().map(|row| row.1).collect();
-        let from = told["parts"][i]["from_s"].as_f64().expect("a number");
+        let from = timetable["parts"][i]["from_s"].as_f64().expect("a number");
         let same: Vec<f64> =
             whole.iter().filter(|(t, _)| *t > from - 0.003).take(alone.len()).map(|row| row.1).collect();
         assert!(alone == same, "{part}");
@@ -69,8 +69,8 @@ fn a_part_alone_is_that_of_the_whole() {
 }
 
 #[test]
-fn every_format_runs_and_brings_the_axis_back() {
-    let folder = Folder::new("campaign_formats");
+fn all_formats_give_equal_figures() {
+    let folder = TestFolder::new("campaign_formats");
     let mut figures = Vec::new();
     for extension in ["csv", "yaml", "mcap"] {
         let file = path(&folder, &format!("c.{extension}"));
@@ -88,12 +88,12 @@ fn every_format_runs_and_brings_the_axis_back() {
 }
 
 #[test]
-fn range_and_feed_are_kept() {
-    let folder = Folder::new("campaign_range");
+fn range_and_feed_limits_are_kept() {
+    let folder = TestFolder::new("campaign_range");
     let file = path(&folder, "x.csv");
     let text =
         printed(&["psec", "campaign", "--axis", "x", "--range", "50,150", "--max-feed", "6", "--out", &file]);
-    assert!(text.contains("x starts and ends at 55.000 mm, to be brought there first"), "{text}");
+    assert!(text.contains("x starts and ends at 55.000 mm; move it there before the start"), "{text}");
     let rows = rows(&file, "x");
     assert!(rows.iter().all(|(_, x)| (0.055..=0.145).contains(x)));
     let fastest = rows.windows(2).map(|pair| (pair[1].1 - pair[0].1).abs() / 0.006).fold(0.0, f64::max);
@@ -101,8 +101,8 @@ fn range_and_feed_are_kept() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_in_one_line_and_leaves_no_file() {
-    let folder = Folder::new("campaign_refused");
+fn impossible_campaigns_are_rejected_in_one_line_without_a_file() {
+    let folder = TestFolder::new("campaign_rejected");
     let file = path(&folder, "x.csv");
     for (more, words) in [
         (&["--axis", "w"][..], &["--axis w", "x, y, z, a, c"][..]),
@@ -122,9 +122,9 @@ fn what_cannot_be_is_refused_in_one_line_and_leaves_no_file() {
         }
         assert!(folder.names().is_empty());
     }
-    // The parser's own messages.
+    // Messages of the argument parser.
     for wrong in [&["--range", "5"][..], &["--range", "a,b"], &["--part", "torque"]] {
-        assert_refused(&[&["psec", "campaign", "--axis", "x", "--out", &file], wrong].concat(), &wrong[..1]);
+        assert_rejected(&[&["psec", "campaign", "--axis", "x", "--out", &file], wrong].concat(), &wrong[..1]);
         assert!(folder.names().is_empty());
     }
 }

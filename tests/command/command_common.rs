@@ -1,4 +1,4 @@
-//! The command as a user runs it.
+//! Helpers to run the command `virtual_axes`.
 
 use std::process::{Command, Output};
 
@@ -8,12 +8,12 @@ pub fn run(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_virtual_axes")).args(arguments).output().expect("the command starts")
 }
 
-/// What a run that succeeds prints.
+/// Returns the standard output of a successful run.
 #[track_caller]
 pub fn printed(arguments: &[&str]) -> String {
     let output = run(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    // No bar where standard error is no terminal.
+    // No progress bar if standard error is no terminal.
     assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("UTF-8")
 }
@@ -24,7 +24,7 @@ pub fn json(arguments: &[&str]) -> Value {
 }
 
 #[track_caller]
-pub fn assert_refused(arguments: &[&str], parts: &[&str]) {
+pub fn assert_rejected(arguments: &[&str], parts: &[&str]) {
     let output = run(arguments);
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{message}");

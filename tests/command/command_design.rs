@@ -1,4 +1,4 @@
-//! The command `virtual_axes design` as a user runs it.
+//! The command `virtual_axes design`.
 
 use std::process::{Command, Output};
 
@@ -28,7 +28,7 @@ fn object(arguments: &[&str]) -> Value {
 }
 
 #[track_caller]
-fn assert_refused(arguments: &[&str], words: &[&str]) {
+fn assert_rejected(arguments: &[&str], words: &[&str]) {
     let output = run(arguments);
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{message}");
@@ -39,7 +39,7 @@ fn assert_refused(arguments: &[&str], words: &[&str]) {
 }
 
 #[test]
-fn the_preset_has_its_margins_on_all_axes() {
+fn the_default_tuning_has_its_margins_on_all_axes() {
     let object = object(&["gpc"]);
     assert_eq!(object["axes"].as_object().map(|axes| axes.len()), Some(5));
     let worst = |figure: &str| object["worst"][figure].as_f64().expect("a number");
@@ -53,7 +53,7 @@ fn the_preset_has_its_margins_on_all_axes() {
 }
 
 #[test]
-fn a_tuning_of_the_command_goes_before_the_machine_s() {
+fn options_override_the_tuning_of_the_machine() {
     let object =
         object(&["gpc", "--axis", "x,z", "--n1", "1", "--n2", "8", "--nu", "6", "--lambda-rel", "1e-3"]);
     let axes: Vec<&String> = object["axes"].as_object().expect("axes").keys().collect();
@@ -65,7 +65,7 @@ fn a_tuning_of_the_command_goes_before_the_machine_s() {
 }
 
 #[test]
-fn the_lines_for_a_machine_file_run_as_they_are() {
+fn yaml_output_is_valid_in_a_machine_file() {
     for method in [
         &["gpc"][..],
         &["p"],
@@ -78,7 +78,7 @@ fn the_lines_for_a_machine_file_run_as_they_are() {
         parameters.overlay_yaml(&yaml, "design", None).expect("parameters");
         let config = parameters.machine_config().expect("a machine");
         MachineParameters::new(&config).unwrap_or_else(|error| panic!("{method:?}: {error}"));
-        // To the last digit.
+        // All digits are kept.
         for axis in ["x", "c"] {
             let printed = text(&[method, &["--axis", axis]].concat());
             for (key, name) in [("r", "R = ["), ("s", "S = ["), ("t", "T = [")] {
@@ -92,7 +92,7 @@ fn the_lines_for_a_machine_file_run_as_they_are() {
 }
 
 #[test]
-fn a_cascade_s_gain_is_taken_from_the_machine() {
+fn the_gain_defaults_to_that_of_the_machine() {
     let object = object(&["p", "--axis", "z", "--feedforward", "0"]);
     let z = &object["axes"]["z"];
     // 3.5 (m/min)/mm
@@ -102,7 +102,7 @@ fn a_cascade_s_gain_is_taken_from_the_machine() {
 }
 
 #[test]
-fn placed_poles_are_there() {
+fn placed_poles_are_closed_loop_poles() {
     let object = object(&["poles", "--axis", "x", "--pole", "0.7,0.2", "--pole", "0.1"]);
     let poles = object["axes"]["x"]["poles"].as_array().expect("poles");
     let near = |pole: &Value, re: f64, im: f64| {
@@ -116,32 +116,35 @@ fn placed_poles_are_there() {
 }
 
 #[test]
-fn an_unstable_loop_is_refused_with_its_pole_unless_forced() {
-    let loud = ["p", "--axis", "x", "--gain", "20"];
-    assert_refused(&loud, &["axis x: the closed loop is unstable: its pole ", "--force accepts it"]);
-    let forced = text(&[&loud[..], &["--force"]].concat());
+fn an_unstable_loop_is_rejected_with_its_pole_unless_forced() {
+    let unstable = ["p", "--axis", "x", "--gain", "20"];
+    assert_rejected(
+        &unstable,
+        &["axis x: the closed loop is unstable: its pole ", "use --force to accept it"],
+    );
+    let forced = text(&[&unstable[..], &["--force"]].concat());
     assert!(forced.contains("no margins: the closed loop is unstable"), "{forced}");
-    let yaml = text(&[&loud[..], &["--force", "--yaml"]].concat());
+    let yaml = text(&[&unstable[..], &["--force", "--yaml"]].concat());
     assert!(yaml.contains("allow_unstable: true"), "{yaml}");
 }
 
 #[test]
-fn bad_input_is_refused_by_name() {
-    assert_refused(
+fn invalid_options_are_rejected_by_name() {
+    assert_rejected(
         &["gpc", "--n1", "9", "--n2", "8", "--nu", "6"],
         &["axis x: n1 = 9 must lie in 1 … n2 = 8"],
     );
-    assert_refused(&["gpc", "--nu", "15"], &["axis x: nu = 15 must lie in 1 … n2 = 14"]);
-    assert_refused(&["gpc", "--lambda-rel", "-1"], &["lambda_rel = -1 must be finite and not negative"]);
-    assert_refused(&["gpc", "--lambda", "nan"], &["lambda = NaN must be finite"]);
-    assert_refused(&["gpc", "--axis", "w"], &["--axis w: the machine has x, y, z, a, c"]);
-    assert_refused(&["pi", "--integral-time-ms", "0"], &["integral_time = 0 must be above 0"]);
+    assert_rejected(&["gpc", "--nu", "15"], &["axis x: nu = 15 must lie in 1 … n2 = 14"]);
+    assert_rejected(&["gpc", "--lambda-rel", "-1"], &["lambda_rel = -1 must be finite and not negative"]);
+    assert_rejected(&["gpc", "--lambda", "nan"], &["lambda = NaN must be finite"]);
+    assert_rejected(&["gpc", "--axis", "w"], &["--axis w: the machine has x, y, z, a, c"]);
+    assert_rejected(&["pi", "--integral-time-ms", "0"], &["integral_time = 0 must be above 0"]);
     for gain in ["-1", "1e6", "nan", "1e-7", "1e-320"] {
-        assert_refused(&["p", "--gain", gain], &["--gain", "at most 600 (m/min)/mm"]);
+        assert_rejected(&["p", "--gain", gain], &["--gain", "at most 600 (m/min)/mm"]);
     }
-    assert_refused(&["p", "--feedforward", "1e300"], &["velocity_feedforward = 1e300 must"]);
-    assert_refused(&["poles", "--pole", "1.5"], &["the wanted pole 1.500000 has the modulus 1.5"]);
-    assert_refused(&["poles", "--pole", "a"], &["--pole"]);
-    assert_refused(&["poles"], &["--bandwidth"]);
-    assert_refused(&["gpc", "--set", "x.no_such=1"], &["x.no_such"]);
+    assert_rejected(&["p", "--feedforward", "1e300"], &["velocity_feedforward = 1e300 must"]);
+    assert_rejected(&["poles", "--pole", "1.5"], &["the wanted pole 1.500000 has the modulus 1.5"]);
+    assert_rejected(&["poles", "--pole", "a"], &["--pole"]);
+    assert_rejected(&["poles"], &["--bandwidth"]);
+    assert_rejected(&["gpc", "--set", "x.no_such=1"], &["x.no_such"]);
 }

@@ -1,4 +1,4 @@
-//! Output files stand under their names only when they are whole.
+//! Output files are written atomically.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -6,15 +6,15 @@ use std::path::Path;
 
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_io::files::{OutputFile, TraceCsv, psec_writer, trace_writer};
-use virtual_axes_verification::fixtures::folder::Folder;
+use virtual_axes_verification::fixtures::folder::TestFolder;
 
 fn joints() -> Vec<String> {
     vec!["x".to_owned()]
 }
 
 #[test]
-fn a_file_takes_its_place_when_it_is_whole() {
-    let folder = Folder::new("output_whole");
+fn a_file_is_replaced_when_it_is_complete() {
+    let folder = TestFolder::new("output_whole");
     let path = folder.file("out.txt", "old");
     let mut out = OutputFile::create(&path).expect("can be made");
     out.write_all(b"new").expect("can be written");
@@ -27,8 +27,8 @@ fn a_file_takes_its_place_when_it_is_whole() {
 }
 
 #[test]
-fn a_file_that_is_given_up_leaves_nothing() {
-    let folder = Folder::new("output_dropped");
+fn an_abandoned_file_is_removed() {
+    let folder = TestFolder::new("output_dropped");
     let path = folder.file("out.txt", "old");
     for name in ["out.txt", "none.txt"] {
         let mut out = OutputFile::create(&folder.0.join(name)).expect("can be made");
@@ -50,9 +50,9 @@ fn a_file_that_is_given_up_leaves_nothing() {
 
 #[cfg(unix)]
 #[test]
-fn links_are_followed_and_permissions_kept() {
+fn symbolic_links_are_followed_and_permissions_are_kept() {
     use std::os::unix::fs::{PermissionsExt, symlink};
-    let folder = Folder::new("output_links");
+    let folder = TestFolder::new("output_links");
     let path = folder.file("real.txt", "old");
     fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).expect("mine");
     let link = folder.0.join("link.txt");
@@ -75,8 +75,8 @@ fn links_are_followed_and_permissions_kept() {
 }
 
 #[test]
-fn two_that_write_one_file_do_not_meet() {
-    let folder = Folder::new("output_two");
+fn two_writers_of_one_file_do_not_interfere() {
+    let folder = TestFolder::new("output_two");
     let path = folder.0.join("out.txt");
     let mut first = OutputFile::create(&path).expect("can be made");
     let mut second = OutputFile::create(&path).expect("can be made");
@@ -88,11 +88,11 @@ fn two_that_write_one_file_do_not_meet() {
     assert_eq!(folder.names(), ["out.txt"]);
 }
 
-/// A trace and the table on one stream: neither is lost nor overwrites the other.
+/// Trace and table on one stream: neither is lost or overwritten.
 #[cfg(target_os = "linux")]
 #[test]
-fn the_standard_output_takes_a_trace() {
-    let folder = Folder::new("output_stdout");
+fn a_trace_can_be_written_to_standard_output() {
+    let folder = TestFolder::new("output_stdout");
     let psec = folder.file("psec.csv", "time,x\n0,0\n0.06,0.001\n");
     let run = |stdout: std::process::Stdio| {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_virtual_axes"));
@@ -101,7 +101,7 @@ fn the_standard_output_takes_a_trace() {
     };
     let piped = String::from_utf8(run(std::process::Stdio::piped()).stdout).expect("text");
     assert!(piped.starts_with("time,x.psec,"), "{piped:.80}");
-    assert!(piped.lines().count() > 11 && piped.contains("tracking error"), "{piped}");
+    assert!(piped.lines().count() > 11 && piped.contains("following error"), "{piped}");
     let out = folder.0.join("out.txt");
     assert!(run(fs::File::create(&out).expect("can be made").into()).status.success());
     assert_eq!(fs::read_to_string(&out).expect("readable"), piped);
@@ -110,14 +110,14 @@ fn the_standard_output_takes_a_trace() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_said_with_its_name() {
+fn a_full_disk_is_reported_with_the_file_name() {
     let mut out = OutputFile::create("/dev/full".as_ref()).expect("can be opened");
     out.write_all(b"short").expect("is buffered");
     let error = out.finish().expect_err("is full");
     assert_eq!(error.kind(), ErrorKind::StorageFull);
     assert!(error.to_string().starts_with("/dev/full: "), "{error}");
 
-    let folder = Folder::new("output_full");
+    let folder = TestFolder::new("output_full");
     for name in ["full", "full.csv", "full.mcap"] {
         let path = folder.0.join(name);
         std::os::unix::fs::symlink("/dev/full", &path).expect("a link");
@@ -142,29 +142,29 @@ fn a_full_disk_is_said_with_its_name() {
 }
 
 #[test]
-fn what_cannot_be_written_is_said() {
+fn a_file_that_cannot_be_created_is_reported() {
     let error = OutputFile::create(Path::new("no/such/folder/t.csv")).expect_err("no folder");
     assert!(error.to_string().starts_with("no/such/folder/t.csv: "), "{error}");
-    let folder = Folder::new("output_folder");
+    let folder = TestFolder::new("output_folder");
     let error = OutputFile::create(&folder.0).expect_err("a folder");
     assert!(error.to_string().starts_with(&format!("{}: ", folder.0.display())), "{error}");
 }
 
 #[test]
-fn an_unknown_extension_is_refused_with_the_known_ones() {
-    let refused = |path: &str| match trace_writer(path.as_ref(), &joints()) {
-        Ok(_) => panic!("{path} must be refused"),
+fn an_unknown_extension_is_rejected_with_the_supported_ones() {
+    let rejected = |path: &str| match trace_writer(path.as_ref(), &joints()) {
+        Ok(_) => panic!("{path} must be rejected"),
         Err(error) => error.to_string(),
     };
-    assert_eq!(refused("t.bag"), "t.bag: its extension must say what to write: .csv, .mcap");
-    assert_eq!(refused("t"), "t: its extension must say what to write: .csv, .mcap");
-    let Err(error) = psec_writer("p.json".as_ref(), &joints()) else { panic!("must be refused") };
+    assert_eq!(rejected("t.bag"), "t.bag: its extension must say what to write: .csv, .mcap");
+    assert_eq!(rejected("t"), "t: its extension must say what to write: .csv, .mcap");
+    let Err(error) = psec_writer("p.json".as_ref(), &joints()) else { panic!("must be rejected") };
     assert_eq!(error.to_string(), "p.json: its extension must say what to write: .csv, .mcap, .yaml");
     assert!(!Path::new("t.bag").exists());
 }
 
 #[test]
-fn a_trace_has_its_columns_at_any_tick() {
+fn a_trace_row_can_be_at_any_tick() {
     let joints = ["x".to_owned(), "c".to_owned()];
     let mut trace = TraceCsv::new(Vec::new(), &joints).expect("in memory");
     let sample = AxisSample { psec: 0.1, position: 1e-7, voltage: -3.0, ..AxisSample::default() };

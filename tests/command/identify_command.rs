@@ -1,14 +1,15 @@
-//! `virtual_axes identify` as a user runs it.
+//! The command `virtual_axes identify`.
 
 use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use crate::command_common::{assert_refused, json, printed};
+use crate::command_common::{assert_rejected, json, printed};
 use serde_json::Value;
-use virtual_axes_verification::fixtures::folder::Folder;
+use virtual_axes_verification::fixtures::folder::TestFolder;
 
-/// Traces of the campaign of X of the default machine: feedforward off, velocity, both; and one as MCAP.
+/// Traces of an identification campaign of X of the default machine, with feedforward off, velocity, both, and one as
+/// MCAP.
 struct Recordings {
     off: String,
     velocity: String,
@@ -16,9 +17,9 @@ struct Recordings {
     mcap: String,
 }
 
-/// Made once: a campaign of a minute and a half.
+/// Recordings of a campaign of a minute and a half, simulated once.
 static RECORDINGS: LazyLock<Recordings> = LazyLock::new(|| {
-    // A static is never dropped: the folder is of the test run, and is made anew by the next one.
+    // A static is never dropped: the folder remains until the next test run.
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("identify_recordings");
     std::fs::create_dir_all(&folder).expect("a folder can be made");
     let path = |name: &str| folder.join(name).to_string_lossy().into_owned();
@@ -40,7 +41,7 @@ static RECORDINGS: LazyLock<Recordings> = LazyLock::new(|| {
     }
 });
 
-/// A machine that is not the one that was recorded.
+/// Parameters of an initial machine that differs from the recorded one.
 const OTHER: [&str; 8] = [
     "--set",
     "x.motor.inertia_kg_m2=0.02",
@@ -58,14 +59,14 @@ fn assert_near(found: &Value, expected: f64, part: f64) {
     assert!((found / expected - 1.0).abs() <= part, "{found}, not {expected}");
 }
 
-/// (model.md, table of axes) friction current of X at V m/min, A.
+/// Returns the friction current of X at `v` m/min (model.md, table of axes), A.
 fn friction(a: f64, b: f64, c: f64, d: f64, v: f64) -> f64 {
     a * (b * v).exp() + c * (d * v).exp()
 }
 
 #[test]
-fn a_campaign_gives_back_the_machine_that_was_recorded() {
-    let folder = Folder::new("identify_out");
+fn a_campaign_identifies_the_recorded_machine() {
+    let folder = TestFolder::new("identify_out");
     let recordings = &*RECORDINGS;
     let out = folder.0.join("new.yaml").to_string_lossy().into_owned();
     let page = folder.0.join("page.html").to_string_lossy().into_owned();
@@ -73,7 +74,7 @@ fn a_campaign_gives_back_the_machine_that_was_recorded() {
     arguments.extend(["--report", &page]);
     arguments.extend(["--axis", "x", "--feedforward", "off,velocity,both", "--json", "--out", &out]);
     arguments.extend(["--validate", &recordings.mcap, "--set", "y.velocity_loop.gain=4.25"]);
-    // The MCAP shows VFFWS and TFFWS: nothing wrong is believed about it.
+    // The MCAP contains VFFWS and TFFWS, which override the wrong option.
     arguments.extend(["--validate-feedforward", "off"]);
     arguments.extend(OTHER);
     let found = json(&arguments);
@@ -86,7 +87,7 @@ fn a_campaign_gives_back_the_machine_that_was_recorded() {
             .find(|value| value["key"] == key.as_str())
             .unwrap_or_else(|| panic!("{key} in {found:#}"))
     };
-    // The values of model.md.
+    // Values of model.md.
     assert_near(&value("motor.inertia_kg_m2")["value"], 0.028, 0.01);
     assert_eq!(value("motor.inertia_kg_m2")["before"], 0.02);
     assert_eq!(value("motor.inertia_kg_m2")["unit"], "kg·m²");
@@ -134,16 +135,16 @@ fn a_campaign_gives_back_the_machine_that_was_recorded() {
     }
     let severities: Vec<&str> =
         found["findings"].as_array().into_iter().flatten().filter_map(|f| f["severity"].as_str()).collect();
-    let place = |name: &&str| ["missing", "warning", "note"].iter().position(|known| known == name);
-    assert!(severities.iter().all(|name| place(name).is_some()));
-    assert!(severities.is_sorted_by_key(place), "{severities:?}");
+    let rank = |name: &&str| ["missing", "warning", "note"].iter().position(|known| known == name);
+    assert!(severities.iter().all(|name| rank(name).is_some()));
+    assert!(severities.is_sorted_by_key(rank), "{severities:?}");
 
-    // The file has the values, and runs.
+    // The machine file contains the values and is valid.
     assert!(printed(&["check", &out]).ends_with("valid\n"));
     let machine = std::fs::read_to_string(&out).expect("it is there");
-    assert!(
-        machine.starts_with("# Mikron UCP 710, from the machine mikron_ucp710 by `virtual_axes identify`.")
-    );
+    assert!(machine.starts_with(
+        "# Mikron UCP 710, from the machine mikron_ucp710 by `virtual_axes identify`; see there"
+    ));
     assert!(machine.contains(&format!("# x was identified from {}, ", recordings.off)), "{machine}");
     assert_eq!(machine.matches("# identified: ").count(), found["values"].as_array().map_or(0, Vec::len));
     assert!(machine.contains("gain: 4.25\n"), "{machine}");
@@ -152,7 +153,7 @@ fn a_campaign_gives_back_the_machine_that_was_recorded() {
     let ran = json(&["run", "x-constant", "--machine", &out, "--json"]);
     let shipped = json(&["run", "x-constant", "--json"]);
     let error =
-        |run: &Value| run["runs"][0]["axes"]["x"]["tracking_error"]["max"].as_f64().expect("a number");
+        |run: &Value| run["runs"][0]["axes"]["x"]["following_error"]["max"].as_f64().expect("a number");
     assert!((error(&ran) - error(&shipped)).abs() < 1.0, "{} and {} µm", error(&ran), error(&shipped));
     let page = std::fs::read_to_string(&page).expect("it is there");
     assert!(page.starts_with("<!DOCTYPE html>") && page.contains("Identification of the x axis"));
@@ -162,7 +163,7 @@ fn a_campaign_gives_back_the_machine_that_was_recorded() {
 }
 
 #[test]
-fn the_text_says_what_was_found_and_what_is_missing() {
+fn the_text_contains_results_and_missing_parameters() {
     let recordings = &*RECORDINGS;
     let text = printed(&[
         "identify",
@@ -184,7 +185,7 @@ fn the_text_says_what_was_found_and_what_is_missing() {
         "inertia: ",
         "by Prévost eq. 5",
         "VFFW: 1.0000 ± ",
-        "beta: 9 ms, left as it was; ",
+        "beta: 9 ms, unchanged; ",
         "at constant velocity, max, µm",
         "velocity.mcap (validation) ",
         "\nwarning: the law of four parameters is not fitted to ",
@@ -200,22 +201,22 @@ fn the_text_says_what_was_found_and_what_is_missing() {
 }
 
 #[test]
-fn what_tells_nothing_of_the_axis_is_refused() {
-    let folder = Folder::new("identify_nothing");
+fn recordings_without_information_on_the_axis_are_rejected() {
+    let folder = TestFolder::new("identify_nothing");
     let out = folder.0.join("new.yaml").to_string_lossy().into_owned();
-    // Y stood still.
+    // Y is stationary.
     let arguments =
         ["identify", &RECORDINGS.off, "--axis", "y", "--feedforward", "off", "--no-refine", "--out", &out];
-    assert_refused(
+    assert_rejected(
         &arguments,
-        &["nothing of y could be identified\n", "missing: no friction law", "; record "],
+        &["no parameter of y could be identified\n", "missing: no friction law", "; record "],
     );
     assert!(folder.names().is_empty());
 }
 
 #[test]
-fn bad_input_is_refused_with_its_name() {
-    let folder = Folder::new("identify_bad");
+fn invalid_input_is_rejected_with_its_name() {
+    let folder = TestFolder::new("identify_bad");
     let file = |name: &str, text: &str| folder.file(name, text).to_string_lossy().into_owned();
     let recordings = &*RECORDINGS;
     let out = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
@@ -228,66 +229,66 @@ fn bad_input_is_refused_with_its_name() {
         let all = [&["identify", &recordings.off, "--axis", "x", "--feedforward", "off"], more].concat();
         all.into_iter().map(str::to_owned).collect()
     };
-    let refused = |more: &[&str], parts: &[&str]| {
+    let rejected = |more: &[&str], parts: &[&str]| {
         let arguments = of(more);
-        assert_refused(&arguments.iter().map(String::as_str).collect::<Vec<_>>(), parts);
+        assert_rejected(&arguments.iter().map(String::as_str).collect::<Vec<_>>(), parts);
     };
-    assert_refused(&["identify", &recordings.off], &["--axis"]);
-    assert_refused(&["identify", "--axis", "x"], &["RECORDING"]);
-    assert_refused(
+    assert_rejected(&["identify", &recordings.off], &["--axis"]);
+    assert_rejected(&["identify", "--axis", "x"], &["RECORDING"]);
+    assert_rejected(
         &["identify", &recordings.off, "--axis", "X1"],
         &["--axis X1", "x, y, z, a, c", "nearest is x"],
     );
-    assert_refused(
-        &["identify", &recordings.off, "--axis", "x"],
-        &["off.csv: it has no", "--feedforward off"],
-    );
+    assert_rejected(&["identify", &recordings.off, "--axis", "x"], &["off.csv: has no", "--feedforward off"]);
     let missing = out("missing.csv");
-    assert_refused(&["identify", &missing, "--axis", "x"], &["missing.csv: "]);
-    assert_refused(&["identify", &empty, "--axis", "x"], &["empty.csv: the file is empty"]);
-    assert_refused(&["identify", &header, "--axis", "x"], &["header.csv"]);
-    assert_refused(
+    assert_rejected(&["identify", &missing, "--axis", "x"], &["missing.csv: "]);
+    assert_rejected(&["identify", &empty, "--axis", "x"], &["empty.csv: the file is empty"]);
+    assert_rejected(&["identify", &header, "--axis", "x"], &["header.csv"]);
+    assert_rejected(
         &["identify", &scenario, "--axis", "x"],
         &["scenario.yaml: it is a scenario, not a recording"],
     );
     // Wrong units and columns.
-    refused(&["--column", "time=time[ms]"], &["off.csv: the samples are 6e-6 s apart", "time=COLUMN[s]"]);
-    refused(&["--column", "position=x.position[deg]"], &["--column: position in [deg]", "linear axis x"]);
-    refused(&["--column", "position=x.positon"], &["off.csv:1: ", "x.positon", "nearest is x.position"]);
-    refused(&["--column", "velocity=y.velocity"], &["off.csv: the velocity "]);
-    refused(&["--column", "current=x.current[-1 A]"], &["off.csv: the current opposes the motion"]);
-    refused(&["--column", "positon=x"], &["--column: there is no \"positon\"", "nearest is position"]);
-    refused(&["--columns", &map], &["off.csv: "]);
-    refused(&["--cutoff-hz", "1000"], &["off.csv: cut-off 1000 Hz"]);
-    refused(&["--current-lag-ms", "50"], &["off.csv: lag of the current 0.05 s"]);
+    rejected(&["--column", "time=time[ms]"], &["off.csv: the samples are 6e-6 s apart", "time=COLUMN[s]"]);
+    rejected(&["--column", "position=x.position[deg]"], &["--column: position in [deg]", "linear axis x"]);
+    rejected(&["--column", "position=x.positon"], &["off.csv:1: ", "x.positon", "nearest is x.position"]);
+    rejected(&["--column", "velocity=y.velocity"], &["off.csv: the velocity "]);
+    rejected(&["--column", "current=x.current[-1 A]"], &["off.csv: the current opposes the motion"]);
+    rejected(&["--column", "positon=x"], &["--column: there is no \"positon\"", "nearest is position"]);
+    rejected(&["--columns", &map], &["off.csv: "]);
+    rejected(&["--cutoff-hz", "1000"], &["off.csv: cut-off 1000 Hz"]);
+    rejected(&["--current-lag-ms", "50"], &["off.csv: lag of the current 0.05 s"]);
     // Lists.
     let (validate, two) = (["--validate", recordings.both.as_str()], ["--validate-feedforward", "off,both"]);
-    refused(&[validate, two].concat(), &["--validate-feedforward: 2 given for 1 recording;"]);
-    assert_refused(
+    rejected(&[validate, two].concat(), &["--validate-feedforward: 2 values for 1 recording;"]);
+    assert_rejected(
         &["identify", &recordings.off, "--axis", "x", "--feedforward", "off,both"],
-        &["--feedforward: 2 given for 1 recording; give one for all, or one for each"],
+        &["--feedforward: 2 values for 1 recording; give one value for all, or one for each"],
     );
-    refused(&["--feedforward", "torque"], &["off, velocity, both"]);
-    refused(&["--validate-feedforward", "off"], &["--validate"]);
+    rejected(&["--feedforward", "torque"], &["off, velocity, both"]);
+    rejected(&["--validate-feedforward", "off"], &["--validate"]);
     // Outputs.
-    refused(&["--report", &out("page.yaml")], &["page.yaml: a report is a page: .html"]);
-    refused(
+    rejected(
+        &["--report", &out("page.yaml")],
+        &["page.yaml: a report is HTML; its extension must be .html or .htm"],
+    );
+    rejected(
         &["--out", &out("new"), "--report", &out("new")],
-        &["new: given for the machine and for the report"],
+        &["new: is given for both --out and --report"],
     );
-    refused(&["--out", &out("new.csv")], &["new.csv: a machine file is YAML"]);
-    refused(
+    rejected(&["--out", &out("new.csv")], &["new.csv: a machine file is YAML"]);
+    rejected(
         &["--machine", &machine, "--out", &machine],
-        &["machine.yaml: the output would replace what is read"],
+        &["machine.yaml: the output would replace an input file"],
     );
-    refused(&["--columns", &map, "--out", &map], &["map.yaml: the output would replace what is read"]);
-    refused(&["--set", "x.friction.a=two"], &["--set", "x.friction.a"]);
+    rejected(&["--columns", &map, "--out", &map], &["map.yaml: the output would replace an input file"]);
+    rejected(&["--set", "x.friction.a=two"], &["--set", "x.friction.a"]);
     assert_eq!(folder.names(), names);
 }
 
 #[test]
-fn interrupted_it_leaves_nothing_behind() {
-    let folder = Folder::new("identify_interrupted");
+fn an_interrupted_identification_leaves_no_file() {
+    let folder = TestFolder::new("identify_interrupted");
     let out = folder.0.join("new.yaml").to_string_lossy().into_owned();
     let recordings = &*RECORDINGS;
     let mut arguments =
@@ -299,7 +300,7 @@ fn interrupted_it_leaves_nothing_behind() {
         .stderr(Stdio::null())
         .spawn()
         .expect("the command starts");
-    // It takes far longer than this on any machine.
+    // The identification takes longer than this.
     std::thread::sleep(Duration::from_millis(500));
     let id = child.id().to_string();
     assert!(Command::new("kill").args(["-s", "INT", &id]).status().expect("kill runs").success());

@@ -1,11 +1,11 @@
-//! TODO
+//! Tests of the command `virtual_axes` and of its input and output files.
 
 mod command;
 mod command_campaign;
 mod command_common;
 mod command_design;
-mod ingress_properties;
 mod files_output;
 mod identify_command;
+mod ingress_properties;
 mod readme;
 mod tune_command;

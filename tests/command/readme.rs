@@ -1,8 +1,8 @@
-//! The README's table of parameters is the schema's.
+//! The README's table of parameters agrees with the schema.
 
 #[test]
-fn the_readme_lists_every_parameter_as_the_schema_has_it() {
+fn the_readme_contains_the_parameter_table_of_the_schema() {
     let readme = include_str!("../../README.md");
     let table = virtual_axes_core::config::listing::markdown();
-    assert!(readme.contains(&table), "README.md: put the output of `virtual_axes parameters --markdown` in");
+    assert!(readme.contains(&table), "README.md: insert the output of `virtual_axes parameters --markdown`");
 }

@@ -1,15 +1,15 @@
-//! `virtual_axes tune` and `robustness` as a user runs them.
+//! The commands `virtual_axes tune` and `virtual_axes robustness`.
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::command_common::{assert_refused, json, printed};
+use crate::command_common::{assert_rejected, json, printed};
 use serde_json::Value;
-use virtual_axes_verification::fixtures::folder::Folder;
-use virtual_axes_verification::fixtures::tune_common::{CIRCLE, CORNER};
+use virtual_axes_verification::fixtures::folder::TestFolder;
+use virtual_axes_verification::fixtures::tuning::{CIRCLE, CORNER};
 
-/// Margins that few designs keep, so that the search is short.
+/// Margin limits that few designs satisfy, so that the search is short.
 const FEW: [&str; 4] = ["--modulus-margin", "0.7", "--delay-margin-ms", "12"];
 
 fn text(path: &PathBuf) -> String {
@@ -17,8 +17,8 @@ fn text(path: &PathBuf) -> String {
 }
 
 #[test]
-fn the_machine_that_is_written_runs_at_the_printed_cost() {
-    let folder = Folder::new("tune_out");
+fn the_written_machine_has_the_printed_cost() {
+    let folder = TestFolder::new("tune_out");
     let corner = folder.file("corner.yaml", CORNER);
     let corner = corner.to_string_lossy();
     for controller in ["gpc", "cascade"] {
@@ -39,10 +39,10 @@ fn the_machine_that_is_written_runs_at_the_printed_cost() {
         assert_eq!(found["tuned_axes"], serde_json::json!(["x", "y"]));
         let again = json(&["run", &corner, "--machine", &out_text, "--json"]);
         let again = &again["runs"][0];
-        // The axes that stand still keep the cascade.
+        // Stationary axes keep the cascade.
         let expected = if controller == "gpc" { "gpc+cascade" } else { "cascade" };
         assert_eq!(again["controller"], expected);
-        // Every figure, bit for bit; the cost is the largest contour error.
+        // All figures are bit-identical; the cost is the largest contour error.
         let mut figures = again.as_object().expect("an object").clone();
         figures.remove("controller");
         figures.remove("changes");
@@ -60,7 +60,7 @@ fn the_machine_that_is_written_runs_at_the_printed_cost() {
         assert_eq!(machine.matches(&tuned).count(), 2, "{machine}");
         assert!(machine.contains("gain: 4.75\n"), "{machine}");
         let page = text(&page);
-        for part in ["<h2>Search</h2>", "Cost against modulus margin", "class=\"mark run-2\"", "as it is"] {
+        for part in ["<h2>Search</h2>", "Cost against modulus margin", "class=\"mark run-2\"", "initial"] {
             assert!(page.contains(part), "{part}");
         }
         assert!(!page.contains("NaN") && !page.contains("inf"));
@@ -69,15 +69,15 @@ fn the_machine_that_is_written_runs_at_the_printed_cost() {
 }
 
 #[test]
-fn the_first_grid_is_as_fine_as_it_is_asked_for() {
-    let folder = Folder::new("tune_designs");
-    // Far enough for a whole turn at steady feed.
+fn the_first_grid_has_the_requested_number_of_designs() {
+    let folder = TestFolder::new("tune_designs");
+    // Long enough for a full turn at steady feed.
     let circle = folder.file("circle.yaml", CIRCLE.replace("turns: 1", "turns: 3"));
     let circle = &*circle.to_string_lossy();
     let mut arguments = vec!["tune", circle, "--controller", "gpc", "--json"];
     arguments.extend(FEW);
     let coarse = json(&arguments);
-    // More than the 1968 designs of the grid that is taken otherwise, and than the rounds add.
+    // More than the 1968 designs of the default grid and its refinement.
     const DESIGNS: u64 = 4000;
     let designs = DESIGNS.to_string();
     arguments.extend(["--designs", &*designs]);
@@ -85,13 +85,13 @@ fn the_first_grid_is_as_fine_as_it_is_asked_for() {
     assert!(coarse["designs"].as_u64() < Some(DESIGNS), "{}", coarse["designs"]);
     assert!(fine["designs"].as_u64() >= Some(DESIGNS), "{}", fine["designs"]);
     assert!(fine["runs"].as_u64() > coarse["runs"].as_u64());
-    // What is told of the best is told as of a run of its own.
+    // The best tuning has the figures of a complete run.
     assert_eq!(fine["best"]["figures"]["circles"].as_array().map(Vec::len), Some(1));
 }
 
 #[test]
-fn the_text_says_what_it_was_and_what_it_becomes() {
-    let folder = Folder::new("tune_text");
+fn the_text_compares_initial_and_best_tuning() {
+    let folder = TestFolder::new("tune_text");
     let (corner, circle) = (folder.file("corner.yaml", CORNER), folder.file("circle.yaml", CIRCLE));
     let (corner, circle) = (corner.to_string_lossy(), circle.to_string_lossy());
     let mut arguments = vec!["tune", &*corner, "--controller", "gpc", "--also", &*circle];
@@ -100,20 +100,20 @@ fn the_text_says_what_it_was_and_what_it_becomes() {
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines[0].ends_with("corner.yaml: Mikron UCP 710 of x, y, cost contour"), "{text}");
     assert!(
-        lines[2].starts_with("tuning    cost, µm  RMS error, µm  modulus margin  delay margin, ms"),
+        lines[2].starts_with("tuning   cost, µm  RMS error, µm  modulus margin  delay margin, ms"),
         "{text}"
     );
-    for start in ["as it is ", "best ", "x.position_loop.gpc.lambda_rel ", "N1 ", "path "] {
+    for start in ["initial ", "best ", "x.position_loop.gpc.lambda_rel ", "N1 ", "path "] {
         assert!(lines.iter().any(|line| line.starts_with(start)), "{start}: {text}");
     }
     assert!(text.contains(" better\n"), "{text}");
-    // The same once more.
+    // The output is deterministic.
     assert_eq!(printed(&arguments), text);
 }
 
 #[test]
-fn a_contrast_is_found_and_named() {
-    let folder = Folder::new("tune_contrast");
+fn a_contrast_is_found_and_reported() {
+    let folder = TestFolder::new("tune_contrast");
     let (corner, circle) = (folder.file("corner.yaml", CORNER), folder.file("circle.yaml", CIRCLE));
     let page = folder.0.join("page.html");
     let (corner, circle, page_text) =
@@ -132,8 +132,8 @@ fn a_contrast_is_found_and_named() {
 }
 
 #[test]
-fn plants_that_deviate_are_shown_one_by_one() {
-    let folder = Folder::new("robustness");
+fn deviating_plants_are_listed() {
+    let folder = TestFolder::new("robustness");
     let circle = folder.file("circle.yaml", CIRCLE);
     let circle = circle.to_string_lossy();
     let text = printed(&["robustness", &circle, "--controller", "gpc"]);
@@ -147,7 +147,7 @@ fn plants_that_deviate_are_shown_one_by_one() {
         "friction × 1.3 ",
         "Kt × 0.7 ",
         "Kt × 1.3 ",
-        "worst together: ",
+        "worst combination: ",
     ];
     assert_eq!(lines.len(), 2 + starts.len(), "{text}");
     for (line, start) in lines[2..].iter().zip(starts) {
@@ -161,17 +161,17 @@ fn plants_that_deviate_are_shown_one_by_one() {
 }
 
 #[test]
-fn options_that_cannot_be_are_refused_by_name() {
-    let folder = Folder::new("tune_refused");
+fn invalid_options_are_rejected_by_name() {
+    let folder = TestFolder::new("tune_rejected");
     let corner = folder.file("corner.yaml", CORNER);
     let corner = &*corner.to_string_lossy();
     let out = folder.0.join("out.yaml");
     let out = &*out.to_string_lossy();
     let page = format!("{out}.html");
     for (options, parts) in [
-        (vec!["--modulus-margin", "2"], vec!["--modulus-margin", "'2'", "must lie in 0 … 1"]),
-        (vec!["--modulus-margin", "nan"], vec!["--modulus-margin", "must lie in 0 … 1"]),
-        (vec!["--delay-margin-ms", "-1"], vec!["--delay-margin-ms", "'-1'", "must lie in 0 … 1000"]),
+        (vec!["--modulus-margin", "2"], vec!["--modulus-margin", "'2'", "must be in 0 … 1"]),
+        (vec!["--modulus-margin", "nan"], vec!["--modulus-margin", "must be in 0 … 1"]),
+        (vec!["--delay-margin-ms", "-1"], vec!["--delay-margin-ms", "'-1'", "must be in 0 … 1000"]),
         (vec!["--cost", "color"], vec!["--cost", "unknown term color"]),
         (vec!["--cost", "rms=-1"], vec!["--cost", "rms=-1", "a number from 0 to 1e9"]),
         (vec!["--cost", "rms=1e300"], vec!["--cost", "rms=1e300", "a number from 0 to 1e9"]),
@@ -188,7 +188,7 @@ fn options_that_cannot_be_are_refused_by_name() {
         ),
         (vec!["--designs", "0"], vec!["--designs", "'0'"]),
         (vec!["--also", "no-such"], vec!["no-such"]),
-        (vec!["--out", corner], vec!["corner.yaml", "would replace what is read"]),
+        (vec!["--out", corner], vec!["corner.yaml", "would replace an input file"]),
         (vec!["--out", &page], vec![".html", "YAML"]),
         (vec!["--out", out, "--report", out], vec!["out.yaml", "machine", "report"]),
         (vec!["--report", out], vec!["out.yaml", ".html"]),
@@ -198,17 +198,17 @@ fn options_that_cannot_be_are_refused_by_name() {
     ] {
         let mut arguments = vec!["tune", corner];
         arguments.extend(&options);
-        assert_refused(&arguments, &parts);
+        assert_rejected(&arguments, &parts);
     }
     for by in ["-0.1", "1", "nan"] {
-        assert_refused(&["robustness", corner, "--by", by], &["--by", "must lie in 0 … 0.8"]);
+        assert_rejected(&["robustness", corner, "--by", by], &["--by", "must be in 0 … 0.8"]);
     }
     assert_eq!(folder.names(), ["corner.yaml"]);
 }
 
 #[test]
-fn an_interrupted_search_leaves_nothing_behind() {
-    let folder = Folder::new("tune_interrupted");
+fn an_interrupted_search_leaves_no_file() {
+    let folder = TestFolder::new("tune_interrupted");
     let out = folder.0.join("out.yaml");
     let mut child = Command::new(env!("CARGO_BIN_EXE_virtual_axes"))
         .args(["tune", "ballbar", "--controller", "gpc", "--designs", "1000000"])
@@ -217,7 +217,7 @@ fn an_interrupted_search_leaves_nothing_behind() {
         .stderr(Stdio::null())
         .spawn()
         .expect("the command starts");
-    // It takes far longer than this on any machine.
+    // The search takes longer than this.
     std::thread::sleep(Duration::from_millis(700));
     let id = child.id().to_string();
     assert!(Command::new("kill").args(["-s", "INT", &id]).status().expect("kill runs").success());

@@ -1,49 +1,50 @@
-//! One axis of a machine, and the units that people give its motion in.
+//! The `--axis` option, and the units of an axis on the command line.
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, RPM};
 
-/// Least similarity (Jaro-Winkler) of a name that is offered in place of an unknown one.
-const NEAR_ENOUGH: f64 = 0.7;
+/// Smallest Jaro–Winkler similarity of a name that is suggested for an unknown one.
+const LEAST_SIMILARITY: f64 = 0.7;
 
-/// The place of the axis `name`, as `--axis` gives it.
+/// Returns the index of the axis `name`, the value of `--axis`.
 ///
 /// # Errors
-/// The axes that there are, and the one that looks most like it.
-pub fn place(config: &MachineConfig, name: &str) -> Result<usize, String> {
+///
+/// Returns a message with the axes of the machine and the most similar name if no axis has this name.
+pub fn index(config: &MachineConfig, name: &str) -> Result<usize, String> {
     let known: Vec<&str> = config.axes().iter().map(|axis| axis.name()).collect();
     known.iter().position(|known| *known == name).ok_or_else(|| {
-        // `X` and `X1` are meant for x.
+        // `X` and `X1` are similar to x.
         let similarity = |known: &str| strsim::jaro_winkler(&name.to_lowercase(), &known.to_lowercase());
         let near = known.iter().map(|known| (similarity(known), known));
-        let nearest = near.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(near, _)| *near >= NEAR_ENOUGH);
+        let nearest = near.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(near, _)| *near >= LEAST_SIMILARITY);
         let nearest = nearest.map_or_else(String::new, |(_, name)| format!("; the nearest is {name}"));
         format!("--axis {name}: the machine has {}{nearest}", known.join(", "))
     })
 }
 
-/// Units of an axis on the command line.
+/// Units of an axis on the command line and in JSON keys.
 #[derive(Debug, Clone, Copy)]
-pub struct Units {
-    /// Of lengths, in SI.
+pub struct AxisUnits {
+    /// Unit of positions, m or rad.
     pub length: f64,
-    /// Of lengths, for people.
+    /// Symbol of the unit of positions.
     pub length_name: &'static str,
-    /// Of lengths, in keys.
+    /// Suffix of JSON keys for positions.
     pub length_key: &'static str,
-    /// Of speeds, in SI.
+    /// Unit of speeds, m/s or rad/s.
     pub speed: f64,
-    /// Of speeds, for people.
+    /// Symbol of the unit of speeds.
     pub speed_name: &'static str,
-    /// Of speeds, in keys.
+    /// Suffix of JSON keys for speeds.
     pub speed_key: &'static str,
 }
 
-impl Units {
-    /// Of a kind of axis.
-    pub fn of(kind: AxisKind) -> Self {
+impl AxisUnits {
+    /// Returns the units of a kind of axis.
+    pub fn for_kind(kind: AxisKind) -> Self {
         match kind {
-            AxisKind::Linear => Units {
+            AxisKind::Linear => AxisUnits {
                 length: MILLIMETER,
                 length_name: "mm",
                 length_key: "mm",
@@ -51,7 +52,7 @@ impl Units {
                 speed_name: "m/min",
                 speed_key: "m_min",
             },
-            AxisKind::Rotary => Units {
+            AxisKind::Rotary => AxisUnits {
                 length: DEGREE,
                 length_name: "°",
                 length_key: "deg",

@@ -1,4 +1,4 @@
-//! `virtual_axes psec campaign`: the setpoints that an axis is identified from.
+//! `virtual_axes psec campaign`: setpoints of the identification campaign of an axis.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -8,59 +8,59 @@ use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
 use virtual_axes_identify::identify::FeedforwardMode;
 use virtual_axes_identify::identify::campaign::{Campaign, CampaignOptions, CampaignRun};
 use virtual_axes_io::files::psec_writer;
-use virtual_axes_report::{TableColumn, Table};
+use virtual_axes_report::{Table, TableColumn};
 
-use crate::axis::{self, Units};
+use crate::axis::{self, AxisUnits};
 use crate::input::must_not_replace;
 use crate::{interrupt, table, variant};
 
-/// Which axis, and where to.
+/// Arguments of `virtual_axes psec campaign`.
 #[derive(Debug, clap::Args)]
-pub struct Arguments {
-    /// The axis to move; the others are left alone.
+pub struct CampaignArguments {
+    /// Axis to move; the other axes stay at rest.
     #[arg(long)]
     axis: String,
-    /// Only this part; otherwise all three, with 3 s of rest between them to switch the feedforward in.
+    /// Part of the campaign [default: all three parts, separated by 3 s of rest to switch the feedforward].
     #[arg(long, value_enum)]
-    part: Option<PartName>,
-    /// The file: CSV (`time,x` in s and m or rad), MCAP with a JointTrajectory on `/psec`, or the YAML that
-    /// `ros2 topic pub` takes.
+    part: Option<FeedforwardName>,
+    /// Output file: CSV (`time,x` in s and m or rad), MCAP with a JointTrajectory on `/psec`, or YAML for
+    /// `ros2 topic pub`.
     #[arg(long, value_name = "FILE.csv|FILE.mcap|FILE.yaml")]
     out: PathBuf,
-    /// A shipped machine or a machine file, whose limits and sampling period the setpoints are for.
+    /// Shipped machine or machine file whose limits and sampling period apply.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
-    /// A parameter, as in `x.limits.jerk_m_s3=20`; can be given several times.
+    /// Set a parameter, for example `x.limits.jerk_m_s3=20`; can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Where the axis may go, mm or degrees, less 5 % at either end; its stroke if left out.
+    /// Position range, mm or degrees, reduced by 5 % at each end [default: travel limits].
     #[arg(long, value_name = "MIN,MAX", allow_hyphen_values = true, value_parser = range)]
     range: Option<[f64; 2]>,
-    /// Highest speed, m/min or rpm; 20 if left out, or 95 % of what the axis can.
+    /// Highest speed, m/min or rpm [default: 20, at most 95 % of the velocity limit].
     #[arg(long, allow_negative_numbers = true)]
     max_feed: Option<f64>,
-    /// Print the timetable as JSON.
+    /// Print the timetable as one JSON object.
     #[arg(long)]
     json: bool,
 }
 
-/// What of the feedforward is on.
+/// Feedforward that is switched on.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
-pub enum PartName {
-    /// None, to show friction, gravity and inertia.
+pub enum FeedforwardName {
+    /// No feedforward, to identify friction, gravity and inertia.
     Off,
-    /// That of the velocity.
+    /// Velocity feedforward.
     Velocity,
-    /// Those of velocity and torque.
+    /// Velocity and torque feedforward.
     Both,
 }
 
-impl From<PartName> for FeedforwardMode {
-    fn from(name: PartName) -> Self {
+impl From<FeedforwardName> for FeedforwardMode {
+    fn from(name: FeedforwardName) -> Self {
         match name {
-            PartName::Off => FeedforwardMode::Off,
-            PartName::Velocity => FeedforwardMode::Velocity,
-            PartName::Both => FeedforwardMode::Both,
+            FeedforwardName::Off => FeedforwardMode::Off,
+            FeedforwardName::Velocity => FeedforwardMode::Velocity,
+            FeedforwardName::Both => FeedforwardMode::Both,
         }
     }
 }
@@ -69,23 +69,23 @@ fn range(text: &str) -> Result<[f64; 2], String> {
     let numbers = text
         .split_once(',')
         .and_then(|(min, max)| Some([min.trim().parse::<f64>().ok()?, max.trim().parse::<f64>().ok()?]));
-    numbers.ok_or_else(|| "two numbers are wanted, as in -100,250".to_owned())
+    numbers.ok_or_else(|| "must be two numbers MIN,MAX, for example -100,250".to_owned())
 }
 
-/// Writes them; tells what to set when.
-pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+/// Writes the setpoints and returns the timetable with the parameters to set for each part.
+pub fn run(arguments: &CampaignArguments) -> Result<String, Box<dyn Error>> {
     must_not_replace(&arguments.out, Path::new(&arguments.machine))?;
     let machine = Parameters::load(&arguments.machine)?;
     let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
     let config = parameters.machine_config()?;
-    let place = axis::place(&config, &arguments.axis)?;
-    let units = Units::of(config.axes()[place].kind());
+    let index = axis::index(&config, &arguments.axis)?;
+    let units = AxisUnits::for_kind(config.axes()[index].kind());
     let options = CampaignOptions {
         range: arguments.range.map(|range| range.map(|value| value * units.length)),
         max_feed: arguments.max_feed.map(|feed| feed * units.speed),
     };
     let parts = arguments.part.map_or(FeedforwardMode::ALL.to_vec(), |part| vec![part.into()]);
-    let campaign = Campaign::plan(&config, place, &parts, &options)?;
+    let campaign = Campaign::plan(&config, index, &parts, &options)?;
     let mut writer = psec_writer(&arguments.out, std::slice::from_ref(&arguments.axis))?;
     let mut time = 0;
     for position in campaign.psec() {
@@ -94,25 +94,26 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         time += campaign.period();
     }
     writer.finish()?;
-    let told = Told { campaign: &campaign, parameters: &parameters, axis: &arguments.axis, units };
-    Ok(if arguments.json { format!("{:#}\n", told.json()) } else { told.text() })
+    let output =
+        CampaignOutput { campaign: &campaign, parameters: &parameters, axis: &arguments.axis, units };
+    Ok(if arguments.json { format!("{:#}\n", output.json()) } else { output.text() })
 }
 
-/// What the command says of a campaign.
-struct Told<'a> {
+/// Data of the timetable.
+struct CampaignOutput<'a> {
     campaign: &'a Campaign,
     parameters: &'a Parameters,
     axis: &'a str,
-    units: Units,
+    units: AxisUnits,
 }
 
-/// To two decimals, or two digits of what is slower.
-fn told_speed(speed: f64) -> String {
+/// Formats a speed with two decimals, or two significant digits if it is below 1.
+fn format_speed(speed: f64) -> String {
     let decimals = (1.0 - speed.log10().floor()).clamp(2.0, 12.0) as usize;
     format!("{speed:.decimals$}")
 }
 
-impl Told<'_> {
+impl CampaignOutput<'_> {
     fn settings(&self, run: &CampaignRun) -> Vec<String> {
         let assignments = run.part.assignments(self.parameters, self.axis);
         assignments.iter().map(|assignment| format!("{}={}", assignment.key, assignment.value)).collect()
@@ -130,16 +131,16 @@ impl Told<'_> {
         let rows = self.campaign.runs().iter().map(|run| {
             let [from, to] = self.campaign.times(run);
             let speeds: Vec<String> =
-                run.speeds.iter().map(|speed| told_speed(speed / self.units.speed)).collect();
+                run.speeds.iter().map(|speed| format_speed(speed / self.units.speed)).collect();
             let times = [from, to, to - from].map(|time| format!("{time:.3}"));
             [vec![run.part.name().to_owned()], times.to_vec(), vec![speeds.join(" ")]].concat()
         });
         let table = Table { caption: String::new(), columns, rows: rows.collect() };
-        let [low, high] = self.campaign.range().map(|place| place / self.units.length);
+        let [low, high] = self.campaign.range().map(|position| position / self.units.length);
         let start = self.campaign.start() / self.units.length;
         let unit = self.units.length_name;
         let mut text = table::text(&table);
-        let first = if start == 0.0 { "" } else { ", to be brought there first" };
+        let first = if start == 0.0 { "" } else { "; move it there before the start" };
         text.push_str(&format!(
             "{} starts and ends at {start:.3} {unit}{first}; it moves between {low:.3} and {high:.3} {unit}\n",
             self.axis
@@ -151,7 +152,7 @@ impl Told<'_> {
     }
 
     fn json(&self) -> Value {
-        let Units { length, length_key, speed, speed_key, .. } = self.units;
+        let AxisUnits { length, length_key, speed, speed_key, .. } = self.units;
         let runs = self.campaign.runs().iter().map(|run| {
             let [from, to] = self.campaign.times(run);
             let speeds: Vec<f64> = run.speeds.iter().map(|value| value / speed).collect();
@@ -163,7 +164,8 @@ impl Told<'_> {
         });
         let mut object = json!({ "axis": self.axis });
         object[format!("start_{length_key}")] = json!(self.campaign.start() / length);
-        object[format!("range_{length_key}")] = json!(self.campaign.range().map(|place| place / length));
+        object[format!("range_{length_key}")] =
+            json!(self.campaign.range().map(|position| position / length));
         object["parts"] = runs.collect();
         object
     }

@@ -1,4 +1,4 @@
-//! `virtual_axes check`: whether a file is in order, and what it is.
+//! `virtual_axes check`: validation of machine files, scenarios and setpoints.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -9,22 +9,22 @@ use virtual_axes_core::scenario::Scenario;
 use virtual_axes_core::trial::Trial;
 use virtual_axes_io::files::{self, FileKind};
 
-use crate::input::Input;
+use crate::input::CommandInput;
 use crate::interrupt;
 
-/// Which file.
+/// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
-pub struct Arguments {
-    /// A machine file (a ROS 2 parameter file), a scenario, or setpoints (CSV, MCAP, YAML); or what is
-    /// shipped, by its name.
+pub struct CheckArguments {
+    /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML), or name of a shipped machine or
+    /// scenario.
     file: PathBuf,
-    /// The machine that a scenario or setpoints are for.
+    /// Machine for a scenario or setpoints: shipped machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
 }
 
-/// Says what it is and that it is valid, or what is wrong.
-pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+/// Validates the file and returns its kind and contents.
+pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     let name = arguments.file.to_string_lossy();
     let is_machine = match arguments.file.exists() {
         true => files::Input::open(&arguments.file)?.kind() == FileKind::Machine,
@@ -36,7 +36,7 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         return Ok(machine(&config));
     }
     let config = Parameters::load(&arguments.machine)?.machine_config()?;
-    let input = Input::open(&name, None)?;
+    let input = CommandInput::open(&name, None)?;
     let program = input.program(&config, None)?;
     let kind = if program.is_some() { "scenario" } else { "setpoints" };
     let trial = Trial {
@@ -45,14 +45,14 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         allow_nonzero_end_velocity: false,
         record: false,
     };
-    // The surest check is to run it.
+    // The setpoints are validated by a simulation.
     let setpoints = input.setpoints(&config, program.as_ref())?;
     let outcome = virtual_axes_core::trial::run(&trial, setpoints, |_| interrupt::check())
-        .map_err(|error| crate::run::named(&input, error))?;
+        .map_err(|error| input.name_error(error))?;
     Ok(format!("{kind} for {}: {:.3} s\nvalid\n", config.name(), outcome.figures.duration))
 }
 
-/// Whether it is a shipped machine, and not a shipped scenario.
+/// Returns true for a shipped machine, false for a shipped scenario.
 fn is_shipped_machine(name: &str) -> Result<bool, String> {
     let machines: Vec<&str> = Parameters::builtin_names().collect();
     let scenarios: Vec<&str> = Scenario::builtin_names().collect();
@@ -60,7 +60,7 @@ fn is_shipped_machine(name: &str) -> Result<bool, String> {
     match machine || scenarios.contains(&name) {
         true => Ok(machine),
         false => Err(format!(
-            "{name}: no such file, and neither a shipped machine ({}) nor a shipped scenario ({})",
+            "{name}: no such file, no shipped machine ({}) and no shipped scenario ({})",
             machines.join(", "),
             scenarios.join(", ")
         )),

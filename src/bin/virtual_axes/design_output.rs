@@ -1,25 +1,42 @@
-//! Controllers that were designed, as text, JSON and lines of a machine file.
+//! Output of `virtual_axes design`: text, JSON, and parameters of a machine file.
 
 use nalgebra::Complex;
 use serde_json::{Map, Value, json};
-use virtual_axes_core::design::Margins;
+use virtual_axes_core::control::Rst;
+use virtual_axes_core::design::{DesignError, Margins, PredictionModel};
 use virtual_axes_core::units::{DEGREE, MILLISECOND};
-use virtual_axes_report::{TableColumn, Table};
+use virtual_axes_report::{Table, TableColumn};
 
-use crate::design::Design;
 use crate::table;
 
-/// Poles nearer to 0 than so are delays; they are counted and not listed.
-const DELAY: f64 = 1e-3;
+/// Modulus below which a pole represents a delay; such poles are counted and not listed.
+const DELAY_MODULUS: f64 = 1e-3;
 
-/// The controllers one after the other, then the margins of all.
-pub fn text(method: &str, designs: &[Design]) -> String {
-    let mut text: String = designs.iter().map(|design| one(method, design) + "\n").collect();
+/// Position controller of one axis with the properties of its closed loop.
+#[derive(Debug)]
+pub struct AxisDesign {
+    /// Axis name.
+    pub axis: String,
+    /// Names and values of the design parameters.
+    pub tuning: Vec<(&'static str, f64)>,
+    /// Prediction model of the plant.
+    pub model: PredictionModel,
+    /// Controller polynomials.
+    pub rst: Rst,
+    /// Closed-loop poles, sorted by decreasing modulus.
+    pub poles: Vec<Complex<f64>>,
+    /// Stability margins, or an error with the unstable pole.
+    pub margins: Result<Margins, DesignError>,
+}
+
+/// Returns the controllers and a table of the margins of all axes.
+pub fn text(method: &str, designs: &[AxisDesign]) -> String {
+    let mut text: String = designs.iter().map(|design| axis_text(method, design) + "\n").collect();
     text.push_str(&table::text(&margins_table(designs)));
     text
 }
 
-fn one(method: &str, design: &Design) -> String {
+fn axis_text(method: &str, design: &AxisDesign) -> String {
     let tuning: Vec<String> = design.tuning.iter().map(|(name, value)| format!("{name} = {value}")).collect();
     let (model, rst) = (&design.model, &design.rst);
     let order = model.a().len().max(model.b().len()) - 1;
@@ -35,7 +52,7 @@ fn one(method: &str, design: &Design) -> String {
     text.push_str(&table::text(&poles_table(design)));
     let delays = design.poles.iter().filter(|pole| is_delay(**pole)).count();
     if delays > 0 {
-        text.push_str(&format!("and {delays} at or near 0 (modulus below {DELAY})\n"));
+        text.push_str(&format!("and {delays} poles at or near 0 (modulus below {DELAY_MODULUS})\n"));
     }
     if let Err(error) = &design.margins {
         text.push_str(&format!("no margins: {error}\n"));
@@ -43,7 +60,7 @@ fn one(method: &str, design: &Design) -> String {
     text
 }
 
-fn poles_table(design: &Design) -> Table {
+fn poles_table(design: &AxisDesign) -> Table {
     let columns = [
         TableColumn::new("closed-loop pole", ""),
         TableColumn::new("modulus", ""),
@@ -52,17 +69,17 @@ fn poles_table(design: &Design) -> Table {
     ];
     let mut rows = Vec::new();
     for pole in design.poles.iter().filter(|pole| !is_delay(**pole)) {
-        // A pair is one row.
+        // A conjugate pair has one row.
         if pole.im < 0.0 {
             continue;
         }
         let (frequency, damping) = continuous(*pole, design.model.period());
-        let place = match pole.im {
+        let location = match pole.im {
             0.0 => format!("{:.6}", pole.re),
             im => format!("{:.6} ± {im:.6}j", pole.re),
         };
         rows.push(vec![
-            place,
+            location,
             format!("{:.6}", pole.norm()),
             format!("{frequency:.2}"),
             format!("{damping:.3}"),
@@ -72,17 +89,17 @@ fn poles_table(design: &Design) -> Table {
 }
 
 fn is_delay(pole: Complex<f64>) -> bool {
-    pole.norm() < DELAY
+    pole.norm() < DELAY_MODULUS
 }
 
-/// Natural frequency, rad/s, and damping of the pole s = ln(z)/Tsp.
+/// Returns natural frequency in rad/s and damping ratio of the continuous pole s = ln(z)/Tsp.
 fn continuous(pole: Complex<f64>, period: f64) -> (f64, f64) {
     let s = pole.ln() / period;
     (s.norm(), -s.re / s.norm())
 }
 
-/// Margins of all axes, with the worst of several.
-fn margins_table(designs: &[Design]) -> Table {
+/// Creates the table of the margins of all axes, with the worst margins if there are several axes.
+fn margins_table(designs: &[AxisDesign]) -> Table {
     let columns = [
         TableColumn::new("margins of", ""),
         TableColumn::new("modulus", ""),
@@ -125,8 +142,8 @@ fn row(name: &str, margins: &Margins) -> Vec<String> {
     ]
 }
 
-/// The worst of each margin; none if an axis is unstable.
-fn worst(designs: &[Design]) -> Option<Margins> {
+/// Returns the smallest of each margin over the axes; `None` if an axis is unstable.
+fn worst(designs: &[AxisDesign]) -> Option<Margins> {
     designs.iter().map(|design| design.margins.as_ref().ok().copied()).reduce(|a, b| {
         let (a, b) = (a?, b?);
         Some(Margins {
@@ -139,8 +156,8 @@ fn worst(designs: &[Design]) -> Option<Margins> {
     })?
 }
 
-/// `--json`: units stand in the keys; what is infinite is null.
-pub fn object(machine: &str, method: &str, designs: &[Design]) -> Value {
+/// Returns the JSON object. Keys contain units; infinite margins are null.
+pub fn object(machine: &str, method: &str, designs: &[AxisDesign]) -> Value {
     let axes: Map<String, Value> = designs.iter().map(|d| (d.axis.clone(), axis(d))).collect();
     json!({
         "machine": machine,
@@ -150,7 +167,7 @@ pub fn object(machine: &str, method: &str, designs: &[Design]) -> Value {
     })
 }
 
-fn axis(design: &Design) -> Value {
+fn axis(design: &AxisDesign) -> Value {
     let tuning: Map<String, Value> =
         design.tuning.iter().map(|(name, value)| ((*name).to_owned(), json!(value))).collect();
     let (model, rst) = (&design.model, &design.rst);
@@ -192,10 +209,10 @@ fn margins(margins: &Margins) -> Value {
     })
 }
 
-/// `--yaml`: parameters that run these controllers, over a machine file or to be pasted into it.
-pub fn yaml(designs: &[Design]) -> String {
+/// Returns the controllers as parameters of a machine file.
+pub fn yaml(designs: &[AxisDesign]) -> String {
     let mut text = "/**:\n  ros__parameters:\n".to_owned();
-    for Design { axis, rst, margins, .. } in designs {
+    for AxisDesign { axis, rst, margins, .. } in designs {
         text.push_str(&format!("    {axis}:\n      position_loop:\n        controller: rst\n"));
         if margins.is_err() {
             text.push_str("        allow_unstable: true\n");
@@ -214,8 +231,8 @@ fn list(polynomial: &[f64]) -> String {
     format!("[{}]", numbers.join(", "))
 }
 
-/// The shortest digits that give the same number back, as every YAML reader takes them: with a point
-/// and, in an exponent, a sign.
+/// Formats a number with the fewest digits that parse to the same value, in YAML 1.1 syntax: with a decimal point,
+/// and with a sign in the exponent.
 fn number(value: f64) -> String {
     let text = format!("{:?}", value + 0.0);
     let Some((digits, exponent)) = text.split_once('e') else {
@@ -226,7 +243,7 @@ fn number(value: f64) -> String {
     format!("{digits}{point}e{sign}{exponent}")
 }
 
-/// Without negative zeros.
+/// Replaces negative zeros.
 fn plain(polynomial: &[f64]) -> Vec<f64> {
     polynomial.iter().map(|c| c + 0.0).collect()
 }

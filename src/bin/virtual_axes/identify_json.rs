@@ -1,23 +1,24 @@
-//! `virtual_axes identify --json`: what was found as one object.
+//! JSON output of `virtual_axes identify`.
 //!
-//! Units stand in the keys; those of an axis in `position_unit`, `velocity_unit` and `speed_unit`.
+//! Keys contain units; units that depend on the axis are in `position_unit`, `velocity_unit` and `speed_unit`.
 
 use serde_json::{Value, json};
 use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS};
 use virtual_axes_identify::identify::{
-    Agreement, ExperimentComparison, DelayFit, ResidualStatistics, FrictionFit, FrictionLaw, GravityFit, GravityCurrent,
-    GravitySource, IdentifiedValue, LawFit, SteadyCurrent, Refinement, FeedforwardRegression,
+    Agreement, DelayFit, ExperimentComparison, FeedforwardRegression, FrictionFit, FrictionLaw,
+    GravityCurrent, GravityFit, GravitySource, IdentifiedValue, LawFit, Refinement, ResidualStatistics,
+    SteadyCurrent,
 };
 use virtual_axes_identify::recording::Finding;
 
-use crate::axis::Units;
-use crate::identify::Found;
+use crate::axis::AxisUnits;
+use crate::identify_result::IdentificationResult;
 use crate::identify_text::{by_speed, modes, severity, velocity_scale};
-use crate::recordings::Recorded;
+use crate::recordings::ConditionedRecording;
 use crate::table;
 
-/// The object of what was found.
-pub fn object(found: &Found) -> Value {
+/// Returns the result as a JSON object.
+pub fn object(found: &IdentificationResult) -> Value {
     let (kind, identification) = (found.axis.kind(), &found.identification);
     let scales = Scales::of(found);
     let agreements: Vec<Value> = found
@@ -62,7 +63,7 @@ pub fn object(found: &Found) -> Value {
     })
 }
 
-fn recording(recorded: &Recorded, agreement: Option<&Agreement>) -> Value {
+fn recording(recorded: &ConditionedRecording, agreement: Option<&Agreement>) -> Value {
     let signals = &recorded.signals;
     json!({
         "name": signals.name,
@@ -112,11 +113,11 @@ fn law(law: &LawFit) -> Value {
         "i0": c.i0,
         "standard_errors": { "a": a, "b": b, "c": c_error, "d": d },
         "line": law.line().map(|(level, slope)| json!({ "level_a": level, "slope_a": slope })),
-        "r_squared": law.determination,
+        "r_squared": law.r_squared,
     })
 }
 
-fn inertia(found: &Found) -> Value {
+fn inertia(found: &IdentificationResult) -> Value {
     let Some(inertia) = &found.identification.inertia else { return Value::Null };
     let refined = found.identification.refinement.as_ref().and_then(|refinement| {
         let of = |r: &&virtual_axes_identify::identify::RefinedValue| {
@@ -161,7 +162,7 @@ fn regression(found: &FeedforwardRegression) -> Value {
     json!({
         "value": found.value,
         "error": found.error,
-        "r_squared": found.determination,
+        "r_squared": found.r_squared,
         "delay_ms": [found.delay.0 / MILLISECOND, found.delay.1 / MILLISECOND],
     })
 }
@@ -170,19 +171,19 @@ fn deviation(found: Option<ResidualStatistics>, scale: f64) -> Value {
     found.map_or(Value::Null, |d| json!({ "max": d.max / scale, "rms": d.rms / scale }))
 }
 
-/// Units of the axis.
+/// Units of the axis and their names.
 struct Scales {
     position: f64,
     velocity: f64,
     velocity_name: &'static str,
-    units: Units,
+    units: AxisUnits,
 }
 
 impl Scales {
-    fn of(found: &Found) -> Self {
+    fn of(found: &IdentificationResult) -> Self {
         let kind = found.axis.kind();
         let (velocity_name, velocity) = velocity_scale(kind);
-        Scales { position: table::scale(kind).2, velocity, velocity_name, units: Units::of(kind) }
+        Scales { position: table::scale(kind).2, velocity, velocity_name, units: AxisUnits::for_kind(kind) }
     }
 
     fn friction(&self, friction: &FrictionFit, levels: &[SteadyCurrent]) -> Value {
@@ -209,10 +210,10 @@ impl Scales {
         let profile = fit.profile.iter().map(|(delay, rms)| json!([ms(*delay), rms / self.position]));
         json!({
             "name": fit.delay.name(),
-            "feedforward": fit.delay.mode().name(),
+            "feedforward": fit.delay.feedforward_mode().name(),
             "value_ms": ms(fit.value),
             "interval_ms": [ms(fit.interval.0), ms(fit.interval.1)],
-            "left": fit.left,
+            "left": fit.is_unchanged,
             "profile": profile.collect::<Vec<_>>(),
         })
     }
@@ -224,7 +225,7 @@ impl Scales {
                 "before": refined.before,
                 "value": refined.value,
                 "error": refined.error,
-                "at_bound": refined.at_bound,
+                "at_bound": refined.is_at_bound,
             })
         });
         let (before, after) = refinement.position;
@@ -236,7 +237,7 @@ impl Scales {
         })
     }
 
-    fn agreement(&self, recorded: &Recorded, agreement: &Agreement) -> Value {
+    fn agreement(&self, recorded: &ConditionedRecording, agreement: &Agreement) -> Value {
         let part = |(mode, comparison): (&str, &ExperimentComparison)| {
             json!({
                 "feedforward": mode,
@@ -244,7 +245,7 @@ impl Scales {
                 "elsewhere": deviation(comparison.elsewhere, self.position),
                 "velocity": deviation(comparison.velocity, self.velocity),
                 "current_a": deviation(comparison.current, 1.0),
-                "current_r_squared": comparison.current_determination,
+                "current_r_squared": comparison.current_r_squared,
             })
         };
         let modes = agreement.experiments.iter().map(|experiment| experiment.mode.name());
@@ -253,7 +254,7 @@ impl Scales {
             "parts": modes.zip(&agreement.comparisons).map(part).collect::<Vec<_>>(),
             "inverse_dynamics": agreement.inverse.as_ref().map(|inverse| json!({
                 "current_a": deviation(Some(inverse.current), 1.0),
-                "current_r_squared": inverse.determination,
+                "current_r_squared": inverse.r_squared,
             })),
         })
     }

@@ -1,25 +1,26 @@
-//! What `virtual_axes identify` prints.
+//! Text output of `virtual_axes identify`.
 
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::{DEGREE, MILLIMETER, MILLISECOND, MILLISECOND_NS};
 use virtual_axes_identify::identify::{
-    Agreement, ExperimentComparison, ResidualStatistics, FrictionFit, FrictionLaw, GravityFit, GravitySource, Identification,
-    IdentifiedValue, LawFit, SteadyCurrent, RefinedParameter, FeedforwardRegression,
+    Agreement, ExperimentComparison, FeedforwardRegression, FrictionFit, FrictionLaw, GravityFit,
+    GravitySource, Identification, IdentifiedValue, LawFit, RefinedParameter, ResidualStatistics,
+    SteadyCurrent,
 };
 use virtual_axes_identify::recording::{Finding, Severity};
-use virtual_axes_report::{TableColumn, Table};
+use virtual_axes_report::{Table, TableColumn};
 
-use crate::axis::Units;
-use crate::identify::Found;
-use crate::recordings::Recorded;
+use crate::axis::AxisUnits;
+use crate::identify_result::IdentificationResult;
+use crate::recordings::ConditionedRecording;
 use crate::table;
 
-/// What stands where there is nothing.
+/// Cell without a value.
 const NONE: &str = "–";
-/// Speeds in the two directions that differ by less than this part are one.
+/// Relative difference below which the speeds of both directions share a row.
 const SAME_SPEED: f64 = 0.03;
 
-/// Unit of an axis's velocities for people and for programs, and its value in SI.
+/// Returns the name of the unit of an axis's velocities, and its size in SI units.
 pub fn velocity_scale(kind: AxisKind) -> (&'static str, f64) {
     match kind {
         AxisKind::Linear => ("mm/s", MILLIMETER),
@@ -27,7 +28,7 @@ pub fn velocity_scale(kind: AxisKind) -> (&'static str, f64) {
     }
 }
 
-/// Name of a severity.
+/// Returns the name of a severity.
 pub fn severity(severity: Severity) -> &'static str {
     match severity {
         Severity::Missing => "missing",
@@ -36,13 +37,13 @@ pub fn severity(severity: Severity) -> &'static str {
     }
 }
 
-/// A finding on a line, with its remedy.
+/// Formats a finding with its remedy on one line.
 pub fn finding(finding: &Finding) -> String {
     format!("{}: {finding}", severity(finding.severity))
 }
 
-/// The feedforward that acted in a recording, part by part.
-pub fn modes(recorded: &Recorded, agreement: &Agreement) -> Vec<&'static str> {
+/// Returns the active feedforward of each part of a recording.
+pub fn modes(recorded: &ConditionedRecording, agreement: &Agreement) -> Vec<&'static str> {
     let mut names: Vec<&str> = agreement.experiments.iter().map(|e| e.mode.name()).collect();
     if names.is_empty() {
         names.extend(recorded.feedforward.map(|mode| mode.name()));
@@ -51,15 +52,16 @@ pub fn modes(recorded: &Recorded, agreement: &Agreement) -> Vec<&'static str> {
     names
 }
 
-/// Levels by speed, towards plus and towards minus.
+/// Groups friction levels by speed, each with the positive and the negative direction.
 pub fn by_speed(levels: &[SteadyCurrent]) -> Vec<[Option<&SteadyCurrent>; 2]> {
     let mut sorted: Vec<&SteadyCurrent> = levels.iter().collect();
     sorted.sort_by(|a, b| a.velocity.abs().total_cmp(&b.velocity.abs()));
     let mut found: Vec<[Option<&SteadyCurrent>; 2]> = Vec::new();
     for level in sorted {
         let (side, other) = if level.velocity > 0.0 { (0, 1) } else { (1, 0) };
-        let near =
-            |other: &SteadyCurrent| level.velocity.abs() - other.velocity.abs() < SAME_SPEED * other.velocity.abs();
+        let near = |other: &SteadyCurrent| {
+            level.velocity.abs() - other.velocity.abs() < SAME_SPEED * other.velocity.abs()
+        };
         match found.last_mut() {
             Some(pair) if pair[side].is_none() && pair[other].is_some_and(near) => pair[side] = Some(level),
             _ => {
@@ -77,9 +79,9 @@ fn table_of(columns: &[(&str, &str)]) -> Table {
     Table { columns, ..Table::default() }
 }
 
-/// A number to so many digits that count.
+/// Formats a number with `count` significant digits.
 fn digits(value: f64, count: i32) -> String {
-    /// Magnitudes that are written without an exponent.
+    /// Decimal exponents of numbers that are written without an exponent.
     const PLAIN: std::ops::Range<i32> = -5..7;
     if !value.is_finite() {
         return NONE.to_owned();
@@ -95,8 +97,8 @@ fn or_none(value: Option<f64>, text: impl Fn(f64) -> String) -> String {
     value.filter(|value| value.is_finite()).map_or_else(|| NONE.to_owned(), text)
 }
 
-/// The result in words and tables.
-pub fn text(found: &Found) -> String {
+/// Returns the result as text and tables.
+pub fn text(found: &IdentificationResult) -> String {
     let mut parts = vec![
         format!("{}: {}\n", found.machine, found.axis.name()),
         table::text(&recordings(found)),
@@ -110,12 +112,12 @@ pub fn text(found: &Found) -> String {
     parts.join("\n")
 }
 
-/// Name of a recording that the axis was not identified from.
-fn validation(recorded: &Recorded) -> String {
+/// Returns the name of a validation recording.
+fn validation_name(recorded: &ConditionedRecording) -> String {
     format!("{} (validation)", recorded.signals.name)
 }
 
-fn recordings(found: &Found) -> Table {
+fn recordings(found: &IdentificationResult) -> Table {
     let mut table = table_of(&[
         ("recording", ""),
         ("duration", "s"),
@@ -130,7 +132,8 @@ fn recordings(found: &Found) -> Table {
     let all = found.recordings.iter().zip(agreements).chain(validations);
     for (number, (recorded, agreement)) in all.enumerate() {
         let signals = &recorded.signals;
-        let name = if number < found.recordings.len() { signals.name.clone() } else { validation(recorded) };
+        let name =
+            if number < found.recordings.len() { signals.name.clone() } else { validation_name(recorded) };
         let modes = agreement.map_or_else(Vec::new, |agreement| modes(recorded, agreement));
         table.rows.push(vec![
             name,
@@ -146,7 +149,8 @@ fn recordings(found: &Found) -> Table {
 }
 
 fn values(values: &[IdentifiedValue]) -> Table {
-    let columns = [("parameter", ""), ("value", ""), ("unit", ""), ("±", ""), ("before", ""), ("from", "")];
+    let columns =
+        [("parameter", ""), ("value", ""), ("unit", ""), ("±", ""), ("initial", ""), ("source", "")];
     let mut table = table_of(&columns);
     for value in values {
         let spread = match (value.interval, value.error) {
@@ -165,12 +169,16 @@ fn values(values: &[IdentifiedValue]) -> Table {
     table
 }
 
-/// The figures of the steps, a part each.
-fn steps(found: &Found) -> Vec<String> {
+/// Returns the results of the steps.
+fn steps(found: &IdentificationResult) -> Vec<String> {
     let identification = &found.identification;
     let mut parts = Vec::new();
     if let Some(friction) = &identification.friction {
-        parts.push(self::friction(friction, &identification.steady.levels, Units::of(found.axis.kind())));
+        parts.push(self::friction(
+            friction,
+            &identification.steady.levels,
+            AxisUnits::for_kind(found.axis.kind()),
+        ));
     }
     let mut lines = String::new();
     let all = [
@@ -185,9 +193,9 @@ fn steps(found: &Found) -> Vec<String> {
     for fit in &identification.delays {
         let ms = |delay: i64| delay as f64 / MILLISECOND_NS as f64;
         let [low, high] = [fit.interval.0, fit.interval.1].map(ms);
-        let left = if fit.left { ", left as it was" } else { "" };
+        let left = if fit.is_unchanged { ", unchanged" } else { "" };
         lines.push_str(&format!(
-            "{}: {} ms{left}; above {low} and up to {high} ms the recordings tell no difference\n",
+            "{}: {} ms{left}; delays above {low} and up to {high} ms give the same motion\n",
             fit.delay.name(),
             ms(fit.value),
         ));
@@ -197,7 +205,7 @@ fn steps(found: &Found) -> Vec<String> {
         let unit = table::scale(found.axis.kind()).0;
         let (before, after) = refinement.position;
         lines.push_str(&format!(
-            "refined on the closed loop: {} parameters; position RMS {} → {} {unit}",
+            "refined in closed loop: {} parameters; position RMS {} → {} {unit}",
             refinement.parameters.len(),
             digits(before / scale, 3),
             digits(after / scale, 3)
@@ -211,14 +219,14 @@ fn steps(found: &Found) -> Vec<String> {
     parts
 }
 
-fn friction(friction: &FrictionFit, levels: &[SteadyCurrent], units: Units) -> String {
+fn friction(friction: &FrictionFit, levels: &[SteadyCurrent], units: AxisUnits) -> String {
     let law = &friction.law;
     let speeds = by_speed(levels);
     let name = match law.law {
         FrictionLaw::DoubleExponential => "a e^(bV) + c e^(dV) (Prévost eq. 3)",
         FrictionLaw::Linear => "Coulomb level and viscous slope",
     };
-    let mut text = format!("friction: {name}, {} speeds, R² {:.5}", speeds.len(), law.determination);
+    let mut text = format!("friction: {name}, {} speeds, R² {:.5}", speeds.len(), law.r_squared);
     if friction.asymmetry.is_finite() {
         text.push_str(&format!("; directions differ by up to {:.1} %", 100.0 * friction.asymmetry));
     }
@@ -238,19 +246,19 @@ fn friction(friction: &FrictionFit, levels: &[SteadyCurrent], units: Units) -> S
             }
         };
         let figures = figures.into_iter().map(|figure| digits(figure, 5));
-        [vec![name.to_owned()], figures.collect(), vec![format!("{:.5}", law.determination)]].concat()
+        [vec![name.to_owned()], figures.collect(), vec![format!("{:.5}", law.r_squared)]].concat()
     };
     laws.rows.push(row("both directions", law));
-    for (name, law) in ["towards plus", "towards minus"].iter().zip(&friction.directions) {
+    for (name, law) in ["positive direction", "negative direction"].iter().zip(&friction.directions) {
         laws.rows.extend(law.as_ref().map(|law| row(name, law)));
     }
     text.push_str(&table::text(&laws));
     text.push('\n');
     let mut table = table_of(&[
         ("speed", units.speed_name),
-        ("friction towards plus", "A"),
+        ("friction, positive direction", "A"),
         ("±", "A"),
-        ("towards minus", "A"),
+        ("negative direction", "A"),
         ("±", "A"),
         ("law", "A"),
     ]);
@@ -267,7 +275,7 @@ fn friction(friction: &FrictionFit, levels: &[SteadyCurrent], units: Units) -> S
     text + &table::text(&table)
 }
 
-/// Of the directions that there are, m/s or rad/s.
+/// Returns the mean speed of the directions with a level, m/s or rad/s.
 fn mean_speed(pair: &[Option<&SteadyCurrent>; 2]) -> Option<f64> {
     let speeds: Vec<f64> = pair.iter().flatten().map(|level| level.velocity.abs()).collect();
     (!speeds.is_empty()).then(|| speeds.iter().sum::<f64>() / speeds.len() as f64)
@@ -287,12 +295,12 @@ fn gravity(gravity: &GravityFit) -> String {
     }
     let model = &gravity.model;
     if model.constant == 0.0 && model.sine == 0.0 && model.cosine == 0.0 {
-        text.push_str("; not significant, taken as none");
+        text.push_str("; not significant, set to zero");
     }
     text
 }
 
-/// Where a gravity comes from.
+/// Returns the name of the source of the gravity.
 pub fn source(source: GravitySource) -> &'static str {
     match source {
         GravitySource::Motion => "constant velocities in both directions",
@@ -303,7 +311,7 @@ pub fn source(source: GravitySource) -> &'static str {
 fn inertia(identification: &Identification) -> Option<String> {
     let inertia = identification.inertia.as_ref()?;
     let mut text = format!(
-        "inertia: {} ± {} by Prévost eq. 5 from {} accelerations (spread of single instants {})",
+        "inertia: {} ± {} by Prévost eq. 5 from {} accelerations (standard deviation of single samples {})",
         digits(inertia.value, 5),
         digits(inertia.error, 2),
         inertia.accelerations,
@@ -313,7 +321,8 @@ fn inertia(identification: &Identification) -> Option<String> {
         text.push_str(&format!("; {} by eq. 5 on the simulated axis", digits(replayed, 5)));
     }
     let refined = identification.refinement.as_ref().map(|refinement| refinement.parameters.iter());
-    if let Some(refined) = refined.and_then(|mut all| all.find(|r| r.parameter == RefinedParameter::Inertia)) {
+    if let Some(refined) = refined.and_then(|mut all| all.find(|r| r.parameter == RefinedParameter::Inertia))
+    {
         text.push_str(&format!("; refined {} ± {}", digits(refined.value, 5), digits(refined.error, 2)));
     }
     Some(text)
@@ -323,23 +332,23 @@ fn regression(name: &str, found: Option<&FeedforwardRegression>) -> Option<Strin
     let found = found?;
     let [low, high] = [found.delay.0, found.delay.1].map(|delay| digits(delay / MILLISECOND, 3));
     Some(format!(
-        "{name}: {} ± {}, R² {:.6}, {low} … {high} ms behind the setpoints",
+        "{name}: {} ± {}, R² {:.6}, {low} … {high} ms delay after the setpoints",
         digits(found.value, 5),
         digits(found.error, 2),
-        found.determination
+        found.r_squared
     ))
 }
 
-/// The largest of a figure over the parts of a recording.
+/// Returns the largest value of a figure over the parts of a recording.
 pub fn worst(agreement: &Agreement, of: impl Fn(&ExperimentComparison) -> Option<f64>) -> Option<f64> {
     agreement.comparisons.iter().filter_map(of).reduce(f64::max)
 }
 
-fn agreement(found: &Found) -> Table {
+fn agreement(found: &IdentificationResult) -> Table {
     let (position, _, length) = table::scale(found.axis.kind());
     let (velocity, speed) = velocity_scale(found.axis.kind());
     let mut table = table_of(&[
-        ("simulated against recorded", ""),
+        ("simulated − recorded", ""),
         ("at constant velocity, max", position),
         ("elsewhere, max", position),
         ("velocity, max", velocity),
@@ -349,12 +358,12 @@ fn agreement(found: &Found) -> Table {
     ]);
     let identified = found.recordings.iter().zip(&found.identification.agreements);
     let identified = identified.map(|(recorded, agreement)| (recorded.signals.name.clone(), agreement));
-    let validated = found.validations.iter().map(|v| (validation(&v.recorded), &v.agreement));
+    let validated = found.validations.iter().map(|v| (validation_name(&v.recorded), &v.agreement));
     for (name, agreement) in identified.chain(validated) {
         let max = |deviation: &Option<ResidualStatistics>| deviation.map(|d| d.max);
         let in_unit = |value: Option<f64>, unit: f64| or_none(value, |value| format!("{:.1}", value / unit));
         let inverse = agreement.inverse.as_ref();
-        let simulated = agreement.comparisons.iter().filter_map(|c| c.current_determination).reduce(f64::min);
+        let simulated = agreement.comparisons.iter().filter_map(|c| c.current_r_squared).reduce(f64::min);
         let current = worst(agreement, |c| c.current.map(|d| d.rms)).or(inverse.map(|i| i.current.rms));
         table.rows.push(vec![
             name,
@@ -363,7 +372,7 @@ fn agreement(found: &Found) -> Table {
             in_unit(worst(agreement, |c| max(&c.velocity)), speed),
             or_none(current, |current| format!("{current:.3}")),
             or_none(simulated, |r2| format!("{r2:.4}")),
-            or_none(inverse.map(|i| i.determination), |r2| format!("{r2:.4}")),
+            or_none(inverse.map(|i| i.r_squared), |r2| format!("{r2:.4}")),
         ]);
     }
     table

@@ -1,4 +1,4 @@
-//! What a command is given to run: a scenario or a file of setpoints.
+//! Input of a command: a scenario or a file with setpoints.
 
 use std::cell::RefCell;
 use std::error::Error;
@@ -10,14 +10,14 @@ use std::sync::Arc;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::Scenario;
-use virtual_axes_core::simulation::joints;
-use virtual_axes_core::trajectory::Request;
-use virtual_axes_core::trial::{GridSource, ProgramSource, Setpoints, SourceError};
+use virtual_axes_core::simulation::joint_limits;
+use virtual_axes_core::trajectory::TrajectoryRequest;
+use virtual_axes_core::trial::{GridSource, ProgramSource, SetpointSource, SourceError, TrialError};
 use virtual_axes_io::files::{self, FileKind, PsecCsv, Trajectories, read_psec_yaml};
 
-/// A scenario or setpoints.
+/// Scenario or file with setpoints.
 #[derive(Debug)]
-pub struct Input {
+pub struct CommandInput {
     name: String,
     content: Content,
 }
@@ -25,39 +25,40 @@ pub struct Input {
 #[derive(Debug)]
 enum Content {
     Scenario(Box<Scenario>),
-    /// The opened file serves the first run, so that a pipe will do; the others open it anew.
+    /// Opened file, which the first run consumes, so that a pipe is possible; later runs reopen it.
     Csv(RefCell<Option<files::Input>>),
-    Yaml(Vec<Request>),
+    Yaml(Vec<TrajectoryRequest>),
     Mcap {
         topic: Option<String>,
     },
 }
 
-impl Input {
-    /// A shipped scenario if `name` is one, otherwise the file `name`; `topic` is that of a recording.
+impl CommandInput {
+    /// Opens the shipped scenario `name`, or the file `name`. `topic` selects the topic of an MCAP recording.
     ///
     /// # Errors
-    /// What is wrong with the file.
+    ///
+    /// Returns an error if the file cannot be read or is invalid, or if `topic` is given for another kind of file.
     pub fn open(name: &str, topic: Option<&str>) -> Result<Self, Box<dyn Error>> {
         let shipped = Scenario::builtin_names().any(|known| known == name);
         let content = if shipped || !Path::new(name).exists() {
-            // What is neither is told with the names that there are.
+            // The error of an unknown name lists the shipped scenarios.
             Content::Scenario(Box::new(Scenario::load(name)?))
         } else {
             content_of(files::Input::open(Path::new(name))?, topic)?
         };
         if topic.is_some() && !matches!(content, Content::Mcap { .. }) {
-            return Err(format!("{name}: --topic is for recordings (MCAP)").into());
+            return Err(format!("{name}: --topic requires an MCAP recording").into());
         }
-        Ok(Input { name: name.to_owned(), content })
+        Ok(CommandInput { name: name.to_owned(), content })
     }
 
-    /// Name of the scenario or the file.
+    /// Returns the name of the scenario or file.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What it is, if that is told.
+    /// Returns the description of a scenario; empty for other files.
     pub fn description(&self) -> &str {
         match &self.content {
             Content::Scenario(scenario) => scenario.description(),
@@ -65,12 +66,12 @@ impl Input {
         }
     }
 
-    /// Refuses to write where it is read from.
+    /// Rejects an output file that is the input file.
     pub fn must_not_be(&self, output: &Path) -> Result<(), String> {
         must_not_replace(output, Path::new(&self.name))
     }
 
-    /// Path and law of time, of a scenario.
+    /// Returns path and feed profile of a scenario; `None` for other files.
     pub fn program(
         &self,
         machine: &MachineConfig,
@@ -78,21 +79,21 @@ impl Input {
     ) -> Result<Option<Arc<Program>>, Box<dyn Error>> {
         match &self.content {
             Content::Scenario(scenario) => Ok(Some(Arc::new(scenario.program(machine, feed)?))),
-            _ if feed.is_some() => Err(format!("{}: --feed is for scenarios", self.name).into()),
+            _ if feed.is_some() => Err(format!("{}: --feed requires a scenario", self.name).into()),
             _ => Ok(None),
         }
     }
 
-    /// The setpoints; `program` is what [`Self::program`] gave.
+    /// Returns the setpoints. `program` is the result of [`Self::program`].
     pub fn setpoints(
         &self,
         machine: &MachineConfig,
         program: Option<&Arc<Program>>,
-    ) -> Result<Setpoints<'_>, Box<dyn Error>> {
-        let (limits, period) = (joints(machine, ""), machine.periods().position);
+    ) -> Result<SetpointSource<'_>, Box<dyn Error>> {
+        let (limits, period) = (joint_limits(machine, ""), machine.periods().position);
         if let Some(program) = program {
             let source = ProgramSource::new(Arc::clone(program), &self.name, &limits, period);
-            return Ok(Setpoints::Grid(Box::new(source)));
+            return Ok(SetpointSource::Grid(Box::new(source)));
         }
         match &self.content {
             Content::Scenario(_) => Err(format!("{}: a scenario without its program", self.name).into()),
@@ -102,24 +103,35 @@ impl Input {
                     None => files::Input::open(Path::new(&self.name))?,
                 };
                 let psec = PsecCsv::new(file.into_reader(), &self.name, period, &limits)?;
-                Ok(Setpoints::Grid(Box::new(CsvSource(psec.starting_at_first_row()))))
+                Ok(SetpointSource::Grid(Box::new(CsvSource(psec.starting_at_first_row()))))
             }
-            Content::Yaml(requests) => {
-                Ok(Setpoints::Requests(Box::new(requests.iter().map(|request| Ok((0, request.clone()))))))
-            }
+            Content::Yaml(requests) => Ok(SetpointSource::Requests(Box::new(
+                requests.iter().map(|request| Ok((0, request.clone()))),
+            ))),
             Content::Mcap { topic } => {
                 let trajectories = Trajectories::open(Path::new(&self.name), topic.as_deref())?;
-                Ok(Setpoints::Requests(Box::new(trajectories.map(|next| next.map_err(SourceError::from)))))
+                Ok(SetpointSource::Requests(Box::new(
+                    trajectories.map(|next| next.map_err(SourceError::from)),
+                )))
             }
+        }
+    }
+
+    /// Adds the name of the input to an error that does not name a file.
+    pub fn name_error(&self, error: TrialError) -> Box<dyn Error> {
+        match error {
+            TrialError::Callback(error) => error.into(),
+            TrialError::Source(error) => error,
+            error => format!("{}: {error}", self.name).into(),
         }
     }
 }
 
-/// Refuses to write `output` where `input` is read from.
+/// Rejects an output file that is the same file as `input`.
 pub fn must_not_replace(output: &Path, input: &Path) -> Result<(), String> {
     let same = fs::canonicalize(output).is_ok_and(|out| fs::canonicalize(input).is_ok_and(|i| i == out));
     if same && fs::metadata(output).is_ok_and(|m| m.is_file()) {
-        return Err(format!("{}: the output would replace what is read", output.display()));
+        return Err(format!("{}: the output would replace an input file", output.display()));
     }
     Ok(())
 }
@@ -135,18 +147,18 @@ fn content_of(file: files::Input, topic: Option<&str>) -> Result<Content, Box<dy
         FileKind::PsecYaml => {
             let requests = read_psec_yaml(file.text().unwrap_or_default(), &name)?;
             if requests.iter().all(|request| request.points() == 0) {
-                return Err(format!("{name}: there is no setpoint: no trajectory has points").into());
+                return Err(format!("{name}: no setpoints: no trajectory has points").into());
             }
             Content::Yaml(requests)
         }
         FileKind::Mcap => Content::Mcap { topic: topic.map(str::to_owned) },
         kind @ FileKind::Machine => {
-            return Err(format!("{name}: it is {kind}, to be given to --machine").into());
+            return Err(format!("{name}: is {kind}; use --machine for it").into());
         }
     })
 }
 
-/// Setpoints of a file, row by row.
+/// Setpoints of a CSV file, read row by row.
 struct CsvSource<R>(PsecCsv<R>);
 
 impl<R: Read> GridSource for CsvSource<R> {

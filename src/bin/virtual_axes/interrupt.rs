@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: what is being written is taken away, then the command ends.
+//! Handler of SIGINT and SIGTERM: unfinished output files are removed, then the command exits.
 
 use std::io;
 use std::process;
@@ -6,29 +6,29 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-/// Exit status of a command that was interrupted, as shells have it for SIGINT.
+/// Exit status of an interrupted command, the convention of shells for SIGINT.
 pub const INTERRUPTED: u8 = 130;
-/// Time to tidy up; a command that waits for a pipe does not look at the flag.
-const PATIENCE: Duration = Duration::from_millis(500);
+/// Time to remove unfinished files. A command that is blocked on a pipe does not check the flag.
+const CLEANUP_TIME: Duration = Duration::from_millis(500);
 
 static RAISED: AtomicBool = AtomicBool::new(false);
 
-/// Listens from now on. Where that is not possible, signals end the program as they do by default.
-pub fn listen() {
+/// Installs the handler. If that fails, the default action of the signals remains.
+pub fn install_handler() {
     let _ = ctrlc::set_handler(|| {
         RAISED.store(true, Ordering::Relaxed);
-        thread::sleep(PATIENCE);
+        thread::sleep(CLEANUP_TIME);
         process::exit(INTERRUPTED.into());
     });
 }
 
-/// Whether the command has been interrupted.
-pub fn raised() -> bool {
+/// Returns true if the command was interrupted.
+pub fn is_raised() -> bool {
     RAISED.load(Ordering::Relaxed)
 }
 
-/// An error once the command has been interrupted, so that work ends and its files are taken away.
+/// Returns an error if the command was interrupted, so that the work ends and its files are removed.
 pub fn check() -> io::Result<()> {
-    // Not ErrorKind::Interrupted, which writers take for a call to be made again.
-    if raised() { Err(io::Error::other("interrupted")) } else { Ok(()) }
+    // Not ErrorKind::Interrupted, upon which writers repeat the call.
+    if is_raised() { Err(io::Error::other("interrupted")) } else { Ok(()) }
 }

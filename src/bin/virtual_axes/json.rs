@@ -1,6 +1,6 @@
-//! `--json`: the figures of the table as one object.
+//! JSON output of `virtual_axes run`.
 //!
-//! Units stand in the keys; those of an axis in its `unit`: um and mdeg.
+//! Keys contain units; the unit of an axis's errors is in its `unit`: um or mdeg.
 
 use serde_json::{Map, Value, json};
 use virtual_axes_core::trial::{
@@ -8,12 +8,12 @@ use virtual_axes_core::trial::{
 };
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
-use crate::input::Input;
-use crate::run::Run;
+use crate::input::CommandInput;
 use crate::table::{MICROMETER, MILLIDEGREE, scale};
+use crate::variant::VariantRun;
 
-/// The object of a command's runs.
-pub fn object(input: &Input, machine: &str, runs: &[Run]) -> Value {
+/// Returns the runs of a command as a JSON object.
+pub fn object(input: &CommandInput, machine: &str, runs: &[VariantRun]) -> Value {
     json!({
         "input": input.name(),
         "description": input.description(),
@@ -22,7 +22,7 @@ pub fn object(input: &Input, machine: &str, runs: &[Run]) -> Value {
     })
 }
 
-fn run(run: &Run) -> Value {
+fn run(run: &VariantRun) -> Value {
     let mut object = Map::new();
     object.insert("controller".to_owned(), json!(run.controller));
     object.insert("changes".to_owned(), json!(run.changes));
@@ -30,7 +30,7 @@ fn run(run: &Run) -> Value {
     Value::Object(object)
 }
 
-/// Everything that was measured on a run.
+/// Returns all figures of a run.
 pub fn figures(figures: &Figures) -> Map<String, Value> {
     let mut object = Map::new();
     object.insert("duration_s".to_owned(), json!(figures.duration));
@@ -52,18 +52,18 @@ fn axis(axis: &AxisFigures) -> Value {
     json!({
         "unit": unit,
         "moves": axis.moves,
-        "tracking_error": {
+        "following_error": {
             "max": report.max_following_error / scale,
             "rms": report.rms_following_error / scale,
         },
-        "synchronized_tracking_error": {
+        "delay_compensated_following_error": {
             "max": report.max_delay_compensated_following_error / scale,
             "rms": report.rms_delay_compensated_following_error / scale,
         },
         "peak_current_a": report.peak_current,
         "saturation_s": report.saturation_time,
         "control_activity_a": report.control_activity,
-        "outside_stroke_s": axis.outside_stroke_time,
+        "outside_travel_limits_s": axis.outside_travel_limits_time,
         "friction_extrapolated": axis.friction_extrapolated,
     })
 }

@@ -1,4 +1,4 @@
-//! `virtual_axes machines` and `virtual_axes scenarios`.
+//! `virtual_axes machines` and `virtual_axes scenarios`: lists of shipped files.
 
 use std::error::Error;
 
@@ -6,7 +6,7 @@ use serde_json::json;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::scenario::Scenario;
 
-/// The shipped machines, one a line.
+/// Returns the shipped machines, one per line or as JSON.
 pub fn machines(as_json: bool) -> Result<String, Box<dyn Error>> {
     let mut list = Vec::new();
     for name in Parameters::builtin_names() {
@@ -24,12 +24,12 @@ pub fn machines(as_json: bool) -> Result<String, Box<dyn Error>> {
     Ok(list.iter().map(|(name, title, _)| format!("{name}: {title}\n")).collect())
 }
 
-/// The file of a shipped machine.
+/// Returns the file of a shipped machine.
 pub fn machine(name: &str) -> Result<String, Box<dyn Error>> {
     Ok(Parameters::builtin_text(name)?.to_owned())
 }
 
-/// The shipped scenarios, one a line.
+/// Returns the shipped scenarios, one per line or as JSON.
 pub fn scenarios(as_json: bool) -> Result<String, Box<dyn Error>> {
     let list: Vec<Scenario> = Scenario::builtin_names().map(Scenario::builtin).collect::<Result<_, _>>()?;
     if as_json {
@@ -49,7 +49,7 @@ pub fn scenarios(as_json: bool) -> Result<String, Box<dyn Error>> {
         .collect())
 }
 
-/// The file of a shipped scenario.
+/// Returns the file of a shipped scenario.
 pub fn scenario(name: &str) -> Result<String, Box<dyn Error>> {
     Ok(Scenario::builtin_text(name)?.to_owned())
 }

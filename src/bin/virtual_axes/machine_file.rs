@@ -1,20 +1,22 @@
-//! `--out`: a machine file that a command writes.
+//! The `--out` option: a machine file as output.
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use virtual_axes_io::files::OutputFile;
 
-/// Refuses a name that says that it is something else; devices and pipes have no extension.
+/// Rejects a file name with an extension other than `.yaml` or `.yml`. Devices and pipes have no extension.
 pub fn check_name(path: &Path) -> Result<(), String> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         None | Some("yaml" | "yml") => Ok(()),
-        Some(_) => Err(format!("{}: a machine file is YAML: .yaml", path.display())),
+        Some(_) => {
+            Err(format!("{}: a machine file is YAML; its extension must be .yaml or .yml", path.display()))
+        }
     }
 }
 
-/// Writes it; it stands under its name only when it is whole.
+/// Writes the file atomically.
 pub fn write(path: &Path, text: &str) -> io::Result<()> {
     let mut file = OutputFile::create(path)?;
     file.write_all(text.as_bytes())?;

@@ -1,4 +1,4 @@
-//! Command line of the virtual axes; needs no network.
+//! Command line `virtual_axes`: offline simulation, controller design, tuning and identification without ROS 2.
 
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
@@ -10,6 +10,7 @@ mod design;
 mod design_output;
 mod identify;
 mod identify_json;
+mod identify_result;
 mod identify_text;
 mod input;
 mod interrupt;
@@ -25,10 +26,11 @@ mod report;
 mod robustness;
 mod run;
 mod search;
-mod subject;
 mod table;
+mod trial_arguments;
 mod tune;
 mod tune_output;
+mod tune_result;
 mod urdf;
 mod variant;
 
@@ -41,94 +43,94 @@ use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use virtual_axes_core::config::listing;
 
-/// Exit status of a command that refused its input, or could not write its output.
+/// Exit status of a command that rejected its input or could not write its output.
 const BAD_INPUT: u8 = 2;
 
-/// Virtual machine-tool axes.
+/// Simulate virtual machine-tool axes offline.
 #[derive(Debug, Parser)]
-#[command(version, about, after_help = "`virtual_axes run ballbar` is a good beginning.")]
-struct Arguments {
+#[command(version, about, after_help = "Example: virtual_axes run ballbar")]
+struct CommandLine {
     #[command(subcommand)]
     command: Command,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run a scenario or setpoints through a machine and print its errors.
-    Run(run::Arguments),
-    /// Write setpoints to a file: those of a scenario, or of a campaign to identify an axis.
-    Psec(psec::Arguments),
-    /// Design position controllers: polynomials, closed-loop poles and stability margins.
-    Design(design::Arguments),
-    /// Find the tuning of the position controllers that suits a path best.
-    Tune(Box<tune::Arguments>),
-    /// Run one tuning on plants whose inertia, friction and torque constant are off.
-    Robustness(Box<robustness::Arguments>),
-    /// Find the parameters of an axis from recordings of it, and write a machine file with them.
-    Identify(Box<identify::Arguments>),
-    /// Check a file: a machine, a scenario, or setpoints.
-    Check(check::Arguments),
+    /// Simulate a scenario or setpoints on a machine and print its errors.
+    Run(run::RunArguments),
+    /// Write the setpoints of a scenario or of an identification campaign to a file.
+    Psec(psec::PsecArguments),
+    /// Design position controllers and print polynomials, closed-loop poles and stability margins.
+    Design(design::DesignArguments),
+    /// Optimize the tuning of the position controllers for a path.
+    Tune(Box<tune::TuneArguments>),
+    /// Simulate one tuning on plants with deviating inertia, friction and torque constant.
+    Robustness(Box<robustness::RobustnessArguments>),
+    /// Identify the parameters of an axis from recordings and write a machine file.
+    Identify(Box<identify::IdentifyArguments>),
+    /// Validate a machine file, a scenario, or setpoints.
+    Check(check::CheckArguments),
     /// Print the URDF of a machine, for robot_state_publisher and RViz.
-    Urdf(urdf::Arguments),
-    /// Print where the tool is in the workpiece frame for positions of the joints.
-    Pose(pose::Arguments),
-    /// List the machines that come with the program.
+    Urdf(urdf::UrdfArguments),
+    /// Print the tool pose in the workpiece frame for joint positions (forward kinematics).
+    Pose(pose::PoseArguments),
+    /// List the shipped machines.
     Machines {
-        /// As a JSON list.
+        /// Print a JSON list.
         #[arg(long)]
         json: bool,
-        /// Print the file of this one, to begin another from.
+        /// Print the file of this machine or scenario, as a template.
         #[arg(long, value_name = "MACHINE", conflicts_with = "json")]
         show: Option<String>,
     },
-    /// List the scenarios that come with the program.
+    /// List the shipped scenarios.
     Scenarios {
-        /// As a JSON list.
+        /// Print a JSON list.
         #[arg(long)]
         json: bool,
-        /// Print the file of this one, to begin another from.
+        /// Print the file of this machine or scenario, as a template.
         #[arg(long, value_name = "SCENARIO", conflicts_with = "json")]
         show: Option<String>,
     },
-    /// List every parameter with its unit, range and default.
+    /// List all parameters with unit, range and default.
     Parameters {
-        /// As a Markdown table.
+        /// Print a Markdown table.
         #[arg(long)]
         markdown: bool,
     },
-    /// Print completions for a shell.
+    /// Print a completion script for a shell.
     Completions {
-        /// Which shell.
+        /// Shell.
         shell: Shell,
     },
 }
 
 fn main() -> ExitCode {
-    interrupt::listen();
-    let text = match text_of(&Arguments::parse().command) {
+    interrupt::install_handler();
+    let text = match run_command(&CommandLine::parse().command) {
         Ok(text) => text,
         Err(error) => {
-            complain(&*error);
-            return ExitCode::from(if interrupt::raised() { interrupt::INTERRUPTED } else { BAD_INPUT });
+            print_error(&*error);
+            return ExitCode::from(if interrupt::is_raised() { interrupt::INTERRUPTED } else { BAD_INPUT });
         }
     };
     match io::stdout().write_all(text.as_bytes()).and_then(|()| io::stdout().flush()) {
-        // A reader that has seen enough (`| head`) is no fault.
+        // A closed pipe (`| head`) is no error.
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            complain(&format!("standard output: {error}"));
+            print_error(&format!("standard output: {error}"));
             ExitCode::from(BAD_INPUT)
         }
         _ => ExitCode::SUCCESS,
     }
 }
 
-/// Says what is wrong; that nobody can read it changes nothing.
-fn complain(what: &(impl Display + ?Sized)) {
-    let _ = writeln!(io::stderr(), "{what}");
+/// Prints an error; a failure of standard error is ignored.
+fn print_error(error: &(impl Display + ?Sized)) {
+    let _ = writeln!(io::stderr(), "{error}");
 }
 
-/// What the command prints.
-fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
+/// Runs a command and returns its output.
+fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
     match command {
         Command::Run(arguments) => run::run(arguments),
         Command::Psec(arguments) => psec::run(arguments),
@@ -147,8 +149,8 @@ fn text_of(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Parameters { markdown: false } => Ok(listing::text()),
         Command::Completions { shell } => {
             let mut text = Vec::new();
-            let name = Arguments::command().get_name().to_owned();
-            clap_complete::generate(*shell, &mut Arguments::command(), name, &mut text);
+            let name = CommandLine::command().get_name().to_owned();
+            clap_complete::generate(*shell, &mut CommandLine::command(), name, &mut text);
             Ok(String::from_utf8(text)?)
         }
     }

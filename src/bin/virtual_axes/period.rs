@@ -1,43 +1,43 @@
-//! A period on the command line: a number with its unit.
+//! A period on the command line: a number with a unit.
 
 use std::str::FromStr;
 
 use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, SECOND_NS};
 
-/// Units, longest first where one ends with another.
+/// Units. A unit precedes every shorter unit that is its suffix.
 const UNITS: [(&str, Nanoseconds); 5] =
     [("ns", 1), ("us", MICROSECOND_NS), ("µs", MICROSECOND_NS), ("ms", MILLISECOND_NS), ("s", SECOND_NS)];
 /// Longest period, ns.
 const LONGEST: Nanoseconds = 3600 * SECOND_NS;
 
-/// More than no time, in whole nanoseconds.
+/// Positive period in whole nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Period(Nanoseconds);
+pub struct PeriodArgument(Nanoseconds);
 
-impl Period {
-    /// ns.
+impl PeriodArgument {
+    /// Returns the period, ns.
     pub fn nanoseconds(self) -> Nanoseconds {
         self.0
     }
 }
 
-impl FromStr for Period {
+impl FromStr for PeriodArgument {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let unit = UNITS.iter().find_map(|(unit, ns)| Some((text.strip_suffix(unit)?, *ns)));
-        let wanted = "a number with its unit is wanted, as in 125us, 1ms, 0.01s";
-        let (number, unit) = unit.ok_or(wanted)?;
-        let number: f64 = number.trim().parse().map_err(|_| wanted)?;
+        let expected = "must be a number with a unit (ns, us, ms, s), for example 125us";
+        let (number, unit) = unit.ok_or(expected)?;
+        let number: f64 = number.trim().parse().map_err(|_| expected)?;
         let period = number * unit as f64;
         if !(period > 0.0 && period <= LONGEST as f64) {
-            return Err("must be longer than 0 and at most an hour".to_owned());
+            return Err("must be greater than 0 and at most 3600s".to_owned());
         }
         let whole = period.round();
         if (period - whole).abs() > 1e-6 {
-            return Err("must be whole nanoseconds".to_owned());
+            return Err("must be a whole number of nanoseconds".to_owned());
         }
-        Ok(Period(whole as Nanoseconds))
+        Ok(PeriodArgument(whole as Nanoseconds))
     }
 }
 
@@ -46,8 +46,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_come_with_a_unit() {
-        let ns = |text: &str| text.parse::<Period>().map(Period::nanoseconds);
+    fn a_period_requires_a_unit() {
+        let ns = |text: &str| text.parse::<PeriodArgument>().map(PeriodArgument::nanoseconds);
         assert_eq!(ns("125us"), Ok(125_000));
         assert_eq!(ns("125 µs"), Ok(125_000));
         assert_eq!(ns("0.006s"), Ok(6_000_000));

@@ -1,4 +1,4 @@
-//! `virtual_axes pose`: where the tool is in the workpiece frame.
+//! `virtual_axes pose`: forward kinematics, the tool pose in the workpiece frame.
 
 use std::error::Error;
 
@@ -6,27 +6,26 @@ use serde_json::json;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::Kinematics;
 
-use crate::subject::MachineChoice;
+use crate::trial_arguments::MachineArguments;
 
-/// Furthest position from 0, m or rad: with more, its figures would have no digits left for micrometers.
-const FURTHEST: f64 = 1e6;
+/// Largest position, m or rad. Larger positions have no micrometer resolution in f64 arithmetic.
+const MAX_POSITION: f64 = 1e6;
 
-/// Which machine, and where its joints are.
+/// Arguments of `virtual_axes pose`.
 #[derive(Debug, clap::Args)]
-pub struct Arguments {
+pub struct PoseArguments {
     #[command(flatten)]
-    machine: MachineChoice,
-    /// Positions, m or rad, as in `x=0.1,a=0.5`; joints that are not named are at 0. Can be given several
-    /// times.
+    machine: MachineArguments,
+    /// Joint positions, m or rad, for example `x=0.1,a=0.5`; other joints are at 0; can be repeated.
     #[arg(long, required = true, value_name = "JOINT=POSITION,…", allow_hyphen_values = true)]
     joints: Vec<String>,
-    /// As a JSON list.
+    /// Print a JSON list.
     #[arg(long)]
     json: bool,
 }
 
-/// A line for each set of joints.
-pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+/// Returns the pose for each set of joint positions, one per line or as JSON.
+pub fn run(arguments: &PoseArguments) -> Result<String, Box<dyn Error>> {
     let config = arguments.machine.parameters()?.machine_config()?;
     let kinematics = Kinematics::new(&config);
     let mut lines = String::new();
@@ -34,45 +33,47 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     for text in &arguments.joints {
         let joints = positions(&config, text).map_err(|reason| format!("--joints {text}: {reason}"))?;
         let pose = kinematics.forward(&joints);
-        // No minus before a zero.
+        // Adding 0 removes the sign of a negative zero.
         let [[x, y, z], [u, v, w]]: [[f64; 3]; 2] =
             [pose.tip, pose.axis].map(|v| v.map(|value| value + 0.0).into());
         let axes = config.axes().iter().zip(&joints);
-        let outside: Vec<&str> =
-            axes.filter(|(axis, at)| axis.limits().is_left_by(**at)).map(|(axis, _)| axis.name()).collect();
+        let outside: Vec<&str> = axes
+            .filter(|(axis, at)| axis.limits().is_outside_travel(**at))
+            .map(|(axis, _)| axis.name())
+            .collect();
         let remark = match outside.as_slice() {
             [] => String::new(),
-            names => format!("; outside the stroke: {}", names.join(", ")),
+            names => format!("; outside the travel limits: {}", names.join(", ")),
         };
         lines += &format!("tip {x} {y} {z} m, axis {u} {v} {w}{remark}\n");
-        // In the order of ROS: x, y, z, w.
+        // Quaternion in ROS order: x, y, z, w.
         let orientation: [f64; 4] = kinematics.orientation(&joints).coords.into();
         list.push(json!({
             "joints": joints, "tip": [x, y, z], "axis": [u, v, w], "orientation": orientation,
-            "outside_stroke": outside,
+            "outside_travel_limits": outside,
         }));
     }
     Ok(if arguments.json { format!("{:#}\n", json!(list)) } else { lines })
 }
 
-/// One position for each joint of the machine.
+/// Parses the positions of all joints of the machine.
 fn positions(machine: &MachineConfig, text: &str) -> Result<Vec<f64>, String> {
     let axes = machine.axes();
     let mut positions = vec![None; axes.len()];
     for entry in text.split(',') {
         let (name, number) =
-            entry.split_once('=').ok_or_else(|| format!("'{entry}' is not JOINT=POSITION"))?;
+            entry.split_once('=').ok_or_else(|| format!("'{entry}' must be JOINT=POSITION"))?;
         let name = name.trim();
-        let Some(place) = axes.iter().position(|axis| axis.name() == name) else {
+        let Some(index) = axes.iter().position(|axis| axis.name() == name) else {
             let known: Vec<&str> = axes.iter().map(|axis| axis.name()).collect();
-            return Err(format!("unknown joint {name}; there are {}", known.join(", ")));
+            return Err(format!("unknown joint {name}; the machine has {}", known.join(", ")));
         };
-        let position = number.trim().parse().ok().filter(|number: &f64| number.abs() <= FURTHEST);
+        let position = number.trim().parse().ok().filter(|number: &f64| number.abs() <= MAX_POSITION);
         let position = position.ok_or_else(|| {
-            format!("{name} is '{number}', must be a number from -{FURTHEST} to {FURTHEST} m or rad")
+            format!("{name} is '{number}', must be a number from -{MAX_POSITION} to {MAX_POSITION} m or rad")
         })?;
-        if positions[place].replace(position).is_some() {
-            return Err(format!("joint {name} is named twice"));
+        if positions[index].replace(position).is_some() {
+            return Err(format!("joint {name} is given twice"));
         }
     }
     Ok(positions.into_iter().map(Option::unwrap_or_default).collect())

@@ -1,4 +1,4 @@
-//! Progress on standard error, for work that takes more than a second.
+//! Progress bars on standard error for work that takes more than a second.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,27 +11,27 @@ use virtual_axes_identify::tune::Progress;
 
 use crate::interrupt;
 
-/// Work shorter than this shows nothing.
-const PATIENCE: Duration = Duration::from_secs(1);
-/// Position instants between two looks at the clock.
-const LOOK: u32 = 256;
-/// Steps of the bar in a simulated second.
-const RESOLUTION: f64 = 1000.0;
+/// Duration of work below which no progress is shown.
+const SHOW_AFTER: Duration = Duration::from_secs(1);
+/// Number of position cycles between two reads of the clock.
+const CYCLES_PER_CHECK: u32 = 256;
+/// Steps of the bar per simulated second.
+const STEPS_PER_SECOND: f64 = 1000.0;
 
-/// A bar, or a counter where the end is not known; neither where nobody looks.
+/// Progress of a trial: a bar, or a counter if the duration is unknown. Hidden if standard error is no terminal.
 #[derive(Debug)]
-pub struct Progress {
+pub struct TrialProgress {
     bar: ProgressBar,
     began: Instant,
-    instants: u32,
-    shown: bool,
+    cycles: u32,
+    is_shown: bool,
 }
 
-impl Progress {
-    /// For `name`, which takes `duration` s of simulated time if that is known.
+impl TrialProgress {
+    /// Creates the progress of `name` with its simulated duration, s, if it is known.
     pub fn new(name: &str, duration: Option<f64>) -> Self {
         let bar = ProgressBar::with_draw_target(
-            duration.map(|duration| (duration * RESOLUTION) as u64),
+            duration.map(|duration| (duration * STEPS_PER_SECOND) as u64),
             ProgressDrawTarget::hidden(),
         );
         let template = match duration {
@@ -42,63 +42,63 @@ impl Progress {
             bar.set_style(style);
         }
         bar.set_prefix(name.to_owned());
-        Progress { bar, began: Instant::now(), instants: 0, shown: false }
+        TrialProgress { bar, began: Instant::now(), cycles: 0, is_shown: false }
     }
 
-    /// Tells that `time` s have been simulated.
-    pub fn reached(&mut self, time: f64) {
-        self.instants = (self.instants + 1) % LOOK;
-        if self.instants != 0 || self.began.elapsed() < PATIENCE {
+    /// Reports that `time` s have been simulated.
+    pub fn set_time(&mut self, time: f64) {
+        self.cycles = (self.cycles + 1) % CYCLES_PER_CHECK;
+        if self.cycles != 0 || self.began.elapsed() < SHOW_AFTER {
             return;
         }
-        if !self.shown {
-            // Hidden still where standard error is no terminal.
+        if !self.is_shown {
+            // The bar remains hidden if standard error is no terminal.
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
-            self.shown = true;
+            self.is_shown = true;
         }
-        self.bar.set_position((time * RESOLUTION) as u64);
+        self.bar.set_position((time * STEPS_PER_SECOND) as u64);
         self.bar.set_message(format!("{time:.0} s simulated"));
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// Runs of a search, counted from any thread.
+/// Progress of a search: a bar that counts runs from any thread.
 #[derive(Debug)]
-pub struct Runs {
+pub struct SearchProgress {
     bar: ProgressBar,
     began: Instant,
-    shown: AtomicBool,
+    is_shown: AtomicBool,
 }
 
-impl Runs {
-    /// None yet.
+impl SearchProgress {
+    /// Creates a hidden bar without runs.
     pub fn new() -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template("{prefix} {wide_bar} {pos} of {len} runs, {eta} left")
         {
             bar.set_style(style);
         }
-        Runs { bar, began: Instant::now(), shown: AtomicBool::new(false) }
+        SearchProgress { bar, began: Instant::now(), is_shown: AtomicBool::new(false) }
     }
 
     fn show(&self) {
-        if self.began.elapsed() >= PATIENCE && !self.shown.swap(true, Ordering::Relaxed) {
-            // Hidden still where standard error is no terminal.
+        if self.began.elapsed() >= SHOW_AFTER && !self.is_shown.swap(true, Ordering::Relaxed) {
+            // The bar remains hidden if standard error is no terminal.
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-impl Progress for Runs {
+impl Progress for SearchProgress {
     fn begin(&self, part: &'static str, runs: usize) {
         self.bar.set_position(0);
         self.bar.set_length(runs as u64);
@@ -106,64 +106,64 @@ impl Progress for Runs {
         self.bar.reset_eta();
     }
 
-    fn done(&self) {
+    fn finish_run(&self) {
         self.bar.inc(1);
         self.show();
     }
 
-    fn go_on(&self) -> io::Result<()> {
+    fn check_interrupt(&self) -> io::Result<()> {
         interrupt::check()
     }
 }
 
-/// Time between two pictures of a spinner.
-const TURN: Duration = Duration::from_millis(100);
+/// Time between two frames of the spinner.
+const FRAME_TIME: Duration = Duration::from_millis(100);
 
-/// A spinner that turns by itself, for work that does not tell how far it is.
+/// Spinner with its own thread, for work of unknown progress.
 #[derive(Debug)]
 pub struct Spinner {
     bar: ProgressBar,
-    /// Dropped when the work is done.
-    working: Option<Sender<()>>,
-    turning: Option<JoinHandle<()>>,
+    /// Channel whose end stops the thread.
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
 }
 
 impl Spinner {
-    /// Not seen in the first second.
+    /// Starts the spinner, which is hidden for the first second.
     pub fn new() -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {
             bar.set_style(style);
         }
-        let (working, work) = mpsc::channel();
-        let seen = bar.clone();
-        let turning = thread::spawn(move || {
-            let mut wait = PATIENCE;
-            while work.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
-                if wait == PATIENCE {
-                    // Hidden still where standard error is no terminal.
-                    seen.set_draw_target(ProgressDrawTarget::stderr());
-                    wait = TURN;
+        let (stop, stopped) = mpsc::channel();
+        let visible = bar.clone();
+        let thread = thread::spawn(move || {
+            let mut wait = SHOW_AFTER;
+            while stopped.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
+                if wait == SHOW_AFTER {
+                    // The bar remains hidden if standard error is no terminal.
+                    visible.set_draw_target(ProgressDrawTarget::stderr());
+                    wait = FRAME_TIME;
                 }
-                seen.tick();
+                visible.tick();
             }
         });
-        Spinner { bar, working: Some(working), turning: Some(turning) }
+        Spinner { bar, stop: Some(stop), thread: Some(thread) }
     }
 
-    /// Says what is being done; an error once the command has been interrupted.
-    pub fn now(&self, what: impl Into<String>) -> io::Result<()> {
-        self.bar.set_message(what.into());
+    /// Shows the current activity. Returns an error if the command was interrupted.
+    pub fn set_activity(&self, activity: impl Into<String>) -> io::Result<()> {
+        self.bar.set_message(activity.into());
         interrupt::check()
     }
 }
 
 impl Drop for Spinner {
     fn drop(&mut self) {
-        self.working = None;
-        if let Some(turning) = self.turning.take() {
-            // It only draws: how it ended changes nothing.
-            let _ = turning.join();
+        self.stop = None;
+        if let Some(thread) = self.thread.take() {
+            // The thread only draws; its result is irrelevant.
+            let _ = thread.join();
         }
         self.bar.finish_and_clear();
     }

@@ -1,78 +1,78 @@
-//! `virtual_axes psec`: setpoints as a file.
+//! `virtual_axes psec`: writes setpoints (PSEC) to a file.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
-use virtual_axes_core::simulation::joints;
-use virtual_axes_core::trial::Setpoints;
+use virtual_axes_core::simulation::joint_limits;
+use virtual_axes_core::trial::SetpointSource;
 use virtual_axes_io::files::psec_writer;
 
-use crate::input::{Input, must_not_replace};
+use crate::input::{CommandInput, must_not_replace};
 use crate::{campaign, interrupt, variant};
 
-/// Those of a scenario, or a campaign.
+/// Arguments of `virtual_axes psec`.
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
-pub struct Arguments {
+pub struct PsecArguments {
     #[command(subcommand)]
-    kind: Option<Kind>,
+    kind: Option<PsecKind>,
     #[command(flatten)]
-    scenario: Option<OfScenario>,
+    scenario: Option<ScenarioPsecArguments>,
 }
 
-/// What is no scenario.
+/// Source of the setpoints other than a scenario.
 #[derive(Debug, clap::Subcommand)]
-enum Kind {
-    /// Write what an axis is to be moved through to be identified, and say what to set when.
-    Campaign(campaign::Arguments),
+enum PsecKind {
+    /// Write the setpoints of an identification campaign for one axis and print its timetable.
+    Campaign(campaign::CampaignArguments),
 }
 
-/// Which setpoints, and where to.
+/// Arguments of `virtual_axes psec` for a scenario.
 #[derive(Debug, clap::Args)]
-struct OfScenario {
-    /// A shipped scenario or a scenario file.
+struct ScenarioPsecArguments {
+    /// Shipped scenario or scenario file.
     scenario: String,
-    /// The file: CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory on `/psec`, or the YAML
-    /// that `ros2 topic pub` takes.
+    /// Output file: CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory on `/psec`, or YAML for
+    /// `ros2 topic pub`.
     #[arg(long, value_name = "FILE.csv|FILE.mcap|FILE.yaml")]
     out: PathBuf,
-    /// A shipped machine or a machine file, whose limits and sampling period they are for.
+    /// Shipped machine or machine file whose limits and sampling period apply.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
-    /// A parameter, as in `x.limits.jerk_m_s3=20`; can be given several times.
+    /// Set a parameter, for example `x.limits.jerk_m_s3=20`; can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Feed in the place of the scenario's, m/min (rpm for a scenario of rotary moves).
+    /// Override the feed of the scenario, m/min (rpm for a scenario of rotary moves).
     #[arg(long, allow_negative_numbers = true)]
     feed: Option<f64>,
 }
 
-/// Writes them.
-pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+/// Writes the setpoints of a scenario or of a campaign.
+pub fn run(arguments: &PsecArguments) -> Result<String, Box<dyn Error>> {
     match (&arguments.kind, &arguments.scenario) {
-        (Some(Kind::Campaign(arguments)), _) => campaign::run(arguments),
-        (None, Some(arguments)) => of_scenario(arguments),
-        (None, None) => Err("psec wants a scenario, or `campaign`".into()),
+        (Some(PsecKind::Campaign(arguments)), _) => campaign::run(arguments),
+        (None, Some(arguments)) => write_scenario(arguments),
+        (None, None) => Err("psec requires a scenario or the subcommand `campaign`".into()),
     }
 }
 
-/// Writes those of a scenario; says nothing.
-fn of_scenario(arguments: &OfScenario) -> Result<String, Box<dyn Error>> {
+/// Writes the setpoints of a scenario and returns an empty text.
+fn write_scenario(arguments: &ScenarioPsecArguments) -> Result<String, Box<dyn Error>> {
     let machine = Parameters::load(&arguments.machine)?;
     let config = variant::parameters(&machine, None, &arguments.set, &[])?.machine_config()?;
-    let input = Input::open(&arguments.scenario, None)?;
+    let input = CommandInput::open(&arguments.scenario, None)?;
     input.must_not_be(&arguments.out)?;
     must_not_replace(&arguments.out, Path::new(&arguments.machine))?;
     let program = input.program(&config, arguments.feed)?;
-    let Setpoints::Grid(mut source) = input.setpoints(&config, program.as_ref())? else {
-        return Err(format!("{}: trajectories already; psec wants a scenario", arguments.scenario).into());
+    let SetpointSource::Grid(mut source) = input.setpoints(&config, program.as_ref())? else {
+        return Err(format!("{}: contains trajectories; psec requires a scenario", arguments.scenario).into());
     };
-    let limits = joints(&config, "");
+    let limits = joint_limits(&config, "");
     let names: Vec<String> = source
         .joints()
         .iter()
-        .filter_map(|&place| limits.get(place))
+        .filter_map(|&index| limits.get(index))
         .map(|joint| joint.name.clone())
         .collect();
     let mut writer = psec_writer(&arguments.out, &names)?;

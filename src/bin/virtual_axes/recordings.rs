@@ -1,4 +1,4 @@
-//! Recordings of one axis as a command is given them: read, conditioned, and what feedforward acted.
+//! Recordings of one axis on the command line: reading, conditioning, and active feedforward.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -9,42 +9,41 @@ use virtual_axes_identify::identify::{FeedforwardMode, IdentificationInput};
 use virtual_axes_identify::recording::{Conditioning, Finding, Signals, condition};
 use virtual_axes_io::files::{Columns, RecordingOptions, read_recording};
 
-use crate::campaign::PartName;
+use crate::campaign::FeedforwardName;
 
-/// How recordings are read; alike for all of them.
+/// Options for reading all recordings.
 #[derive(Debug, clap::Args)]
-pub struct Reading {
-    /// Where a channel of a CSV file stands and in which unit, as in `position=Pos1[mm]`, `current=#4[-1 A]`:
-    /// time, psec, position, velocity, current, velocity_feedforward, torque_feedforward; also `delimiter=;`,
-    /// `decimal_comma=true`, `skip_lines=2`. Can be given several times.
+pub struct RecordingArguments {
+    /// Column and unit of a channel in CSV files, for example `position=Pos1[mm]`, `current=#4[-1 A]`. Channels: time,
+    /// psec, position, velocity, current, velocity_feedforward, torque_feedforward; also `delimiter=;`,
+    /// `decimal_comma=true`, `skip_lines=2`; can be repeated.
     #[arg(long, value_name = "CHANNEL=COLUMN[UNIT]")]
     column: Vec<String>,
-    /// A file with such a mapping, under --column.
+    /// File with column mappings; --column has priority.
     #[arg(long, value_name = "MAP.yaml")]
     columns: Option<PathBuf>,
-    /// A topic of an MCAP recording, or the beginning of its name, where several carry one type; can be given
-    /// several times.
+    /// Topic of an MCAP recording, or a prefix of its name, if several topics have one type; can be repeated.
     #[arg(long)]
     topic: Vec<String>,
-    /// The joint's name in the recordings, if it is not the axis's.
+    /// Joint name in the recordings [default: axis name].
     #[arg(long)]
     joint: Option<String>,
-    /// Where the filter of velocity, acceleration and current passes half the power, Hz; 100, or less where the
-    /// recording is slow.
+    /// Cut-off frequency (−3 dB) of the filter of velocity, acceleration and current, Hz [default: 100, less for low
+    /// sampling rates].
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     cutoff_hz: Option<f64>,
-    /// By how much the current lags behind the motion, ms; estimated if it is not given.
+    /// Lag of the recorded current, ms [default: estimated].
     #[arg(long, value_name = "MS", allow_negative_numbers = true)]
     current_lag_ms: Option<f64>,
 }
 
-impl Reading {
-    /// The file with the mapping of columns, if there is one.
+impl RecordingArguments {
+    /// Returns the file with column mappings, if given.
     pub fn map(&self) -> Option<&Path> {
         self.columns.as_deref()
     }
 
-    /// How files are to be read.
+    /// Returns the options for reading files.
     pub fn options(&self) -> Result<RecordingOptions, Box<dyn Error>> {
         let columns = Columns::read(self.map(), &self.column, "--column")?;
         Ok(RecordingOptions { columns, topics: self.topic.clone(), joint: self.joint.clone() })
@@ -58,74 +57,76 @@ impl Reading {
     }
 }
 
-/// A recording that is fit for use.
+/// Recording after conditioning, with its active feedforward and findings.
 #[derive(Debug)]
-pub struct Recorded {
-    /// The recording.
+pub struct ConditionedRecording {
+    /// Conditioned signals.
     pub signals: Signals,
-    /// The feedforward that was said to act.
+    /// Active feedforward according to the options.
     pub feedforward: Option<FeedforwardMode>,
-    /// What reading and conditioning found.
+    /// Findings of reading and conditioning.
     pub findings: Vec<Finding>,
 }
 
-impl Recorded {
-    /// As the library takes it.
+impl ConditionedRecording {
+    /// Converts the recording to the input of the identification.
     pub fn input(&self) -> IdentificationInput<'_> {
         IdentificationInput { signals: &self.signals, feedforward: self.feedforward }
     }
 
-    /// From the first sample to the last, s.
+    /// Returns the duration from the first to the last sample, s.
     pub fn duration(&self) -> f64 {
         let Signals { spans, period, .. } = &self.signals;
         let end = spans.last().map(|s| s.start + s.position.len().saturating_sub(1) as f64 * period);
         spans.first().zip(end).map_or(0.0, |(first, end)| end - first.start)
     }
 
-    /// Samples that are used.
+    /// Returns the number of samples.
     pub fn samples(&self) -> usize {
         self.signals.spans.iter().map(|span| span.position.len()).sum()
     }
 }
 
-/// Reads the recording `path` of `axis`; `feedforward` is what was said to act, by `option`.
+/// Reads and conditions the recording `path` of `axis`; `feedforward` is the value of `option`.
 ///
 /// # Errors
-/// What is wrong with the file; or that its feedforward is not known.
+///
+/// Returns an error if the file is invalid, or if its active feedforward is unknown.
 pub fn read(
     path: &Path,
     (axis, periods): (&AxisConfig, &Periods),
-    (reading, options): (&Reading, &RecordingOptions),
+    (reading, options): (&RecordingArguments, &RecordingOptions),
     (feedforward, option): (Option<FeedforwardMode>, &str),
-) -> Result<Recorded, Box<dyn Error>> {
+) -> Result<ConditionedRecording, Box<dyn Error>> {
     let (raw, mut findings) = read_recording(path, axis, options)?;
     let (signals, more) = condition(&raw, axis, periods, &reading.conditioning())?;
     findings.extend(more);
-    if let (None, Some(unseen)) = (feedforward, unseen_feedforward(&signals)) {
+    if let (None, Some(missing)) = (feedforward, missing_feedforward(&signals)) {
         return Err(format!(
-            "{}: it has no {unseen}, so that the feedforward that acted must be said: {option} off, velocity or both",
+            "{}: has no {missing}; give the active feedforward with {option} off, velocity or both",
             signals.name
         )
         .into());
     }
-    Ok(Recorded { signals, feedforward, findings })
+    Ok(ConditionedRecording { signals, feedforward, findings })
 }
 
-/// What would show the feedforward that acted on the setpoints, if that is not there.
-fn unseen_feedforward(signals: &Signals) -> Option<&'static str> {
-    let acts = |channel: &[f64]| channel.iter().any(|value| *value != 0.0);
+/// Returns the name of the feedforward signal that is missing to determine the active feedforward.
+fn missing_feedforward(signals: &Signals) -> Option<&'static str> {
+    let is_active = |channel: &[f64]| channel.iter().any(|value| *value != 0.0);
     signals.spans.iter().filter(|span| span.psec.is_some()).find_map(|span| {
         match (&span.velocity_feedforward, &span.torque_feedforward) {
             (None, _) => Some("velocity feedforward (VFFWS)"),
-            (Some(velocity), None) if acts(velocity) => Some("torque feedforward (TFFWS)"),
+            (Some(velocity), None) if is_active(velocity) => Some("torque feedforward (TFFWS)"),
             _ => None,
         }
     })
 }
 
-/// The feedforward of each of `count` recordings, from a list for each or one for all; `option` is its name.
+/// Returns the active feedforward of each of `count` recordings from the values of `option`: one for all, or one
+/// for each.
 pub fn feedforward(
-    given: &[PartName],
+    given: &[FeedforwardName],
     count: usize,
     option: &str,
 ) -> Result<Vec<Option<FeedforwardMode>>, String> {
@@ -134,7 +135,7 @@ pub fn feedforward(
         [one] => Ok(vec![Some((*one).into()); count]),
         all if all.len() == count => Ok(all.iter().map(|part| Some((*part).into())).collect()),
         all => Err(format!(
-            "{option}: {} given for {count} recording{}; give one for all, or one for each",
+            "{option}: {} values for {count} recording{}; give one value for all, or one for each",
             all.len(),
             if count == 1 { "" } else { "s" }
         )),

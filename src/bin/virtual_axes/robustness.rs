@@ -1,30 +1,30 @@
-//! `virtual_axes robustness`: one tuning on plants that deviate from what it was designed for.
+//! `virtual_axes robustness`: one tuning on plants that deviate from the nominal plant of its design.
 
 use std::error::Error;
 
 use serde_json::{Value, json};
 use virtual_axes_core::config::MachineConfig;
-use virtual_axes_identify::tune::{Cost, DeviatingRun, PlantDeviation, Robustness, robustness};
+use virtual_axes_identify::tune::{Cost, DeviatingRun, PlantDeviation, Robustness, analyze_robustness};
 use virtual_axes_report::Table;
 
-use crate::progress::Runs;
-use crate::search::{columns, course, named, object, row};
-use crate::subject::Subject;
+use crate::progress::SearchProgress;
+use crate::search::{columns, name_error, object, read_workload, row};
 use crate::table;
-use crate::variant::{self, Controller};
+use crate::trial_arguments::TrialArguments;
+use crate::variant::{self, ControllerName};
 
-/// What to run.
+/// Arguments of `virtual_axes robustness`.
 #[derive(Debug, clap::Args)]
-pub struct Arguments {
+pub struct RobustnessArguments {
     #[command(flatten)]
-    subject: Subject,
-    /// Position controller in the place of the machine's.
+    trial: TrialArguments,
+    /// Override the position controller of the machine.
     #[arg(long, value_enum)]
-    controller: Option<Controller>,
-    /// By what part inertia, friction and torque constant are off.
-    #[arg(long, default_value_t = 0.3, allow_negative_numbers = true, value_parser = part)]
+    controller: Option<ControllerName>,
+    /// Relative deviation of inertia, friction and torque constant.
+    #[arg(long, default_value_t = 0.3, allow_negative_numbers = true, value_parser = relative_deviation)]
     by: f64,
-    /// What to compare, as for `tune`.
+    /// Cost function to compare, see `tune`.
     #[arg(long, default_value = "contour", value_name = "TERM=WEIGHT[,…]")]
     cost: Cost,
     /// Print the figures as one JSON object.
@@ -32,25 +32,25 @@ pub struct Arguments {
     json: bool,
 }
 
-fn part(text: &str) -> Result<f64, String> {
-    /// Below nothing there is no plant; with nearly nothing of its inertia none that can be stepped.
+fn relative_deviation(text: &str) -> Result<f64, String> {
+    /// Larger deviations would reduce the inertia to a value that cannot be simulated.
     const MOST: f64 = 0.8;
-    let refused = || format!("must lie in 0 … {MOST}, a part of the value");
-    let value: f64 = text.parse().map_err(|_| refused())?;
-    if (0.0..=MOST).contains(&value) { Ok(value) } else { Err(refused()) }
+    let error = || format!("must be in 0 … {MOST}, relative to the nominal value");
+    let value: f64 = text.parse().map_err(|_| error())?;
+    if (0.0..=MOST).contains(&value) { Ok(value) } else { Err(error()) }
 }
 
-/// Runs it; the text is a table, or JSON.
-pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    let machine = arguments.subject.machine()?;
-    let parameters = variant::parameters(&machine, arguments.controller, &arguments.subject.set, &[])?;
-    let input = arguments.subject.input()?;
-    let config = variant::checked(&parameters, &machine, &arguments.subject.machine)?;
-    let path = course(&input, &config, arguments.subject.feed)?;
-    let progress = Runs::new();
-    let found = robustness(&parameters, &path, &arguments.cost, arguments.by, &progress);
+/// Runs the command and returns a table or JSON.
+pub fn run(arguments: &RobustnessArguments) -> Result<String, Box<dyn Error>> {
+    let machine = arguments.trial.machine()?;
+    let parameters = variant::parameters(&machine, arguments.controller, &arguments.trial.set, &[])?;
+    let input = arguments.trial.input()?;
+    let config = variant::checked(&parameters, &machine, &arguments.trial.machine)?;
+    let path = read_workload(&input, &config, arguments.trial.feed)?;
+    let progress = SearchProgress::new();
+    let found = analyze_robustness(&parameters, &path, &arguments.cost, arguments.by, &progress);
     progress.finish();
-    let found = found.map_err(|error| named(&input, error))?;
+    let found = found.map_err(|error| name_error(&input, error))?;
     let controller = variant::controller_name(&parameters);
     if arguments.json {
         let plain = |one: &DeviatingRun| json_of(one, &config);
@@ -71,23 +71,23 @@ pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     Ok(format!("{head}\n\n{}", table::text(&rows(arguments, &config, &found))))
 }
 
-fn rows(arguments: &Arguments, config: &MachineConfig, found: &Robustness) -> Table {
+fn rows(arguments: &RobustnessArguments, config: &MachineConfig, found: &Robustness) -> Table {
     let cells =
         |name: String, one: &DeviatingRun| row(name, one.cost, one.margins.as_ref(), &one.figures, config);
     let nominal = cells("nominal".to_owned(), &found.nominal);
     let single = found.single.iter().map(|one| cells(name(&one.deviation), one));
-    let worst = cells(format!("worst together: {}", name(&found.worst.deviation)), &found.worst);
+    let worst = cells(format!("worst combination: {}", name(&found.worst.deviation)), &found.worst);
     let rows = std::iter::once(nominal).chain(single).chain([worst]).collect();
     Table { columns: columns("plant", &arguments.cost, &found.nominal.figures), rows, ..Table::default() }
 }
 
-/// "inertia × 0.7, friction × 1.3"
+/// Returns a name such as "inertia × 0.7, friction × 1.3".
 fn name(deviation: &PlantDeviation) -> String {
     let factors =
         [("inertia", deviation.inertia), ("friction", deviation.friction), ("Kt", deviation.torque_constant)];
-    let told = factors.iter().filter(|(_, factor)| *factor != 1.0);
-    let told: Vec<String> = told.map(|(name, factor)| format!("{name} × {factor}")).collect();
-    if told.is_empty() { "nominal".to_owned() } else { told.join(", ") }
+    let deviating = factors.iter().filter(|(_, factor)| *factor != 1.0);
+    let names: Vec<String> = deviating.map(|(name, factor)| format!("{name} × {factor}")).collect();
+    if names.is_empty() { "nominal".to_owned() } else { names.join(", ") }
 }
 
 fn json_of(one: &DeviatingRun, config: &MachineConfig) -> Value {

@@ -1,4 +1,4 @@
-//! What `tune` and `robustness` share: paths that are run many times, and figures as cells and JSON.
+//! Common parts of `tune` and `robustness`: repeated simulation of paths, and figures as table cells and JSON.
 
 use std::error::Error;
 
@@ -7,32 +7,36 @@ use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::design::Margins;
 use virtual_axes_core::trial::Figures;
 use virtual_axes_core::units::{DEGREE, MILLISECOND};
-use virtual_axes_identify::tune::{TuningCandidate, Cost, Workload, CostTerm, TuneError, Tuning};
+use virtual_axes_identify::tune::{Cost, CostTerm, TuneError, Tuning, TuningCandidate, Workload};
 use virtual_axes_report::TableColumn;
 
-use crate::input::Input;
+use crate::input::CommandInput;
 use crate::interrupt;
 
-/// What stands in a cell that has no value.
+/// Cell without a value.
 const NONE: &str = "–";
 
-/// Reads the setpoints of `input` into memory.
-pub fn course(input: &Input, machine: &MachineConfig, feed: Option<f64>) -> Result<Workload, Box<dyn Error>> {
+/// Reads all setpoints of `input` for repeated simulation.
+pub fn read_workload(
+    input: &CommandInput,
+    machine: &MachineConfig,
+    feed: Option<f64>,
+) -> Result<Workload, Box<dyn Error>> {
     let program = input.program(machine, feed)?;
     let setpoints = input.setpoints(machine, program.as_ref())?;
     Workload::read(input.name(), program.clone(), setpoints, interrupt::check)
         .map_err(|error| -> Box<dyn Error> { error })
 }
 
-/// The error with the name of the path, where it does not name a file itself.
-pub fn named(input: &Input, error: TuneError) -> Box<dyn Error> {
+/// Adds the name of the path to an error that does not name a file.
+pub fn name_error(input: &CommandInput, error: TuneError) -> Box<dyn Error> {
     match error {
-        TuneError::Trial(error) => crate::run::named(input, error),
+        TuneError::Trial(error) => input.name_error(error),
         error => format!("{}: {error}", input.name()).into(),
     }
 }
 
-/// Heads of the columns that say how a tuning does on a path with `figures`.
+/// Returns the column headings for the results of a tuning on a path with `figures`.
 pub fn columns(first: &str, cost: &Cost, figures: &Figures) -> Vec<TableColumn> {
     let rms = CostTerm::ContourRms.unit(figures);
     let columns = [
@@ -42,14 +46,14 @@ pub fn columns(first: &str, cost: &Cost, figures: &Figures) -> Vec<TableColumn> 
         ("modulus margin", ""),
         ("delay margin", "ms"),
         ("phase margin", "°"),
-        ("peak current", "of the limit"),
+        ("peak current", "of limit"),
         ("activity", "A"),
         ("saturated", "s"),
     ];
     columns.map(|(name, unit)| TableColumn::new(name, unit)).to_vec()
 }
 
-/// Their cells.
+/// Returns the cells of a row under the headings of [`columns`].
 pub fn row(
     name: String,
     cost: f64,
@@ -74,25 +78,25 @@ pub fn row(
     ]
 }
 
-/// Time with a limit reached, of the axis that reached it for the longest, s.
+/// Returns the longest saturation time of an axis, s.
 fn saturation(figures: &Figures) -> f64 {
     figures.axes.iter().map(|axis| axis.report.saturation_time).fold(0.0, f64::max)
 }
 
-/// A run as JSON: what it is, cost, margins, and each figure that can be part of a cost.
+/// Returns a run as JSON: `description`, cost, margins, and all terms of cost functions.
 pub fn object(
-    what: Vec<(&str, Value)>,
+    description: Vec<(&str, Value)>,
     cost: f64,
     margins: Option<&Margins>,
     figures: &Figures,
     machine: &MachineConfig,
 ) -> Map<String, Value> {
     let mut object: Map<String, Value> =
-        what.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        description.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     object.insert("cost".to_owned(), json!(cost));
     let margins = margins.map_or(Value::Null, |m| {
         json!({
-            // JSON knows no infinity: null where there is no such margin.
+            // Infinite margins are null in JSON.
             "modulus": m.modulus,
             "phase_deg": m.phase / DEGREE,
             "gain": m.gain,
@@ -106,10 +110,10 @@ pub fn object(
     object
 }
 
-/// A tuning that was run, as JSON.
+/// Returns a simulated tuning as JSON.
 pub fn candidate(candidate: &TuningCandidate, machine: &MachineConfig) -> Map<String, Value> {
-    let what = vec![("tuning", tuning(&candidate.tuning))];
-    object(what, candidate.cost, candidate.margins.as_ref(), &candidate.figures, machine)
+    let description = vec![("tuning", tuning(&candidate.tuning))];
+    object(description, candidate.cost, candidate.margins.as_ref(), &candidate.figures, machine)
 }
 
 fn tuning(tuning: &Tuning) -> Value {

@@ -1,19 +1,19 @@
-//! Figures as tables: on the terminal and in reports.
+//! Tables of figures for the terminal and for reports.
 
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::trial::{AxisFigures, Figures, Reference};
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
-use virtual_axes_report::{TableColumn, Table};
+use virtual_axes_report::{Table, TableColumn};
 
-/// Meters in a micrometer.
+/// Micrometer, m.
 pub const MICROMETER: f64 = 1e-6;
-/// Radians in a thousandth of a degree.
+/// Millidegree, rad.
 pub const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 
-/// Why there is no contour error.
+/// Reason for a missing contour error.
 pub const NO_CONTOUR: &str = "no linear joint is named x, y or z";
 
-/// Unit of an axis's errors for people and for programs, and its value in SI.
+/// Returns symbol, ASCII name and size in SI units of the unit of an axis's errors.
 pub fn scale(kind: AxisKind) -> (&'static str, &'static str, f64) {
     match kind {
         AxisKind::Linear => ("µm", "um", MICROMETER),
@@ -21,12 +21,12 @@ pub fn scale(kind: AxisKind) -> (&'static str, &'static str, f64) {
     }
 }
 
-/// A table for a terminal: the first column to the left, the others to the right.
+/// Formats a table for the terminal with the first column aligned left, the others right.
 pub fn text(table: &Table) -> String {
     aligned(table, &[0])
 }
 
-/// A table for a terminal: the columns `left` to the left, the others to the right.
+/// Formats a table for the terminal with the columns `left` aligned left, the others right.
 pub fn aligned(table: &Table, left: &[usize]) -> String {
     let header: Vec<String> = table.columns.iter().map(heading).collect();
     let all = || std::iter::once(&header).chain(&table.rows);
@@ -60,14 +60,14 @@ fn table(caption: &str, columns: &[(&str, &str)]) -> Table {
     Table { caption: caption.to_owned(), columns, rows: Vec::new() }
 }
 
-/// Tracking errors, currents and saturation of each axis that moves; of all if none does.
+/// Creates the table of following errors, currents and saturation of the moving axes, or of all axes if none moves.
 pub fn axes(figures: &Figures) -> Table {
     let columns = [
         ("axis", ""),
         ("unit", ""),
-        ("tracking error max", ""),
+        ("following error max", ""),
         ("RMS", ""),
-        ("synchronized max", ""),
+        ("delay-compensated max", ""),
         ("RMS", ""),
         ("peak current", "A"),
         ("saturated", "s"),
@@ -94,40 +94,41 @@ pub fn axes(figures: &Figures) -> Table {
     table
 }
 
-/// What else is to be said about the axes, a line each.
+/// Returns remarks on the axes, one per line.
 pub fn remarks(figures: &Figures) -> Vec<String> {
-    let names = |told: fn(&AxisFigures) -> bool| {
-        let names: Vec<&str> = figures.axes.iter().filter(|a| told(a)).map(|a| a.name.as_str()).collect();
+    let names = |is_listed: fn(&AxisFigures) -> bool| {
+        let names: Vec<&str> =
+            figures.axes.iter().filter(|a| is_listed(a)).map(|a| a.name.as_str()).collect();
         (!names.is_empty()).then(|| names.join(", "))
     };
-    let still = names(|axis| !axis.moves).map(|names| format!("standing still: {names}"));
+    let stationary = names(|axis| !axis.moves).map(|names| format!("stationary: {names}"));
     let extrapolated = names(|axis| axis.friction_extrapolated)
-        .map(|names| format!("friction law used beyond the velocities that it was fitted for: {names}"));
-    let outside = figures
-        .axes
-        .iter()
-        .filter_map(|axis| Some(format!("{} was outside of its stroke for {} s", axis.name, outside(axis)?)));
+        .map(|names| format!("friction law extrapolated beyond its fitted velocities: {names}"));
+    let outside = figures.axes.iter().filter_map(|axis| {
+        Some(format!("{} was outside its travel limits for {} s", axis.name, outside(axis)?))
+    });
     let no_contour = figures.contour.is_none().then(|| format!("no contour error: {NO_CONTOUR}"));
-    still.into_iter().chain(outside).chain(extrapolated).chain(no_contour).chain(more(figures)).collect()
+    stationary.into_iter().chain(outside).chain(extrapolated).chain(no_contour).chain(more(figures)).collect()
 }
 
-/// For how long an axis had left its stroke, s; none if it had not.
+/// Returns the time that an axis was outside its travel limits, s; `None` if it was always inside.
 pub fn outside(axis: &AxisFigures) -> Option<String> {
-    (axis.outside_stroke_time > 0.0).then(|| format!("{:.3}", axis.outside_stroke_time))
+    (axis.outside_travel_limits_time > 0.0).then(|| format!("{:.3}", axis.outside_travel_limits_time))
 }
 
-/// What of the path has no figures of its own, a line each.
+/// Returns remarks on circles and corners without figures, one per line.
 pub fn more(figures: &Figures) -> impl Iterator<Item = String> {
-    let line = |count: usize, told: usize, what: &str| {
-        (count > 0).then(|| format!("{count} more {what}: only the first {told} are measured one by one"))
+    let line = |count: usize, listed: usize, feature: &str| {
+        (count > 0)
+            .then(|| format!("{count} more {feature} without figures; only the first {listed} are evaluated"))
     };
     let circles = line(figures.more_circles, figures.circles.len(), "circles");
     let corners = line(figures.more_corners, figures.corners.len(), "corners");
     circles.into_iter().chain(corners)
 }
 
-/// Whether the largest and the RMS contour error differ, in print, without what overshoots the path's
-/// ends.
+/// Returns true for the largest and for the RMS contour error if its printed value changes when the overshoot at the
+/// ends of the path is excluded.
 pub fn overshoots(figures: &Figures) -> [bool; 2] {
     let differ = |a: f64, b: f64| signed(a / MICROMETER) != signed(b / MICROMETER);
     figures
@@ -135,17 +136,17 @@ pub fn overshoots(figures: &Figures) -> [bool; 2] {
         .map_or([false; 2], |c| [differ(c.max, c.max_within_ends), differ(c.rms, c.rms_within_ends)])
 }
 
-/// Contour, orientation, circles and corners; empty where there is nothing of these. `ends` adds the
-/// largest and the RMS contour error without what overshoots the path's ends.
+/// Creates the table of contour error, orientation error, circles and corners. `ends` adds the largest and the RMS
+/// contour error without the overshoot at the ends of the path.
 pub fn path(figures: &Figures, ends: [bool; 2]) -> Table {
-    let mut table = table("Path", &[("error of the path", ""), ("value", ""), ("unit", "")]);
+    let mut table = table("Path", &[("path error", ""), ("value", ""), ("unit", "")]);
     let mut add = |name: String, value: f64, unit: &str, scale: f64| {
         table.rows.push(vec![name, signed(value / scale), unit.to_owned()]);
     };
     if let Some(contour) = &figures.contour {
         let reference = match contour.reference {
             Reference::Path => "",
-            Reference::Setpoints => " (from the polyline of the setpoints)",
+            Reference::Setpoints => " (from the polyline of setpoints)",
         };
         let parts = [
             ("contour error, max", contour.max, contour.max_within_ends, ends[0]),
@@ -154,7 +155,7 @@ pub fn path(figures: &Figures, ends: [bool; 2]) -> Table {
         for (name, whole, within_ends, differ) in parts {
             add(format!("{name}{reference}"), whole, "µm", MICROMETER);
             if differ {
-                add(format!("{name}, without overshoot of the path's ends"), within_ends, "µm", MICROMETER);
+                add(format!("{name}, without overshoot at the path ends"), within_ends, "µm", MICROMETER);
             }
         }
     }
@@ -182,19 +183,19 @@ pub fn path(figures: &Figures, ends: [bool; 2]) -> Table {
     }
     for corner in &figures.corners {
         let name =
-            format!("corner behind move {}, {:.0}°: contour error, max", corner.index, corner.turn / DEGREE);
+            format!("corner after move {}, {:.0}°: contour error, max", corner.index, corner.turn / DEGREE);
         add(name, corner.max_contour_error, "µm", MICROMETER);
     }
     table
 }
 
 fn signed(value: f64) -> String {
-    // No "-0.0".
+    // Avoids "-0.0".
     let text = format!("{value:.1}");
     if text == "-0.0" { "0.0".to_owned() } else { text }
 }
 
 fn millimeters(value: f64) -> String {
-    // To a µm, so that 0.15 m is 150 and not 150.00000000000003.
+    // Rounded to 1 µm, so that 0.15 m is 150 and not 150.00000000000003.
     format!("{}", (value / MILLIMETER * 1e3).round() / 1e3)
 }

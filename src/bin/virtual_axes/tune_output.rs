@@ -1,137 +1,138 @@
-//! What `virtual_axes tune` prints, and the pictures of its report.
+//! Output of `virtual_axes tune`: text, JSON, and scatter plots of the report.
 
 use serde_json::{Map, Value, json};
 use virtual_axes_core::units::MILLISECOND;
-use virtual_axes_identify::tune::{TuningProblem, TuningCandidate, MarginLimits, CostTerm, Tuning, front};
-use virtual_axes_report::{TableColumn, PointGroup, PointStyle, Scatter, Table};
+use virtual_axes_identify::tune::{
+    CostTerm, MarginLimits, Tuning, TuningCandidate, TuningProblem, pareto_front,
+};
+use virtual_axes_report::{PointGroup, PointStyle, Scatter, Table, TableColumn};
 
-use crate::input::Input;
+use crate::input::CommandInput;
 use crate::search::{candidate, columns, row};
-use crate::tune::{Found, Tunable};
+use crate::tune_result::{TunableController, TuningResult};
 use crate::{json, table};
 
-/// Rows of a table of many tunings; `--json` has all.
+/// Maximum number of rows of a table of tunings; the JSON output contains all.
 const ROWS: usize = 12;
-/// Points that cost more than so many times the machine as it is and the best are not in the picture: they
-/// would press the others to its edge.
-const PICTURED: f64 = 2.0;
+/// Cost above which tunings are not plotted, relative to the larger of initial and best cost.
+const MAX_PLOTTED_COST: f64 = 2.0;
 
 fn modulus(candidate: &TuningCandidate) -> f64 {
     candidate.margins.map_or(f64::NAN, |margins| margins.modulus)
 }
 
-/// The cheapest tuning for each modulus margin.
-fn pareto(found: &Found) -> Vec<&TuningCandidate> {
-    found.search.as_ref().map_or_else(Vec::new, |search| front(&search.tried, modulus))
+/// Returns the Pareto front of cost and modulus margin.
+fn pareto(found: &TuningResult) -> Vec<&TuningCandidate> {
+    found.search.as_ref().map_or_else(Vec::new, |search| pareto_front(&search.tried, modulus))
 }
 
-fn candidate_row(name: String, candidate: &TuningCandidate, bench: &TuningProblem<'_>) -> Vec<String> {
-    row(name, candidate.cost, candidate.margins.as_ref(), &candidate.figures, bench.config())
+fn candidate_row(name: String, candidate: &TuningCandidate, problem: &TuningProblem<'_>) -> Vec<String> {
+    row(name, candidate.cost, candidate.margins.as_ref(), &candidate.figures, problem.config())
 }
 
-/// As many of `all` as a table has, evenly, with both ends.
-fn thinned<T>(all: &[T]) -> Vec<&T> {
+/// Selects evenly spaced rows, including the first and the last.
+fn table_rows<T>(all: &[T]) -> Vec<&T> {
     if all.len() <= ROWS {
         return all.iter().collect();
     }
     (0..ROWS).filter_map(|i| all.get(i * (all.len() - 1) / (ROWS - 1))).collect()
 }
 
-/// The result as tables.
-pub fn text(bench: &TuningProblem<'_>, found: &Found) -> String {
-    let columns = |first: &str| columns(first, bench.cost(), &bench.present().figures);
+/// Returns the result as tables.
+pub fn text(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
+    let columns = |first: &str| columns(first, problem.cost(), &problem.present().figures);
     let mut tunings = Table { columns: columns("tuning"), ..Table::default() };
-    tunings.rows.push(candidate_row("as it is".to_owned(), bench.present(), bench));
+    tunings.rows.push(candidate_row("initial".to_owned(), problem.present(), problem));
     let name = if found.contrasts.is_empty() { "best" } else { "found" };
-    tunings.rows.push(candidate_row(name.to_owned(), &found.best, bench));
+    tunings.rows.push(candidate_row(name.to_owned(), &found.best, problem));
     let mut text = format!(
         "{}: {} of {}, cost {}\n\n{}\n{}",
-        bench.course().name(),
-        bench.config().name(),
-        bench.joints().join(", "),
-        bench.cost(),
+        problem.workload().name(),
+        problem.config().name(),
+        problem.joints().join(", "),
+        problem.cost(),
         table::text(&tunings),
-        table::text(&values(bench, &found.best.tuning)),
+        table::text(&values(problem, &found.best.tuning)),
     );
-    if found.best.cost >= bench.present().cost {
-        text.push_str("\nno tuning within these margins is better than the machine as it is\n");
+    if found.best.cost >= problem.present().cost {
+        text.push_str("\nno tuning within these margins is better than the initial tuning\n");
     }
     if let Some(search) = &found.search {
         let front = pareto(found);
         let mut rows = Table { columns: columns("cost against modulus margin"), ..Table::default() };
-        for one in thinned(&front) {
-            rows.rows.push(candidate_row(one.tuning.to_string(), one, bench));
+        for one in table_rows(&front) {
+            rows.rows.push(candidate_row(one.tuning.to_string(), one, problem));
         }
         text.push_str(&format!("\n{}", table::text(&rows)));
         if front.len() > ROWS {
-            text.push_str(&format!("{} more between these: --json\n", front.len() - ROWS));
+            text.push_str(&format!("{} more rows between these: use --json\n", front.len() - ROWS));
         }
-        text.push_str(&format!("\n{} tunings designed, {} run\n", search.designs, search.runs));
+        text.push_str(&format!("\n{} tunings designed, {} simulated\n", search.designs, search.runs));
     }
     if !found.contrasts.is_empty() {
-        text.push_str(&format!("\n{}", table::text(&contrasts(bench, found))));
+        text.push_str(&format!("\n{}", table::text(&contrasts(problem, found))));
         if found.contrasts.len() > ROWS {
-            text.push_str(&format!("{} more: --json\n", found.contrasts.len() - ROWS));
+            text.push_str(&format!("{} more rows: use --json\n", found.contrasts.len() - ROWS));
         }
     }
     if !found.elsewhere.is_empty() {
-        text.push_str(&format!("\n{}", table::text(&elsewhere(bench, found))));
+        text.push_str(&format!("\n{}", table::text(&elsewhere(problem, found))));
     }
     text
 }
 
-/// The parameters that the tuning sets, before and behind.
-fn values(bench: &TuningProblem<'_>, tuning: &Tuning) -> Table {
-    let columns = ["parameter", "as it is", "tuned"].map(|name| TableColumn::new(name, ""));
+/// Creates the table of tuned parameters with initial and tuned values.
+fn values(problem: &TuningProblem<'_>, tuning: &Tuning) -> Table {
+    let columns = ["parameter", "initial", "tuned"].map(|name| TableColumn::new(name, ""));
     let row = |(key, value): (String, virtual_axes_core::config::Value)| {
-        let before = bench.parameters().get(&key).map_or("–".to_owned(), |value| value.to_string());
+        let before = problem.parameters().get(&key).map_or("–".to_owned(), |value| value.to_string());
         vec![key, before, value.to_string()]
     };
-    let values = tuning.values(bench.joints(), bench.parameters());
+    let values = tuning.values(problem.joints(), problem.parameters());
     Table { columns: columns.to_vec(), rows: values.into_iter().map(row).collect(), ..Table::default() }
 }
 
-fn contrasts(bench: &TuningProblem<'_>, found: &Found) -> Table {
+fn contrasts(problem: &TuningProblem<'_>, found: &TuningResult) -> Table {
     let other = found.elsewhere.first().map_or("", |path| path.name.as_str());
     let columns = [
         ("tuning", ""),
-        (bench.course().name(), bench.cost().unit(&bench.present().figures)),
-        (other, found.elsewhere.first().map_or("", |path| bench.cost().unit(&path.present.figures))),
+        (problem.workload().name(), problem.cost().unit(&problem.present().figures)),
+        (other, found.elsewhere.first().map_or("", |path| problem.cost().unit(&path.present.figures))),
         ("modulus margin", ""),
         ("delay margin", "ms"),
     ];
     let columns = columns.map(|(name, unit)| TableColumn::new(name, unit)).to_vec();
     let cells = |name: String, better: &TuningCandidate, worse: &TuningCandidate| {
-        let margins = candidate_row(name.clone(), better, bench);
-        let margin = |place: usize| margins.get(place).cloned().unwrap_or_default();
+        let margins = candidate_row(name.clone(), better, problem);
+        let margin = |column: usize| margins.get(column).cloned().unwrap_or_default();
         vec![name, format!("{:.2}", better.cost), format!("{:.2}", worse.cost), margin(3), margin(4)]
     };
     let present =
-        found.elsewhere.iter().map(|path| cells("as it is".to_owned(), bench.present(), &path.present));
+        found.elsewhere.iter().map(|path| cells("initial".to_owned(), problem.present(), &path.present));
     let worst = found.contrasts.iter().take(ROWS);
     let rows = present.chain(worst.map(|c| cells(c.better.tuning.to_string(), &c.better, &c.worse)));
     Table { columns, rows: rows.collect(), ..Table::default() }
 }
 
-/// Where the tuning is better than the machine as it is, and where it is worse.
-fn elsewhere(bench: &TuningProblem<'_>, found: &Found) -> Table {
-    let columns = [("path", ""), ("as it is", ""), ("tuned", ""), ("unit", ""), ("the tuned one is", "")];
+/// Creates the table that compares initial and best tuning on all paths.
+fn elsewhere(problem: &TuningProblem<'_>, found: &TuningResult) -> Table {
+    let columns = [("path", ""), ("initial", ""), ("tuned", ""), ("unit", ""), ("tuned result", "")];
     let row = |name: &str, present: &TuningCandidate, tuned: &TuningCandidate| {
         let verdict = match tuned.cost.total_cmp(&present.cost) {
             std::cmp::Ordering::Less => "better",
-            std::cmp::Ordering::Equal => "as good",
+            std::cmp::Ordering::Equal => "equal",
             std::cmp::Ordering::Greater => "worse",
         };
-        let saturates = if tuned.saturated { ", saturates" } else { "" };
+        let saturates = if tuned.is_saturated { ", saturates" } else { "" };
         vec![
             name.to_owned(),
             format!("{:.2}", present.cost),
             format!("{:.2}", tuned.cost),
-            bench.cost().unit(&present.figures).to_owned(),
+            problem.cost().unit(&present.figures).to_owned(),
             format!("{verdict}{saturates}"),
         ]
     };
-    let first = row(bench.course().name(), bench.present(), &found.best);
+    let first = row(problem.workload().name(), problem.present(), &found.best);
     let others = found.elsewhere.iter().map(|path| row(&path.name, &path.present, &path.tuned));
     Table {
         columns: columns.map(|(name, unit)| TableColumn::new(name, unit)).to_vec(),
@@ -140,35 +141,35 @@ fn elsewhere(bench: &TuningProblem<'_>, found: &Found) -> Table {
     }
 }
 
-/// The result as one object.
+/// Returns the result as a JSON object.
 pub fn object(
-    input: &Input,
-    tunable: Tunable,
+    input: &CommandInput,
+    tunable: TunableController,
     limits: &MarginLimits,
     seed: u64,
-    bench: &TuningProblem<'_>,
-    found: &Found,
+    problem: &TuningProblem<'_>,
+    found: &TuningResult,
 ) -> Value {
     let with_figures = |one: &TuningCandidate| {
-        let mut object = candidate(one, bench.config());
+        let mut object = candidate(one, problem.config());
         object.insert("figures".to_owned(), json::figures(&one.figures).into());
         Value::Object(object)
     };
-    let plain = |one: &TuningCandidate| Value::Object(candidate(one, bench.config()));
+    let plain = |one: &TuningCandidate| Value::Object(candidate(one, problem.config()));
     let mut object = Map::new();
     let mut add = |name: &str, value: Value| object.insert(name.to_owned(), value);
     add("input", json!(input.name()));
     add("description", json!(input.description()));
-    add("machine", json!(bench.config().name()));
-    add("controller", json!(if tunable == Tunable::Gpc { "gpc" } else { "cascade" }));
-    add("tuned_axes", json!(bench.joints()));
-    let terms = bench.cost().terms().iter().map(|(term, weight)| (term.name().to_owned(), json!(weight)));
+    add("machine", json!(problem.config().name()));
+    add("controller", json!(if tunable == TunableController::Gpc { "gpc" } else { "cascade" }));
+    add("tuned_axes", json!(problem.joints()));
+    let terms = problem.cost().terms().iter().map(|(term, weight)| (term.name().to_owned(), json!(weight)));
     add("cost", Value::Object(terms.collect()));
-    add("cost_unit", json!(bench.cost().unit(&bench.present().figures)));
+    add("cost_unit", json!(problem.cost().unit(&problem.present().figures)));
     let delay = limits.delay / MILLISECOND;
     add("limits", json!({ "modulus_margin": limits.modulus, "delay_margin_ms": delay }));
     add("seed", json!(seed));
-    add("present", with_figures(bench.present()));
+    add("present", with_figures(problem.present()));
     add("best", with_figures(&found.best));
     if let Some(search) = &found.search {
         add("designs", json!(search.designs));
@@ -185,28 +186,28 @@ pub fn object(
     Value::Object(object)
 }
 
-/// Cost against modulus margin and against control activity, or on one path against another.
-pub fn scatters(bench: &TuningProblem<'_>, found: &Found) -> Vec<Scatter> {
-    let unit = bench.cost().unit(&bench.present().figures);
+/// Creates the scatter plots: cost over modulus margin and control activity, or over the cost on another path.
+pub fn scatters(problem: &TuningProblem<'_>, found: &TuningResult) -> Vec<Scatter> {
+    let unit = problem.cost().unit(&problem.present().figures);
     let quantity = |unit: &str| if unit.is_empty() { String::new() } else { format!(" ({unit})") };
-    let cost = format!("Cost: {}{}", bench.cost(), quantity(unit));
+    let cost = format!("Cost: {}{}", problem.cost(), quantity(unit));
     let group = |label: &str, style, points| PointGroup { label: label.to_owned(), style, points };
     if let Some(path) = found.elsewhere.first().filter(|_| !found.contrasts.is_empty()) {
         let points = found.contrasts.iter().map(|c| [c.better.cost, c.worse.cost]).collect();
         return vec![Scatter {
-            title: format!("Better on {} and worse on {}", bench.course().name(), path.name),
-            note: "than the machine as it is".to_owned(),
-            x: format!("{} on {}", cost, bench.course().name()),
+            title: format!("Better on {} and worse on {}", problem.workload().name(), path.name),
+            note: "compared with the initial tuning".to_owned(),
+            x: format!("{} on {}", cost, problem.workload().name()),
             y: format!("{} on {}", cost, path.name),
             groups: vec![
                 group("tunings", PointStyle::Dots, points),
-                group("as it is", PointStyle::Run(0), vec![[bench.present().cost, path.present.cost]]),
+                group("initial", PointStyle::Run(0), vec![[problem.present().cost, path.present.cost]]),
                 group("found", PointStyle::Run(1), vec![[found.best.cost, path.tuned.cost]]),
             ],
         }];
     }
     let Some(search) = &found.search else { return Vec::new() };
-    let activity = |c: &TuningCandidate| CostTerm::Activity.of(&c.figures, bench.config());
+    let activity = |c: &TuningCandidate| CostTerm::Activity.of(&c.figures, problem.config());
     let less_activity = |c: &TuningCandidate| -activity(c);
     type Measure<'a> = &'a dyn Fn(&TuningCandidate) -> f64;
     let pictures: [(&str, &str, Measure, Measure); 2] = [
@@ -214,24 +215,20 @@ pub fn scatters(bench: &TuningProblem<'_>, found: &Found) -> Vec<Scatter> {
         ("Cost against control activity", "Control activity (A)", &activity, &less_activity),
     ];
     let scatter = |(title, y, measure, merit): (&str, &str, Measure, Measure)| {
-        let front = front(&search.tried, merit);
-        let dearest = PICTURED * search.best.cost.max(bench.present().cost);
+        let front = pareto_front(&search.tried, merit);
+        let dearest = MAX_PLOTTED_COST * search.best.cost.max(problem.present().cost);
         let point = |c: &TuningCandidate| [c.cost, measure(c)];
         let shown = search.tried.iter().filter(|c| c.cost <= dearest);
         let front = front.into_iter().filter(|c| c.cost <= dearest);
         Scatter {
             title: title.to_owned(),
-            note: "of the tunings that were run and keep the margins".to_owned(),
+            note: "all simulated tunings within the margin limits".to_owned(),
             x: cost.clone(),
             y: y.to_owned(),
             groups: vec![
                 group("tunings", PointStyle::Dots, shown.map(point).collect()),
-                group(
-                    "no tuning is better in both",
-                    PointStyle::Steps,
-                    front.into_iter().map(point).collect(),
-                ),
-                group("as it is", PointStyle::Run(0), vec![point(bench.present())]),
+                group("Pareto front", PointStyle::Steps, front.into_iter().map(point).collect()),
+                group("initial", PointStyle::Run(0), vec![point(problem.present())]),
                 group("best", PointStyle::Run(1), vec![point(&search.best)]),
             ],
         }

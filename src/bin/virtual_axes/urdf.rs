@@ -1,4 +1,4 @@
-//! `virtual_axes urdf`: a machine for robot_state_publisher and RViz.
+//! `virtual_axes urdf`: URDF of a machine for robot_state_publisher and RViz.
 
 use std::error::Error;
 use std::io::Write;
@@ -7,23 +7,23 @@ use std::path::PathBuf;
 use virtual_axes_io::files::OutputFile;
 use virtual_axes_io::urdf::urdf;
 
-use crate::subject::MachineChoice;
+use crate::trial_arguments::MachineArguments;
 
-/// Which machine, and where its URDF goes.
+/// Arguments of `virtual_axes urdf`.
 #[derive(Debug, clap::Args)]
-pub struct Arguments {
+pub struct UrdfArguments {
     #[command(flatten)]
-    machine: MachineChoice,
-    /// Text before the joint names, as the node's joint_prefix.
+    machine: MachineArguments,
+    /// Prefix of joint names, like the parameter joint_prefix of the node.
     #[arg(long, default_value = "", value_name = "TEXT")]
     joint_prefix: String,
-    /// File to write; the standard output when left out.
+    /// Output file [default: standard output].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-/// The URDF, or nothing when it goes into a file.
-pub fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+/// Returns the URDF, or an empty text if it is written to a file.
+pub fn run(arguments: &UrdfArguments) -> Result<String, Box<dyn Error>> {
     let machine = &arguments.machine;
     let config = machine.parameters()?.machine_config()?;
     let text =

@@ -1,40 +1,43 @@
-//! The machine as each run of a command has it.
+//! Variants of a machine: controller and parameters of each run of a command.
 
 use std::error::Error;
 
-use virtual_axes_core::config::{Assignment, MachineConfig, Parameters, Source, Value, parse_assignment};
+use virtual_axes_core::config::{
+    Assignment, MachineConfig, Parameters, Value, ValueSource, parse_assignment,
+};
 use virtual_axes_core::machine::MachineParameters;
+use virtual_axes_core::trial::TrialOutcome;
 
-/// Position controllers that a run can be asked for.
+/// Position controller of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Controller {
-    /// Proportional, with the feedforward of the machine file.
+pub enum ControllerName {
+    /// Proportional controller with the feedforward of the machine file.
     Cascade,
-    /// Proportional, without feedforward.
+    /// Proportional controller without feedforward.
     CascadeNoff,
-    /// Generalized predictive control, with the tuning of the machine file.
+    /// Generalized predictive controller with the tuning of the machine file.
     Gpc,
-    /// The polynomials of the machine file.
+    /// RST controller with the polynomials of the machine file.
     Rst,
 }
 
-impl Controller {
-    /// The value of `position_loop.controller`.
+impl ControllerName {
+    /// Returns the value of `position_loop.controller`.
     fn name(self) -> &'static str {
         match self {
-            Controller::Cascade | Controller::CascadeNoff => "cascade",
-            Controller::Gpc => "gpc",
-            Controller::Rst => "rst",
+            ControllerName::Cascade | ControllerName::CascadeNoff => "cascade",
+            ControllerName::Gpc => "gpc",
+            ControllerName::Rst => "rst",
         }
     }
 
-    /// The parameters that it sets on each axis of `parameters`.
+    /// Returns the parameters to set for each axis of `parameters`.
     fn assignments(self, parameters: &Parameters) -> Vec<Assignment> {
-        let set = |key: String, value| Assignment { key, value, source: Source::named("--controller") };
+        let set = |key: String, value| Assignment { key, value, source: ValueSource::named("--controller") };
         let of_key = |(key, _): (String, Value)| {
             if key.ends_with(".position_loop.controller") {
                 Some(set(key, Value::Text(self.name().to_owned())))
-            } else if self == Controller::CascadeNoff && key.contains(".feedforward.") {
+            } else if self == ControllerName::CascadeNoff && key.contains(".feedforward.") {
                 Some(set(key, Value::Double(0.0)))
             } else {
                 None
@@ -44,7 +47,7 @@ impl Controller {
     }
 }
 
-/// Name of the controller that the axes of `parameters` have.
+/// Returns the name of the controller of the axes, or several names joined by `+`.
 pub fn controller_name(parameters: &Parameters) -> String {
     let mut names: Vec<String> = Vec::new();
     let mut feedforward = false;
@@ -63,10 +66,10 @@ pub fn controller_name(parameters: &Parameters) -> String {
     }
 }
 
-/// One machine: the controller, then what `--set` and `--compare` say, over the machine file.
+/// Returns the machine with the controller and the parameters of `--set` and `--compare`, in this order.
 pub fn parameters(
     machine: &Parameters,
-    controller: Option<Controller>,
+    controller: Option<ControllerName>,
     set: &[String],
     compared: &[String],
 ) -> Result<Parameters, Box<dyn Error>> {
@@ -75,15 +78,15 @@ pub fn parameters(
         parameters.set_all(controller.assignments(machine))?;
     }
     for (option, texts) in [("--set", set), ("--compare", compared)] {
-        let source = Source::named(option);
+        let source = ValueSource::named(option);
         let assignments = texts.iter().map(|text| parse_assignment(text, &source));
         parameters.set_all(assignments.collect::<Result<_, _>>()?)?;
     }
     Ok(parameters)
 }
 
-/// The machine that `parameters` make, over those of the machine file `name`; whoever is to blame is named if
-/// it cannot be built.
+/// Builds and validates the machine. An error names the source of the invalid parameters: the machine file `name` or
+/// the options.
 pub fn checked(
     parameters: &Parameters,
     machine: &Parameters,
@@ -91,9 +94,32 @@ pub fn checked(
 ) -> Result<MachineConfig, Box<dyn Error>> {
     let config = parameters.machine_config()?;
     MachineParameters::new(&config).map_err(|error| {
-        let by_itself = machine.machine_config().is_ok_and(|own| MachineParameters::new(&own).is_err());
-        let blamed = if by_itself { name } else { "--controller, --set or --compare" };
-        format!("{blamed}: {error}")
+        let is_file_invalid = machine.machine_config().is_ok_and(|own| MachineParameters::new(&own).is_err());
+        let source = if is_file_invalid { name } else { "--controller, --set or --compare" };
+        format!("{source}: {error}")
     })?;
     Ok(config)
+}
+
+/// One run of a command with its variant of the machine.
+#[derive(Debug)]
+pub struct VariantRun {
+    /// Name of the controller.
+    pub controller: String,
+    /// Changed parameters, in the syntax of the command line.
+    pub changes: Vec<String>,
+    /// Result of the run.
+    pub outcome: TrialOutcome,
+}
+
+impl VariantRun {
+    /// Returns the title that distinguishes the run from the others.
+    pub fn title(&self) -> String {
+        let mut title = self.controller.clone();
+        for change in &self.changes {
+            title.push_str(", ");
+            title.push_str(change);
+        }
+        title
+    }
 }

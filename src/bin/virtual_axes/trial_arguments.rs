@@ -1,0 +1,75 @@
+//! Arguments that several commands share: machine, parameters and setpoints.
+
+use std::error::Error;
+use std::path::Path;
+
+use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
+
+use crate::input::{CommandInput, must_not_replace};
+use crate::variant;
+
+/// Machine and parameters.
+#[derive(Debug, clap::Args)]
+pub struct MachineArguments {
+    /// Shipped machine or machine file.
+    #[arg(long, default_value = DEFAULT_MACHINE)]
+    machine: String,
+    /// Set a parameter, for example `kinematics.tool_length_mm=150`; can be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+impl MachineArguments {
+    /// Returns the name or path of the machine.
+    pub fn name(&self) -> &str {
+        &self.machine
+    }
+
+    /// Rejects an output file that is the machine file.
+    pub fn must_not_be(&self, output: &Path) -> Result<(), String> {
+        must_not_replace(output, Path::new(&self.machine))
+    }
+
+    /// Loads the machine with the parameters of `--set`.
+    pub fn parameters(&self) -> Result<Parameters, Box<dyn Error>> {
+        variant::parameters(&Parameters::load(&self.machine)?, None, &self.set, &[])
+    }
+}
+
+/// Setpoints, machine and parameters.
+#[derive(Debug, clap::Args)]
+pub struct TrialArguments {
+    /// Shipped scenario, scenario file, or file with setpoints: CSV (`time,x,y,…` in s, m, rad), MCAP with a
+    /// JointTrajectory, or YAML for `ros2 topic pub`.
+    #[arg(value_name = "SCENARIO|FILE")]
+    input: String,
+    /// Shipped machine or machine file.
+    #[arg(long, default_value = DEFAULT_MACHINE)]
+    pub machine: String,
+    /// Set a parameter, for example `x.velocity_loop.gain=4.5`; can be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Override the feed of the scenario, m/min (rpm for a scenario of rotary moves).
+    #[arg(long, allow_negative_numbers = true)]
+    pub feed: Option<f64>,
+    /// Topic to run, if a recording has several topics with a JointTrajectory.
+    #[arg(long)]
+    topic: Option<String>,
+}
+
+impl TrialArguments {
+    /// Loads the machine without the parameters of `--set`.
+    pub fn machine(&self) -> Result<Parameters, Box<dyn Error>> {
+        Ok(Parameters::load(&self.machine)?)
+    }
+
+    /// Rejects an output file that is the machine file.
+    pub fn machine_must_not_be(&self, output: &Path) -> Result<(), String> {
+        must_not_replace(output, Path::new(&self.machine))
+    }
+
+    /// Opens the scenario or the file with setpoints.
+    pub fn input(&self) -> Result<CommandInput, Box<dyn Error>> {
+        CommandInput::open(&self.input, self.topic.as_deref())
+    }
+}
