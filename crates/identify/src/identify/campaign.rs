@@ -54,7 +54,7 @@ pub struct Campaign {
 }
 
 impl Campaign {
-    /// Plans `parts` in sequence for the axis at index `axis`, with 3 s of standstill between them, starting
+    /// Plans `parts` in sequence for the axis at `index`, with 3 s of standstill between them, starting
     /// at time 0.
     ///
     /// Speeds reach up to 20 m/min (rev/min), limited to 95 % of Vmax and of the motor speed, or
@@ -67,28 +67,33 @@ impl Campaign {
     /// or if the axis cannot reach the feed.
     pub fn plan(
         machine: &MachineConfig,
-        place: usize,
+        index: usize,
         parts: &[FeedforwardMode],
         options: &CampaignOptions,
     ) -> Result<Self, CampaignError> {
-        let room = TravelLimits::new(machine, place, options)?;
+        let limits = TravelLimits::new(machine, index, options)?;
         let period = machine.periods().position;
-        let mut campaign =
-            Campaign { period, start: room.start, range: room.window, runs: Vec::new(), psec: Vec::new() };
+        let mut campaign = Campaign {
+            period,
+            start: limits.start,
+            range: limits.window,
+            runs: Vec::new(),
+            psec: Vec::new(),
+        };
         for &part in parts {
             if let Some(&last) = campaign.psec.last() {
                 let pause = (PAUSE / seconds(period)).round() as usize;
                 campaign.psec.resize(campaign.psec.len() + pause, last);
             }
-            let mut legs = CampaignPlanner::new(machine, place, &room);
+            let mut planner = CampaignPlanner::new(machine, index, &limits);
             let speeds = match part {
-                FeedforwardMode::Off => legs.plan_off()?,
-                FeedforwardMode::Velocity | FeedforwardMode::Both => legs.plan_short()?,
+                FeedforwardMode::Off => planner.plan_off()?,
+                FeedforwardMode::Velocity | FeedforwardMode::Both => planner.plan_short()?,
             };
-            let program = legs.program(machine)?;
+            let program = planner.program(machine)?;
             let duration = program.duration();
             if duration > LONGEST {
-                let axis = room.axis.name().to_owned();
+                let axis = limits.axis.name().to_owned();
                 return Err(CampaignError::TooLong { axis, part: part.name(), duration, limit: LONGEST });
             }
             let from = campaign.psec.len();
@@ -96,7 +101,7 @@ impl Campaign {
             let mut joints = vec![0.0; machine.axes().len()];
             campaign.psec.extend((0..=last).map(|k| {
                 program.psec(seconds(k * period), &mut joints);
-                joints[place]
+                joints[index]
             }));
             campaign.runs.push(CampaignRun { part, rows: from..campaign.psec.len(), speeds });
         }

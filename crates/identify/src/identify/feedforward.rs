@@ -90,8 +90,8 @@ fn fit_weight<'a>(
             let at = |i: usize| {
                 let instant = ((i as f64 * signals.period - setpoints.first) / tsp + 1e-9).floor();
                 // The first derivative belongs to the third setpoint.
-                let place = instant - 2.0;
-                if place < 0.0 { 0.0 } else { derivatives.get(place as usize).copied().unwrap_or(0.0) }
+                let index = instant - 2.0;
+                if index < 0.0 { 0.0 } else { derivatives.get(index as usize).copied().unwrap_or(0.0) }
             };
             parts.push(((0..recorded.len()).map(at).collect(), recorded, signals.period));
         }

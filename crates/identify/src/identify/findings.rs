@@ -191,8 +191,8 @@ fn report_inertia(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mut Iden
     }
     let truth = found.axis.motor.inertia;
     let differs = |a: f64, b: f64| (a / b - 1.0).abs() > UNSEEN;
-    let told = if refined { differs(by_steps.value, truth) } else { coarse };
-    if !told {
+    let is_reported = if refined { differs(by_steps.value, truth) } else { coarse };
+    if !is_reported {
         return;
     }
     let values: Vec<String> = parts.iter().map(|(value, name)| format!("{value:.4} ({name})")).collect();

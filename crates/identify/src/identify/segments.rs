@@ -85,10 +85,10 @@ pub fn find_segments(signals: &Signals) -> Vec<MotionSegment> {
 /// Returns the largest magnitude without outliers.
 pub(super) fn largest_magnitude(values: &[f64]) -> f64 {
     let mut magnitudes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
-    let place = ((magnitudes.len() as f64) * (1.0 - OUTLIERS)) as usize;
+    let index = ((magnitudes.len() as f64) * (1.0 - OUTLIERS)) as usize;
     match magnitudes.len() {
         0 => 0.0,
-        count => *magnitudes.select_nth_unstable_by(place.min(count - 1), f64::total_cmp).1,
+        count => *magnitudes.select_nth_unstable_by(index.min(count - 1), f64::total_cmp).1,
     }
 }
 

@@ -156,11 +156,11 @@ impl Identification {
     /// Returns the standard error of a + c from the refinement.
     fn error_of_sum(&self) -> Option<f64> {
         let refinement = self.refinement.as_ref()?;
-        let place = |parameter| refinement.parameters.iter().position(|p| p.parameter == parameter);
-        if let Some(level) = place(RefinedParameter::Coulomb) {
+        let index = |parameter| refinement.parameters.iter().position(|p| p.parameter == parameter);
+        if let Some(level) = index(RefinedParameter::Coulomb) {
             return Some(refinement.parameters[level].error);
         }
-        let (a, c) = (place(RefinedParameter::FrictionA)?, place(RefinedParameter::FrictionC)?);
+        let (a, c) = (index(RefinedParameter::FrictionA)?, index(RefinedParameter::FrictionC)?);
         let (x, y) = (refinement.parameters[a].error, refinement.parameters[c].error);
         let rho = refinement.correlations.get(a)?.get(c)?;
         Some((x * x + y * y + 2.0 * rho * x * y).max(0.0).sqrt())

@@ -72,17 +72,17 @@ impl MovingSamples {
         let mut speeds: Vec<f64> =
             parts.iter().flat_map(|p| p.motion.first.iter().map(|v| v.abs())).collect();
         let threshold = MOVING * quantile(&mut speeds, 0.99).unwrap_or(0.0);
-        let mut places = Vec::new();
+        let mut indices = Vec::new();
         for (p, part) in parts.iter().enumerate() {
             let reach = part.filter.radius();
             let runs = runs(&part.motion.first, threshold);
             let inside = runs
                 .into_iter()
                 .map(|run| run.start + before + reach..run.end.saturating_sub(behind + reach));
-            places.extend(inside.flatten().map(|n| (p, n)));
+            indices.extend(inside.flatten().map(|n| (p, n)));
         }
-        let stride = places.len().div_ceil(MOST_SAMPLES).max(1);
-        let indices: Vec<(usize, usize)> = places.into_iter().step_by(stride).collect();
+        let stride = indices.len().div_ceil(MOST_SAMPLES).max(1);
+        let indices: Vec<(usize, usize)> = indices.into_iter().step_by(stride).collect();
         let column = |of: &dyn Fn(usize, usize) -> f64| indices.iter().map(|&(p, n)| of(p, n)).collect();
         let mut columns: Vec<Vec<f64>> = vec![
             column(&|p, n| parts[p].motion.second[n]),
@@ -176,12 +176,12 @@ pub(super) fn compensate(parts: &mut [FilteredSection], lag: f64, period: f64) {
     }
 }
 
-/// Interpolates at the fractional index `place` with the cubic through the four nearest samples; exact at a
+/// Interpolates at the fractional index `index` with the cubic through the four nearest samples; exact at a
 /// sample.
-fn interpolate_cubic(values: &[f64], place: f64) -> f64 {
+fn interpolate_cubic(values: &[f64], index: f64) -> f64 {
     let last = values.len() as isize - 1;
-    let whole = place.floor();
-    let part = place - whole;
+    let whole = index.floor();
+    let part = index - whole;
     let value = |offset: isize| values[(whole as isize + offset).clamp(0, last) as usize];
     if part == 0.0 {
         return value(0);
@@ -199,8 +199,8 @@ mod tests {
     fn a_cubic_between_samples_is_exact() {
         let cubic = |t: f64| 1.0 - 2.0 * t + 0.5 * t * t - 0.1 * t * t * t;
         let values: Vec<f64> = (0..10).map(|n| cubic(n as f64)).collect();
-        for place in [1.25, 4.5, 7.9] {
-            assert!((interpolate_cubic(&values, place) - cubic(place)).abs() < 1e-12);
+        for index in [1.25, 4.5, 7.9] {
+            assert!((interpolate_cubic(&values, index) - cubic(index)).abs() < 1e-12);
         }
         assert_eq!(interpolate_cubic(&values, 3.0), values[3]);
     }

@@ -50,12 +50,16 @@ const DIGITS: usize = 5;
 /// # Errors
 /// [`TuneError`] if a run fails or no tuning is within the limits.
 pub fn tune_cascade(
-    bench: &TuningProblem<'_>,
+    problem: &TuningProblem<'_>,
     limits: &MarginLimits,
     seed: u64,
 ) -> Result<SearchResult, TuneError> {
-    let axes: Vec<Axis> =
-        bench.joints().iter().zip(bench.axes()).map(|(j, a)| Axis::of(bench, j, a.motor.inertia)).collect();
+    let axes: Vec<Axis> = problem
+        .joints()
+        .iter()
+        .zip(problem.axes())
+        .map(|(j, a)| Axis::of(problem, j, a.motor.inertia))
+        .collect();
     let own: Vec<[f64; VARIABLES]> = axes.iter().map(Axis::own).collect();
     let mean = |variable: usize| own.iter().map(|o| o[variable]).sum::<f64>() / own.len() as f64;
     let mut random = SplitMix(seed);
@@ -63,12 +67,12 @@ pub fn tune_cascade(
     starts
         .resize_with(STARTS, || START_BOUNDS.map(|(low, high)| low + (high - low) * random.next()).to_vec());
 
-    bench.progress().begin("alike on each axis", STARTS * COMMON_RUNS);
+    problem.progress().begin("common gains", STARTS * COMMON_RUNS);
     let spread = |x: &[f64]| -> Tuning {
         let point: Vec<f64> = axes.iter().flat_map(|_| x.iter().copied()).collect();
         tuning(&axes, &point)
     };
-    let common = descend_all(bench, limits, starts, &STEPS, COMMON_RUNS, &spread)?;
+    let common = descend_all(problem, limits, starts, &STEPS, COMMON_RUNS, &spread)?;
     // The mean gains are poor common gains if the axes differ, so the own gains are a start, too.
     let mut ends: Vec<(f64, Vec<f64>)> = common.iter().filter_map(|found| found.end(limits)).collect();
     ends.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -82,8 +86,8 @@ pub fn tune_cascade(
         .collect();
     fine.push(own.concat());
     let runs = RUNS_PER_VARIABLE * VARIABLES * axes.len();
-    bench.progress().begin("each axis by itself", fine.len() * runs);
-    tried.extend(descend_all(bench, limits, fine, &FINE_STEPS, runs, &apart)?);
+    problem.progress().begin("gains per axis", fine.len() * runs);
+    tried.extend(descend_all(problem, limits, fine, &FINE_STEPS, runs, &apart)?);
 
     let designs = tried.iter().map(|found| found.history.len()).sum();
     let all: Vec<TuningCandidate> =
@@ -111,8 +115,8 @@ struct Axis {
 }
 
 impl Axis {
-    fn of(bench: &TuningProblem<'_>, joint: &str, inertia: f64) -> Self {
-        let number = |key: String| match bench.parameters().get(&key) {
+    fn of(problem: &TuningProblem<'_>, joint: &str, inertia: f64) -> Self {
+        let number = |key: String| match problem.parameters().get(&key) {
             Some(Value::Double(value)) => value,
             _ => 0.0,
         };
@@ -120,7 +124,7 @@ impl Axis {
         let gains = AxisGains {
             gain: if gain > 0.0 { gain } else { DEFAULT_GAIN },
             velocity: number(format!("{joint}.feedforward.velocity")),
-            torque: number(torque_key(joint, bench.parameters())),
+            torque: number(torque_key(joint, problem.parameters())),
         };
         Axis { joint: joint.to_owned(), gains, inertia }
     }
@@ -166,7 +170,7 @@ impl DescentHistory {
 
 /// Runs one search per start in parallel.
 fn descend_all(
-    bench: &TuningProblem<'_>,
+    problem: &TuningProblem<'_>,
     limits: &MarginLimits,
     starts: Vec<Vec<f64>>,
     steps: &[f64; VARIABLES],
@@ -176,13 +180,13 @@ fn descend_all(
     starts
         .into_par_iter()
         .with_max_len(1)
-        .map(|start| descend(bench, limits, &start, steps, runs, tuning_at))
+        .map(|start| descend(problem, limits, &start, steps, runs, tuning_at))
         .collect()
 }
 
 /// Minimizes the cost from `start`; margins and saturation are constraints.
 fn descend(
-    bench: &TuningProblem<'_>,
+    problem: &TuningProblem<'_>,
     limits: &MarginLimits,
     start: &[f64],
     steps: &[f64; VARIABLES],
@@ -197,14 +201,14 @@ fn descend(
             return 0.0;
         }
         let known = seen.borrow().iter().rposition(|(point, _)| point == x);
-        if let Some(place) = known {
-            return read(seen.borrow()[place].1.as_ref());
+        if let Some(index) = known {
+            return read(seen.borrow()[index].1.as_ref());
         }
         let tuning = tuning_at(x);
-        let run = match bench.margins(&tuning) {
+        let run = match problem.margins(&tuning) {
             // An unstable axis is not simulated; it would saturate.
             None => Ok(None),
-            margins => bench.run(&tuning, margins).map(Some),
+            margins => problem.run(&tuning, margins).map(Some),
         };
         match run {
             Ok(candidate) => {
@@ -218,7 +222,7 @@ fn descend(
             }
         }
     };
-    let unstable = UNSTABLE * bench.present().cost.max(f64::MIN_POSITIVE);
+    let unstable = UNSTABLE * problem.present().cost.max(f64::MIN_POSITIVE);
     let objective = |x: &[f64], (): &mut ()| look(x, &|c| c.map_or(unstable, |c| c.cost));
     let modulus = |x: &[f64], (): &mut ()| {
         look(x, &|c| c.and_then(|c| c.margins).map_or(-1.0, |m| m.modulus - limits.modulus))

@@ -25,27 +25,27 @@ pub struct Contrast {
 /// # Errors
 /// [`TuneError`] if a run fails.
 pub fn find_contrasts(
-    bench: &TuningProblem<'_>,
+    problem: &TuningProblem<'_>,
     other: &Workload,
     limits: &MarginLimits,
 ) -> Result<(TuningCandidate, Vec<Contrast>), TuneError> {
-    let present = bench.run_on(other, &Tuning::Present)?;
-    let designs = within_limits(bench.designs(design_grid()), limits);
-    let is_better = |candidate: &TuningCandidate| candidate.cost < bench.present().cost;
+    let present = problem.run_on(other, &Tuning::Present)?;
+    let designs = within_limits(problem.designs(design_grid()), limits);
+    let is_better = |candidate: &TuningCandidate| candidate.cost < problem.present().cost;
     let is_worse = |candidate: &TuningCandidate| candidate.cost > present.cost;
     // The shorter path is run first, which reduces the runs on the longer one.
-    let other_first = present.figures.duration < bench.present().figures.duration;
+    let other_first = present.figures.duration < problem.present().figures.duration;
     let all: Vec<Tuning> = designs.into_iter().map(|(tuning, _)| tuning).collect();
-    let on_bench = |tunings: Vec<Tuning>| bench.runs_on(bench.workload(), tunings);
-    let on_other = |tunings: Vec<Tuning>| bench.runs_on(other, tunings);
+    let on_own = |tunings: Vec<Tuning>| problem.runs_on(problem.workload(), tunings);
+    let on_other = |tunings: Vec<Tuning>| problem.runs_on(other, tunings);
     let tunings =
         |candidates: &[TuningCandidate]| candidates.iter().map(|c| c.tuning.clone()).collect::<Vec<_>>();
     let (better, worse) = if other_first {
         let mut worse = on_other(all)?;
         worse.retain(is_worse);
-        (on_bench(tunings(&worse))?, worse)
+        (on_own(tunings(&worse))?, worse)
     } else {
-        let mut better = on_bench(all)?;
+        let mut better = on_own(all)?;
         better.retain(is_better);
         let worse = on_other(tunings(&better))?;
         (better, worse)
@@ -54,8 +54,8 @@ pub fn find_contrasts(
     let mut contrasts: Vec<Contrast> = pairs.filter(|c| is_better(&c.better) && is_worse(&c.worse)).collect();
     contrasts.sort_by(|a, b| b.worse.cost.total_cmp(&a.worse.cost));
     if let Some(worst) = contrasts.first_mut() {
-        worst.better = bench.with_complete_figures(bench.workload(), &worst.better)?;
-        worst.worse = bench.with_complete_figures(other, &worst.worse)?;
+        worst.better = problem.with_complete_figures(problem.workload(), &worst.better)?;
+        worst.worse = problem.with_complete_figures(other, &worst.worse)?;
     }
     Ok((present, contrasts))
 }

@@ -152,11 +152,11 @@ impl Cost {
     /// # Errors
     /// [`CostError`] if a weight is out of range, a term is duplicate or all weights are zero.
     pub fn new(terms: &[(CostTerm, f64)]) -> Result<Self, CostError> {
-        for (place, (term, weight)) in terms.iter().enumerate() {
+        for (index, (term, weight)) in terms.iter().enumerate() {
             if !(0.0..=LARGEST_WEIGHT).contains(weight) {
                 return Err(CostError::Weight { term: term.name(), weight: Rounded(*weight).to_string() });
             }
-            if terms[..place].iter().any(|(before, _)| before == term) {
+            if terms[..index].iter().any(|(before, _)| before == term) {
                 return Err(CostError::Duplicate { term: term.name() });
             }
         }
@@ -187,8 +187,8 @@ impl Cost {
 
 impl fmt::Display for Cost {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (place, (term, weight)) in self.terms.iter().enumerate() {
-            let comma = if place > 0 { "," } else { "" };
+        for (index, (term, weight)) in self.terms.iter().enumerate() {
+            let comma = if index > 0 { "," } else { "" };
             write!(f, "{comma}{}", term.name())?;
             if *weight != 1.0 {
                 write!(f, "={weight}")?;

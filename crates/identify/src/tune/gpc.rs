@@ -67,8 +67,8 @@ fn keep_cheapest(candidates: Vec<TuningCandidate>) -> Vec<TuningCandidate> {
 ///
 /// # Errors
 /// [`TuneError`] if a run fails or no tuning is within the limits.
-pub fn tune_gpc(bench: &TuningProblem<'_>, limits: &MarginLimits) -> Result<SearchResult, TuneError> {
-    tune_gpc_from(bench, limits, design_grid())
+pub fn tune_gpc(problem: &TuningProblem<'_>, limits: &MarginLimits) -> Result<SearchResult, TuneError> {
+    tune_gpc_from(problem, limits, design_grid())
 }
 
 /// Searches like [`tune_gpc`] with another grid `first`, such as a [`fine_design_grid`].
@@ -76,14 +76,14 @@ pub fn tune_gpc(bench: &TuningProblem<'_>, limits: &MarginLimits) -> Result<Sear
 /// # Errors
 /// [`TuneError`] if a run fails or no tuning is within the limits.
 pub fn tune_gpc_from(
-    bench: &TuningProblem<'_>,
+    problem: &TuningProblem<'_>,
     limits: &MarginLimits,
     mut first: Vec<Tuning>,
 ) -> Result<SearchResult, TuneError> {
-    first.extend(preset(bench).filter(|preset| !first.contains(preset)));
+    first.extend(preset(problem).filter(|preset| !first.contains(preset)));
     let mut seen: HashSet<Key> = first.iter().filter_map(key).collect();
     let mut designs = first.len();
-    let all = bench.designs(first);
+    let all = problem.designs(first);
     let closest =
         all.iter().filter_map(|(_, margins)| *margins).max_by(|a, b| a.modulus.total_cmp(&b.modulus));
     let kept = within_limits(all, limits);
@@ -96,7 +96,7 @@ pub fn tune_gpc_from(
         });
     }
     let mut runs = kept.len();
-    let mut tried = keep_cheapest(bench.runs("grid", kept)?);
+    let mut tried = keep_cheapest(problem.runs("grid", kept)?);
     let mut factor = FIRST_FACTOR;
     for _ in 0..ROUNDS {
         let Some(best) = tried.first().map(|best| best.cost) else { break };
@@ -107,9 +107,9 @@ pub fn tune_gpc_from(
             .filter(|tuning| key(tuning).is_some_and(|key| seen.insert(key)))
             .collect();
         designs += around.len();
-        let kept = within_limits(bench.designs(around), limits);
+        let kept = within_limits(problem.designs(around), limits);
         runs += kept.len();
-        tried.extend(bench.runs("about the best", kept)?);
+        tried.extend(problem.runs("refinement", kept)?);
         tried = keep_cheapest(tried);
         let saved = tried.first().is_some_and(|now| now.cost < best * (1.0 - GAIN));
         if !saved {
@@ -120,7 +120,7 @@ pub fn tune_gpc_from(
         }
     }
     let best = tried.first_mut().ok_or(TuneError::Saturated { runs })?;
-    *best = bench.with_complete_figures(bench.workload(), best)?;
+    *best = problem.with_complete_figures(problem.workload(), best)?;
     let best = best.clone();
     Ok(SearchResult { best, tried, designs, runs })
 }
@@ -136,8 +136,8 @@ fn key(tuning: &Tuning) -> Option<Key> {
 }
 
 /// Returns the predictive controller of the machine file if it is the same on all axes.
-pub(super) fn preset(bench: &TuningProblem<'_>) -> Option<Tuning> {
-    let parameters = bench.parameters();
+pub(super) fn preset(problem: &TuningProblem<'_>) -> Option<Tuning> {
+    let parameters = problem.parameters();
     let own = |joint: &String| {
         let get = |key: &str| parameters.get(&format!("{joint}.position_loop.gpc.{key}"));
         let count = |key: &str| match get(key) {
@@ -151,7 +151,7 @@ pub(super) fn preset(bench: &TuningProblem<'_>) -> Option<Tuning> {
             _ => None,
         }
     };
-    let mut presets = bench.joints().iter().map(own);
+    let mut presets = problem.joints().iter().map(own);
     let first = presets.next()??;
     let alike = presets.all(|other| other.as_ref() == Some(&first));
     alike.then_some(first)

@@ -68,14 +68,14 @@ impl<'a> TuningProblem<'a> {
     /// [`TuneError`] if the machine cannot be run or no axis moves.
     pub fn new(
         parameters: &'a Parameters,
-        course: &'a Workload,
+        workload: &'a Workload,
         cost: &'a Cost,
-        watch: &'a dyn Progress,
+        progress: &'a dyn Progress,
     ) -> Result<Self, TuneError> {
         let config = parameters.machine_config()?;
-        watch.begin("as it is", 1);
-        let figures = run(parameters, course, watch, false)?.figures;
-        watch.finish_run();
+        progress.begin("present tuning", 1);
+        let figures = run(parameters, workload, progress, false)?.figures;
+        progress.finish_run();
         let moving: Vec<usize> = (0..config.axes().len()).filter(|&axis| figures.axes[axis].moves).collect();
         if moving.is_empty() {
             return Err(TuneError::NothingMoves);
@@ -91,17 +91,7 @@ impl<'a> TuningProblem<'a> {
         );
         let joints = axes.iter().map(|axis| axis.name().to_owned()).collect();
         let present = candidate(Tuning::Present, margins, figures, cost, &config);
-        Ok(TuningProblem {
-            parameters,
-            workload: course,
-            cost,
-            progress: watch,
-            config,
-            moving,
-            joints,
-            models,
-            present,
-        })
+        Ok(TuningProblem { parameters, workload, cost, progress, config, moving, joints, models, present })
     }
 
     /// Returns the present tuning of the machine.
@@ -170,14 +160,14 @@ impl<'a> TuningProblem<'a> {
         Ok(candidate(tuning.clone(), margins, figures, self.cost, &self.config))
     }
 
-    /// Runs `candidate` again by itself on `course`, which gives complete figures.
+    /// Runs `candidate` again by itself on `workload`, which gives complete figures.
     pub(super) fn with_complete_figures(
         &self,
-        course: &Workload,
+        workload: &Workload,
         candidate: &TuningCandidate,
     ) -> Result<TuningCandidate, TuneError> {
         let tuned = candidate.tuning.apply(self.parameters, &self.joints)?;
-        let figures = run(&tuned, course, self.progress, false)?.figures;
+        let figures = run(&tuned, workload, self.progress, false)?.figures;
         Ok(TuningCandidate { figures, ..candidate.clone() })
     }
 
@@ -185,17 +175,17 @@ impl<'a> TuningProblem<'a> {
     ///
     /// # Errors
     /// [`TuneError`] if the tuning cannot be applied or the run fails.
-    pub fn record_on(&self, course: &Workload, tuning: &Tuning) -> Result<TrialOutcome, TuneError> {
-        run(&tuning.apply(self.parameters, &self.joints)?, course, self.progress, true)
+    pub fn record_on(&self, workload: &Workload, tuning: &Tuning) -> Result<TrialOutcome, TuneError> {
+        run(&tuning.apply(self.parameters, &self.joints)?, workload, self.progress, true)
     }
 
     /// Runs `tuning` on another workload; the tuned axes are those that move on the workload of the problem.
     ///
     /// # Errors
     /// [`TuneError`] if the tuning cannot be applied or the run fails.
-    pub fn run_on(&self, course: &Workload, tuning: &Tuning) -> Result<TuningCandidate, TuneError> {
+    pub fn run_on(&self, workload: &Workload, tuning: &Tuning) -> Result<TuningCandidate, TuneError> {
         let tuned = tuning.apply(self.parameters, &self.joints)?;
-        let figures = run(&tuned, course, self.progress, false)?.figures;
+        let figures = run(&tuned, workload, self.progress, false)?.figures;
         self.progress.finish_run();
         Ok(candidate(tuning.clone(), self.margins(tuning), figures, self.cost, &self.config))
     }
@@ -203,7 +193,7 @@ impl<'a> TuningProblem<'a> {
     /// Runs `tunings` on a workload in parallel, in their order.
     pub(super) fn runs_on(
         &self,
-        course: &Workload,
+        workload: &Workload,
         tunings: Vec<Tuning>,
     ) -> Result<Vec<TuningCandidate>, TuneError> {
         let with_margins = |tuning: Tuning| {
@@ -211,7 +201,7 @@ impl<'a> TuningProblem<'a> {
             (tuning, margins)
         };
         self.progress.begin("both paths", tunings.len());
-        self.run_all(course, tunings.into_par_iter().map(with_margins).collect())
+        self.run_all(workload, tunings.into_par_iter().map(with_margins).collect())
     }
 
     /// Computes the margins of `tunings` in parallel.
@@ -237,17 +227,17 @@ impl<'a> TuningProblem<'a> {
     /// Runs tunings in parallel, in chunks that are simulated side by side.
     fn run_all(
         &self,
-        course: &Workload,
+        workload: &Workload,
         tunings: Vec<(Tuning, Option<Margins>)>,
     ) -> Result<Vec<TuningCandidate>, TuneError> {
         // `with_max_len` lets idle cores take single chunks.
-        let some = tunings.par_chunks(CHUNK).with_max_len(1).map(|tunings| self.run_chunk(course, tunings));
+        let some = tunings.par_chunks(CHUNK).with_max_len(1).map(|tunings| self.run_chunk(workload, tunings));
         Ok(some.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
     }
 
     fn run_chunk(
         &self,
-        course: &Workload,
+        workload: &Workload,
         tunings: &[(Tuning, Option<Margins>)],
     ) -> Result<Vec<TuningCandidate>, TuneError> {
         let tuned =
@@ -255,7 +245,7 @@ impl<'a> TuningProblem<'a> {
         let variants = tunings.iter().map(tuned).collect::<Result<Vec<_>, TuneError>>()?;
         let allow = self.parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
         let go_on = || self.progress.check_interrupt();
-        let figures = course.run_variants(&self.config, &variants, &self.moving, allow, go_on)?;
+        let figures = workload.run_variants(&self.config, &variants, &self.moving, allow, go_on)?;
         let candidates = tunings.iter().zip(figures).map(|((tuning, margins), figures)| {
             self.progress.finish_run();
             candidate(tuning.clone(), *margins, figures, self.cost, &self.config)
@@ -283,13 +273,13 @@ pub(super) fn ranked(mut candidates: Vec<TuningCandidate>) -> Vec<TuningCandidat
 /// Runs a machine on a workload.
 fn run(
     parameters: &Parameters,
-    course: &Workload,
-    watch: &dyn Progress,
+    workload: &Workload,
+    progress: &dyn Progress,
     record: bool,
 ) -> Result<TrialOutcome, TuneError> {
     let config = parameters.machine_config()?;
     let allow = parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
-    Ok(course.run(&config, allow, record, |_| watch.check_interrupt())?)
+    Ok(workload.run(&config, allow, record, |_| progress.check_interrupt())?)
 }
 
 fn candidate(

@@ -75,7 +75,7 @@ pub struct Robustness {
     pub worst: DeviatingRun,
 }
 
-/// Runs `parameters` on `course` with inertia, friction and torque constant changed by ±`by` (relative).
+/// Runs `parameters` on `workload` with inertia, friction and torque constant changed by ±`by` (relative).
 ///
 /// The changes multiply the deviations of the parameters themselves.
 ///
@@ -83,22 +83,22 @@ pub struct Robustness {
 /// [`TuneError`] if a run fails.
 pub fn analyze_robustness(
     parameters: &Parameters,
-    course: &Workload,
+    workload: &Workload,
     cost: &Cost,
     by: f64,
-    watch: &dyn Progress,
+    progress: &dyn Progress,
 ) -> Result<Robustness, TuneError> {
     let (single, combined) = (PlantDeviation::single(by), PlantDeviation::combined(by));
     let all: Vec<PlantDeviation> = [PlantDeviation::NONE].into_iter().chain(single).chain(combined).collect();
-    watch.begin("deviating plants", all.len());
+    progress.begin("deviating plants", all.len());
     let plants =
         all.iter().map(|deviation| deviating(parameters, deviation)).collect::<Result<Vec<_>, _>>()?;
     let machine = parameters.machine_config()?;
     let axes: Vec<usize> = (0..machine.axes().len()).collect();
     let allow = parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
     let side_by_side = |plants: &[MachineConfig]| {
-        let figures = course.run_variants(&machine, plants, &axes, allow, || watch.check_interrupt())?;
-        figures.iter().for_each(|_| watch.finish_run());
+        let figures = workload.run_variants(&machine, plants, &axes, allow, || progress.check_interrupt())?;
+        figures.iter().for_each(|_| progress.finish_run());
         Ok(figures)
     };
     let share = plants.len().div_ceil(rayon::current_num_threads().max(1));

@@ -115,8 +115,8 @@ impl fmt::Display for Tuning {
                 write!(f, "N1 {n1}, N2 {n2}, Nu {nu}, λ_rel {lambda_rel}")
             }
             Tuning::Cascade(axes) => {
-                for (place, (joint, gains)) in axes.iter().enumerate() {
-                    let comma = if place > 0 { "; " } else { "" };
+                for (index, (joint, gains)) in axes.iter().enumerate() {
+                    let comma = if index > 0 { "; " } else { "" };
                     let AxisGains { gain, velocity, torque } = gains;
                     write!(f, "{comma}{joint} Kp {gain}, VFFW {velocity}, TFFW {torque}")?;
                 }

@@ -69,11 +69,11 @@ impl Workload {
         machine: &MachineConfig,
         allow_nonzero_end_velocity: bool,
         record: bool,
-        watch: impl FnMut(Tick<'_>) -> io::Result<()>,
+        observe: impl FnMut(Tick<'_>) -> io::Result<()>,
     ) -> Result<TrialOutcome, TrialError> {
         let program = self.program.clone();
         let trial = Trial { machine, program, allow_nonzero_end_velocity, record };
-        trial::run(&trial, self.setpoints(), watch)
+        trial::run(&trial, self.setpoints(), observe)
     }
 
     /// Runs the workload on `variants` of `machine` that differ in the axes `own`, with
@@ -87,11 +87,11 @@ impl Workload {
         variants: &[MachineConfig],
         own: &[usize],
         allow_nonzero_end_velocity: bool,
-        watch: impl Fn() -> io::Result<()>,
+        go_on: impl Fn() -> io::Result<()>,
     ) -> Result<Vec<Figures>, TrialError> {
         let program = self.program.clone();
         let trial = Trial { machine, program, allow_nonzero_end_velocity, record: false };
-        trial::run_variants(&trial, self.setpoints(), variants, own, watch)
+        trial::run_variants(&trial, self.setpoints(), variants, own, go_on)
     }
 
     fn setpoints(&self) -> SetpointSource<'_> {

@@ -128,15 +128,15 @@ impl<'a> CampaignPlanner<'a> {
     /// Adds standstills at each position, approached from below, then from above.
     fn add_standstills(&mut self) -> Result<(), CampaignError> {
         let [low, high] = self.limits.window;
-        let place = |i: usize| low + (high - low) * (i as f64 + 0.5) / STANDSTILLS as f64;
+        let position = |i: usize| low + (high - low) * (i as f64 + 0.5) / STANDSTILLS as f64;
         let dwell = self.limits.settling_time + STANDSTILL;
         self.position_to(low)?;
         for i in 0..STANDSTILLS {
-            self.add_leg(place(i), MOVING_SPEED * self.limits.max_speed, MOVING_ACCELERATION, dwell)?;
+            self.add_leg(position(i), MOVING_SPEED * self.limits.max_speed, MOVING_ACCELERATION, dwell)?;
         }
         self.position_to(high)?;
         for i in (0..STANDSTILLS).rev() {
-            self.add_leg(place(i), MOVING_SPEED * self.limits.max_speed, MOVING_ACCELERATION, dwell)?;
+            self.add_leg(position(i), MOVING_SPEED * self.limits.max_speed, MOVING_ACCELERATION, dwell)?;
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use super::options::{CampaignOptions, SPEED_RESERVE};
 /// Distance of the setpoints from each end of the range, relative to the range, as margin for overshoot.
 const MARGIN: f64 = 0.05;
 /// Default highest speed, m/min or rev/min: the range of the friction law (Prévost Appendix 2).
-const HIGHEST_SPEED: f64 = 20.0;
+const DEFAULT_MAX_SPEED: f64 = 20.0;
 /// Constant-speed time of a leg after settling, s.
 pub(super) const CONSTANT: f64 = 1.8;
 /// Shortest constant-speed time of a leg after settling, s.
@@ -47,43 +47,46 @@ impl CampaignUnits {
 /// Usable range, highest speed and settling time of a campaign.
 pub(super) struct TravelLimits<'a> {
     pub axis: &'a AxisConfig,
+    /// Start and end position of each part, m or rad.
     pub start: f64,
+    /// Range of motion, m or rad.
     pub window: [f64; 2],
+    /// Highest speed, m/s or rad/s.
     pub max_speed: f64,
+    /// Settling time at a speed, s.
     pub settling_time: f64,
 }
 
 impl<'a> TravelLimits<'a> {
     pub fn new(
         machine: &'a MachineConfig,
-        place: usize,
+        index: usize,
         options: &CampaignOptions,
     ) -> Result<Self, CampaignError> {
         let count = machine.axes().len();
         let axis = machine
             .axes()
-            .get(place)
-            .ok_or(CampaignError::NoAxis { number: place.saturating_add(1), count })?;
+            .get(index)
+            .ok_or(CampaignError::NoAxis { number: index.saturating_add(1), count })?;
         let range = allowed_range(axis, options)?;
-        let highest = highest_speed(axis, options)?;
+        let max_speed = max_speed(axis, options)?;
         let delay = seconds(axis.alpha());
-        let settling =
+        let settling_time =
             (SETTLING_CONSTANTS / axis.position_loop.gain + delay).clamp(LEAST_SETTLING, MOST_SETTLING);
-        let mut room =
-            TravelLimits { axis, start: 0.0, window: range, max_speed: highest, settling_time: settling };
+        let mut limits = TravelLimits { axis, start: 0.0, window: range, max_speed, settling_time };
         let [min, max] = range;
         let extent = max - min;
-        let margin = MARGIN * if extent.is_finite() { extent } else { room.wanted_length() };
+        let margin = MARGIN * if extent.is_finite() { extent } else { limits.wanted_length() };
         let (low, high) = (min + margin, max - margin);
-        room.start = if min <= 0.0 && max >= 0.0 { 0.0 } else { 0.0_f64.clamp(low, high) };
-        let needed = room.leg_length(highest, 1.0, LEAST_CONSTANT);
+        limits.start = if min <= 0.0 && max >= 0.0 { 0.0 } else { 0.0_f64.clamp(low, high) };
+        let needed = limits.leg_length(max_speed, 1.0, LEAST_CONSTANT);
         if needed > high - low {
-            return Err(room.too_short(extent, needed));
+            return Err(limits.too_short(extent, needed));
         }
-        let wanted = room.wanted_length().min(high - low);
-        let low = (room.start - 0.5 * wanted).max(low).min(high - wanted);
-        room.window = [low, low + wanted];
-        Ok(room)
+        let wanted = limits.wanted_length().min(high - low);
+        let low = (limits.start - 0.5 * wanted).max(low).min(high - wanted);
+        limits.window = [low, low + wanted];
+        Ok(limits)
     }
 
     pub fn axis_limits(&self) -> &LimitsConfig {
@@ -178,25 +181,25 @@ fn allowed_range(axis: &AxisConfig, options: &CampaignOptions) -> Result<[f64; 2
     }
     let (unit, length) = CampaignUnits::of(axis).length;
     // Removes rounding errors of the unit conversion.
-    let told = |value: f64| (value / length * 1e6).round() / 1e6;
+    let rounded = |value: f64| (value / length * 1e6).round() / 1e6;
     let end = |value: f64| match value.is_finite() {
-        true => format!("{} {unit}", told(value)),
+        true => format!("{} {unit}", rounded(value)),
         false => "unlimited".to_owned(),
     };
     Err(CampaignError::Range {
-        min: told(min),
-        max: told(max),
+        min: rounded(min),
+        max: rounded(max),
         unit,
         axis: axis.name().to_owned(),
         limits: format!("{} … {}", end(travel_min), end(travel_max)),
     })
 }
 
-fn highest_speed(axis: &AxisConfig, options: &CampaignOptions) -> Result<f64, CampaignError> {
+fn max_speed(axis: &AxisConfig, options: &CampaignOptions) -> Result<f64, CampaignError> {
     let by_motor = axis.motor.max_speed * axis.transmission_ratio;
     let allowed = SPEED_RESERVE * axis.limits.velocity.min(by_motor);
     let (unit, speed) = CampaignUnits::of(axis).speed;
-    let Some(feed) = options.max_feed else { return Ok(allowed.min(HIGHEST_SPEED * speed)) };
+    let Some(feed) = options.max_feed else { return Ok(allowed.min(DEFAULT_MAX_SPEED * speed)) };
     if feed > 0.0 && feed <= allowed * (1.0 + ROUNDING) {
         return Ok(feed.min(allowed));
     }
