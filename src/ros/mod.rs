@@ -9,7 +9,7 @@
 //! | module | RTPS submessage | purpose |
 //! |---|---|---|
 //! | `first_sample_nack` | NACK_FRAG | requests the first sample of a publisher that was matched late |
-//! | `stalled_readers` | GAP | unblocks a writer whose reader sends no ACKNACK |
+//! | `stalled_readers` | GAP | unblocks a writer stalled by a reader whose ACKNACKs acknowledge nothing |
 //! | `dispose` | DATA with PID_KEY_HASH | disposes of the participant or a writer |
 //! | `large_response` | DATA, GAP | delivers service responses longer than the path's MTU |
 //! | `writer_rotation` | – | bounds the memory of a volatile writer |

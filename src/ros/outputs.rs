@@ -135,8 +135,8 @@ impl Queue {
     }
 }
 
-/// Starts the publishing tasks, one per topic.
-pub struct Publishing<'a> {
+/// Factory of outputs, which starts one publishing task per topic.
+pub struct OutputFactory<'a> {
     /// Participant of the node.
     pub participant: &'a DomainParticipant,
     /// Number of dropped messages of all topics.
@@ -149,7 +149,7 @@ pub struct Publishing<'a> {
     pub rotated: &'a mut RotatedTopics,
 }
 
-impl Publishing<'_> {
+impl OutputFactory<'_> {
     /// Starts the task that writes queued messages of a topic; it ends when the output is dropped.
     pub fn start<M: Serialize + Send + Sync + 'static>(
         &mut self,

@@ -1,9 +1,9 @@
 //! GAP that unblocks a writer stalled by a non-acknowledging reader.
 //!
 //! RustDDS keeps the samples that a reliable reader has not acknowledged, up to a limit, and then blocks all writes
-//! until that reader leaves. Fast DDS 2.14 has readers that never send an ACKNACK for new samples again: a KEEP_LAST
-//! reader that lost samples, and received as many newer ones as its depth before the lost ones were repeated,
-//! discards each repetition and requests it again. Only a flood of messages causes this.
+//! until that reader leaves. Fast DDS 2.14 has readers whose ACKNACKs never acknowledge a new sample again: a KEEP_LAST
+//! reader that lost samples, and received as many newer ones as its depth before the lost ones were repeated, discards
+//! each repetition and requests it again. Only a flood of messages causes this.
 //!
 //! After a timeout, a GAP declares the oldest half of the unacknowledged samples irrelevant. A stalled reader then
 //! continues. Readers that have received those samples keep them. A reader that was only slow loses them, which is
@@ -63,8 +63,8 @@ impl StalledReaders {
         let (first, end) = oldest_half(self.written(), self.max_unacknowledged);
         let name = self.topic.trim_start_matches("rt");
         warn!(
-            "stalled reader on {name}: no ACKNACK for {waited_s} s, {} samples unacknowledged; the oldest {} are \
-             discarded (GAP)",
+            "stalled reader on {name}: no sample acknowledged (ACKNACK) for {waited_s} s, {} samples pending; the \
+             oldest {} are discarded (GAP)",
             self.max_unacknowledged,
             end - first
         );

@@ -51,7 +51,7 @@ pub struct Topics {
 pub struct GraphNames {
     subscribed: Vec<String>,
     published: Vec<String>,
-    served: Vec<String>,
+    services: Vec<String>,
     /// Names of the actions.
     pub actions: Vec<String>,
 }
@@ -110,7 +110,7 @@ impl Topics {
             .into_iter()
             .chain(clock.iter().map(|(_, name)| name.clone()))
             .collect(),
-            served: ["~/reset", "~/stop"].iter().filter_map(|s| args.resolve_service(s).ok()).collect(),
+            services: ["~/reset", "~/stop"].iter().filter_map(|s| args.resolve_service(s).ok()).collect(),
             actions: Vec::new(),
         };
         Ok(Topics {
@@ -147,7 +147,7 @@ impl GraphNames {
         for (label, names) in [
             ("subscribes", &self.subscribed),
             ("publishes", &self.published),
-            ("services", &self.served),
+            ("services", &self.services),
             ("actions", &self.actions),
         ] {
             for (index, name) in names.iter().enumerate() {

@@ -45,8 +45,8 @@ Without arguments, the embedded Mikron UCP 710 runs in real time.
 
 fn main() -> ExitCode {
     match arguments().and_then(|arguments| Command::parse(arguments, "virtual_axes")) {
-        Ok(Command::Help) => print(HELP),
-        Ok(Command::Version) => print(concat!("virtual_axes_node ", env!("CARGO_PKG_VERSION"))),
+        Ok(Command::Help) => print_line(HELP),
+        Ok(Command::Version) => print_line(concat!("virtual_axes_node ", env!("CARGO_PKG_VERSION"))),
         Ok(Command::Run(args)) => run(&args),
         Err(error) => fail(&error),
     }
@@ -57,7 +57,7 @@ fn arguments() -> Result<Vec<String>, ArgsError> {
     std::env::args_os().skip(1).map(|argument| argument.into_string().map_err(not_utf8)).collect()
 }
 
-fn print(text: &str) -> ExitCode {
+fn print_line(text: &str) -> ExitCode {
     // A closed stdout is not an error.
     let _ = writeln!(std::io::stdout(), "{text}");
     ExitCode::SUCCESS

@@ -22,7 +22,7 @@ pub use self::status::RecordingStatus;
 use self::status::number;
 use self::tap::RecordingClock;
 pub use self::tap::{Direction, Tap};
-use self::thread::{RecordingEntry, Writing};
+use self::thread::{RecordingEntry, RecordingWriter};
 use super::outputs::OverflowPolicy;
 use super::pace::Health;
 use virtual_axes_core::config::{NodeConfig, QosConfig};
@@ -73,7 +73,7 @@ pub enum RecordError {
 struct Shared {
     path: String,
     entries: mpsc::Sender<RecordingEntry>,
-    /// Free bytes of the queue; closed when writing has ended.
+    /// Semaphore of the free bytes of the queue; closed when writing has ended.
     free_bytes: Arc<Semaphore>,
     overflow: OverflowPolicy,
     clock: RecordingClock,
@@ -95,7 +95,7 @@ pub struct TopicRecorder {
 struct Prepared {
     path: PathBuf,
     file: File,
-    bound: u64,
+    max_bytes: u64,
     topics: Vec<RecordedTopic>,
     shared: Arc<Shared>,
     entries: mpsc::Receiver<RecordingEntry>,
@@ -138,7 +138,7 @@ impl TopicRecorder {
         let shared = Arc::new(shared);
         let topics = Vec::new();
         Ok(TopicRecorder {
-            prepared: Some(Prepared { path, file, bound: config.record_max, topics, shared, entries }),
+            prepared: Some(Prepared { path, file, max_bytes: config.record_max, topics, shared, entries }),
         })
     }
 
@@ -159,17 +159,17 @@ impl TopicRecorder {
     /// [`RecordError`] if the file cannot be written or the thread cannot be started.
     pub fn start(mut self) -> Result<Option<TopicRecording>, RecordError> {
         let Some(prepared) = self.prepared.take() else { return Ok(None) };
-        let Prepared { path, file, bound, topics, shared, entries } = prepared;
+        let Prepared { path, file, max_bytes, topics, shared, entries } = prepared;
         let failed = |source| {
             // The file is still empty.
             let _ = std::fs::remove_file(&path);
             RecordError::Start { path: path.display().to_string(), source }
         };
         let truncate = file.try_clone().map_err(failed)?;
-        let recording = BoundedRecording::new(file, bound, &topics).map_err(failed)?;
+        let recording = BoundedRecording::new(file, max_bytes, &topics).map_err(failed)?;
         let (done, is_done) = oneshot::channel();
-        let writing = Writing { recording, entries, truncate, shared: Arc::clone(&shared), done };
-        std::thread::Builder::new().name("recording".into()).spawn(move || writing.run()).map_err(failed)?;
+        let writer = RecordingWriter { recording, entries, truncate, shared: Arc::clone(&shared), done };
+        std::thread::Builder::new().name("recording".into()).spawn(move || writer.run()).map_err(failed)?;
         info!("recording {} topics in {}", topics.len(), shared.path);
         Ok(Some(TopicRecording { shared, is_done }))
     }

@@ -43,7 +43,7 @@ enum WriteEnd {
 }
 
 /// State of the writing thread.
-pub(super) struct Writing {
+pub(super) struct RecordingWriter {
     pub(super) recording: BoundedRecording<File>,
     pub(super) entries: Receiver<RecordingEntry>,
     /// Second handle of the file, to truncate a chunk that was written in part.
@@ -53,13 +53,13 @@ pub(super) struct Writing {
     pub(super) done: oneshot::Sender<()>,
 }
 
-impl Writing {
+impl RecordingWriter {
     /// Writes entries until the file is closed, has reached its size limit, or fails.
     pub(super) fn run(mut self) {
         let written = self.write();
         // Waiting taps leave their messages out from here on.
         self.shared.free_bytes.close();
-        let Writing { recording, entries, truncate, shared, done } = self;
+        let RecordingWriter { recording, entries, truncate, shared, done } = self;
         let whole = recording.whole();
         let finished = written.and_then(|end| {
             if matches!(end, WriteEnd::SizeLimit) {
