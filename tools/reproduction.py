@@ -71,13 +71,13 @@ def section(title: str, text: str, command: str, rows: list[tuple[str, str, str,
 
 
 def axis_rows(run: dict, axis: str, specified: tuple[str, str], paper: str = "—") -> list[tuple[str, str, str, str]]:
-    """Largest synchronized tracking error and current of an axis."""
+    """Largest delay-compensated following error and current of an axis."""
     figures = run["axes"][axis]
     unit = {"um": "µm", "mdeg": "mdeg"}[figures["unit"]]
     name = axis.upper()
-    error, current = figures["synchronized_tracking_error"]["max"], figures["peak_current_a"]
+    error, current = figures["delay_compensated_following_error"]["max"], figures["peak_current_a"]
     return [
-        (f"{name}, largest synchronized tracking error, {unit}", paper, specified[0], number(error)),
+        (f"{name}, largest delay-compensated following error, {unit}", paper, specified[0], number(error)),
         (f"{name}, largest current, A", "—", specified[1], number(current, 2)),
     ]
 
@@ -87,7 +87,7 @@ def contour_rows(run: dict) -> list[tuple[str, str, str, str]]:
     contour, orientation = run["contour_error_um"], run["orientation_error_mdeg"]
     rows = [
         ("contour error, max, µm", "—", "—", number(contour["max"])),
-        ("the same without overshoot of the path's ends, µm", "—", "—", number(contour["max_within_ends"])),
+        ("the same without overshoot at the path ends, µm", "—", "—", number(contour["max_within_ends"])),
         ("contour error, RMS, µm", "—", "—", number(contour["rms"])),
     ]
     if orientation["max"] > 0:
@@ -95,15 +95,15 @@ def contour_rows(run: dict) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def synchronized_rows(run: dict) -> list[tuple[str, str, str, str]]:
-    """Largest synchronized tracking error of each axis that moves."""
+def following_error_rows(run: dict) -> list[tuple[str, str, str, str]]:
+    """Largest delay-compensated following error of each axis that moves."""
     units = {"um": "µm", "mdeg": "mdeg"}
     return [
         (
-            f"{name.upper()}, largest synchronized tracking error, {units[axis['unit']]}",
+            f"{name.upper()}, largest delay-compensated following error, {units[axis['unit']]}",
             "—",
             "—",
-            number(axis["synchronized_tracking_error"]["max"]),
+            number(axis["delay_compensated_following_error"]["max"]),
         )
         for name, axis in run["axes"].items()
         if axis["moves"]
@@ -190,7 +190,7 @@ def page() -> str:
                 f"{text[0].upper()}{text[1:]}. In the paper "
                 f"{validated.format('5 µm or 0.005°, on the spline to 12 µm')}.",
                 name,
-                synchronized_rows(single) + contour_rows(single),
+                following_error_rows(single) + contour_rows(single),
             )
         )
     command = "ballbar --controller cascade,cascade-noff"
@@ -270,7 +270,7 @@ def page() -> str:
                 f"Section 6, the stated aim: {name}",
                 f"{text}: the final geometric error due to the drives, in the workpiece frame.",
                 name,
-                synchronized_rows(single) + contour_rows(single),
+                following_error_rows(single) + contour_rows(single),
             )
         )
     return "".join(parts)

@@ -170,8 +170,8 @@ fn selected_axes<'a>(
         let known: Vec<&str> = axes.iter().map(AxisConfig::name).collect();
         return Err(format!("--axis {unknown}: the machine has {}", known.join(", ")).into());
     }
-    let wanted = |axis: &&AxisConfig| names.is_empty() || names.iter().any(|name| axis.name() == name);
-    Ok(axes.iter().filter(wanted).collect())
+    let is_selected = |axis: &&AxisConfig| names.is_empty() || names.iter().any(|name| axis.name() == name);
+    Ok(axes.iter().filter(is_selected).collect())
 }
 
 fn design_axis(
@@ -255,8 +255,8 @@ fn controller(
             }
             let velocity_feedforward = preset.number(*feedforward, FEEDFORWARD)?;
             tuning.push(("feedforward", velocity_feedforward));
-            let wanted = PolePlacement { poles, integrator: *integrator, velocity_feedforward };
-            (pole_placement(model, &wanted)?, tuning)
+            let placement = PolePlacement { poles, integrator: *integrator, velocity_feedforward };
+            (pole_placement(model, &placement)?, tuning)
         }
     })
 }

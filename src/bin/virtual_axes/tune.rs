@@ -89,7 +89,7 @@ fn within(text: &str, most: f64) -> Result<f64, String> {
 pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
     let machine = arguments.trial.machine()?;
     let parameters = variant::parameters(&machine, None, &arguments.trial.set, &[])?;
-    let tunable = arguments.controller.map_or_else(|| tunable(&parameters), Ok)?;
+    let tunable = arguments.controller.map_or_else(|| tunable_controller(&parameters), Ok)?;
     if arguments.contrast && tunable != TunableController::Gpc {
         return Err("--contrast requires --controller gpc".into());
     }
@@ -147,11 +147,11 @@ pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
 }
 
 /// Returns the controller of the machine if it can be tuned.
-fn tunable(parameters: &Parameters) -> Result<TunableController, String> {
+fn tunable_controller(parameters: &Parameters) -> Result<TunableController, String> {
     match variant::controller_name(parameters).as_str() {
         "gpc" => Ok(TunableController::Gpc),
         "cascade" | "cascade-noff" => Ok(TunableController::Cascade),
-        other => Err(format!("--controller: say which to tune, gpc or cascade; the machine has {other}")),
+        other => Err(format!("--controller: must be gpc or cascade; the machine has {other}, which cannot be tuned")),
     }
 }
 
@@ -163,7 +163,7 @@ fn limits(arguments: &TuneArguments) -> MarginLimits {
     }
 }
 
-/// Refuses, before the work begins, what could not be written behind it.
+/// Rejects invalid output files before the search starts.
 fn check_outputs(arguments: &TuneArguments, input: &CommandInput) -> Result<(), Box<dyn Error>> {
     for output in [&arguments.out, &arguments.report].into_iter().flatten() {
         input.must_not_be(output)?;
