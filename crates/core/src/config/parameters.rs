@@ -53,7 +53,7 @@ impl Parameters {
     ///
     /// # Errors
     ///
-    /// None: a test loads the embedded file.
+    /// Any [`ConfigError`], which a test excludes for the embedded file.
     pub fn embedded_default() -> Result<Self, ConfigError> {
         Self::builtin(DEFAULT_MACHINE)
     }

@@ -1,4 +1,4 @@
-//! The chain: roles of the joints, the tables, joints to tool pose.
+//! Kinematic chain and forward kinematics: joints to tool pose.
 
 use std::fmt;
 
@@ -11,159 +11,159 @@ use crate::config::{AxisConfig, AxisKind, KinematicsConfig, MachineConfig};
 pub struct ToolPose {
     /// Tool tip, m.
     pub tip: Vector3<f64>,
-    /// Direction from the tip to the spindle, a unit vector.
+    /// Tool axis: unit vector from the tip to the spindle.
     pub axis: Vector3<f64>,
 }
 
-/// What a joint does in the chain.
+/// Role of a joint in the kinematic chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
-    /// Moves the tool along X.
+pub enum AxisRole {
+    /// Linear axis that moves the tool along X.
     X,
-    /// Moves the tool along Y.
+    /// Linear axis that moves the tool along Y.
     Y,
-    /// Moves the tool along Z.
+    /// Linear axis that moves the tool along Z.
     Z,
-    /// Turns the workpiece about X.
+    /// Tilting table that rotates the workpiece about X.
     A,
-    /// Turns the workpiece about Z of the table.
+    /// Rotary table that rotates the workpiece about Z of the tilting table.
     C,
 }
 
-impl Role {
-    /// The linear ones, in the order of coordinates.
-    pub const LINEAR: [Role; 3] = [Role::X, Role::Y, Role::Z];
-    /// All of them.
-    pub const ALL: [Role; 5] = [Role::X, Role::Y, Role::Z, Role::A, Role::C];
+impl AxisRole {
+    /// Linear roles, in the order of coordinates.
+    pub const LINEAR: [AxisRole; 3] = [AxisRole::X, AxisRole::Y, AxisRole::Z];
+    /// All roles.
+    pub const ALL: [AxisRole; 5] = [AxisRole::X, AxisRole::Y, AxisRole::Z, AxisRole::A, AxisRole::C];
 
-    /// Name of a joint that has the role.
+    /// Returns the joint name for the role.
     pub fn name(self) -> &'static str {
         match self {
-            Role::X => "x",
-            Role::Y => "y",
-            Role::Z => "z",
-            Role::A => "a",
-            Role::C => "c",
+            AxisRole::X => "x",
+            AxisRole::Y => "y",
+            AxisRole::Z => "z",
+            AxisRole::A => "a",
+            AxisRole::C => "c",
         }
     }
 
-    /// The kind that the joint must have.
+    /// Returns the axis type for the role.
     pub fn kind(self) -> AxisKind {
         match self {
-            Role::X | Role::Y | Role::Z => AxisKind::Linear,
-            Role::A | Role::C => AxisKind::Rotary,
+            AxisRole::X | AxisRole::Y | AxisRole::Z => AxisKind::Linear,
+            AxisRole::A | AxisRole::C => AxisKind::Rotary,
         }
     }
 
-    fn fits(self, axis: &AxisConfig) -> bool {
+    fn matches(self, axis: &AxisConfig) -> bool {
         axis.kind() == self.kind() && axis.name().eq_ignore_ascii_case(self.name())
     }
 }
 
-impl fmt::Display for Role {
+impl fmt::Display for AxisRole {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
 }
 
-/// Kinematics of one machine; see the [room](super) for the equations.
+/// Kinematics of a machine; the [module documentation](super) contains the equations.
 ///
-/// A joint has a role by its name (`x`, `y`, `z`, `a`, `c`, upper or lower case) and its kind. A role
-/// that no joint has is held at 0; a joint without a role does not move the tool.
+/// Name (`x`, `y`, `z`, `a`, `c`, in upper or lower case) and type of a joint determine its role. A role without joint
+/// is fixed at 0; a joint without role does not move the tool.
 ///
 /// ```
-/// use virtual_axes::config::Parameters;
-/// use virtual_axes::kinematics::Kinematics;
+/// use virtual_axes_core::config::Parameters;
+/// use virtual_axes_core::kinematics::Kinematics;
 ///
 /// let kinematics = Kinematics::new(&Parameters::embedded_default()?.machine_config()?);
-/// // x, y, z in m, a = 90°, c = 0: the tool lies along −Y of the workpiece.
+/// // x, y, z in m, a = 90°, c = 0: the tool axis is −Y of the workpiece.
 /// let pose = kinematics.forward(&[0.0, 0.0, 0.1, std::f64::consts::FRAC_PI_2, 0.0]);
 /// assert!((pose.axis.y + 1.0).abs() < 1e-15 && pose.tip.norm() < 1e-15);
-/// # Ok::<(), virtual_axes::config::ConfigError>(())
+/// # Ok::<(), virtual_axes_core::config::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kinematics {
     pub(super) geometry: KinematicsConfig,
-    /// Place of the joint of each role, in the order of [`Role`].
-    places: [Option<usize>; Role::ALL.len()],
-    /// Joints of the machine.
+    /// Joint index of each role, in the order of [`AxisRole`].
+    indices: [Option<usize>; AxisRole::ALL.len()],
+    /// Number of joints of the machine.
     pub(super) joints: usize,
-    /// Stroke of A, rad.
-    pub(super) stroke_a: [f64; 2],
+    /// Travel limits of A, rad.
+    pub(super) travel_a: [f64; 2],
 }
 
 impl Kinematics {
-    /// The kinematics of a machine.
+    /// Creates the kinematics of a machine.
     pub fn new(config: &MachineConfig) -> Self {
         let axes = config.axes();
-        let places = Role::ALL.map(|role| axes.iter().position(|axis| role.fits(axis)));
-        let stroke_a = places[Role::A as usize].map(|place| axes[place].limits());
+        let indices = AxisRole::ALL.map(|role| axes.iter().position(|axis| role.matches(axis)));
+        let travel_a = indices[AxisRole::A as usize].map(|index| axes[index].limits());
         Self {
             geometry: *config.kinematics(),
-            places,
+            indices,
             joints: axes.len(),
-            stroke_a: stroke_a
+            travel_a: travel_a
                 .map_or([f64::NEG_INFINITY, f64::INFINITY], |limits| [limits.travel_min, limits.travel_max]),
         }
     }
 
-    /// Whether a joint moves the tool tip along X, Y or Z.
+    /// Returns true if a joint moves the tool along X, Y or Z.
     pub fn has_linear_axis(&self) -> bool {
-        Role::LINEAR.iter().any(|role| self.role(*role).is_some())
+        AxisRole::LINEAR.iter().any(|role| self.role(*role).is_some())
     }
 
-    /// Whether a joint turns the tool relative to the workpiece.
+    /// Returns true if a joint rotates the workpiece.
     pub fn has_rotary_axis(&self) -> bool {
-        self.role(Role::A).is_some() || self.role(Role::C).is_some()
+        self.role(AxisRole::A).is_some() || self.role(AxisRole::C).is_some()
     }
 
-    /// Place of the joint that has the role, in the order of the machine's `joints`.
-    pub fn role(&self, role: Role) -> Option<usize> {
-        self.places[role as usize]
+    /// Returns the index of the joint with the role, in the order of `joints` of the machine.
+    pub fn role(&self, role: AxisRole) -> Option<usize> {
+        self.indices[role as usize]
     }
 
-    /// Value of the joint that has the role, 0 where there is none.
-    pub(super) fn value(&self, joints: &[f64], role: Role) -> f64 {
+    /// Returns the value of the joint with the role, 0 if there is none.
+    pub(super) fn value(&self, joints: &[f64], role: AxisRole) -> f64 {
         debug_assert_eq!(joints.len(), self.joints, "one value for each joint");
-        self.role(role).and_then(|place| joints.get(place)).copied().unwrap_or(0.0)
+        self.role(role).and_then(|index| joints.get(index)).copied().unwrap_or(0.0)
     }
 
     fn tables_at(&self, joints: &[f64]) -> Tables<'_> {
-        self.tables(self.value(joints, Role::A), self.value(joints, Role::C))
+        self.tables(self.value(joints, AxisRole::A), self.value(joints, AxisRole::C))
     }
 
-    /// The tables at a and c, rad.
+    /// Returns the tables at the angles a and c, rad.
     pub(super) fn tables(&self, a: f64, c: f64) -> Tables<'_> {
         Tables { geometry: &self.geometry, a: a.sin_cos(), c: c.sin_cos() }
     }
 
-    /// Pose of the tool at these joints: one value for each joint of the machine, m or rad.
+    /// Returns the tool pose (forward kinematics). `joints` contains one value per joint of the machine, m or rad.
     pub fn forward(&self, joints: &[f64]) -> ToolPose {
-        self.forward_from(&mut Turned::default(), joints)
+        self.forward_cached(&mut TableAngles::default(), joints)
     }
 
-    /// As [`forward`](Self::forward), for poses that follow each other: `turned` is where the tables stood.
-    pub fn forward_from(&self, turned: &mut Turned, joints: &[f64]) -> ToolPose {
-        let tables = self.turned(turned, [self.value(joints, Role::A), self.value(joints, Role::C)]);
-        let linear = Role::LINEAR.map(|role| self.value(joints, role));
+    /// Returns the tool pose, see [`forward`](Self::forward). `table_angles` caches sines and cosines between calls.
+    pub fn forward_cached(&self, table_angles: &mut TableAngles, joints: &[f64]) -> ToolPose {
+        let tables = self
+            .tables_cached(table_angles, [self.value(joints, AxisRole::A), self.value(joints, AxisRole::C)]);
+        let linear = AxisRole::LINEAR.map(|role| self.value(joints, role));
         ToolPose { tip: tables.tip(Vector3::from(linear)), axis: tables.tool_axis() }
     }
 
-    /// The tables at `angles`, rad.
+    /// Returns the tables at `angles` (rad), and updates the cache.
     #[inline]
-    pub(super) fn turned(&self, turned: &mut Turned, angles: [f64; 2]) -> Tables<'_> {
-        turned.turn_to(angles);
-        let [a, c] = turned.sin_cos;
+    pub(super) fn tables_cached(&self, table_angles: &mut TableAngles, angles: [f64; 2]) -> Tables<'_> {
+        table_angles.update(angles);
+        let [a, c] = table_angles.sin_cos;
         Tables { geometry: &self.geometry, a, c }
     }
 
-    /// Orientation of the tool frame in the workpiece frame, `Rz(c) Rx(a)`; its Z axis is the tool axis.
+    /// Returns the orientation of the tool frame in the workpiece frame, `Rz(c) Rx(a)`. Its Z axis is the tool axis.
     ///
-    /// It is continuous in the joints, also over whole turns of C: after one it is the opposite quaternion,
-    /// which is the same orientation.
+    /// The quaternion is continuous in the joints. A full turn of C negates it, which is the same orientation.
     pub fn orientation(&self, joints: &[f64]) -> UnitQuaternion<f64> {
-        let (sin_a, cos_a) = (0.5 * self.value(joints, Role::A)).sin_cos();
-        let (sin_c, cos_c) = (0.5 * self.value(joints, Role::C)).sin_cos();
+        let (sin_a, cos_a) = (0.5 * self.value(joints, AxisRole::A)).sin_cos();
+        let (sin_c, cos_c) = (0.5 * self.value(joints, AxisRole::C)).sin_cos();
         UnitQuaternion::new_unchecked(Quaternion::new(
             cos_c * cos_a,
             cos_c * sin_a,
@@ -172,45 +172,44 @@ impl Kinematics {
         ))
     }
 
-    /// Tool-center-point programming: `coordinates` holds for each joint its value, but for x, y and z
-    /// the tip's coordinates in the workpiece frame, m; they are turned into joints in place. A and C
-    /// are joints in both.
+    /// Converts tool center point (TCP) coordinates to joints, in place: x, y and z from tip coordinates in the workpiece
+    /// frame (m) to joint positions; all other joints are unchanged.
     ///
-    /// On a machine that lacks one of x, y and z the tip has there the coordinate of home.
+    /// On a machine without one of x, y and z, the tip has the coordinate of the home position there.
     pub fn tip_to_joints(&self, coordinates: &mut [f64]) {
         let home = -self.tool_vector() - Vector3::from(self.geometry.workpiece);
         let mut tip = home;
-        for (coordinate, role) in tip.iter_mut().zip(Role::LINEAR) {
+        for (coordinate, role) in tip.iter_mut().zip(AxisRole::LINEAR) {
             if self.role(role).is_some() {
                 *coordinate = self.value(coordinates, role);
             }
         }
         let linear = self.tables_at(coordinates).linear_joints(tip);
-        self.put_linear(linear, coordinates);
+        self.set_linear(linear, coordinates);
     }
 
-    /// Tip coordinates instead of x, y and z: the inverse of [`tip_to_joints`](Self::tip_to_joints) on
-    /// machines that have all three, or no rotary axis.
+    /// Converts joints to tool center point (TCP) coordinates, in place. It is the inverse of
+    /// [`tip_to_joints`](Self::tip_to_joints) on machines with x, y and z, or without rotary axes.
     pub fn joints_to_tip(&self, joints: &mut [f64]) {
         let tip = self.forward(joints).tip;
-        self.put_tip(tip, joints);
+        self.set_tip(tip, joints);
     }
 
-    /// Writes the coordinates of the tip (m, workpiece frame) in the place of x, y and z.
-    pub fn put_tip(&self, tip: Vector3<f64>, coordinates: &mut [f64]) {
-        self.put_linear(tip, coordinates);
+    /// Sets x, y and z to the coordinates of the tip, m, workpiece frame.
+    pub fn set_tip(&self, tip: Vector3<f64>, coordinates: &mut [f64]) {
+        self.set_linear(tip, coordinates);
     }
 
-    /// Writes the coordinates of those linear roles that joints have.
-    fn put_linear(&self, values: Vector3<f64>, joints: &mut [f64]) {
-        for (value, role) in values.iter().zip(Role::LINEAR) {
-            self.put(role, *value, joints);
+    /// Sets the values of the joints with linear roles.
+    fn set_linear(&self, values: Vector3<f64>, joints: &mut [f64]) {
+        for (value, role) in values.iter().zip(AxisRole::LINEAR) {
+            self.set(role, *value, joints);
         }
     }
 
-    /// Writes the value of the joint that has the role, if one has.
-    pub(super) fn put(&self, role: Role, value: f64, joints: &mut [f64]) {
-        if let Some(joint) = self.role(role).and_then(|place| joints.get_mut(place)) {
+    /// Sets the value of the joint with the role, if there is one.
+    pub(super) fn set(&self, role: AxisRole, value: f64, joints: &mut [f64]) {
+        if let Some(joint) = self.role(role).and_then(|index| joints.get_mut(index)) {
             *joint = value;
         }
     }
@@ -220,30 +219,30 @@ impl Kinematics {
     }
 }
 
-/// From the tip to the point that X, Y and Z move, machine frame, m.
+/// Returns the vector from the tip to the point moved by X, Y and Z, machine frame, m.
 fn tool_vector(geometry: &KinematicsConfig) -> Vector3<f64> {
     Vector3::new(0.0, 0.0, geometry.tool_length)
 }
 
-/// Where the tables stand, with what is reckoned from it: most paths turn one of them or none.
+/// Table angles with their cached sines and cosines. Most paths move only one table or none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turned {
-    /// a and c, rad.
+pub struct TableAngles {
+    /// Angles a and c, rad.
     angles: [f64; 2],
     sin_cos: [(f64, f64); 2],
 }
 
-impl Default for Turned {
-    /// Both at 0.
+impl Default for TableAngles {
+    /// Returns both angles at 0.
     fn default() -> Self {
-        Turned { angles: [0.0; 2], sin_cos: [(0.0, 1.0); 2] }
+        TableAngles { angles: [0.0; 2], sin_cos: [(0.0, 1.0); 2] }
     }
 }
 
-impl Turned {
-    fn turn_to(&mut self, angles: [f64; 2]) {
+impl TableAngles {
+    fn update(&mut self, angles: [f64; 2]) {
         for ((angle, sin_cos), next) in self.angles.iter_mut().zip(&mut self.sin_cos).zip(angles) {
-            // −0 has another sine than 0.
+            // The sine of −0 differs from that of 0.
             if angle.to_bits() != next.to_bits() {
                 (*angle, *sin_cos) = (next, next.sin_cos());
             }
@@ -251,7 +250,7 @@ impl Turned {
     }
 }
 
-/// Both tables at one pair of angles.
+/// Tilting and rotary table at given angles.
 pub(super) struct Tables<'a> {
     geometry: &'a KinematicsConfig,
     /// Sine and cosine of a.
@@ -261,14 +260,14 @@ pub(super) struct Tables<'a> {
 }
 
 impl Tables<'_> {
-    /// u = (sin a sin c, −sin a cos c, cos a); each component with its own relative accuracy.
+    /// Returns the tool axis u = (sin a sin c, −sin a cos c, cos a). Each component has full relative accuracy.
     #[inline]
     pub(super) fn tool_axis(&self) -> Vector3<f64> {
         let ((sin_a, cos_a), (sin_c, cos_c)) = (self.a, self.c);
         Vector3::new(sin_a * sin_c, -sin_a * cos_c, cos_a)
     }
 
-    /// Tip in the workpiece frame with X, Y and Z at `linear`, m.
+    /// Returns the tip in the workpiece frame for X, Y and Z at `linear`, m.
     #[inline]
     pub(super) fn tip(&self, linear: Vector3<f64>) -> Vector3<f64> {
         let ([pivot_a, pivot_c, workpiece], (sin_a, cos_a), (sin_c, cos_c)) = (self.points(), self.a, self.c);
@@ -277,7 +276,7 @@ impl Tables<'_> {
         Vector3::new(cos_c * p.x - sin_c * p.y, sin_c * p.x + cos_c * p.y, p.z) + pivot_c - workpiece
     }
 
-    /// X, Y and Z with the tip there in the workpiece frame, m: the inverse of [`tip`](Self::tip).
+    /// Returns X, Y and Z for a tip in the workpiece frame, m. It is the inverse of [`tip`](Self::tip).
     pub fn linear_joints(&self, tip: Vector3<f64>) -> Vector3<f64> {
         let ([pivot_a, pivot_c, workpiece], (sin_a, cos_a), (sin_c, cos_c)) = (self.points(), self.a, self.c);
         let p = workpiece + tip - pivot_c;
@@ -286,7 +285,7 @@ impl Tables<'_> {
         p + pivot_a + tool_vector(self.geometry)
     }
 
-    /// Pa, Pc and W.
+    /// Returns Pa, Pc and W, m.
     fn points(&self) -> [Vector3<f64>; 3] {
         let KinematicsConfig { pivot_a, pivot_c, workpiece, .. } = *self.geometry;
         [

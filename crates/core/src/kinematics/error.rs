@@ -1,59 +1,59 @@
-//! Why no joints bring the tool to a pose.
+//! Errors of the inverse kinematics.
 
 use thiserror::Error;
 
-use super::chain::Role;
+use super::chain::AxisRole;
+use crate::units::Rounded;
 
-/// A pose that the machine has no joints for.
+/// Rejection of a pose by the inverse kinematics.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum KinematicsError {
-    /// NaN or infinity in the pose or in the joints near which the solution is sought.
-    #[error("the pose with tip {tip:?} m and tool axis {axis:?}, near given joints, is not finite")]
+    /// NaN or infinity in the pose or in the reference joints.
+    #[error("tip {tip:?} m, tool axis {axis:?} or reference joints are not finite")]
     NotFinite {
         /// Tip, m.
         tip: [f64; 3],
         /// Tool axis.
         axis: [f64; 3],
     },
-    /// A tool axis of length zero.
-    #[error("the tool axis {axis:?} has no direction; it must have the length 1")]
+    /// Tool axis of length zero.
+    #[error("tool axis {axis:?} has length 0, must be a unit vector")]
     NoDirection {
         /// Tool axis.
         axis: [f64; 3],
     },
-    /// The wrong number of joints.
-    #[error("{found} joints given, the machine has {wanted}")]
+    /// Wrong number of joints.
+    #[error("found {found} joints, the machine has {wanted}")]
     WrongSize {
-        /// Joints given.
+        /// Number of joints found.
         found: usize,
-        /// Joints of the machine.
+        /// Number of joints of the machine.
         wanted: usize,
     },
-    /// A tool axis that needs a rotary axis which the machine does not have.
+    /// Tool axis that requires a missing rotary axis.
     #[error(
-        "the tool axis {axis:?} needs a rotary axis {missing}, which the machine does not have: \
-         the nearest direction it reaches is {} deg away",
-        .angle.to_degrees()
+        "tool axis {axis:?} is unreachable without a rotary axis {missing}; the nearest reachable direction differs by {} deg",
+        Rounded(.angle.to_degrees())
     )]
     AxisUnreachable {
         /// Tool axis.
         axis: [f64; 3],
-        /// The joint that is missing.
-        missing: Role,
-        /// Angle to the nearest direction that can be reached, rad.
+        /// Role of the missing joint.
+        missing: AxisRole,
+        /// Angle to the nearest reachable direction, rad.
         angle: f64,
     },
-    /// A tip that needs a linear axis which the machine does not have.
+    /// Tip that requires a missing linear axis.
     #[error(
-        "the tip {tip:?} m needs a linear axis {missing} at {} mm, and the machine has none (it counts as 0)",
-        .position * 1e3
+        "tip {tip:?} m is unreachable without a linear axis {missing}, which would be at {} mm",
+        Rounded(.position * 1e3)
     )]
     TipUnreachable {
         /// Tip, m.
         tip: [f64; 3],
-        /// The joint that is missing.
-        missing: Role,
-        /// Where it would have to be, m.
+        /// Role of the missing joint.
+        missing: AxisRole,
+        /// Required position of the missing joint, m.
         position: f64,
     },
 }

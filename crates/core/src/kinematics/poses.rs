@@ -1,77 +1,84 @@
-//! Poses of the tool at many instants at once.
+//! Batch forward kinematics: tool poses at consecutive instants.
 
 use nalgebra::Vector3;
 
-use super::chain::{Kinematics, Role, ToolPose, Turned};
+use super::chain::{AxisRole, Kinematics, TableAngles, ToolPose};
 
-/// Poses of the tool at instants that follow each other, coordinate by coordinate.
+/// Tool poses at consecutive instants, as structure of arrays.
 #[derive(Debug, Clone, Default)]
 pub struct Poses {
     /// X, Y and Z of the tips, m, workpiece frame.
     tips: [Vec<f64>; 3],
-    /// Tool axes; a single one where the tables stand still.
+    /// Tool axes; a single one if the tables do not move.
     axes: Vec<Vector3<f64>>,
 }
 
-/// Whether all values are the same, bit for bit.
-fn stand(values: &[f64]) -> bool {
+/// Returns true if all values are bit-identical.
+fn are_equal(values: &[f64]) -> bool {
     values.iter().all(|value| value.to_bits() == values[0].to_bits())
 }
 
 impl Poses {
-    /// How many there are.
+    /// Returns the number of poses.
     pub fn len(&self) -> usize {
         self.tips[0].len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no poses.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// X, Y and Z of the tips, m, workpiece frame.
+    /// Returns X, Y and Z of the tips, m, workpiece frame.
     pub fn tips(&self) -> [&[f64]; 3] {
         self.tips.each_ref().map(Vec::as_slice)
     }
 
-    /// One of the tips, m, workpiece frame.
+    /// Returns the tip at `instant`, m, workpiece frame.
     ///
     /// # Panics
-    /// If there is no such instant.
+    /// If `instant` is not below [`len`](Self::len).
     #[inline]
     pub fn tip(&self, instant: usize) -> Vector3<f64> {
         Vector3::new(self.tips[0][instant], self.tips[1][instant], self.tips[2][instant])
     }
 
-    /// One of them.
+    /// Returns the pose at `instant`.
     ///
     /// # Panics
-    /// If there is no such instant.
+    /// If `instant` is not below [`len`](Self::len).
     pub fn get(&self, instant: usize) -> ToolPose {
         ToolPose { tip: self.tip(instant), axis: self.axes[instant.min(self.axes.len() - 1)] }
     }
 
-    /// The tool axis of all of them, if the tables stand still.
-    pub fn only_axis(&self) -> Option<Vector3<f64>> {
+    /// Returns the common tool axis if the tables do not move.
+    pub fn constant_axis(&self) -> Option<Vector3<f64>> {
         if let [axis] = self.axes[..] { Some(axis) } else { None }
     }
 
-    /// Whether all of them are the same, bit for bit.
-    pub fn stand_still(&self) -> bool {
-        self.axes.len() <= 1 && self.tips().into_iter().all(stand)
+    /// Returns true if all poses are bit-identical.
+    pub fn is_constant(&self) -> bool {
+        self.axes.len() <= 1 && self.tips().into_iter().all(are_equal)
     }
 }
 
 impl Kinematics {
-    /// As [`forward_from`](Self::forward_from), for `instants` that follow each other: `joints` has the values
-    /// of one joint at all of them behind those of another, m or rad. The same bits.
-    pub fn forward_all(&self, turned: &mut Turned, joints: &[f64], instants: usize, poses: &mut Poses) {
+    /// Computes the tool poses at `instants` consecutive instants, bit-identical to
+    /// [`forward_cached`](Self::forward_cached). `joints` contains the values of the first joint at all instants, then those
+    /// of the next joint, m or rad.
+    pub fn forward_batch(
+        &self,
+        table_angles: &mut TableAngles,
+        joints: &[f64],
+        instants: usize,
+        poses: &mut Poses,
+    ) {
         debug_assert_eq!(joints.len(), self.joints * instants, "one value for each joint and instant");
-        let of = |role: Role| {
-            let place = self.role(role)?;
-            joints.get(place * instants..(place + 1) * instants)
+        let of = |role: AxisRole| {
+            let index = self.role(role)?;
+            joints.get(index * instants..(index + 1) * instants)
         };
-        for (tips, role) in poses.tips.iter_mut().zip(Role::LINEAR) {
+        for (tips, role) in poses.tips.iter_mut().zip(AxisRole::LINEAR) {
             tips.clear();
             match of(role) {
                 Some(values) => tips.extend_from_slice(values),
@@ -79,19 +86,19 @@ impl Kinematics {
             }
         }
         poses.axes.clear();
-        let tables = [of(Role::A), of(Role::C)];
+        let tables = [of(AxisRole::A), of(AxisRole::C)];
         let angles = |instant: usize| tables.map(|values| values.map_or(0.0, |values| values[instant]));
         let [xs, ys, zs] = &mut poses.tips;
         let linear = xs.iter_mut().zip(ys.iter_mut()).zip(zs.iter_mut());
-        if instants > 0 && tables.into_iter().flatten().all(stand) {
-            let tables = self.turned(turned, angles(0));
+        if instants > 0 && tables.into_iter().flatten().all(are_equal) {
+            let tables = self.tables_cached(table_angles, angles(0));
             poses.axes.push(tables.tool_axis());
             for ((x, y), z) in linear {
                 [*x, *y, *z] = tables.tip(Vector3::new(*x, *y, *z)).into();
             }
         } else {
             for (instant, ((x, y), z)) in linear.enumerate() {
-                let tables = self.turned(turned, angles(instant));
+                let tables = self.tables_cached(table_angles, angles(instant));
                 poses.axes.push(tables.tool_axis());
                 [*x, *y, *z] = tables.tip(Vector3::new(*x, *y, *z)).into();
             }

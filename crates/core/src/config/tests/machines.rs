@@ -1,11 +1,11 @@
-//! The shipped machines, number by number.
+//! Values of the built-in machines.
 
 use std::f64::consts::{PI, TAU};
 
 use super::{MIKRON, mikron};
 use crate::config::{AxisConfig, AxisKind, KinematicsConfig, MachineConfig, Parameters, ValueSource};
 
-/// Relative difference that the conversion of units may leave.
+/// Relative tolerance for the conversion of units.
 const ROUNDING: f64 = 1e-12;
 
 fn assert_near(actual: f64, expected: f64, what: &str) {
@@ -17,12 +17,12 @@ fn assert_near(actual: f64, expected: f64, what: &str) {
 }
 
 fn machine(name: &str) -> MachineConfig {
-    let parameters = Parameters::builtin(name).expect("a shipped machine");
+    let parameters = Parameters::builtin(name).expect("a built-in machine");
     parameters.machine_config().expect("a valid machine")
 }
 
-/// One column of the table of the model, in SI units.
-struct Column {
+/// Parameters of one axis, in SI units (Prévost Appendix 2).
+struct ExpectedAxis {
     name: &'static str,
     kind: AxisKind,
     ratio: f64,
@@ -38,7 +38,7 @@ struct Column {
     gravity: [f64; 3],
     /// Vmax, Amax, Jmax.
     limits: [f64; 3],
-    stroke: (f64, f64),
+    travel: (f64, f64),
 }
 
 /// 1FT7086-AC7, 2000 rpm.
@@ -48,10 +48,10 @@ const SMALL: [f64; 7] = [0.88, 0.293, 0.61, 0.0042, 30.0, 245.0, 6000.0 * TAU / 
 const ROTARY_FRICTION: [f64; 5] = [0.6, 0.019, -0.2, -0.3, 0.4];
 const LEAD: f64 = 0.020;
 
-fn columns() -> [Column; 5] {
+fn expected_axes() -> [ExpectedAxis; 5] {
     let turn = PI / 180.0;
     [
-        Column {
+        ExpectedAxis {
             name: "x",
             kind: AxisKind::Linear,
             ratio: LEAD / TAU,
@@ -64,9 +64,9 @@ fn columns() -> [Column; 5] {
             motor: LARGE,
             gravity: [0.0; 3],
             limits: [0.5, 2.5, 50.0],
-            stroke: (-0.355, 0.355),
+            travel: (-0.355, 0.355),
         },
-        Column {
+        ExpectedAxis {
             name: "y",
             kind: AxisKind::Linear,
             ratio: LEAD / TAU,
@@ -79,9 +79,9 @@ fn columns() -> [Column; 5] {
             motor: LARGE,
             gravity: [0.0; 3],
             limits: [0.5, 3.0, 50.0],
-            stroke: (-0.275, 0.275),
+            travel: (-0.275, 0.275),
         },
-        Column {
+        ExpectedAxis {
             name: "z",
             kind: AxisKind::Linear,
             ratio: LEAD / TAU,
@@ -94,9 +94,9 @@ fn columns() -> [Column; 5] {
             motor: LARGE,
             gravity: [400.0, 0.0, 0.0],
             limits: [0.5, 2.1, 50.0],
-            stroke: (-0.250, 0.250),
+            travel: (-0.250, 0.250),
         },
-        Column {
+        ExpectedAxis {
             name: "a",
             kind: AxisKind::Rotary,
             ratio: 1.0 / 180.0,
@@ -109,9 +109,9 @@ fn columns() -> [Column; 5] {
             motor: SMALL,
             gravity: [0.0, 30.0, 0.0],
             limits: [15.0 * TAU / 60.0, 0.83 * TAU, 50.0 * TAU],
-            stroke: (-30.0 * turn, 120.0 * turn),
+            travel: (-30.0 * turn, 120.0 * turn),
         },
-        Column {
+        ExpectedAxis {
             name: "c",
             kind: AxisKind::Rotary,
             ratio: 1.0 / 120.0,
@@ -124,12 +124,12 @@ fn columns() -> [Column; 5] {
             motor: SMALL,
             gravity: [0.0; 3],
             limits: [20.0 * TAU / 60.0, 0.83 * TAU, 50.0 * TAU],
-            stroke: (f64::NEG_INFINITY, f64::INFINITY),
+            travel: (f64::NEG_INFINITY, f64::INFINITY),
         },
     ]
 }
 
-impl Column {
+impl ExpectedAxis {
     fn check(&self, axis: &AxisConfig) {
         assert_eq!(axis.name, self.name);
         assert_eq!(axis.kind, self.kind);
@@ -163,8 +163,8 @@ impl Column {
             ("Vmax", axis.limits.velocity, self.limits[0]),
             ("Amax", axis.limits.acceleration, self.limits[1]),
             ("Jmax", axis.limits.jerk, self.limits[2]),
-            ("stroke min", axis.limits.travel_min, self.stroke.0),
-            ("stroke max", axis.limits.travel_max, self.stroke.1),
+            ("travel min", axis.limits.travel_min, self.travel.0),
+            ("travel max", axis.limits.travel_max, self.travel.1),
         ];
         for (what, actual, expected) in pairs {
             assert_near(actual, expected, &format!("{} {what}", self.name));
@@ -175,7 +175,7 @@ impl Column {
 }
 
 #[test]
-fn mikron_has_every_value_of_the_model() {
+fn mikron_has_the_expected_values() {
     let machine = machine("mikron_ucp710");
     assert_eq!(machine.name(), "Mikron UCP 710");
     let periods = machine.periods();
@@ -183,13 +183,13 @@ fn mikron_has_every_value_of_the_model() {
     let kinematics = KinematicsConfig { tool_length: 0.1, ..KinematicsConfig::default() };
     assert_eq!(machine.kinematics(), &kinematics);
     assert_eq!(machine.axes().len(), 5);
-    for (column, axis) in columns().iter().zip(machine.axes()) {
-        column.check(axis);
+    for (expected, axis) in expected_axes().iter().zip(machine.axes()) {
+        expected.check(axis);
     }
 }
 
 #[test]
-fn linear_motors_count_in_meters_and_newtons() {
+fn linear_motors_have_units_of_meters_and_newtons() {
     let machine = machine("linear_motor_center");
     let x = &machine.axes()[0];
     assert_eq!((x.kind, x.transmission_ratio), (AxisKind::Linear, 1.0));
@@ -205,7 +205,7 @@ fn linear_motors_count_in_meters_and_newtons() {
 }
 
 #[test]
-fn each_part_of_the_kinematics_has_its_key() {
+fn each_kinematics_value_has_its_key() {
     let mut parameters = mikron();
     let keys = [
         "tool_length",
@@ -232,16 +232,16 @@ fn each_part_of_the_kinematics_has_its_key() {
 }
 
 #[test]
-fn a_file_that_says_nothing_of_kinematics_has_a_tool_without_length() {
+fn a_file_without_kinematics_has_zero_tool_length() {
     let (before, rest) = MIKRON.split_once("    kinematics:\n").expect("the section");
-    let (_, after) = rest.split_once("\n\n").expect("an empty line behind it");
+    let (_, after) = rest.split_once("\n\n").expect("an empty line after it");
     let parameters = Parameters::from_yaml(&format!("{before}\n{after}"), "my.yaml").expect("a machine");
     let machine = parameters.machine_config().expect("a valid machine");
     assert_eq!(machine.kinematics(), &KinematicsConfig::default());
 }
 
 #[test]
-fn every_shipped_machine_is_valid_and_the_default_is_the_first() {
+fn builtin_machines_are_valid_and_the_default_is_the_first() {
     let names: Vec<&str> = Parameters::builtin_names().collect();
     assert_eq!(names, ["mikron_ucp710", "linear_motor_center"]);
     for name in names {
@@ -251,7 +251,7 @@ fn every_shipped_machine_is_valid_and_the_default_is_the_first() {
 }
 
 #[test]
-fn every_value_that_no_paper_prints_is_marked_assumed() {
+fn every_value_without_a_source_is_marked_assumed() {
     let unmarked = |text: &str, axis: &str, key: &str| {
         let line = text
             .split_once(&format!("\n    {axis}:\n"))
@@ -271,7 +271,7 @@ fn every_value_that_no_paper_prints_is_marked_assumed() {
             assert!(!unmarked(MIKRON, axis, key), "{axis} {key}");
         }
     }
-    // A value of the linear-motor machine without a mark would pass for a measured one.
+    // Every value of the linear-motor machine is assumed.
     let other = include_str!("../../../config/linear_motor_center.yaml");
     for line in other.lines().skip_while(|line| !line.contains("periods:")) {
         let has_value = line.split('#').next().and_then(|code| code.split_once(": ")).is_some();

@@ -1,4 +1,4 @@
-//! Setting parameters: one at a time, several, from files on top of a machine.
+//! Setting parameters: single values, batches and overlay files.
 
 use super::mikron;
 use crate::config::{
@@ -18,16 +18,16 @@ fn set(text: &str) -> Result<Parameters, String> {
     }
 }
 
-fn refused(text: &str) -> String {
+fn rejection(text: &str) -> String {
     set(text).err().unwrap_or_else(|| "accepted".to_owned())
 }
 
 #[test]
-fn every_live_key_takes_both_ends_of_its_range() {
+fn every_live_key_accepts_both_ends_of_its_range() {
     let mut live = 0;
     for machine in Parameters::builtin_names() {
-        let start = Parameters::builtin(machine).expect("a shipped machine");
-        for (key, definition) in start.definitions().filter(|(_, definition)| definition.live) {
+        let start = Parameters::builtin(machine).expect("a built-in machine");
+        for (key, definition) in start.definitions().filter(|(_, definition)| definition.is_live) {
             live += 1;
             let values = match definition.kind {
                 ParameterKind::Number { min, max } => vec![Value::Double(min), Value::Double(max)],
@@ -43,7 +43,7 @@ fn every_live_key_takes_both_ends_of_its_range() {
             };
             for value in values {
                 let mut parameters = start.clone();
-                // What goes with the key, so that its own range is what is tried.
+                // Values of related keys, so that only the range of the key is tested.
                 if let Some((joint, _)) = key.split_once(".position_loop.") {
                     for polynomial in ["r", "s", "t"] {
                         let key = format!("{joint}.position_loop.rst.{polynomial}");
@@ -74,7 +74,7 @@ fn every_live_key_takes_both_ends_of_its_range() {
 }
 
 #[test]
-fn horizons_that_contradict_each_other_are_refused_by_name() {
+fn inconsistent_horizons_are_rejected_with_their_keys() {
     for (text, key, value) in [
         ("x.position_loop.gpc.n1=15", "x.position_loop.gpc.n1", "15"),
         ("x.position_loop.gpc.nu=15", "x.position_loop.gpc.nu", "15"),
@@ -90,7 +90,7 @@ fn horizons_that_contradict_each_other_are_refused_by_name() {
 }
 
 #[test]
-fn lists_of_numbers_take_integers() {
+fn lists_of_numbers_accept_integers() {
     for (text, expected) in
         [("[1.0, -2]", vec![1.0, -2.0]), ("[3, 4]", vec![3.0, 4.0]), ("[1e-9]", vec![1e-9])]
     {
@@ -100,50 +100,50 @@ fn lists_of_numbers_take_integers() {
 }
 
 #[test]
-fn lists_of_numbers_are_refused_by_name() {
+fn invalid_lists_of_numbers_are_rejected() {
     for (text, why) in [
-        ("x.position_loop.rst.r=2.0", "found number 2, list of numbers wanted"),
-        ("x.position_loop.rst.r=[a]", "found a list of texts [a], list of numbers wanted"),
-        ("x.position_loop.rst.r=[true]", "found a list of flags [true], list of numbers wanted"),
-        ("x.position_loop.rst.r=[1, [2]]", "found a list of unlike or nested items, a value wanted"),
+        ("x.position_loop.rst.r=2.0", "found number 2, expected list of numbers"),
+        ("x.position_loop.rst.r=[a]", "found a list of texts [a], expected list of numbers"),
+        ("x.position_loop.rst.r=[true]", "found a list of flags [true], expected list of numbers"),
+        ("x.position_loop.rst.r=[1, [2]]", "found a list with mixed types or nested items, expected a value"),
     ] {
-        assert_eq!(refused(text), format!("--set: x.position_loop.rst.r: {why}"));
+        assert_eq!(rejection(text), format!("--set: x.position_loop.rst.r: {why}"));
     }
     for value in ["[]", "[1, NaN]", "[inf]"] {
         let written = value.replace("NaN", ".nan").replace("inf", ".inf");
         assert_eq!(
-            refused(&format!("x.position_loop.rst.r={written}")),
+            rejection(&format!("x.position_loop.rst.r={written}")),
             format!("--set: x.position_loop.rst.r = {value}: must be a list of 1 … 32 finite numbers")
         );
     }
     let long = format!("x.position_loop.rst.t=[{}1]", "1,".repeat(401));
-    assert!(refused(&long).ends_with("must be a list of 1 … 401 finite numbers"), "{}", refused(&long));
+    assert!(rejection(&long).ends_with("must be a list of 1 … 401 finite numbers"), "{}", rejection(&long));
 }
 
 #[test]
-fn a_gain_that_is_set_reaches_the_machine() {
+fn a_gain_is_set_in_the_machine_configuration() {
     let machine = set("x.velocity_loop.gain=4.5").map(|parameters| parameters.machine_config());
     let gain = machine.map(|machine| machine.map(|machine| machine.axes()[0].velocity_loop.gain));
     assert_eq!(gain, Ok(Ok(4.5)));
 }
 
 #[test]
-fn an_integer_serves_where_a_number_is_wanted() {
+fn an_integer_is_accepted_for_a_number() {
     let parameters = set("x.velocity_loop.gain:=4");
     let value = parameters.map(|parameters| parameters.get("x.velocity_loop.gain"));
     assert_eq!(value, Ok(Some(Value::Double(4.0))));
 }
 
 #[test]
-fn wrong_assignments_say_what_is_wrong() {
+fn invalid_assignments_are_rejected() {
     for (text, expected) in [
-        ("x.velocity_loop.gain", "--set: x.velocity_loop.gain: KEY=VALUE wanted"),
-        ("=1", "--set: =1: KEY=VALUE wanted"),
-        ("x.velocity_loop.gain=", "--set: x.velocity_loop.gain: found text \"\", number wanted"),
+        ("x.velocity_loop.gain", "--set: expected KEY=VALUE, found x.velocity_loop.gain"),
+        ("=1", "--set: expected KEY=VALUE, found =1"),
+        ("x.velocity_loop.gain=", "--set: x.velocity_loop.gain: found text \"\", expected number"),
         ("x.velocity_loop.gain=-1", "--set: x.velocity_loop.gain = -1: must lie in 0 … 1e9 N·m/(rad/s)"),
         (
             "x.velocity_loop.gian=1",
-            "--set: unknown parameter x.velocity_loop.gian; the nearest known one is \
+            "--set: unknown parameter x.velocity_loop.gian; the nearest is \
              x.velocity_loop.gain",
         ),
         (
@@ -153,20 +153,20 @@ fn wrong_assignments_say_what_is_wrong() {
         ),
         ("time=slow", "--set: time = slow: must be real or fast"),
         ("max_points=0", "--set: max_points = 0: must lie in 1 … 100000000"),
-        ("x.feedforward.velocity={a: 1}", "--set: x.feedforward.velocity: found a mapping, a value wanted"),
-        ("joints=[x, [y]]", "--set: joints: found a list of unlike or nested items, a value wanted"),
-        ("joint_prefix=7", "--set: joint_prefix: found integer 7, text (in quotation marks) wanted"),
+        ("x.feedforward.velocity={a: 1}", "--set: x.feedforward.velocity: found a mapping, expected a value"),
+        ("joints=[x, [y]]", "--set: joints: found a list with mixed types or nested items, expected a value"),
+        ("joint_prefix=7", "--set: joint_prefix: found integer 7, expected text (in quotation marks)"),
         (
             "x.gravity.tilt_nm=3",
             "--set: x.gravity.tilt_nm does not apply: it is for rotary axes, and x.type = linear",
         ),
     ] {
-        assert_eq!(refused(text), expected);
+        assert_eq!(rejection(text), expected);
     }
 }
 
 #[test]
-fn an_error_leaves_all_of_a_batch_unset() {
+fn a_batch_with_an_error_sets_nothing() {
     let mut parameters = mikron();
     let assignment =
         |key: &str, value| Assignment { key: key.to_owned(), value: Value::Double(value), source: source() };
@@ -181,20 +181,20 @@ fn a_batch_is_checked_as_a_whole() {
     let mut parameters = mikron();
     let assignment =
         |key: &str, value| Assignment { key: key.to_owned(), value: Value::Double(value), source: source() };
-    // Each alone would break the multiple.
+    // Each alone would violate the integer multiple.
     let batch = vec![assignment("periods.velocity_us", 300.0), assignment("periods.current_us", 100.0)];
     assert_eq!(parameters.set_all(batch), Ok(()));
     assert_eq!(parameters.set_all(Vec::new()), Ok(()));
 }
 
 #[test]
-fn a_joint_left_out_takes_its_parameters_with_it() {
+fn parameters_of_a_removed_joint_are_removed() {
     let parameters = set("joints=[c, x]").expect("two of five joints");
     let machine = parameters.machine_config().expect("a valid machine");
     let names: Vec<&str> = machine.axes().iter().map(|axis| axis.name()).collect();
     assert_eq!(names, ["c", "x"]);
     assert_eq!(parameters.get("y.type"), None);
-    assert!(refused("joints=[x, b]").starts_with("--set: b.type is missing: "));
+    assert!(rejection("joints=[x, b]").starts_with("--set: b.type is missing: "));
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn node_parameters_have_their_defaults_and_units() {
 }
 
 #[test]
-fn an_overlay_changes_some_parameters_of_the_node_it_names() {
+fn an_overlay_changes_parameters_of_the_matching_node() {
     let text = "\
 /**:
   ros__parameters:
@@ -242,11 +242,11 @@ other:
 ";
     let mut parameters = mikron();
     let overlay = parameters.overlay_yaml(text, "site.yaml", Some("/cell/mill"));
-    let overlay = overlay.expect("a good file");
+    let overlay = overlay.expect("a valid file");
     assert_eq!((overlay.parameters, overlay.sections), (3, 2));
     assert_eq!(overlay.skipped, ["/other"]);
     assert!(!overlay.is_machine_replaced);
-    // The later section wins.
+    // The later section takes precedence.
     assert_eq!(parameters.get("x.velocity_loop.gain"), Some(Value::Double(2.5)));
     assert_eq!(parameters.get("y.velocity_loop.gain"), Some(Value::Double(3.0)));
     let at = parameters.source("x.velocity_loop.gain").map(ToString::to_string);
@@ -259,7 +259,7 @@ other:
 }
 
 #[test]
-fn an_overlay_for_another_node_changes_nothing_and_says_so() {
+fn an_overlay_for_another_node_changes_nothing() {
     let mut parameters = mikron();
     let text = "/mill:\n  ros__parameters:\n    nonsense: 1\n";
     let overlay = parameters.overlay_yaml(text, "site.yaml", Some("/lathe"));
@@ -269,7 +269,7 @@ fn an_overlay_for_another_node_changes_nothing_and_says_so() {
 }
 
 #[test]
-fn a_bad_overlay_changes_nothing() {
+fn an_invalid_overlay_changes_nothing() {
     let mut parameters = mikron();
     let text = "/**:\n  ros__parameters:\n    x.velocity_loop.gain: 4\n    y.velocity_loop.gain: -4\n";
     let error = parameters.overlay_yaml(text, "site.yaml", None).map_err(|error| error.to_string());
@@ -281,7 +281,7 @@ fn a_bad_overlay_changes_nothing() {
 }
 
 #[test]
-fn a_complete_machine_replaces_the_one_before_and_keeps_the_node() {
+fn a_complete_machine_replaces_the_machine_and_keeps_node_parameters() {
     let mut parameters = mikron();
     assert_eq!(parameters.set_text("joint_prefix=mill_", &source()), Ok(()));
     let text = include_str!("../../../config/linear_motor_center.yaml");
@@ -293,16 +293,16 @@ fn a_complete_machine_replaces_the_one_before_and_keeps_the_node() {
 }
 
 #[test]
-fn half_a_machine_is_refused_with_the_way_out() {
+fn an_incomplete_machine_is_rejected() {
     let text = "/**:\n  ros__parameters:\n    joints: [x]\n    x.type: linear\n";
     let error = mikron().overlay_yaml(text, "half.yaml", None).map_err(|error| error.to_string());
     let message = error.err().unwrap_or_default();
     assert!(message.starts_with("half.yaml: machine is missing: "), "{message}");
-    assert!(message.ends_with("leave both out to change some parameters of the present one"));
+    assert!(message.ends_with("omit both to change parameters of the present machine"));
 }
 
 #[test]
-fn definitions_are_sound() {
+fn definitions_are_consistent() {
     for (index, definition) in DEFINITIONS.iter().enumerate() {
         let key = definition.key;
         assert!(definition.description.ends_with('.'), "{key}");
@@ -313,7 +313,7 @@ fn definitions_are_sound() {
             assert_eq!(definition.checked(key, &value, &source()), Ok(value), "{key}");
         }
         if definition.scope == Scope::Node {
-            // Node parameters are never asked for in a machine file.
+            // A machine file need not contain node parameters.
             assert!(matches!(definition.presence, Presence::Default(_)), "{key}");
         }
         for other in &DEFINITIONS[index + 1..] {

@@ -1,4 +1,4 @@
-//! Machine files that are written, and read again.
+//! Round trips of written machine files.
 
 use proptest::prelude::*;
 
@@ -9,7 +9,7 @@ fn source() -> ValueSource {
     ValueSource::named("test")
 }
 
-/// Asserts that the file of `parameters` holds the same values.
+/// Asserts that writing and reading `parameters` yields the same values.
 fn assert_reads_back(parameters: &Parameters) -> Result<(), TestCaseError> {
     let text = parameters.to_yaml("", |_| None);
     let again =
@@ -21,15 +21,15 @@ fn assert_reads_back(parameters: &Parameters) -> Result<(), TestCaseError> {
 }
 
 #[test]
-fn shipped_machines_are_the_same_after_writing() {
+fn builtin_machines_are_unchanged_by_a_round_trip() {
     for name in Parameters::builtin_names() {
-        let parameters = Parameters::builtin(name).expect("a shipped machine");
+        let parameters = Parameters::builtin(name).expect("a built-in machine");
         assert_reads_back(&parameters).expect(name);
     }
 }
 
 #[test]
-fn the_file_is_laid_out_as_the_shipped_ones() {
+fn written_files_have_the_layout_of_the_builtin_files() {
     let mut parameters = mikron();
     parameters.set_text("max_points=7", &source()).expect("valid");
     parameters.set_text("x.position_loop.rst.r=[1.0, -2, 1e-9]", &source()).expect("valid");
@@ -52,22 +52,22 @@ fn the_file_is_laid_out_as_the_shipped_ones() {
         "{text}"
     );
     assert!(text.contains("\n        rst:\n          r: [1.0, -2.0, 1.0e-9]\n"), "{text}");
-    // Bare, it is the flag "yes" to other readers.
+    // Without quotation marks, YAML 1.1 readers read y as true.
     assert!(text.contains("\n\n    \"y\":\n      type: linear\n"), "{text}");
     assert!(text.ends_with("\n\n    max_points: 7\n"), "{text}");
-    // What has its default only is not written.
+    // Parameters at their defaults are not written.
     assert!(!text.contains("t_first") && !text.contains("qos"), "{text}");
 }
 
 #[test]
-fn a_comment_stays_one_comment() {
+fn line_breaks_in_comments_are_replaced() {
     let text = mikron().to_yaml("a\u{2028}b\rc", |_| Some("x\nmachine: other".to_owned()));
     let again = Parameters::from_yaml(&text, "new.yaml").expect("valid");
     assert_eq!(again.machine_config(), mikron().machine_config());
 }
 
 #[test]
-fn joints_that_are_words_of_yaml_are_read_back() {
+fn joint_names_that_are_yaml_booleans_are_quoted() {
     let text = super::MIKRON.replace("[\"x\", \"y\"", "[\"x\", \"on\"").replace("    y:\n", "    \"on\":\n");
     let parameters = Parameters::from_yaml(&text, "my.yaml").expect("valid");
     assert_reads_back(&parameters).expect("the same");
@@ -75,13 +75,13 @@ fn joints_that_are_words_of_yaml_are_read_back() {
 
 proptest! {
     #[test]
-    fn changed_values_are_the_same_bits_after_writing(
+    fn changed_values_are_bit_identical_after_a_round_trip(
         machine in prop::sample::select(Parameters::builtin_names().collect::<Vec<_>>()),
         name in any::<String>(),
         changes in prop::collection::vec((any::<prop::sample::Index>(), 0.0..1.0f64, -300i32..300), 1..40),
         list in prop::collection::vec(-1e300..1e300f64, 1..32),
     ) {
-        let mut parameters = Parameters::builtin(machine).expect("a shipped machine");
+        let mut parameters = Parameters::builtin(machine).expect("a built-in machine");
         parameters.set("machine", Value::Text(name), &source()).expect("any text");
         let all: Vec<_> = parameters.definitions().collect();
         for (index, fraction, exponent) in changes {

@@ -1,63 +1,63 @@
-//! Faults of files as such: not YAML, not ROS parameters, hostile.
+//! Rejected files: invalid YAML, no ROS 2 parameter file, malicious content.
 
 use proptest::prelude::*;
 
-use super::{MIKRON, assert_refused, line_of, mikron_with, refusal};
+use super::{MIKRON, assert_rejected, line_of, mikron_with, rejection};
 use crate::config::{Parameters, ValueSource};
 
 #[test]
-fn key_twice_in_one_mapping() {
+fn duplicate_key_in_a_mapping() {
     let text = mikron_with("b: 0.01965", "b: 0.01965\n        b: 3");
-    assert_refused(&text, "b: 3", "my.yaml:{line}: b stands twice in one mapping");
+    assert_rejected(&text, "b: 3", "my.yaml:{line}: invalid YAML: duplicate key b");
 }
 
 #[test]
-fn key_twice_flat_and_nested() {
+fn duplicate_key_flat_and_nested() {
     let text = mikron_with("    periods:", "    x.friction.b: 0.5\n    periods:");
     let first = line_of(&text, "x.friction.b");
-    assert_refused(
+    assert_rejected(
         &text,
         "b: 0.01965",
-        &format!("my.yaml:{{line}}: x.friction.b is set a second time; the first is my.yaml:{first}"),
+        &format!("my.yaml:{{line}}: duplicate parameter x.friction.b, first set at my.yaml:{first}"),
     );
 }
 
 #[test]
-fn not_yaml() {
+fn invalid_yaml() {
     let text = mikron_with("    x:\n", "    x: [\n");
-    let message = refusal(&text);
+    let message = rejection(&text);
     assert!(message.starts_with("my.yaml:"), "{message}");
-    assert!(message.contains(": not YAML: "), "{message}");
+    assert!(message.contains(": invalid YAML: "), "{message}");
     assert!(!message.contains('\n'), "{message}");
 }
 
 #[test]
 fn two_machines_in_one_file() {
     let mikron = mikron_with("    x:\n", "    x:\n");
-    let message = refusal(&format!("{mikron}---\n{mikron}"));
+    let message = rejection(&format!("{mikron}---\n{mikron}"));
     assert!(message.starts_with("my.yaml:"), "{message}");
-    assert!(message.ends_with(": a second YAML document begins; a file of parameters is one"), "{message}");
+    assert!(message.ends_with(": invalid YAML: more than one YAML document, expected one"), "{message}");
 }
 
 #[test]
 fn not_a_ros_parameter_file() {
-    let beginning = "a file begins with `/**:`, below it `ros__parameters:`, below that the keys";
+    let structure = "expected `/**:`, nested in it `ros__parameters:`, nested in that the parameters";
     for (text, expected) in [
-        ("", "my.yaml:1: not a ROS 2 parameter file: it holds no mapping"),
-        ("mill", "my.yaml:1: not a ROS 2 parameter file: it holds no mapping"),
-        ("{}", "my.yaml: not a ROS 2 parameter file: it is empty"),
-        ("\nmachine: mill\n", "my.yaml:2: not a ROS 2 parameter file: no `ros__parameters` below `machine`"),
+        ("", "my.yaml:1: not a ROS 2 parameter file: not a mapping"),
+        ("mill", "my.yaml:1: not a ROS 2 parameter file: not a mapping"),
+        ("{}", "my.yaml: not a ROS 2 parameter file: empty mapping"),
+        ("\nmachine: mill\n", "my.yaml:2: not a ROS 2 parameter file: no `ros__parameters` in `machine`"),
         (
             "/**:\n  ros_parameters:\n    machine: mill\n",
-            "my.yaml:3: not a ROS 2 parameter file: `machine` stands below `/**/ros_parameters`, \
-             not below `ros__parameters`",
+            "my.yaml:3: not a ROS 2 parameter file: `machine` is in `/**/ros_parameters`, \
+             not in `ros__parameters`",
         ),
         (
             "ros__parameters:\n  machine: mill\n",
-            "my.yaml:1: not a ROS 2 parameter file: `ros__parameters` stands below no node",
+            "my.yaml:1: not a ROS 2 parameter file: no node name above `ros__parameters`",
         ),
     ] {
-        assert_eq!(refusal(text), format!("{expected}; {beginning}"));
+        assert_eq!(rejection(text), format!("{expected}; {structure}"));
     }
 }
 
@@ -72,10 +72,10 @@ fn unreadable_files() {
 }
 
 #[test]
-fn unknown_shipped_machine() {
+fn unknown_builtin_machine() {
     assert_eq!(
         Parameters::builtin("mikron").map_err(|error| error.to_string()),
-        Err("no machine mikron is shipped; there are mikron_ucp710, linear_motor_center".to_owned())
+        Err("unknown machine mikron; built-in machines: mikron_ucp710, linear_motor_center".to_owned())
     );
 }
 
@@ -87,13 +87,13 @@ fn alias_bomb() {
         let items = vec![format!("*l{below}"); 8].join(", ");
         text.push_str(&format!("    l{level}: &l{level} [{items}]\n"));
     }
-    assert!(refusal(&text).starts_with("my.yaml:"));
+    assert!(rejection(&text).starts_with("my.yaml:"));
 }
 
 #[test]
-fn long_garbage_is_cut_in_messages() {
+fn long_keys_are_truncated_in_messages() {
     let garbage = "k".repeat(100_000);
-    let message = refusal(&format!("/**:\n  ros__parameters:\n    ? {garbage}\n    : {garbage}\n"));
+    let message = rejection(&format!("/**:\n  ros__parameters:\n    ? {garbage}\n    : {garbage}\n"));
     assert!(message.len() < 1000, "{} bytes", message.len());
     let source = ValueSource::named("--set");
     for text in [garbage.clone(), format!("machine={garbage}=[")] {
