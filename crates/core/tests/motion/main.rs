@@ -1,11 +1,11 @@
-//! TODO
+//! Tests of trajectory execution, streamed setpoints and the simulation.
 
 mod allocation;
 mod goals;
 mod simulation;
 mod simulation_common;
 mod stream;
-mod trajectory_checks;
 mod trajectory_common;
 mod trajectory_properties;
 mod trajectory_timeline;
+mod trajectory_validation;

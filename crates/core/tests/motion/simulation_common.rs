@@ -1,4 +1,4 @@
-//! A machine under way, for tests of what it is asked.
+//! Fixture with a simulated machine, for tests of its commands.
 
 use std::sync::Arc;
 
@@ -13,18 +13,18 @@ pub const TSP: Nanoseconds = 6 * MILLISECOND_NS;
 pub const X: usize = 0;
 pub const NONE: &[(&str, f64)] = &[];
 
-pub struct Bench {
+pub struct SimulationFixture {
     pub simulation: Simulation,
     pub joints: Vec<JointLimits>,
     pub origin: Nanoseconds,
 }
 
-impl Bench {
+impl SimulationFixture {
     pub fn new(changes: &[(&str, f64)], origin: Nanoseconds) -> Self {
         let config = parameters(changes).machine_config().expect("valid");
         let joints = joint_limits(&config, "");
         let simulation = Simulation::new(&config, joints.clone(), origin).expect("can be simulated");
-        Bench { simulation, joints, origin }
+        SimulationFixture { simulation, joints, origin }
     }
 
     pub fn trajectory(
@@ -37,7 +37,7 @@ impl Bench {
         for &(time, positions) in points {
             request
                 .push(time, TrajectoryPoint { positions, ..TrajectoryPoint::default() })
-                .expect("well formed");
+                .expect("valid point");
         }
         let context = ValidationContext {
             joints: &self.joints,
@@ -61,18 +61,19 @@ impl Bench {
         self.trajectory(start, &["x", "y"], &points)
     }
 
-    /// Steps until nothing is asked; every axis's signals at each instant, and how motions ended.
+    /// Steps until no command is active; returns the signals of all axes at each instant and the finished
+    /// motions.
     pub fn run(&mut self) -> (Vec<Vec<u64>>, Vec<MotionEnd>) {
-        let (mut rows, mut ends) = (Vec::new(), Vec::new());
+        let (mut rows, mut finished) = (Vec::new(), Vec::new());
         while self.simulation.is_busy() {
             self.simulation.step();
             let bits = |s: &virtual_axes_core::machine::AxisSample| {
                 [s.psec, s.position, s.velocity, s.current, s.voltage].map(f64::to_bits)
             };
             rows.push(self.simulation.samples().iter().flat_map(bits).collect());
-            ends.extend(self.simulation.drain_finished());
-            assert!(rows.len() < 100_000, "it never settles");
+            finished.extend(self.simulation.drain_finished());
+            assert!(rows.len() < 100_000, "no end of settling");
         }
-        (rows, ends)
+        (rows, finished)
     }
 }

@@ -1,4 +1,4 @@
-//! Properties that hold for every trajectory, checked on random ones.
+//! Property tests of trajectories and the timeline with random requests.
 
 use crate::trajectory_common::*;
 use proptest::prelude::*;
@@ -8,9 +8,9 @@ use virtual_axes_core::trajectory::{
     KinematicState, MotionId, Start, TimelineEvent, TrajectoryPoint, TrajectoryRequest,
 };
 
-/// One request of the soup, in plain numbers.
+/// Random request.
 #[derive(Debug, Clone)]
-struct Soup {
+struct RandomRequest {
     start: Option<i64>,
     joints: usize,
     order: usize,
@@ -19,7 +19,7 @@ struct Soup {
 
 #[derive(Debug, Clone)]
 enum Step {
-    Offer(Soup),
+    Submit(RandomRequest),
     Stop(usize),
     Run(usize),
     Stream(usize, f64),
@@ -30,27 +30,27 @@ fn names(joints: usize) -> Vec<String> {
     sets[joints].iter().map(|&name| name.to_owned()).collect()
 }
 
-fn build(soup: &Soup) -> Option<TrajectoryRequest> {
-    // Starts are relative to instant 0, off the grid.
-    let start = soup.start.map_or(Start::Now, |ns| Start::At(ORIGIN + ns));
-    let mut request = TrajectoryRequest::new(start, names(soup.joints));
+fn build(random: &RandomRequest) -> Option<TrajectoryRequest> {
+    // Starts are relative to instant 0, between position instants.
+    let start = random.start.map_or(Start::Now, |ns| Start::At(ORIGIN + ns));
+    let mut request = TrajectoryRequest::new(start, names(random.joints));
     let mut time = 0;
-    for &(dt, p, v, a) in &soup.points {
+    for &(dt, p, v, a) in &random.points {
         time += dt;
         let n = request.joints().len();
         let (positions, velocities, accelerations) = (vec![p; n], vec![v; n], vec![a; n]);
-        let row = TrajectoryPoint {
+        let point = TrajectoryPoint {
             positions: &positions,
-            velocities: if soup.order > 0 { &velocities } else { &[] },
-            accelerations: if soup.order > 1 { &accelerations } else { &[] },
+            velocities: if random.order > 0 { &velocities } else { &[] },
+            accelerations: if random.order > 1 { &accelerations } else { &[] },
             effort: &[],
         };
-        request.push(time, row).ok()?;
+        request.push(time, point).ok()?;
     }
     Some(request)
 }
 
-fn soup() -> impl Strategy<Value = Soup> {
+fn random_request() -> impl Strategy<Value = RandomRequest> {
     let time = prop_oneof![
         4 => (0..200i64).prop_map(|k| k * TSP),
         4 => 0..600_000_000i64,
@@ -65,12 +65,12 @@ fn soup() -> impl Strategy<Value = Soup> {
         0..3usize,
         prop::collection::vec((time, value, velocity, acceleration), 1..6),
     )
-        .prop_map(|(start, joints, order, points)| Soup { start, joints, order, points })
+        .prop_map(|(start, joints, order, points)| RandomRequest { start, joints, order, points })
 }
 
 fn steps() -> impl Strategy<Value = Vec<Step>> {
     let step = prop_oneof![
-        6 => soup().prop_map(Step::Offer),
+        6 => random_request().prop_map(Step::Submit),
         1 => (0..4usize).prop_map(Step::Stop),
         4 => (0..80usize).prop_map(Step::Run),
         1 => (0..3usize, -0.4..0.4f64).prop_map(|(joint, p)| Step::Stream(joint, p)),
@@ -78,15 +78,15 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     prop::collection::vec(step, 0..60)
 }
 
-/// What was told about each trajectory: starts, ends.
-type Told = HashMap<MotionId, (u32, u32)>;
+/// Number of start events and end events of each trajectory.
+type EventCounts = HashMap<MotionId, (u32, u32)>;
 
-fn watch(t: &mut virtual_axes_core::trajectory::Timeline, periods: usize, told: &mut Told) {
+fn run_checked(t: &mut virtual_axes_core::trajectory::Timeline, periods: usize, counts: &mut EventCounts) {
     for _ in 0..periods {
         let before = [t.psec()[0], t.psec()[1]];
         let ahead = [t.psec_ahead(0, 1).unwrap(), t.psec_ahead(1, 1).unwrap()];
         t.next();
-        assert_eq!(t.psec(), ahead, "what was foreseen is what is commanded");
+        assert_eq!(t.psec(), ahead, "previewed setpoints are commanded");
         for (joint, before) in before.iter().enumerate() {
             let step = (t.psec()[joint] - before).abs();
             assert!(step <= 0.5 * TSP_S * (1.0 + 1e-6), "{step} on {joint}");
@@ -95,16 +95,16 @@ fn watch(t: &mut virtual_axes_core::trajectory::Timeline, periods: usize, told: 
         for event in t.events() {
             match *event {
                 TimelineEvent::Started(id) => {
-                    let entry = told.get_mut(&id).unwrap();
+                    let entry = counts.get_mut(&id).unwrap();
                     assert_eq!(*entry, (0, 0), "{event:?}");
                     entry.0 += 1;
                 }
                 TimelineEvent::Completed(id) => {
-                    assert_eq!(told[&id], (1, 0), "an end has a start");
-                    told.get_mut(&id).unwrap().1 += 1;
+                    assert_eq!(counts[&id], (1, 0), "completed without start");
+                    counts.get_mut(&id).unwrap().1 += 1;
                 }
                 TimelineEvent::Preempted { id, .. } | TimelineEvent::Stopped { id, .. } => {
-                    told.get_mut(&id).unwrap().1 += 1;
+                    counts.get_mut(&id).unwrap().1 += 1;
                 }
             }
         }
@@ -115,35 +115,35 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 
     #[test]
-    fn any_sequence_of_requests_keeps_to_speed_and_stroke_and_tells_each_end_once(
+    fn any_sequence_of_requests_obeys_the_limits_and_ends_each_motion_once(
         steps in steps(),
     ) {
         let mut t = timeline();
-        let mut told = Told::new();
+        let mut counts = EventCounts::new();
         for (id, step) in steps.iter().enumerate() {
             let id = id as u64;
             let request = match step {
                 Step::Run(periods) => {
-                    watch(&mut t, *periods, &mut told);
+                    run_checked(&mut t, *periods, &mut counts);
                     continue;
                 }
                 Step::Stream(joint, position) => {
                     let _ = t.submit_setpoint(*joint, *position);
                     continue;
                 }
-                Step::Offer(soup) => build(soup),
+                Step::Submit(random) => build(random),
                 Step::Stop(joints) => Some(TrajectoryRequest::new(Start::Now, names(*joints))),
             };
-            let Some(Ok(trajectory)) = request.map(|r| check(r, true)) else { continue };
-            if offer(&mut t, id, &trajectory).is_ok() {
-                told.insert(MotionId(id), (0, 0));
+            let Some(Ok(trajectory)) = request.map(|r| validate(r, true)) else { continue };
+            if submit(&mut t, id, &trajectory).is_ok() {
+                counts.insert(MotionId(id), (0, 0));
             }
         }
-        offer(&mut t, u64::MAX, &stop(&[])).unwrap();
-        told.insert(MotionId(u64::MAX), (0, 0));
-        watch(&mut t, 300, &mut told);
+        submit(&mut t, u64::MAX, &stop(&[])).unwrap();
+        counts.insert(MotionId(u64::MAX), (0, 0));
+        run_checked(&mut t, 300, &mut counts);
         prop_assert!(!t.is_moving() && !t.is_waiting());
-        for (id, (_, ends)) in told {
+        for (id, (_, ends)) in counts {
             prop_assert_eq!(ends, 1, "{:?}", id);
         }
     }
@@ -154,7 +154,7 @@ proptest! {
         start in 0..20i64,
         points in prop::collection::vec((1..40i64, -1.0..1.0f64, -0.5..0.5f64, -2.0..2.0f64), 1..20),
     ) {
-        // Positions that are within reach of each other, from rest at zero.
+        // Reachable positions, from rest at zero.
         let (mut k, mut position, mut rows) = (0, 0.0, vec![(0, 0.0, 0.0, 0.0)]);
         for (dk, direction, velocity, acceleration) in points {
             k += dk;
@@ -173,21 +173,20 @@ proptest! {
                 })
                 .unwrap();
         }
-        let checked = check(request, true);
+        let checked = validate(request, true);
         let Ok(checked) = checked else { return Ok(()) };
         let mut t = timeline();
-        offer(&mut t, 1, &checked).unwrap();
+        submit(&mut t, 1, &checked).unwrap();
         let (psec, _) = run(&mut t, 1, (start + k) as usize + 1);
         for (time, p, _, _) in rows {
             prop_assert_eq!(psec[(start + time / TSP) as usize].to_bits(), p.to_bits());
         }
     }
 
-    /// The limits are those of the sampled setpoints: a difference quotient is a mean of the
-    /// derivative over the periods that it spans. They hold from the instant before the stop on;
-    /// what was commanded earlier is the trajectory's own affair.
+    /// Checks difference quotients of the setpoints, which are means of the derivatives over position cycles,
+    /// from the instant before the stop on.
     #[test]
-    fn a_stop_at_any_time_keeps_to_acceleration_and_jerk_and_ends_at_rest(
+    fn a_stop_at_any_time_obeys_acceleration_and_jerk_and_ends_at_rest(
         order in 0..3usize,
         after in 0..200usize,
         points in prop::collection::vec((5..80i64, -1.0..1.0f64, -1.0..1.0f64, -4.0..4.0f64), 1..8),
@@ -208,14 +207,14 @@ proptest! {
                 .unwrap();
         }
         let mut t = timeline();
-        let accepted = check(request, true).and_then(|path| offer(&mut t, 1, &path));
+        let accepted = validate(request, true).and_then(|path| submit(&mut t, 1, &path));
         if accepted.is_err() {
             return Ok(());
         }
         t.next();
         run(&mut t, 1, after);
         let mut psec = vec![t.psec()[1]];
-        offer(&mut t, 2, &stop(&["c"])).unwrap();
+        submit(&mut t, 2, &stop(&["c"])).unwrap();
         psec.extend(run(&mut t, 1, 150).0);
         let d: Vec<_> = psec.windows(2).map(|w| (w[1] - w[0]) / TSP_S).collect();
         let dd: Vec<_> = d.windows(2).map(|w| (w[1] - w[0]) / TSP_S).collect();
@@ -226,7 +225,7 @@ proptest! {
     }
 
     #[test]
-    fn rubbish_is_refused_or_executed_but_never_panics(
+    fn arbitrary_values_including_nan_do_not_panic(
         stamp in any::<i64>(),
         origin in any::<i64>(),
         times in prop::collection::vec(any::<i64>(), 0..4),
@@ -249,7 +248,7 @@ proptest! {
             });
         }
         let mut t = timeline();
-        if let Ok(trajectory) = check(request, true) {
+        if let Ok(trajectory) = validate(request, true) {
             let _ = t.submit(MotionId(1), Arc::clone(&trajectory), origin);
             let _ = t.submit(MotionId(2), trajectory, stamp);
         }
