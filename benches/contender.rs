@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::{Value, json};
 use virtual_axes_core::assess::{AxisAssessor, AxisReport};
-use virtual_axes_core::config::{Assignment, Parameters, Source, Value as Setting};
+use virtual_axes_core::config::{Assignment, Parameters, Value as Setting, ValueSource};
 use virtual_axes_core::machine::{Machine, MachineParameters};
 use virtual_axes_core::units::seconds;
 
@@ -68,7 +68,7 @@ const TOGETHER: usize = 16;
 
 /// Runs some machines side by side with all their figures: the part that is measured.
 fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures> {
-    let Some(together) = MachineParameters::together(machines) else { return Vec::new() };
+    let Some(together) = MachineParameters::concatenate(machines) else { return Vec::new() };
     let axes = case.joints.len();
     let mut machine = Machine::new(Arc::new(together));
     machine.reset(&case.rows[0].repeat(machines.len()));
@@ -175,7 +175,7 @@ fn machine(
     let text = MACHINE.replace(JOINTS, &format!("joints: [{}]", quoted.join(", ")));
     let text = without_sections(&text, joints);
     let mut parameters = Parameters::from_yaml(&text, "benches/contender.rs")?;
-    let source = Source::named("benches/contender.rs");
+    let source = ValueSource::named("benches/contender.rs");
     let mut assignments = Vec::new();
     for joint in joints {
         for (key, factor) in [("position_loop.gain", position), ("velocity_loop.gain", velocity)] {
@@ -253,10 +253,10 @@ fn as_json(figures: &Figures, joints: &[String]) -> Value {
         .zip(&figures.axes)
         .map(|(joint, report)| {
             let value = json!({
-                "max_tracking_error": report.max_tracking_error,
-                "rms_tracking_error": report.rms_tracking_error,
-                "max_synchronized_tracking_error": report.max_synchronized_tracking_error,
-                "rms_synchronized_tracking_error": report.rms_synchronized_tracking_error,
+                "max_following_error": report.max_following_error,
+                "rms_following_error": report.rms_following_error,
+                "max_delay_compensated_following_error": report.max_delay_compensated_following_error,
+                "rms_delay_compensated_following_error": report.rms_delay_compensated_following_error,
                 "peak_current": report.peak_current,
                 "saturation_time": report.saturation_time,
                 "control_activity": report.control_activity,

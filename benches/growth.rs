@@ -16,9 +16,9 @@ use rayon::prelude::*;
 use virtual_axes_core::assess::AxisAssessor;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::machine::{Machine, MachineParameters};
-use virtual_axes_core::trial::{self, Figures, GridSource, Setpoints, SourceError, Trial};
+use virtual_axes_core::trial::{self, Figures, GridSource, SetpointSource, SourceError, Trial};
 use virtual_axes_core::units::seconds;
-use virtual_axes_verification::fixtures::common::{AXES, parameters, program, setpoints};
+use virtual_axes_verification::fixtures::machines::{AXES, parameters, program, setpoints};
 
 /// Rounds of a table, an odd number.
 const ROUNDS: usize = 11;
@@ -116,7 +116,7 @@ fn length(config: &MachineConfig) {
     let trial = Trial { machine: config, program: None, allow_nonzero_end_velocity: false, record: false };
     let run = |count: usize| {
         let source = Cycle { joints: [0, 1, 2, 3, 4], rows: Arc::clone(&rows), next: 0, count: count + 1 };
-        black_box(trial::run(&trial, Setpoints::Grid(Box::new(source)), |_| Ok(())).expect("a run"));
+        black_box(trial::run(&trial, SetpointSource::Grid(Box::new(source)), |_| Ok(())).expect("a run"));
     };
     let period = seconds(config.periods().position);
     let lengths = [1, 10, 100, 1000];
@@ -138,7 +138,7 @@ fn axes(config: &MachineConfig) {
     let instants = (AXES_TIME / seconds(config.periods().position)) as usize;
     let row = |count: usize| {
         let places: Vec<usize> = (0..count).map(|axis| axis % AXES).collect();
-        let made = MachineParameters::of_axes(config, &places).expect("it can be discretized");
+        let made = MachineParameters::from_axes(config, &places).expect("it can be discretized");
         let mut machine = Machine::new(Arc::new(made));
         let cycle = Arc::clone(&cycle);
         let mut psec = vec![0.0; count];
@@ -173,7 +173,7 @@ fn variants(count: usize) -> Vec<MachineConfig> {
 fn sweep(trial: &Trial<'_>, variants: &[MachineConfig], own: &[usize]) -> Vec<Figures> {
     let run = |some: &[MachineConfig]| {
         let program = trial.program.clone().expect("planned");
-        trial::run_together(trial, setpoints("ballbar", program, trial.machine), some, own, || Ok(()))
+        trial::run_variants(trial, setpoints("ballbar", program, trial.machine), some, own, || Ok(()))
             .expect("a run")
     };
     variants.par_chunks(TOGETHER).with_max_len(1).flat_map(run).collect()

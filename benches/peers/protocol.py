@@ -40,7 +40,7 @@ def asked() -> Asked:
 def figures(max_synchronized: float, peak_current: float, **more: float) -> Figures:
     """The figures that every contender has, and those that it has beside them."""
     return {
-        "max_synchronized_tracking_error": float(max_synchronized),
+        "max_delay_compensated_following_error": float(max_synchronized),
         "peak_current": float(peak_current),
         **{name: float(value) for name, value in more.items()},
     }

@@ -116,8 +116,8 @@ static void print_figures(const struct machine *m, const struct setpoints *sp) {
   printf("\"axes\": {");
   for (int a = 0; a < m->axes; a++) {
     const struct figures *f = &m->figures[a];
-    printf("%s\"%s\": {\"max_tracking_error\": %.17g, \"rms_tracking_error\": %.17g, "
-           "\"max_synchronized_tracking_error\": %.17g, \"rms_synchronized_tracking_error\": %.17g, "
+    printf("%s\"%s\": {\"max_following_error\": %.17g, \"rms_following_error\": %.17g, "
+           "\"max_delay_compensated_following_error\": %.17g, \"rms_delay_compensated_following_error\": %.17g, "
            "\"peak_current\": %.17g, \"saturation_time\": %.17g, \"control_activity\": %.17g, \"position\": %.17g}",
            a ? ", " : "", sp->joints[a], f->max_tracking, sqrt(f->square_tracking / n), f->max_synchronized,
            sqrt(f->square_synchronized / n), f->peak_current, f->saturated_ticks * CURRENT_PERIOD,

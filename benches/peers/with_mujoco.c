@@ -81,7 +81,7 @@ int main(int argc, char **argv) {
         }
       }
     }
-    printf("{\"seconds\": %.9g, \"machines\": [{\"axes\": {\"%s\": {\"max_synchronized_tracking_error\": %.17g, "
+    printf("{\"seconds\": %.9g, \"machines\": [{\"axes\": {\"%s\": {\"max_delay_compensated_following_error\": %.17g, "
            "\"peak_current\": %.17g, \"position\": %.17g}}}]}\n",
            (now() - began) / runs, setpoints.joints[0], synchronized, peak, data->qpos[0] * p.ratio);
     fflush(stdout);

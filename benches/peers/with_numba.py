@@ -107,9 +107,9 @@ def main() -> None:
         return figures(
             synchronized,
             peak,
-            max_tracking_error=tracking,
-            rms_tracking_error=rms_tracking,
-            rms_synchronized_tracking_error=rms_synchronized,
+            max_following_error=tracking,
+            rms_following_error=rms_tracking,
+            rms_delay_compensated_following_error=rms_synchronized,
             saturation_time=saturation,
             control_activity=activity,
             position=position,

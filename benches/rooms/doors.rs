@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use byteorder::LittleEndian;
 use criterion::{Criterion, Throughput};
-use virtual_axes_core::assess::Recording;
+use virtual_axes_core::assess::SignalRecording;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters};
 use virtual_axes_core::scenario::Scenario;
-use virtual_axes_core::trajectory::{Request, Row, Start};
+use virtual_axes_core::trajectory::{Start, TrajectoryPoint, TrajectoryRequest};
 use virtual_axes_core::trial::{self, Trial};
 use virtual_axes_io::files::encode;
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
@@ -71,10 +71,10 @@ fn messages_as_bytes(criterion: &mut Criterion) {
     let mut machine = Machine::new(Arc::new(MachineParameters::new(&config).expect("it can be discretized")));
     machine.advance(&[1e-3; 5], &[]);
     let samples: Vec<AxisSample> = machine.axes().iter().map(|axis| *axis.sample()).collect();
-    let mut long = Request::new(Start::Now, names.clone());
+    let mut long = TrajectoryRequest::new(Start::Now, names.clone());
     for k in 0..POINTS {
         let positions: [f64; 5] = std::array::from_fn(|axis| swing(axis, k));
-        let row = Row { positions: &positions, ..Row::default() };
+        let row = TrajectoryPoint { positions: &positions, ..TrajectoryPoint::default() };
         long.push(k as i64 * config.periods().position, row).expect("well formed");
     }
     let long = messages::joint_trajectory(&long);
@@ -90,7 +90,7 @@ fn messages_as_bytes(criterion: &mut Criterion) {
 
 fn report(criterion: &mut Criterion) {
     let config = shipped();
-    let recordings: LazyCell<Vec<Recording>, _> = LazyCell::new(|| {
+    let recordings: LazyCell<Vec<SignalRecording>, _> = LazyCell::new(|| {
         let program = program("ballbar", &config);
         let trial = Trial {
             machine: &config,

@@ -4,20 +4,20 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{BatchSize, Criterion, Throughput};
-use virtual_axes_core::assess::{AxisAssessor, CircleAssessor, Deviations, PathTracker};
+use virtual_axes_core::assess::{AxisAssessor, CircleAssessor, PathDeviations, PathTracker};
 use virtual_axes_core::config::MachineConfig;
-use virtual_axes_core::kinematics::{Kinematics, Poses, Turned};
+use virtual_axes_core::kinematics::{Kinematics, Poses, TableAngles};
 use virtual_axes_core::machine::{Machine, MachineParameters};
 use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::Scenario;
-use virtual_axes_core::simulation::{Simulation, joints};
+use virtual_axes_core::simulation::{Simulation, joint_limits};
 use virtual_axes_core::trajectory::{
-    Context, JointLimits, MotionId, Request, Row, Start, Timeline, Trajectory,
+    JointLimits, MotionId, Start, Timeline, Trajectory, TrajectoryPoint, TrajectoryRequest, ValidationContext,
 };
 use virtual_axes_core::units::seconds;
 
 use crate::{bench, shipped};
-use virtual_axes_verification::fixtures::common::program;
+use virtual_axes_verification::fixtures::machines::program;
 
 /// Points of a long trajectory: a minute at 6 ms.
 const POINTS: usize = 10_000;
@@ -39,9 +39,9 @@ pub fn all(criterion: &mut Criterion) {
 }
 
 /// Setpoints of five axes that move slowly and stand still at both ends; with their velocities if so asked.
-fn request(config: &MachineConfig, every: i64, with_velocities: bool) -> Request {
+fn request(config: &MachineConfig, every: i64, with_velocities: bool) -> TrajectoryRequest {
     let names = config.axes().iter().map(|axis| axis.name().to_owned()).collect();
-    let mut request = Request::new(Start::Now, names);
+    let mut request = TrajectoryRequest::new(Start::Now, names);
     let period = config.periods().position * every;
     // Rest to rest as 10 u³ − 15 u⁴ + 6 u⁵.
     let size = 0.05;
@@ -52,20 +52,21 @@ fn request(config: &MachineConfig, every: i64, with_velocities: bool) -> Request
         let velocity = size * 30.0 * (u * (1.0 - u)).powi(2) / duration;
         let (positions, velocities) = ([position; 5], [velocity; 5]);
         let velocities: &[f64] = if with_velocities { &velocities } else { &[] };
-        let row = Row { positions: &positions, velocities, ..Row::default() };
+        let row = TrajectoryPoint { positions: &positions, velocities, ..TrajectoryPoint::default() };
         request.push(k as i64 * period, row).expect("well formed");
     }
     request
 }
 
-fn checked(request: Request, limits: &[JointLimits], period: i64) -> Trajectory {
-    let context = Context { joints: limits, period, max_points: POINTS, allow_nonzero_end_velocity: false };
+fn checked(request: TrajectoryRequest, limits: &[JointLimits], period: i64) -> Trajectory {
+    let context =
+        ValidationContext { joints: limits, period, max_points: POINTS, allow_nonzero_end_velocity: false };
     Trajectory::new(request, &context).expect("the machine can do it")
 }
 
 fn trajectory(criterion: &mut Criterion) {
     let config = shipped();
-    let (limits, period) = (joints(&config, ""), config.periods().position);
+    let (limits, period) = (joint_limits(&config, ""), config.periods().position);
     // On the grid of position instants, and with polynomials of the third degree between the points.
     let kinds = [("on the grid", request(&config, 1, false)), ("cubic", request(&config, 3, true))];
     let mut group = criterion.benchmark_group("trajectory, points");
@@ -83,7 +84,7 @@ fn trajectory(criterion: &mut Criterion) {
         let trajectory = Arc::new(checked(request, &limits, period));
         let begun = || {
             let mut timeline = Timeline::new(limits.clone(), period, &[0.0; 5]).expect("joints");
-            timeline.offer(MotionId(1), Arc::clone(&trajectory), 0).expect("it is free");
+            timeline.submit(MotionId(1), Arc::clone(&trajectory), 0).expect("it is free");
             timeline
         };
         let sample = |mut timeline: Timeline| {
@@ -127,7 +128,7 @@ fn poses(program: &Program, config: &MachineConfig) -> Vec<Poses> {
     let kinematics = Kinematics::new(config);
     let (ticks, axes) = (config.periods().ticks_per_position() as usize, config.axes().len());
     let tick = seconds(config.periods().current);
-    let mut turned = Turned::default();
+    let mut turned = TableAngles::default();
     let mut joints = vec![0.0; axes];
     let period = |period: usize| {
         let mut columns = vec![0.0; axes * ticks];
@@ -140,7 +141,7 @@ fn poses(program: &Program, config: &MachineConfig) -> Vec<Poses> {
             }
         }
         let mut poses = Poses::default();
-        kinematics.forward_all(&mut turned, &columns, ticks, &mut poses);
+        kinematics.forward_batch(&mut turned, &columns, ticks, &mut poses);
         poses
     };
     (0..periods_of(program, config)).map(period).collect()
@@ -156,7 +157,7 @@ fn assess(criterion: &mut Criterion) {
         let tracker = PathTracker::new(Arc::clone(program.path()));
         let until: Vec<f64> =
             (0..poses.len() * ticks).map(|i| program.progress(i as f64 * tick) + AHEAD).collect();
-        let mut found = Deviations::default();
+        let mut found = PathDeviations::default();
         let follow = |mut tracker: PathTracker| {
             for (period, poses) in poses.iter().enumerate() {
                 black_box(tracker.follow(poses, |at| until[period * ticks + at], &mut found));
@@ -182,7 +183,7 @@ fn assess(criterion: &mut Criterion) {
     let (sample, activity) = (*machine.axis(0).sample(), machine.activity(0));
     let mut assessor = AxisAssessor::default();
     let mut group = criterion.benchmark_group("assess, position periods of an axis");
-    bench(&mut group, "tracking errors and currents", 1000, || {
+    bench(&mut group, "following errors and currents", 1000, || {
         (0..1000).for_each(|_| assessor.observe(black_box(&sample), &activity));
         assessor.report(tick)
     });
@@ -191,7 +192,7 @@ fn assess(criterion: &mut Criterion) {
 
 fn simulation(criterion: &mut Criterion) {
     let config = shipped();
-    let (limits, period) = (joints(&config, ""), config.periods().position);
+    let (limits, period) = (joint_limits(&config, ""), config.periods().position);
     let trajectory = Arc::new(checked(request(&config, 1, false), &limits, period));
     let mut group = criterion.benchmark_group("simulation, position periods");
     group.throughput(Throughput::Elements(POINTS as u64));
@@ -199,7 +200,7 @@ fn simulation(criterion: &mut Criterion) {
         let begun = || {
             let mut simulation = Simulation::new(&config, limits.clone(), 0).expect("it can be simulated");
             simulation.set_assessing(assessing);
-            simulation.offer(MotionId(1), Arc::clone(&trajectory)).expect("it is free");
+            simulation.submit(MotionId(1), Arc::clone(&trajectory)).expect("it is free");
             simulation
         };
         let run = |mut simulation: Simulation| {

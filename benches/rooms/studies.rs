@@ -8,16 +8,20 @@ use criterion::Criterion;
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::trial::{self, Trial};
 use virtual_axes_core::units::seconds;
-use virtual_axes_identify::identify::campaign::{Campaign, Options as CampaignOptions};
-use virtual_axes_identify::identify::{FeedforwardMode, Input, Options, Refine, identify};
+use virtual_axes_identify::identify::campaign::{Campaign, CampaignOptions};
+use virtual_axes_identify::identify::{
+    FeedforwardMode, IdentificationInput, IdentificationOptions, RefinementScope, identify,
+};
 use virtual_axes_identify::recording::{Conditioning, RawRecording, Signals, condition};
 use virtual_axes_identify::tune::{
-    Bench, Cost, Course, MarginLimits, Tuning, Unwatched, fine_grid, tune_gpc_from,
+    Cost, MarginLimits, NoProgress, Tuning, TuningProblem, Workload, fine_design_grid, tune_gpc_from,
 };
 
 use crate::{bench, shipped};
-use virtual_axes_verification::fixtures::common::{program, setpoints};
-use virtual_axes_verification::fixtures::recordings::{Disturbance, ignorant, record_campaign, truth};
+use virtual_axes_verification::fixtures::machines::{program, setpoints};
+use virtual_axes_verification::fixtures::recordings::{
+    Disturbance, initial_parameters, record_campaign, true_parameters,
+};
 
 /// Machines that are run side by side, as a search does.
 const TOGETHER: usize = 32;
@@ -62,7 +66,7 @@ fn trial(criterion: &mut Criterion) {
         let variants = vec![config.clone(); TOGETHER];
         let own: Vec<usize> = (0..config.axes().len()).collect();
         bench(&mut group, &format!("{name}, 32 machines together"), count * TOGETHER, || {
-            trial::run_together(&bare, points(&bare), &variants, &own, || Ok(()))
+            trial::run_variants(&bare, points(&bare), &variants, &own, || Ok(()))
         });
     }
     group.finish();
@@ -72,16 +76,15 @@ fn tune(criterion: &mut Criterion) {
     let config = shipped();
     let parameters = Parameters::embedded_default().expect("the shipped machine");
     let program = program("ballbar", &config);
-    let course = Course::read(
-        "ballbar",
-        Some(Arc::clone(&program)),
-        setpoints("ballbar", program, &config),
-        || Ok(()),
-    )
-    .expect("setpoints");
+    let course =
+        Workload::read("ballbar", Some(Arc::clone(&program)), setpoints("ballbar", program, &config), || {
+            Ok(())
+        })
+        .expect("setpoints");
     let cost = Cost::default();
-    let bench_of = LazyCell::new(|| Bench::new(&parameters, &course, &cost, &Unwatched).expect("a bench"));
-    let designs: Vec<Tuning> = fine_grid(DESIGNS).into_iter().step_by(DESIGNS / SCREENED).collect();
+    let bench_of =
+        LazyCell::new(|| TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench"));
+    let designs: Vec<Tuning> = fine_design_grid(DESIGNS).into_iter().step_by(DESIGNS / SCREENED).collect();
     let mut group = criterion.benchmark_group("tune, designs");
     bench(&mut group, "margins of the worst axis", designs.len(), || {
         designs.iter().filter(|design| bench_of.margins(design).is_some()).count()
@@ -95,13 +98,18 @@ fn tune(criterion: &mut Criterion) {
 
 fn identify_one(criterion: &mut Criterion) {
     const AXIS: &str = "x";
-    let start = ignorant(AXIS);
+    let start = initial_parameters(AXIS);
     let machine = start.machine_config().expect("a machine");
     let axis = &machine.axes()[0];
     let raw: LazyCell<Vec<RawRecording>, _> = LazyCell::new(|| {
         let disturbance = Disturbance::usual(axis.kind(), 1);
-        let parts =
-            record_campaign(&truth(), AXIS, &FeedforwardMode::ALL, &CampaignOptions::default(), &disturbance);
+        let parts = record_campaign(
+            &true_parameters(),
+            AXIS,
+            &FeedforwardMode::ALL,
+            &CampaignOptions::default(),
+            &disturbance,
+        );
         parts.into_iter().map(|(_, recording)| recording).collect()
     });
     let conditioned = |raw: &RawRecording| -> Signals {
@@ -120,13 +128,21 @@ fn identify_one(criterion: &mut Criterion) {
     bench(&mut group, "recordings checked and filtered", samples, || {
         raw.iter().map(conditioned).collect::<Vec<_>>()
     });
-    let refined = |refine: Refine| {
+    let refined = |refine: RefinementScope| {
         let modes = FeedforwardMode::ALL.into_iter().map(Some);
-        let inputs: Vec<Input> =
-            signals.iter().zip(modes).map(|(signals, feedforward)| Input { signals, feedforward }).collect();
-        identify(&inputs, axis, &machine.periods(), &Options { refine, ..Options::default() })
+        let inputs: Vec<IdentificationInput> = signals
+            .iter()
+            .zip(modes)
+            .map(|(signals, feedforward)| IdentificationInput { signals, feedforward })
+            .collect();
+        identify(
+            &inputs,
+            axis,
+            &machine.periods(),
+            &IdentificationOptions { refine, ..IdentificationOptions::default() },
+        )
     };
-    bench(&mut group, "one axis by the steps of the paper", samples, || refined(Refine::NONE));
-    bench(&mut group, "one axis, refined on the closed loop", samples, || refined(Refine::ALL));
+    bench(&mut group, "one axis by the steps of the paper", samples, || refined(RefinementScope::NONE));
+    bench(&mut group, "one axis, refined on the closed loop", samples, || refined(RefinementScope::ALL));
     group.finish();
 }

@@ -1,6 +1,6 @@
-//! The C loop of benches/peers: it keeps the numbers of the model's page, and the library agrees with it.
+//! Independent C reference of benches/peers: reproduces the model page, and the library agrees with it.
 //!
-//! It shares nothing with the library: its parameters are a table of its own, its motor is discretized by a series.
+//! The C program has its own parameter table and discretizes the motor by a series.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -16,10 +16,11 @@ use virtual_axes_verification::fixtures::machines::*;
 
 const MICROMETER: f64 = 1e-6;
 const JOINTS: [&str; AXES] = ["x", "y", "z", "a", "c"];
-/// m or rad. The order of operations alone leaves less than 1e-14; friction that is off by 1e-12 A less than this.
+/// Position tolerance, m or rad: the order of operations causes less than 1e-14, a friction error of 1e-12 A less than
+/// this.
 const ROUNDING: f64 = 1e-12;
 
-/// The program, built once. Without -ffast-math: what differs then is the order of operations only.
+/// Path of the C program, built once without -ffast-math, so that only the order of operations differs.
 static PROGRAM: LazyLock<PathBuf> = LazyLock::new(|| {
     let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join("scalar");
     let status = Command::new("gcc")
@@ -28,7 +29,7 @@ static PROGRAM: LazyLock<PathBuf> = LazyLock::new(|| {
         .arg(peers("scalar.c"))
         .arg("-lm")
         .status()
-        .expect("gcc is there (Debian: apt-get install gcc)");
+        .expect("gcc is installed (Debian: apt-get install gcc)");
     assert!(status.success(), "gcc: {status}");
     program
 });
@@ -59,7 +60,7 @@ impl Setpoints {
         }
     }
 
-    /// What the program says of these setpoints when it is told `input`.
+    /// Runs the program on these setpoints with `input` on stdin; returns its output.
     fn run(&self, input: &str, arguments: &[&str]) -> String {
         let mut text = self.joints.join(" ") + "\n";
         for row in &self.rows {
@@ -78,7 +79,7 @@ impl Setpoints {
             .stdout(Stdio::piped())
             .spawn()
             .expect("the program starts");
-        // Dropped behind this statement: the program ends with its input.
+        // The pipe closes after this statement; the program ends at the end of its input.
         child.stdin.take().expect("it is piped").write_all(input.as_bytes()).expect("the program reads");
         let output = child.wait_with_output().expect("the program ends");
         assert!(output.status.success(), "{}: {}", self.name, output.status);
@@ -102,7 +103,7 @@ fn figure(figures: &Value, path: &str) -> f64 {
 }
 
 #[test]
-fn the_c_loop_keeps_the_lines_and_rotations_of_the_models_page() {
+fn c_reference_reproduces_lines_and_rotations_of_the_model_page() {
     let line = |acceleration| RestToRestProfile::new(0.200, 10.0 * M_MIN, acceleration, 50.0);
     let turn = RestToRestProfile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
     for (joint, profile, unit, error, current) in [
@@ -114,7 +115,7 @@ fn the_c_loop_keeps_the_lines_and_rotations_of_the_models_page() {
     ] {
         let setpoints = Setpoints::new(joint, &[joint], profile.duration() + 0.5, |t| vec![profile.at(t)]);
         let figures = setpoints.figures(&[]);
-        let largest = figure(&figures, &format!("/axes/{joint}/max_synchronized_tracking_error"));
+        let largest = figure(&figures, &format!("/axes/{joint}/max_delay_compensated_following_error"));
         assert_near(joint, largest / unit, error, error / 100.0);
         let peak = figure(&figures, &format!("/axes/{joint}/peak_current"));
         assert_near(joint, peak, current, current / 100.0);
@@ -122,7 +123,7 @@ fn the_c_loop_keeps_the_lines_and_rotations_of_the_models_page() {
 }
 
 #[test]
-fn the_c_loop_keeps_the_ballbar_of_the_models_page() {
+fn c_reference_reproduces_the_ballbar_of_the_model_page() {
     let trial = Ballbar::paper();
     let setpoints = Setpoints::new("ballbar", &["x", "y"], trial.duration(), |t| trial.psec(t)[..2].to_vec());
     let window = trial.window();
@@ -133,15 +134,15 @@ fn the_c_loop_keeps_the_ballbar_of_the_models_page() {
     }
 }
 
-/// Positions at position instants and figures of the library.
-fn library(setpoints: &Setpoints) -> (Vec<Vec<f64>>, Vec<AxisReport>) {
+/// Returns positions at position cycles and figures of the library.
+fn simulate(setpoints: &Setpoints) -> (Vec<Vec<f64>>, Vec<AxisReport>) {
     let mut machine = machine(&[]);
     let mut assessors = [AxisAssessor::default(); AXES];
     let mut positions = Vec::new();
     for psec in &setpoints.rows {
         machine.advance(psec, &[]);
-        for (place, assessor) in assessors.iter_mut().enumerate() {
-            assessor.observe(machine.axis(place).sample(), &machine.activity(place));
+        for (index, assessor) in assessors.iter_mut().enumerate() {
+            assessor.observe(machine.axis(index).sample(), &machine.activity(index));
         }
         positions.push(machine.axes().iter().map(|axis| axis.sample().position).collect());
     }
@@ -150,7 +151,7 @@ fn library(setpoints: &Setpoints) -> (Vec<Vec<f64>>, Vec<AxisReport>) {
 }
 
 fn assert_library_agrees(setpoints: &Setpoints) -> Vec<AxisReport> {
-    let (positions, reports) = library(setpoints);
+    let (positions, reports) = simulate(setpoints);
     let wanted = setpoints.positions();
     assert_eq!(positions.len(), wanted.len());
     for (k, (found, wanted)) in positions.iter().zip(&wanted).enumerate() {
@@ -161,11 +162,11 @@ fn assert_library_agrees(setpoints: &Setpoints) -> Vec<AxisReport> {
     let figures = setpoints.figures(&[]);
     for (joint, report) in JOINTS.iter().zip(&reports) {
         for (key, found, tolerance) in [
-            ("max_tracking_error", report.max_following_error, ROUNDING),
-            ("rms_tracking_error", report.rms_following_error, ROUNDING),
-            ("max_synchronized_tracking_error", report.max_delay_compensated_following_error, ROUNDING),
-            ("rms_synchronized_tracking_error", report.rms_delay_compensated_following_error, ROUNDING),
-            // Amperes are some thousand times what the axis moves: motor radians, then gains.
+            ("max_following_error", report.max_following_error, ROUNDING),
+            ("rms_following_error", report.rms_following_error, ROUNDING),
+            ("max_delay_compensated_following_error", report.max_delay_compensated_following_error, ROUNDING),
+            ("rms_delay_compensated_following_error", report.rms_delay_compensated_following_error, ROUNDING),
+            // Errors of currents are about 1000 times those of positions: transmission ratio and gains.
             ("peak_current", report.peak_current, 1e3 * ROUNDING),
             ("control_activity", report.control_activity, 1e3 * ROUNDING),
             ("saturation_time", report.saturation_time, ROUNDING),
@@ -178,12 +179,13 @@ fn assert_library_agrees(setpoints: &Setpoints) -> Vec<AxisReport> {
 }
 
 #[test]
-fn five_axes_at_once_agree_with_the_c_loop() {
+fn five_axes_agree_with_the_c_reference() {
     let line = RestToRestProfile::new(0.200, 10.0 * M_MIN, 2.1, 50.0);
     let turn = RestToRestProfile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
-    // There and back: every axis reverses, and stops twice.
-    let shuttle =
-        |profile: RestToRestProfile, pause: f64, t: f64| profile.at(t) - profile.at(t - profile.duration() - pause);
+    // Forward and back: every axis reverses and stops twice.
+    let shuttle = |profile: RestToRestProfile, pause: f64, t: f64| {
+        profile.at(t) - profile.at(t - profile.duration() - pause)
+    };
     let setpoints = Setpoints::new("five-axis", &JOINTS, 2.0 * turn.duration() + 0.5, |t| {
         vec![
             shuttle(line, 0.0, t),
@@ -198,7 +200,7 @@ fn five_axes_at_once_agree_with_the_c_loop() {
 }
 
 #[test]
-fn a_step_into_every_limit_agrees_with_the_c_loop() {
+fn step_into_every_limit_agrees_with_the_c_reference() {
     let setpoints = Setpoints::new("step", &JOINTS, 0.6, |t| {
         let size = if t < 0.05 { 0.0 } else { 1.0 };
         vec![0.020 * size, -0.020 * size, 0.020 * size, 10.0 * DEGREE * size, 20.0 * DEGREE * size]

@@ -1,4 +1,4 @@
-//! The search of tunings: as good as a grid by brute force, within the margins, the same on every machine.
+//! Tuning search: as good as a brute-force grid, within the margins, independent of the number of threads.
 
 use std::io;
 use std::sync::Arc;
@@ -24,13 +24,13 @@ fn set(parameters: &mut Parameters, key: &str, value: Value) {
     parameters.set(key, value, &ValueSource::named("test")).expect(key);
 }
 
-/// The machine with a predictive controller on each of `joints`, key by key.
+/// Returns the machine with a predictive controller on each of `joints`, set key by key.
 fn with_gpc(parameters: &Parameters, joints: &[&str], tuning: (i64, i64, i64, f64)) -> MachineConfig {
     let (n1, n2, nu, lambda_rel) = tuning;
     let mut tuned = parameters.clone();
     for joint in joints {
         let key = |name: &str| format!("{joint}.position_loop.{name}");
-        // N2 first where it grows, last where it shrinks: at no time below the others.
+        // N2 is set first if it grows and last if it shrinks, so that it is never below the others.
         set(&mut tuned, &key("gpc.n2"), Value::Integer(60));
         set(&mut tuned, &key("gpc.n1"), Value::Integer(n1));
         set(&mut tuned, &key("gpc.nu"), Value::Integer(nu));
@@ -41,8 +41,8 @@ fn with_gpc(parameters: &Parameters, joints: &[&str], tuning: (i64, i64, i64, f6
     tuned.machine_config().expect("a machine")
 }
 
-/// Largest synchronized tracking error of the first axis, µm; none where a limit is reached.
-fn tracking_error(config: &MachineConfig, scenario: &str) -> Option<f64> {
+/// Returns the largest delay-compensated following error of the first axis, µm; none if a limit is reached.
+fn following_error(config: &MachineConfig, scenario: &str) -> Option<f64> {
     let program = program(scenario, config);
     let trial = Trial {
         machine: config,
@@ -60,7 +60,7 @@ fn the_tuning_is_as_good_as_any_of_the_grid_by_brute_force() {
     let parameters = machine(&["x"]);
     let config = parameters.machine_config().expect("a machine");
     let model = prediction_model(&config.axes()[0], &config.periods()).expect("a model");
-    // The grid, written down once more.
+    // The grid, written out.
     let mut grid = Vec::new();
     for n2 in 1..=24 {
         for nu in 1..=n2.min(8) {
@@ -80,47 +80,48 @@ fn the_tuning_is_as_good_as_any_of_the_grid_by_brute_force() {
         .collect();
     assert!(keeping.len() > 300, "only {} keep the margins", keeping.len());
     let cost = |&(n2, nu, lambda_rel): &(usize, usize, f64)| {
-        tracking_error(&with_gpc(&parameters, &["x"], (1, n2 as i64, nu as i64, lambda_rel)), THERE_AND_BACK)
+        following_error(&with_gpc(&parameters, &["x"], (1, n2 as i64, nu as i64, lambda_rel)), THERE_AND_BACK)
     };
     let best =
         keeping.par_iter().filter_map(cost).min_by(f64::total_cmp).expect("one that does not saturate");
 
-    let course = workload(THERE_AND_BACK, &config);
+    let workload = workload(THERE_AND_BACK, &config);
     let cost = Cost::default();
-    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
-    let found = tune_gpc(&bench, &MarginLimits::default()).expect("a tuning");
+    let problem = TuningProblem::new(&parameters, &workload, &cost, &NoProgress).expect("a tuning problem");
+    let found = tune_gpc(&problem, &MarginLimits::default()).expect("a tuning");
     assert!(found.best.cost <= best, "{} found, {best} on the grid", found.best.cost);
-    // One axis has no contour: the cost is its largest synchronized tracking error.
+    // A single axis has no contour: the cost is its largest delay-compensated following error.
     let Tuning::Gpc { n1, n2, nu, lambda_rel } = found.best.tuning else { panic!("{}", found.best.tuning) };
     let again = with_gpc(&parameters, &["x"], (n1 as i64, n2 as i64, nu as i64, lambda_rel));
-    assert_eq!(tracking_error(&again, THERE_AND_BACK), Some(found.best.cost));
+    assert_eq!(following_error(&again, THERE_AND_BACK), Some(found.best.cost));
     let rst = gpc(&model, &GpcTuning { n1, n2, nu, weight: ControlWeight::Relative(lambda_rel) })
         .expect("a design");
     let kept = margins(&model, &rst).expect("stable");
     assert!(kept.modulus >= 0.5 && kept.delay >= 0.005, "{kept:?}");
 }
 
-/// A search with so many threads.
+/// Runs a search with a number of threads.
 fn with_threads(threads: usize, search: impl Fn() -> SearchResult + Sync) -> SearchResult {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-    // Elsewhere than in the pool's own thread, `install` would not use it.
+    // `install` uses the pool only from another thread.
     let search = &search;
     std::thread::scope(|scope| scope.spawn(|| pool.install(search)).join().expect("a search"))
 }
 
 #[test]
-fn the_number_of_threads_changes_nothing() {
+fn the_result_is_independent_of_the_number_of_threads() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = workload(CORNER, &config);
+    let workload = workload(CORNER, &config);
     let cost: Cost = "contour=1,rms=0.5,activity=10".parse().expect("a cost");
     // High margins leave few designs to run.
     let limits = MarginLimits { modulus: 0.75, delay: 0.01 };
     let search = |seed: Option<u64>| {
-        let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
+        let problem =
+            TuningProblem::new(&parameters, &workload, &cost, &NoProgress).expect("a tuning problem");
         match seed {
-            None => tune_gpc(&bench, &limits).expect("a tuning"),
-            Some(seed) => tune_cascade(&bench, &limits, seed).expect("a tuning"),
+            None => tune_gpc(&problem, &limits).expect("a tuning"),
+            Some(seed) => tune_cascade(&problem, &limits, seed).expect("a tuning"),
         }
     };
     for seed in [None, Some(7)] {
@@ -135,14 +136,14 @@ fn the_number_of_threads_changes_nothing() {
 fn the_cascade_is_tuned_within_the_margins() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = workload(CIRCLE, &config);
+    let workload = workload(CIRCLE, &config);
     let cost = Cost::default();
-    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
+    let problem = TuningProblem::new(&parameters, &workload, &cost, &NoProgress).expect("a tuning problem");
     let limits = MarginLimits { modulus: 0.7, delay: 0.02 };
-    let found = tune_cascade(&bench, &limits, 1).expect("a tuning");
-    // The lead of the feedforward costs the machine as it is ΔR ≈ v²/(R Kp) Tsp/2: 167 µm here.
-    assert!(bench.present().cost > 150.0, "{}", bench.present().cost);
-    assert!(found.best.cost < bench.present().cost / 5.0, "{}", found.best.cost);
+    let found = tune_cascade(&problem, &limits, 1).expect("a tuning");
+    // The feedforward lead of the present machine costs ΔR ≈ v²/(R Kp) Tsp/2: 167 µm here.
+    assert!(problem.present().cost > 150.0, "{}", problem.present().cost);
+    assert!(found.best.cost < problem.present().cost / 5.0, "{}", found.best.cost);
     let Tuning::Cascade(axes) = &found.best.tuning else { panic!("{}", found.best.tuning) };
     assert_eq!(axes.iter().map(|(joint, _)| joint.as_str()).collect::<Vec<_>>(), ["x", "y"]);
     for ((_, gains), axis) in axes.iter().zip(config.axes()) {
@@ -157,36 +158,36 @@ fn the_cascade_is_tuned_within_the_margins() {
 }
 
 #[test]
-fn what_saturates_is_not_taken() {
+fn saturated_tunings_are_rejected() {
     let mut parameters = machine(&["x"]);
-    // The move asks for more current than there is, whatever the controller.
+    // The move needs more current than the limit with any controller.
     set(&mut parameters, "x.motor.max_current_a", Value::Double(2.0));
     let config = parameters.machine_config().expect("a machine");
-    let course = workload(THERE_AND_BACK, &config);
+    let workload = workload(THERE_AND_BACK, &config);
     let cost = Cost::default();
-    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
-    assert!(bench.present().is_saturated);
+    let problem = TuningProblem::new(&parameters, &workload, &cost, &NoProgress).expect("a tuning problem");
+    assert!(problem.present().is_saturated);
     let limits = MarginLimits { modulus: 0.85, delay: 0.02 };
-    let error = tune_gpc(&bench, &limits).expect_err("no tuning");
+    let error = tune_gpc(&problem, &limits).expect_err("no tuning");
     assert!(matches!(error, TuneError::Saturated { runs } if runs > 0), "{error}");
     assert!(error.to_string().contains("saturates"), "{error}");
 }
 
 #[test]
-fn margins_that_no_design_has_are_refused_with_the_best_there_is() {
+fn margin_limits_of_no_design_are_rejected_with_the_best_margins() {
     let parameters = machine(&["x"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = workload(THERE_AND_BACK, &config);
+    let workload = workload(THERE_AND_BACK, &config);
     let cost = Cost::default();
-    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
+    let problem = TuningProblem::new(&parameters, &workload, &cost, &NoProgress).expect("a tuning problem");
     let limits = MarginLimits { modulus: 0.999, delay: 0.005 };
-    match tune_gpc(&bench, &limits).expect_err("no tuning") {
+    match tune_gpc(&problem, &limits).expect_err("no tuning") {
         TuneError::NoMargins { designs, limits: asked, modulus, .. } => {
             assert!(designs > 1900 && asked == limits && modulus > 0.8 && modulus < 0.999, "{modulus}");
         }
         error => panic!("{error}"),
     }
-    let error = tune_cascade(&bench, &limits, 1).expect_err("no tuning");
+    let error = tune_cascade(&problem, &limits, 1).expect_err("no tuning");
     assert!(matches!(error, TuneError::NoMargins { .. }), "{error}");
 }
 
@@ -196,14 +197,15 @@ fn a_path_without_motion_has_nothing_to_tune() {
     let cost = Cost::default();
     let rows = Rows { left: 100 };
     let setpoints = trial::SetpointSource::Grid(Box::new(rows));
-    let course =
+    let workload =
         virtual_axes_identify::tune::Workload::read("still", None, setpoints, || Ok(())).expect("setpoints");
-    let error =
-        TuningProblem::new(&parameters, &course, &cost, &NoProgress).map(|_| ()).expect_err("nothing moves");
+    let error = TuningProblem::new(&parameters, &workload, &cost, &NoProgress)
+        .map(|_| ())
+        .expect_err("nothing moves");
     assert!(matches!(error, TuneError::NothingMoves), "{error}");
 }
 
-/// So many rows of X at home.
+/// Source of rows of X at home.
 struct Rows {
     left: usize,
 }
@@ -220,10 +222,10 @@ impl trial::GridSource for Rows {
     }
 }
 
-/// Ends the search after so many position periods.
-struct Impatient(AtomicUsize);
+/// Progress receiver that interrupts the search after a number of position cycles.
+struct InterruptAfter(AtomicUsize);
 
-impl Progress for Impatient {
+impl Progress for InterruptAfter {
     fn check_interrupt(&self) -> io::Result<()> {
         let left = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
         left.map(|_| ()).map_err(|_| io::Error::other("enough"))
@@ -231,14 +233,14 @@ impl Progress for Impatient {
 }
 
 #[test]
-fn a_weight_given_as_such_does_not_hide_the_relative_one() {
+fn an_absolute_weight_does_not_override_the_relative_one() {
     let mut parameters = machine(&["x", "y"]);
     set(&mut parameters, "x.position_loop.gpc.lambda", Value::Double(1.0));
     let tuning = Tuning::Gpc { n1: 1, n2: 8, nu: 6, lambda_rel: 0.01 };
     let tuned = tuning.apply(&parameters, &["x".to_owned()]).expect("valid");
     assert_eq!(tuned.get("x.position_loop.gpc.lambda"), None);
     assert_eq!(tuned.get("x.position_loop.gpc.lambda_rel"), Some(Value::Double(0.01)));
-    // The other axis is as it was.
+    // The other axis is unchanged.
     let y = |parameters: &Parameters| {
         parameters.iter().filter(|(key, _)| key.starts_with("y.")).collect::<Vec<_>>()
     };
@@ -246,54 +248,55 @@ fn a_weight_given_as_such_does_not_hide_the_relative_one() {
 }
 
 #[test]
-fn a_search_that_is_interrupted_ends_with_the_reason() {
+fn an_interrupted_search_returns_the_error() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = workload(CORNER, &config);
+    let workload = workload(CORNER, &config);
     let cost = Cost::default();
     for cascade in [false, true] {
-        let watch = Impatient(AtomicUsize::new(2000));
-        let bench = TuningProblem::new(&parameters, &course, &cost, &watch).expect("a bench");
+        let watch = InterruptAfter(AtomicUsize::new(2000));
+        let problem = TuningProblem::new(&parameters, &workload, &cost, &watch).expect("a tuning problem");
         let limits = MarginLimits::default();
-        let found = if cascade { tune_cascade(&bench, &limits, 1) } else { tune_gpc(&bench, &limits) };
+        let found = if cascade { tune_cascade(&problem, &limits, 1) } else { tune_gpc(&problem, &limits) };
         assert_eq!(found.expect_err("interrupted").to_string(), "enough");
     }
 }
 
 #[test]
-fn contrasts_are_better_here_and_worse_there() {
+fn contrasts_are_better_on_one_path_and_worse_on_the_other() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
     let (circle, corner) = (workload(CIRCLE, &config), workload(CORNER, &config));
     let cost = Cost::default();
-    let bench = TuningProblem::new(&parameters, &circle, &cost, &NoProgress).expect("a bench");
+    let problem = TuningProblem::new(&parameters, &circle, &cost, &NoProgress).expect("a tuning problem");
     let limits = MarginLimits { modulus: 0.7, delay: 0.0 };
-    let (present, found) = find_contrasts(&bench, &corner, &limits).expect("contrasts");
+    let (present, found) = find_contrasts(&problem, &corner, &limits).expect("contrasts");
     assert!(!found.is_empty());
     for pair in &found {
-        assert!(pair.better.cost < bench.present().cost && pair.worse.cost > present.cost);
+        assert!(pair.better.cost < problem.present().cost && pair.worse.cost > present.cost);
         assert_eq!(pair.better.tuning, pair.worse.tuning);
         assert!(pair.better.margins.is_some_and(|margins| margins.modulus >= 0.7));
     }
     assert!(found.windows(2).all(|pair| pair[0].worse.cost >= pair[1].worse.cost));
-    // The other way round the longer path comes first.
-    let bench = TuningProblem::new(&parameters, &corner, &cost, &NoProgress).expect("a bench");
-    let (_, other) = find_contrasts(&bench, &circle, &limits).expect("contrasts");
+    // In the reverse order the longer path comes first.
+    let problem = TuningProblem::new(&parameters, &corner, &cost, &NoProgress).expect("a tuning problem");
+    let (_, other) = find_contrasts(&problem, &circle, &limits).expect("contrasts");
     for pair in &other {
         assert!(
-            pair.better.cost < bench.present().cost && pair.worse.cost > circle_cost(&parameters, &circle)
+            pair.better.cost < problem.present().cost
+                && pair.worse.cost > cost_of_circle(&parameters, &circle)
         );
     }
 }
 
-fn circle_cost(parameters: &Parameters, circle: &virtual_axes_identify::tune::Workload) -> f64 {
+fn cost_of_circle(parameters: &Parameters, circle: &virtual_axes_identify::tune::Workload) -> f64 {
     let config = parameters.machine_config().expect("a machine");
     let outcome = circle.run(&config, false, false, |_| Ok(())).expect("a run");
     outcome.figures.contour.expect("a contour").max / MICROMETER
 }
 
 #[test]
-fn costs_are_read_and_refused_by_name() {
+fn costs_are_parsed_and_invalid_terms_rejected() {
     let cost: Cost = "contour=1, rms=0.5,current".parse().expect("a cost");
     assert_eq!(
         cost.terms(),
@@ -321,8 +324,8 @@ fn costs_are_read_and_refused_by_name() {
 fn a_cost_is_the_weighted_sum_of_figures() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = workload(CORNER, &config);
-    let figures = course.run(&config, false, false, |_| Ok(())).expect("a run").figures;
+    let workload = workload(CORNER, &config);
+    let figures = workload.run(&config, false, false, |_| Ok(())).expect("a run").figures;
     let of = |text: &str| text.parse::<Cost>().expect("a cost").of(&figures, &config);
     let contour = figures.contour.expect("a contour");
     assert_eq!(of("contour"), contour.max / MICROMETER);
@@ -340,17 +343,17 @@ fn a_cost_is_the_weighted_sum_of_figures() {
 }
 
 #[test]
-fn the_front_is_what_no_other_beats() {
+fn the_front_contains_the_pareto_optimal_candidates() {
     let parameters = machine(&["x"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = workload(THERE_AND_BACK, &config);
+    let workload = workload(THERE_AND_BACK, &config);
     let cost = Cost::default();
-    let bench = TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench");
+    let problem = TuningProblem::new(&parameters, &workload, &cost, &NoProgress).expect("a tuning problem");
     let merit = |c: &TuningCandidate| c.margins.map_or(f64::NAN, |m| m.modulus);
-    // Costs and margins that repeat, by a multiplicative sequence.
+    // Repeating costs and margins from a multiplicative sequence.
     let all: Vec<TuningCandidate> = (0..200)
         .map(|i| {
-            let mut candidate = bench.present().clone();
+            let mut candidate = problem.present().clone();
             candidate.cost = f64::from(i * 37 % 41);
             candidate.margins = candidate
                 .margins
