@@ -43,13 +43,13 @@ impl NodeFqn {
         Ok(Self { namespace: namespace.to_owned(), name: name.to_owned() })
     }
 
-    /// Namespace, with a leading slash.
+    /// Returns the namespace, with a leading slash.
     #[must_use]
     pub fn namespace(&self) -> &str {
         &self.namespace
     }
 
-    /// Base name.
+    /// Returns the base name.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name

@@ -141,7 +141,8 @@ proptest! {
 
     #[test]
     fn any_goal_has_tolerances_for_its_joints_or_is_rejected_with_one_line(
-        trajectory in trajectory(), path_tolerance in tolerances(), goal_tolerance in tolerances(), goal_time_tolerance in time(),
+        trajectory in trajectory(), path_tolerance in tolerances(), goal_tolerance in tolerances(),
+        goal_time_tolerance in time(),
     ) {
         let goal = FollowJointTrajectoryGoal {
             trajectory, path_tolerance, goal_tolerance, goal_time_tolerance, ..Default::default()

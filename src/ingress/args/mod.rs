@@ -57,7 +57,7 @@ impl LogLevel {
         Self::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, level)| *level)
     }
 
-    /// Name in capitals.
+    /// Returns the name in capitals.
     #[must_use]
     pub fn name(self) -> &'static str {
         Self::NAMES[self as usize].0
@@ -190,7 +190,7 @@ pub struct RosArgs {
 }
 
 impl RosArgs {
-    /// Node name after remapping by `__ns` and `__node`.
+    /// Returns the node name after remapping by `__ns` and `__node`.
     #[must_use]
     pub fn node(&self) -> &NodeFqn {
         &self.node
@@ -205,37 +205,37 @@ impl RosArgs {
         })
     }
 
-    /// Remapping rules, in the order of the command line.
+    /// Returns the remapping rules, in the order of the command line.
     #[must_use]
     pub fn remaps(&self) -> &[RemapRule] {
         &self.remaps
     }
 
-    /// Log level of all loggers, if given.
+    /// Returns the log level of all loggers, if given.
     #[must_use]
     pub fn log_level(&self) -> Option<LogLevel> {
         self.log_level
     }
 
-    /// Log levels of single loggers.
+    /// Returns the log levels of single loggers.
     #[must_use]
     pub fn logger_levels(&self) -> &[(String, LogLevel)] {
         &self.logger_levels
     }
 
-    /// Outputs of log messages.
+    /// Returns the outputs of log messages.
     #[must_use]
     pub fn log_sinks(&self) -> LogSinks {
         self.log_sinks
     }
 
-    /// Security enclave of the node, if given.
+    /// Returns the security enclave of the node, if given.
     #[must_use]
     pub fn enclave(&self) -> Option<&str> {
         self.enclave.as_deref()
     }
 
-    /// Warnings about accepted arguments without effect, for the log.
+    /// Returns the warnings about accepted arguments without effect, for the log.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings

@@ -34,7 +34,7 @@ pub struct LiveNodeParameters {
 }
 
 impl LiveNodeParameters {
-    /// Default path and goal tolerances of action goals.
+    /// Returns the default path and goal tolerances of action goals.
     pub fn goal_defaults(&self) -> Arc<GoalDefaults> {
         Arc::clone(&self.goal_defaults.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -62,7 +62,7 @@ impl ParameterStore {
         *self.live.goal_defaults.lock().unwrap_or_else(PoisonError::into_inner) = defaults;
     }
 
-    /// Present values.
+    /// Returns the present values.
     pub fn parameters(&self) -> &Parameters {
         &self.parameters
     }

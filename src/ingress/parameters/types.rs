@@ -48,7 +48,7 @@ pub enum ParameterValue {
 }
 
 impl ParameterValue {
-    /// Type of the value.
+    /// Returns the type of the value.
     #[must_use]
     pub fn kind(&self) -> ParameterType {
         match self {

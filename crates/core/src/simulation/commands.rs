@@ -111,7 +111,7 @@ impl Simulation {
         self.timeline.is_stream_inhibited()
     }
 
-    /// Counters of streamed setpoints since construction.
+    /// Returns the counters of streamed setpoints since construction.
     pub fn stream_counts(&self) -> StreamCounts {
         self.timeline.stream_counts()
     }
@@ -121,7 +121,7 @@ impl Simulation {
         self.timeline.take_stream_end()
     }
 
-    /// Delay of streamed setpoints in effect, ns: the preview of the controllers.
+    /// Returns the delay of streamed setpoints in effect, ns: the preview of the controllers.
     ///
     /// After [`update_parameters`](Self::update_parameters) it changes when the stream pauses, see
     /// [`set_stream_delay`](crate::trajectory::Timeline::set_stream_delay).

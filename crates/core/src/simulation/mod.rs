@@ -124,17 +124,17 @@ impl Simulation {
         self.grid.time_of(k)
     }
 
-    /// Position instant that the next [`step`](Self::step) computes.
+    /// Returns the position instant that the next [`step`](Self::step) computes.
     pub fn next_instant(&self) -> i64 {
         self.next
     }
 
-    /// Position period Tsp, ns.
+    /// Returns the position period Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
         self.grid.period
     }
 
-    /// Simulated machine.
+    /// Returns the simulated machine.
     pub fn machine(&self) -> &Machine {
         &self.machine
     }
@@ -257,7 +257,7 @@ impl Simulation {
         }
     }
 
-    /// Samples of all axes at the last position instant.
+    /// Returns the samples of all axes at the last position instant.
     pub fn samples(&self) -> &[AxisSample] {
         &self.samples
     }

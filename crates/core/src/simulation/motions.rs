@@ -284,7 +284,7 @@ impl ActiveMotions {
         finished.extend(self.list.drain(..).map(|m| m.into_end(MotionOutcome::Aborted(reason), time)));
     }
 
-    /// Assessors of the running motions.
+    /// Returns the assessors of the running motions.
     fn assessors(&mut self) -> impl Iterator<Item = &mut MotionAssessor> {
         self.list.iter_mut().filter(|m| m.is_running).filter_map(|m| m.assessor.as_mut())
     }

@@ -47,22 +47,22 @@ impl Trajectory {
         trajectory
     }
 
-    /// Start of the trajectory.
+    /// Returns the start of the trajectory.
     pub fn start(&self) -> Start {
         self.start
     }
 
-    /// Machine indices of the joints, one per column.
+    /// Returns the machine indices of the joints, one per column.
     pub fn joints(&self) -> &[usize] {
         &self.joints
     }
 
-    /// Number of joints of the machine for which the trajectory was validated.
+    /// Returns the number of joints of the machine for which the trajectory was validated.
     pub fn machine_joints(&self) -> usize {
         self.machine_joints
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     pub fn points(&self) -> usize {
         self.times.len()
     }
@@ -72,17 +72,17 @@ impl Trajectory {
         self.times.is_empty()
     }
 
-    /// Times of the points from the start, ns, strictly increasing.
+    /// Returns the times of the points from the start, ns, strictly increasing.
     pub fn times(&self) -> &[Nanoseconds] {
         &self.times
     }
 
-    /// Time of the last point, ns; 0 for a stop.
+    /// Returns the time of the last point, ns; 0 for a stop.
     pub fn duration(&self) -> Nanoseconds {
         self.times.last().copied().unwrap_or(0)
     }
 
-    /// Time of the first point, ns; 0 for a stop.
+    /// Returns the time of the first point, ns; 0 for a stop.
     pub fn first_time(&self) -> Nanoseconds {
         self.times.first().copied().unwrap_or(0)
     }
@@ -103,12 +103,12 @@ impl Trajectory {
         self.positions.get(index.checked_mul(columns)?..)?.get(..columns)
     }
 
-    /// Spline degree allowed by the fields of point `index`.
+    /// Returns the spline degree allowed by the fields of point `index`.
     pub(super) fn degree(&self, index: usize) -> SplineDegree {
         self.degrees[index]
     }
 
-    /// Number of segments.
+    /// Returns the number of segments.
     pub(super) fn segments(&self) -> usize {
         self.times.len().saturating_sub(1)
     }
@@ -165,7 +165,7 @@ impl Trajectory {
         self.final_stops = (0..self.joints.len()).map(final_stop).collect();
     }
 
-    /// Controlled stop after the last point of `column`, if that point is in motion.
+    /// Returns the controlled stop after the last point of `column`, if that point is in motion.
     pub(super) fn final_stop(&self, column: usize) -> Option<&Stop> {
         self.final_stops.get(column)?.as_ref()
     }

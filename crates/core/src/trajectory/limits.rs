@@ -26,7 +26,7 @@ impl JointLimits {
         Self { name: axis.name().to_owned(), kind: axis.kind(), limits: *axis.limits() }
     }
 
-    /// Unit of positions: `m` or `rad`.
+    /// Returns the unit of positions: `m` or `rad`.
     pub fn unit(&self) -> &'static str {
         match self.kind {
             AxisKind::Linear => "m",
@@ -34,7 +34,7 @@ impl JointLimits {
         }
     }
 
-    /// Largest accepted speed, m/s or rad/s: Vmax plus its tolerance.
+    /// Returns the largest accepted speed, m/s or rad/s: Vmax plus its tolerance.
     pub fn speed_bound(&self) -> f64 {
         self.limits.velocity * (1.0 + SPEED_TOLERANCE)
     }

@@ -43,7 +43,7 @@ impl MotionTable {
         }
     }
 
-    /// Number of slots: upper bound of the number of motions with events.
+    /// Returns the number of slots: upper bound of the number of motions with events.
     pub fn capacity(&self) -> usize {
         self.slots.len()
     }

@@ -48,7 +48,7 @@ pub enum RejectionCode {
 }
 
 impl RejectionCode {
-    /// Name of the constant in the message `TrajectoryResult`.
+    /// Returns the name of the constant in the message `TrajectoryResult`.
     pub fn name(self) -> &'static str {
         match self {
             RejectionCode::UnknownJoint => "UNKNOWN_JOINT",

@@ -63,7 +63,7 @@ impl TrajectoryRequest {
         self.positions.reserve(points.saturating_mul(self.joints.len()));
     }
 
-    /// Start of the trajectory.
+    /// Returns the start of the trajectory.
     pub fn start(&self) -> Start {
         self.start
     }
@@ -80,12 +80,12 @@ impl TrajectoryRequest {
         Some((*self.times.first()?, self.positions.get(..columns)?))
     }
 
-    /// Joint names, in the order of the columns.
+    /// Returns the joint names, in the order of the columns.
     pub fn joints(&self) -> &[String] {
         &self.joints
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     pub fn points(&self) -> usize {
         self.times.len()
     }

@@ -65,7 +65,7 @@ impl Segment {
         }
     }
 
-    /// Degree of the polynomial.
+    /// Returns the degree of the polynomial.
     pub fn degree(&self) -> SplineDegree {
         self.degree
     }

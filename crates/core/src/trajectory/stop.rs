@@ -40,7 +40,7 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// Time until rest, s.
+    /// Returns the time until rest, s.
     pub fn duration(&self) -> f64 {
         self.duration
     }

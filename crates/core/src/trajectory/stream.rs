@@ -226,7 +226,7 @@ impl SetpointStream {
         }
     }
 
-    /// Delay in effect, position cycles.
+    /// Returns the delay in effect, position cycles.
     pub fn delay(&self) -> u32 {
         self.delay as u32
     }
@@ -246,7 +246,7 @@ impl SetpointStream {
         self.joints.iter().any(|joint| joint.gate.is_inhibited(k, self.period))
     }
 
-    /// Counters since construction.
+    /// Returns the counters since construction.
     pub fn counts(&self) -> StreamCounts {
         self.counts
     }

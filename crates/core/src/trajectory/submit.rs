@@ -244,7 +244,7 @@ impl Timeline {
     }
 }
 
-/// ⌈n / d⌉ for d > 0.
+/// Returns ⌈n / d⌉ for d > 0.
 fn ceil_div(n: i128, d: i128) -> i128 {
     n.div_euclid(d) + i128::from(n.rem_euclid(d) != 0)
 }

@@ -152,27 +152,27 @@ impl Timeline {
         k
     }
 
-    /// Setpoints of the last commanded instant, m or rad, one per joint.
+    /// Returns the setpoints of the last commanded instant, m or rad, one per joint.
     pub fn psec(&self) -> &[f64] {
         &self.psec
     }
 
-    /// Events of the last commanded instant and since the instant before it.
+    /// Returns the events of the last commanded instant and since the instant before it.
     pub fn events(&self) -> &[TimelineEvent] {
         &self.events
     }
 
-    /// Index of the instant that [`Timeline::next`] commands next.
+    /// Returns the index of the instant that [`Timeline::next`] commands next.
     pub fn next_instant(&self) -> i64 {
         self.next_k
     }
 
-    /// Joint limits.
+    /// Returns the joint limits.
     pub fn joints(&self) -> &[JointLimits] {
         &self.joints
     }
 
-    /// Position period Tsp, ns.
+    /// Returns the position period Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
         self.period
     }
@@ -344,7 +344,7 @@ impl Timeline {
         self.stream.set_delay(cycles, self.next_k, &self.psec);
     }
 
-    /// Delay of streamed setpoints in effect, position cycles.
+    /// Returns the delay of streamed setpoints in effect, position cycles.
     pub fn stream_delay(&self) -> u32 {
         self.stream.delay()
     }
@@ -365,7 +365,7 @@ impl Timeline {
         self.stream.is_inhibited(self.next_k)
     }
 
-    /// Counters of streamed setpoints since construction.
+    /// Returns the counters of streamed setpoints since construction.
     pub fn stream_counts(&self) -> StreamCounts {
         self.stream.counts()
     }
