@@ -261,7 +261,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_matrix_with_a_number_that_is_none_has_no_inverse() {
+    fn a_matrix_with_non_finite_elements_has_no_inverse() {
         for strange in [f64::INFINITY, f64::NAN] {
             assert!(inverse(&DMatrix::from_row_slice(2, 2, &[1.0, 0.5, 0.5, strange])).is_none());
             assert!(inverse(&DMatrix::from_row_slice(2, 2, &[1.0, strange, strange, 1.0])).is_none());
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn an_exponential_is_found_and_a_bound_is_told() {
+    fn an_exponential_is_fitted_and_a_bound_is_reported() {
         let residuals = |p: &[f64]| {
             Some(DVector::from_iterator(
                 20,
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn the_robust_spread_of_a_normal_sample_is_its_standard_deviation() {
+    fn the_robust_deviation_of_a_normal_sample_is_its_standard_deviation() {
         // Quantiles of a normal distribution of mean 2 and deviation 1: -1.5, -0.6745, 0, 0.6745, 1.5.
         let (middle, spread) = robust_mean_and_deviation(&[0.5, 1.3255, 2.0, 2.6745, 3.5]);
         assert!((middle - 2.0).abs() < 1e-12 && (spread - 1.0).abs() < 1e-3);

@@ -171,7 +171,15 @@ pub fn fit_friction(
         findings.push(Finding::warning("few-speeds", what, remedy));
     }
     let law = fit(&both)?;
-    report_bounds(&law, findings);
+    let (plus, minus) = (of(&[1.0]), of(&[-1.0]));
+    let asymmetry = asymmetry(&plus, &minus);
+    report_law(&law, asymmetry, findings);
+    Some(FrictionFit { directions: [fit(&plus), fit(&minus)], law, asymmetry })
+}
+
+/// Reports exponents at their bounds, a low R², and differences between the directions.
+fn report_law(law: &LawFit, asymmetry: f64, findings: &mut Vec<Finding>) {
+    report_bounds(law, findings);
     if law.r_squared < LEAST_DETERMINATION {
         findings.push(Finding::warning(
             "poor-friction-law",
@@ -180,8 +188,6 @@ pub fn fit_friction(
              uniform recordings",
         ));
     }
-    let (plus, minus) = (of(&[1.0]), of(&[-1.0]));
-    let asymmetry = asymmetry(&plus, &minus);
     if asymmetry.is_nan() {
         findings.push(Finding::warning(
             "one-direction",
@@ -197,7 +203,6 @@ pub fn fit_friction(
             ),
         ));
     }
-    Some(FrictionFit { directions: [fit(&plus), fit(&minus)], law, asymmetry })
 }
 
 fn join_speeds(speeds: &[f64]) -> String {

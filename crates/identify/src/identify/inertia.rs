@@ -41,39 +41,8 @@ pub fn fit_inertia(
     gravity: &GravityCurrent,
     findings: &mut Vec<Finding>,
 ) -> Option<InertiaFit> {
-    let accelerations: Vec<f64> = recordings
-        .iter()
-        .flat_map(|(s, _)| s.spans.iter())
-        .flat_map(|s| s.acceleration.iter().copied())
-        .collect();
-    let strong = STRONG * largest_magnitude(&accelerations);
-    let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, speed_unit(axis));
-    let limit = SATURATED * axis.motor.max_current;
-    let (mut instants, mut phases, mut saturated) = (Vec::new(), Vec::new(), 0_usize);
-    for (number, (signals, segments)) in recordings.iter().enumerate() {
-        for segment in segments.iter().filter(|s| s.kind == SegmentKind::Accelerating) {
-            let Some(span) = signals.spans.get(segment.span) else { continue };
-            let (Some(current), Some(raw)) = (&span.smooth_current, &span.current) else { continue };
-            let mut phase = Vec::new();
-            for i in segment.samples.clone() {
-                let (v, a) = (span.velocity[i], span.acceleration[i]);
-                if a.abs() < strong {
-                    continue;
-                }
-                if raw[i].abs() >= limit {
-                    saturated += 1;
-                    continue;
-                }
-                let rest = current[i] - friction.at(v / unit) - gravity.at(span.position[i]);
-                let value = kt * rest * r / a;
-                instants.push((number, span.start + i as f64 * signals.period, value));
-                phase.push(value);
-            }
-            if !phase.is_empty() {
-                phases.push(median(&mut phase).unwrap_or(f64::NAN));
-            }
-        }
-    }
+    let samples = evaluate_samples(recordings, axis, friction, gravity);
+    let AcceleratingSamples { instants, phases, saturated } = samples;
     if saturated > 0 {
         findings.push(Finding::warning(
             "saturated-current",
@@ -106,4 +75,58 @@ pub fn fit_inertia(
         return None;
     }
     Some(InertiaFit { value, error, spread, instants, accelerations: phases.len() })
+}
+
+/// Equivalent inertia at the accelerating samples.
+#[derive(Default)]
+struct AcceleratingSamples {
+    /// Index of the recording among those with current, time in s, inertia by eq. 5.
+    instants: Vec<(usize, f64, f64)>,
+    /// Median inertia of each acceleration.
+    phases: Vec<f64>,
+    /// Number of samples with saturated current.
+    saturated: usize,
+}
+
+/// Evaluates eq. 5 at each strongly accelerating sample without saturation.
+fn evaluate_samples(
+    recordings: &[(&Signals, &[MotionSegment])],
+    axis: &AxisConfig,
+    friction: &LawFit,
+    gravity: &GravityCurrent,
+) -> AcceleratingSamples {
+    let accelerations: Vec<f64> = recordings
+        .iter()
+        .flat_map(|(s, _)| s.spans.iter())
+        .flat_map(|s| s.acceleration.iter().copied())
+        .collect();
+    let strong = STRONG * largest_magnitude(&accelerations);
+    let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, speed_unit(axis));
+    let limit = SATURATED * axis.motor.max_current;
+    let mut found = AcceleratingSamples::default();
+    for (number, (signals, segments)) in recordings.iter().enumerate() {
+        for segment in segments.iter().filter(|s| s.kind == SegmentKind::Accelerating) {
+            let Some(span) = signals.spans.get(segment.span) else { continue };
+            let (Some(current), Some(raw)) = (&span.smooth_current, &span.current) else { continue };
+            let mut phase = Vec::new();
+            for i in segment.samples.clone() {
+                let (v, a) = (span.velocity[i], span.acceleration[i]);
+                if a.abs() < strong {
+                    continue;
+                }
+                if raw[i].abs() >= limit {
+                    found.saturated += 1;
+                    continue;
+                }
+                let rest = current[i] - friction.at(v / unit) - gravity.at(span.position[i]);
+                let value = kt * rest * r / a;
+                found.instants.push((number, span.start + i as f64 * signals.period, value));
+                phase.push(value);
+            }
+            if !phase.is_empty() {
+                found.phases.push(median(&mut phase).unwrap_or(f64::NAN));
+            }
+        }
+    }
+    found
 }

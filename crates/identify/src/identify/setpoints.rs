@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_steps_of_a_staircase_are_its_instants() {
+    fn steps_of_zero_order_held_setpoints_are_the_position_cycles() {
         // Steps of 6 samples, the first one after 2.
         let psec: Vec<f64> = (0..60).map(|i| f64::from((i + 4) / 6)).collect();
         let span = SignalSpan { psec: Some(psec), ..SignalSpan::default() };
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_beside_the_grid_has_no_instants() {
+    fn a_recording_off_the_grid_has_no_position_cycles() {
         let span = SignalSpan { psec: Some(vec![0.0, 10.0, 20.0]), ..SignalSpan::default() };
         assert_eq!(
             [5e-3, 7e-3, 12e-3].map(|period| SetpointGrid::of(&span, period, 6e-3)),

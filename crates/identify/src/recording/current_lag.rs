@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn the_top_of_a_parabola() {
+    fn the_vertex_of_a_parabola_is_exact() {
         let parabola = |t: f64| 2.0 - (t - 0.3) * (t - 0.3);
         assert!((parabola_vertex(parabola(-1.0), parabola(0.0), parabola(1.0)) - 0.3).abs() < 1e-12);
     }

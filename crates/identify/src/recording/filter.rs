@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sine_is_attenuated_as_the_gaussian_says_and_differentiated() {
+    fn a_sine_is_attenuated_by_the_gaussian_and_differentiated() {
         let (cutoff, frequency) = (100.0, 12.0);
         let w = TAU * frequency;
         let gain = (-0.5 * (w * deviation(cutoff)).powi(2)).exp();

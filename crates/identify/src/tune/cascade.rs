@@ -273,7 +273,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_of_a_seed_are_those_of_the_published_generator() {
+    fn split_mix_matches_the_reference_implementation() {
         // First outputs for seed 0 of the reference implementation: e220a8397b1dcdaf, 6e789e6aa1b965f4.
         let mut random = SplitMix(0);
         let expected = [0xe220_a839_7b1d_cdaf_u64, 0x6e78_9e6a_a1b9_65f4];

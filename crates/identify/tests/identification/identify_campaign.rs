@@ -1,4 +1,4 @@
-//! Setpoints of a campaign: within all limits, and with everything in them that identification needs.
+//! Campaign setpoints: they keep all limits and contain the excitation that the identification needs.
 
 use proptest::prelude::*;
 use virtual_axes_core::config::{MachineConfig, Parameters};
@@ -13,7 +13,7 @@ use virtual_axes_verification::fixtures::recordings::{
 
 const MACHINES: [&str; 2] = ["mikron_ucp710", "linear_motor_center"];
 const AXES: [&str; 5] = ["x", "y", "z", "a", "c"];
-/// Part of a limit that differences of setpoints may exceed it by, as every path of this crate.
+/// Relative tolerance of the limits, as for every path of this crate.
 const TOLERANCE: f64 = 1e-6;
 
 fn shipped(machine: &str) -> MachineConfig {
@@ -30,7 +30,8 @@ fn plan(
         .unwrap_or_else(|error| panic!("{} {axis}: {error}", machine.name()))
 }
 
-/// Largest first, second and third difference over the period and its powers; at rest before the first setpoint.
+/// Returns the largest first, second and third difference quotient of the setpoints; at rest before the first
+/// one.
 fn differences(campaign: &Campaign) -> [f64; 3] {
     let psec = campaign.psec();
     let period = seconds(campaign.period());
@@ -50,7 +51,7 @@ fn differences(campaign: &Campaign) -> [f64; 3] {
     largest
 }
 
-/// Everything that must hold of any campaign within `range`.
+/// Checks the properties of every campaign within `range`.
 fn check(campaign: &Campaign, limits: &JointLimits, range: [f64; 2], top: f64) -> Result<(), String> {
     let psec = campaign.psec();
     let [speed, acceleration, jerk] = differences(campaign);
@@ -65,7 +66,7 @@ fn check(campaign: &Campaign, limits: &JointLimits, range: [f64; 2], top: f64) -
             return Err(format!("{what}: {found} of {allowed}"));
         }
     }
-    // Only home may be nearer to the end than the margin.
+    // Only home may be closer to the end than the margin.
     let margin = if (range[1] - range[0]).is_finite() { 0.05 * (range[1] - range[0]) } else { 0.0 };
     let slack = 1e-12;
     let (low, high) = (range[0] + margin - slack, range[1] - margin + slack);
@@ -117,7 +118,7 @@ proptest! {
     fn a_campaign_of_any_linear_axis_keeps_its_limits(
         velocity in 0.5..120.0f64, acceleration in 0.2..20.0f64, jerk in 5.0..800.0f64,
         motor in 100.0..6000.0f64, gain in 0.3..6.0f64,
-        stroke in (-800.0..0.0f64, 0.1..800.0f64),
+        travel in (-800.0..0.0f64, 0.1..800.0f64),
         range in prop::option::of((0.0..1.0f64, 0.0..1.0f64)),
         feed in prop::option::of(0.01..1.0f64),
     ) {
@@ -125,22 +126,22 @@ proptest! {
             ("x.limits.velocity_m_min", velocity),
             ("x.limits.acceleration_m_s2", acceleration),
             ("x.limits.jerk_m_s3", jerk),
-            ("x.limits.travel_min_mm", stroke.0),
-            ("x.limits.travel_max_mm", stroke.1),
+            ("x.limits.travel_min_mm", travel.0),
+            ("x.limits.travel_max_mm", travel.1),
             ("x.motor.max_speed_rpm", motor),
             ("x.position_loop.gain", gain),
         ];
-        // 20 mm of lead.
+        // Screw lead 20 mm.
         let top = 0.95 * velocity.min(motor * 0.020) * M_MIN;
-        let stroke = [stroke.0 * MILLIMETER, stroke.1 * MILLIMETER];
-        any_axis("x", &changes, stroke, range, feed, top)?;
+        let travel = [travel.0 * MILLIMETER, travel.1 * MILLIMETER];
+        any_axis("x", &changes, travel, range, feed, top)?;
     }
 
     #[test]
     fn a_campaign_of_any_rotary_axis_keeps_its_limits(
         velocity in 0.5..100.0f64, acceleration in 0.05..20.0f64, jerk in 1.0..500.0f64,
         motor in 100.0..20000.0f64, gain in 0.3..6.0f64,
-        stroke in (-800.0..0.0f64, 1.0..800.0f64),
+        travel in (-800.0..0.0f64, 1.0..800.0f64),
         range in prop::option::of((0.0..1.0f64, 0.0..1.0f64)),
         feed in prop::option::of(0.02..1.0f64),
     ) {
@@ -148,40 +149,41 @@ proptest! {
             ("a.limits.velocity_rpm", velocity),
             ("a.limits.acceleration_rev_s2", acceleration),
             ("a.limits.jerk_rev_s3", jerk),
-            ("a.limits.travel_min_deg", stroke.0),
-            ("a.limits.travel_max_deg", stroke.1),
+            ("a.limits.travel_min_deg", travel.0),
+            ("a.limits.travel_max_deg", travel.1),
             ("a.motor.max_speed_rpm", motor),
             ("a.position_loop.gain", gain),
         ];
-        // 180 : 1.
+        // Gear ratio 180 : 1.
         let top = 0.95 * velocity.min(motor / 180.0) * RPM;
-        let stroke = [stroke.0 * DEGREE, stroke.1 * DEGREE];
-        any_axis("a", &changes, stroke, range, feed, top)?;
+        let travel = [travel.0 * DEGREE, travel.1 * DEGREE];
+        any_axis("a", &changes, travel, range, feed, top)?;
     }
 }
 
-/// Plans for an axis of the default machine with `changes`, in a part of `stroke`, at a part of its speed `top`.
+/// Plans for an axis of the default machine with `changes`, in a part of `travel`, at a part of its speed
+/// `top`.
 fn any_axis(
     axis: &str,
     changes: &[(&str, f64)],
-    stroke: [f64; 2],
+    travel: [f64; 2],
     range: Option<(f64, f64)>,
     feed: Option<f64>,
     top: f64,
 ) -> Result<(), TestCaseError> {
     let config = parameters(changes).machine_config().expect("valid");
-    let place = axis_index(&config, axis);
-    let limits = JointLimits::from_axis(&config.axes()[place]);
-    let at = |part: f64| stroke[0] + part * (stroke[1] - stroke[0]);
+    let index = axis_index(&config, axis);
+    let limits = JointLimits::from_axis(&config.axes()[index]);
+    let at = |part: f64| travel[0] + part * (travel[1] - travel[0]);
     let range = range.map(|(a, b)| [at(a.min(b)), at(a.max(b))]).filter(|range| range[0] < range[1]);
-    let within = range.unwrap_or(stroke);
+    let within = range.unwrap_or(travel);
     let mut options = CampaignOptions { range, max_feed: feed.map(|part| part * top) };
     let unit = if axis == "x" { M_MIN } else { RPM };
-    let mut found = Campaign::plan(&config, place, &FeedforwardMode::ALL, &options);
+    let mut found = Campaign::plan(&config, index, &FeedforwardMode::ALL, &options);
     if let Err(CampaignError::TooShort { possible, .. }) = found {
-        // What is told helps.
+        // The feed of the message is valid.
         options.max_feed = Some(possible * unit);
-        found = Campaign::plan(&config, place, &FeedforwardMode::ALL, &options);
+        found = Campaign::plan(&config, index, &FeedforwardMode::ALL, &options);
         prop_assert!(!matches!(found, Err(CampaignError::TooShort { .. })), "{found:?}");
     }
     match found {
@@ -200,7 +202,7 @@ fn any_axis(
 }
 
 #[test]
-fn the_range_that_a_refusal_tells_is_long_enough() {
+fn the_range_in_the_rejection_is_sufficient() {
     let config = shipped(MACHINES[0]);
     let planned = |millimeters: f64| {
         let range = Some([0.0, millimeters * MILLIMETER]);
@@ -217,7 +219,7 @@ fn the_range_that_a_refusal_tells_is_long_enough() {
 }
 
 #[test]
-fn ranges_and_feeds_that_an_axis_does_not_have_are_refused() {
+fn ranges_and_feeds_beyond_the_axis_are_rejected() {
     let config = shipped(MACHINES[0]);
     let refused = |axis: usize, range: Option<[f64; 2]>, max_feed: Option<f64>| {
         let error =
@@ -233,13 +235,13 @@ fn ranges_and_feeds_that_an_axis_does_not_have_are_refused() {
         assert!(matches!(refused(0, None, Some(feed)), CampaignError::Feed { .. }), "{feed}");
     }
     assert_eq!(refused(5, None, None), CampaignError::NoAxis { number: 6, count: 5 });
-    // Somebody would wait for days.
+    // The campaign would take days.
     let slow = CampaignOptions { range: None, max_feed: Some(1e-4 * RPM) };
     let error = Campaign::plan(&config, 4, &[FeedforwardMode::Off], &slow).unwrap_err();
     assert!(matches!(error, CampaignError::TooLong { part: "off", .. }), "{error}");
 }
 
-/// Velocity setpoint, m/s or rad/s, before each row.
+/// Returns the velocity setpoint before each row, m/s or rad/s.
 fn velocities(psec: &[f64], period: f64) -> Vec<f64> {
     std::iter::once(0.0).chain(psec.windows(2).map(|pair| (pair[1] - pair[0]) / period)).collect()
 }
@@ -253,11 +255,12 @@ fn the_long_part_accelerates_dozens_of_times_at_half_and_at_full_acceleration() 
             let limits = JointLimits::from_axis(&config.axes()[axis_index(&config, axis)]).limits;
             let campaign = plan(&config, axis, &[FeedforwardMode::Off], &CampaignOptions::default());
             let velocity = velocities(campaign.psec(), period);
-            // The most that a ramp from rest has with the jerk that there is: √(v j).
+            // A ramp from rest with jerk j reaches at most the acceleration √(v j).
             let top = campaign.runs()[0].speeds.last().copied().expect("speeds");
             let full = (top * limits.jerk).sqrt().min(limits.acceleration);
             let half = 0.5 * limits.acceleration;
-            // The highest of each phase, which ends where the acceleration falls to half of the smaller one.
+            // Peak acceleration of each phase; a phase ends where the acceleration falls to half of the
+            // smaller one.
             let mut peaks = Vec::new();
             let mut peak = 0.0_f64;
             for pair in velocity.windows(2) {
@@ -268,7 +271,7 @@ fn the_long_part_accelerates_dozens_of_times_at_half_and_at_full_acceleration() 
                     peaks.push(std::mem::take(&mut peak));
                 }
             }
-            // Differences round off the peaks of short ramps.
+            // Differences flatten the peaks of short ramps.
             let count = |wanted: f64| peaks.iter().filter(|peak| (*peak / wanted - 1.0).abs() < 0.03).count();
             println!("{machine} {axis}: {} at {half:.2}, {} at {full:.2}", count(half), count(full));
             assert!(count(half) >= 36 && count(full) >= 36, "{machine} {axis}: {peaks:.2?}");
@@ -277,7 +280,7 @@ fn the_long_part_accelerates_dozens_of_times_at_half_and_at_full_acceleration() 
 }
 
 #[test]
-fn standstills_are_approached_from_both_sides_all_over_the_range() {
+fn standstills_are_approached_from_both_sides_over_the_whole_range() {
     for machine in MACHINES {
         let config = shipped(machine);
         let period = seconds(config.periods().position);
@@ -285,8 +288,8 @@ fn standstills_are_approached_from_both_sides_all_over_the_range() {
             let campaign = plan(&config, axis, &[FeedforwardMode::Off], &CampaignOptions::default());
             let psec = campaign.psec();
             let velocity = velocities(psec, period);
-            // Places of rest for three quarters of a second or more, and the side from which they were reached.
-            let mut places: Vec<(f64, bool)> = Vec::new();
+            // Positions of standstills of at least 0.75 s, and the side of approach.
+            let mut positions: Vec<(f64, bool)> = Vec::new();
             let mut from = false;
             let mut since = 0;
             for (position, velocity) in psec.iter().zip(&velocity) {
@@ -295,13 +298,13 @@ fn standstills_are_approached_from_both_sides_all_over_the_range() {
                     from = *velocity > 0.0;
                 }
                 if since == (0.75 / period) as usize {
-                    places.push((*position, from));
+                    positions.push((*position, from));
                 }
             }
-            let both = |(place, from): &&(f64, bool)| {
-                *from && places.iter().any(|(other, from)| !from && (other - place).abs() < 1e-9)
+            let both = |(position, from): &&(f64, bool)| {
+                *from && positions.iter().any(|(other, from)| !from && (other - position).abs() < 1e-9)
             };
-            let both: Vec<f64> = places.iter().filter(both).map(|(place, _)| *place).collect();
+            let both: Vec<f64> = positions.iter().filter(both).map(|(position, _)| *position).collect();
             let [low, high] = campaign.range();
             let spread = both.iter().fold(f64::NEG_INFINITY, |m, p| m.max(*p))
                 - both.iter().fold(f64::INFINITY, |m, p| m.min(*p));
@@ -311,7 +314,7 @@ fn standstills_are_approached_from_both_sides_all_over_the_range() {
 }
 
 #[test]
-fn a_rotary_axis_is_swept_through_its_range_at_two_speeds_and_a_full_turn_if_it_can() {
+fn a_rotary_axis_sweeps_its_range_or_a_full_turn_at_two_speeds() {
     for machine in MACHINES {
         let config = shipped(machine);
         let period = seconds(config.periods().position);
@@ -338,28 +341,28 @@ fn a_rotary_axis_is_swept_through_its_range_at_two_speeds_and_a_full_turn_if_it_
 }
 
 #[test]
-fn parts_set_the_feedforward_that_they_are_named_after() {
+fn parts_set_the_feedforward_of_their_name() {
     let parameters = Parameters::builtin("mikron_ucp710").expect("shipped");
-    let told = |part: FeedforwardMode| -> Vec<String> {
+    let assigned = |part: FeedforwardMode| -> Vec<String> {
         let list = part.assignments(&parameters, "x");
         list.iter().map(|assignment| format!("{}={}", assignment.key, assignment.value)).collect()
     };
     let friction = "x.feedforward.friction=0";
     assert_eq!(
-        told(FeedforwardMode::Off),
+        assigned(FeedforwardMode::Off),
         ["x.feedforward.velocity=0", "x.feedforward.torque_kg_m2=0", friction]
     );
     assert_eq!(
-        told(FeedforwardMode::Velocity),
+        assigned(FeedforwardMode::Velocity),
         ["x.feedforward.velocity=1", "x.feedforward.torque_kg_m2=0", friction]
     );
     assert_eq!(
-        told(FeedforwardMode::Both),
+        assigned(FeedforwardMode::Both),
         ["x.feedforward.velocity=1", "x.feedforward.torque_kg_m2=0.002034", friction]
     );
 }
 
-/// Friction current of the default X axis ([P] eq. 3 and Appendix 2), V in m/min.
+/// Returns the friction current of the default X axis (Prévost eq. 3 and Appendix 2), V in m/min.
 fn friction_of_x(velocity: f64) -> f64 {
     let v = velocity.abs();
     (1.576 * (0.01965 * v).exp() - 0.5332 * (-0.2801 * v).exp()).copysign(velocity)
@@ -373,7 +376,7 @@ fn legs_of_the_long_part_settle_at_twelve_speeds_in_both_directions() {
     let recording = record(&machine, "x", campaign.psec(), &Disturbance::default());
     let current = recording.current.expect("recorded");
     let velocity = velocities(recording.psec.as_deref().expect("recorded"), TSP);
-    // 8/Kp + α, by when 0.03 % of a step of the setpoint are left.
+    // 8/Kp + α: 0.03 % of a setpoint step remain.
     let settling = ((8.0 / 25.0 + 0.009) / TSP) as usize;
     for &speed in &campaign.runs()[0].speeds {
         for direction in [1.0, -1.0] {

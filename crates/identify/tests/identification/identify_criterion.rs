@@ -1,6 +1,6 @@
-//! The paper's criterion (Prévost section 4): an identified axis against "measured" motions that it was not
-//! identified from. The hidden truth has what the model lacks: 2 µm (2 mdeg) of play before the encoder, and
-//! another friction curve, with a Stribeck bump of a tenth of an ampere at low speed.
+//! Criterion of the paper (Prévost section 4): an identified axis against "measured" motions that were not
+//! used for the identification. The measured plant has effects that the model lacks: 2 µm (2 mdeg) of
+//! backlash before the encoder, and another friction curve with a Stribeck bump of 0.1 A at low speed.
 
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::units::{DEGREE, seconds};
@@ -21,7 +21,7 @@ fn hidden(machine: &MachineConfig, axis: &str, seed: u64) -> Disturbance {
     Disturbance { backlash: 2.0 * usual.resolution, friction: Some(stribeck), ..usual }
 }
 
-/// An axis identified from a campaign on the hidden truth, and the machine that it belongs to.
+/// Axis identified from a campaign on the measured plant, and its machine.
 struct Trial {
     axis: String,
     machine: MachineConfig,
@@ -58,14 +58,14 @@ impl Trial {
         Trial { axis: axis.to_owned(), machine, identified }
     }
 
-    /// Simulated against "measured" motion on a scenario: largest deviation at constant velocity and elsewhere.
+    /// Returns the largest position residual on a scenario at constant velocity and elsewhere.
     fn deviations(&self, scenario: &str) -> (f64, f64) {
         let program = virtual_axes_verification::fixtures::machines::program(scenario, &self.machine);
         let axis = axis_index(&self.machine, &self.axis);
         let period = self.machine.periods().position;
         let last = (program.duration() / seconds(period)).ceil() as i64;
         let mut joints = vec![0.0; self.machine.axes().len()];
-        // A second of rest before and behind.
+        // One second of rest before and after.
         let rest = 1_000_000_000 / period;
         let psec: Vec<f64> = (-rest..=last + rest)
             .map(|k| {

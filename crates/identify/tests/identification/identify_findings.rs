@@ -1,4 +1,5 @@
-//! What a recording does not show is said, with what to record; what it shows in another way is still found.
+//! Findings of the identification: missing data are reported with a remedy, and parameters are identified
+//! from other data where possible.
 
 use virtual_axes_core::config::{Parameters, Value, ValueSource};
 use virtual_axes_identify::identify::campaign::{Campaign, CampaignOptions as Limits};
@@ -20,7 +21,7 @@ fn law(v: f64) -> f64 {
     X[0] * (X[1] * v).exp() + X[2] * (X[3] * v).exp()
 }
 
-/// There and back at each speed (m/min), from rest to rest.
+/// Returns legs at each speed (m/min) from rest to rest, with the way back if `back`.
 fn legs(speeds: &[f64], back: bool) -> Vec<f64> {
     let mut psec = vec![0.0; 100];
     for &speed in speeds {
@@ -41,7 +42,7 @@ fn legs(speeds: &[f64], back: bool) -> Vec<f64> {
     psec
 }
 
-/// X without feedforward on the way that `psec` says.
+/// Records X without feedforward on the setpoints `psec`.
 fn recorded(parameters: &Parameters, psec: &[f64], disturbance: &Disturbance) -> RawRecording {
     record(&machine_with_feedforward(parameters, "x", FeedforwardMode::Off), "x", psec, disturbance)
 }
@@ -72,11 +73,11 @@ fn identified(raw: &[RawRecording], start: &Parameters, options: &Identification
 const STEPS_ONLY: IdentificationOptions =
     IdentificationOptions { i0: Breakaway::Held, refine: RefinementScope::NONE };
 
-/// The text of the one finding with this code, and its remedy.
+/// Returns text and remedy of the only finding with this code.
 fn finding(found: &Identification, severity: Severity, code: &str) -> String {
     let mut of_it = found.findings.iter().filter(|finding| finding.code == code);
     let finding = of_it.next().unwrap_or_else(|| panic!("no {code} in {:?}", found.findings));
-    assert!(of_it.next().is_none(), "{code} is told twice");
+    assert!(of_it.next().is_none(), "{code} is reported twice");
     assert_eq!(finding.severity, severity, "{finding}");
     finding.to_string()
 }
@@ -86,12 +87,12 @@ fn inertia_of(found: &Identification) -> f64 {
 }
 
 #[test]
-fn three_speeds_get_a_straight_law_and_are_told_so() {
+fn three_speeds_give_a_linear_law_and_a_finding() {
     let raw = recorded(&true_parameters(), &legs(&[4.0, 8.0, 12.0], true), &clean());
     let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
-    let told = finding(&found, Severity::Warning, "few-speeds");
-    assert!(told.contains("not fitted to 3 speeds (4.000, 8.000, 12.000 m/min)"), "{told}");
-    assert!(told.contains("record at least 6 speeds"), "{told}");
+    let text = finding(&found, Severity::Warning, "few-speeds");
+    assert!(text.contains("3 speeds (4.000, 8.000, 12.000 m/min) are too few"), "{text}");
+    assert!(text.contains("record at least 6 speeds"), "{text}");
     let friction = found.friction.expect("a law");
     assert_eq!(friction.law.law, FrictionLaw::Linear);
     let (level, slope) = friction.law.line().expect("a line");
@@ -101,14 +102,14 @@ fn three_speeds_get_a_straight_law_and_are_told_so() {
     let wanted_slope = (currents[2] - currents[0]) / 8.0;
     assert!((slope / wanted_slope - 1.0).abs() < 0.01, "{slope} against {wanted_slope}");
     assert!((level / (mean - 8.0 * wanted_slope) - 1.0).abs() < 0.01, "{level}");
-    // In the form of eq. 3 it is the same line.
+    // The form of eq. 3 describes the same line.
     for v in [0.5, 4.0, 20.0] {
         assert!((friction.law.at(v) / (level + slope * v) - 1.0).abs() < 1e-3);
     }
 }
 
 #[test]
-fn six_speeds_that_lie_close_together_are_no_law_of_four_parameters() {
+fn six_close_speeds_do_not_give_a_law_of_four_parameters() {
     let raw = recorded(&true_parameters(), &legs(&[4.0, 5.0, 6.0, 7.0, 8.0, 9.0], true), &clean());
     let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
     finding(&found, Severity::Warning, "few-speeds");
@@ -116,18 +117,18 @@ fn six_speeds_that_lie_close_together_are_no_law_of_four_parameters() {
 }
 
 #[test]
-fn one_speed_is_no_law_at_all() {
+fn one_speed_gives_no_law() {
     let raw = recorded(&true_parameters(), &legs(&[6.0], true), &clean());
     let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
-    let told = finding(&found, Severity::Missing, "few-speeds");
-    assert!(told.contains("1 speed"), "{told}");
+    let text = finding(&found, Severity::Missing, "few-speeds");
+    assert!(text.contains("1 speed"), "{text}");
     assert!(found.friction.is_none() && found.inertia.is_none());
-    // What is not found stays as the machine file says.
+    // Parameters that are not identified keep the value of the machine file.
     assert_eq!(inertia_of(&found), 0.015);
 }
 
 #[test]
-fn a_standstill_tells_of_no_motion() {
+fn a_standstill_reports_missing_motion() {
     let raw = recorded(&true_parameters(), &[0.0; 400], &clean());
     let found = identified(&[raw], &initial_parameters("x"), &IdentificationOptions::default());
     finding(&found, Severity::Missing, "few-speeds");
@@ -135,42 +136,43 @@ fn a_standstill_tells_of_no_motion() {
 }
 
 #[test]
-fn speeds_in_one_direction_are_told() {
+fn speeds_in_one_direction_are_reported() {
     let raw = recorded(&true_parameters(), &legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], false), &clean());
     let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
-    let told = finding(&found, Severity::Warning, "one-direction");
-    assert!(told.contains("record each speed in both directions"), "{told}");
+    let text = finding(&found, Severity::Warning, "one-direction");
+    assert!(text.contains("record each speed in both directions"), "{text}");
 }
 
 #[test]
-fn a_saturated_current_is_left_out_and_told() {
+fn a_saturated_current_is_excluded_and_reported() {
     let weak = |parameters| with(parameters, "x.motor.max_current_a", Value::Double(4.0));
     let raw = recorded(&weak(true_parameters()), &legs(&[1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true), &clean());
     let found = identified(&[raw], &weak(initial_parameters("x")), &STEPS_ONLY);
-    let told = finding(&found, Severity::Warning, "saturated-current");
-    assert!(told.contains("4.0 A") && told.contains("lower acceleration"), "{told}");
+    let text = finding(&found, Severity::Warning, "saturated-current");
+    assert!(text.contains("4.0 A") && text.contains("lower acceleration"), "{text}");
 }
 
 #[test]
-fn a_recording_that_begins_in_motion_has_no_closed_loop() {
+fn a_recording_that_starts_in_motion_is_not_simulated() {
     let whole = legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true);
     let mut raw = recorded(&true_parameters(), &whole, &clean());
     let psec = raw.psec.clone().expect("PSEC is recorded");
-    // From a setpoint in motion to the last one in motion, without the rests between: none is as long as 0.1 s.
+    // From a setpoint in motion to the last one in motion, without the rests between, which are shorter than
+    // 0.1 s.
     let moving: Vec<usize> = (1..psec.len()).filter(|&k| psec[k] != psec[k - 1]).collect();
     let pick = |channel: &Option<Vec<f64>>| channel.as_ref().map(|c| moving.iter().map(|&k| c[k]).collect());
     (raw.psec, raw.position, raw.current) = (pick(&raw.psec), pick(&raw.position), pick(&raw.current));
     (raw.velocity_feedforward, raw.torque_feedforward) = (None, None);
     raw.time = (0..moving.len()).map(|k| k as f64 * TSP).collect();
     let found = identified(&[raw], &initial_parameters("x"), &IdentificationOptions::default());
-    let told = finding(&found, Severity::Missing, "no-setpoints");
-    assert!(told.contains("from standstill on"), "{told}");
+    let text = finding(&found, Severity::Missing, "no-setpoints");
+    assert!(text.contains("starting at rest"), "{text}");
     finding(&found, Severity::Warning, "no-standstill");
     assert!(found.refinement.is_none() && found.delays.is_empty());
 }
 
 #[test]
-fn a_friction_that_no_law_describes_is_told() {
+fn friction_that_no_law_describes_is_reported() {
     let rough = Disturbance { friction: Some(|v| 0.6 * (2.5 * v).sin()), ..clean() };
     let raw = recorded(&true_parameters(), &legs(&[0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0], true), &rough);
     let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
@@ -178,8 +180,8 @@ fn a_friction_that_no_law_describes_is_told() {
 }
 
 #[test]
-fn an_exponent_at_its_bound_is_told() {
-    // A law that is flat beyond 0.2 m/min: d would have to be far below its bound.
+fn an_exponent_at_its_bound_is_reported() {
+    // A law that is flat beyond 0.2 m/min: d would be far below its bound.
     let steep = with(
         with(true_parameters(), "x.friction.d", Value::Double(-60.0)),
         "x.friction.b",
@@ -187,22 +189,22 @@ fn an_exponent_at_its_bound_is_told() {
     );
     let raw = recorded(&steep, &legs(&[0.02, 0.04, 0.06, 0.1, 0.5, 2.0, 5.0, 10.0], true), &clean());
     let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
-    let told = finding(&found, Severity::Warning, "at-bound");
-    assert!(told.contains("friction.d"), "{told}");
+    let text = finding(&found, Severity::Warning, "at-bound");
+    assert!(text.contains("friction.d"), "{text}");
 }
 
 #[test]
-fn another_position_controller_is_not_taken_for_the_cascade() {
+fn another_position_controller_is_reported() {
     let raw = recorded(&true_parameters(), &legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true), &clean());
     let start = with(initial_parameters("x"), "x.position_loop.controller", Value::Text("gpc".to_owned()));
     let found = identified(&[raw], &start, &IdentificationOptions::default());
-    let told = finding(&found, Severity::Missing, "not-a-cascade");
-    assert!(told.contains("controller=cascade"), "{told}");
+    let text = finding(&found, Severity::Missing, "not-a-cascade");
+    assert!(text.contains("controller=cascade"), "{text}");
     assert!(found.friction.is_some(), "the steps before do not need it");
 }
 
 #[test]
-fn a_current_every_millisecond_shows_the_inertia_by_equation_5_alone() {
+fn a_current_every_millisecond_gives_the_inertia_by_equation_5() {
     let psec = legs(&[1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true);
     let raw = recorded(&true_parameters(), &psec, &Disturbance { sample_ticks: Some(8), ..clean() });
     let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
@@ -212,7 +214,7 @@ fn a_current_every_millisecond_shows_the_inertia_by_equation_5_alone() {
 }
 
 #[test]
-fn positions_alone_tell_inertia_and_friction() {
+fn inertia_and_friction_are_identified_from_positions_only() {
     let psec = legs(&[0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true);
     let mut raw = recorded(&true_parameters(), &psec, &clean());
     raw.current = None;
@@ -236,7 +238,7 @@ fn positions_alone_tell_inertia_and_friction() {
 }
 
 #[test]
-fn a_breakaway_above_the_law_is_found_where_it_is_freed() {
+fn a_breakaway_above_the_law_is_identified_as_separate_parameter() {
     let sticky = with(true_parameters(), "x.friction.i0", Value::Double(1.4));
     let psec = legs(&[0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0], true);
     let raw = recorded(&sticky, &psec, &Disturbance::usual(virtual_axes_core::config::AxisKind::Linear, 5));
@@ -248,7 +250,7 @@ fn a_breakaway_above_the_law_is_found_where_it_is_freed() {
 }
 
 #[test]
-fn a_logger_that_stalls_jitters_and_leaves_gaps_costs_no_accuracy() {
+fn stalls_jitter_and_gaps_do_not_reduce_accuracy() {
     let machine = true_parameters().machine_config().expect("a machine");
     let campaign =
         Campaign::plan(&machine, 0, &[FeedforwardMode::Off], &Limits { range: None, max_feed: Some(0.2) })
@@ -270,7 +272,7 @@ fn a_logger_that_stalls_jitters_and_leaves_gaps_costs_no_accuracy() {
 }
 
 #[test]
-fn parts_in_one_recording_are_told_apart_by_their_feedforward() {
+fn parts_in_one_recording_are_split_by_their_feedforward() {
     let parameters = true_parameters();
     let machine = parameters.machine_config().expect("a machine");
     let axis = &machine.axes()[0];
@@ -310,7 +312,7 @@ fn parts_in_one_recording_are_told_apart_by_their_feedforward() {
 }
 
 #[test]
-fn only_what_is_chosen_is_refined() {
+fn only_selected_parameters_are_refined() {
     let psec = legs(&[0.5, 1.0, 2.0, 4.0, 8.0, 12.0], true);
     let raw = recorded(&true_parameters(), &psec, &clean());
     let chosen = RefinementScope { inertia: true, ..RefinementScope::NONE };

@@ -1,4 +1,4 @@
-//! Recordings that tests of identification are made of: what disturbs them does what it says.
+//! Recording fixtures: each disturbance has the stated effect.
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_identify::identify::FeedforwardMode;
@@ -9,7 +9,8 @@ use virtual_axes_verification::fixtures::recordings::{
     CurrentNoise, Disturbance, NoiseGenerator, machine_with_feedforward, record, record_campaign, stribeck,
 };
 
-/// X there and back at 3 m/min, with ramps of constant acceleration, 0.2 s at rest before and after.
+/// Returns setpoints of X at 3 m/min in both directions, with ramps of constant acceleration and 0.2 s of
+/// rest.
 fn there_and_back() -> Vec<f64> {
     let (speed, ramp, cruise, rest) = (3.0 * M_MIN, 0.1, 0.6, 0.2);
     let velocity = |t: f64| {
@@ -49,7 +50,7 @@ fn deviation(values: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 #[test]
-fn a_clean_recording_has_the_set_points_at_their_instants() {
+fn a_clean_recording_contains_the_setpoints_of_each_position_cycle() {
     let psec = there_and_back();
     let clean = recorded(&Disturbance::default());
     assert_eq!(clean.psec.as_deref(), Some(&psec[..]));
@@ -61,13 +62,13 @@ fn a_clean_recording_has_the_set_points_at_their_instants() {
     for (k, time) in clean.time.iter().enumerate() {
         assert!((time - k as f64 * TSP).abs() < 1e-12);
     }
-    // α = 9 ms and Kp = 25 1/s with VFFW = 1: position follows two periods later, but for micrometers.
+    // α = 9 ms and Kp = 25 1/s with VFFW = 1: the position follows two periods later within micrometers.
     let lag = position(&clean).iter().skip(2).zip(&psec).map(|(position, psec)| (position - psec).abs());
     assert!(lag.fold(0.0, f64::max) < 100e-6);
 }
 
 #[test]
-fn more_samples_are_taken_between_the_instants() {
+fn finer_sampling_adds_samples_between_position_cycles() {
     let clean = recorded(&Disturbance::default());
     let fine = recorded(&Disturbance {
         sample_ticks: Some(8),
@@ -79,7 +80,7 @@ fn more_samples_are_taken_between_the_instants() {
     assert!((fine.time[1] - 0.001).abs() < 1e-15);
     let every_sixth: Vec<f64> = position(&fine).iter().copied().step_by(6).collect();
     assert_eq!(every_sixth, position(&clean));
-    // The velocity is the derivative of the position: trapezoids of 1 ms against what they add up to.
+    // The velocity is the derivative of the position, integrated by trapezoids of 1 ms.
     let velocity = fine.velocity.as_deref().expect("asked for");
     let way: f64 = velocity.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]) * 0.001).sum();
     let wanted = position(&fine).last().expect("rows") - position(&fine)[0];
@@ -87,7 +88,7 @@ fn more_samples_are_taken_between_the_instants() {
 }
 
 #[test]
-fn noise_and_resolution_are_as_large_as_they_say_and_repeat_with_the_seed() {
+fn noise_and_resolution_match_their_parameters_and_repeat_with_the_seed() {
     let clean = recorded(&Disturbance::default());
     let usual = Disturbance::usual(AxisKind::Linear, 7);
     let noisy = recorded(&usual);
@@ -95,7 +96,7 @@ fn noise_and_resolution_are_as_large_as_they_say_and_repeat_with_the_seed() {
     assert_ne!(noisy, recorded(&Disturbance { seed: 8, ..usual.clone() }));
     let largest = current(&clean).iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
     let noise = current(&noisy).iter().zip(current(&clean)).map(|(noisy, clean)| (noisy - clean) / largest);
-    // 366 values: their deviation is known to 1/√(2·366) = 3.7 %, three of which are allowed.
+    // 366 values: their deviation is known to 1/√(2·366) = 3.7 %; three times this is allowed.
     let sigma = deviation(noise);
     println!("σ {sigma}");
     assert!((sigma / 0.02 - 1.0).abs() < 0.11, "{sigma}");
@@ -111,7 +112,7 @@ fn noise_and_resolution_are_as_large_as_they_say_and_repeat_with_the_seed() {
 }
 
 #[test]
-fn normal_numbers_are_normal() {
+fn normal_numbers_have_the_moments_of_a_normal_distribution() {
     let mut random = NoiseGenerator::new(3);
     let count = 100_000;
     let numbers: Vec<f64> = (0..count).map(|_| random.normal()).collect();
@@ -126,22 +127,22 @@ fn normal_numbers_are_normal() {
 }
 
 #[test]
-fn play_lags_by_half_its_width_in_either_direction() {
+fn backlash_lags_by_half_its_width_in_both_directions() {
     let clean = recorded(&Disturbance::default());
     let played = recorded(&Disturbance { backlash: 2e-6, ..Disturbance::default() });
     let lags: Vec<f64> = position(&played).iter().zip(position(&clean)).map(|(p, c)| p - c).collect();
     let near = |t: f64| lags[(t / TSP) as usize];
-    // In the middle of the way there and of the way back.
+    // In the middle of both legs.
     assert!((near(0.6) + 1e-6).abs() < 1e-15 && (near(1.4) - 1e-6).abs() < 1e-15);
     assert!(lags.iter().all(|lag| lag.abs() <= 1e-6 + 1e-15));
     assert_eq!(lags[0], 0.0);
 }
 
 #[test]
-fn more_friction_is_more_current() {
+fn additional_friction_increases_the_current() {
     let clean = recorded(&Disturbance::default());
     let rough = recorded(&Disturbance { friction: Some(|v| 0.2 * v / 3.0), ..Disturbance::default() });
-    // 3 m/min there and back, settled.
+    // Settled at 3 m/min in both directions.
     for (time, wanted) in [(0.85, 0.2), (1.65, -0.2)] {
         let k = (time / TSP) as usize;
         let more = current(&rough)[k] - current(&clean)[k];
@@ -152,7 +153,7 @@ fn more_friction_is_more_current() {
 }
 
 #[test]
-fn the_current_lags_and_the_stamps_jitter_leap_and_stall() {
+fn current_lag_jitter_gaps_and_stalls_match_their_parameters() {
     let fine = |current_lag| Disturbance { sample_ticks: Some(8), current_lag, ..Disturbance::default() };
     let (clean, late) = (recorded(&fine(0.0)), recorded(&fine(0.003)));
     assert_eq!(&current(&late)[3..], &current(&clean)[..current(&clean).len() - 3]);
@@ -168,14 +169,14 @@ fn the_current_lags_and_the_stamps_jitter_leap_and_stall() {
         Disturbance { gaps: vec![0.301..0.501], stalls: vec![0.801..0.899], ..Disturbance::default() };
     let holed = recorded(&holes);
     assert!(holed.time.iter().all(|t| !(0.301..0.501).contains(t) && !(0.801..0.899).contains(t)));
-    // 33 samples are missing, and 16 have the stamp at which the logger went on.
+    // 33 samples are missing, and 16 have the stamp at the end of the stall.
     assert_eq!(steady.time.len() - holed.time.len(), 33);
     assert_eq!(holed.time.iter().filter(|t| **t == 0.899).count(), 16);
     assert_eq!(holed.current.as_ref().map(Vec::len), Some(holed.time.len()));
 }
 
 #[test]
-fn parts_of_a_campaign_differ_in_what_the_feedforward_does() {
+fn parts_of_a_campaign_differ_in_feedforward() {
     let parameters = parameters::<&str>(&[]);
     let clean = Disturbance::default();
     let short = CampaignOptions { range: Some([0.0, 0.05]), max_feed: Some(3.0 * M_MIN) };
@@ -187,7 +188,7 @@ fn parts_of_a_campaign_differ_in_what_the_feedforward_does() {
         assert_eq!(recording.name, part.name());
         let velocity = largest(&recording.velocity_feedforward);
         let torque = largest(&recording.torque_feedforward);
-        // 3 m/min is 0.05 m/s behind a screw of 20 mm.
+        // 3 m/min is 0.05 m/s with a screw of 20 mm.
         let wanted = if *part == FeedforwardMode::Off { 0.0 } else { 0.05 / 0.020 * std::f64::consts::TAU };
         assert!((velocity - wanted).abs() < 1e-6, "{part:?}: {velocity}");
         assert_eq!(torque > 0.0, *part == FeedforwardMode::Both, "{part:?}: {torque}");

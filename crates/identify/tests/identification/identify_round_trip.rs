@@ -1,4 +1,4 @@
-//! Axes that are identified from simulated recordings of a campaign, against the parameters they were made with.
+//! Round trip: axes identified from simulated recordings of a campaign, compared with their true parameters.
 
 use virtual_axes_core::config::{AxisKind, MachineConfig, Parameters, Value};
 use virtual_axes_identify::identify::campaign::CampaignOptions as Campaign;
@@ -61,7 +61,7 @@ impl Found {
         findings.filter(|finding| finding.severity == severity).map(|finding| finding.code).collect()
     }
 
-    /// Friction current at V (m/min or rev/min), A.
+    /// Returns the friction current at V (m/min or rev/min), A.
     fn friction(&self, v: f64) -> f64 {
         let [a, b, c, d] = ["a", "b", "c", "d"].map(|name| self.number(&format!("friction.{name}")));
         a * (b * v).exp() + c * (d * v).exp()
@@ -75,14 +75,14 @@ fn number(parameters: &Parameters, key: &str) -> f64 {
     }
 }
 
-/// What model.md says of an axis.
+/// True parameters of an axis (model.md).
 struct Axis {
     name: &'static str,
     inertia: f64,
-    /// a, b, c, d, i0.
+    /// Friction parameters a, b, c, d, i0.
     friction: [f64; 5],
     torque_feedforward: f64,
-    /// Largest speed that the axis may go at in a campaign: 20, or what is left of Vmax.
+    /// Largest speed of the axis in a campaign: 20, or the reduced Vmax.
     top: f64,
 }
 
@@ -153,7 +153,7 @@ fn round_trip(number: usize) -> Found {
     let [low, high] = alpha.interval.expect("an interval");
     println!("   alpha {low} … {high} ms, beta {:?} ms as {}", beta.interval, beta.value);
     assert!(low < 9.0 && 9.0 <= high, "alpha {low} … {high}");
-    // No wider than what the comparator cannot tell, a period.
+    // The interval is at most one period of the position comparator.
     assert!(high - low < 6.0 + 1e-9);
     assert!((beta.value - 9.0).abs() <= 0.25, "beta {}", beta.value);
     if axis.torque_feedforward == 0.0 {
@@ -171,7 +171,7 @@ fn round_trip(number: usize) -> Found {
 }
 
 #[test]
-fn x_and_y_come_back_and_their_ballbar_is_that_of_the_truth() {
+fn x_and_y_are_identified_and_their_ballbar_matches() {
     let (x, y) = (round_trip(0), round_trip(1));
     assert_eq!((x.number("gravity.weight_n"), y.number("gravity.weight_n")), (0.0, 0.0));
     let mut machine = x.machine.clone();
@@ -188,7 +188,7 @@ fn x_and_y_come_back_and_their_ballbar_is_that_of_the_truth() {
     }
 }
 
-/// Radial deviation on the ballbar: mean, min, max, µm.
+/// Returns the radial deviation on the ballbar: mean, min, max, µm.
 fn ballbar(machine: &MachineConfig) -> [f64; 3] {
     let figures = virtual_axes_verification::fixtures::machines::watch_scenario("ballbar", machine, |_| {});
     let circle = &figures.circles[0];
@@ -196,7 +196,7 @@ fn ballbar(machine: &MachineConfig) -> [f64; 3] {
 }
 
 #[test]
-fn z_and_its_weight_come_back() {
+fn z_and_its_weight_are_identified() {
     let found = round_trip(2);
     let weight = found.number("gravity.weight_n");
     println!("   weight {weight} N");
@@ -204,17 +204,17 @@ fn z_and_its_weight_come_back() {
 }
 
 #[test]
-fn a_and_its_tilting_torque_come_back() {
+fn a_and_its_tilting_torque_are_identified() {
     let found = round_trip(3);
     let (tilt, phase) = (found.number("gravity.tilt_nm"), found.number("gravity.tilt_phase_deg"));
     println!("   k {tilt} N·m, φ {phase}°");
     assert!((tilt / 30.0 - 1.0).abs() < 0.02, "{tilt} N·m");
-    // 2 % of a radian: the truth is 0.
+    // 2 % of a radian; the true value is 0.
     assert!(phase.to_radians().abs() < 0.02, "{phase}°");
 }
 
 #[test]
-fn c_comes_back_without_gravity() {
+fn c_is_identified_without_gravity() {
     let found = round_trip(4);
     let gravity = found.identification.gravity.as_ref().expect("gravity is looked for");
     assert_eq!(gravity.tilt.map(|(tilt, _)| tilt), Some(0.0));
@@ -223,7 +223,7 @@ fn c_comes_back_without_gravity() {
 }
 
 #[test]
-fn weights_and_delays_of_the_feedforward_come_back_without_its_set_points() {
+fn feedforward_weights_and_delays_are_identified_without_recorded_feedforward() {
     let mut start = initial_parameters("x");
     for (key, value) in [("delays.beta_ms", 15.0), ("delays.gamma_ms", 3.0), ("friction.a", 2.0)] {
         let source = virtual_axes_core::config::ValueSource::named("the test");
@@ -241,7 +241,7 @@ fn weights_and_delays_of_the_feedforward_come_back_without_its_set_points() {
     let [low, high] = found.value("delays.gamma_ms").interval.expect("an interval");
     println!("VFFW {velocity:.5}, TFFW {torque:.6}, beta {}, gamma {low} … {high}", beta.value);
     assert!((velocity - 1.0).abs() < 0.005, "VFFW {velocity}");
-    // Seen through positions and currents only: a few parts in a hundred of a feedforward of 7 % of the inertia.
+    // Identified from positions and currents only: a few per cent of a feedforward of 7 % of the inertia.
     assert!((torque / 0.002034 - 1.0).abs() < 0.1, "TFFW {torque}");
     assert!((inertia / 0.028 - 1.0).abs() < 0.01, "Jeq {inertia}");
     assert!((beta.value - 9.0).abs() <= 0.25, "beta {}", beta.value);

@@ -1,4 +1,4 @@
-//! Recordings made from analytic motion, then spoilt: what conditioning makes of them.
+//! Conditioning of analytic recordings with disturbances.
 
 use std::f64::consts::{LN_2, PI, TAU};
 
@@ -8,19 +8,19 @@ use virtual_axes_identify::recording::{
     Conditioning, ConditioningError, Finding, RawRecording, Signals, condition,
 };
 
-/// 1 kHz.
+/// Sampling period of 1 kHz, s.
 const PERIOD: f64 = 1e-3;
 const SAMPLES: usize = 9000;
-/// Of each ramp, s.
+/// Duration of each ramp, s.
 const RAMP: f64 = 0.2;
-/// At full speed, s.
+/// Duration at full speed, s.
 const HOLD: f64 = 0.6;
-/// At rest between two moves, s.
+/// Rest between two moves, s.
 const REST: f64 = 0.3;
-/// There and back at three speeds, m/s.
+/// Speeds of the moves, m/s.
 const SPEEDS: [f64; 6] = [0.05, -0.05, 0.15, -0.15, 0.3, -0.3];
 
-/// Position, velocity and acceleration of the moves at time t: ramps v/2 (1 − cos πt/RAMP), mirrored at the end.
+/// Returns position, velocity and acceleration at time t: ramps v/2 (1 − cos πt/RAMP), mirrored at the end.
 fn motion(t: f64) -> [f64; 3] {
     let length = 2.0 * RAMP + HOLD + REST;
     let mut position = 0.0;
@@ -50,21 +50,21 @@ fn motion(t: f64) -> [f64; 3] {
     [position, 0.0, 0.0]
 }
 
-/// Current, A: inertia, viscous and Coulomb friction.
+/// Returns the current, A: inertia, viscous and Coulomb friction.
 fn current(t: f64) -> f64 {
     let [_, v, a] = motion(t);
     let direction = if v == 0.0 { 0.0 } else { v.signum() };
     3.4 * a + 2.0 * v + 1.2 * direction
 }
 
-/// Repeatable noise, uniform in −1 … 1.
+/// Returns repeatable noise, uniform in −1 … 1.
 fn noise(n: usize) -> f64 {
     let mixed = (n as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     ((mixed ^ (mixed >> 32)) % 2_000_001) as f64 / 1e6 - 1.0
 }
 
-/// The motion sampled every `period`, position in micrometers.
+/// Returns the motion sampled every `period`, with a position resolution of 1 µm.
 fn sampled(period: f64, samples: usize) -> RawRecording {
     let time: Vec<f64> = (0..samples).map(|n| n as f64 * period).collect();
     let of = |f: &dyn Fn(f64) -> f64| Some(time.iter().map(|&t| f(t)).collect::<Vec<f64>>());
@@ -112,7 +112,7 @@ fn codes(findings: &[Finding]) -> Vec<&str> {
     findings.iter().map(|finding| finding.code).collect()
 }
 
-/// Takes the samples of `rows` out of every channel.
+/// Removes the samples of `rows` from every channel.
 fn remove(raw: &mut RawRecording, rows: std::ops::Range<usize>) {
     raw.time.drain(rows.clone());
     for channel in channels(raw).into_iter().flatten() {
@@ -130,7 +130,7 @@ fn scale(channel: &mut Option<Vec<f64>>, factor: f64) {
     }
 }
 
-/// Every sample of the spans against the recorded motion at its time.
+/// Asserts that every sample of the spans is the recorded motion at its time.
 fn assert_in_place(signals: &Signals, tolerance: f64) {
     for span in &signals.spans {
         for (n, position) in span.position.iter().enumerate() {
@@ -182,7 +182,7 @@ fn derivatives_follow_the_analytic_motion() {
 }
 
 #[test]
-fn a_cutoff_out_of_range_is_refused() {
+fn a_cutoff_out_of_range_is_rejected() {
     for cutoff in [0.0, -1.0, f64::NAN, 161.0, 0.01] {
         let options = Conditioning { cutoff: Some(cutoff), ..Conditioning::default() };
         let fault = run_with(&recording(), &options).expect_err("out of range");
@@ -193,7 +193,7 @@ fn a_cutoff_out_of_range_is_refused() {
 }
 
 #[test]
-fn stamps_that_jitter_are_put_on_the_grid() {
+fn jittering_stamps_are_moved_to_the_grid() {
     for part in [0.05, 0.3, 0.45] {
         let mut raw = recording();
         let wanted = raw.clone();
@@ -204,13 +204,13 @@ fn stamps_that_jitter_are_put_on_the_grid() {
         assert_eq!(codes(&findings), ["jitter"], "{part}");
         assert_eq!(signals.period, PERIOD, "{part}");
         assert_eq!(Some(&signals.spans[0].position), wanted.position.as_ref(), "{part}");
-        // The median of 9000 jittering stamps.
+        // Median of 9000 jittering stamps.
         assert!(signals.spans[0].start.abs() < 0.05 * PERIOD);
     }
 }
 
 #[test]
-fn a_clock_coarser_than_the_sampling_is_seen_through() {
+fn a_clock_coarser_than_the_sampling_is_detected() {
     let mut raw = sampled(0.25e-3, 4 * SAMPLES);
     let wanted = raw.clone();
     for stamp in &mut raw.time {
@@ -223,10 +223,10 @@ fn a_clock_coarser_than_the_sampling_is_seen_through() {
 }
 
 #[test]
-fn a_stall_with_a_burst_is_put_on_the_grid() {
+fn a_stall_with_a_burst_is_moved_to_the_grid() {
     let mut raw = recording();
     let wanted = raw.clone();
-    // 40 samples come when the logger wakes up, 20 µs apart; another stall interrupts the burst of a third.
+    // After a stall 40 samples arrive 20 µs apart; another stall interrupts the burst of the third.
     for (first, count) in [(1700, 40), (4000, 15), (4013, 30)] {
         for n in first..first + count {
             raw.time[n] = raw.time[n].max(wanted.time[first + count] + (n - first) as f64 * 2e-5 - 1e-3);
@@ -240,7 +240,7 @@ fn a_stall_with_a_burst_is_put_on_the_grid() {
 }
 
 #[test]
-fn frozen_values_are_cut_out() {
+fn frozen_values_are_dropped() {
     let mut raw = recording();
     for channel in channels(&mut raw).into_iter().flatten() {
         let held = channel[5700];
@@ -256,7 +256,7 @@ fn frozen_values_are_cut_out() {
 #[test]
 fn a_slow_quantized_motion_and_a_stop_are_not_frozen() {
     let mut raw = recording();
-    // 0.3 µm per sample, then at rest, then on.
+    // 0.3 µm per sample, then a rest, then motion again.
     let slow = |n: usize| (n.min(4000) as f64 + n.max(5000) as f64) * 0.3e-6;
     raw.position = Some((0..SAMPLES).map(|n| (slow(n) * 1e6).round() / 1e6).collect());
     (raw.psec, raw.velocity, raw.current) = (None, None, None);
@@ -266,7 +266,7 @@ fn a_slow_quantized_motion_and_a_stop_are_not_frozen() {
 }
 
 #[test]
-fn long_gaps_part_the_recording_and_short_ones_are_bridged() {
+fn long_gaps_split_the_recording_and_short_ones_are_interpolated() {
     let mut raw = recording();
     remove(&mut raw, 6000..6500);
     remove(&mut raw, 3300..3302);
@@ -281,7 +281,7 @@ fn long_gaps_part_the_recording_and_short_ones_are_bridged() {
 }
 
 #[test]
-fn gaps_in_jittering_stamps_are_counted_right() {
+fn gaps_in_jittering_stamps_are_counted_correctly() {
     let mut raw = recording();
     for (n, stamp) in raw.time.iter_mut().enumerate() {
         *stamp += 0.2 * PERIOD * noise(n);
@@ -298,7 +298,7 @@ fn gaps_in_jittering_stamps_are_counted_right() {
 }
 
 #[test]
-fn values_that_are_missing_are_bridged_or_part_the_recording() {
+fn missing_values_are_interpolated_or_split_the_recording() {
     let mut raw = recording();
     if let Some(current) = &mut raw.current {
         current[2000] = f64::NAN;
@@ -312,7 +312,7 @@ fn values_that_are_missing_are_bridged_or_part_the_recording() {
 }
 
 #[test]
-fn repeated_and_overtaken_stamps_are_dropped_and_sorted() {
+fn repeated_stamps_are_dropped_and_late_stamps_sorted() {
     let mut raw = recording();
     let wanted = raw.clone();
     for channel in channels(&mut raw).into_iter().flatten() {
@@ -329,7 +329,7 @@ fn repeated_and_overtaken_stamps_are_dropped_and_sorted() {
 }
 
 #[test]
-fn rows_that_stand_more_than_once_are_dropped_however_many_they_are() {
+fn duplicate_rows_are_dropped_in_any_number() {
     let wanted = recording();
     for (every, times) in [(5, 1), (2, 1), (1, 1), (1, 3)] {
         let mut raw = wanted.clone();
@@ -377,8 +377,8 @@ fn irregular_sampling_is_interpolated() {
 }
 
 #[test]
-fn samples_taken_when_they_are_stamped_are_interpolated() {
-    // The count fits, but the position says that the stamps are true.
+fn samples_taken_at_their_stamps_are_interpolated() {
+    // The sample count fits, but the position shows that the stamps are the sampling times.
     let mut raw = recording();
     for (n, stamp) in raw.time.iter_mut().enumerate() {
         *stamp += 0.3 * PERIOD * noise(n);
@@ -391,10 +391,10 @@ fn samples_taken_when_they_are_stamped_are_interpolated() {
 }
 
 #[test]
-fn a_lag_of_the_current_is_found_and_taken_back() {
+fn a_current_lag_is_estimated_and_compensated() {
     for lag in [3e-3, -2e-3, 7.4e-3] {
         let mut raw = recording();
-        // Two per cent of noise.
+        // Noise of 2 %.
         raw.current = Some(
             raw.time.iter().enumerate().map(|(n, t)| current(t - 0.009 - lag) + 0.2 * noise(n)).collect(),
         );
@@ -411,7 +411,7 @@ fn a_lag_of_the_current_is_found_and_taken_back() {
 }
 
 #[test]
-fn a_lag_that_is_given_is_taken_back_exactly() {
+fn a_given_lag_is_compensated_exactly() {
     let raw = recording();
     let given = raw.current.clone().expect("recorded");
     for later in [3, 4, 7] {
@@ -430,21 +430,21 @@ fn a_lag_that_is_given_is_taken_back_exactly() {
 }
 
 #[test]
-fn no_lag_is_invented() {
+fn no_lag_is_estimated_without_lag() {
     let mut raw = recording();
     let noisy = raw.time.iter().enumerate().map(|(n, t)| current(t - 0.009) + 0.4 * noise(n));
     raw.current = Some(noisy.collect());
     let (signals, findings) = run(&raw);
     assert_eq!(findings, []);
     assert_eq!(signals.current_lag, 0.0);
-    // Less than a sampling period cannot be told from the ripple of the drive.
+    // A lag below a sampling period cannot be separated from the ripple of the drive.
     let mut slow = sampled(0.006, 1500);
     slow.current = Some(slow.time.iter().map(|t| current(t - 0.009 - 0.002)).collect());
     assert_eq!(run(&slow).0.current_lag, 0.0);
 }
 
 #[test]
-fn a_recording_of_a_standstill_is_fine() {
+fn a_recording_of_a_standstill_is_accepted() {
     let mut raw = recording();
     raw.psec = Some(vec![0.1; SAMPLES]);
     raw.position = Some((0..SAMPLES).map(|n| 0.1 + (noise(n)).round() * 1e-6).collect());
@@ -456,7 +456,7 @@ fn a_recording_of_a_standstill_is_fine() {
 }
 
 #[test]
-fn wrong_units_are_named() {
+fn wrong_units_are_reported() {
     type Spoil = fn(&mut RawRecording);
     let cases: [(Spoil, &str); 15] = [
         (|r| r.time.iter_mut().for_each(|t| *t *= 1e3), "time=COLUMN[ms]"),
@@ -464,11 +464,11 @@ fn wrong_units_are_named() {
         (|r| r.time.iter_mut().for_each(|t| *t *= 1e9), "time=COLUMN[ns]"),
         (|r| r.time.iter_mut().for_each(|t| *t *= 1e-3), "time=COLUMN[s]"),
         (|r| scale(&mut r.position, 1e3), "position=COLUMN[mm]"),
-        (|r| scale(&mut r.position, 1e-3), "velocity looks like mm/s"),
+        (|r| scale(&mut r.position, 1e-3), "velocity is likely in mm/s"),
         (|r| scale(&mut r.velocity, 1e3), "velocity=COLUMN[mm/s]"),
         (|r| scale(&mut r.velocity, 60.0), "velocity=COLUMN[m/min]"),
         (|r| scale(&mut r.velocity, 6e4), "velocity=COLUMN[mm/min]"),
-        (|r| scale(&mut r.velocity, -1.0), "its sign is counted the other way"),
+        (|r| scale(&mut r.velocity, -1.0), "its sign is inverted"),
         (|r| scale(&mut r.velocity, TAU / 0.02), "that of the motor in rad/s"),
         (|r| scale(&mut r.velocity, 60.0 / 0.02), "that of the motor in rpm"),
         (|r| scale(&mut r.psec, 1e3), "psec=COLUMN[mm]"),
@@ -484,7 +484,7 @@ fn wrong_units_are_named() {
 }
 
 #[test]
-fn degrees_are_named_on_a_rotary_axis() {
+fn degrees_are_reported_on_a_rotary_axis() {
     let mut raw = recording();
     (raw.psec, raw.current) = (None, None);
     scale(&mut raw.velocity, 180.0 / PI);
@@ -492,7 +492,7 @@ fn degrees_are_named_on_a_rotary_axis() {
         .expect_err("deg/s")
         .to_string();
     assert!(message.contains("velocity=COLUMN[deg/s]"), "{message}");
-    // 0.3 rad/s as degrees is 17 rad/s, eight times what C is permitted: only a velocity beside it tells.
+    // 0.3 rad/s in degrees is 17 rad/s, eight times the limit of C: only a velocity channel shows the unit.
     let mut raw = recording();
     (raw.psec, raw.current) = (None, None);
     scale(&mut raw.position, 180.0 / PI);
@@ -503,7 +503,7 @@ fn degrees_are_named_on_a_rotary_axis() {
 }
 
 #[test]
-fn swapped_columns_are_named() {
+fn swapped_columns_are_reported() {
     let good = recording();
     let mut raw = good.clone();
     (raw.position, raw.velocity) = (good.velocity.clone(), good.position.clone());
@@ -521,7 +521,7 @@ fn swapped_columns_are_named() {
     assert!(matches!(fault(&raw), ConditioningError::CurrentIsMotion { signal: "position", .. }));
     let mut raw = good.clone();
     raw.velocity = good.position.clone();
-    assert!(fault(&raw).to_string().contains("the velocity is a position"), "{}", fault(&raw));
+    assert!(fault(&raw).to_string().contains("the velocity column contains a position"), "{}", fault(&raw));
     let mut raw = good.clone();
     raw.psec = good.current.clone();
     scale(&mut raw.psec, 0.01);
@@ -532,7 +532,7 @@ fn swapped_columns_are_named() {
 }
 
 #[test]
-fn files_without_substance_are_refused() {
+fn recordings_without_content_are_rejected() {
     let good = recording();
     assert!(matches!(
         fault(&RawRecording { position: Some(vec![]), ..RawRecording::default() }),
@@ -560,7 +560,7 @@ fn any_value() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// Intervals of a logger, most of them good.
+/// Intervals of a logger, mostly regular.
 fn any_interval() -> impl Strategy<Value = f64> {
     prop_oneof![20 => Just(PERIOD), 2 => 0.0..3e-3, 1 => Just(0.0), 1 => -0.05..0.5]
 }
@@ -571,7 +571,7 @@ fn assert_even(signals: &Signals) {
     for span in &signals.spans {
         let count = span.position.len();
         assert!(count > 0 && span.start > end, "{} after {end}", span.start);
-        // The next span begins at the next sample or later, but for the jitter of its first stamps.
+        // The next span starts at the next sample or later, except for the jitter of its first stamps.
         end = span.start + (count as f64 - 1.0) * signals.period;
         assert!(span.velocity.len() == count && span.acceleration.len() == count);
         let optional = [
@@ -612,7 +612,7 @@ proptest! {
     }
 
     #[test]
-    fn spoilt_recordings_become_even(
+    fn disturbed_recordings_become_uniform(
         intervals in prop::collection::vec(any_interval(), 300..2000),
         spoilt in prop::collection::vec((0_usize..2000, 0_usize..4, any_value()), 0..20),
         offset in -1e3..1e9,

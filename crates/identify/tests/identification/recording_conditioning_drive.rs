@@ -1,4 +1,5 @@
-//! Recordings of the simulated drives: none is refused, and a lag of the current is found or left, never invented.
+//! Conditioning of recordings of simulated drives: all are accepted, and a current lag is estimated correctly
+//! or not at all.
 
 use virtual_axes_core::config::LimitsConfig;
 use virtual_axes_identify::recording::{Conditioning, RawRecording, condition};
@@ -6,15 +7,15 @@ use virtual_axes_verification::fixtures::machines::{AXES, TSP, machine, paramete
 
 /// Tick of the default machine, s.
 const TICK: f64 = 125e-6;
-/// Speeds there and back, parts of Vmax.
+/// Speeds of the moves in both directions, relative to Vmax.
 const SPEEDS: [f64; 5] = [0.02, 0.05, 0.1, 0.3, 0.7];
-/// Part of Amax.
+/// Acceleration relative to Amax.
 const ACCELERATION: f64 = 0.6;
-/// Periods at rest between two moves, and over which the trapezoids are averaged to limit the jerk.
+/// Position cycles of rest between two moves, and of averaging of the trapezoids to limit the jerk.
 const REST: usize = 50;
 const AVERAGED: usize = 9;
 
-/// Velocities of the setpoint, one for each position period.
+/// Returns the velocities of the setpoint, one per position cycle.
 fn velocities(limits: &LimitsConfig) -> Vec<f64> {
     let mut trapezoids = vec![0.0; REST];
     for speed in SPEEDS {
@@ -31,14 +32,14 @@ fn velocities(limits: &LimitsConfig) -> Vec<f64> {
     trapezoids.windows(AVERAGED).map(|window| window.iter().sum::<f64>() / AVERAGED as f64).collect()
 }
 
-/// PSEC, position, velocity and current of axis `place` at every tick.
-fn ticks(place: usize, limits: &LimitsConfig, changes: &[(&str, f64)]) -> Vec<[f64; 4]> {
+/// Returns PSEC, position, velocity and current of axis `index` at every tick.
+fn ticks(index: usize, limits: &LimitsConfig, changes: &[(&str, f64)]) -> Vec<[f64; 4]> {
     let mut machine = machine(changes);
     let (mut psec, mut ticks) = (vec![0.0; AXES], Vec::new());
     for velocity in velocities(limits) {
-        psec[place] += velocity * TSP;
+        psec[index] += velocity * TSP;
         machine.advance_with(&psec, &psec, |machine| {
-            let s = machine.axes()[place].sample();
+            let s = machine.axes()[index].sample();
             ticks.push([s.psec, s.position, s.velocity, s.current]);
         });
     }
@@ -46,16 +47,16 @@ fn ticks(place: usize, limits: &LimitsConfig, changes: &[(&str, f64)]) -> Vec<[f
 }
 
 #[test]
-fn lags_of_simulated_drives_are_found_or_left_but_not_invented() {
-    for (place, name) in ["x", "y", "z", "a", "c"].into_iter().enumerate() {
+fn lags_of_simulated_drives_are_estimated_correctly_or_not_at_all() {
+    for (index, name) in ["x", "y", "z", "a", "c"].into_iter().enumerate() {
         for feedforward in [1.0, 0.0] {
             let key = format!("{name}.feedforward.velocity");
             let changes = [(key.as_str(), feedforward)];
             let config = parameters(&changes).machine_config().expect("valid");
-            let axis = &config.axes()[place];
-            let ticks = ticks(place, axis.limits(), &changes);
+            let axis = &config.axes()[index];
+            let ticks = ticks(index, axis.limits(), &changes);
             // Encoder of 1 µm or 1 mdeg.
-            let quantum = if place < 3 { 1e-6 } else { 1e-3_f64.to_radians() };
+            let quantum = if index < 3 { 1e-6 } else { 1e-3_f64.to_radians() };
             for (step, late) in [(2, 0), (8, 0), (16, 0), (48, 0), (2, 24), (8, 24), (16, 24), (48, 24)] {
                 let sampled = |channel: usize, late: usize| -> Vec<f64> {
                     (0..ticks.len()).step_by(step).map(|n| ticks[n.saturating_sub(late)][channel]).collect()
@@ -78,8 +79,9 @@ fn lags_of_simulated_drives_are_found_or_left_but_not_invented() {
                 assert_eq!(signals.spans.len(), 1, "{}", raw.name);
                 let (found, lag) = (signals.current_lag, late as f64 * TICK);
                 let right = (found - lag).abs() < 0.3e-3;
-                // The linear axes have inertia enough to tell 3 ms, unless sampled every 6 ms.
-                let told = late == 0 || (place < 3 && step < 48);
+                // The inertia of the linear axes is large enough to show 3 ms, except when sampled every 6
+                // ms.
+                let told = late == 0 || (index < 3 && step < 48);
                 assert!(right || !told && found == 0.0, "{}: {found} s", raw.name);
             }
         }

@@ -1,4 +1,4 @@
-//! Tunings on plants that deviate, and the measure of control activity.
+//! Robustness of tunings on deviating plants, and the control activity.
 
 use virtual_axes_core::assess::AxisAssessor;
 use virtual_axes_core::config::{AxisConfig, Parameters, Value, ValueSource};
@@ -15,14 +15,14 @@ fn with(parameters: &Parameters, changes: &[(&str, f64)]) -> Parameters {
 }
 
 #[test]
-fn a_deviating_model_is_that_of_a_machine_with_such_a_plant() {
+fn a_deviating_model_equals_the_model_of_a_machine_with_that_plant() {
     let nominal = machine(&["x"]);
     let model = |parameters: &Parameters, of: fn(&AxisConfig, &_) -> Result<_, _>| {
         let config = parameters.machine_config().expect("a machine");
         of(&config.axes()[0], &config.periods()).expect("a model")
     };
     let deviating = with(&nominal, &[("x.deviation.inertia", 1.3), ("x.deviation.torque_constant", 0.7)]);
-    // The velocity loop divides its torque by the Kt that it knows: a smaller Kt is a smaller Kv.
+    // The velocity loop divides its torque by the nominal Kt: a smaller Kt acts like a smaller Kv.
     let such = with(
         &nominal,
         &[
@@ -36,23 +36,23 @@ fn a_deviating_model_is_that_of_a_machine_with_such_a_plant() {
     for (a, b) in found.a().iter().chain(found.b()).zip(expected.a().iter().chain(expected.b())) {
         assert!((a - b).abs() < 1e-9, "{a} and {b}");
     }
-    // What it is designed for does not see it.
+    // The model of the controller design does not contain the deviation.
     assert_eq!(model(&deviating, prediction_model), model(&nominal, prediction_model));
     assert_eq!(model(&nominal, deviating_plant_model), model(&nominal, prediction_model));
 }
 
 #[test]
-fn each_deviation_is_a_run_of_its_own() {
+fn each_deviation_equals_a_separate_run() {
     let parameters = machine(&["x", "y"]);
     let config = parameters.machine_config().expect("a machine");
-    let course = workload(CIRCLE, &config);
+    let workload = workload(CIRCLE, &config);
     let cost = Cost::default();
-    let found = analyze_robustness(&parameters, &course, &cost, 0.3, &NoProgress).expect("runs");
-    let plain = course.run(&config, false, false, |_| Ok(())).expect("a run").figures;
+    let found = analyze_robustness(&parameters, &workload, &cost, 0.3, &NoProgress).expect("runs");
+    let plain = workload.run(&config, false, false, |_| Ok(())).expect("a run").figures;
     assert_eq!(found.nominal.figures, plain);
     assert_eq!(found.nominal.deviation, PlantDeviation::NONE);
     assert_eq!(found.single.len(), 6);
-    for (place, (name, factor)) in [
+    for (index, (name, factor)) in [
         ("inertia", 0.7),
         ("inertia", 1.3),
         ("friction", 0.7),
@@ -66,8 +66,8 @@ fn each_deviation_is_a_run_of_its_own() {
         let keys = [format!("x.deviation.{name}"), format!("y.deviation.{name}")];
         let changed = with(&parameters, &[(&keys[0], factor), (&keys[1], factor)]);
         let config = changed.machine_config().expect("a machine");
-        let figures = course.run(&config, false, false, |_| Ok(())).expect("a run").figures;
-        assert_eq!(found.single[place].figures, figures, "{name} × {factor}");
+        let figures = workload.run(&config, false, false, |_| Ok(())).expect("a run").figures;
+        assert_eq!(found.single[index].figures, figures, "{name} × {factor}");
         assert_ne!(figures, plain, "{name} × {factor}");
     }
     // Friction is outside the linear loop.
@@ -82,10 +82,10 @@ fn each_deviation_is_a_run_of_its_own() {
 }
 
 #[test]
-fn control_activity_is_the_rms_of_changes_at_position_instants() {
+fn control_activity_is_the_rms_of_changes_per_position_cycle() {
     let mut assessor = AxisAssessor::default();
     let sample = |current_setpoint: f64| AxisSample { current_setpoint, ..AxisSample::default() };
-    // The first value is no change; what is between position instants is of no concern.
+    // The first value is no change; values between position cycles do not count.
     let activity = Activity { peak_current: 100.0, ..Activity::default() };
     for current in [10.0, 13.0, 9.0, 9.0, 9.0] {
         assessor.observe(&sample(current), &activity);
