@@ -1,20 +1,20 @@
-//! Kinematics RRTTT: signs by hand, an independent composition of matrices, identities.
+//! Kinematics RRTTT: signs, comparison with homogeneous matrices, round trips.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::LazyLock;
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 use proptest::prelude::*;
-use virtual_axes_core::config::{KinematicsConfig, Parameters, Source};
-use virtual_axes_core::kinematics::{Kinematics, KinematicsError, Role, ToolPose};
-use virtual_axes_verification::fixtures::common::parameters;
+use virtual_axes_core::config::{KinematicsConfig, Parameters, ValueSource};
+use virtual_axes_core::kinematics::{AxisRole, Kinematics, KinematicsError, ToolPose};
+use virtual_axes_verification::fixtures::machines::parameters;
 
-/// What both identities keep, m and rad.
-const IDENTITY: f64 = 1e-12;
-/// Tool length of the shipped machine, m.
+/// Tolerance of round trips, m and rad.
+const ROUND_TRIP: f64 = 1e-12;
+/// Tool length of the default machine, m.
 const TOOL: f64 = 0.1;
 
-/// Every part of the geometry different from zero and from each other, m.
+/// Geometry with distinct nonzero values, m.
 const GEOMETRY: KinematicsConfig = KinematicsConfig {
     tool_length: 0.137,
     pivot_a: [0.021, -0.093],
@@ -22,7 +22,7 @@ const GEOMETRY: KinematicsConfig = KinematicsConfig {
     workpiece: [0.055, -0.071, 0.112],
 };
 
-/// The default machine with a geometry, m.
+/// Returns the kinematics of the default machine with `geometry`.
 fn with(geometry: &KinematicsConfig) -> Kinematics {
     let KinematicsConfig { tool_length, pivot_a, pivot_c, workpiece } = *geometry;
     let values = [
@@ -39,7 +39,7 @@ fn with(geometry: &KinematicsConfig) -> Kinematics {
     Kinematics::new(&parameters(&changes).machine_config().expect("a valid machine"))
 }
 
-/// The default machine with everything displaced.
+/// Returns the kinematics of the default machine with [`GEOMETRY`].
 fn displaced() -> &'static Kinematics {
     static DISPLACED: LazyLock<Kinematics> = LazyLock::new(|| with(&GEOMETRY));
     &DISPLACED
@@ -49,10 +49,10 @@ fn mikron() -> Kinematics {
     with(&KinematicsConfig { tool_length: TOOL, ..KinematicsConfig::default() })
 }
 
-/// The default machine with other joints, in that order.
+/// Returns the kinematics of the default machine with the joints `joints`, in this order.
 fn with_joints(joints: &str) -> Kinematics {
-    let mut parameters = Parameters::embedded_default().expect("the shipped machine");
-    parameters.set_text(&format!("joints={joints}"), &Source::named("test")).expect("fewer joints");
+    let mut parameters = Parameters::embedded_default().expect("the built-in machine");
+    parameters.set_text(&format!("joints={joints}"), &ValueSource::named("test")).expect("fewer joints");
     Kinematics::new(&parameters.machine_config().expect("a valid machine"))
 }
 
@@ -75,7 +75,7 @@ fn solve(kinematics: &Kinematics, pose: &ToolPose, near: &[f64]) -> Result<Vec<f
     kinematics.inverse(pose, near, &mut out).map(|()| out)
 }
 
-/// The pose by homogeneous matrices: the chain from the workpiece to the machine, inverted as a matrix.
+/// Returns the pose by homogeneous matrices: the chain from the workpiece to the machine, inverted.
 fn pose_by_matrices(geometry: &KinematicsConfig, joints: &[f64]) -> ToolPose {
     let KinematicsConfig { tool_length, pivot_a, pivot_c, workpiece } = *geometry;
     let turn = |axis: Vector3<f64>, angle: f64, about: Vector3<f64>| {
@@ -83,7 +83,7 @@ fn pose_by_matrices(geometry: &KinematicsConfig, joints: &[f64]) -> ToolPose {
             * Matrix4::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle)
             * Matrix4::new_translation(&-about)
     };
-    // The tables turn against the joints (ISO 841).
+    // The tables rotate opposite to the joints (ISO 841).
     let machine_from_workpiece = turn(Vector3::x(), -joints[3], Vector3::new(0.0, pivot_a[0], pivot_a[1]))
         * turn(Vector3::z(), -joints[4], Vector3::new(pivot_c[0], pivot_c[1], 0.0))
         * Matrix4::new_translation(&Vector3::from(workpiece));
@@ -96,35 +96,35 @@ fn pose_by_matrices(geometry: &KinematicsConfig, joints: &[f64]) -> ToolPose {
 }
 
 #[test]
-fn at_home_the_tip_hangs_below_the_origin_and_the_axis_points_up() {
+fn at_home_the_tip_is_below_the_origin_and_the_tool_axis_is_plus_z() {
     let pose = mikron().forward(&[0.0; 5]);
     assert_eq!(pose.tip, Vector3::new(0.0, 0.0, -TOOL));
     assert_eq!(pose.axis, Vector3::z());
 }
 
 #[test]
-fn linear_joints_move_the_tool_towards_their_own_plus() {
+fn linear_joints_move_the_tool_in_their_positive_direction() {
     let pose = mikron().forward(&[0.01, 0.02, 0.03, 0.0, 0.0]);
     assert_vector("tip", pose.tip, [0.01, 0.02, 0.03 - TOOL], 1e-16);
 }
 
-/// The right hand about +X carries +Z to −Y: seen from the workpiece the tool tilts so, and the table,
-/// which turns the other way, carries its own +Z to +Y of the machine.
+/// A right-handed rotation about +X maps +Z to −Y: the tool axis in the workpiece frame. The table rotates in the opposite
+/// direction and maps its +Z to +Y of the machine.
 #[test]
-fn a_of_plus_90_degrees_lays_the_tool_along_minus_y() {
+fn a_of_plus_90_degrees_gives_the_tool_axis_minus_y() {
     let pose = mikron().forward(&[0.0, 0.0, 0.0, FRAC_PI_2, 0.0]);
     assert_vector("axis", pose.axis, [0.0, -1.0, 0.0], 1e-16);
-    // The tip (0, 0, −0.1) is turned by the same right hand: −Z to +Y.
+    // The rotation maps the tip (0, 0, −0.1) from −Z to +Y.
     assert_vector("tip", pose.tip, [0.0, TOOL, 0.0], 1e-16);
     let mut joints = [0.0, 0.0, 0.2, FRAC_PI_2, 0.0];
     mikron().tip_to_joints(&mut joints);
     assert_same("a point 0.2 above", &joints, &[0.0, 0.2, TOOL, FRAC_PI_2, 0.0], 1e-16);
 }
 
-/// The right hand about +Z carries +X to +Y: the tool that stands at +X of the machine is, at C = +90°,
-/// at +Y of the workpiece; a point at +X of the workpiece has been carried to −Y of the machine.
+/// A right-handed rotation about +Z maps +X to +Y: at C = +90° a tool at +X of the machine is at +Y of the workpiece, and a
+/// point at +X of the workpiece is at −Y of the machine.
 #[test]
-fn c_of_plus_90_degrees_turns_the_tool_from_x_to_y_of_the_workpiece() {
+fn c_of_plus_90_degrees_rotates_the_tool_from_x_to_y_of_the_workpiece() {
     let pose = mikron().forward(&[0.3, 0.0, TOOL, 0.0, FRAC_PI_2]);
     assert_vector("tip", pose.tip, [0.0, 0.3, 0.0], 1e-16);
     assert_vector("axis", pose.axis, [0.0, 0.0, 1.0], 0.0);
@@ -133,23 +133,23 @@ fn c_of_plus_90_degrees_turns_the_tool_from_x_to_y_of_the_workpiece() {
     assert_same("a point at +X", &joints, &[0.0, -0.3, TOOL, 0.0, FRAC_PI_2], 1e-16);
 }
 
-/// A first, then C about the Z of the workpiece: −Y, where A = 90° lays the tool, turns to +X.
+/// The rotation by A gives −Y; the rotation by C about Z of the workpiece then gives +X.
 #[test]
-fn both_at_90_degrees_lay_the_tool_along_plus_x() {
+fn both_at_90_degrees_give_the_tool_axis_plus_x() {
     let pose = mikron().forward(&[0.0, 0.0, 0.0, FRAC_PI_2, FRAC_PI_2]);
     assert_vector("axis", pose.axis, [1.0, 0.0, 0.0], 1e-16);
 }
 
-/// Halves and roots of three: u = (sin a sin c, −sin a cos c, cos a).
+/// Tool axis by u = (sin a sin c, −sin a cos c, cos a).
 #[test]
-fn a_of_30_and_c_of_60_degrees_give_the_axis_of_the_model() {
+fn a_of_30_and_c_of_60_degrees_give_the_tool_axis_of_the_equation() {
     let pose = mikron().forward(&[0.0, 0.0, 0.0, PI / 6.0, PI / 3.0]);
     let root = 3.0_f64.sqrt();
     assert_vector("axis", pose.axis, [root / 4.0, -0.25, root / 2.0], 1e-15);
 }
 
 #[test]
-fn what_is_on_a_pivot_stays_where_it_is() {
+fn points_on_a_pivot_do_not_move() {
     let pivots = KinematicsConfig { workpiece: [0.0; 3], ..GEOMETRY };
     let kinematics = with(&pivots);
     for angle in [-0.5, 0.3, 2.0] {
@@ -164,10 +164,9 @@ fn what_is_on_a_pivot_stays_where_it_is() {
     }
 }
 
-/// The origin of the workpiece stands 0.1 above the axis of A; the table at −90° about X lays it 0.1
-/// towards +Y of that axis.
+/// The origin of the workpiece is 0.1 above the axis of A; the table at −90° about X moves it to 0.1 in +Y of the axis.
 #[test]
-fn a_point_above_the_pivot_of_a_swings_towards_plus_y() {
+fn a_point_above_the_pivot_of_a_moves_to_plus_y() {
     let geometry = KinematicsConfig { pivot_a: [0.0, -0.1], ..KinematicsConfig::default() };
     let mut joints = [0.0, 0.0, 0.0, FRAC_PI_2, 0.0];
     with(&geometry).tip_to_joints(&mut joints);
@@ -190,41 +189,41 @@ fn a_path_through_the_singularity_keeps_c_and_changes_the_sign_of_a() {
         let mut near = vec![0.1, -0.1, 0.2, 0.25, turns];
         for a in tilts {
             let joints = [0.1 + a, -0.1, 0.2, a, turns];
-            let found = solve(kinematics, &kinematics.forward(&joints), &near).expect("in reach");
-            assert_same("joints", &found, &joints, IDENTITY);
+            let found = solve(kinematics, &kinematics.forward(&joints), &near).expect("reachable");
+            assert_same("joints", &found, &joints, ROUND_TRIP);
             near = found;
         }
     }
 }
 
 #[test]
-fn at_the_singularity_c_keeps_any_value_that_it_had() {
+fn at_the_singularity_c_keeps_its_reference_value() {
     let pose = ToolPose { tip: Vector3::new(0.3, 0.1, -0.2), axis: Vector3::z() };
     for c in [-100.0, -0.1, 0.0, 2.0, 7.5] {
-        // Rounding of the axis is no reason to turn the table.
+        // Rounding of the tool axis must not rotate the table.
         for noise in [0.0, 3e-16, -2e-15, 5e-14] {
             let axis = Vector3::new(noise, -noise / 3.0, 1.0);
             let found =
-                solve(displaced(), &ToolPose { axis, ..pose }, &[0.0, 0.0, 0.0, 0.1, c]).expect("in reach");
+                solve(displaced(), &ToolPose { axis, ..pose }, &[0.0, 0.0, 0.0, 0.1, c]).expect("reachable");
             assert_eq!(found[4], c);
             let back = displaced().forward(&found);
-            assert_vector("tip", back.tip, pose.tip.into(), IDENTITY);
-            assert_vector("axis", back.axis, axis.into(), IDENTITY);
+            assert_vector("tip", back.tip, pose.tip.into(), ROUND_TRIP);
+            assert_vector("axis", back.axis, axis.into(), ROUND_TRIP);
         }
     }
 }
 
 #[test]
-fn an_axis_upside_down_is_singular_too_and_keeps_c() {
+fn at_a_tool_axis_of_minus_z_c_keeps_its_reference_value() {
     let pose = ToolPose { tip: Vector3::new(0.1, 0.1, 0.0), axis: -Vector3::z() };
-    let found = solve(displaced(), &pose, &[0.0, 0.0, 0.0, 3.0, 1.25]).expect("in reach");
+    let found = solve(displaced(), &pose, &[0.0, 0.0, 0.0, 3.0, 1.25]).expect("reachable");
     assert_same("a and c", &found[3..], &[PI, 1.25], 1e-15);
-    let found = solve(displaced(), &pose, &[0.0, 0.0, 0.0, -3.0, 1.25]).expect("in reach");
+    let found = solve(displaced(), &pose, &[0.0, 0.0, 0.0, -3.0, 1.25]).expect("reachable");
     assert_same("a and c", &found[3..], &[-PI, 1.25], 1e-15);
 }
 
 #[test]
-fn of_the_two_solutions_the_nearer_one_is_taken() {
+fn the_nearer_of_the_two_solutions_is_selected() {
     let kinematics = mikron();
     let pose = kinematics.forward(&[0.0, 0.0, 0.0, 0.4, 0.1]);
     for (near, wanted) in [
@@ -234,44 +233,45 @@ fn of_the_two_solutions_the_nearer_one_is_taken() {
         ([0.3, 5.0 * TAU], [0.4, 0.1 + 5.0 * TAU]),
         ([-0.3, -8.0 * TAU + 3.0], [-0.4, 0.1 + PI - 8.0 * TAU]),
     ] {
-        let found = solve(&kinematics, &pose, &[0.0, 0.0, 0.0, near[0], near[1]]).expect("in reach");
+        let found = solve(&kinematics, &pose, &[0.0, 0.0, 0.0, near[0], near[1]]).expect("reachable");
         assert_same("a and c", &found[3..], &wanted, 1e-14);
     }
 }
 
 #[test]
-fn a_solution_outside_the_stroke_of_a_is_taken_last() {
-    // A of the default machine goes from −30° to 120°.
+fn solutions_inside_the_travel_limits_of_a_take_precedence() {
+    // Travel limits of A of the default machine: −30° and 120°.
     let kinematics = mikron();
     let degrees = |a: f64, c: f64| [0.0, 0.0, 0.0, a.to_radians(), c.to_radians()];
     for (a, near, wanted) in [
         (40.0, degrees(0.0, 170.0), degrees(40.0, 0.0)),
         (20.0, degrees(0.0, 170.0), degrees(-20.0, 180.0)),
-        // On the end of the stroke, where rounding must not make the table turn over.
+        // At a travel limit: rounding must not switch the solution.
         (30.0, degrees(-30.0, 180.0), degrees(-30.0, 180.0)),
-        // Both outside: the nearer one, for others to refuse.
+        // Both outside: the nearer one.
         (150.0, degrees(-100.0, 170.0), degrees(-150.0, 180.0)),
     ] {
         let pose = kinematics.forward(&degrees(a, 0.0));
-        let found = solve(&kinematics, &pose, &near).expect("in reach");
+        let found = solve(&kinematics, &pose, &near).expect("reachable");
         assert_same("a and c", &found[3..], &wanted[3..], 1e-14);
     }
 }
 
 #[test]
-fn the_length_of_the_tool_axis_does_not_matter() {
+fn the_length_of_the_tool_axis_is_irrelevant() {
     let joints = [0.1, 0.2, 0.0, 0.5, -0.5];
     let pose = displaced().forward(&joints);
     for factor in [1e-3, 7.0] {
         let scaled = ToolPose { axis: pose.axis * factor, ..pose };
-        assert_same("joints", &solve(displaced(), &scaled, &joints).expect("in reach"), &joints, IDENTITY);
+        assert_same("joints", &solve(displaced(), &scaled, &joints).expect("reachable"), &joints, ROUND_TRIP);
     }
 }
 
 #[test]
-fn roles_go_by_name_and_kind_in_any_order() {
+fn name_and_type_of_a_joint_determine_its_role() {
     let kinematics = with_joints("[c, z, x]");
-    let roles = [Role::X, Role::Y, Role::Z, Role::A, Role::C].map(|role| kinematics.role(role));
+    let roles =
+        [AxisRole::X, AxisRole::Y, AxisRole::Z, AxisRole::A, AxisRole::C].map(|role| kinematics.role(role));
     assert_eq!(roles, [Some(2), None, Some(1), None, Some(0)]);
     let pose = kinematics.forward(&[FRAC_PI_2, TOOL, 0.3]);
     assert_vector("tip", pose.tip, [0.0, 0.3, 0.0], 1e-16);
@@ -279,95 +279,96 @@ fn roles_go_by_name_and_kind_in_any_order() {
     assert!(!with_joints("[x, y]").has_rotary_axis());
     assert!(!with_joints("[c]").has_linear_axis());
 
-    // A rotary axis that is called x is none of the chain.
-    let mut parameters = Parameters::embedded_default().expect("the shipped machine");
+    // A rotary axis b has no role.
+    let mut parameters = Parameters::embedded_default().expect("the built-in machine");
     let text = include_str!("../../../../config/mikron_ucp710.yaml")
         .replace("\"c\"]", "\"b\"]")
         .replace("\n    c:\n", "\n    b:\n");
     parameters.overlay_yaml(&text, "b.yaml", None).expect("a machine with b");
     let kinematics = Kinematics::new(&parameters.machine_config().expect("a valid machine"));
-    assert_eq!(kinematics.role(Role::C), None);
+    assert_eq!(kinematics.role(AxisRole::C), None);
     let pose = ToolPose { tip: Vector3::zeros(), axis: Vector3::z() };
-    let found = solve(&kinematics, &pose, &[0.0, 0.0, 0.0, 0.0, 0.77]).expect("in reach");
+    let found = solve(&kinematics, &pose, &[0.0, 0.0, 0.0, 0.0, 0.77]).expect("reachable");
     assert_eq!(found, [0.0, 0.0, TOOL, 0.0, 0.77], "b keeps its value");
 }
 
 #[test]
-fn upper_case_names_have_their_roles() {
+fn upper_case_names_have_roles() {
     let text = include_str!("../../../../config/mikron_ucp710.yaml")
         .replace("\"x\",", "\"X\",")
         .replace("\n    x:\n", "\n    X:\n");
     let parameters = Parameters::from_yaml(&text, "upper.yaml").expect("a machine with X");
     let kinematics = Kinematics::new(&parameters.machine_config().expect("a valid machine"));
-    assert_eq!(kinematics.role(Role::X), Some(0));
+    assert_eq!(kinematics.role(AxisRole::X), Some(0));
 }
 
 #[test]
-fn a_machine_without_c_tilts_in_its_plane_and_no_other() {
+fn without_c_only_tool_axes_in_the_plane_of_a_are_reachable() {
     let kinematics = with_joints("[x, y, z, a]");
     let axis = Vector3::new(0.0, -0.6, 0.8);
     let pose = ToolPose { tip: Vector3::new(0.1, 0.0, 0.0), axis };
-    let found = solve(&kinematics, &pose, &[0.0; 4]).expect("in reach");
+    let found = solve(&kinematics, &pose, &[0.0; 4]).expect("reachable");
     assert_same("a", &found[3..], &[0.6_f64.asin()], 1e-15);
-    assert_vector("tip", kinematics.forward(&found).tip, [0.1, 0.0, 0.0], IDENTITY);
+    assert_vector("tip", kinematics.forward(&found).tip, [0.1, 0.0, 0.0], ROUND_TRIP);
     // tan = 0.1 / 1 out of the plane.
     let pose = ToolPose { axis: Vector3::new(0.1, 0.6, 0.8), ..pose };
     let error = solve(&kinematics, &pose, &[0.0; 4]).expect_err("out of the plane");
     let KinematicsError::AxisUnreachable { axis, missing, angle } = error else { panic!("{error}") };
-    assert_eq!((axis, missing), ([0.1, 0.6, 0.8], Role::C));
+    assert_eq!((axis, missing), ([0.1, 0.6, 0.8], AxisRole::C));
     assert!((angle - 0.1_f64.atan()).abs() < 1e-15, "{angle}");
 }
 
 #[test]
-fn a_machine_without_a_keeps_the_tool_upright() {
+fn without_a_only_the_tool_axis_plus_z_is_reachable() {
     for joints in ["[x, y, z, c]", "[x, y, z]"] {
         let kinematics = with_joints(joints);
         let mut near = vec![0.0, 0.0, 0.0, 4.0];
         near.truncate(joints.split(',').count());
         let pose = ToolPose { tip: Vector3::new(0.1, 0.2, 0.3), axis: Vector3::z() };
-        let found = solve(&kinematics, &pose, &near).expect("in reach");
+        let found = solve(&kinematics, &pose, &near).expect("reachable");
         assert_eq!(found.get(3), near.get(3));
-        assert_vector("tip", kinematics.forward(&found).tip, [0.1, 0.2, 0.3], IDENTITY);
+        assert_vector("tip", kinematics.forward(&found).tip, [0.1, 0.2, 0.3], ROUND_TRIP);
         let error = solve(&kinematics, &ToolPose { axis: Vector3::y(), ..pose }, &near).expect_err("no A");
         assert_eq!(
             error.to_string(),
-            "the tool axis [0.0, 1.0, 0.0] needs a rotary axis a, which the machine does not have: \
-             the nearest direction it reaches is 90 deg away"
+            "tool axis [0.0, 1.0, 0.0] is unreachable without a rotary axis a; the nearest reachable \
+             direction differs by 90 deg"
         );
     }
 }
 
 #[test]
-fn a_tip_that_needs_a_missing_linear_axis_is_refused_with_its_place() {
+fn a_tip_that_requires_a_missing_linear_axis_is_rejected() {
     let kinematics = with_joints("[x, z]");
     let pose = ToolPose { tip: Vector3::new(0.1, 0.25, 0.0), axis: Vector3::z() };
     let mut out = [7.0; 2];
     let error = kinematics.inverse(&pose, &[0.0; 2], &mut out);
     assert_eq!(
         error,
-        Err(KinematicsError::TipUnreachable { tip: [0.1, 0.25, 0.0], missing: Role::Y, position: 0.25 })
+        Err(KinematicsError::TipUnreachable { tip: [0.1, 0.25, 0.0], missing: AxisRole::Y, position: 0.25 })
     );
     assert_eq!(out, [7.0; 2], "nothing is written");
 }
 
 #[test]
-fn what_is_no_pose_is_refused() {
+fn invalid_poses_are_rejected() {
     let kinematics = mikron();
     let good = kinematics.forward(&[0.0; 5]);
-    let refusal = |pose: ToolPose, near: &[f64]| solve(&kinematics, &pose, near).expect_err("no pose");
+    let rejection =
+        |pose: ToolPose, near: &[f64]| solve(&kinematics, &pose, near).expect_err("an invalid pose");
     let nan = ToolPose { tip: Vector3::new(0.0, f64::NAN, 0.0), ..good };
-    assert!(matches!(refusal(nan, &[0.0; 5]), KinematicsError::NotFinite { .. }));
+    assert!(matches!(rejection(nan, &[0.0; 5]), KinematicsError::NotFinite { .. }));
     let infinite = ToolPose { axis: Vector3::new(f64::INFINITY, 0.0, 0.0), ..good };
-    assert!(matches!(refusal(infinite, &[0.0; 5]), KinematicsError::NotFinite { .. }));
+    assert!(matches!(rejection(infinite, &[0.0; 5]), KinematicsError::NotFinite { .. }));
     let near = [0.0, 0.0, 0.0, 0.0, f64::NAN];
-    assert!(matches!(refusal(good, &near), KinematicsError::NotFinite { .. }));
+    assert!(matches!(rejection(good, &near), KinematicsError::NotFinite { .. }));
     let zero = ToolPose { axis: Vector3::zeros(), ..good };
-    assert_eq!(refusal(zero, &[0.0; 5]), KinematicsError::NoDirection { axis: [0.0; 3] });
-    assert_eq!(refusal(good, &[0.0; 4]), KinematicsError::WrongSize { found: 4, wanted: 5 });
+    assert_eq!(rejection(zero, &[0.0; 5]), KinematicsError::NoDirection { axis: [0.0; 3] });
+    assert_eq!(rejection(good, &[0.0; 4]), KinematicsError::WrongSize { found: 4, wanted: 5 });
 }
 
 #[test]
-fn the_angle_between_two_directions_is_right_at_every_size() {
+fn the_orientation_error_is_accurate_at_small_and_large_angles() {
     for angle in [0.0, 1e-12, 1e-9, 1e-3, 1.0, FRAC_PI_2, 3.0, PI - 1e-9] {
         let (sin, cos) = f64::sin_cos(angle);
         let error = Kinematics::orientation_error(&Vector3::z(), &Vector3::new(sin * 0.6, sin * 0.8, cos));
@@ -375,7 +376,7 @@ fn the_angle_between_two_directions_is_right_at_every_size() {
     }
 }
 
-/// Tilt from nothing through tiny to large, of both signs.
+/// Zero, tiny and large tilts of both signs.
 fn tilt() -> impl Strategy<Value = f64> {
     prop_oneof![
         1 => Just(0.0),
@@ -387,11 +388,11 @@ fn tilt() -> impl Strategy<Value = f64> {
 fn away_from_the_singularity() -> impl Strategy<Value = f64> {
     let tiny = ((-12.0..-3.0f64), any::<bool>())
         .prop_map(|(exponent, plus)| if plus { 10f64.powf(exponent) } else { -(10f64.powf(exponent)) });
-    // The stroke of A, its ends left out.
+    // Inside the travel limits of A.
     prop_oneof![1 => tiny, 1 => -0.52..2.09f64]
 }
 
-/// X, Y, Z over more than the strokes, C over many turns.
+/// Joints: X, Y and Z beyond their travel limits, C over several turns.
 fn joints(a: impl Strategy<Value = f64>) -> impl Strategy<Value = [f64; 5]> {
     let c = prop_oneof![1 => Just(0.0), 4 => -4.0..4.0f64, 1 => -60.0..60.0f64];
     (-0.5..0.5f64, -0.5..0.5f64, -0.5..0.5f64, a, c).prop_map(|(x, y, z, a, c)| [x, y, z, a, c])
@@ -401,22 +402,22 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn forward_agrees_with_a_composition_of_matrices(joints in joints(tilt())) {
+    fn forward_kinematics_agrees_with_homogeneous_matrices(joints in joints(tilt())) {
         let (pose, wanted) = (displaced().forward(&joints), pose_by_matrices(&GEOMETRY, &joints));
-        prop_assert!((pose.tip - wanted.tip).norm() <= IDENTITY);
-        prop_assert!((pose.axis - wanted.axis).norm() <= IDENTITY);
+        prop_assert!((pose.tip - wanted.tip).norm() <= ROUND_TRIP);
+        prop_assert!((pose.axis - wanted.axis).norm() <= ROUND_TRIP);
         prop_assert!((pose.axis.norm() - 1.0).abs() <= 1e-15);
     }
 
     #[test]
     fn pose_to_joints_to_pose_is_the_identity(joints in joints(tilt()), near in joints(-3.0..3.0f64)) {
-        // Poses that the code under test has not made.
+        // Poses computed independently of the code under test.
         let pose = pose_by_matrices(&GEOMETRY, &joints);
         let found = solve(displaced(), &pose, &near);
         prop_assert!(found.is_ok());
         let back = displaced().forward(&found.unwrap_or_default());
-        prop_assert!((back.tip - pose.tip).norm() <= IDENTITY, "tip {:e}", (back.tip - pose.tip).norm());
-        prop_assert!((back.axis - pose.axis).norm() <= IDENTITY, "axis {:e}", (back.axis - pose.axis).norm());
+        prop_assert!((back.tip - pose.tip).norm() <= ROUND_TRIP, "tip {:e}", (back.tip - pose.tip).norm());
+        prop_assert!((back.axis - pose.axis).norm() <= ROUND_TRIP, "axis {:e}", (back.axis - pose.axis).norm());
     }
 
     #[test]
@@ -432,8 +433,8 @@ proptest! {
         let found = solve(displaced(), &pose, &near);
         prop_assert!(found.is_ok());
         let back = pose_by_matrices(&GEOMETRY, &found.unwrap_or_default());
-        prop_assert!((back.tip - pose.tip).norm() <= IDENTITY, "tip {:e}", (back.tip - pose.tip).norm());
-        prop_assert!((back.axis - pose.axis).norm() <= IDENTITY, "axis {:e}", (back.axis - pose.axis).norm());
+        prop_assert!((back.tip - pose.tip).norm() <= ROUND_TRIP, "tip {:e}", (back.tip - pose.tip).norm());
+        prop_assert!((back.axis - pose.axis).norm() <= ROUND_TRIP, "axis {:e}", (back.axis - pose.axis).norm());
     }
 
     #[test]
@@ -445,7 +446,7 @@ proptest! {
         let found = solve(displaced(), &displaced().forward(&joints), &near).unwrap_or_default();
         prop_assert_eq!(found.len(), 5);
         for (found, wanted) in found.iter().zip(&joints) {
-            prop_assert!((found - wanted).abs() <= IDENTITY, "{} for {}", found, wanted);
+            prop_assert!((found - wanted).abs() <= ROUND_TRIP, "{} for {}", found, wanted);
         }
     }
 
@@ -455,12 +456,12 @@ proptest! {
         displaced().tip_to_joints(&mut joints);
         let tip = pose_by_matrices(&GEOMETRY, &joints).tip;
         for i in 0..3 {
-            prop_assert!((tip[i] - coordinates[i]).abs() <= IDENTITY);
+            prop_assert!((tip[i] - coordinates[i]).abs() <= ROUND_TRIP);
         }
         prop_assert_eq!(&joints[3..], &coordinates[3..]);
         displaced().joints_to_tip(&mut joints);
         for (back, wanted) in joints.iter().zip(&coordinates) {
-            prop_assert!((back - wanted).abs() <= IDENTITY);
+            prop_assert!((back - wanted).abs() <= ROUND_TRIP);
         }
     }
 
@@ -476,7 +477,7 @@ proptest! {
             let found = solve(displaced(), &displaced().forward(&next), &near).unwrap_or_default();
             prop_assert_eq!(found.len(), 5);
             for (found, wanted) in found.iter().zip(&next) {
-                prop_assert!((found - wanted).abs() <= IDENTITY);
+                prop_assert!((found - wanted).abs() <= ROUND_TRIP);
             }
             near = found;
         }

@@ -1,7 +1,7 @@
-//! The trials of the paper, with the numbers that two independent implementations agree on.
+//! Test motions of Prévost et al. with reference values from two independent implementations.
 
 use virtual_axes_core::units::{DEGREE, REVOLUTION, RPM};
-use virtual_axes_verification::fixtures::common::*;
+use virtual_axes_verification::fixtures::machines::*;
 
 const X: usize = 0;
 const Y: usize = 1;
@@ -17,7 +17,7 @@ const NO_FEEDFORWARD: &[(&str, f64)] = &[
     ("y.feedforward.torque_kg_m2", 0.0),
 ];
 
-/// Mean, minimum and maximum radial deviation over the steady part, at every tick, µm.
+/// Returns mean, minimum and maximum radial deviation at constant feed, over all ticks, µm.
 fn ballbar(changes: &[(&str, f64)]) -> (f64, f64, f64) {
     let trial = Ballbar::paper();
     let window = trial.window();
@@ -40,7 +40,7 @@ fn ballbar(changes: &[(&str, f64)]) -> (f64, f64, f64) {
 }
 
 #[test]
-fn ballbar_with_feedforward_runs_49_micrometers_outside() {
+fn ballbar_with_feedforward_has_49_micrometers_mean_radial_deviation() {
     let (mean, min, max) = ballbar(&[]);
     assert_near("mean", mean, 49.0, 0.2);
     assert_near("min", min, 47.7, 1.0);
@@ -48,17 +48,17 @@ fn ballbar_with_feedforward_runs_49_micrometers_outside() {
 }
 
 #[test]
-fn ballbar_without_feedforward_runs_283_micrometers_inside() {
+fn ballbar_without_feedforward_has_minus_283_micrometers_mean_radial_deviation() {
     let (mean, min, max) = ballbar(NO_FEEDFORWARD);
     assert_near("mean", mean, -283.1, 0.2);
     assert_near("min", min, -284.4, 1.0);
     assert_near("max", max, -263.5, 1.0);
 }
 
-/// Largest contour error within 0.15 s of the corner, µm.
+/// Returns the maximum contour error within 0.15 s of the corner, µm.
 fn corner(turn: f64) -> f64 {
     const LEG: f64 = 0.050;
-    let leg = Profile::new(LEG, 10.0 * M_MIN, 2.5, 50.0);
+    let leg = RestToRestProfile::new(LEG, 10.0 * M_MIN, 2.5, 50.0);
     let (sin, cos) = turn.sin_cos();
     let psec = |t: f64| {
         let (first, second) = (leg.at(t), leg.at(t - leg.duration()));
@@ -85,8 +85,8 @@ fn corners_are_rounded_by_the_cascade() {
     assert_near("45°", corner(45.0 * DEGREE), 103.7, 1.037);
 }
 
-/// Largest synchronized tracking error at position instants (m or rad), and largest current (A).
-fn move_one(axis: usize, profile: Profile, changes: &[(&str, f64)]) -> (f64, f64) {
+/// Largest delay-compensated following error at position instants (m or rad), and largest current (A).
+fn move_one(axis: usize, profile: RestToRestProfile, changes: &[(&str, f64)]) -> (f64, f64) {
     let (mut error, mut current): (f64, f64) = (0.0, 0.0);
     let psec = |t: f64| {
         let mut psec = [0.0; AXES];
@@ -97,7 +97,7 @@ fn move_one(axis: usize, profile: Profile, changes: &[(&str, f64)]) -> (f64, f64
     run(&mut machine(changes), profile.duration() + 0.5, psec, |_, m| {
         let s = m.axis(axis).sample();
         if tick % m.periods().ticks_per_position() == 0 {
-            error = error.max(s.synchronized_tracking_error().abs());
+            error = error.max(s.delay_compensated_following_error().abs());
         }
         current = current.max(s.current.abs());
         tick += 1;
@@ -110,8 +110,8 @@ fn assert_one_percent(what: &str, value: f64, wanted: f64) {
     assert_near(what, value, wanted, wanted / 100.0);
 }
 
-fn line(acceleration: f64) -> Profile {
-    Profile::new(0.200, 10.0 * M_MIN, acceleration, 50.0)
+fn line(acceleration: f64) -> RestToRestProfile {
+    RestToRestProfile::new(0.200, 10.0 * M_MIN, acceleration, 50.0)
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn line_in_y() {
 }
 
 #[test]
-fn line_in_z_starts_with_the_current_that_holds_the_weight() {
+fn line_in_z_starts_with_the_holding_current_of_the_weight() {
     assert_one_percent("Z current at rest, A", machine(&[]).axis(Z).sample().current, 0.482);
     let (error, current) = move_one(Z, line(2.1), &[]);
     assert_one_percent("Z error, µm", error / MICROMETER, 102.7);
@@ -151,7 +151,7 @@ fn line_in_z_starts_with_the_current_that_holds_the_weight() {
 
 #[test]
 fn rotations_of_a_and_c() {
-    let turn = Profile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
+    let turn = RestToRestProfile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
     for (name, axis, wanted_error, wanted_current) in [("C", C, 35.4, 1.76), ("A", A, 35.0, 2.37)] {
         let (error, current) = move_one(axis, turn, &[]);
         assert_one_percent(&format!("{name} error, mdeg"), error / DEGREE * 1e3, wanted_error);

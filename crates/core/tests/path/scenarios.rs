@@ -1,4 +1,4 @@
-//! The shipped scenarios: their setpoints, and the errors that the trial measures on them.
+//! Built-in scenarios: setpoints and figures.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::scenario::Scenario;
 use virtual_axes_core::trial::{Figures, Tick, Trial, run as run_trial};
 use virtual_axes_core::units::{DEGREE, REVOLUTION, RPM};
-use virtual_axes_verification::fixtures::common::*;
+use virtual_axes_verification::fixtures::machines::*;
 
 const X: usize = 0;
 const Y: usize = 1;
@@ -22,7 +22,7 @@ fn config(changes: &[(&str, f64)]) -> MachineConfig {
     parameters(changes).machine_config().expect("the machine is valid")
 }
 
-/// Runs a shipped scenario and shows every tick.
+/// Runs a built-in scenario and calls `look` at every tick.
 fn watch(name: &str, changes: &[(&str, f64)], look: impl FnMut(Tick<'_>)) -> Figures {
     watch_scenario(name, &config(changes), look)
 }
@@ -38,7 +38,7 @@ const NO_FEEDFORWARD: &[(&str, f64)] = &[
     ("y.feedforward.torque_kg_m2", 0.0),
 ];
 
-/// Asserts that a scenario asks for the positions `wanted(t)`, to a picometer.
+/// Asserts that the setpoints of a scenario equal `wanted(t)` within a picometer.
 #[track_caller]
 fn assert_setpoints(name: &str, duration: f64, wanted: impl Fn(f64) -> [f64; AXES]) {
     let program = program(name, &config(&[]));
@@ -61,8 +61,8 @@ fn the_ballbar_is_two_turns_between_cosine_ramps() {
 
 #[test]
 fn lines_and_rotations_are_seven_phase_profiles() {
-    let line = |acceleration| Profile::new(0.200, 10.0 * M_MIN, acceleration, 50.0);
-    let turn = Profile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
+    let line = |acceleration| RestToRestProfile::new(0.200, 10.0 * M_MIN, acceleration, 50.0);
+    let turn = RestToRestProfile::new(90.0 * DEGREE, 10.0 * RPM, 0.83 * REVOLUTION, 50.0 * REVOLUTION);
     let trials = [
         ("x-constant", X, line(2.5)),
         ("y-constant", Y, line(2.5)),
@@ -80,9 +80,9 @@ fn lines_and_rotations_are_seven_phase_profiles() {
 }
 
 #[test]
-fn corners_are_two_legs_without_a_pause() {
+fn corners_are_two_lines_with_a_stop_in_between() {
     for (name, turn) in [("corner-90", 90.0 * DEGREE), ("corner-45", 45.0 * DEGREE)] {
-        let leg = Profile::new(0.050, 10.0 * M_MIN, 2.5, 50.0);
+        let leg = RestToRestProfile::new(0.050, 10.0 * M_MIN, 2.5, 50.0);
         assert_setpoints(name, 2.0 * leg.duration() + 2.0 * REST, |t| {
             let (first, second) = (leg.at(t - REST), leg.at(t - REST - leg.duration()));
             [first + second * turn.cos(), second * turn.sin(), 0.0, 0.0, 0.0]
@@ -91,13 +91,13 @@ fn corners_are_two_legs_without_a_pause() {
 }
 
 #[test]
-fn the_slower_of_two_speeds_is_reached_at_the_border() {
+fn the_lower_of_two_feeds_is_reached_at_the_block_boundary() {
     let program = program("c-two-speeds", &config(&[]));
-    let border = program.span(0).end;
+    let border = program.time_range(0).end;
     let speed = |t: f64| (program.progress(t + 1e-5) - program.progress(t - 1e-5)) / 2e-5;
     assert!((program.progress(border) - 130.0 * DEGREE).abs() < 1e-12);
     assert!((speed(border) - 6.0 * RPM).abs() < 1e-6 * RPM, "{} rpm", speed(border) / RPM);
-    // A jerk phase before the border the feed is still higher, behind it it is not.
+    // The feed is higher up to the deceleration before the boundary, and constant after it.
     assert!(speed(border - 0.01) > 6.0 * RPM * 1.000_01);
     assert!((speed(border + 0.01) - 6.0 * RPM).abs() < 1e-6 * RPM);
     let fastest = (0..1000).map(|i| speed(border * f64::from(i) / 1000.0)).fold(0.0, f64::max);
@@ -105,13 +105,13 @@ fn the_slower_of_two_speeds_is_reached_at_the_border() {
 }
 
 #[test]
-fn every_shipped_scenario_runs_on_every_shipped_machine() {
+fn every_builtin_scenario_runs_on_every_builtin_machine() {
     for machine in virtual_axes_core::config::Parameters::builtin_names() {
         let config = virtual_axes_core::config::Parameters::builtin(machine)
             .and_then(|parameters| parameters.machine_config())
-            .expect("the shipped machines are valid");
+            .expect("the built-in machines are valid");
         for name in Scenario::builtin_names() {
-            let scenario = Scenario::builtin(name).expect("it is shipped");
+            let scenario = Scenario::builtin(name).expect("built-in");
             let program =
                 Arc::new(scenario.program(&config, None).unwrap_or_else(|e| panic!("{machine}: {e}")));
             let trial = Trial {
@@ -121,16 +121,16 @@ fn every_shipped_scenario_runs_on_every_shipped_machine() {
                 record: true,
             };
             let outcome = run_trial(&trial, setpoints(name, program, &config), |_| Ok(()));
-            // The circle is wider than the stroke of the smaller machine.
+            // The circle exceeds the travel limits of the smaller machine.
             if machine == "linear_motor_center" && name.starts_with("ballbar") {
-                let error = outcome.expect_err("it leaves the stroke").to_string();
-                assert!(error.contains("outside the stroke"), "{error}");
+                let error = outcome.expect_err("outside the travel limits").to_string();
+                assert!(error.contains("outside the travel limits"), "{error}");
                 continue;
             }
             let outcome = outcome.unwrap_or_else(|error| panic!("{name} on {machine}: {error}"));
             let figures = outcome.figures;
             assert!(figures.axes.iter().any(|axis| axis.moves), "{name} on {machine} moves nothing");
-            let contour = figures.contour.expect("there are linear axes");
+            let contour = figures.contour.expect("linear axes");
             assert!(contour.max < 2e-3, "{name} on {machine}: contour error {} m", contour.max);
             assert!(contour.max_within_ends <= contour.max);
         }
@@ -146,23 +146,23 @@ fn ballbar_figures() {
         assert_near("mean, µm", circle.mean / MICROMETER, mean, 0.2);
         assert_near("min, µm", circle.min / MICROMETER, min, 1.0);
         assert_near("max, µm", circle.max / MICROMETER, max, 1.0);
-        // G is the range about the center of the least-squares circle, here near the nominal one.
+        // G is the range about the center of the least-squares circle, which is near the nominal center here.
         let deviation = circle.circular_deviation.expect("two turns");
         assert_near("G, µm", deviation / MICROMETER, (circle.max - circle.min) / MICROMETER, 1.0);
     }
 }
 
 #[test]
-fn both_directions_of_a_circle_are_told_together() {
+fn bidirectional_circular_deviation() {
     let both = figures("ballbar-both", &[]);
     let [first, second] = &both.circles[..] else { panic!("{} circles", both.circles.len()) };
     assert!(first.counterclockwise && !second.counterclockwise);
     assert_near("counterclockwise, mean, µm", first.mean / MICROMETER, 49.0, 0.2);
     let [pair] = &both.bidirectional[..] else { panic!("{} pairs", both.bidirectional.len()) };
-    // The mean of both directions' means, and a range that holds that of each.
+    // D is the mean of the means of both directions; G(b) is at least the range of each.
     let mean = (first.mean + second.mean) / 2.0;
     assert_near("D, µm", pair.mean_radial_deviation / MICROMETER, mean / MICROMETER, 0.1);
-    // The common center is not quite that of each direction, but near.
+    // The common center is near the center of each direction.
     for circle in [first, second] {
         assert!(pair.circular_deviation > circle.circular_deviation.expect("two turns") - MICROMETER);
     }
@@ -194,51 +194,61 @@ fn line_and_rotation_figures() {
         let report = figures.axes[axis].report;
         let moving: Vec<bool> = figures.axes.iter().map(|axis| axis.moves).collect();
         assert_eq!(moving.iter().position(|&moves| moves), Some(axis));
-        assert_near(name, report.max_synchronized_tracking_error / unit, error, error / 100.0);
+        assert_near(name, report.max_delay_compensated_following_error / unit, error, error / 100.0);
         assert_near(name, report.peak_current, current, current / 100.0);
     }
 }
 
-/// Tracking and synchronized error of X at position instants in the middle of x-constant, m.
+/// Following error and delay-compensated following error of X at constant velocity in x-constant, m.
 fn steady_errors(changes: &[(&str, f64)]) -> (f64, f64) {
     let mut errors = (f64::NAN, f64::NAN);
     watch("x-constant", changes, |tick| {
         let time = tick.time as f64 * 1e-9;
-        // A second after the start of the motion, a hundred milliseconds before it slows down.
+        // One second after the start of the motion, 100 ms before the deceleration.
         if tick.position_instant && time < 1.5 {
             let sample = tick.machine.axis(X).sample();
-            errors = (sample.tracking_error(), sample.synchronized_tracking_error());
+            errors = (sample.following_error(), sample.delay_compensated_following_error());
         }
     });
     errors
 }
 
 #[test]
-fn without_feedforward_a_steady_axis_lags_by_speed_over_gain_and_the_delay() {
+fn without_feedforward_the_steady_following_error_is_velocity_over_gain_plus_the_delay() {
     let speed = 10.0 * M_MIN;
-    let (tracking, synchronized) = steady_errors(NO_FEEDFORWARD);
-    // Kp = 1.5 (m/min)/mm = 25 s⁻¹; the comparator reads the setpoint of two periods ago.
-    assert_near("synchronized, µm", synchronized / MICROMETER, speed / 25.0 / MICROMETER, 1e-3);
-    assert_near("tracking, µm", tracking / MICROMETER, (speed / 25.0 + speed * 2.0 * TSP) / MICROMETER, 1e-3);
+    let (following, compensated) = steady_errors(NO_FEEDFORWARD);
+    // Kp = 1.5 (m/min)/mm = 25 s⁻¹; the comparator reads the setpoint of two position cycles earlier.
+    assert_near(
+        "delay-compensated following error, µm",
+        compensated / MICROMETER,
+        speed / 25.0 / MICROMETER,
+        1e-3,
+    );
+    assert_near(
+        "following error, µm",
+        following / MICROMETER,
+        (speed / 25.0 + speed * 2.0 * TSP) / MICROMETER,
+        1e-3,
+    );
 }
 
 #[test]
-fn with_feedforward_a_steady_axis_lags_by_the_delay_only() {
-    let (tracking, synchronized) = steady_errors(&[]);
-    assert_near("synchronized, µm", synchronized / MICROMETER, 0.0, 1e-3);
-    assert_near("tracking, µm", tracking / MICROMETER, 10.0 * M_MIN * 2.0 * TSP / MICROMETER, 1e-3);
+fn with_feedforward_the_steady_following_error_is_that_of_the_delay() {
+    let (following, compensated) = steady_errors(&[]);
+    assert_near("delay-compensated following error, µm", compensated / MICROMETER, 0.0, 1e-3);
+    assert_near("following error, µm", following / MICROMETER, 10.0 * M_MIN * 2.0 * TSP / MICROMETER, 1e-3);
 }
 
 #[test]
-fn overshoot_of_the_ends_is_told_apart() {
-    // A line has no contour error but its overshoot.
+fn overshoot_beyond_the_ends_is_excluded_within_ends() {
+    // The contour error of a line consists of its overshoot only.
     let contour = figures("x-constant", &[]).contour.expect("X is linear");
     assert!(contour.max > 10.0 * MICROMETER, "{contour:?}");
     assert!(contour.max_within_ends < 1e-15, "{contour:?}");
 }
 
 #[test]
-fn what_is_plotted_is_as_large_as_the_figures() {
+fn recorded_signals_have_the_maxima_of_the_figures() {
     for name in ["corner-90", "five-axis"] {
         let config = config(&[]);
         let program = program(name, &config);
@@ -249,25 +259,25 @@ fn what_is_plotted_is_as_large_as_the_figures() {
             record: true,
         };
         let outcome = run_trial(&trial, setpoints(name, program, &config), |_| Ok(())).expect("a run");
-        let (figures, recording) = (outcome.figures, outcome.recording.expect("it was asked for"));
+        let (figures, recording) = (outcome.figures, outcome.recording.expect("recording is enabled"));
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-        let tool = recording.tool.expect("there is a tool");
-        assert_eq!(largest(&tool.contour_error), figures.contour.expect("there is a tool").max, "{name}");
+        let tool = recording.tool.expect("tool signals");
+        assert_eq!(largest(&tool.contour_error), figures.contour.expect("tool signals").max, "{name}");
         if !tool.orientation_error.is_empty() {
-            let orientation = figures.orientation.expect("there are tables");
+            let orientation = figures.orientation.expect("rotary axes");
             assert_eq!(largest(&tool.orientation_error), orientation.max, "{name}");
         }
         for (axis, shown) in figures.axes.iter().zip(&recording.axes).filter(|(axis, _)| axis.moves) {
             let at = format!("{name}, {}", axis.name);
             assert_eq!(largest(&shown.current), axis.report.peak_current, "{at}");
-            assert_eq!(largest(&shown.tracking_error), axis.report.max_tracking_error, "{at}");
+            assert_eq!(largest(&shown.following_error), axis.report.max_following_error, "{at}");
         }
     }
 }
 
-/// Between two position instants the current of a reversal is larger than at either.
+/// The peak current of a reversal occurs between two position cycles.
 #[test]
-fn a_peak_between_two_position_instants_is_plotted() {
+fn a_peak_between_two_position_cycles_is_recorded() {
     let config = config(&[]);
     let mut at_instants = 0.0_f64;
     let figures = watch_scenario("x-there-and-back", &config, |tick| {
@@ -283,7 +293,7 @@ fn a_peak_between_two_position_instants_is_plotted() {
         record: true,
     };
     let outcome = run_trial(&trial, setpoints("x-there-and-back", program, &config), |_| Ok(()));
-    let recording = outcome.expect("a run").recording.expect("it was asked for");
+    let recording = outcome.expect("a run").recording.expect("recording is enabled");
     let plotted = recording.axes[X].current.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     assert!(plotted > at_instants, "{plotted} A, at the instants {at_instants} A");
     assert_eq!(plotted, figures.axes[X].report.peak_current);
