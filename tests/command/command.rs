@@ -205,7 +205,7 @@ fn invalid_scenarios_are_rejected_with_file_and_line() {
         (
             "ramp.yaml",
             "description: d\nfeed_m_min: 6\nmoves:\n  - {line: {x_mm: 10}, ramp_s: 10}\n".to_owned(),
-            &["ramp.yaml:4", "ramp_s", "10", "0.1000 s"],
+            &["ramp.yaml:4", "ramp_s", "10", "at most 0.1 s"],
         ),
         (
             "turns.yaml",

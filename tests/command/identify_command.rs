@@ -188,7 +188,7 @@ fn the_text_contains_results_and_missing_parameters() {
         "beta: 9 ms, unchanged; ",
         "at constant velocity, max, µm",
         "velocity.mcap (validation) ",
-        "\nwarning: the law of four parameters is not fitted to ",
+        "\nwarning: 3 speeds (3.619, 3.850, 7.700 m/min) are too few for the law of four parameters",
         "psec campaign --part off",
     ] {
         assert!(text.contains(part), "{part:?} in {text}");
@@ -249,7 +249,7 @@ fn invalid_input_is_rejected_with_its_name() {
         &["scenario.yaml: it is a scenario, not a recording"],
     );
     // Wrong units and columns.
-    rejected(&["--column", "time=time[ms]"], &["off.csv: the samples are 6e-6 s apart", "time=COLUMN[s]"]);
+    rejected(&["--column", "time=time[ms]"], &["off.csv: sampling period 6e-6 s", "time=COLUMN[s]"]);
     rejected(&["--column", "position=x.position[deg]"], &["--column: position in [deg]", "linear axis x"]);
     rejected(&["--column", "position=x.positon"], &["off.csv:1: ", "x.positon", "nearest is x.position"]);
     rejected(&["--column", "velocity=y.velocity"], &["off.csv: the velocity "]);
@@ -257,7 +257,7 @@ fn invalid_input_is_rejected_with_its_name() {
     rejected(&["--column", "positon=x"], &["--column: there is no \"positon\"", "nearest is position"]);
     rejected(&["--columns", &map], &["off.csv: "]);
     rejected(&["--cutoff-hz", "1000"], &["off.csv: cut-off 1000 Hz"]);
-    rejected(&["--current-lag-ms", "50"], &["off.csv: lag of the current 0.05 s"]);
+    rejected(&["--current-lag-ms", "50"], &["off.csv: current lag 0.05 s"]);
     // Lists.
     let (validate, two) = (["--validate", recordings.both.as_str()], ["--validate-feedforward", "off,both"]);
     rejected(&[validate, two].concat(), &["--validate-feedforward: 2 values for 1 recording;"]);

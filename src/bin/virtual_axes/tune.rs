@@ -151,7 +151,9 @@ fn tunable_controller(parameters: &Parameters) -> Result<TunableController, Stri
     match variant::controller_name(parameters).as_str() {
         "gpc" => Ok(TunableController::Gpc),
         "cascade" | "cascade-noff" => Ok(TunableController::Cascade),
-        other => Err(format!("--controller: must be gpc or cascade; the machine has {other}, which cannot be tuned")),
+        other => Err(format!(
+            "--controller: must be gpc or cascade; the machine has {other}, which cannot be tuned"
+        )),
     }
 }
 

@@ -157,13 +157,13 @@ const MACHINE: &[ParameterDefinition] = &[
         .describe("Jeq, equivalent inertia at the motor shaft (Prévost eqs. 1 and 5)."),
     ParameterDefinition::number("motor.mass_kg", "kg", 1e-6, 1e6)
         .driven_by(LinearMotor)
-        .describe("Moving mass, in index of Jeq (Prévost eq. 1)."),
+        .describe("Moving mass, in place of Jeq (Prévost eq. 1)."),
     ParameterDefinition::number("motor.torque_constant_nm_a", "N·m/A", POSITIVE, 1e4)
         .driven_by(RotaryMotor)
         .describe("Kt, torque constant (Prévost eq. 1)."),
     ParameterDefinition::number("motor.force_constant_n_a", "N/A", POSITIVE, 1e5)
         .driven_by(LinearMotor)
-        .describe("Force constant, in index of Kt (Prévost eq. 1)."),
+        .describe("Force constant, in place of Kt (Prévost eq. 1)."),
     ParameterDefinition::number("motor.emf_constant_v_s_rad", "V·s/rad", 0.0, 1e4)
         .driven_by(RotaryMotor)
         .describe("Ke, back-EMF constant (Prévost eq. 1)."),

@@ -347,7 +347,7 @@ fn missing_results_are_reported() {
     for (heading, wanted) in [
         ("Gravity", "record the motor current"),
         ("Delays", "record the position setpoints"),
-        ("Identified parameters", "no parameter"),
+        ("Identified parameters", "No parameter was identified"),
         ("Identified parameters", "record the motor current"),
         ("Identified parameters", "record the position setpoints"),
         ("Gravity", "not identified"),

@@ -3,7 +3,7 @@
 use std::process::{Command, Output};
 use std::sync::LazyLock;
 
-use virtual_axes_core::machine::{AxisSample, Width};
+use virtual_axes_core::machine::{AxisSample, SimdWidth};
 use virtual_axes_verification::stress::{Bench, Check, Fleet, Kind, Options, Summary, run};
 
 /// Trajectories of a test.
@@ -13,7 +13,7 @@ static FLEET: LazyLock<Fleet> =
     LazyLock::new(|| Fleet::shipped().expect("the shipped machines take all controllers"));
 
 fn options(count: u64) -> Options {
-    Options { seed: 7, first: 0, count, threads: 2, width: Width::Widest }
+    Options { seed: 7, first: 0, count, threads: 2, width: SimdWidth::Widest }
 }
 
 fn stressed(options: Options) -> Summary {
@@ -45,17 +45,17 @@ fn the_digest_follows_from_the_seed_alone() {
     assert_eq!(one, digest(Options { threads: 5, ..options(count) }));
     assert!(one != digest(Options { seed: 8, ..options(count) }));
     let few = digest(options(count / 4));
-    for width in [Width::Four, Width::Baseline] {
+    for width in [SimdWidth::Four, SimdWidth::Baseline] {
         assert_eq!(few, digest(Options { width, ..options(count / 4) }), "{width:?}");
     }
 }
 
 #[test]
 fn a_trajectory_is_the_same_alone() {
-    let mut bench = Bench::new(&FLEET, 7, Width::Widest);
+    let mut bench = Bench::new(&FLEET, 7, SimdWidth::Widest);
     let all: Vec<_> = (0..100).map(|number| bench.run(number).expect("runs")).collect();
     for number in (0..100).rev().step_by(7) {
-        let alone = Bench::new(&FLEET, 7, Width::Widest).run(number).expect("runs");
+        let alone = Bench::new(&FLEET, 7, SimdWidth::Widest).run(number).expect("runs");
         assert_eq!(alone, all[number as usize]);
     }
 }
@@ -63,7 +63,7 @@ fn a_trajectory_is_the_same_alone() {
 /// That `check` finds what `alter` does to the samples of one of many trajectories, none of which has a fault.
 #[track_caller]
 fn assert_found(check: Check, mut alter: impl FnMut(usize, usize, &mut AxisSample)) {
-    let mut bench = Bench::new(&FLEET, 7, Width::Widest);
+    let mut bench = Bench::new(&FLEET, 7, SimdWidth::Widest);
     let mut found = |number: u64| {
         let record = bench.run_altered(number, &mut alter).expect("runs");
         record.faults.iter().any(|fault| fault.check == check)
@@ -157,4 +157,20 @@ fn the_command_runs_many_and_shows_one() {
     let unknown = command(&["--machine", "no/such.yaml"]);
     assert_eq!(unknown.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&unknown.stderr).starts_with("no/such.yaml: "));
+}
+
+#[test]
+fn options_out_of_range_are_rejected_by_name() {
+    for [name, number] in [
+        ["--count", "0"],
+        ["--first", "18446744073709551615"],
+        ["--threads", "0"],
+        ["--threads", "1025"],
+        ["--seed", "-1"],
+    ] {
+        let output = command(&[name, number]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(name) && message.contains(number), "{message}");
+    }
 }
