@@ -8,8 +8,8 @@ use crate::command_common::{assert_rejected, json, printed};
 use serde_json::Value;
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
-/// Traces of an identification campaign of X of the default machine, with feedforward off, velocity, both, and one as
-/// MCAP.
+/// Traces of an identification campaign of X of the default machine, with feedforward off, velocity, both,
+/// and one as MCAP.
 struct Recordings {
     off: String,
     velocity: String,

@@ -7,8 +7,8 @@ use super::unit::DisplayUnit;
 /// A plot of pairs of values on linear axes.
 ///
 /// Values are in SI units and are labeled in the unit of their axis; a [`DisplayUnit`] of size 1 shows them
-/// unchanged. Values that are not finite, or beyond ±1e12 of the unit, are omitted and break a line. Long series
-/// are decimated to the resolution of the plot; peaks and isolated points are kept.
+/// unchanged. Values that are not finite, or beyond ±1e12 of the unit, are omitted and break a line. Long
+/// series are decimated to the resolution of the plot; peaks and isolated points are kept.
 ///
 /// ```
 /// use virtual_axes_report::{Band, BandClass, Chart, ChartAxis, Document, Guide, Panel};
@@ -81,8 +81,9 @@ pub enum AxisRange {
     All,
     /// Range of all values, bands and lines, extended to zero.
     WithZero,
-    /// Fixed range from a value to a larger one, SI units. Lines are broken outside of it, and the chart states how
-    /// many values lie above or below. Points outside a fixed range of x are ignored, also for the range of y.
+    /// Fixed range from a value to a larger one, SI units. Lines are broken outside of it, and the chart
+    /// states how many values lie above or below. Points outside a fixed range of x are ignored, also for the
+    /// range of y.
     Within(f64, f64),
 }
 
@@ -108,11 +109,13 @@ pub enum SeriesStyle {
     Measured,
     /// Second line style, dashed, for values of a model.
     Simulated,
-    /// Line style by index. Six styles differ in color and dash pattern; `Measured` and `Simulated` are the first two.
+    /// Line style by index. Six styles differ in color and dash pattern; `Measured` and `Simulated` are the
+    /// first two.
     Line(usize),
     /// Step plot in a line style by index: each value is held until the next x.
     Steps(usize),
-    /// Markers by index of the group, in different colors and shapes. More than 300 points have small markers.
+    /// Markers by index of the group, in different colors and shapes. More than 300 points have small
+    /// markers.
     Points(usize),
 }
 
@@ -189,7 +192,8 @@ impl ChartSeries {
         ChartSeries { label: label.into(), style, points, errors: Vec::new() }
     }
 
-    /// Creates a series without error bars from two lists, SI units. Surplus elements of the longer list are ignored.
+    /// Creates a series without error bars from two lists, SI units. Surplus elements of the longer list are
+    /// ignored.
     pub fn from_xy(label: impl Into<String>, style: SeriesStyle, x: &[f64], y: &[f64]) -> Self {
         ChartSeries::new(label, style, x.iter().zip(y).map(|(&x, &y)| [x, y]).collect())
     }

@@ -19,7 +19,8 @@ const TOP: f64 = 8.0;
 const HEIGHT_ALONE: f64 = 330.0;
 const HEIGHT: f64 = 154.0;
 const GAP: f64 = 16.0;
-/// Approximate distance between ticks, pixels. Low panels have closer ticks, so that they have at least three.
+/// Approximate distance between ticks, pixels. Low panels have closer ticks, so that they have at least
+/// three.
 const X_TICKS: f64 = 90.0;
 const Y_TICKS_ALONE: f64 = 36.0;
 const Y_TICKS: f64 = 28.0;

@@ -1,7 +1,8 @@
 //! Decimation of lines and markers to the resolution of a plot.
 //!
 //! A signal over time keeps the smallest and the largest value of each pixel column, so that no peak is lost.
-//! Then, and for curves in a plane, points on the line between their neighbors are dropped (Ramer–Douglas–Peucker).
+//! Then, and for curves in a plane, points on the line between their neighbors are dropped
+//! (Ramer–Douglas–Peucker).
 
 use super::scale::is_drawable;
 
@@ -21,7 +22,8 @@ const MOST_MARKERS: usize = 9000;
 
 /// Returns the decimated line through points, split at points that cannot be drawn.
 ///
-/// If x never decreases, the extremes of each pixel column are kept; otherwise the line is decimated as a curve.
+/// If x never decreases, the extremes of each pixel column are kept; otherwise the line is decimated as a
+/// curve.
 pub(super) fn line(points: &[Option<PixelPoint>]) -> Vec<Vec<PixelPoint>> {
     let known = || points.iter().flatten();
     if known().zip(known().skip(1)).all(|(a, b)| a[0] <= b[0]) {
@@ -78,10 +80,11 @@ fn apart(a: PixelPoint, b: PixelPoint) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// Returns the indices of the smallest and the largest value in each pixel column, in order, as one list for each
-/// part between values that cannot be drawn.
+/// Returns the indices of the smallest and the largest value in each pixel column, in order, as one list for
+/// each part between values that cannot be drawn.
 ///
-/// `column(i)` is the column of sample i and does not decrease. A gap within a column is invisible and is closed.
+/// `column(i)` is the column of sample i and does not decrease. A gap within a column is invisible and is
+/// closed.
 fn extremes(values: &[f64], column: impl Fn(usize) -> i64) -> Vec<Vec<usize>> {
     let mut parts: Vec<Vec<usize>> = Vec::new();
     // Column, index of its smallest value, index of its largest value.
@@ -129,8 +132,8 @@ fn close(parts: &mut [Vec<usize>], open: Option<(i64, usize, usize)>, last: usiz
     }
 }
 
-/// Returns the indices of the points of a curve that differ visibly from the previous one. `same(i, j, distance)`
-/// returns true if points i and j are closer than `distance` pixels.
+/// Returns the indices of the points of a curve that differ visibly from the previous one. `same(i, j,
+/// distance)` returns true if points i and j are closer than `distance` pixels.
 pub(super) fn steps(length: usize, same: impl Fn(usize, usize, f64) -> bool) -> Vec<usize> {
     let mut within = SHORTEST_STEP;
     loop {

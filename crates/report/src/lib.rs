@@ -1,10 +1,11 @@
 //! HTML report pages with tables and plots of simulated runs and of identifications.
 //!
-//! [`Report`] compares one or several runs, [`IdentificationPage`] documents the identification of an axis, and
-//! [`Document`] is a page of any text, tables and [`Chart`]s. A page is one self-contained file: it includes its
-//! style sheet and its plots (SVG), has no script, and loads nothing. Colors follow the light, dark or print
-//! theme; lines differ by dash pattern as well. Equal input gives equal bytes. Signals are decimated to the
-//! resolution of the plot and keep their peaks, so that the size of a page is independent of the run length.
+//! [`Report`] compares one or several runs, [`IdentificationPage`] documents the identification of an axis,
+//! and [`Document`] is a page of any text, tables and [`Chart`]s. A page is one self-contained file: it
+//! includes its style sheet and its plots (SVG), has no script, and loads nothing. Colors follow the light,
+//! dark or print theme; lines differ by dash pattern as well. Equal input gives equal bytes. Signals are
+//! decimated to the resolution of the plot and keep their peaks, so that the size of a page is independent of
+//! the run length.
 //!
 //! ```
 //! use virtual_axes_report::{Chart, ChartAxis, ChartSeries, DisplayUnit, Document, Panel, Section, SeriesStyle};

@@ -46,7 +46,8 @@ impl Page<'_> {
         format!("{line}{}", Text(self.runs.get(run).map_or("", |run| run.title)))
     }
 
-    /// Writes the tables of figures: merged row by row if the runs have equal rows, one after the other if not.
+    /// Writes the tables of figures: merged row by row if the runs have equal rows, one after the other if
+    /// not.
     pub(super) fn tables(&mut self) {
         let runs = self.runs;
         let most = runs.iter().map(|run| run.tables.len()).max().unwrap_or(0);

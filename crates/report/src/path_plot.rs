@@ -28,7 +28,8 @@ const SHARE: f64 = 0.15;
 const LEAST_ERROR: f64 = 1e-7;
 /// Range below which a coordinate is stationary, m.
 const STANDSTILL: f64 = 1e-6;
-/// Paths have separate ranges if a common range exceeds the longest one by more than this fraction of the path.
+/// Paths have separate ranges if a common range exceeds the longest one by more than this fraction of the
+/// path.
 const SEPARATE: f64 = 0.3;
 /// Maximum number of lines from the path to the magnified points.
 const WHISKERS: usize = 100;
@@ -56,7 +57,8 @@ pub(super) struct PathPlot<'a> {
 }
 
 impl PathView {
-    /// Returns the plane of the two coordinates with the largest range within a run; `None` if no coordinate moves.
+    /// Returns the plane of the two coordinates with the largest range within a run; `None` if no coordinate
+    /// moves.
     pub(super) fn from_traces(tools: &[&ToolTrace]) -> Option<PathView> {
         let error = |axis: usize| {
             let errors = tools.iter().flat_map(|t| errors(t).map(move |e| e[axis]));

@@ -6,7 +6,8 @@ use super::svg::{Anchor, Svg};
 
 /// Height of tick labels and axis label below the plot area, pixels.
 pub(super) const BELOW: f64 = 44.0;
-/// Distances of tick labels from the plot area, left and below, and of a text's baseline from its middle, pixels.
+/// Distances of tick labels from the plot area, left and below, and of a text's baseline from its middle,
+/// pixels.
 const TICK_LEFT: f64 = 9.0;
 const TICK_BELOW: f64 = 20.5;
 const TEXT_MIDDLE: f64 = 4.5;
@@ -41,8 +42,8 @@ impl PlotArea {
         [self.x()(x), self.y()(y)]
     }
 
-    /// Draws background, grid, ticks and axis labels. Without a label for x its ticks have no text. `zero` selects
-    /// the axes whose grid line at 0 is emphasized.
+    /// Draws background, grid, ticks and axis labels. Without a label for x its ticks have no text. `zero`
+    /// selects the axes whose grid line at 0 is emphasized.
     pub(super) fn draw(&self, svg: &mut Svg, x_label: Option<&str>, y_label: &str, zero: [bool; 2]) {
         let PlotArea { left, right, top, bottom, .. } = *self;
         let (x, y) = (self.x(), self.y());

@@ -3,8 +3,8 @@
 use super::text;
 use super::unit::DisplayUnit;
 
-/// Largest magnitude of a value that is drawn, SI units. Larger values are omitted like NaN, so that differences
-/// cannot overflow.
+/// Largest magnitude of a value that is drawn, SI units. Larger values are omitted like NaN, so that
+/// differences cannot overflow.
 const LARGEST: f64 = 1e12;
 
 /// Returns true if a value can be drawn.

@@ -47,7 +47,8 @@ pub(super) fn smaller(peaks: &[f64]) -> Vec<usize> {
     (0..peaks.len()).filter(|&i| peaks[i] * COMPARABLE < largest).collect()
 }
 
-/// Appends a figure of one signal of all runs. `of` is the object of the title, for example "X axis"; can be empty.
+/// Appends a figure of one signal of all runs. `of` is the object of the title, for example "X axis"; can be
+/// empty.
 pub(super) fn strip(page: &mut Page, of: &str, time: Extent, strip: Strip, series: Vec<TimeSeries>) {
     let Strip { title, note, quantity, unit } = strip;
     let legend = if page.is_comparison() { legend(&series) } else { Vec::new() };

@@ -41,8 +41,8 @@ pub(super) struct RunTable<'a> {
 }
 
 impl Html {
-    /// Appends facts: a row for each name, with one value for each of `heads` (HTML), or a single value without heads.
-    /// Equal values of a row are merged into one cell.
+    /// Appends facts: a row for each name, with one value for each of `heads` (HTML), or a single value
+    /// without heads. Equal values of a row are merged into one cell.
     pub(super) fn facts(&mut self, heads: &[String], rows: &[(&str, Vec<String>)]) {
         self.append(format_args!("<div class=\"table\"><table>\n"));
         if !heads.is_empty() {

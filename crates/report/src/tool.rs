@@ -50,8 +50,8 @@ pub(super) fn sections(page: &mut Page) {
     page.html.close_section();
 }
 
-/// Writes paths and circles, side by side for a single run, otherwise a row of runs for each. Returns true if a
-/// path was plotted.
+/// Writes paths and circles, side by side for a single run, otherwise a row of runs for each. Returns true if
+/// a path was plotted.
 fn paths_and_circles(page: &mut Page, tools: &[(usize, &ToolTrace)], circles: &[Circles]) -> bool {
     if !page.is_comparison() {
         page.html.open_row(1 + circles.len());

@@ -15,8 +15,8 @@ use crate::interrupt;
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArguments {
-    /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML), or name of a shipped machine or
-    /// scenario.
+    /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML), or name of a shipped
+    /// machine or scenario.
     file: PathBuf,
     /// Machine for a scenario or setpoints: shipped machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]

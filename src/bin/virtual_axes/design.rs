@@ -27,7 +27,8 @@ pub struct DesignArguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum DesignMethod {
-    /// Design a generalized predictive controller (Prévost section 5); omitted values are those of the machine file.
+    /// Design a generalized predictive controller (Prévost section 5); omitted values are those of the
+    /// machine file.
     Gpc {
         /// N1, first position cycle of the prediction horizon.
         #[arg(long)]

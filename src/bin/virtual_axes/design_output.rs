@@ -231,8 +231,8 @@ fn list(polynomial: &[f64]) -> String {
     format!("[{}]", numbers.join(", "))
 }
 
-/// Formats a number with the fewest digits that parse to the same value, in YAML 1.1 syntax: with a decimal point,
-/// and with a sign in the exponent.
+/// Formats a number with the fewest digits that parse to the same value, in YAML 1.1 syntax: with a decimal
+/// point, and with a sign in the exponent.
 fn number(value: f64) -> String {
     let text = format!("{:?}", value + 0.0);
     let Some((digits, exponent)) = text.split_once('e') else {

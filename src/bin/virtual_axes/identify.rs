@@ -37,8 +37,8 @@ enum RefinedGroup {
 /// Arguments of `virtual_axes identify`.
 #[derive(Debug, clap::Args)]
 pub struct IdentifyArguments {
-    /// Recordings of the axis: CSV, or MCAP with DriveStates or JointState messages; for a campaign one for each
-    /// feedforward mode.
+    /// Recordings of the axis: CSV, or MCAP with DriveStates or JointState messages; for a campaign one for
+    /// each feedforward mode.
     #[arg(value_name = "RECORDING", required = true)]
     recordings: Vec<PathBuf>,
     /// Recorded axis.
@@ -52,8 +52,8 @@ pub struct IdentifyArguments {
     set: Vec<String>,
     #[command(flatten)]
     reading: RecordingArguments,
-    /// Active feedforward, one for all recordings or one for each; required for recordings without feedforward
-    /// signals (VFFWS, TFFWS).
+    /// Active feedforward, one for all recordings or one for each; required for recordings without
+    /// feedforward signals (VFFWS, TFFWS).
     #[arg(long, value_enum, value_delimiter = ',', value_name = "off|velocity|both[,…]")]
     feedforward: Vec<FeedforwardName>,
     /// RefinementScope i0 independently of a + c; requires several slow starts from rest.
@@ -68,8 +68,8 @@ pub struct IdentifyArguments {
     /// Recording for validation of the identified axis; can be repeated.
     #[arg(long, value_name = "RECORDING")]
     validate: Vec<PathBuf>,
-    /// Active feedforward of the --validate recordings, one for all or one for each [default: --feedforward if it has
-    /// one value].
+    /// Active feedforward of the --validate recordings, one for all or one for each [default: --feedforward
+    /// if it has one value].
     #[arg(
         long,
         value_enum,

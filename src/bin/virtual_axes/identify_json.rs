@@ -1,6 +1,7 @@
 //! JSON output of `virtual_axes identify`.
 //!
-//! Keys contain units; units that depend on the axis are in `position_unit`, `velocity_unit` and `speed_unit`.
+//! Keys contain units; units that depend on the axis are in `position_unit`, `velocity_unit` and
+//! `speed_unit`.
 
 use serde_json::{Value, json};
 use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS};

@@ -38,7 +38,8 @@ impl CommandInput {
     ///
     /// # Errors
     ///
-    /// Returns an error if the file cannot be read or is invalid, or if `topic` is given for another kind of file.
+    /// Returns an error if the file cannot be read or is invalid, or if `topic` is given for another kind of
+    /// file.
     pub fn open(name: &str, topic: Option<&str>) -> Result<Self, Box<dyn Error>> {
         let shipped = Scenario::builtin_names().any(|known| known == name);
         let content = if shipped || !Path::new(name).exists() {

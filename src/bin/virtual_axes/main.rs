@@ -1,4 +1,5 @@
-//! Command line `virtual_axes`: offline simulation, controller design, tuning and identification without ROS 2.
+//! Command line `virtual_axes`: offline simulation, controller design, tuning and identification without ROS
+//! 2.
 
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]

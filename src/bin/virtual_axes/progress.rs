@@ -18,7 +18,8 @@ const CYCLES_PER_CHECK: u32 = 256;
 /// Steps of the bar per simulated second.
 const STEPS_PER_SECOND: f64 = 1000.0;
 
-/// Progress of a trial: a bar, or a counter if the duration is unknown. Hidden if standard error is no terminal.
+/// Progress of a trial: a bar, or a counter if the duration is unknown. Hidden if standard error is no
+/// terminal.
 #[derive(Debug)]
 pub struct TrialProgress {
     bar: ProgressBar,

@@ -14,9 +14,9 @@ use crate::campaign::FeedforwardName;
 /// Options for reading all recordings.
 #[derive(Debug, clap::Args)]
 pub struct RecordingArguments {
-    /// Column and unit of a channel in CSV files, for example `position=Pos1[mm]`, `current=#4[-1 A]`. Channels: time,
-    /// psec, position, velocity, current, velocity_feedforward, torque_feedforward; also `delimiter=;`,
-    /// `decimal_comma=true`, `skip_lines=2`; can be repeated.
+    /// Column and unit of a channel in CSV files, for example `position=Pos1[mm]`, `current=#4[-1 A]`.
+    /// Channels: time, psec, position, velocity, current, velocity_feedforward, torque_feedforward; also
+    /// `delimiter=;`, `decimal_comma=true`, `skip_lines=2`; can be repeated.
     #[arg(long, value_name = "CHANNEL=COLUMN[UNIT]")]
     column: Vec<String>,
     /// File with column mappings; --column has priority.
@@ -28,8 +28,8 @@ pub struct RecordingArguments {
     /// Joint name in the recordings [default: axis name].
     #[arg(long)]
     joint: Option<String>,
-    /// Cut-off frequency (−3 dB) of the filter of velocity, acceleration and current, Hz [default: 100, less for low
-    /// sampling rates].
+    /// Cut-off frequency (−3 dB) of the filter of velocity, acceleration and current, Hz [default: 100, less
+    /// for low sampling rates].
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     cutoff_hz: Option<f64>,
     /// Lag of the recorded current, ms [default: estimated].
@@ -123,8 +123,8 @@ fn missing_feedforward(signals: &Signals) -> Option<&'static str> {
     })
 }
 
-/// Returns the active feedforward of each of `count` recordings from the values of `option`: one for all, or one
-/// for each.
+/// Returns the active feedforward of each of `count` recordings from the values of `option`: one for all, or
+/// one for each.
 pub fn feedforward(
     given: &[FeedforwardName],
     count: usize,

@@ -1,4 +1,5 @@
-//! Common parts of `tune` and `robustness`: repeated simulation of paths, and figures as table cells and JSON.
+//! Common parts of `tune` and `robustness`: repeated simulation of paths, and figures as table cells and
+//! JSON.
 
 use std::error::Error;
 

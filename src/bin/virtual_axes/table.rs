@@ -60,7 +60,8 @@ fn table(caption: &str, columns: &[(&str, &str)]) -> Table {
     Table { caption: caption.to_owned(), columns, rows: Vec::new() }
 }
 
-/// Creates the table of following errors, currents and saturation of the moving axes, or of all axes if none moves.
+/// Creates the table of following errors, currents and saturation of the moving axes, or of all axes if none
+/// moves.
 pub fn axes(figures: &Figures) -> Table {
     let columns = [
         ("axis", ""),
@@ -127,8 +128,8 @@ pub fn more(figures: &Figures) -> impl Iterator<Item = String> {
     circles.into_iter().chain(corners)
 }
 
-/// Returns true for the largest and for the RMS contour error if its printed value changes when the overshoot at the
-/// ends of the path is excluded.
+/// Returns true for the largest and for the RMS contour error if its printed value changes when the overshoot
+/// at the ends of the path is excluded.
 pub fn overshoots(figures: &Figures) -> [bool; 2] {
     let differ = |a: f64, b: f64| signed(a / MICROMETER) != signed(b / MICROMETER);
     figures
@@ -136,8 +137,8 @@ pub fn overshoots(figures: &Figures) -> [bool; 2] {
         .map_or([false; 2], |c| [differ(c.max, c.max_within_ends), differ(c.rms, c.rms_within_ends)])
 }
 
-/// Creates the table of contour error, orientation error, circles and corners. `ends` adds the largest and the RMS
-/// contour error without the overshoot at the ends of the path.
+/// Creates the table of contour error, orientation error, circles and corners. `ends` adds the largest and
+/// the RMS contour error without the overshoot at the ends of the path.
 pub fn path(figures: &Figures, ends: [bool; 2]) -> Table {
     let mut table = table("Path", &[("path error", ""), ("value", ""), ("unit", "")]);
     let mut add = |name: String, value: f64, unit: &str, scale: f64| {

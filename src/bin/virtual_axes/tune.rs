@@ -47,15 +47,15 @@ pub struct TuneArguments {
     /// Evaluate the best tuning on this path as well; can be repeated.
     #[arg(long, value_name = "SCENARIO|FILE")]
     also: Vec<String>,
-    /// Search predictive controllers that are better than the initial tuning on SCENARIO and worse on the --also
-    /// path, and select the worst of them.
+    /// Search predictive controllers that are better than the initial tuning on SCENARIO and worse on the
+    /// --also path, and select the worst of them.
     #[arg(long, requires = "also")]
     contrast: bool,
     /// Write the machine with the best tuning to this file.
     #[arg(long, value_name = "FILE.yaml")]
     out: Option<PathBuf>,
-    /// Write a page with the results of the search and plots of best and initial tuning (with --contrast on the --also
-    /// path).
+    /// Write a page with the results of the search and plots of best and initial tuning (with --contrast on
+    /// the --also path).
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
     /// Print the result as one JSON object.

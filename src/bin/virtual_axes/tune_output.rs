@@ -186,7 +186,8 @@ pub fn object(
     Value::Object(object)
 }
 
-/// Creates the scatter plots: cost over modulus margin and control activity, or over the cost on another path.
+/// Creates the scatter plots: cost over modulus margin and control activity, or over the cost on another
+/// path.
 pub fn scatters(problem: &TuningProblem<'_>, found: &TuningResult) -> Vec<Scatter> {
     let unit = problem.cost().unit(&problem.present().figures);
     let quantity = |unit: &str| if unit.is_empty() { String::new() } else { format!(" ({unit})") };

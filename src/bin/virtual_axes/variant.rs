@@ -85,8 +85,8 @@ pub fn parameters(
     Ok(parameters)
 }
 
-/// Builds and validates the machine. An error names the source of the invalid parameters: the machine file `name` or
-/// the options.
+/// Builds and validates the machine. An error names the source of the invalid parameters: the machine file
+/// `name` or the options.
 pub fn checked(
     parameters: &Parameters,
     machine: &Parameters,

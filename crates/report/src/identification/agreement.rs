@@ -33,8 +33,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let pairs: Vec<(&IdentificationInput, &Agreement)> =
         page.inputs.iter().zip(&page.identification.agreements).collect();
     section.paragraphs.push(
-        "Simulation of the identified axis in closed loop with the recorded setpoints (Prévost fig. 6). Deviations are simulated \
-         minus measured."
+        "Simulation of the identified axis in closed loop with the recorded setpoints (Prévost fig. 6). \
+         Deviations are simulated minus measured."
             .to_owned(),
     );
     fill(page, &mut section, &pairs);
@@ -56,8 +56,8 @@ fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Identificat
             let name = &input.signals.name;
             section.paragraphs.push(match &agreement.inverse {
                 Some(_) => format!(
-                    "{name} has no PSEC that begins at rest: its current is compared with inverse dynamics. At \
-                     rest, static friction allows any current within ±i0."
+                    "{name} has no PSEC that begins at rest: its current is compared with inverse dynamics. \
+                     At rest, static friction allows any current within ±i0."
                 ),
                 None => format!(
                     "{name} has neither PSEC that begins at rest nor a current: no comparison is possible."
@@ -72,8 +72,9 @@ fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Identificat
     let inverse: Vec<Vec<String>> = pairs.iter().filter_map(|(input, a)| inverse_row(input, a)).collect();
     if !inverse.is_empty() {
         section.paragraphs.push(
-            "Inverse dynamics is the current that is required for the recorded motion (Prévost eqs. 1 and 3), without a \
-             simulation. It does not contain oscillations between two samples or above the cut-off frequency of the filter."
+            "Inverse dynamics is the current that is required for the recorded motion (Prévost eqs. 1 and \
+             3), without a simulation. It does not contain oscillations between two samples or above the \
+             cut-off frequency of the filter."
                 .to_owned(),
         );
         let heads = [("recording", ""), ("largest", "A"), ("RMS", "A"), ("R²", "")];

@@ -9,7 +9,8 @@ use super::{IdentificationPage, Step};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_identify::identify::{DelayFit, DelayParameter};
 
-/// Ratio of the range of all tried delays to the accepted interval above which the interval has an enlarged plot.
+/// Ratio of the range of all tried delays to the accepted interval above which the interval has an enlarged
+/// plot.
 const WIDE: f64 = 10.0;
 /// Margin of the enlarged plot on each side, in widths of the interval.
 const ENLARGED_MARGIN: f64 = 2.0;
@@ -18,8 +19,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let fits = &page.identification.delays;
     let mut section = page.step("Delays", Step::Delays);
     section.paragraphs.push(
-        "α is identified without feedforward, β with velocity feedforward, γ with both, by least squares of simulated \
-         minus recorded positions (Prévost section 3.5)."
+        "α is identified without feedforward, β with velocity feedforward, γ with both, by least squares of \
+         simulated minus recorded positions (Prévost section 3.5)."
             .to_owned(),
     );
     if fits.is_empty() {
@@ -29,10 +30,10 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         return section;
     }
     section.paragraphs.push(format!(
-        "A delay is effective in steps of a loop cycle: α in position cycles of {} ms; β and γ \
-         in velocity cycles of {} ms. All delays of an interval, open below and closed \
-         above, give the same motion and cannot be distinguished by the recordings. A delay of the \
-         machine file that lies in its interval is kept.",
+        "A delay is effective in steps of a loop cycle: α in position cycles of {} ms; β and γ in velocity \
+         cycles of {} ms. All delays of an interval, open below and closed above, give the same motion and \
+         cannot be distinguished by the recordings. A delay of the machine file that lies in its interval is \
+         kept.",
         ms(page.periods.position),
         ms(page.periods.velocity)
     ));

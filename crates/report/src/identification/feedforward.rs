@@ -56,8 +56,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         },
     ];
     section.paragraphs.push(
-        "The weights are the ratios of the feedforward signals to the backward differences of PSEC \
-         (Prévost eqs. 6 to 8)."
+        "The weights are the ratios of the feedforward signals to the backward differences of PSEC (Prévost \
+         eqs. 6 to 8)."
             .to_owned(),
     );
     section.paragraphs.extend(both.iter().map(|weight| weight.text(page)));

@@ -23,7 +23,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let Some(friction) = &found.friction else {
         section.paragraphs.push(if found.refinement.is_some() {
             format!(
-                "No law was fitted to currents at constant velocities. The refinement in closed loop gives {}.",
+                "No law was fitted to currents at constant velocities. The refinement in closed loop gives \
+                 {}.",
                 describe(page, &page.axis().friction)
             )
         } else {
@@ -47,8 +48,8 @@ fn text(page: &IdentificationPage, friction: &FrictionFit) -> String {
     let r2 = format_r_squared(law.r_squared);
     let mut text = match law.line() {
         Some((level, slope)) => format!(
-            "A Coulomb level and a viscous slope are fitted, because the speeds do not determine the four parameters of \
-             Prévost eq. 3: i = {} A + {} A/({unit}) · V, R² {r2}.",
+            "A Coulomb level and a viscous slope are fitted, because the speeds do not determine the four \
+             parameters of Prévost eq. 3: i = {} A + {} A/({unit}) · V, R² {r2}.",
             digits(level, 4),
             digits(slope, 3)
         ),

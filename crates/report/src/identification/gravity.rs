@@ -19,8 +19,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let mut section = page.step("Gravity", Step::Gravity);
     let Some(gravity) = &found.gravity else {
         section.paragraphs.push(
-            "Gravity was not identified: the recordings have no current at standstill, and none at constant velocities in both \
-             directions. The value of the machine file is kept."
+            "Gravity was not identified: the recordings have no current at standstill, and none at constant \
+             velocities in both directions. The value of the machine file is kept."
                 .to_owned(),
         );
         return section;
@@ -34,8 +34,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         }
     };
     section.paragraphs.push(format!(
-        "At constant velocity and at rest the acceleration is zero (Prévost eq. 2), and the current is the sum of friction \
-         and gravity. Gravity is identified from {from}. {}",
+        "At constant velocity and at rest the acceleration is zero (Prévost eq. 2), and the current is the \
+         sum of friction and gravity. Gravity is identified from {from}. {}",
         sentence(page, gravity)
     ));
     if !found.steady.standstills.is_empty() {

@@ -19,15 +19,18 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let value = with_unit(page, page.axis().motor.inertia);
     let Some(inertia) = &found.inertia else {
         section.paragraphs.push(if found.refinement.is_some() {
-            format!("Prévost eq. 5 requires accelerations with currents, which were not recorded. The refinement in closed loop gives {value}.")
+            format!(
+                "Prévost eq. 5 requires accelerations with currents, which were not recorded. The refinement \
+                 in closed loop gives {value}."
+            )
         } else {
             "The inertia was not identified; the value of the machine file is kept.".to_owned()
         });
         return section;
     };
     section.paragraphs.push(format!(
-        "Jeq = (Kt i − C_friction − C_gravity) / (dω/dt) (Prévost eq. 5) at {} of {} gives {} ± {}, the mean without \
-         outliers. The standard deviation of single samples is {}.",
+        "Jeq = (Kt i − C_friction − C_gravity) / (dω/dt) (Prévost eq. 5) at {} of {} gives {} ± {}, the mean \
+         without outliers. The standard deviation of single samples is {}.",
         counted(inertia.instants.len(), "sample"),
         counted(inertia.accelerations, "acceleration"),
         with_unit(page, inertia.value),
@@ -40,9 +43,9 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     if let Some(replayed) = found.replayed_inertia {
         let deviation = replayed / page.axis().motor.inertia - 1.0;
         section.paragraphs.push(format!(
-            "Eq. 5 applied to the simulated axis, sampled like the recordings, gives {}, which deviates by {} % from the \
-             simulated inertia. This is the error of the method, because the current oscillates between \
-             two samples. The inertia refined in closed loop does not have this error.",
+            "Eq. 5 applied to the simulated axis, sampled like the recordings, gives {}, which deviates by \
+             {} % from the simulated inertia. This is the error of the method, because the current \
+             oscillates between two samples. The inertia refined in closed loop does not have this error.",
             with_unit(page, replayed),
             percent(deviation)
         ));

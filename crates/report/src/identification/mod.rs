@@ -70,8 +70,7 @@ impl IdentificationPage<'_> {
         sections.extend(self.validations.iter().map(|check| agreement::validation_section(self, check)));
         Document {
             title: format!("Identification of the {} axis", self.axis().name()),
-            description: "The steps of Prévost section 3, and a refinement in simulated \
-                          closed loop."
+            description: "The steps of Prévost section 3, and a refinement in simulated closed loop."
                 .to_owned(),
             facts: self.facts(),
             sections,

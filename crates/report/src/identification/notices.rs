@@ -17,7 +17,8 @@ pub(super) enum Step {
 }
 
 impl Step {
-    /// Returns the steps of a finding by its code; `Whole` for other codes. `refined` is true if there is a refinement.
+    /// Returns the steps of a finding by its code; `Whole` for other codes. `refined` is true if there is a
+    /// refinement.
     pub(super) fn of(finding: &Finding, refined: bool) -> &'static [Step] {
         match finding.code {
             "no-current" => &[Step::Gravity, Step::Friction, Step::Inertia],

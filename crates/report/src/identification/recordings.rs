@@ -18,9 +18,9 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         .map(|(number, input)| (input, page.identification.agreements.get(number)))
         .collect();
     let findings = page.findings.iter().take(page.inputs.len()).flatten();
-    let text = "Velocity and acceleration are derivatives of the position after a zero-phase low-pass filter; its \
-                cut-off frequency is at −3 dB. Shaded intervals are the segments of the motion (Prévost fig. 4); parts that are \
-                too short or not steady are not used.";
+    let text = "Velocity and acceleration are derivatives of the position after a zero-phase low-pass \
+                filter; its cut-off frequency is at −3 dB. Shaded intervals are the segments of the motion \
+                (Prévost fig. 4); parts that are too short or not steady are not used.";
     Section {
         paragraphs: vec![text.to_owned()],
         notices: findings.map(notices::notice).collect(),

@@ -11,9 +11,11 @@ use virtual_axes_identify::identify::{RefinedParameter, RefinedValue, Refinement
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let mut section = page.step("Refinement in closed loop", Step::Refinement);
     let Some(refinement) = &page.identification.refinement else {
-        section
-            .paragraphs
-            .push("The refinement was not run; the values are those of the preceding steps, or of the machine file.".to_owned());
+        section.paragraphs.push(
+            "The refinement was not run; the values are those of the preceding steps, or of the machine \
+             file."
+                .to_owned(),
+        );
         return section;
     };
     section.paragraphs.push(text(page, refinement));
@@ -25,8 +27,11 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     section.paragraphs.push(if pairs.is_empty() {
         "No two parameters are strongly correlated.".to_owned()
     } else {
-        format!("Strongly correlated parameters, with their coefficient of correlation: {}. Their combined effect is more accurate than each of \
-             them.", listed(&pairs))
+        format!(
+            "Strongly correlated parameters, with their coefficient of correlation: {}. Their combined \
+             effect is more accurate than each of them.",
+            listed(&pairs)
+        )
     });
     let heads = [
         ("parameter", ""),
@@ -57,8 +62,8 @@ fn text(page: &IdentificationPage, refinement: &Refinement) -> String {
         format!(", the RMS of the current deviation from {} to {}", of(before), of(after))
     });
     format!(
-        "All parameters below are adjusted jointly to minimize the deviation of the simulated axis from the recorded \
-         positions{}, weighted by the residuals. The RMS of the position deviation changes from {} \
+        "All parameters below are adjusted jointly to minimize the deviation of the simulated axis from the \
+         recorded positions{}, weighted by the residuals. The RMS of the position deviation changes from {} \
          to {}{current}.",
         if refinement.current.is_some() { " and currents" } else { "" },
         of(before),

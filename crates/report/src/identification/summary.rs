@@ -23,8 +23,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         "No parameter was identified from the recordings.".to_owned()
     } else {
         format!(
-            "{count} identified from the recordings. ± is the standard error. The value of a delay lies in an interval, open \
-             below and closed above; all delays of the interval give the same motion."
+            "{count} identified from the recordings. ± is the standard error. The value of a delay lies in \
+             an interval, open below and closed above; all delays of the interval give the same motion."
         )
     };
     let heads = [("parameter", ""), ("value", ""), ("±", ""), ("unit", ""), ("initial", ""), ("source", "")];

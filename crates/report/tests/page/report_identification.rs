@@ -101,8 +101,8 @@ impl TestCase {
     }
 }
 
-/// X over a short range, all parts, refined; validated with the recording with velocity feedforward, and with the
-/// same recording without PSEC.
+/// X over a short range, all parts, refined; validated with the recording with velocity feedforward, and with
+/// the same recording without PSEC.
 struct Whole {
     case: TestCase,
     found: Identification,

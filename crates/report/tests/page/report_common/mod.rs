@@ -50,7 +50,8 @@ pub fn empty_axis(name: &str, kind: AxisKind) -> AxisTrace {
     }
 }
 
-/// Records every `every`-th tick of a motion; `nearest` returns the point of the path that is nearest to the tool tip.
+/// Records every `every`-th tick of a motion; `nearest` returns the point of the path that is nearest to the
+/// tool tip.
 pub fn record(
     changes: &[(&str, f64)],
     duration: f64,
