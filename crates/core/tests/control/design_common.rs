@@ -1,10 +1,10 @@
-//! Models and closed loops for the tests of designs, computed apart from the library.
+//! Models and closed loops for the tests of controller designs, independent of the library.
 
 use nalgebra::Complex;
 use proptest::prelude::*;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::control::Rst;
-use virtual_axes_core::design::{GpcTuning, PredictionModel, ControlWeight, gpc};
+use virtual_axes_core::design::{ControlWeight, GpcTuning, PredictionModel, gpc};
 use virtual_axes_core::machine::prediction_model;
 
 /// Position period of the default machine, s.
@@ -14,7 +14,7 @@ pub fn model(a: &[f64], b: &[f64]) -> PredictionModel {
     PredictionModel::new(a.to_vec(), b.to_vec(), TSP).expect("a model")
 }
 
-/// The prediction models of the default machine's axes, with their names.
+/// Returns names and prediction models of the axes of the default machine.
 pub fn axes() -> Vec<(String, PredictionModel)> {
     let config =
         Parameters::embedded_default().and_then(|p| p.machine_config()).expect("the machine is valid");
@@ -27,30 +27,30 @@ pub fn relative(n1: usize, n2: usize, nu: usize, lambda: f64) -> GpcTuning {
     GpcTuning { n1, n2, nu, weight: ControlWeight::Relative(lambda) }
 }
 
-/// R and T times `factor`.
-pub fn louder(rst: &Rst, factor: f64) -> Rst {
+/// Returns the controller with R and T multiplied by `factor`.
+pub fn scaled_gain(rst: &Rst, factor: f64) -> Rst {
     let times = |p: &[f64]| p.iter().map(|c| c * factor).collect::<Vec<_>>();
     Rst::new(&times(rst.r()), rst.s(), &times(rst.t()), rst.t_first()).expect("a controller")
 }
 
-/// The model behind `periods` further periods of delay.
+/// Returns the model with an additional delay of `periods` position cycles.
 pub fn delayed(of: &PredictionModel, periods: usize) -> PredictionModel {
     let mut b = vec![0.0; periods];
     b.extend(of.b());
     model(of.a(), &b)
 }
 
-/// Σ cᵢ q⁻ⁱ at q = e^{jx}.
+/// Evaluates Σ cᵢ q⁻ⁱ at q = e^{jx}.
 pub fn at(polynomial: &[f64], x: f64) -> Complex<f64> {
     polynomial.iter().enumerate().map(|(i, c)| Complex::from_polar(*c, -x * i as f64)).sum()
 }
 
-/// L = B R / (A S) at the angle x.
+/// Evaluates L = B R / (A S) at the angle x.
 pub fn open_loop(model: &PredictionModel, rst: &Rst, x: f64) -> Complex<f64> {
     at(model.b(), x) * at(rst.r(), x) / (at(model.a(), x) * at(rst.s(), x))
 }
 
-/// A model with poles and zeros inside the unit circle, real or in pairs, some with an integrator.
+/// Generates models with real or complex poles and zeros inside the unit circle, some with an integrator.
 pub fn models() -> impl Strategy<Value = PredictionModel> {
     let roots = |last: f64| prop::collection::vec((-last..last, 0.0..1.0_f64, any::<bool>()), 0..3);
     (roots(0.95), roots(0.9), any::<bool>(), 0_usize..3, 0.01..10.0_f64).prop_map(
@@ -85,7 +85,7 @@ pub fn times(a: &[f64], b: &[f64]) -> Vec<f64> {
     product
 }
 
-/// GPC of this tuning on an axis.
-pub fn predictive(model: &PredictionModel, tuning: GpcTuning) -> Rst {
+/// Designs a GPC controller for an axis.
+pub fn gpc_controller(model: &PredictionModel, tuning: GpcTuning) -> Rst {
     gpc(model, &tuning).expect("a controller")
 }

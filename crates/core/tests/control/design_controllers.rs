@@ -1,14 +1,15 @@
-//! P, PI, PID and pole placement as RST triples.
+//! P, PI, PID and pole placement in RST form.
 
 use crate::design_common::{TSP, axes, model, models};
 use nalgebra::Complex;
 use proptest::prelude::*;
 use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{
-    DesignError, PidTuning, PolePlacement, check_stable, p_controller, pi_controller, pid_controller, pole_pair, pole_placement, poles,
+    DesignError, PidTuning, PolePlacement, check_stable, p_controller, pi_controller, pid_controller,
+    pole_pair, pole_placement, poles,
 };
 
-/// Ω* of the triple for these signals, by its difference equation.
+/// Computes Ω* of a controller for these signals by its difference equation.
 fn run(rst: &Rst, setpoints: &[f64], angles: &[f64]) -> Vec<f64> {
     let mut speeds: Vec<f64> = Vec::new();
     let back = |signal: &[f64], k: usize, lag: usize| k.checked_sub(lag).map_or(0.0, |i| signal[i]);
@@ -34,11 +35,11 @@ fn assert_run(rst: &Rst, wanted: impl Fn(&[f64], &[f64]) -> Vec<f64>) {
     let (found, wanted) = (run(rst, &setpoints, &angles), wanted(&setpoints, &angles));
     let scale = wanted.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
     for (f, w) in found.iter().zip(&wanted) {
-        assert!((f - w).abs() <= 1e-12 * scale, "{f} against {w}");
+        assert!((f - w).abs() <= 1e-12 * scale, "{f}, expected {w}");
     }
 }
 
-/// The controller of the doc comment, written with its states.
+/// Returns the PID controller of [`PidTuning`] in state form.
 fn textbook(tuning: PidTuning) -> impl Fn(&[f64], &[f64]) -> Vec<f64> {
     move |setpoints, angles| {
         let (mut integral, mut derivative, mut speeds) = (0.0, 0.0, Vec::new());
@@ -58,7 +59,7 @@ fn textbook(tuning: PidTuning) -> impl Fn(&[f64], &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn the_triples_do_what_the_textbook_s_controllers_do() {
+fn rst_polynomials_equal_the_textbook_controllers() {
     let full = PidTuning {
         gain: 25.0,
         integral_time: 0.2,
@@ -78,7 +79,7 @@ fn the_triples_do_what_the_textbook_s_controllers_do() {
 }
 
 #[test]
-fn a_gain_alone_is_three_numbers() {
+fn proportional_controller_has_three_coefficients() {
     let rst = p_controller(25.0, 0.0, TSP).expect("a P");
     assert_eq!((rst.r(), rst.s(), rst.t(), rst.t_first()), (&[25.0][..], &[1.0][..], &[25.0][..], 0));
     assert!(!rst.has_integral_action());
@@ -86,7 +87,7 @@ fn a_gain_alone_is_three_numbers() {
 }
 
 #[test]
-fn bad_gains_and_times_are_refused_by_name() {
+fn invalid_gains_and_times_are_rejected_by_name() {
     let good = PidTuning {
         gain: 25.0,
         integral_time: 0.2,
@@ -119,7 +120,7 @@ fn placed(poles: &[Complex<f64>], integrator: bool) -> PolePlacement {
 }
 
 #[test]
-fn a_lag_by_hand() {
+fn pole_placement_of_a_first_order_lag() {
     // A = 1 − 0.8q⁻¹, B = 0.4q⁻¹, one pole at 0.5: S = 1, R = r with −0.8 + 0.4 r = −0.5.
     let lag = model(&[1.0, -0.8], &[0.0, 0.4]);
     let rst = pole_placement(&lag, &placed(&[0.5.into()], false)).expect("a controller");
@@ -131,7 +132,7 @@ fn a_lag_by_hand() {
 }
 
 #[test]
-fn every_axis_gets_its_poles() {
+fn every_axis_gets_the_desired_poles() {
     for (name, model) in axes() {
         for integrator in [false, true] {
             let mut wanted = pole_pair(60.0, 0.8, TSP).expect("a pair").to_vec();
@@ -149,7 +150,7 @@ fn every_axis_gets_its_poles() {
 }
 
 #[test]
-fn a_pair_has_its_bandwidth_and_damping() {
+fn pole_pair_has_its_bandwidth_and_damping() {
     for (bandwidth, damping) in [(60.0, 0.7), (200.0, 0.05), (3.0, 0.999)] {
         let [one, other] = pole_pair(bandwidth, damping, TSP).expect("a pair");
         assert!((one - other.conj()).norm() < 1e-15 && one.im != 0.0, "{one} {other}");
@@ -171,40 +172,40 @@ fn a_pair_has_its_bandwidth_and_damping() {
 }
 
 #[test]
-fn poles_that_cannot_be_placed_are_refused_by_name() {
+fn poles_that_cannot_be_placed_are_rejected_by_name() {
     let lag = model(&[1.0, -0.8], &[0.0, 0.4]);
-    let refused = |model, poles: &[Complex<f64>]| {
-        pole_placement(model, &placed(poles, true)).expect_err("refused").to_string()
+    let rejection = |model, poles: &[Complex<f64>]| {
+        pole_placement(model, &placed(poles, true)).expect_err("rejected").to_string()
     };
     assert_eq!(
-        refused(&lag, &[0.1.into(), 0.2.into(), 0.3.into()]),
+        rejection(&lag, &[0.1.into(), 0.2.into(), 0.3.into()]),
         "poles = 3 must be at most 2 in number, the order of this loop"
     );
     assert_eq!(
-        refused(&lag, &[1.0.into()]),
+        rejection(&lag, &[1.0.into()]),
         "the wanted pole 1.000000 has the modulus 1; it must be below 1 − 10⁻⁶"
     );
     assert_eq!(
-        refused(&lag, &[0.2.into(), Complex::new(0.5, 0.25)]),
+        rejection(&lag, &[0.2.into(), Complex::new(0.5, 0.25)]),
         "the wanted pole 0.500000 + 0.250000j must come with its conjugate 0.500000 − 0.250000j"
     );
-    assert!(refused(&lag, &[f64::NAN.into()]).contains("NaN"));
+    assert!(rejection(&lag, &[f64::NAN.into()]).contains("NaN"));
     // A = (1 − 0.8q⁻¹)(1 − 0.3q⁻¹), B = 0.4q⁻¹(1 − 0.3q⁻¹)
     let shared = model(&[1.0, -1.1, 0.24], &[0.0, 0.4, -0.12]);
     assert_eq!(
-        refused(&shared, &[0.1.into()]),
+        rejection(&shared, &[0.1.into()]),
         "poles cannot be placed: A and B of the prediction model share the root 0.300000 or nearly so"
     );
-    // B(1) = 0 stands against an integrator.
+    // B(1) = 0 cancels an integrator.
     let differentiating = model(&[1.0, -0.8], &[0.0, 0.4, -0.4]);
-    assert!(refused(&differentiating, &[0.1.into()]).contains("share the root 1.000000"));
+    assert!(rejection(&differentiating, &[0.1.into()]).contains("share the root 1.000000"));
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn pole_placement_gives_the_poles_asked_for(
+    fn pole_placement_gives_the_desired_poles(
         model in models(),
         size in 0.1..0.95_f64,
         turn in 0.0..3.0_f64,
@@ -213,12 +214,12 @@ proptest! {
         let pole = Complex::from_polar(size, turn);
         let rst = match pole_placement(&model, &placed(&[pole, pole.conj()], integrator)) {
             Ok(rst) => rst,
-            // Models of low order, and roots of A and B that happen to be near each other.
+            // Models of low order, and close roots of A and B.
             Err(DesignError::OutOfRange { name: "poles", .. } | DesignError::SharedRoot { .. }) => return Ok(()),
             Err(DesignError::Rst(_)) => return Ok(()),
             Err(other) => return Err(TestCaseError::fail(format!("{other}"))),
         };
-        // A S + B R = 1 − 2 size cos(turn) q⁻¹ + size² q⁻², and nothing behind.
+        // A S + B R = 1 − 2 size cos(turn) q⁻¹ + size² q⁻², without further terms.
         let (a, b) = (model.a(), model.b());
         let scale: f64 = crate::design_common::times(a, rst.s()).iter().chain(&crate::design_common::times(b, rst.r())).map(|c| c.abs()).sum();
         let at = |p: &[f64], q: &[f64], i: usize| -> f64 {

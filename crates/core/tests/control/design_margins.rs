@@ -1,9 +1,11 @@
-//! Stability margins against closed forms, a fine grid, and the poles of the loop that is made to oscillate.
+//! Stability margins against closed forms, a fine grid, and the poles of loops at the stability limit.
 
 use std::f64::consts::PI;
 use std::time::Instant;
 
-use crate::design_common::{TSP, axes, delayed, louder, model, models, open_loop, predictive, relative};
+use crate::design_common::{
+    TSP, axes, delayed, gpc_controller, model, models, open_loop, relative, scaled_gain,
+};
 use proptest::prelude::*;
 use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{
@@ -12,7 +14,7 @@ use virtual_axes_core::design::{
 
 #[track_caller]
 fn assert_close(found: f64, wanted: f64, tolerance: f64) {
-    assert!((found - wanted).abs() <= tolerance * wanted.abs(), "{found} against {wanted}");
+    assert!((found - wanted).abs() <= tolerance * wanted.abs(), "{found}, expected {wanted}");
 }
 
 fn margins_of(model: &PredictionModel, rst: &Rst) -> Margins {
@@ -20,7 +22,7 @@ fn margins_of(model: &PredictionModel, rst: &Rst) -> Margins {
 }
 
 #[test]
-fn an_integrator_under_a_gain() {
+fn margins_of_an_integrator_with_proportional_control() {
     // L = K q⁻¹/(1 − q⁻¹), K = Kp Tsp: L(e^{jx}) = K e^{−jx/2}/(2j sin x/2).
     for loop_gain in [0.001, 0.1, 0.3, 1.0, 1.2, 1.9] {
         let integrator = model(&[1.0, -1.0], &[0.0, TSP]);
@@ -31,25 +33,25 @@ fn an_integrator_under_a_gain() {
         assert_close(found.delay, (PI - crossover) / 2.0 / crossover * TSP, 1e-9);
         assert_close(found.gain, 2.0 / loop_gain, 1e-12);
         assert_eq!(found.gain_reduction, 0.0);
-        // |1 + L|² = 1 + K(K − 2)/(4 sin² x/2), which is least at π for K < 2.
+        // |1 + L|² = 1 + K(K − 2)/(4 sin² x/2), which is smallest at π for K < 2.
         assert_close(found.modulus, 1.0 - loop_gain / 2.0, 1e-9);
     }
 }
 
 #[test]
-fn a_lag_under_a_gain_that_crosses_nothing() {
+fn margins_of_a_lag_without_crossover() {
     // L = K q⁻¹ (1 − a)/(1 − a q⁻¹): from K at 0 to −K (1 − a)/(1 + a) at π, |L| < 1 for K < 1.
     let (pole, gain) = (0.8, 0.5);
     let lag = model(&[1.0, -pole], &[0.0, 1.0 - pole]);
     let found = margins_of(&lag, &p_controller(gain, 0.0, TSP).expect("a controller"));
     assert_eq!((found.phase, found.delay), (f64::INFINITY, f64::INFINITY));
     assert_close(found.gain, (1.0 + pole) / (1.0 - pole) / gain, 1e-12);
-    // |1 + L|² is a quotient of two lines in cos x, and those are monotonic.
+    // |1 + L|² is a quotient of two linear functions of cos x, which is monotonic.
     assert_close(found.modulus, (1.0 - gain * (1.0 - pole) / (1.0 + pole)).min(1.0 + gain), 1e-12);
 }
 
 #[test]
-fn a_plant_that_needs_its_gain_has_a_margin_downwards() {
+fn unstable_plant_has_a_gain_reduction_margin() {
     // Pole at 1.2 by b = 1: the loop's pole is 1.2 − k, stable for 0.2 < k < 2.2.
     let runaway = model(&[1.0, -1.2], &[0.0, 1.0]);
     let found = margins_of(&runaway, &p_controller(1.0, 0.0, TSP).expect("a controller"));
@@ -57,53 +59,54 @@ fn a_plant_that_needs_its_gain_has_a_margin_downwards() {
     assert_close(found.gain, 2.2, 1e-12);
 }
 
-/// The least modulus and the least delay margin (s) of those axes.
+/// Returns the smallest modulus margin and the smallest delay margin (s) of the named axes.
 fn worst(n2: usize, nu: usize, lambda: f64, names: &[&str]) -> (f64, f64) {
     let axes = axes().into_iter().filter(|(name, _)| names.contains(&name.as_str()));
-    let found = axes.map(|(_, model)| margins_of(&model, &predictive(&model, relative(1, n2, nu, lambda))));
+    let found =
+        axes.map(|(_, model)| margins_of(&model, &gpc_controller(&model, relative(1, n2, nu, lambda))));
     found.fold((f64::INFINITY, f64::INFINITY), |(m, d), f| (m.min(f.modulus), d.min(f.delay)))
 }
 
 #[test]
-fn the_preset_on_every_axis_of_the_default_machine() {
+fn margins_of_the_preset_on_every_axis() {
     let (modulus, delay) = worst(14, 12, 0.005, &["x", "y", "z", "a", "c"]);
     assert!(modulus >= 0.59 && delay >= 7.2e-3, "{modulus}, {delay} s");
 }
 
 #[test]
-fn the_tunings_of_the_ballbar() {
+fn margins_of_the_ballbar_tunings() {
     // The axes of the circle; A and C have 0.335.
     let (modulus, _) = worst(8, 6, 1e-3, &["x", "y"]);
     assert!((modulus - 0.34).abs() <= 0.005, "{modulus}");
-    // The page cuts its digits off, so that they hold.
+    // The model page truncates its digits.
     let (modulus, delay) = worst(8, 6, 1e-2, &["x", "y", "z", "a", "c"]);
     assert!((0.49..0.50).contains(&modulus) && (4.4e-3..4.5e-3).contains(&delay), "{modulus}, {delay} s");
 }
 
 #[test]
-fn a_loop_brought_to_its_delay_margin_has_poles_on_the_circle() {
-    // The louder a loop, the smaller its delay margin: at the loudness at which n periods of delay are
-    // just too many, as the poles tell, the margin is n periods.
+fn loop_at_its_delay_margin_has_poles_on_the_unit_circle() {
+    // The delay margin decreases with the gain: at the gain at which the poles become unstable with n cycles of delay,
+    // the margin is n cycles.
     for (name, axis) in axes() {
-        let rst = predictive(&axis, relative(1, 14, 12, 0.005));
+        let rst = gpc_controller(&axis, relative(1, 14, 12, 0.005));
         for periods in 1..=3 {
             let late = delayed(&axis, periods);
-            let unstable = |factor| check_stable(&late, &louder(&rst, factor)).is_err();
+            let unstable = |factor| check_stable(&late, &scaled_gain(&rst, factor)).is_err();
             let (mut low, mut high) = (1e-3, 1.6);
             assert!(!unstable(low) && unstable(high), "{name}, {periods}");
             for _ in 0..50 {
                 let middle = (low + high) / 2.0;
                 *(if unstable(middle) { &mut high } else { &mut low }) = middle;
             }
-            let found = margins_of(&axis, &louder(&rst, low)).delay;
-            // The poles count as unstable 1e-6 inside the circle already.
+            let found = margins_of(&axis, &scaled_gain(&rst, low)).delay;
+            // Poles count as unstable from 1e-6 inside the circle on.
             assert_close(found, periods as f64 * TSP, 1e-4);
         }
     }
 }
 
 #[test]
-fn a_narrow_resonance_of_the_controller_is_seen() {
+fn margins_resolve_a_narrow_resonance_of_the_controller() {
     // S has a pair 1e-5 inside the circle, R one 6e-5 inside it: |L| is 0.2, but 1.2 over a few 1e-5 rad.
     let turn = PI / 3.0;
     let pair = |depth: f64| [1.0, -2.0 * (1.0 - depth) * turn.cos(), (1.0 - depth) * (1.0 - depth)];
@@ -123,16 +126,16 @@ fn a_narrow_resonance_of_the_controller_is_seen() {
 }
 
 #[test]
-fn an_unstable_loop_has_no_margins_but_a_pole() {
+fn unstable_loop_is_reported_with_its_pole() {
     let integrator = model(&[1.0, -1.0], &[0.0, 1.0]);
-    let refused = margins(&integrator, &p_controller(2.5, 0.0, TSP).expect("a controller"));
-    assert_eq!(refused, Err(DesignError::Unstable { re: -1.5, im: 0.0, modulus: 1.5 }));
+    let result = margins(&integrator, &p_controller(2.5, 0.0, TSP).expect("a controller"));
+    assert_eq!(result, Err(DesignError::Unstable { re: -1.5, im: 0.0, modulus: 1.5 }));
 }
 
 #[test]
 fn a_thousand_loops_take_less_than_a_second() {
     let axes = axes();
-    let rst = predictive(&axes[0].1, relative(1, 14, 12, 0.005));
+    let rst = gpc_controller(&axes[0].1, relative(1, 14, 12, 0.005));
     let start = Instant::now();
     for _ in 0..1000 {
         std::hint::black_box(margins_of(&axes[0].1, &rst));
@@ -141,15 +144,15 @@ fn a_thousand_loops_take_less_than_a_second() {
     assert!(took.as_secs_f64() < 1.0, "{took:?}");
 }
 
-/// Modulus, phase and delay margin by brute force: |1 + L| on a fine grid, crossovers halved in.
+/// Computes modulus, phase and delay margin by brute force: |1 + L| on a fine grid, crossovers by bisection.
 fn brute_force(model: &PredictionModel, rst: &Rst) -> [f64; 3] {
     const POINTS: usize = 20_000;
     let [mut modulus, mut phase, mut delay] = [f64::INFINITY; 3];
-    // Half the points rise by a factor, so that slow loops are met as well as fast ones.
+    // Half of the points are spaced logarithmically, for slow loops.
     let mut angles: Vec<f64> = (1..=POINTS).map(|i| PI * i as f64 / POINTS as f64).collect();
     angles.extend((0..POINTS).map(|i| 1e-7 * (PI / 1e-7).powf(i as f64 / POINTS as f64)));
     angles.sort_by(f64::total_cmp);
-    let loud = |x: f64| open_loop(model, rst, x).norm() > 1.0;
+    let above_unity = |x: f64| open_loop(model, rst, x).norm() > 1.0;
     let mut before: Option<(f64, bool)> = None;
     for x in angles {
         let l = open_loop(model, rst, x);
@@ -161,7 +164,7 @@ fn brute_force(model: &PredictionModel, rst: &Rst) -> [f64; 3] {
             let mut high = x;
             while high - low > 1e-14 * high {
                 let middle = (low + high) / 2.0;
-                *(if loud(middle) == side { &mut low } else { &mut high }) = middle;
+                *(if above_unity(middle) == side { &mut low } else { &mut high }) = middle;
             }
             let ahead = (-open_loop(model, rst, high)).arg().rem_euclid(2.0 * PI);
             phase = phase.min(ahead).min(2.0 * PI - ahead);
@@ -176,7 +179,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn margins_are_those_of_a_fine_grid(model in models(), n2 in 3_usize..15, lambda in 1e-3..1.0_f64) {
+    fn margins_equal_those_of_a_fine_grid(model in models(), n2 in 3_usize..15, lambda in 1e-3..1.0_f64) {
         let Ok(rst) = gpc(&model, &relative(1, n2, n2.min(4), lambda)) else {
             return Ok(());
         };
@@ -186,12 +189,12 @@ proptest! {
         let wanted = brute_force(&model, &rst);
         for (found, wanted) in [found.modulus, found.phase, found.delay].into_iter().zip(wanted) {
             let near = found == wanted || (found - wanted).abs() <= 1e-4 * wanted;
-            prop_assert!(near, "{found} against {wanted}");
+            prop_assert!(near, "{found}, expected {wanted}");
         }
     }
 
     #[test]
-    fn a_loop_is_stable_up_to_its_gain_margins(
+    fn loop_is_stable_up_to_its_gain_margins(
         model in models(),
         n2 in 3_usize..15,
         lambda in 1e-3..1.0_f64,
@@ -203,9 +206,9 @@ proptest! {
         let Ok(found) = margins(&model, &rst) else {
             return Ok(());
         };
-        // However slow.
-        let stable = |factor| poles(&model, &louder(&rst, factor)).expect("poles")[0].norm() < 1.0;
-        // Further off, or slower, than anybody looks.
+        // Slow poles count as stable here.
+        let stable = |factor| poles(&model, &scaled_gain(&rst, factor)).expect("poles")[0].norm() < 1.0;
+        // Factors beyond the search range are not checked.
         let (up, down) = (found.gain.min(1e4), found.gain_reduction.max(1e-2));
         for share in shares {
             prop_assert!(stable(1.0 + share * (up * 0.9999 - 1.0)), "{found:?}");

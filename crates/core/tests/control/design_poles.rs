@@ -1,15 +1,17 @@
-//! Poles of closed loops that are known, and what is unstable.
+//! Poles of closed loops with known solutions, and rejection of unstable loops.
 
-use crate::design_common::{TSP, axes, model, models, predictive, relative, times};
+use crate::design_common::{TSP, axes, gpc_controller, model, models, relative, times};
 use nalgebra::Complex;
 use proptest::prelude::*;
 use virtual_axes_core::control::Rst;
-use virtual_axes_core::design::{DesignError, PredictionModel, require_stable, check_stable, margins, p_controller, poles};
+use virtual_axes_core::design::{
+    DesignError, PredictionModel, check_stable, margins, p_controller, poles, require_stable,
+};
 
-/// Every wanted pole has a found one within the tolerance, each taken once.
+/// Checks that each expected pole has a distinct computed pole within the tolerance.
 #[track_caller]
 fn assert_poles(found: &[Complex<f64>], wanted: &[Complex<f64>], tolerance: f64) {
-    assert_eq!(found.len(), wanted.len(), "{found:?} against {wanted:?}");
+    assert_eq!(found.len(), wanted.len(), "{found:?}, expected {wanted:?}");
     let mut left = found.to_vec();
     for pole in wanted {
         let nearest =
@@ -20,10 +22,11 @@ fn assert_poles(found: &[Complex<f64>], wanted: &[Complex<f64>], tolerance: f64)
 }
 
 #[test]
-fn an_integrator_with_dead_time() {
-    // z^(d+1) − z^d + K: at K = dᵈ/(d+1)^(d+1) two poles meet at d/(d+1); for d = 1 the rest is known.
+fn poles_of_an_integrator_with_dead_time() {
+    // z^(d+1) − z^d + K: at K = dᵈ/(d+1)^(d+1) two poles meet at d/(d+1); for d = 1 all poles are known.
     let plant = model(&[1.0, -1.0], &[0.0, 0.0, 1.0]);
-    let loop_with = |gain| poles(&plant, &p_controller(gain, 0.0, TSP).expect("a controller")).expect("poles");
+    let loop_with =
+        |gain| poles(&plant, &p_controller(gain, 0.0, TSP).expect("a controller")).expect("poles");
     let root = (0.25_f64 - 0.16).sqrt();
     assert_poles(&loop_with(0.16), &[(0.5 + root).into(), (0.5 - root).into()], 1e-14);
     let pair = Complex::new(0.5, (0.5_f64 - 0.25).sqrt());
@@ -32,10 +35,11 @@ fn an_integrator_with_dead_time() {
 }
 
 #[test]
-fn poles_come_by_modulus_and_pairs_together() {
-    // A = (1 − 0.3q⁻¹)(1 − 1.2q⁻¹ + 0.72q⁻²)(1 + 0.9q⁻¹) and next to no controller.
+fn poles_are_sorted_by_modulus_with_adjacent_pairs() {
+    // A = (1 − 0.3q⁻¹)(1 − 1.2q⁻¹ + 0.72q⁻²)(1 + 0.9q⁻¹) and a negligible controller gain.
     let a = times(&times(&[1.0, -0.3], &[1.0, -1.2, 0.72]), &[1.0, 0.9]);
-    let found = poles(&model(&a, &[0.0, 1e-13]), &p_controller(1e-3, 0.0, TSP).expect("a controller")).expect("poles");
+    let found = poles(&model(&a, &[0.0, 1e-13]), &p_controller(1e-3, 0.0, TSP).expect("a controller"))
+        .expect("poles");
     let wanted = [(-0.9).into(), Complex::new(0.6, 0.6), Complex::new(0.6, -0.6), 0.3.into()];
     for (f, w) in found.iter().zip(wanted) {
         assert!((f - w).norm() < 1e-12, "{found:?}");
@@ -43,7 +47,7 @@ fn poles_come_by_modulus_and_pairs_together() {
 }
 
 #[test]
-fn delays_bring_poles_at_zero() {
+fn delays_add_poles_at_zero() {
     let plant = model(&[1.0, -0.5, 0.0, 0.0], &[0.0, 0.2]);
     assert_poles(
         &poles(&plant, &p_controller(1.0, 0.0, TSP).expect("a controller")).expect("poles"),
@@ -53,7 +57,7 @@ fn delays_bring_poles_at_zero() {
 }
 
 #[test]
-fn an_unstable_loop_is_refused_with_its_pole_unless_forced() {
+fn unstable_loop_is_rejected_unless_allowed() {
     let plant = model(&[1.0, -1.0], &[0.0, 0.0, 1.0]);
     let rst = p_controller(1.25, 0.0, TSP).expect("a controller");
     // z² − z + 1.25 = 0
@@ -73,9 +77,9 @@ fn an_unstable_loop_is_refused_with_its_pole_unless_forced() {
 }
 
 #[test]
-fn a_pole_on_the_circle_is_unstable() {
+fn pole_on_the_unit_circle_is_unstable() {
     let plant = model(&[1.0, -1.0], &[0.0, 1.0]);
-    // 1 − 10⁻⁹, which no machine would wait for, and −1.
+    // Poles at 1 − 10⁻⁹ and at −1.
     let slow = Rst::new(&[1e-9], &[1.0], &[1e-9], 0).expect("a controller");
     assert!(matches!(check_stable(&plant, &slow), Err(DesignError::Unstable { .. })));
     let ringing = Rst::new(&[2.0], &[1.0], &[2.0], 0).expect("a controller");
@@ -85,7 +89,7 @@ fn a_pole_on_the_circle_is_unstable() {
 #[test]
 fn the_preset_is_stable_on_every_axis() {
     for (name, model) in axes() {
-        let rst = predictive(&model, relative(1, 14, 12, 0.005));
+        let rst = gpc_controller(&model, relative(1, 14, 12, 0.005));
         let found = poles(&model, &rst).expect("poles");
         let order = (model.a().len() + rst.s().len()).max(model.b().len() + rst.r().len()) - 2;
         assert_eq!(found.len(), order, "{name}");
@@ -94,15 +98,15 @@ fn the_preset_is_stable_on_every_axis() {
     }
 }
 
-/// Whether θ dies away after a kick, by running the loop.
+/// Returns true if θ decays after an impulse, by running the loop.
 fn settles(model: &PredictionModel, rst: &Rst) -> bool {
     let (mut angles, mut speeds) = (vec![0.0; 4000], vec![0.0; 4000]);
     for k in 100..4000 {
         let back = |signal: &[f64], polynomial: &[f64], from: usize| -> f64 {
             polynomial.iter().enumerate().skip(from).map(|(lag, c)| c * signal[k - lag]).sum()
         };
-        let kick = if k == 100 { 1.0 } else { 0.0 };
-        angles[k] = kick + back(&speeds, model.b(), 1) - back(&angles, model.a(), 1);
+        let impulse = if k == 100 { 1.0 } else { 0.0 };
+        angles[k] = impulse + back(&speeds, model.b(), 1) - back(&angles, model.a(), 1);
         speeds[k] = -back(&angles, rst.r(), 0) - back(&speeds, rst.s(), 1);
     }
     angles[3900..].iter().all(|angle| angle.abs() < 1e-3)
@@ -112,10 +116,10 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn stable_is_what_settles(model in models(), gain in 1e-3..3.0_f64) {
+    fn stable_loops_settle(model in models(), gain in 1e-3..3.0_f64) {
         let rst = p_controller(gain, 0.0, TSP).expect("a controller");
         let largest = poles(&model, &rst).expect("poles")[0].norm();
-        // Near the circle a run of some seconds does not tell.
+        // Close to the circle a run of some seconds is not conclusive.
         prop_assume!((largest - 1.0).abs() > 5e-3);
         prop_assert_eq!(settles(&model, &rst), largest < 1.0);
         prop_assert_eq!(check_stable(&model, &rst).is_ok(), largest < 1.0);

@@ -1,20 +1,20 @@
-//! Generalized predictive control against the model page and against a second formulation.
+//! Generalized predictive control against the model page and against a least-squares formulation.
 
-use crate::design_common::{axes, models, predictive, relative};
+use crate::design_common::{axes, gpc_controller, models, relative};
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use virtual_axes_core::control::Rst;
-use virtual_axes_core::design::{DesignError, GpcTuning, PredictionModel, ControlWeight, gpc};
+use virtual_axes_core::design::{ControlWeight, DesignError, GpcTuning, PredictionModel, gpc};
 
 fn assert_near(found: &[f64], wanted: &[f64], tolerance: f64) {
-    assert_eq!(found.len(), wanted.len(), "{found:?} against {wanted:?}");
+    assert_eq!(found.len(), wanted.len(), "{found:?}, expected {wanted:?}");
     for (f, w) in found.iter().zip(wanted) {
-        assert!((f - w).abs() <= tolerance, "{found:?} against {wanted:?}");
+        assert!((f - w).abs() <= tolerance, "{found:?}, expected {wanted:?}");
     }
 }
 
 #[test]
-fn the_check_vector_of_the_model_page() {
+fn gpc_reproduces_the_check_vector_of_the_model_page() {
     let model = PredictionModel::new(vec![1.0, -0.8], vec![0.0, 0.4], 0.006).expect("a model");
     let tuning = GpcTuning { n1: 1, n2: 4, nu: 1, weight: ControlWeight::Absolute(0.1) };
     let rst = gpc(&model, &tuning).expect("a controller");
@@ -24,7 +24,7 @@ fn the_check_vector_of_the_model_page() {
     assert_eq!(rst.t_first(), 1);
 }
 
-/// What is known at instant k: θ and Ω* before it, newest first, and the setpoints from k + 1 on.
+/// Known signals at position cycle k: past θ and Ω*, newest first, and setpoints from k + 1 on.
 #[derive(Debug)]
 struct Situation {
     angles: Vec<f64>,
@@ -33,16 +33,15 @@ struct Situation {
 }
 
 impl Situation {
-    /// θ(k + 1) … θ(k + n) of A Δθ = B ΔΩ* when Ω* is moved by `increments` from k on, by running the
-    /// model's own difference equation.
+    /// Computes θ(k + 1) … θ(k + n) of A Δθ = B ΔΩ* for `increments` of Ω* from k on by the difference equation.
     fn response(&self, model: &PredictionModel, increments: &[f64], n: usize) -> Vec<f64> {
         // Oldest first, k at the end.
         let mut angles: Vec<f64> = self.angles.iter().rev().copied().collect();
         let mut speeds: Vec<f64> = self.speeds.iter().rev().copied().collect();
         let present = angles.len();
         let back = |signal: &[f64], lag: usize| {
-            let place = |lag: usize| signal[signal.len() - lag];
-            place(lag) - place(lag + 1)
+            let lagged = |lag: usize| signal[signal.len() - lag];
+            lagged(lag) - lagged(lag + 1)
         };
         for step in 0..n {
             speeds.push(speeds[speeds.len() - 1] + increments.get(step).copied().unwrap_or(0.0));
@@ -58,18 +57,17 @@ impl Situation {
         angles[present..].to_vec()
     }
 
-    /// The first increment of Ω* that minimizes Σ (θ* − θ)² + λ Σ ΔΩ*² over the horizons: least
-    /// squares of the criterion's residuals, whose derivatives are the responses to one increment at a
-    /// time. λ_rel is resolved with the same responses.
+    /// Computes the first increment of Ω* that minimizes Σ (θ* − θ)² + λ Σ ΔΩ*² over the horizons: least squares of the
+    /// residuals, whose derivatives are the responses to single increments. λ_rel uses the same responses.
     fn first_increment(&self, model: &PredictionModel, tuning: &GpcTuning) -> f64 {
         let GpcTuning { n1, n2, nu, weight } = *tuning;
         let free = self.response(model, &[], n2)[n1 - 1..].to_vec();
-        let forced = forced(model, tuning);
+        let forced = unit_responses(model, tuning);
         let lambda = match weight {
             ControlWeight::Absolute(lambda) => lambda,
             ControlWeight::Relative(lambda) => lambda * sum_of_squares(&forced),
         };
-        // The residuals e = w − J ΔΩ* are least where Jᵀ e = 0; both are the unknowns of one system.
+        // The residuals e = w − J ΔΩ* are smallest for Jᵀ e = 0; e and ΔΩ* are the unknowns of one system.
         let (rows, all) = (n2 - n1 + 1, n2 - n1 + 1 + nu);
         let derivative = |row: usize, column: usize| match row.checked_sub(rows) {
             None => forced[column][row],
@@ -87,8 +85,8 @@ impl Situation {
         system.full_piv_lu().solve(&wanted).expect("λ > 0")[all]
     }
 
-    /// ΔΩ*(k) of S Ω* = −R θ + T θ*.
-    fn by(&self, rst: &Rst) -> f64 {
+    /// Computes ΔΩ*(k) of S Ω* = −R θ + T θ*.
+    fn rst_increment(&self, rst: &Rst) -> f64 {
         let setpoint = |ahead: i64| self.setpoints[usize::try_from(ahead - 1).expect("T reads ahead")];
         let t: f64 = rst.t().iter().zip(rst.t_first()..).map(|(c, ahead)| c * setpoint(ahead)).sum();
         let r: f64 = rst.r().iter().zip(&self.angles).map(|(c, angle)| c * angle).sum();
@@ -97,8 +95,8 @@ impl Situation {
     }
 }
 
-/// What one unit of each increment adds to θ over the horizon.
-fn forced(model: &PredictionModel, tuning: &GpcTuning) -> Vec<Vec<f64>> {
+/// Returns the responses of θ over the horizon to a unit of each increment.
+fn unit_responses(model: &PredictionModel, tuning: &GpcTuning) -> Vec<Vec<f64>> {
     let rest = Situation { angles: vec![0.0; 12], speeds: vec![0.0; 12], setpoints: Vec::new() };
     let response = |moved: usize| {
         let mut increments = vec![0.0; tuning.nu];
@@ -130,74 +128,74 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_first_increment_minimizes_the_criterion(
+    fn first_increment_minimizes_the_criterion(
         model in models(),
         tuning in tunings(),
         situation in situations(),
     ) {
-        // Where the horizon ends before the dead time nothing can be reached.
+        // A horizon shorter than the dead time has no response.
         prop_assume!(model.b().iter().take(tuning.n2 + 1).any(|b| *b != 0.0));
         let rst = gpc(&model, &tuning).expect("a controller");
-        let (found, wanted) = (situation.by(&rst), situation.first_increment(&model, &tuning));
+        let (found, wanted) = (situation.rst_increment(&rst), situation.first_increment(&model, &tuning));
         let size: f64 = rst.r().iter().chain(rst.t()).chain(rst.s()).map(|c| c.abs()).sum();
-        prop_assert!((found - wanted).abs() <= 1e-9 * size, "{found} against {wanted}");
-        // The same λ, given as such.
+        prop_assert!((found - wanted).abs() <= 1e-9 * size, "{found}, expected {wanted}");
+        // The same weight as absolute λ.
         let ControlWeight::Relative(lambda) = tuning.weight else { unreachable!("the tunings are relative") };
-        let weight = ControlWeight::Absolute(lambda * sum_of_squares(&forced(&model, &tuning)));
-        let found = situation.by(&gpc(&model, &GpcTuning { weight, ..tuning }).expect("a controller"));
-        prop_assert!((found - wanted).abs() <= 1e-9 * size, "{found} against {wanted}");
+        let weight = ControlWeight::Absolute(lambda * sum_of_squares(&unit_responses(&model, &tuning)));
+        let found = situation.rst_increment(&gpc(&model, &GpcTuning { weight, ..tuning }).expect("a controller"));
+        prop_assert!((found - wanted).abs() <= 1e-9 * size, "{found}, expected {wanted}");
     }
 }
 
 #[test]
-fn the_first_increment_minimizes_the_criterion_on_every_axis() {
+fn first_increment_minimizes_the_criterion_on_every_axis() {
     let wave = |count: usize, rate: f64| (0..count).map(|i| (rate * i as f64).sin()).collect();
     let situation = Situation { angles: wave(12, 0.3), speeds: wave(12, 2.0), setpoints: wave(30, 0.7) };
     for (name, model) in axes() {
         for tuning in [relative(1, 14, 12, 0.005), relative(1, 8, 6, 1e-3), relative(3, 20, 2, 0.1)] {
-            let rst = predictive(&model, tuning);
-            let (found, wanted) = (situation.by(&rst), situation.first_increment(&model, &tuning));
+            let rst = gpc_controller(&model, tuning);
+            let (found, wanted) = (situation.rst_increment(&rst), situation.first_increment(&model, &tuning));
             let size: f64 = rst.r().iter().chain(rst.t()).map(|c| c.abs()).sum();
-            assert!((found - wanted).abs() <= 1e-10 * size, "{name}: {found} against {wanted}");
+            assert!((found - wanted).abs() <= 1e-10 * size, "{name}: {found}, expected {wanted}");
         }
     }
 }
 
 #[track_caller]
-fn assert_refused(tuning: GpcTuning, words: &str) {
+fn assert_rejected(tuning: GpcTuning, words: &str) {
     let model = PredictionModel::new(vec![1.0, -0.8], vec![0.0, 0.4], 0.006).expect("a model");
-    assert_eq!(gpc(&model, &tuning).expect_err("refused").to_string(), words);
+    assert_eq!(gpc(&model, &tuning).expect_err("rejected").to_string(), words);
 }
 
 #[test]
-fn tunings_out_of_range_are_refused_by_name() {
+fn tunings_out_of_range_are_rejected_by_name() {
     let tuning = |n1, n2, nu, weight| GpcTuning { n1, n2, nu, weight };
     let light = ControlWeight::Absolute(0.1);
-    assert_refused(tuning(5, 4, 1, light), "n1 = 5 must lie in 1 … n2 = 4");
-    assert_refused(tuning(0, 4, 1, light), "n1 = 0 must lie in 1 … n2 = 4");
-    assert_refused(tuning(1, 4, 5, light), "nu = 5 must lie in 1 … n2 = 4");
-    assert_refused(tuning(1, 4, 0, light), "nu = 0 must lie in 1 … n2 = 4");
-    assert_refused(tuning(1, 0, 1, light), "n2 = 0 must lie in 1 … 200");
-    assert_refused(tuning(1, 201, 1, light), "n2 = 201 must lie in 1 … 200");
+    assert_rejected(tuning(5, 4, 1, light), "n1 = 5 must lie in 1 … n2 = 4");
+    assert_rejected(tuning(0, 4, 1, light), "n1 = 0 must lie in 1 … n2 = 4");
+    assert_rejected(tuning(1, 4, 5, light), "nu = 5 must lie in 1 … n2 = 4");
+    assert_rejected(tuning(1, 4, 0, light), "nu = 0 must lie in 1 … n2 = 4");
+    assert_rejected(tuning(1, 0, 1, light), "n2 = 0 must lie in 1 … 200");
+    assert_rejected(tuning(1, 201, 1, light), "n2 = 201 must lie in 1 … 200");
     for (weight, name) in [
         (ControlWeight::Absolute(-0.1), "lambda = -0.1"),
         (ControlWeight::Relative(-0.1), "lambda_rel = -0.1"),
         (ControlWeight::Absolute(f64::NAN), "lambda = NaN"),
         (ControlWeight::Relative(f64::INFINITY), "lambda_rel = inf"),
     ] {
-        assert_refused(tuning(1, 4, 1, weight), &format!("{name} must be finite and not negative"));
+        assert_rejected(tuning(1, 4, 1, weight), &format!("{name} must be finite and not negative"));
     }
 }
 
 #[test]
-fn a_matrix_without_inverse_is_refused_by_name() {
-    // Two periods of dead time: within three periods nothing but the first increment shows.
+fn singular_matrix_is_rejected_by_name() {
+    // Two cycles of dead time: only the first increment has a response within three cycles.
     let late = PredictionModel::new(vec![1.0, -0.8], vec![0.0, 0.0, 0.0, 0.4], 0.006).expect("a model");
     let of = |n2, nu, weight| gpc(&late, &GpcTuning { n1: 1, n2, nu, weight });
     for weight in [ControlWeight::Absolute(0.0), ControlWeight::Relative(0.0)] {
         assert!(of(3, 1, weight).is_ok());
         assert_eq!(of(3, 2, weight), Err(DesignError::Singular { n1: 1, n2: 3, nu: 2, lambda: 0.0 }));
-        let message = of(2, 1, weight).expect_err("nothing can be reached").to_string();
+        let message = of(2, 1, weight).expect_err("no response within the horizon").to_string();
         assert!(
             message.starts_with("the matrix GᵀG + λI of n1 = 1, n2 = 2, nu = 1 is singular"),
             "{message}"

@@ -1,5 +1,6 @@
-//! TODO
+//! Tests of position controllers: design, margins, predictive control, bumpless transfer.
 
+mod bumpless_transfer;
 mod design_common;
 mod design_controllers;
 mod design_margins;
@@ -7,4 +8,3 @@ mod design_poles;
 mod gpc;
 mod predictive;
 mod predictive_recovery;
-mod predictive_switch;

@@ -1,4 +1,4 @@
-//! Predictive control on the model page's trials, and the model that it predicts with.
+//! Predictive control on the scenarios of the model page, and its prediction model.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ const DEFAULT: &str = MACHINES[0];
 const GPC: &str = "position_loop.controller=gpc";
 const MICROMETER: f64 = 1e-6;
 
-/// The default machine under predictive control with this tuning.
+/// Returns the default machine with a GPC tuning.
 fn tuned(n1: usize, n2: usize, nu: usize, lambda_rel: f64) -> MachineConfig {
     let values = [("n1", n1 as f64), ("n2", n2 as f64), ("nu", nu as f64), ("lambda_rel", lambda_rel)];
     let texts = values.map(|(name, value)| format!("position_loop.gpc.{name}={value}"));
@@ -26,15 +26,15 @@ fn figures(scenario: &str, machine: &MachineConfig) -> Figures {
     watch_scenario(scenario, machine, |_| ())
 }
 
-/// What a scenario leaves at every tick of one axis.
-fn samples(scenario: &str, machine: &MachineConfig, place: usize) -> Vec<AxisSample> {
+/// Returns the samples of one axis at every tick of a scenario.
+fn samples(scenario: &str, machine: &MachineConfig, index: usize) -> Vec<AxisSample> {
     let mut samples = Vec::new();
-    watch_scenario(scenario, machine, |tick: Tick<'_>| samples.push(*tick.machine.axis(place).sample()));
+    watch_scenario(scenario, machine, |tick: Tick<'_>| samples.push(*tick.machine.axis(index).sample()));
     samples
 }
 
 #[test]
-fn the_prediction_model_is_the_simulation_without_friction() {
+fn prediction_model_equals_the_simulation_without_friction() {
     let frictionless = [
         "friction.a=0",
         "friction.c=0",
@@ -46,9 +46,9 @@ fn the_prediction_model_is_the_simulation_without_friction() {
         "position_loop.rst.t=[25]",
     ];
     for name in MACHINES {
-        // Gravity that depends on the position is no part of a linear model.
+        // Tilt gravity is not linear.
         let config = configured_with(name, &frictionless, &["a.gravity.tilt_nm=0"]);
-        for (place, axis) in config.axes().iter().enumerate() {
+        for (index, axis) in config.axes().iter().enumerate() {
             let model = prediction_model(axis, &config.periods()).expect("a model");
             let (a, b) = (model.a(), model.b());
             let mut machine = at_rest(&config);
@@ -60,24 +60,24 @@ fn the_prediction_model_is_the_simulation_without_friction() {
             let (mut input, mut output, mut predicted) = (Vec::new(), Vec::new(), Vec::new());
             for k in 0..1500 {
                 let mut first = true;
-                advance_axis(&mut machine, place, k, psec, |m| {
+                advance_axis(&mut machine, index, k, psec, |m| {
                     if std::mem::take(&mut first) {
-                        let s = m.axis(place).sample();
+                        let s = m.axis(index).sample();
                         assert!(!s.saturated);
                         input.push(s.velocity_setpoint);
                         output.push(s.position);
                     }
                 });
-                // Alone from the first instant on, by what was asked for.
+                // Open-loop prediction from the recorded Ω*.
                 let k = k as usize;
                 let back = |values: &[f64], weights: &[f64]| -> f64 {
                     (1..weights.len()).filter(|&i| i <= k).map(|i| weights[i] * values[k - i]).sum()
                 };
                 predicted.push(back(&input, b) - back(&predicted, a));
             }
-            // θ in units of the axis: the ratio is what the two differ by, the same at every instant.
+            // θ is in motor units: the positions differ by the transmission ratio.
             let largest = output.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-            let at = output.iter().position(|v| v.abs() == largest).expect("it moved");
+            let at = output.iter().position(|v| v.abs() == largest).expect("the axis moves");
             let ratio = output[at] / predicted[at];
             let wanted = transmission(name, axis.name());
             assert!((ratio / wanted - 1.0).abs() < 1e-9, "{name} {}: ratio {ratio}", axis.name());
@@ -89,7 +89,7 @@ fn the_prediction_model_is_the_simulation_without_friction() {
     }
 }
 
-/// Meters or radians of the axis per radian (or meter) of its motor, from the machine files' text.
+/// Returns the transmission ratio of the machine files, m or rad per rad (or m) of the motor.
 fn transmission(machine: &str, axis: &str) -> f64 {
     match (machine, axis) {
         ("mikron_ucp710", "a") => 1.0 / 180.0,
@@ -100,7 +100,7 @@ fn transmission(machine: &str, axis: &str) -> f64 {
 }
 
 #[test]
-fn the_prediction_model_leaves_out_no_state_that_counts() {
+fn prediction_model_keeps_all_significant_states() {
     for name in MACHINES {
         let config = configured(name, &[]);
         for axis in config.axes() {
@@ -112,7 +112,7 @@ fn the_prediction_model_leaves_out_no_state_that_counts() {
     }
 }
 
-/// Radial deviation on the steady circle: mean, min, max, µm.
+/// Returns the radial deviation at steady feed: mean, min, max, µm.
 fn ballbar(machine: &MachineConfig) -> [f64; 3] {
     let figures = figures("ballbar", machine);
     let circle = figures.circles.first().expect("a circle");
@@ -120,7 +120,7 @@ fn ballbar(machine: &MachineConfig) -> [f64; 3] {
 }
 
 #[test]
-fn the_ballbar_lands_on_the_model_pages_rows() {
+fn gpc_ballbar_reproduces_the_model_page() {
     let rows = [
         ((1, 8, 6, 1e-3), [0.0, -9.5, 10.4]),
         ((1, 8, 6, 1e-2), [-1.6, -10.4, 10.9]),
@@ -138,27 +138,27 @@ fn the_ballbar_lands_on_the_model_pages_rows() {
 }
 
 #[test]
-fn the_preset_of_the_machine_file_is_that_of_the_model_page() {
+fn preset_of_the_machine_file_equals_the_model_page() {
     let preset = configured(DEFAULT, &[GPC]);
     assert_eq!(preset, tuned(1, 14, 12, 0.005));
 }
 
 #[test]
-fn compensated_friction_leaves_no_spikes_on_the_circle() {
+fn friction_compensation_removes_reversal_spikes() {
     let config = configured(DEFAULT, &[GPC, "feedforward.friction=1", "delays.friction_ms=11.75"]);
     let [_, min, max] = ballbar(&config);
     assert_near("min, µm", min, -1.4, 0.2);
     assert_near("max, µm", max, 0.4, 0.2);
     assert!(min >= -2.0 && max <= 2.0);
-    // The cascade's spikes, 21 µm from its mean without it, are gone as well.
+    // The reversal spikes of the cascade, 21 µm without compensation, disappear too.
     let cascade = configured(DEFAULT, &["feedforward.friction=1", "delays.friction_ms=11.75"]);
     let [mean, min, max] = ballbar(&cascade);
     assert!(max - mean < 2.0 && mean - min < 2.0, "{mean} {min} {max}");
 }
 
 #[test]
-fn corners_land_on_the_model_pages_numbers() {
-    // Against the cascade's 146.6 and 103.7 µm.
+fn gpc_corners_reproduce_the_model_page() {
+    // The cascade has 146.6 and 103.7 µm.
     let rows = [
         ("corner-90", 1e-3, 6.6),
         ("corner-45", 1e-3, 4.0),
@@ -173,7 +173,7 @@ fn corners_land_on_the_model_pages_numbers() {
 }
 
 #[test]
-fn a_proportional_controller_by_its_polynomials_is_the_cascade_without_feedforward() {
+fn proportional_rst_equals_the_cascade_without_feedforward() {
     // 1.5 (m/min)/mm.
     let gain = 25.0;
     let texts = [
@@ -187,7 +187,7 @@ fn a_proportional_controller_by_its_polynomials_is_the_cascade_without_feedforwa
     let off = ["feedforward.velocity=0", "feedforward.torque_kg_m2=0"];
     let cascade = samples("x-there-and-back", &configured(DEFAULT, &off), 0);
     assert_eq!(rst.len(), cascade.len());
-    assert!(cascade.iter().any(|s| s.velocity.abs() > 0.1), "nothing moves");
+    assert!(cascade.iter().any(|s| s.velocity.abs() > 0.1), "the axis does not move");
     for (r, c) in rst.iter().zip(&cascade) {
         assert!((r.position - c.position).abs() < 1e-12, "{r:?} {c:?}");
         assert!((r.current - c.current).abs() < 1e-7, "{r:?} {c:?}");
@@ -196,8 +196,8 @@ fn a_proportional_controller_by_its_polynomials_is_the_cascade_without_feedforwa
 }
 
 #[test]
-fn the_axis_does_not_know_whether_a_controller_is_predictive() {
-    use virtual_axes_core::design::{GpcTuning, ControlWeight, gpc};
+fn gpc_given_as_rst_coefficients_is_bit_identical() {
+    use virtual_axes_core::design::{ControlWeight, GpcTuning, gpc};
 
     let config = configured(DEFAULT, &[GPC]);
     let x = &config.axes()[0];
@@ -226,35 +226,35 @@ fn the_axis_does_not_know_whether_a_controller_is_predictive() {
 }
 
 #[test]
-fn a_controller_that_goes_elsewhere_or_has_no_gain_is_refused_by_axis_and_number() {
+fn rst_with_wrong_static_gain_is_rejected_by_axis_and_value() {
     use virtual_axes_core::machine::MachineParameters;
 
-    let refusal = |texts: &[&str]| {
+    let rejection = |texts: &[&str]| {
         let mut all = vec!["position_loop.controller=rst", "position_loop.rst.s=[1]"];
         all.extend(texts);
-        MachineParameters::new(&configured(DEFAULT, &all)).expect_err("refused").to_string()
+        MachineParameters::new(&configured(DEFAULT, &all)).expect_err("rejected").to_string()
     };
-    let text = refusal(&["position_loop.rst.r=[25]", "position_loop.rst.t=[24]"]);
+    let text = rejection(&["position_loop.rst.r=[25]", "position_loop.rst.t=[24]"]);
     assert!(text.starts_with("axis x: position_loop") && text.contains("T(1) = 24 and R(1) = 25"), "{text}");
-    let text = refusal(&["position_loop.rst.r=[25, -25]", "position_loop.rst.t=[0]"]);
+    let text = rejection(&["position_loop.rst.r=[25, -25]", "position_loop.rst.t=[0]"]);
     assert!(text.contains("R(1) = 0"), "{text}");
     let text =
-        refusal(&["position_loop.rst.s=[0, 1]", "position_loop.rst.r=[25]", "position_loop.rst.t=[25]"]);
+        rejection(&["position_loop.rst.s=[0, 1]", "position_loop.rst.r=[25]", "position_loop.rst.t=[25]"]);
     assert!(text.contains("s[0] = 0"), "{text}");
 }
 
 #[test]
-fn an_unstable_loop_is_refused_with_its_pole_unless_it_is_forced() {
+fn unstable_position_loop_is_rejected_unless_allowed() {
     use virtual_axes_core::machine::MachineParameters;
 
-    // A gain that the lag of the velocity loop cannot bear.
+    // A gain that is unstable with the lag of the velocity loop.
     let unstable = [
         "position_loop.controller=rst",
         "position_loop.rst.r=[250]",
         "position_loop.rst.s=[1]",
         "position_loop.rst.t=[250]",
     ];
-    let text = MachineParameters::new(&configured(DEFAULT, &unstable)).expect_err("refused").to_string();
+    let text = MachineParameters::new(&configured(DEFAULT, &unstable)).expect_err("rejected").to_string();
     assert!(
         text.starts_with("axis x: position_loop") && text.contains("unstable") && text.contains("pole"),
         "{text}"
@@ -262,7 +262,7 @@ fn an_unstable_loop_is_refused_with_its_pole_unless_it_is_forced() {
     let mut forced = unstable.to_vec();
     forced.push("position_loop.allow_unstable=true");
     let config = configured(DEFAULT, &forced);
-    // It is told the truth: without a limit the oscillation would grow for ever.
+    // The oscillation grows to the limits.
     let mut machine = at_rest(&config);
     let mut saturated = false;
     for k in 0..500 {
@@ -276,25 +276,25 @@ fn an_unstable_loop_is_refused_with_its_pole_unless_it_is_forced() {
             },
         );
     }
-    assert!(saturated, "the loop is stable after all");
+    assert!(saturated, "the loop is stable");
 }
 
 #[test]
-fn inner_loops_that_diverge_are_refused_where_a_model_of_them_is_needed_only() {
+fn diverging_inner_loops_are_rejected_only_with_a_prediction_model() {
     use virtual_axes_core::machine::MachineParameters;
 
     for gain in
         ["current_loop.gain=500", "current_loop.gain=1e9", "velocity_loop.gain=1e5", "velocity_loop.gain=0"]
     {
         let cascade = MachineParameters::new(&configured(DEFAULT, &[gain]));
-        assert!(cascade.is_ok(), "{gain}: the cascade is simulated as it is");
+        assert!(cascade.is_ok(), "{gain}: the cascade is simulated without a model");
         let text = MachineParameters::new(&configured(DEFAULT, &[GPC, gain])).expect_err(gain).to_string();
         assert!(text.starts_with("axis x: position_loop"), "{gain}: {text}");
     }
 }
 
 #[test]
-fn coefficients_that_overflow_are_refused_and_an_overflow_that_is_left_stops_the_axis() {
+fn overflowing_coefficients_are_rejected_and_a_remaining_overflow_stops_the_axis() {
     use virtual_axes_core::machine::MachineParameters;
 
     let forced = |r: &str, s: &str| {
@@ -330,7 +330,7 @@ fn coefficients_that_overflow_are_refused_and_an_overflow_that_is_left_stops_the
 }
 
 #[test]
-fn a_shift_of_a_compensation_that_is_off_delays_nothing() {
+fn delay_of_disabled_friction_compensation_does_not_count() {
     let delay = |changes: &[&str]| at_rest(&configured(DEFAULT, changes)).longest_delay();
     let long = "delays.friction_ms=100";
     assert_eq!(delay(&[long]), delay(&[]));

@@ -1,4 +1,4 @@
-//! The drive against closed forms and against matrices made another way, to 1e-9 relative.
+//! Motor and control loops against closed forms and independently computed matrices, to 1e-9 relative.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use virtual_axes_core::config::MotorConfig;
@@ -9,7 +9,7 @@ use virtual_axes_verification::fixtures::machines::{friction_of_x, machine, para
 const TICK: f64 = 125e-6;
 const RELATIVE: f64 = 1e-9;
 
-/// The motor of the default X axis, from its data sheet.
+/// Motor of the default X axis, from its data sheet.
 const MOTOR: MotorConfig = MotorConfig {
     inertia: 0.028,
     torque_constant: 2.64,
@@ -38,11 +38,11 @@ impl ClosedForm {
             0.0,
         );
         let b = Vector2::new(voltage / m.inductance, torque / m.inertia);
-        let rest = -a.try_inverse().expect("the motor has a steady state") * b;
+        let rest = -a.try_inverse().expect("a steady state") * b;
         ClosedForm { a, rest, start: Vector2::new(current, speed), b }
     }
 
-    /// [i, ω] at time t: e^{At} of a 2×2 matrix by Cayley–Hamilton, A = μ ± jν or μ ± ν.
+    /// Returns [i, ω] at time t: e^{At} of a 2×2 matrix by Cayley–Hamilton, A = μ ± jν or μ ± ν.
     fn at(&self, t: f64) -> Vector2<f64> {
         let mu = self.a.trace() / 2.0;
         let discriminant = mu * mu - self.a.determinant();
@@ -58,7 +58,7 @@ impl ClosedForm {
         self.rest + exponential * (self.start - self.rest)
     }
 
-    /// θ at time t from θ(0) = 0: A ∫x = x(t) − x(0) − b t.
+    /// Returns θ at time t from θ(0) = 0: A ∫x = x(t) − x(0) − b t.
     fn angle(&self, t: f64) -> f64 {
         let integral = self.a.try_inverse().expect("invertible") * (self.at(t) - self.start - self.b * t);
         integral[1]
@@ -69,13 +69,13 @@ impl ClosedForm {
 fn assert_state(n: usize, s: &MotorState, exact: &ClosedForm, scale: (f64, f64, f64)) {
     let t = n as f64 * TICK;
     let x = exact.at(t);
-    for (what, value, wanted, scale) in [
+    for (signal, value, wanted, scale) in [
         ("i", s.current, x[0], scale.0),
         ("ω", s.speed, x[1], scale.1),
         ("θ", s.angle, exact.angle(t), scale.2),
     ] {
         let error = (value - wanted).abs();
-        assert!(error <= RELATIVE * scale, "tick {n}: {what} = {value}, wanted {wanted}");
+        assert!(error <= RELATIVE * scale, "tick {n}: {signal} = {value}, wanted {wanted}");
     }
 }
 
@@ -92,7 +92,7 @@ fn motor_at_constant_voltage() {
 }
 
 #[test]
-fn decay_under_constant_friction_until_the_step_before_it_stops() {
+fn decay_under_constant_friction_until_standstill() {
     let friction_current = 1.2;
     let friction = [friction_current, 0.0, 0.0, 0.0, friction_current];
     let config = parameters(&friction_of_x(friction)).machine_config().expect("valid");
@@ -107,14 +107,14 @@ fn decay_under_constant_friction_until_the_step_before_it_stops() {
         plant.step(&mut s, 0.0, 0.0);
         moving += 1;
         assert_state(moving, &s, &exact, (1.0, speed, speed * 0.01));
-        assert!(moving < 100_000, "it never stops");
+        assert!(moving < 100_000, "the motor does not stop");
     }
-    assert!(moving > 50, "it stops at once");
+    assert!(moving > 50, "the motor stops too early");
     plant.step(&mut s, 0.0, 0.0);
-    assert_eq!(s.speed, 0.0, "the step in which it would turn back ends at standstill");
+    assert_eq!(s.speed, 0.0, "the tick in which the speed would reverse must end at standstill");
 }
 
-/// e^{A t} by a Taylor series on a halved interval, squared back: no code in common with the library.
+/// Computes e^A by a Taylor series with scaling and squaring, independent of the library.
 fn exponential<const N: usize>(a: SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
     const HALVINGS: i32 = 10;
     let a = a * 0.5f64.powi(HALVINGS);
@@ -127,7 +127,7 @@ fn exponential<const N: usize>(a: SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
     (0..HALVINGS).fold(sum, |m, _| m * m)
 }
 
-// Places in the state of the linear cascade.
+// Indices in the state of the linear cascade.
 const I: usize = 0;
 const W: usize = 1;
 const TH: usize = 2;
@@ -136,12 +136,12 @@ const II: usize = 4; // integral of the current PI
 const U: usize = 5; // voltage, held
 const IS: usize = 6; // current setpoint, held
 const WS: usize = 7; // velocity setpoint, held
-const REF: usize = 8; // what the outermost loop is asked for
+const REF: usize = 8; // setpoint of the outermost loop
 const N: usize = 9;
 type State = SVector<f64, N>;
 type Map = SMatrix<f64, N, N>;
 
-/// One tick of the plant: held voltage, no friction, no gravity.
+/// Returns the map of the plant over one tick: held voltage, no friction, no gravity.
 fn plant_map() -> Map {
     let mut a = Map::zeros();
     a[(I, I)] = -MOTOR.resistance / MOTOR.inductance;
@@ -152,7 +152,7 @@ fn plant_map() -> Map {
     exponential(a * TICK)
 }
 
-/// A PI as a map: J ← J + g·e, y ← K·e + J, both over `scale` for y; e = plus − minus.
+/// Returns the map of a PI controller: J ← J + g·e, y ← (K·e + J)/scale; e = Σ sign·signal.
 fn pi_map(
     gain: f64,
     step_gain: f64,
@@ -190,12 +190,12 @@ fn current_loop_step() {
     let motor = Motor::new(&MOTOR, TICK).expect("can be discretized");
     let config = virtual_axes_core::config::PiConfig { gain: KI, integral_time: TI };
     let pi = Pi::new(&config, TICK, 1.0, MOTOR.max_voltage);
-    let (mut s, mut memory) = (MotorState::default(), PiState::default());
+    let (mut s, mut pi_state) = (MotorState::default(), PiState::default());
     let mut x = State::zeros();
     x[IS] = 5.0;
     let tick = plant_map() * current_map();
     for n in 0..2000 {
-        let voltage = pi.update(&mut memory, 5.0 - s.current);
+        let voltage = pi.update(&mut pi_state, 5.0 - s.current);
         s = motor.step(&s, voltage, 0.0);
         x = tick * x;
         assert!((s.current - x[I]).abs() <= RELATIVE * 5.0, "tick {n}: i = {}, wanted {}", s.current, x[I]);
@@ -203,16 +203,16 @@ fn current_loop_step() {
     }
 }
 
-/// Kp = 0 leaves the velocity loop alone; otherwise the whole cascade follows a step of position.
+/// Compares the response of the cascade to a step of the position setpoint with the linear maps at every tick.
 fn cascade_step(kp: f64, periods: usize, step: f64) {
-    let none = 0.0;
+    let zero = 0.0;
     let mut m = machine(&[
-        ("x.friction.a", none),
-        ("x.friction.c", none),
-        ("x.friction.i0", none),
-        ("x.feedforward.velocity", none),
-        ("x.feedforward.torque_kg_m2", none),
-        ("x.delays.alpha_ms", none),
+        ("x.friction.a", zero),
+        ("x.friction.c", zero),
+        ("x.friction.i0", zero),
+        ("x.feedforward.velocity", zero),
+        ("x.feedforward.torque_kg_m2", zero),
+        ("x.delays.alpha_ms", zero),
     ]);
     let ratio = 0.020 / std::f64::consts::TAU;
     let position = {
@@ -249,12 +249,12 @@ fn cascade_step(kp: f64, periods: usize, step: f64) {
             x = plant * x;
         });
     }
-    assert!(x[TH] * ratio > 0.01 * step, "nothing moved");
+    assert!(x[TH] * ratio > 0.01 * step, "the axis did not move");
 }
 
 #[test]
-fn velocity_loop_step_within_one_position_period() {
-    // The position loop acts once, at the first instant: a step of Ω* for the velocity loop.
+fn velocity_loop_step_within_one_position_cycle() {
+    // The position loop executes once, at the start: a step of Ω* for the velocity loop.
     cascade_step(25.0, 1, 1e-3);
 }
 

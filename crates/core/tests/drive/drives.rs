@@ -1,4 +1,4 @@
-//! Kinds of drive and their limits.
+//! Screw drive, linear motor, saturation and parameter changes.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -10,9 +10,9 @@ use virtual_axes_verification::fixtures::machines::{RestToRestProfile, assert_ne
 const X: usize = 0;
 const Z: usize = 2;
 
-/// A machine with the default X axis alone, behind a screw or as the linear motor that equals it.
+/// Creates a machine with the default X axis only, with a screw or as the equivalent linear motor.
 ///
-/// With r in m/rad, a mass J/r², a force constant Kt/r and so on are the same drive seen from the axis.
+/// With r in m/rad, mass J/r² and force constant Kt/r describe the same drive at the axis.
 fn single_axis(direct: bool) -> Machine {
     let r: f64 = 0.020 / TAU;
     let (transmission, motor, gain, torque) = if direct {
@@ -62,7 +62,7 @@ fn single_axis(direct: bool) -> Machine {
 }
 
 #[test]
-fn a_linear_motor_that_equals_a_screw_drive_moves_as_it_does() {
+fn linear_motor_equals_the_equivalent_screw_drive() {
     let profile = RestToRestProfile::new(0.2, 10.0 / 60.0, 2.5, 50.0);
     let (mut screw, mut linear) = (single_axis(false), single_axis(true));
     let mut largest: f64 = 0.0;
@@ -76,11 +76,11 @@ fn a_linear_motor_that_equals_a_screw_drive_moves_as_it_does() {
         assert!((s.current - l.current).abs() < 1e-7, "instant {k}: {} A and {} A", s.current, l.current);
         assert!((s.effort - l.effort).abs() < 1e-4, "instant {k}: {} N and {} N", s.effort, l.effort);
     }
-    assert!(largest > 5.0, "nothing moved");
+    assert!(largest > 5.0, "the axis did not move");
 }
 
 #[test]
-fn a_step_of_100_mm_saturates_and_is_recovered_from() {
+fn cascade_recovers_from_saturation_by_a_step_of_100_mm() {
     let mut m = machine(&[]);
     let mut saturated = 0;
     for _ in 0..500 {
@@ -92,16 +92,16 @@ fn a_step_of_100_mm_saturates_and_is_recovered_from() {
         });
     }
     assert!(saturated > 10, "the step is too small");
-    // A setpoint without its wind-up comes to rest where it was sent.
+    // Anti-windup: the axis comes to rest at the setpoint.
     assert_near("position, m", m.axis(X).sample().position, 0.1, 2e-6);
     assert_near("velocity, m/s", m.axis(X).sample().velocity, 0.0, 1e-9);
 }
 
 #[test]
-fn a_load_that_saturates_the_current_is_recovered_from() {
+fn cascade_recovers_from_a_load_that_saturates_the_current() {
     let mut m = machine(&[]);
     let rest = [0.0; 5];
-    // 54 A hold 45 kN at X: more than that pushes it away.
+    // 54 A hold 45 kN at X: a larger load moves the axis.
     m.set_load(X, 60e3);
     for _ in 0..3 {
         m.advance(&rest, &[]);
@@ -115,7 +115,7 @@ fn a_load_that_saturates_the_current_is_recovered_from() {
 }
 
 #[test]
-fn an_axis_at_rest_stays_at_rest_under_its_weight() {
+fn vertical_axis_stays_at_rest_under_gravity() {
     let mut m = machine(&[]);
     for _ in 0..1000 {
         m.advance(&[0.0; 5], &[]);
@@ -128,14 +128,15 @@ fn an_axis_at_rest_stays_at_rest_under_its_weight() {
 }
 
 #[test]
-fn gains_changed_at_rest_move_nothing() {
+fn changing_gains_at_rest_causes_no_motion() {
     let mut m = machine(&[]);
     for _ in 0..10 {
         m.advance(&[0.0; 5], &[]);
     }
     let changes = [("z.velocity_loop.gain", 3.0), ("z.position_loop.gain", 1.0), ("z.delays.alpha_ms", 40.0)];
     let config = parameters(&changes).machine_config().expect("valid");
-    m.update_parameters(Arc::new(MachineParameters::new(&config).expect("can be discretized"))).expect("same machine");
+    m.update_parameters(Arc::new(MachineParameters::new(&config).expect("can be discretized")))
+        .expect("same machine");
     for _ in 0..100 {
         m.advance(&[0.0; 5], &[]);
     }
@@ -143,7 +144,7 @@ fn gains_changed_at_rest_move_nothing() {
 }
 
 #[test]
-fn parameters_of_another_machine_are_not_adopted() {
+fn parameters_with_other_periods_are_rejected() {
     let mut m = machine(&[]);
     let other = single_axis(false);
     let before = m.clone();

@@ -1,4 +1,4 @@
-//! What friction may and may not do, for any motor state and load.
+//! Properties of friction for any motor state and load: opposes motion, never reverses the axis, sticks below i0.
 
 use proptest::prelude::*;
 use virtual_axes_core::drive::{MotorState, Plant};
@@ -22,7 +22,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn friction_opposes_motion_and_only_slows_down(
+    fn friction_opposes_motion_and_never_accelerates(
         current in -60.0..60.0f64,
         speed in prop_oneof![-200.0..200.0f64, -0.1..0.1f64, -1e-9..1e-9f64, Just(0.0)],
         voltage in -245.0..245.0f64,
@@ -36,11 +36,11 @@ proptest! {
         plant([0.0; 5]).step(&mut without, voltage, load);
         prop_assert!(torques.friction * with.speed >= 0.0, "friction drives: {torques:?} {with:?}");
         prop_assert!(with.speed.abs() <= without.speed.abs(), "{with:?} faster than {without:?}");
-        prop_assert!(with.speed * without.speed >= 0.0, "friction has reversed the axis");
+        prop_assert!(with.speed * without.speed >= 0.0, "friction reverses the axis");
     }
 
     #[test]
-    fn an_axis_at_rest_sticks_below_i0_and_breaks_away_above(fraction in -0.999_999..0.999_999f64) {
+    fn axis_sticks_below_i0_and_breaks_away_above(fraction in -0.999_999..0.999_999f64) {
         let plant = plant(LAW);
         let breakaway = KT * LAW[4] / RATIO;
         let mut s = MotorState::default();
@@ -57,7 +57,7 @@ proptest! {
 }
 
 #[test]
-fn friction_beyond_the_fitted_range_is_said() {
+fn friction_beyond_the_fitted_range_is_reported_as_extrapolated() {
     let plant = plant(LAW);
     let at = |meters_per_minute: f64| meters_per_minute / 60.0 / RATIO;
     assert!(!plant.is_friction_extrapolated(at(19.99)));

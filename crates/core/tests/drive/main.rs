@@ -1,8 +1,8 @@
-//! TODO
+//! Tests of plant and inner loops: closed forms, C reference, friction, parameter ranges, SIMD bit-identity.
 
 mod analytic;
 mod drives;
 mod friction;
-mod lanes;
-mod numbers;
+mod parameter_ranges;
 mod scalar_c;
+mod simd;

@@ -87,8 +87,8 @@ impl Setpoints {
     }
 
     fn figures(&self, arguments: &[&str]) -> Value {
-        let answer: Value = serde_json::from_str(&self.run("run 1\n", arguments)).expect("it is JSON");
-        answer["machines"][0].clone()
+        let output: Value = serde_json::from_str(&self.run("run 1\n", arguments)).expect("it is JSON");
+        output["machines"][0].clone()
     }
 
     fn positions(&self) -> Vec<Vec<f64>> {

@@ -1,4 +1,4 @@
-//! Axes side by side do what each does alone, bit for bit, however wide the vectors are.
+//! Bit-identity of axes alone and concatenated, for every SIMD width.
 
 use std::sync::Arc;
 
@@ -12,16 +12,16 @@ use virtual_axes_verification::fixtures::machines::{
     AXES, TSP, configured, configured_with, program, setpoints, watch_scenario,
 };
 
-/// Position periods of a run.
-const PERIODS: usize = 300;
+/// Position cycles of a run.
+const CYCLES: usize = 300;
 
 fn parameters(config: &MachineConfig) -> Arc<MachineParameters> {
     Arc::new(MachineParameters::new(config).expect("can be discretized"))
 }
 
-/// Setpoints that reach limits, reverse and stand still, of each axis another.
+/// Returns setpoints that reach limits, reverse and stand still, different for each axis.
 fn psec(axis: usize, k: usize) -> f64 {
-    let t = TSP * k.min(PERIODS / 2) as f64;
+    let t = TSP * k.min(CYCLES / 2) as f64;
     let size = if axis < 3 { 0.02 } else { 0.3 };
     size * (1.0 - (9.0 * t + axis as f64).cos()) * (1.0 + 0.3 * axis as f64)
 }
@@ -41,14 +41,14 @@ fn bits(sample: &AxisSample) -> [u64; 8] {
     numbers.map(f64::to_bits)
 }
 
-/// What can be seen of `count` axes from `first` on: samples of all instants, positions of all ticks, figures.
-fn seen(machine: &mut Machine, first: usize, count: usize) -> Vec<u64> {
+/// Returns the bits of `count` axes from `first` on: samples, positions of all ticks, statistics.
+fn bits_of_run(machine: &mut Machine, first: usize, count: usize) -> Vec<u64> {
     let axes = machine.axis_count();
     let start: Vec<f64> = (0..axes).map(|axis| psec(axis % AXES, 0)).collect();
     machine.reset(&start);
     let horizon = machine.preview_length();
-    let mut seen = Vec::new();
-    for k in 0..PERIODS {
+    let mut result = Vec::new();
+    for k in 0..CYCLES {
         for axis in 0..axes {
             machine.set_load(axis, if k % 50 < 5 { 40.0 * (axis % AXES) as f64 } else { 0.0 });
         }
@@ -57,16 +57,16 @@ fn seen(machine: &mut Machine, first: usize, count: usize) -> Vec<u64> {
             (0..axes).flat_map(|axis| (1..=horizon).map(move |j| psec(axis % AXES, k + j))).collect();
         machine.advance(&now, &ahead);
         for axis in first..first + count {
-            seen.extend(bits(machine.axis(axis).sample()));
-            seen.extend((0..machine.ticks_per_period()).map(|tick| machine.position(axis, tick).to_bits()));
+            result.extend(bits(machine.axis(axis).sample()));
+            result.extend((0..machine.ticks_per_period()).map(|tick| machine.position(axis, tick).to_bits()));
             let activity = machine.activity(axis);
-            seen.extend([activity.peak_current.to_bits(), activity.saturated_ticks]);
+            result.extend([activity.peak_current.to_bits(), activity.saturated_ticks]);
         }
     }
-    seen
+    result
 }
 
-/// Machines that differ in everything that lanes can differ in.
+/// Returns machines that differ in controller, friction compensation, limits and tilt.
 fn machines() -> Vec<MachineConfig> {
     vec![
         configured("mikron_ucp710", &[]),
@@ -80,30 +80,33 @@ fn machines() -> Vec<MachineConfig> {
 }
 
 #[test]
-fn every_width_gives_the_same_bits() {
+fn every_simd_width_is_bit_identical() {
     for config in machines() {
         let mut machine = Machine::new(parameters(&config));
-        let widest = seen(&mut machine, 0, AXES);
+        let widest = bits_of_run(&mut machine, 0, AXES);
         for width in [SimdWidth::Four, SimdWidth::Baseline] {
             machine.set_simd_width(width);
-            assert!(widest == seen(&mut machine, 0, AXES), "{width:?}");
+            assert!(widest == bits_of_run(&mut machine, 0, AXES), "{width:?}");
         }
     }
 }
 
 #[test]
-fn an_axis_does_the_same_alone_and_beside_any_others() {
+fn axes_are_bit_identical_alone_and_concatenated() {
     let all: Vec<_> = machines().iter().map(parameters).collect();
-    let together = MachineParameters::concatenate(&all).expect("alike in their periods");
-    let mut together = Machine::new(Arc::new(together));
-    for (place, one) in all.iter().enumerate() {
+    let concatenated = MachineParameters::concatenate(&all).expect("equal periods");
+    let mut concatenated = Machine::new(Arc::new(concatenated));
+    for (index, one) in all.iter().enumerate() {
         let mut alone = Machine::new(Arc::clone(one));
-        assert!(seen(&mut alone, 0, AXES) == seen(&mut together, place * AXES, AXES), "machine {place}");
+        assert!(
+            bits_of_run(&mut alone, 0, AXES) == bits_of_run(&mut concatenated, index * AXES, AXES),
+            "machine {index}"
+        );
     }
 }
 
 #[test]
-fn machines_of_other_periods_do_not_go_together() {
+fn machines_with_different_periods_cannot_be_concatenated() {
     let slow = configured("mikron_ucp710", &[]);
     let fast = virtual_axes_verification::fixtures::machines::parameters(&[("periods.current_us", 62.5)])
         .machine_config()
@@ -113,19 +116,19 @@ fn machines_of_other_periods_do_not_go_together() {
 }
 
 #[test]
-fn what_is_shown_tick_by_tick_is_what_is_summed_up() {
+fn observed_ticks_agree_with_cycle_statistics() {
     for config in machines() {
         let mut machine = Machine::new(parameters(&config));
-        let mut shown = machine.clone();
-        for k in 0..PERIODS {
+        let mut observed = machine.clone();
+        for k in 0..CYCLES {
             let now: Vec<f64> = (0..AXES).map(|axis| psec(axis, k)).collect();
             machine.advance(&now, &[]);
             let mut tick = 0;
             let mut peaks = [0.0_f64; AXES];
             let mut saturated = [0; AXES];
-            shown.advance_with(&now, &[], |shown| {
+            observed.advance_with(&now, &[], |observed| {
                 for (axis, peak) in peaks.iter_mut().enumerate() {
-                    let sample = shown.axis(axis).sample();
+                    let sample = observed.axis(axis).sample();
                     assert_eq!(sample.position.to_bits(), machine.position(axis, tick).to_bits());
                     *peak = peak.max(sample.current.abs());
                     saturated[axis] += u64::from(sample.saturated);
@@ -136,14 +139,14 @@ fn what_is_shown_tick_by_tick_is_what_is_summed_up() {
             for axis in 0..AXES {
                 let activity = machine.activity(axis);
                 assert_eq!((activity.peak_current, activity.saturated_ticks), (peaks[axis], saturated[axis]));
-                assert_eq!(shown.axis(axis).sample(), machine.axis(axis).sample());
+                assert_eq!(observed.axis(axis).sample(), machine.axis(axis).sample());
             }
         }
     }
 }
 
 #[test]
-fn variants_that_are_run_together_have_the_figures_that_each_has_alone() {
+fn variants_in_one_machine_have_the_figures_of_separate_runs() {
     let base = configured("mikron_ucp710", &[]);
     let (x, y) = (0, 1);
     let variants: Vec<MachineConfig> = ["2.0", "1.2", "1.5"]
@@ -182,8 +185,8 @@ fn variants_that_are_run_together_have_the_figures_that_each_has_alone() {
 }
 
 #[test]
-fn a_period_of_poses_is_as_far_from_the_path_as_each_of_them() {
-    // Share of the periods that go by a closed form: all but those at rest or about a corner on lines and
+fn contour_error_of_a_position_cycle_equals_that_of_single_poses() {
+    // Share of the position cycles that use a closed form: all except those at rest or near a corner on lines and
     // circles, none on splines.
     for (scenario, closed) in [
         ("ballbar", 0.8..1.0),

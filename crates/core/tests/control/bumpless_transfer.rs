@@ -1,4 +1,4 @@
-//! A controller that takes over from another while the axes move.
+//! Bumpless transfer between position controllers in motion.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ fn parameters_of(changes: &[&str]) -> Arc<MachineParameters> {
     Arc::new(MachineParameters::new(&configured(MACHINE, changes)).expect("a machine"))
 }
 
-/// One position period of the ballbar trial, with the setpoints that are read ahead.
+/// Advances by one position cycle of the ballbar scenario, with the preview of the controllers.
 fn advance(machine: &mut Machine, ballbar: &Ballbar, k: i64, observe: impl FnMut(&Machine)) {
     let psec = |k: i64| ballbar.psec(k as f64 * TSP);
     let horizon = machine.preview_length() as i64;
@@ -31,27 +31,27 @@ fn advance(machine: &mut Machine, ballbar: &Ballbar, k: i64, observe: impl FnMut
     machine.advance_with(&psec(k), &ahead, observe);
 }
 
-/// What the velocity loop is asked for, rad/s: Ω* and the velocity feedforward.
+/// Returns the setpoint of the velocity loop, Ω* + VFFWS, rad/s.
 fn command(sample: &AxisSample) -> f64 {
     sample.velocity_setpoint + sample.velocity_feedforward
 }
 
-/// Position periods of a turn at full feed.
+/// Returns the number of position cycles of a turn at full feed.
 fn turn(ballbar: &Ballbar) -> i64 {
     (TAU * ballbar.radius / ballbar.velocity / TSP) as i64
 }
 
-/// What is seen of a stretch of the circle.
+/// Observations on a section of the circle.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
-    /// Largest change of what X or Y is asked for between two position instants, rad/s.
+struct Observation {
+    /// Largest change of Ω* + VFFWS of X or Y per position cycle, rad/s.
     change: f64,
-    /// Radial deviation, smallest and largest at any tick, m.
+    /// Smallest and largest radial deviation of all ticks, m.
     deviation: [f64; 2],
     saturated: bool,
 }
 
-/// Follows the circle to instant `to`, and says what was seen on the way.
+/// Run along the circle.
 #[derive(Clone)]
 struct Run<'a> {
     ballbar: &'a Ballbar,
@@ -65,42 +65,44 @@ impl<'a> Run<'a> {
         Run { ballbar, machine: Machine::new(parameters), next: 0, last: [0.0; 2] }
     }
 
-    fn until(&mut self, to: i64) -> Seen {
-        let mut seen = Seen { change: 0.0, deviation: [f64::INFINITY, f64::NEG_INFINITY], saturated: false };
+    fn until(&mut self, to: i64) -> Observation {
+        let mut observed =
+            Observation { change: 0.0, deviation: [f64::INFINITY, f64::NEG_INFINITY], saturated: false };
         while self.next < to {
             let (ballbar, last) = (self.ballbar, &mut self.last);
-            let mut position_instant = true;
+            let mut is_first_tick = true;
             advance(&mut self.machine, ballbar, self.next, |m| {
-                let [x, y] = [0, 1].map(|place| m.axis(place).sample());
-                if std::mem::take(&mut position_instant) {
+                let [x, y] = [0, 1].map(|index| m.axis(index).sample());
+                if std::mem::take(&mut is_first_tick) {
                     let now = [command(x), command(y)];
                     for (now, last) in now.into_iter().zip(last.iter_mut()) {
-                        seen.change = seen.change.max((now - *last).abs());
+                        observed.change = observed.change.max((now - *last).abs());
                         *last = now;
                     }
                 }
                 let deviation = ballbar.radial_deviation(x.position, y.position);
-                seen.deviation = [seen.deviation[0].min(deviation), seen.deviation[1].max(deviation)];
-                seen.saturated |= x.saturated || y.saturated;
+                observed.deviation =
+                    [observed.deviation[0].min(deviation), observed.deviation[1].max(deviation)];
+                observed.saturated |= x.saturated || y.saturated;
             });
             self.next += 1;
         }
-        seen
+        observed
     }
 }
 
-/// The first instant of a whole turn at steady feed.
+/// First position cycle of a whole turn at steady feed.
 const STEADY: i64 = 250;
 
-/// What is seen on a turn when nothing is switched.
-fn steady(ballbar: &Ballbar, changes: &[&str]) -> Seen {
+/// Returns the observation of one turn without a transfer.
+fn steady(ballbar: &Ballbar, changes: &[&str]) -> Observation {
     let mut run = Run::new(ballbar, parameters_of(changes));
     run.until(STEADY);
     run.until(STEADY + turn(ballbar))
 }
 
 #[test]
-fn cascade_to_predictive_and_back_on_a_circle_is_not_felt() {
+fn transfer_between_cascade_and_gpc_on_a_circle_is_bumpless() {
     let ballbar = Ballbar::paper();
     let turn = turn(&ballbar);
     let (cascade, gpc) = (steady(&ballbar, CASCADE), steady(&ballbar, GPC));
@@ -111,28 +113,33 @@ fn cascade_to_predictive_and_back_on_a_circle_is_not_felt() {
     let (to_cascade, to_gpc) = (parameters_of(CASCADE), parameters_of(GPC));
     let mut undisturbed = Run::new(&ballbar, Arc::clone(&to_cascade));
     undisturbed.until(STEADY + turn / 4);
-    // At every instant of a turn: a reversal is where a switch is felt most.
+    // At every position cycle of a turn; reversals are most sensitive.
     for first in STEADY + turn / 4..STEADY + 5 * turn / 4 {
         undisturbed.until(first);
         let mut run = undisturbed.clone();
         for (parameters, before) in [(&to_gpc, cascade), (&to_cascade, gpc)] {
             run.machine.update_parameters(Arc::clone(parameters)).expect("the same machine");
-            let seen = run.until(run.next + 80);
-            assert!(!seen.saturated);
-            assert!(seen.change <= 2.0 * before.change, "{first}: {} and {}", seen.change, before.change);
+            let observed = run.until(run.next + 80);
+            assert!(!observed.saturated);
             assert!(
-                seen.deviation[0] >= envelope[0] && seen.deviation[1] <= envelope[1],
+                observed.change <= 2.0 * before.change,
+                "{first}: {} and {}",
+                observed.change,
+                before.change
+            );
+            assert!(
+                observed.deviation[0] >= envelope[0] && observed.deviation[1] <= envelope[1],
                 "{first}: {:?} outside {envelope:?}",
-                seen.deviation
+                observed.deviation
             );
         }
     }
 }
 
 #[test]
-fn no_controller_takes_over_from_another_with_a_bump() {
+fn transfer_between_all_controllers_is_bumpless() {
     let ballbar = Ballbar::paper();
-    // What the axes may accelerate within a position period, and what a turn asks for by itself.
+    // Acceleration limit within a position cycle, and the change along the circle.
     let allowed = 3.0 * TSP / (0.020 / TAU);
     let all = [CASCADE, NO_FEEDFORWARD, GPC, STIFF_GPC, STIFF, COMPENSATED];
     for from in all {
@@ -145,17 +152,21 @@ fn no_controller_takes_over_from_another_with_a_bump() {
                 run.machine.update_parameters(parameters_of(to)).expect("the same machine");
                 run.until(first + 1);
                 let step = (0..2).map(|i| (run.last[i] - before[i]).abs()).fold(0.0, f64::max);
-                assert!(step <= allowed + 1.5, "{from:?} to {to:?} at {first}: {step} rad/s at once");
-                let seen = run.until(first + 60);
-                assert!(!seen.saturated, "{from:?} to {to:?} at {first}");
-                assert!(seen.change <= allowed + 1.5, "{from:?} to {to:?} at {first}: {}", seen.change);
-                // Half a second later nothing is left of it but the new controller's own deviation.
+                assert!(step <= allowed + 1.5, "{from:?} to {to:?} at {first}: {step} rad/s in one cycle");
+                let observed = run.until(first + 60);
+                assert!(!observed.saturated, "{from:?} to {to:?} at {first}");
+                assert!(
+                    observed.change <= allowed + 1.5,
+                    "{from:?} to {to:?} at {first}: {}",
+                    observed.change
+                );
+                // Half a second later only the deviation of the new controller remains.
                 run.until(first + 120);
                 let late = run.until(first + 150).deviation;
                 let own = steady(&ballbar, to).deviation;
                 assert!(
                     late[0] >= own[0] - 5e-6 && late[1] <= own[1] + 5e-6,
-                    "{from:?} to {to:?} at {first}: {late:?}, by itself {own:?}"
+                    "{from:?} to {to:?} at {first}: {late:?}, without transfer {own:?}"
                 );
             }
         }
