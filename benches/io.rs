@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use criterion::{Criterion, Throughput};
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::machine::AxisSample;
-use virtual_axes_core::simulation::joints;
+use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::units::Nanoseconds;
 use virtual_axes_io::files::{
     OutputFile, PsecCsv, RecordingOptions, Trajectories, encode, psec_writer, read_psec_yaml, read_recording,
@@ -135,7 +135,7 @@ fn message_bytes(names: &[String], row: &[AxisSample; 5]) -> u64 {
 fn cases(machine: &'static MachineConfig, folder: &Path) -> Vec<Case> {
     let periods = machine.periods();
     let (period, tick) = (periods.position, periods.current);
-    let limits = joints(machine, "");
+    let limits = joint_limits(machine, "");
     let names: Vec<String> = machine.axes().iter().map(|axis| axis.name().to_owned()).collect();
     let rows: Vec<[f64; 5]> =
         (0..INSTANTS).map(|k| std::array::from_fn(|axis| position(axis, k * period))).collect();

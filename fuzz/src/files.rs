@@ -2,13 +2,13 @@
 
 use std::io::Cursor;
 
+use virtual_axes_core::trajectory::{Trajectory, ValidationContext};
+use virtual_axes_identify::recording::{Conditioning, Finding, RawRecording, condition};
 use virtual_axes_io::files::{
     Columns, PsecCsv, PsecCsvOut, RecordingOptions, Trajectories, read_psec_yaml, read_recording_csv,
     read_recording_mcap,
 };
 use virtual_axes_io::messages;
-use virtual_axes_identify::recording::{Conditioning, Finding, RawRecording, condition};
-use virtual_axes_core::trajectory::{Context, Trajectory};
 
 use crate::{JOINTS, MACHINE, bounded, bounded_beside, names, refused};
 
@@ -65,11 +65,11 @@ pub fn psec_csv(data: &[u8]) {
     });
 }
 
-fn check(request: virtual_axes_core::trajectory::Request) {
+fn check(request: virtual_axes_core::trajectory::TrajectoryRequest) {
     if request.points() > 0 && request.point(request.points() - 1).is_some_and(|(time, _)| time > LONGEST) {
         return;
     }
-    let context = Context {
+    let context = ValidationContext {
         joints: &JOINTS,
         period: MACHINE.periods().position,
         max_points: MOST_POINTS,

@@ -30,7 +30,7 @@ const ORIGIN: Nanoseconds = 1_700_000_000_000_000_000;
 
 static PARAMETERS: LazyLock<Parameters> = LazyLock::new(|| Parameters::embedded_default().expect("shipped"));
 static MACHINE: LazyLock<MachineConfig> = LazyLock::new(|| PARAMETERS.machine_config().expect("shipped"));
-static JOINTS: LazyLock<Vec<JointLimits>> = LazyLock::new(|| simulation::joints(&MACHINE, ""));
+static JOINTS: LazyLock<Vec<JointLimits>> = LazyLock::new(|| simulation::joint_limits(&MACHINE, ""));
 
 fn names() -> Vec<String> {
     JOINTS.iter().map(|joint| joint.name.clone()).collect()

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
-use virtual_axes_core::trajectory::{Context, MotionId, Request, Row, Start, Trajectory};
+use virtual_axes_core::trajectory::{
+    MotionId, Start, Trajectory, TrajectoryPoint, TrajectoryRequest, ValidationContext,
+};
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
 
 use crate::{JOINTS, MACHINE, ORIGIN, bounded, machine_at_rest, refused, step};
@@ -31,11 +33,17 @@ fn start(input: &mut Unstructured<'_>, now: Nanoseconds) -> Result<Start> {
 }
 
 /// A request of some joints that begins where they are commanded to be.
-fn request(input: &mut Unstructured<'_>, now: Nanoseconds, commanded: &[f64]) -> Result<Option<Request>> {
+fn request(
+    input: &mut Unstructured<'_>,
+    now: Nanoseconds,
+    commanded: &[f64],
+) -> Result<Option<TrajectoryRequest>> {
     let mask: u8 = input.arbitrary()?;
     let places: Vec<usize> = (0..JOINTS.len()).filter(|place| mask >> place & 1 == 1).collect();
-    let mut request =
-        Request::new(start(input, now)?, places.iter().map(|&place| JOINTS[place].name.clone()).collect());
+    let mut request = TrajectoryRequest::new(
+        start(input, now)?,
+        places.iter().map(|&place| JOINTS[place].name.clone()).collect(),
+    );
     let order = input.int_in_range(0..=2)?;
     let mut at: Vec<f64> = places.iter().map(|&place| commanded[place]).collect();
     let mut time: Nanoseconds = 0;
@@ -58,7 +66,12 @@ fn request(input: &mut Unstructured<'_>, now: Nanoseconds, commanded: &[f64]) ->
         };
         let velocities = if order > 0 { row(0.4, input)? } else { Vec::new() };
         let accelerations = if order > 1 { row(3.0, input)? } else { Vec::new() };
-        let row = Row { positions: &at, velocities: &velocities, accelerations: &accelerations, effort: &[] };
+        let row = TrajectoryPoint {
+            positions: &at,
+            velocities: &velocities,
+            accelerations: &accelerations,
+            effort: &[],
+        };
         if let Err(rejection) = request.push(time, row) {
             refused(&rejection.to_string());
             return Ok(None);
@@ -79,7 +92,7 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
                     .map(|joint| simulation.psec_ahead(joint, 0).unwrap_or_default())
                     .collect();
                 let Some(request) = request(input, now, &commanded)? else { continue };
-                let context = Context {
+                let context = ValidationContext {
                     joints: &JOINTS,
                     period,
                     max_points: MOST_POINTS,
@@ -87,7 +100,7 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
                 };
                 let accepted = Trajectory::new(request, &context).and_then(|trajectory| {
                     id += 1;
-                    simulation.offer(MotionId(id), Arc::new(trajectory))
+                    simulation.submit(MotionId(id), Arc::new(trajectory))
                 });
                 match accepted {
                     Ok(admission) => {
@@ -116,7 +129,7 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
                 let at = simulation.psec_ahead(place, 0).unwrap_or_default();
                 let position = at + value(input, 2e-3)?;
                 let sent = input.arbitrary::<bool>()?.then_some(now);
-                if let Err(rejection) = simulation.stream_sent(place, position, sent) {
+                if let Err(rejection) = simulation.submit_setpoint_stamped(place, position, sent) {
                     refused(&rejection.to_string());
                 }
             }
@@ -130,12 +143,12 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
                 n => _ = simulation.cancel(MotionId(u64::from(n % 16))),
             },
         }
-        offered -= simulation.take_ends().count();
+        offered -= simulation.drain_finished().count();
     }
     // What was accepted ends once: by its end, by another, or by this.
     simulation.reset();
     step(&mut simulation, 1);
-    offered -= simulation.take_ends().count();
+    offered -= simulation.drain_finished().count();
     assert_eq!(offered, 0, "motions without an end");
     Ok(())
 }

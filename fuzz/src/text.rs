@@ -1,7 +1,7 @@
 //! Texts: machine files, parameters, scenarios, arguments.
 
-use virtual_axes_core::config::{Parameters, Source};
 use virtual_axes::ingress::args::Command;
+use virtual_axes_core::config::{Parameters, ValueSource};
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::scenario::Scenario;
 
@@ -43,7 +43,7 @@ pub fn parameter_text(data: &[u8]) {
     let Ok(text) = str::from_utf8(data) else { return };
     bounded(data.len(), || {
         let mut parameters = PARAMETERS.clone();
-        let source = Source::named("-p");
+        let source = ValueSource::named("-p");
         let results: Vec<_> = if text.starts_with('/') {
             let result = parameters.overlay_yaml(text, "over.yaml", Some("/virtual_axes"));
             vec![result.map(|_| ()).map_err(|error| error.to_string())]
