@@ -5,8 +5,9 @@ use std::fmt::Display;
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 
 use super::convert::header;
-use super::footprint::{Discovered, own_memory_mb};
 use super::pace::{AxisHealth, ClockSource, Health};
+use super::process_memory::private_memory_mb;
+use super::remote_endpoints::DiscoveredEndpoints;
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds};
 
 /// What stays the same from message to message.
@@ -21,7 +22,7 @@ pub struct Diagnostics {
     /// `real`, `fast` or `sim`.
     pub time_mode: &'static str,
     /// Counts the endpoints elsewhere.
-    pub discovered: Discovered,
+    pub discovered: DiscoveredEndpoints,
 }
 
 fn value(key: &str, value: impl Display) -> KeyValue {
@@ -42,13 +43,13 @@ impl Diagnostics {
         let axes = self.axes(before, now).map(|(joint, before, now)| self.axis(joint, before, now));
         let mut node = self.node_status(before, now, outputs_dropped);
         node.values.push(value("endpoints_discovered", self.discovered.count()));
-        node.values.extend(own_memory_mb().map(|memory| value("memory_mb", format!("{memory:.1}"))));
+        node.values.extend(private_memory_mb().map(|memory| value("memory_mb", format!("{memory:.1}"))));
         let status = std::iter::once(node).chain(axes).collect();
         DiagnosticArray { header: header(time), status }
     }
 
-    /// Joints that stood outside of their stroke between `before` and `now`.
-    pub fn outside_stroke(&self, before: &Health, now: &Health) -> Vec<&str> {
+    /// Joints that stood outside their travel limits between `before` and `now`.
+    pub fn outside_travel_limits(&self, before: &Health, now: &Health) -> Vec<&str> {
         let left = |&(_, before, now): &(&str, AxisHealth, AxisHealth)| now.outside > before.outside;
         self.axes(before, now).filter(left).map(|(joint, ..)| joint).collect()
     }
@@ -148,12 +149,12 @@ impl Diagnostics {
             problems.push("friction law used beyond its fitted range of 20 m/min or rev/min");
         }
         if now.outside > before.outside {
-            problems.push("outside its stroke");
+            problems.push("outside its travel limits");
         }
         let values = vec![
             value("saturated_periods", now.saturated),
             value("friction_extrapolated_periods", now.extrapolated),
-            value("outside_stroke_periods", now.outside),
+            value("outside_travel_limits_periods", now.outside),
         ];
         self.status(format!("{}: {joint}", self.node), &problems, "ok", values)
     }
@@ -170,7 +171,7 @@ mod tests {
             machine: "m".into(),
             joints: vec!["x".into()],
             time_mode: "real",
-            discovered: Discovered::default(),
+            discovered: DiscoveredEndpoints::default(),
         };
         let before = Health { axes: vec![AxisHealth::default()], ..Health::default() };
         let mut now = before.clone();

@@ -59,16 +59,16 @@ impl FanOut {
                 tool.take(&frame, publish).await;
             }
             if publish {
-                if self.joint_states.is_heard() {
+                if self.joint_states.has_subscriptions() {
                     self.joint_states.send(convert::joint_state(&frame, &self.joints)).await;
                 }
-                if self.motor_currents.is_heard() {
+                if self.motor_currents.has_subscriptions() {
                     self.motor_currents.send(convert::motor_currents(&frame, &self.joints)).await;
                 }
-                if self.drive_states.is_heard() {
+                if self.drive_states.has_subscriptions() {
                     self.drive_states.send(convert::drive_states(&frame, &self.joints)).await;
                 }
-                if self.controller_state.is_heard() {
+                if self.controller_state.has_subscriptions() {
                     self.controller_state.send(controller_state(&frame, velocities, &self.joints)).await;
                 }
             }
@@ -95,10 +95,10 @@ pub async fn publish_diagnostics(
         let mut message = text.message(now.time, &before, &now, (dropped_before, dropped_now));
         message.status.extend(recording.as_mut().map(|status| status.message(&text.node, &text.machine)));
         output.send(message).await;
-        let left = text.outside_stroke(&before, &now);
+        let left = text.outside_travel_limits(&before, &now);
         left.iter()
             .filter(|joint| !outside.contains(joint))
-            .for_each(|joint| warn!("{joint} has left its stroke"));
+            .for_each(|joint| warn!("{joint} has left its travel limits"));
         outside = left;
         (before, dropped_before) = (now, dropped_now);
     }

@@ -11,21 +11,21 @@ use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 use tracing::warn;
 
+use super::arc_pool::ArcPool;
 use super::convert;
 use super::endpoints::Subscription;
 use super::pace::{Command, Health};
 use super::results::{Origin, Results};
-use super::reused::Reused;
-use super::stream::{Order, Setpoints};
+use super::stream::{ReorderFilter, StreamSetpoints};
 use super::throttle::Throttle;
-pub use crate::door::Checks;
+pub use crate::ingress::TrajectoryValidator;
 use virtual_axes_core::trajectory::MotionId;
 use virtual_axes_core::units::Nanoseconds;
 
 /// Takes trajectories in, makes the checks that need no state, and hands them to the simulation.
 pub struct PsecInput {
     /// Those checks.
-    pub checks: Arc<Checks>,
+    pub checks: Arc<TrajectoryValidator>,
     /// To the simulation.
     pub commands: mpsc::Sender<Command>,
     /// Where decisions are published.
@@ -56,7 +56,7 @@ impl PsecInput {
     async fn take(&self, message: JointTrajectory, info: &MessageInfo) {
         let origin = Origin::of(&message.header.stamp, info);
         // A large trajectory takes a while to check; other tasks go on meanwhile.
-        let checked = tokio::task::block_in_place(|| self.checks.check(&message))
+        let checked = tokio::task::block_in_place(|| self.checks.validate(&message))
             .and_then(|trajectory| self.results.hold(trajectory));
         match checked {
             Ok(trajectory) => {
@@ -80,13 +80,14 @@ pub async fn take_stream(
     commands: mpsc::Sender<Command>,
 ) {
     let mut messages = std::pin::pin!(subscription.async_stream());
-    let (mut order, mut sent) = (Order::default(), Reused::default());
+    let (mut order, mut sent) = (ReorderFilter::default(), ArcPool::default());
     while let Some(received) = messages.next().await {
         match received {
             Ok((message, info)) => {
                 let publisher = info.publisher_gid().to_bytes16();
-                let setpoints = Setpoints::in_order(&message, &joints, publisher, &mut order);
-                let _ = commands.send(Command::Stream(sent.next(|last| *last = setpoints))).await;
+                let setpoints =
+                    StreamSetpoints::from_message_in_order(&message, &joints, publisher, &mut order);
+                let _ = commands.send(Command::Stream(sent.acquire(|last| *last = setpoints))).await;
             }
             Err(error) => warn!("a message on psec_stream could not be read: {error:?}"),
         }
@@ -102,11 +103,11 @@ pub async fn take_loads(
 ) {
     let mut messages = std::pin::pin!(subscription.async_stream());
     let (mut told, started) = (Throttle::default(), Instant::now());
-    let mut sent = Reused::default();
+    let mut sent = ArcPool::default();
     while let Some(received) = messages.next().await {
         match received.map_err(|e| format!("{e:?}")).and_then(|(m, _)| convert::loads(&m, &joints)) {
             Ok(loads) => {
-                let loads = sent.next(|last| *last = loads);
+                let loads = sent.acquire(|last| *last = loads);
                 let _ = commands.send(Command::Load { loads, hold }).await;
             }
             Err(reason) => {

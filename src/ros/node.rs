@@ -15,37 +15,41 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 use tracing::{info, warn};
 
-use super::action::{ActionServer, Ending, Feedback, GoalChecks, Tell, Work, feedback_period};
+use super::action::{
+    ActionServer, Feedback, GoalValidator, ServerContext, ShutdownHandle, Work, feedback_period,
+};
 use super::args::RosArgs;
 use super::clock::{ClockInput, ClockOutput, ClockState};
 use super::convert;
 use super::diagnostics::Diagnostics;
+use super::duplicate_node_name;
 use super::endpoints::{EndpointError, Endpoints};
 use super::environment::Environment;
 use super::fan_out::{FanOut, publish_diagnostics};
-use super::footprint::Discovered;
-use super::heard::{self, Listeners};
-use super::inputs::{Checks, PsecInput, next_id, take_loads, take_stream};
+use super::inputs::{PsecInput, TrajectoryValidator, next_id, take_loads, take_stream};
 use super::log::LogRecord;
-use super::namesake;
-use super::outputs::{Publishing, WhenFull, queue_length};
-use super::pace::{self, Channels, Command, Health, Pace, Turns};
+use super::matched_subscriptions::{self, MatchedSubscriptionTracker};
+use super::outputs::{OutputFactory, OverflowPolicy, queue_length};
+use super::pace::{self, Channels, Command, CooperativeTasks, Health, Pace};
 use super::parameter_host::{Host, LiveNodeParameters};
 use super::parameter_services::{self, ParameterServices};
 use super::participant::{Participant, ParticipantError};
-use super::recorder::{RecordError, Recorder};
+use super::recorder::{RecordError, TopicRecorder};
+use super::remote_endpoints::DiscoveredEndpoints;
 use super::results::Results;
 use super::rosout;
 use super::security::Security;
-use super::service::{self, ServiceError, TwoServices};
+use super::service::{self, ServiceError, ServiceNameConflict};
 use super::tool::ToolTopics;
 use super::topics::Topics;
 use super::trigger::{RESET, STOP, Trigger};
-use super::writers::{Owner, Renewals};
+use super::writer_rotation::{RotatedTopics, RotationContext};
 use virtual_axes_core::config::{ConfigError, Parameters, TimeMode};
 use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::simulation::{self, Simulation, SimulationError};
-use virtual_axes_core::trajectory::{Context, JointLimits, MotionId, Request, Start, Trajectory};
+use virtual_axes_core::trajectory::{
+    JointLimits, MotionId, Start, Trajectory, TrajectoryRequest, ValidationContext,
+};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// How long the end of the simulation's thread is waited for.
@@ -79,7 +83,7 @@ pub enum NodeError {
     Service(#[from] ServiceError),
     /// Two services have one name.
     #[error(transparent)]
-    TwoServices(#[from] TwoServices),
+    ServiceNameConflict(#[from] ServiceNameConflict),
     /// The operating system gives no thread, timer or signal handler.
     #[error("cannot {what}: {source}")]
     System {
@@ -99,7 +103,9 @@ impl NodeError {
     pub fn is_usage(&self) -> bool {
         matches!(
             self,
-            Self::Record(_) | Self::Endpoint(EndpointError::TwoTypes { .. }) | Self::TwoServices(_)
+            Self::Record(_)
+                | Self::Endpoint(EndpointError::TopicTypeConflict { .. })
+                | Self::ServiceNameConflict(_)
         )
     }
 }
@@ -140,15 +146,15 @@ async fn serve(
     let config = parameters.machine_config()?;
     let node_config = parameters.node_config();
     let mode = node_config.time;
-    let joint_limits = simulation::joints(&config, &node_config.joint_prefix);
+    let joint_limits = simulation::joint_limits(&config, &node_config.joint_prefix);
     let joints: Vec<String> = joint_limits.iter().map(|j| j.name.clone()).collect();
     let period = config.periods().position;
-    let (when_full, of_results) = match mode {
-        TimeMode::Real => (WhenFull::Drop, WhenFull::WaitForAWhile),
-        TimeMode::Fast | TimeMode::SimTime => (WhenFull::Wait, WhenFull::Wait),
+    let (overflow, of_results) = match mode {
+        TimeMode::Real => (OverflowPolicy::Drop, OverflowPolicy::BlockWithTimeout),
+        TimeMode::Fast | TimeMode::SimTime => (OverflowPolicy::Block, OverflowPolicy::Block),
     };
     let (health_out, health) = watch::channel(Health::default());
-    let mut recorder = Recorder::open(&node_config, when_full, &health)?;
+    let mut recorder = TopicRecorder::open(&node_config, overflow, &health)?;
 
     let context = participant.context()?;
     let dds = context.domain_participant();
@@ -162,16 +168,16 @@ async fn serve(
     let mut endpoints = Endpoints::new(&mut node, &dds, args, &parameters, &mut recorder);
     let mut topics = Topics::create(&mut endpoints, args, mode)?;
     let tool = ToolTopics::create(&mut endpoints, Kinematics::new(&config))?;
-    topics.names.also_publishes(tool.as_ref().map_or(&[], |tool| &tool.names));
+    topics.names.add_published(tool.as_ref().map_or(&[], |tool| &tool.names));
     let (action, action_topics) = ActionServer::new(&mut node, &context, args)?;
-    topics.names.goals_on.push(action_topics.name);
+    topics.names.actions.push(action_topics.name);
     let reset = Trigger::new(&mut node, &context, args, RESET)?;
     let stop = Trigger::new(&mut node, &context, args, STOP)?;
     let parameter_services = ParameterServices::new(&mut node, &context, args)?;
 
     let simulation = Simulation::new(&config, joint_limits.clone(), pace::origin(mode, period))?;
     let (commands, commands_in) = mpsc::channel(pace::COMMAND_QUEUE);
-    let (frames_out, frames) = mpsc::channel(queue_length(when_full));
+    let (frames_out, frames) = mpsc::channel(queue_length(overflow));
     let (reports_out, mut reports) = mpsc::unbounded_channel();
     let channels =
         Channels { commands: commands_in, frames: frames_out, reports: reports_out, health: health_out };
@@ -184,37 +190,37 @@ async fn serve(
     let ids = Arc::new(AtomicU64::new(1));
 
     // What goes out.
-    let mut listeners = Listeners::default();
-    let mut renewals = Renewals::default();
-    let mut publishing = Publishing {
+    let mut tracker = MatchedSubscriptionTracker::default();
+    let mut rotated = RotatedTopics::default();
+    let mut publishing = OutputFactory {
         participant: &dds,
         dropped: &dropped,
-        listeners: &mut listeners,
+        tracker: &mut tracker,
         tasks: &mut tasks,
-        renewals: &mut renewals,
+        rotated: &mut rotated,
     };
     let (goal_events, events) = mpsc::unbounded_channel();
     let results_output = publishing.start(topics.results, of_results);
     let results =
         Arc::new(Results::new(results_output, joint_limits.clone(), goal_events, node_config.max_points));
-    let diagnostics = publishing.start(topics.diagnostics, WhenFull::Drop);
+    let diagnostics = publishing.start(topics.diagnostics, OverflowPolicy::Drop);
     let every = node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * seconds(period))).round() as i64);
     let (running, running_goals) = watch::channel(Arc::from([]));
     let status = publishing.start(action_topics.status, of_results);
     let outputs = FanOut {
-        joint_states: publishing.start(topics.joint_states, when_full),
-        motor_currents: publishing.start(topics.motor_currents, when_full),
-        drive_states: publishing.start(topics.drive_states, when_full),
-        controller_state: publishing.start(topics.controller_state, when_full),
+        joint_states: publishing.start(topics.joint_states, overflow),
+        motor_currents: publishing.start(topics.motor_currents, overflow),
+        drive_states: publishing.start(topics.drive_states, overflow),
+        controller_state: publishing.start(topics.controller_state, overflow),
         feedback: Feedback {
             goals: running_goals,
-            output: publishing.start(action_topics.feedback, when_full),
+            output: publishing.start(action_topics.feedback, overflow),
             joints: joints.clone(),
             every: feedback_period(node_config.action_monitor_rate, period),
         },
-        tool: tool.map(|tool| tool.start(&mut publishing, node_config.tool.clone(), when_full)),
+        tool: tool.map(|tool| tool.start(&mut publishing, node_config.tool.clone(), overflow)),
         clock: topics.clock.map(|publisher| ClockOutput {
-            output: publishing.start(publisher, when_full),
+            output: publishing.start(publisher, overflow),
             state: clock.clone(),
         }),
         joints: joints.clone(),
@@ -224,35 +230,35 @@ async fn serve(
     if let Some(publisher) = rosout_publisher {
         tasks.spawn(rosout::publish(publisher, log));
     }
-    tasks.spawn(namesake::watch(dds.clone(), args.node().clone()));
+    tasks.spawn(duplicate_node_name::watch(dds.clone(), args.node().clone()));
     let recording = recorder.start()?;
 
     // What comes in.
-    let discovered = Discovered::default();
-    tasks.spawn(heard::run(dds.clone(), listeners, discovered.clone()));
-    let owner = Owner { node, context: context.clone(), range: participant.range() };
-    tasks.spawn(renewals.run(owner));
+    let discovered = DiscoveredEndpoints::default();
+    tasks.spawn(matched_subscriptions::run(dds.clone(), tracker, discovered.clone()));
+    let owner = RotationContext { node, context: context.clone(), range: participant.range() };
+    tasks.spawn(rotated.run(owner));
     if let Some((subscription, name)) = topics.clock_input {
         let (participant, health) = (dds.clone(), health.clone());
         let input = ClockInput { subscription, name, participant, period, health, state: clock_out };
         tasks.spawn(input.run(mode == TimeMode::Fast));
     }
     let stop_all = stop_request(&joint_limits, period, node_config.max_points);
-    let checks = Arc::new(Checks {
+    let checks = Arc::new(TrajectoryValidator {
         joints: joint_limits,
         period,
         max_points: node_config.max_points,
         live: Arc::clone(&live),
     });
-    let (action_end, end) = Ending::pair();
-    let tell = Tell {
-        checks: GoalChecks { checks: Arc::clone(&checks) },
+    let (action_end, end) = ShutdownHandle::pair();
+    let server_context = ServerContext {
+        checks: GoalValidator { trajectories: Arc::clone(&checks) },
         commands: commands.clone(),
         results: Arc::clone(&results),
         health: health.clone(),
         ids: Arc::clone(&ids),
     };
-    tasks.spawn(action.serve(Work { tell, events, running, status, end }));
+    tasks.spawn(action.serve(Work { server_context, events, running, status, end }));
     let psec_input = PsecInput {
         checks,
         commands: commands.clone(),
@@ -292,13 +298,13 @@ async fn serve(
             results.report(report).await;
         }
     });
-    let heard = join(streamed, loads).then(|_| pending()).boxed();
+    let input = join(streamed, loads).then(|_| pending()).boxed();
     let published = outputs.run(frames).boxed();
     let pace = match mode {
-        TimeMode::Real => Pace::Real(Turns { heard, published }),
+        TimeMode::Real => Pace::Real(CooperativeTasks { input, output: published }),
         TimeMode::Fast | TimeMode::SimTime => {
             // On a thread of their own, until there are no frames any more: what publishes may wait for subscribers.
-            let woken_alone = FuturesUnordered::from_iter([published, heard]);
+            let woken_alone = FuturesUnordered::from_iter([published, input]);
             let runtime = Handle::current();
             tasks.spawn_blocking(move || {
                 let _ = runtime.block_on(woken_alone.into_future());
@@ -389,6 +395,6 @@ async fn reset_axes(commands: mpsc::Sender<Command>) -> Result<String, String> {
 
 /// A controlled stop of every joint.
 fn stop_request(joints: &[JointLimits], period: Nanoseconds, max_points: usize) -> Option<Arc<Trajectory>> {
-    let context = Context { joints, period, max_points, allow_nonzero_end_velocity: false };
-    Trajectory::new(Request::new(Start::Now, Vec::new()), &context).ok().map(Arc::new)
+    let context = ValidationContext { joints, period, max_points, allow_nonzero_end_velocity: false };
+    Trajectory::new(TrajectoryRequest::new(Start::Now, Vec::new()), &context).ok().map(Arc::new)
 }

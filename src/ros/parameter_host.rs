@@ -6,12 +6,12 @@ use tokio::sync::mpsc;
 
 use super::pace::Command;
 pub use crate::ingress::parameters::LiveNodeParameters;
-use crate::ingress::parameters::{Descriptor, ParameterHost, ParameterValue, Settings};
+use crate::ingress::parameters::{ParameterDescriptor, ParameterHost, ParameterStore, ParameterValue};
 use virtual_axes_core::config::Parameters;
 
 /// Checks what is set against the schema, and hands it to the simulation as a command.
 pub struct Host {
-    settings: Settings,
+    settings: ParameterStore,
     commands: mpsc::Sender<Command>,
     /// Room among the commands for the next change.
     room: Option<mpsc::OwnedPermit<Command>>,
@@ -24,7 +24,7 @@ impl Host {
         commands: mpsc::Sender<Command>,
         live: Arc<LiveNodeParameters>,
     ) -> Self {
-        Host { settings: Settings::new(parameters, live), commands, room: None }
+        Host { settings: ParameterStore::new(parameters, live), commands, room: None }
     }
 }
 
@@ -37,7 +37,7 @@ impl ParameterHost for Host {
         self.settings.get(name)
     }
 
-    fn describe(&self, name: &str) -> Option<Descriptor> {
+    fn describe(&self, name: &str) -> Option<ParameterDescriptor> {
         self.settings.describe(name)
     }
 
@@ -53,7 +53,7 @@ impl ParameterHost for Host {
         let (changed, machine) = tokio::task::block_in_place(|| self.settings.check(changes))?;
         let room = self.room.take().ok_or("the node is shutting down")?;
         room.send(Command::Adopt(Arc::new(machine)));
-        self.settings.adopt(changed);
+        self.settings.replace(changed);
         Ok(())
     }
 }

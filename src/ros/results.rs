@@ -13,9 +13,9 @@ use super::action::{GoalEvent, GoalId, goal_name};
 use super::convert::{header, stamp};
 use super::outputs::Output;
 use super::pace::{Accepted, Report};
-use crate::door::Held;
+use crate::ingress::AdmissionControl;
 use virtual_axes_core::assess::AxisReport;
-use virtual_axes_core::simulation::{Abort, MotionEnd, Outcome, Quantity, Violation};
+use virtual_axes_core::simulation::{AbortReason, MotionEnd, MotionOutcome, Quantity, ToleranceViolation};
 use virtual_axes_core::trajectory::{JointLimits, JointSet, MotionId, Rejection, StreamEnd, Trajectory};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::messages::{Source, Status, TrajectoryResult};
@@ -94,7 +94,7 @@ pub struct Results {
     /// What becomes of goals; at most two events for each.
     goals: mpsc::UnboundedSender<GoalEvent>,
     known: Mutex<HashMap<MotionId, Known>>,
-    held: Held,
+    admission: AdmissionControl,
 }
 
 impl Results {
@@ -106,15 +106,21 @@ impl Results {
         goals: mpsc::UnboundedSender<GoalEvent>,
         max_points: usize,
     ) -> Self {
-        Results { output, joints, goals, known: Mutex::new(HashMap::new()), held: Held::new(max_points) }
+        Results {
+            output,
+            joints,
+            goals,
+            known: Mutex::new(HashMap::new()),
+            admission: AdmissionControl::new(max_points),
+        }
     }
 
     /// Takes a trajectory in, whatever source it has, while there is room for it.
     ///
     /// # Errors
-    /// As [`Held::take`].
+    /// As [`AdmissionControl::admit`].
     pub fn hold(&self, trajectory: Trajectory) -> Result<Arc<Trajectory>, Rejection> {
-        self.held.take(trajectory)
+        self.admission.admit(trajectory)
     }
 
     /// Remembers where a trajectory came from, before the simulation is asked.
@@ -167,9 +173,9 @@ impl Results {
     }
 
     /// Which tolerance was not kept: `path` or `goal`.
-    fn violation(&self, tolerance: &str, violation: &Violation) -> String {
-        let Violation { place, quantity, error, limit } = *violation;
-        let (name, unit) = self.joints.get(place).map_or(("", ""), |j| (j.name.as_str(), j.unit()));
+    fn violation(&self, tolerance: &str, violation: &ToleranceViolation) -> String {
+        let ToleranceViolation { axis_index, quantity, error, limit } = *violation;
+        let (name, unit) = self.joints.get(axis_index).map_or(("", ""), |j| (j.name.as_str(), j.unit()));
         let (what, per) = match quantity {
             Quantity::Position => ("position", ""),
             Quantity::Velocity => ("velocity", "/s"),
@@ -191,7 +197,7 @@ impl Results {
         if let Origin::Action { goal_id, .. } = origin {
             self.tell(GoalEvent::Started(goal_id));
         }
-        let text = if accepted.joined_late {
+        let text = if accepted.is_late {
             let late = seconds(time - accepted.start);
             let text = format!("joined {late} s after its start");
             warn!("{origin}: {text}");
@@ -206,7 +212,7 @@ impl Results {
     /// Publishes what took joints away from a stream.
     async fn stream_ended(&self, time: Nanoseconds, end: StreamEnd, joints: JointSet) {
         let (status, text) = match end {
-            StreamEnd::Displaced(by) => (Status::Displaced, taken_over(&*self.known.lock().await, by)),
+            StreamEnd::Preempted(by) => (Status::Preempted, taken_over(&*self.known.lock().await, by)),
             StreamEnd::Stopped(_) => {
                 let text = "controlled stop; the stream is ignored until it pauses";
                 (Status::Stopped, text.to_owned())
@@ -233,14 +239,14 @@ impl Results {
         let mut known_list = self.known.lock().await;
         let Some(known) = known_list.remove(&end.id) else { return };
         let (status, text) = match end.outcome {
-            Outcome::Completed => (Status::Completed, String::new()),
-            Outcome::Displaced { by } => (Status::Displaced, taken_over(&known_list, by)),
-            Outcome::Stopped => (Status::Stopped, "controlled stop".to_owned()),
-            Outcome::Canceled => (Status::Stopped, "canceled".to_owned()),
-            Outcome::PathTolerance(violation) => (Status::Aborted, self.violation("path", &violation)),
-            Outcome::GoalTolerance(violation) => (Status::Aborted, self.violation("goal", &violation)),
-            Outcome::Aborted(Abort::Reset) => (Status::Aborted, "reset".to_owned()),
-            Outcome::Aborted(Abort::ClockJump { from, to }) => {
+            MotionOutcome::Completed => (Status::Completed, String::new()),
+            MotionOutcome::Preempted { by } => (Status::Preempted, taken_over(&known_list, by)),
+            MotionOutcome::Stopped => (Status::Stopped, "controlled stop".to_owned()),
+            MotionOutcome::Canceled => (Status::Stopped, "canceled".to_owned()),
+            MotionOutcome::PathTolerance(violation) => (Status::Aborted, self.violation("path", &violation)),
+            MotionOutcome::GoalTolerance(violation) => (Status::Aborted, self.violation("goal", &violation)),
+            MotionOutcome::Aborted(AbortReason::Reset) => (Status::Aborted, "reset".to_owned()),
+            MotionOutcome::Aborted(AbortReason::ClockJump { from, to }) => {
                 let (from, to) = (seconds(from), seconds(to));
                 (Status::Aborted, format!("the clock jumped from {from:.3} s to {to:.3} s"))
             }
@@ -256,16 +262,16 @@ impl Results {
             self.tell(GoalEvent::Ended(goal_id, end.outcome, text.clone()));
         }
         let column = |value: fn(&AxisReport) -> f64| end.report.axes.iter().map(value).collect();
-        let name = end.places.iter().filter_map(|&p| Some(self.joints.get(p)?.name.clone())).collect();
+        let name = end.axis_indices.iter().filter_map(|&p| Some(self.joints.get(p)?.name.clone())).collect();
         self.output
             .send(TrajectoryResult {
                 start: known.start,
                 text,
                 name,
-                max_tracking_error: column(|a| a.max_tracking_error),
-                rms_tracking_error: column(|a| a.rms_tracking_error),
-                max_synchronized_tracking_error: column(|a| a.max_synchronized_tracking_error),
-                rms_synchronized_tracking_error: column(|a| a.rms_synchronized_tracking_error),
+                max_tracking_error: column(|a| a.max_following_error),
+                rms_tracking_error: column(|a| a.rms_following_error),
+                max_synchronized_tracking_error: column(|a| a.max_delay_compensated_following_error),
+                rms_synchronized_tracking_error: column(|a| a.rms_delay_compensated_following_error),
                 max_contour_error: end.report.max_contour_error.unwrap_or(f64::NAN),
                 rms_contour_error: end.report.rms_contour_error.unwrap_or(f64::NAN),
                 peak_current: column(|a| a.peak_current),

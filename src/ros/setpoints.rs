@@ -58,7 +58,7 @@ impl Comparison {
             desired.velocities.push(velocity);
             actual.positions.push(sample.position);
             actual.velocities.push(sample.velocity);
-            error.positions.push(sample.synchronized_tracking_error());
+            error.positions.push(sample.delay_compensated_following_error());
             error.velocities.push(velocity - sample.velocity);
         }
         Comparison { desired, actual, error }

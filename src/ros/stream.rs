@@ -3,9 +3,9 @@
 use tracing::warn;
 
 use super::throttle::Throttle;
-pub use crate::ingress::{Order, Setpoints};
+pub use crate::ingress::{ReorderFilter, StreamSetpoints};
 use virtual_axes_core::simulation::Simulation;
-use virtual_axes_core::trajectory::{Code, Rejection, StreamCounts};
+use virtual_axes_core::trajectory::{Rejection, RejectionCode, StreamCounts};
 use virtual_axes_core::units::Nanoseconds;
 
 /// What the diagnostics say about the stream.
@@ -40,21 +40,21 @@ pub struct StreamLog {
 /// What the log tells about.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Told {
-    Refused(Code),
+    Refused(RejectionCode),
     Gap,
 }
 
 impl StreamLog {
     /// Gives `setpoints` to the axes for the next position instant.
-    pub fn take(&mut self, simulation: &mut Simulation, setpoints: &Setpoints) {
+    pub fn take(&mut self, simulation: &mut Simulation, setpoints: &StreamSetpoints) {
         let now = simulation.time_of(simulation.next_instant());
-        self.overtaken += u64::from(setpoints.overtaken);
-        self.refused += setpoints.refused_beside;
-        for rejection in &setpoints.refused {
+        self.overtaken += u64::from(setpoints.is_reordered);
+        self.refused += setpoints.unlisted_rejections;
+        for rejection in &setpoints.rejected {
             self.refuse(rejection, now);
         }
         for &(place, position) in &setpoints.positions {
-            match simulation.stream_sent(place, position, setpoints.sent) {
+            match simulation.submit_setpoint_stamped(place, position, setpoints.sent) {
                 Ok(true) => {}
                 Ok(false) => self.ignored += 1,
                 Err(rejection) => self.refuse(&rejection, now),
@@ -82,7 +82,7 @@ impl StreamLog {
     pub fn health(&self, simulation: &Simulation) -> StreamHealth {
         StreamHealth {
             drives: simulation.is_streaming(),
-            held_off: simulation.is_stream_held_off(),
+            held_off: simulation.is_stream_inhibited(),
             delay: simulation.stream_delay(),
             refused: self.refused,
             ignored: self.ignored,

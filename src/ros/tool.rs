@@ -12,7 +12,7 @@ use ros2_interfaces_jazzy_serde::nav_msgs::msg::Path;
 use tokio::time::{Instant, MissedTickBehavior};
 
 use super::endpoints::{EndpointError, Endpoints, Publisher};
-use super::outputs::{Output, Publishing, WhenFull};
+use super::outputs::{Output, OutputFactory, OverflowPolicy};
 use super::pace::Frame;
 use virtual_axes_core::config::ToolConfig;
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
@@ -59,15 +59,21 @@ impl ToolTopics {
     }
 
     /// Starts what publishes on them.
-    pub fn start(self, publishing: &mut Publishing, config: ToolConfig, when_full: WhenFull) -> ToolOutput {
+    pub fn start(
+        self,
+        publishing: &mut OutputFactory,
+        config: ToolConfig,
+        overflow: OverflowPolicy,
+    ) -> ToolOutput {
         let trace = Arc::new(Mutex::new(Trace::new(config.path_length)));
         if let Some(rate) = config.path_rate {
             // A task of their own waits for slow readers of the paths; the axes do not.
-            let outputs = [self.path, self.setpoint].map(|path| publishing.start(path, WhenFull::Wait));
+            let outputs =
+                [self.path, self.setpoint].map(|path| publishing.start(path, OverflowPolicy::Block));
             let paths = Paths { trace: Arc::clone(&trace), frame: config.frame.clone(), outputs };
             publishing.tasks.spawn(paths.run(Duration::from_secs_f64(1.0 / rate)));
         }
-        let pose = publishing.start(self.pose, when_full);
+        let pose = publishing.start(self.pose, overflow);
         ToolOutput { pose, kinematics: self.kinematics, frame: config.frame, trace }
     }
 }
@@ -86,7 +92,7 @@ impl ToolOutput {
         let actual = self.place(frame, |sample| sample.position);
         let setpoint = self.place(frame, |sample| sample.delayed_psec);
         lock(&self.trace).take(frame.resets, Moment { time: frame.time, actual, setpoint });
-        if publish && self.pose.is_heard() {
+        if publish && self.pose.has_subscriptions() {
             self.pose.send(actual.message(frame.time, &self.frame)).await;
         }
     }
@@ -188,7 +194,7 @@ impl Paths {
         let mut last: Option<Instant> = None;
         loop {
             let now = timer.tick().await;
-            if !self.outputs.iter().any(Output::is_heard) {
+            if !self.outputs.iter().any(Output::has_subscriptions) {
                 continue;
             }
             let is_due = last.is_none_or(|last| now - last >= REPEAT);

@@ -7,8 +7,8 @@ use ros2_client::{Context, Node, ServiceTypeName};
 use ros2_interfaces_jazzy_serde::std_srvs::srv::{TriggerRequest, TriggerResponse};
 
 use super::args::RosArgs;
+use super::response_limiter::ResponseLimiter;
 use super::service::{Service, ServiceError};
-use super::unsent::Unsent;
 
 /// Takes the axes home.
 pub const RESET: &str = "reset";
@@ -43,18 +43,18 @@ impl Trigger {
         let mut requests = self.0.requests();
         // Responses are sent side by side: a client that is gone holds up no other's stop.
         let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
-        let unsent = Unsent::default();
+        let limiter = ResponseLimiter::default();
         loop {
             tokio::select! {
                 biased;
                 Some(()) = responses.next(), if !responses.is_empty() => {}
-                Some((place, request)) = unsent.next(&mut requests) => match request {
+                Some((permit, request)) = limiter.next(&mut requests) => match request {
                     Ok((id, _)) => {
                         let (success, message) = match act().await {
                             Ok(message) => (true, message),
                             Err(message) => (false, message),
                         };
-                        responses.push(self.0.respond(id, TriggerResponse { success, message }, place));
+                        responses.push(self.0.respond(id, TriggerResponse { success, message }, permit));
                     }
                     Err(reason) => tracing::warn!("{reason}"),
                 },

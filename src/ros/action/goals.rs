@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use ros2_client::service::RmwRequestId;
 
 use super::{GoalId, uuid};
-use crate::ingress::{Candidate, select};
+use crate::ingress::{CancelCandidate, select_goals_to_cancel};
 use virtual_axes_core::trajectory::MotionId;
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 use virtual_axes_io::messages::action_msgs::msg::{GoalInfo, GoalStatus, GoalStatusArray};
@@ -154,14 +154,14 @@ impl Goals {
     pub fn cancel(&mut self, request: &CancelGoalRequest) -> (CancelGoalResponse, Vec<MotionId>) {
         let asked = &request.goal_info;
         let time = i64::from(asked.stamp.sec) * SECOND_NS + i64::from(asked.stamp.nanosec);
-        let candidates = self.list.iter().map(|goal| Candidate {
+        let candidates = self.list.iter().map(|goal| CancelCandidate {
             id: goal.id,
             stamp: goal.stamp,
-            cancelable: matches!(goal.state, State::Accepted | State::Executing),
+            is_cancelable: matches!(goal.state, State::Accepted | State::Executing),
         });
         let mut response = CancelGoalResponse::default();
         let mut motions = Vec::new();
-        match select(&asked.goal_id.uuid, time, candidates) {
+        match select_goals_to_cancel(&asked.goal_id.uuid, time, candidates) {
             Ok(ids) => {
                 for goal in self.list.iter_mut().filter(|goal| ids.contains(&goal.id)) {
                     goal.state = State::Canceling;

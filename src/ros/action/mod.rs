@@ -10,10 +10,10 @@ mod goals;
 mod outcome;
 mod server;
 
-pub use crate::door::{GoalChecks, GoalId};
+pub use crate::ingress::{GoalId, GoalValidator};
 pub use feedback::{Feedback, feedback_period};
 pub use outcome::GoalEvent;
-pub use server::{ActionServer, Ending, Tell, Work};
+pub use server::{ActionServer, ServerContext, ShutdownHandle, Work};
 
 use virtual_axes_io::messages::unique_identifier_msgs::msg::UUID;
 

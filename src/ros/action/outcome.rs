@@ -2,8 +2,8 @@
 
 use super::GoalId;
 use super::goals::State;
-use virtual_axes_core::simulation::Outcome;
-use virtual_axes_core::trajectory::{Code, Rejection};
+use virtual_axes_core::simulation::MotionOutcome;
+use virtual_axes_core::trajectory::{Rejection, RejectionCode};
 use virtual_axes_io::messages::{ErrorCode, FollowJointTrajectoryResult};
 
 /// What became of a goal that was handed to the simulation.
@@ -14,7 +14,7 @@ pub enum GoalEvent {
     /// The axes cannot follow it.
     Refused(GoalId, Rejection),
     /// It has ended; the text says how.
-    Ended(GoalId, Outcome, String),
+    Ended(GoalId, MotionOutcome, String),
 }
 
 fn result(code: ErrorCode, text: String) -> FollowJointTrajectoryResult {
@@ -24,8 +24,8 @@ fn result(code: ErrorCode, text: String) -> FollowJointTrajectoryResult {
 /// The result of a goal that cannot be run.
 pub(super) fn refused(rejection: &Rejection) -> FollowJointTrajectoryResult {
     let code = match rejection.code {
-        Code::UnknownJoint | Code::DuplicateJoint => ErrorCode::InvalidJoints,
-        Code::EndedInThePast => ErrorCode::OldHeaderTimestamp,
+        RejectionCode::UnknownJoint | RejectionCode::DuplicateJoint => ErrorCode::InvalidJoints,
+        RejectionCode::EndedInThePast => ErrorCode::OldHeaderTimestamp,
         _ => ErrorCode::InvalidGoal,
     };
     result(code, format!("{}: {rejection}", rejection.code.name()))
@@ -38,13 +38,15 @@ pub(super) fn aborted(text: String) -> FollowJointTrajectoryResult {
 }
 
 /// State and result of a goal that has ended like this.
-pub(super) fn ended(outcome: &Outcome, text: String) -> (State, FollowJointTrajectoryResult) {
+pub(super) fn ended(outcome: &MotionOutcome, text: String) -> (State, FollowJointTrajectoryResult) {
     match outcome {
-        Outcome::Completed => (State::Succeeded, result(ErrorCode::Successful, text)),
-        Outcome::Canceled => (State::Canceled, result(ErrorCode::Successful, text)),
-        Outcome::PathTolerance(_) => (State::Aborted, result(ErrorCode::PathToleranceViolated, text)),
-        Outcome::GoalTolerance(_) => (State::Aborted, result(ErrorCode::GoalToleranceViolated, text)),
-        Outcome::Displaced { .. } | Outcome::Stopped | Outcome::Aborted(_) => (State::Aborted, aborted(text)),
+        MotionOutcome::Completed => (State::Succeeded, result(ErrorCode::Successful, text)),
+        MotionOutcome::Canceled => (State::Canceled, result(ErrorCode::Successful, text)),
+        MotionOutcome::PathTolerance(_) => (State::Aborted, result(ErrorCode::PathToleranceViolated, text)),
+        MotionOutcome::GoalTolerance(_) => (State::Aborted, result(ErrorCode::GoalToleranceViolated, text)),
+        MotionOutcome::Preempted { .. } | MotionOutcome::Stopped | MotionOutcome::Aborted(_) => {
+            (State::Aborted, aborted(text))
+        }
     }
 }
 
@@ -55,10 +57,10 @@ mod tests {
     #[test]
     fn a_refusal_has_the_code_that_clients_know_and_the_name_that_we_have() {
         for (code, number, name) in [
-            (Code::UnknownJoint, -2, "UNKNOWN_JOINT: why"),
-            (Code::DuplicateJoint, -2, "DUPLICATE_JOINT: why"),
-            (Code::EndedInThePast, -3, "ENDED_IN_THE_PAST: why"),
-            (Code::Speed, -1, "SPEED: why"),
+            (RejectionCode::UnknownJoint, -2, "UNKNOWN_JOINT: why"),
+            (RejectionCode::DuplicateJoint, -2, "DUPLICATE_JOINT: why"),
+            (RejectionCode::EndedInThePast, -3, "ENDED_IN_THE_PAST: why"),
+            (RejectionCode::Speed, -1, "SPEED: why"),
         ] {
             let found = refused(&Rejection::new(code, "why"));
             assert_eq!((found.error_code, found.error_string.as_str()), (number, name));

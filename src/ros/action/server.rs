@@ -17,16 +17,18 @@ use tracing::{info, warn};
 use super::feedback::Running;
 use super::goals::{Answer, Goals, MOST_LIVE, State};
 use super::outcome::{self, GoalEvent};
-use super::{GoalChecks, GoalId, goal_name};
-use crate::door::args::RosArgs;
-use crate::ros::endpoints::{KEPT, Publisher, WINDOW, keeping, topic};
+use super::{GoalId, GoalValidator, goal_name};
+use crate::ingress::args::RosArgs;
+use crate::ros::endpoints::{
+    BLOCKING_WINDOW, MAX_UNACKNOWLEDGED, Publisher, create_topic, with_sample_limit,
+};
 use crate::ros::inputs::next_id;
 use crate::ros::outputs::Output;
 use crate::ros::pace::{Command, Health};
+use crate::ros::response_limiter::{ResponseLimiter, ResponsePermit};
 use crate::ros::results::{Origin, Results};
 use crate::ros::service::{Service, ServiceError};
-use crate::ros::unsent::{Place, Unsent};
-use virtual_axes_core::trajectory::{Code, Rejection};
+use virtual_axes_core::trajectory::{Rejection, RejectionCode};
 use virtual_axes_io::messages::action_msgs::msg::GoalStatusArray;
 use virtual_axes_io::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
 use virtual_axes_io::messages::{
@@ -78,7 +80,7 @@ impl ActionServer {
         let kind = |part: &str| format!("{CONTROL_PACKAGE}::action::dds_::{TYPE}_{part}");
         let cancel_type = ServiceTypeName::new("action_msgs", "CancelGoal");
         let server = ActionServer {
-            send_goal: Service::of_action(
+            send_goal: Service::for_action(
                 node,
                 context,
                 &part("send_goal"),
@@ -86,7 +88,7 @@ impl ActionServer {
                 &kind("SendGoal"),
                 SERVICE_DEPTH,
             )?,
-            cancel_goal: Service::named(
+            cancel_goal: Service::with_name(
                 node,
                 context,
                 &part("cancel_goal"),
@@ -94,7 +96,7 @@ impl ActionServer {
                 &cancel_type,
                 SERVICE_DEPTH,
             )?,
-            get_result: Service::of_action(
+            get_result: Service::for_action(
                 node,
                 context,
                 &part("get_result"),
@@ -110,9 +112,10 @@ impl ActionServer {
             ..QosProfile::publisher_default()
         };
         let status_type = MessageTypeName::new("action_msgs", "GoalStatusArray");
-        let status_qos = keeping(&qos(Durability::TransientLocal, 1), WINDOW);
-        let status_topic = topic(&context.domain_participant(), &part("status"), &status_type, &status_qos)
-            .map_err(failed)?;
+        let status_qos = with_sample_limit(&qos(Durability::TransientLocal, 1), BLOCKING_WINDOW);
+        let status_topic =
+            create_topic(&context.domain_participant(), &part("status"), &status_type, &status_qos)
+                .map_err(failed)?;
         let status = node.create_publisher(&status_topic, None).map_err(|e| failed(e.to_string()))?;
         // A topic of a type that the crate cannot name.
         let feedback_qos = (&qos(Durability::Volatile, FEEDBACK_DEPTH)).into();
@@ -126,8 +129,8 @@ impl ActionServer {
             )
             .map_err(|e| failed(e.to_string()))?;
         let feedback = node.create_publisher(&feedback_topic, None).map_err(|e| failed(e.to_string()))?;
-        let status = Publisher::unrecorded(status, status_topic, WINDOW);
-        let feedback = Publisher::unrecorded(feedback, feedback_topic, KEPT);
+        let status = Publisher::unrecorded(status, status_topic, BLOCKING_WINDOW);
+        let feedback = Publisher::unrecorded(feedback, feedback_topic, MAX_UNACKNOWLEDGED);
         Ok((server, ActionTopics { status, feedback, name }))
     }
 
@@ -145,12 +148,12 @@ impl ActionServer {
             goals: Goals::default(),
             responses: FuturesUnordered::new(),
             running: Vec::new(),
-            tell: work.tell,
+            server_context: work.server_context,
             running_out: work.running,
             status: work.status,
         };
         let (asked, done) = end;
-        let unsent = Unsent::default();
+        let limiter = ResponseLimiter::default();
         tokio::pin!(asked);
         loop {
             tokio::select! {
@@ -158,8 +161,8 @@ impl ActionServer {
                 _ = &mut asked => break,
                 Some(()) = task.responses.next(), if !task.responses.is_empty() => {}
                 Some(event) = events.recv() => task.note(event).await,
-                Some((place, request)) = unsent.next(&mut requests) => match request {
-                    Ok(request) => task.answer(request, place).await,
+                Some((permit, request)) = limiter.next(&mut requests) => match request {
+                    Ok(request) => task.answer(request, permit).await,
                     Err(reason) => warn!("{reason}"),
                 },
                 else => break,
@@ -173,7 +176,7 @@ impl ActionServer {
 /// What the task works with.
 pub struct Work {
     /// Whom it asks and tells.
-    pub tell: Tell,
+    pub server_context: ServerContext,
     /// What becomes of goals.
     pub events: mpsc::UnboundedReceiver<GoalEvent>,
     /// The goals that have feedback, some of them over already.
@@ -184,36 +187,36 @@ pub struct Work {
     pub end: (oneshot::Receiver<()>, oneshot::Sender<()>),
 }
 
-/// Whom the task asks and tells.
-pub struct Tell {
-    /// What can be checked without the state of the axes.
-    pub checks: GoalChecks,
-    /// The simulation.
+/// Handles through which the action task reaches the rest of the node.
+pub struct ServerContext {
+    /// Validation that needs no state of the axes.
+    pub checks: GoalValidator,
+    /// Commands to the simulation.
     pub commands: mpsc::Sender<Command>,
-    /// What became of each trajectory.
+    /// Results of trajectories.
     pub results: Arc<Results>,
-    /// What time it is in the simulation.
+    /// Simulation time and health.
     pub health: watch::Receiver<Health>,
-    /// Names of motions.
+    /// Counter of motion ids.
     pub ids: Arc<AtomicU64>,
 }
 
-/// Ends the task in order: goals under way are aborted and told so.
-pub struct Ending {
-    ask: oneshot::Sender<()>,
+/// Handle that shuts the action task down: active goals are aborted and their clients get a result.
+pub struct ShutdownHandle {
+    request: oneshot::Sender<()>,
     done: oneshot::Receiver<()>,
 }
 
-impl Ending {
-    /// The end to keep, and the one of the task.
+impl ShutdownHandle {
+    /// Creates the handle and the channel ends of the task: shutdown request and completion.
     pub fn pair() -> (Self, (oneshot::Receiver<()>, oneshot::Sender<()>)) {
-        let ((ask, asked), (say, done)) = (oneshot::channel(), oneshot::channel());
-        (Ending { ask, done }, (asked, say))
+        let ((request, requested), (completed, done)) = (oneshot::channel(), oneshot::channel());
+        (ShutdownHandle { request, done }, (requested, completed))
     }
 
-    /// Returns when the task has told everybody.
+    /// Requests the shutdown and waits until the results have been sent.
     pub async fn end(self) {
-        let _ = self.ask.send(());
+        let _ = self.request.send(());
         let _ = self.done.await;
     }
 }
@@ -230,30 +233,30 @@ struct Task<'a> {
     /// Responses are sent side by side: a client that is slow to be discovered holds up no other.
     responses: FuturesUnordered<BoxFuture<'a, ()>>,
     running: Vec<Running>,
-    tell: Tell,
+    server_context: ServerContext,
     running_out: watch::Sender<Arc<[Running]>>,
     status: Output<GoalStatusArray>,
 }
 
 impl Task<'_> {
-    async fn answer(&mut self, request: Request, place: Place) {
+    async fn answer(&mut self, request: Request, permit: ResponsePermit) {
         match request {
-            Request::Goal(request, message) => self.take_goal(request, *message, place).await,
-            Request::Cancel(request, message) => self.cancel(request, &message, place).await,
+            Request::Goal(request, message) => self.take_goal(request, *message, permit).await,
+            Request::Cancel(request, message) => self.cancel(request, &message, permit).await,
             Request::Result(request, message) => {
                 if let Answer::Now(response) = self.goals.result(&message.goal_id.uuid, request) {
-                    self.responses.push(self.server.get_result.respond(request, response, place));
+                    self.responses.push(self.server.get_result.respond(request, response, permit));
                 }
             }
         }
     }
 
-    async fn take_goal(&mut self, request: RmwRequestId, message: SendGoalRequest, place: Place) {
+    async fn take_goal(&mut self, request: RmwRequestId, message: SendGoalRequest, permit: ResponsePermit) {
         let id = message.goal_id.uuid;
-        let now = self.tell.health.borrow().time;
+        let now = self.server_context.health.borrow().time;
         let accepted = !self.goals.knows(&id);
         let response = SendGoalResponse { accepted, stamp: stamp(now) };
-        self.responses.push(self.server.send_goal.respond(request, response, place));
+        self.responses.push(self.server.send_goal.respond(request, response, permit));
         if !accepted {
             warn!("{} refused: its id is in use", goal_name(&id));
             return;
@@ -263,16 +266,16 @@ impl Task<'_> {
         self.goals.accept(id, now);
         let checked = if live < MOST_LIVE {
             // A large trajectory takes a while to check; other tasks go on meanwhile.
-            tokio::task::block_in_place(|| self.tell.checks.check(&message.goal))
-                .and_then(|(trajectory, tolerances)| Ok((self.tell.results.hold(trajectory)?, tolerances)))
+            tokio::task::block_in_place(|| self.server_context.checks.validate(&message.goal))
+                .and_then(|(trajectory, tolerances)| Ok((self.server_context.results.hold(trajectory)?, tolerances)))
         } else {
             let text = format!("{live} goals are under way; at most {MOST_LIVE} are taken");
-            Err(Rejection::new(Code::TooManyGoals, text).numbers(live as f64, MOST_LIVE as f64))
+            Err(Rejection::new(RejectionCode::TooManyGoals, text).numbers(live as f64, MOST_LIVE as f64))
         };
         drop(message);
         match checked {
             Ok((trajectory, tolerances)) => {
-                let motion = next_id(&self.tell.ids);
+                let motion = next_id(&self.server_context.ids);
                 self.goals.offered(&id, motion);
                 // Before the simulation is asked, and longer than the goal lasts: its first samples and its
                 // last ones find it here. Frames say themselves which motions they belong to.
@@ -280,20 +283,20 @@ impl Task<'_> {
                 self.running.retain(|running| live.contains(&running.id));
                 self.running.push(Running { id, motion, places: trajectory.joints().to_vec() });
                 self.show_running();
-                self.tell.results.remember(motion, origin, Arc::clone(&trajectory)).await;
+                self.server_context.results.remember(motion, origin, Arc::clone(&trajectory)).await;
                 let offer = Command::Offer { id: motion, trajectory, tolerances: Some(Box::new(tolerances)) };
                 // The simulation is gone only when the node shuts down.
-                let _ = self.tell.commands.send(offer).await;
+                let _ = self.server_context.commands.send(offer).await;
             }
             Err(rejection) => {
-                self.tell.results.rejected(&origin, now, &rejection).await;
+                self.server_context.results.rejected(&origin, now, &rejection).await;
                 self.end(&id, State::Aborted, outcome::refused(&rejection));
             }
         }
         self.publish_status().await;
     }
 
-    async fn cancel(&mut self, request: RmwRequestId, message: &CancelGoalRequest, place: Place) {
+    async fn cancel(&mut self, request: RmwRequestId, message: &CancelGoalRequest, permit: ResponsePermit) {
         let (response, motions) = self.goals.cancel(message);
         if !motions.is_empty() {
             info!("goals to be canceled: {}", motions.len());
@@ -301,9 +304,9 @@ impl Task<'_> {
         for motion in motions {
             // What came of it is told by the motion's end.
             let (done, _) = oneshot::channel();
-            let _ = self.tell.commands.send(Command::Cancel(motion, done)).await;
+            let _ = self.server_context.commands.send(Command::Cancel(motion, done)).await;
         }
-        self.responses.push(self.server.cancel_goal.respond(request, response, place));
+        self.responses.push(self.server.cancel_goal.respond(request, response, permit));
         self.publish_status().await;
     }
 

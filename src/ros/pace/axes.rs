@@ -6,11 +6,11 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tracing::{info, warn};
 
-use super::super::reused::Reused;
+use super::super::arc_pool::ArcPool;
 use super::super::stream::StreamLog;
 use super::{Accepted, AxisHealth, COMMAND_QUEUE, ClockHealth, Command, Frame, Health, Report};
 use virtual_axes_core::simulation::Simulation;
-use virtual_axes_core::trajectory::{Code, MotionId, Rejection};
+use virtual_axes_core::trajectory::{MotionId, Rejection, RejectionCode};
 use virtual_axes_core::units::Nanoseconds;
 
 /// Most reports on streams that are on their way; what becomes of streams meanwhile is told by the last.
@@ -26,7 +26,7 @@ pub(super) struct Axes {
     resets: u64,
     /// The accepted motions that have not ended, with the times of their starts, ns.
     motions: Vec<(MotionId, Nanoseconds)>,
-    frames: Reused<Frame>,
+    frames: ArcPool<Frame>,
     /// The stops that nobody asked a result of, while they last.
     stops: Vec<MotionId>,
     /// Shared by the reports on streams that are on their way.
@@ -40,7 +40,7 @@ impl Axes {
         health: watch::Sender<Health>,
     ) -> Self {
         health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
-        let (stream, frames) = (StreamLog::default(), Reused::default());
+        let (stream, frames) = (StreamLog::default(), ArcPool::default());
         let (motions, stops, stream_ends) = (Vec::new(), Vec::new(), Arc::new(()));
         Axes { simulation, reports, health, stream, resets: 0, motions, frames, stops, stream_ends }
     }
@@ -60,7 +60,7 @@ impl Axes {
         let instant = simulation.next_instant();
         simulation.step();
         stream.watch(simulation);
-        frames.next(|frame| {
+        frames.acquire(|frame| {
             frame.instant = instant;
             frame.time = simulation.time_of(instant);
             frame.samples.clear();
@@ -95,7 +95,7 @@ impl Axes {
             let on_its_way = Arc::clone(&self.stream_ends);
             let _ = self.reports.send(Report::StreamEnded(now, end, joints, on_its_way));
         }
-        for end in self.simulation.take_ends() {
+        for end in self.simulation.drain_finished() {
             self.motions.retain(|(id, _)| *id != end.id);
             let asked_for = self.stops.len();
             self.stops.retain(|id| *id != end.id);
@@ -126,31 +126,31 @@ impl Axes {
     pub(super) fn refuse_full(&self, id: MotionId) {
         let text = format!("{COMMAND_QUEUE} trajectories wait for the first /clock");
         let limit = COMMAND_QUEUE as f64;
-        let rejection = Rejection::new(Code::QueueFull, text).numbers(limit + 1.0, limit);
+        let rejection = Rejection::new(RejectionCode::QueueFull, text).numbers(limit + 1.0, limit);
         let _ = self.reports.send(Report::Decided(id, 0, Err(rejection)));
     }
 
     /// Takes a command; the next step is the first to show it.
-    pub(super) fn obey(&mut self, command: Command) {
+    pub(super) fn apply(&mut self, command: Command) {
         let Axes { simulation, reports, stream, resets, motions, stops, .. } = self;
         // Between two instants, the time is that of the first.
         let now = simulation.time_of(simulation.next_instant() - 1);
         match command {
             Command::Offer { id, trajectory, tolerances } => {
                 let admission = match tolerances {
-                    Some(tolerances) => simulation.offer_within(id, trajectory, *tolerances),
-                    None => simulation.offer(id, trajectory),
+                    Some(tolerances) => simulation.submit_with_tolerances(id, trajectory, *tolerances),
+                    None => simulation.submit(id, trajectory),
                 };
                 let decision = admission.map(|admission| Accepted {
                     start: simulation.time_of(admission.start_k),
-                    joined_late: admission.joined_late,
+                    is_late: admission.is_late,
                 });
                 if let Ok(accepted) = &decision {
                     motions.push((id, accepted.start));
                 }
                 let _ = reports.send(Report::Decided(id, now, decision));
             }
-            Command::Stop(id, trajectory) => match simulation.offer(id, trajectory) {
+            Command::Stop(id, trajectory) => match simulation.submit(id, trajectory) {
                 Ok(_) => stops.push(id),
                 Err(rejection) => warn!("the axes cannot be stopped: {rejection}"),
             },
@@ -164,7 +164,7 @@ impl Axes {
             }
             Command::Stream(setpoints) => stream.take(simulation, &setpoints),
             Command::Adopt(parameters) => {
-                if let Err(error) = simulation.adopt(parameters) {
+                if let Err(error) = simulation.update_parameters(parameters) {
                     warn!("changed parameters could not be taken over: {error}");
                 }
             }

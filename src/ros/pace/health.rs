@@ -42,7 +42,7 @@ pub struct AxisHealth {
     pub saturated: u64,
     /// Position instants at which its friction law was extrapolated.
     pub extrapolated: u64,
-    /// Position instants at which it stood outside its stroke.
+    /// Position instants at which it stood outside its travel limits.
     pub outside: u64,
 }
 
@@ -104,7 +104,7 @@ impl Health {
         self.max_lateness = self.max_lateness.max(lateness);
         self.total_lateness += lateness;
         for (place, (axis, sample)) in self.axes.iter_mut().zip(simulation.samples()).enumerate() {
-            axis.outside += u64::from(simulation.is_outside_stroke(place));
+            axis.outside += u64::from(simulation.is_outside_travel_limits(place));
             axis.saturated += u64::from(sample.saturated);
             axis.extrapolated += u64::from(sample.friction_extrapolated);
         }

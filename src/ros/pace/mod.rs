@@ -23,7 +23,7 @@ use tokio::runtime::Handle;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::clock::ClockState;
-use super::stream::Setpoints;
+use super::stream::StreamSetpoints;
 use virtual_axes_core::machine::{AxisSample, MachineParameters};
 use virtual_axes_core::simulation::{MotionEnd, Simulation, Tolerances};
 use virtual_axes_core::trajectory::{JointSet, MotionId, Rejection, StreamEnd, Trajectory};
@@ -56,7 +56,7 @@ pub enum Command {
         hold: Nanoseconds,
     },
     /// Take the setpoints of a stream over, where no trajectory moves.
-    Stream(Arc<Setpoints>),
+    Stream(Arc<StreamSetpoints>),
     /// Take changed parameters over.
     Adopt(Arc<MachineParameters>),
     /// Back to rest at home.
@@ -71,7 +71,7 @@ pub struct Accepted {
     /// When its time 0 is, ns.
     pub start: Nanoseconds,
     /// Whether that was over when it came.
-    pub joined_late: bool,
+    pub is_late: bool,
 }
 
 /// What the simulation answers.
@@ -112,20 +112,20 @@ pub struct Channels {
     pub health: watch::Sender<Health>,
 }
 
-/// What has its turn on the axes' thread in each period; it must neither block nor end.
+/// Tasks that the simulation thread polls in each position cycle; they must neither block nor complete.
 ///
-/// A thread of its own would have to be woken each time, which takes longer than what it does.
-pub struct Turns {
-    /// What hears setpoints and loads, before each instant: they take effect at one anyway.
-    pub heard: BoxFuture<'static, ()>,
-    /// What takes the frames, after each instant.
-    pub published: BoxFuture<'static, ()>,
+/// Waking a separate thread in each cycle would take longer than the work itself.
+pub struct CooperativeTasks {
+    /// Reception of streamed setpoints and loads, polled before each position cycle.
+    pub input: BoxFuture<'static, ()>,
+    /// Publication of frames, polled after each position cycle.
+    pub output: BoxFuture<'static, ()>,
 }
 
 /// What the thread keeps step with.
 pub enum Pace {
     /// The wall clock.
-    Real(Turns),
+    Real(CooperativeTasks),
     /// A ROS clock, as the task that watches it tells.
     Clock {
         /// What it tells.
@@ -140,7 +140,7 @@ pub fn run(simulation: Simulation, pace: Pace, channels: Channels) {
     let Channels { commands, frames, reports, health } = channels;
     let axes = axes::Axes::new(simulation, reports, health);
     match pace {
-        Pace::Real(turns) => real::run(axes, commands, &frames, turns),
+        Pace::Real(tasks) => real::run(axes, commands, &frames, tasks),
         Pace::Clock { state, runtime } => runtime.block_on(paced::run(axes, commands, &frames, state)),
     }
 }

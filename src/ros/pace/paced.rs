@@ -122,7 +122,7 @@ struct Paced {
 impl Paced {
     fn take(&mut self, command: Command) {
         if self.known {
-            self.axes.obey(command);
+            self.axes.apply(command);
             self.axes.report_ends();
             return;
         }
@@ -137,9 +137,9 @@ impl Paced {
                 if let Some(offer) =
                     self.held.iter().position(is_it).and_then(|place| self.held.remove(place))
                 {
-                    self.axes.obey(offer);
+                    self.axes.apply(offer);
                 }
-                self.axes.obey(command);
+                self.axes.apply(command);
                 self.axes.report_ends();
             }
             // What came before it is stopped at its start; of several in a row one is enough.
@@ -148,16 +148,16 @@ impl Paced {
             // All that waits ends with it.
             Command::Reset(_) => {
                 self.release();
-                self.axes.obey(command);
+                self.axes.apply(command);
                 self.axes.report_ends();
             }
-            Command::Adopt(_) | Command::Shutdown => self.axes.obey(command),
+            Command::Adopt(_) | Command::Shutdown => self.axes.apply(command),
         }
     }
 
     fn release(&mut self) {
         for command in self.held.drain(..) {
-            self.axes.obey(command);
+            self.axes.apply(command);
         }
     }
 

@@ -11,7 +11,7 @@ use tracing::warn;
 
 use super::axes::Axes;
 use super::wall::{PaceClock, since_epoch};
-use super::{ClockSource, Command, Frame, Turns};
+use super::{ClockSource, Command, CooperativeTasks, Frame};
 
 /// Instants that come later than this are computed and not published: a burst of them would push out of
 /// subscribers' queues what they have not read, and tell nothing of now.
@@ -22,7 +22,7 @@ pub(super) fn run(
     mut axes: Axes,
     mut commands: mpsc::Receiver<Command>,
     frames: &mpsc::Sender<Arc<Frame>>,
-    mut turns: Turns,
+    mut tasks: CooperativeTasks,
 ) {
     let clock = PaceClock::new(axes.simulation(), since_epoch);
     axes.tell_clock(|clock| clock.source = ClockSource::Wall);
@@ -32,16 +32,16 @@ pub(super) fn run(
             stood_still(&mut axes, lateness, clock.newest_due(), |k| clock.lateness_of(k));
             lateness = clock.wait_for(axes.simulation().next_instant());
         }
-        have_turn(&mut turns.heard);
+        poll_once(&mut tasks.input);
         if period(&mut axes, &mut commands, frames, lateness, lateness > clock.period).is_break() {
             return;
         }
-        have_turn(&mut turns.published);
+        poll_once(&mut tasks.output);
     }
 }
 
 /// It is asked again in the next period, whether or not it has been woken.
-fn have_turn(future: &mut BoxFuture<'static, ()>) {
+fn poll_once(future: &mut BoxFuture<'static, ()>) {
     let _ = future.as_mut().poll(&mut Context::from_waker(Waker::noop()));
 }
 
@@ -81,7 +81,7 @@ pub(super) fn period(
             Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => {
                 return ControlFlow::Break(());
             }
-            Ok(command) => axes.obey(command),
+            Ok(command) => axes.apply(command),
             Err(mpsc::error::TryRecvError::Empty) => break,
         }
     }

@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use allocation_counter::{AllocationInfo, measure};
 
-use super::super::reused::Reused;
+use super::super::arc_pool::ArcPool;
 use super::*;
 use virtual_axes_core::config::Parameters;
-use virtual_axes_core::simulation::joints;
-use virtual_axes_core::trajectory::{Context, Request, Row, Start};
+use virtual_axes_core::simulation::joint_limits;
+use virtual_axes_core::trajectory::{Start, TrajectoryPoint, TrajectoryRequest, ValidationContext};
 use virtual_axes_core::units::seconds;
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
@@ -33,7 +33,7 @@ impl Thread {
     fn new() -> Self {
         let parameters = Parameters::embedded_default().expect("the embedded machine is valid");
         let config = parameters.machine_config().expect("valid");
-        let limits = joints(&config, "");
+        let limits = joint_limits(&config, "");
         let names = limits.iter().map(|joint| joint.name.clone()).collect();
         let simulation = Simulation::new(&config, limits, 0).expect("can be simulated");
         let (reports_out, reports) = mpsc::unbounded_channel();
@@ -56,15 +56,21 @@ impl Thread {
     /// Y to and fro until after what is looked at.
     fn offer(&self) {
         let parameters = Parameters::embedded_default().expect("the embedded machine is valid");
-        let limits = joints(&parameters.machine_config().expect("valid"), "");
+        let limits = joint_limits(&parameters.machine_config().expect("valid"), "");
         let period = self.axes.simulation().period();
-        let mut request = Request::new(Start::Now, vec!["y".to_owned()]);
+        let mut request = TrajectoryRequest::new(Start::Now, vec!["y".to_owned()]);
         for k in 0..2 * (WARM_UP + LOOKED_AT) {
             let position = [0.01 * (1.0 - (2.0 * seconds(k * period)).cos())];
-            request.push(k * period, Row { positions: &position, ..Row::default() }).expect("well formed");
+            request
+                .push(k * period, TrajectoryPoint { positions: &position, ..TrajectoryPoint::default() })
+                .expect("well formed");
         }
-        let context =
-            Context { joints: &limits, period, max_points: 10_000, allow_nonzero_end_velocity: true };
+        let context = ValidationContext {
+            joints: &limits,
+            period,
+            max_points: 10_000,
+            allow_nonzero_end_velocity: true,
+        };
         let trajectory = Arc::new(Trajectory::new(request, &context).expect("within limits"));
         self.command(Command::Offer { id: MotionId(1), trajectory, tolerances: None });
     }
@@ -83,14 +89,17 @@ impl Thread {
 #[test]
 fn a_period_of_the_thread_allocates_and_frees_nothing() {
     let mut thread = Thread::new();
-    let (mut streamed, mut loads) = (Reused::default(), Reused::default());
+    let (mut streamed, mut loads) = (ArcPool::default(), ArcPool::default());
     thread.offer();
     for k in 0..WARM_UP + LOOKED_AT {
         let position = vec![0.005 * (2.0 * seconds(k * thread.axes.simulation().period())).sin()];
         let message = JointState { name: vec!["x".to_owned()], position, ..JointState::default() };
-        let setpoints = Setpoints::of(&message, &thread.names);
-        thread.command(Command::Stream(streamed.next(|last| *last = setpoints)));
-        thread.command(Command::Load { loads: loads.next(|last| *last = vec![(2, 50.0)]), hold: 60_000_000 });
+        let setpoints = StreamSetpoints::from_message(&message, &thread.names);
+        thread.command(Command::Stream(streamed.acquire(|last| *last = setpoints)));
+        thread.command(Command::Load {
+            loads: loads.acquire(|last| *last = vec![(2, 50.0)]),
+            hold: 60_000_000,
+        });
         let found = thread.period();
         assert!(
             k < WARM_UP || found == AllocationInfo::default(),
@@ -113,11 +122,14 @@ fn a_period_of_the_thread_allocates_and_frees_nothing() {
 #[test]
 fn stops_without_end_leave_no_reports() {
     let parameters = Parameters::embedded_default().expect("the embedded machine is valid");
-    let limits = joints(&parameters.machine_config().expect("valid"), "");
+    let limits = joint_limits(&parameters.machine_config().expect("valid"), "");
     let mut thread = Thread::new();
     let period = thread.axes.simulation().period();
-    let context = Context { joints: &limits, period, max_points: 1, allow_nonzero_end_velocity: false };
-    let stop = Trajectory::new(Request::new(Start::Now, Vec::new()), &context).map(Arc::new).expect("a stop");
+    let context =
+        ValidationContext { joints: &limits, period, max_points: 1, allow_nonzero_end_velocity: false };
+    let stop = Trajectory::new(TrajectoryRequest::new(Start::Now, Vec::new()), &context)
+        .map(Arc::new)
+        .expect("a stop");
     for id in 0..200 {
         thread.command(Command::Stop(MotionId(id), Arc::clone(&stop)));
         thread.period();
@@ -132,7 +144,7 @@ fn stops_without_end_leave_no_reports() {
 fn streams_that_end_without_end_leave_some_reports_and_the_last() {
     let mut thread = Thread::new();
     for _ in 0..200 {
-        let setpoints = Setpoints { positions: vec![(0, 0.0)], ..Setpoints::default() };
+        let setpoints = StreamSetpoints { positions: vec![(0, 0.0)], ..StreamSetpoints::default() };
         thread.command(Command::Stream(Arc::new(setpoints)));
         thread.period();
         thread.command(Command::Reset(oneshot::channel().0));
@@ -184,8 +196,8 @@ fn what_publishes_gets_each_frame_in_the_period_that_made_it() {
             }
         }
     };
-    let turns = Turns { heard: Box::pin(std::future::pending()), published: Box::pin(published) };
-    let thread = std::thread::spawn(move || real::run(axes, commands, &frames, turns));
+    let tasks = CooperativeTasks { input: Box::pin(std::future::pending()), output: Box::pin(published) };
+    let thread = std::thread::spawn(move || real::run(axes, commands, &frames, tasks));
     for instant in 0..FRAMES {
         let found = found.recv_timeout(Duration::from_secs(20)).expect("a frame");
         assert_eq!(found, (instant, 0), "none may wait");
@@ -249,7 +261,7 @@ fn a_wall_clock_that_is_set_neither_stops_nor_hurries_the_axes() {
     let config = parameters.machine_config().expect("valid");
     let simulation = Simulation::new(
         &config,
-        joints(&config, ""),
+        joint_limits(&config, ""),
         i64::try_from(origin.as_nanos()).expect("this century"),
     )
     .expect("can be simulated");

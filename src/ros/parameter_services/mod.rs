@@ -29,9 +29,9 @@ use ros2_interfaces_jazzy_serde::{
 };
 
 use super::args::RosArgs;
-use super::service::{ACKNOWLEDGED, Service, ServiceError, profile};
-use super::unsent::{Place, Unsent};
-use crate::door::parameters::{self as wire, ParameterHost, list};
+use super::response_limiter::{ResponseLimiter, ResponsePermit};
+use super::service::{RESPONSE_DEPTH, Service, ServiceError, profile};
+use crate::ingress::parameters::{self as wire, ParameterHost, list_parameters};
 
 /// rmw's profile for parameter services keeps this many, so that a client may send that many requests at once.
 const QUEUE_DEPTH: usize = 1000;
@@ -93,16 +93,16 @@ impl ParameterServices {
         ]);
         // Responses are sent side by side: one client that is slow to be discovered holds up no other.
         let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
-        let unsent = Unsent::default();
+        let limiter = ResponseLimiter::default();
         tokio::pin!(stop);
         loop {
             tokio::select! {
                 biased;
                 () = &mut stop => break,
                 Some(()) = responses.next(), if !responses.is_empty() => {}
-                Some((place, request)) = unsent.next(&mut requests) => match request {
+                Some((permit, request)) = limiter.next(&mut requests) => match request {
                     Ok(request) => {
-                        let response = self.answer(&mut host, &now, request, place).await;
+                        let response = self.answer(&mut host, &now, request, permit).await;
                         responses.push(response);
                     }
                     Err(reason) => tracing::warn!("{reason}"),
@@ -118,41 +118,41 @@ impl ParameterServices {
         host: &mut H,
         now: &(impl Fn() -> Time + Send),
         request: Request,
-        place: Place,
+        permit: ResponsePermit,
     ) -> BoxFuture<'a, ()> {
         match request {
             Request::Get(id, request) => {
                 let values = within_bounds(&request.names).iter().map(|name| host.get(name));
                 let values = values.map(wire::value_to_wire).collect();
-                self.get.respond(id, GetParametersResponse { values }, place)
+                self.get.respond(id, GetParametersResponse { values }, permit)
             }
             Request::Types(id, request) => {
                 let kinds = within_bounds(&request.names)
                     .iter()
                     .map(|name| wire::type_number(host.get(name).map(|value| value.kind())));
                 let types = kinds.collect();
-                self.types.respond(id, GetParameterTypesResponse { types }, place)
+                self.types.respond(id, GetParameterTypesResponse { types }, permit)
             }
             Request::Set(id, request) => {
                 if let Err(reason) = wire::check_count(request.parameters.len()) {
                     let results = vec![wire::result_to_wire(Err(reason))];
-                    return self.set.respond(id, SetParametersResponse { results }, place);
+                    return self.set.respond(id, SetParametersResponse { results }, permit);
                 }
                 let mut results = Vec::with_capacity(request.parameters.len());
                 for parameter in request.parameters {
                     let result = self.set(host, now, vec![parameter]).await;
                     results.push(wire::result_to_wire(result));
                 }
-                self.set.respond(id, SetParametersResponse { results }, place)
+                self.set.respond(id, SetParametersResponse { results }, permit)
             }
             Request::SetAtomically(id, request) => {
                 let result = self.set(host, now, request.parameters).await;
                 let result = wire::result_to_wire(result);
-                self.set_atomically.respond(id, SetParametersAtomicallyResponse { result }, place)
+                self.set_atomically.respond(id, SetParametersAtomicallyResponse { result }, permit)
             }
             Request::List(id, request) => {
                 let result = listed(&host.names(), &request.prefixes, request.depth);
-                self.list.respond(id, ListParametersResponse { result }, place)
+                self.list.respond(id, ListParametersResponse { result }, permit)
             }
             Request::Describe(id, request) => {
                 let descriptors = within_bounds(&request.names).iter().map(|name| {
@@ -160,7 +160,7 @@ impl ParameterServices {
                     wire::descriptor_to_wire(name.clone(), descriptor)
                 });
                 let descriptors = descriptors.collect();
-                self.describe.respond(id, DescribeParametersResponse { descriptors }, place)
+                self.describe.respond(id, DescribeParametersResponse { descriptors }, permit)
             }
         }
     }
@@ -213,7 +213,7 @@ fn listed(names: &[String], prefixes: &[String], depth: u64) -> msg::ListParamet
     if within_bounds(prefixes).len() < prefixes.len() {
         return msg::ListParametersResult::default();
     }
-    list(names, prefixes, depth)
+    list_parameters(names, prefixes, depth)
 }
 
 /// The services under the node's name.
@@ -250,7 +250,7 @@ impl Door<'_> {
         let type_name = MessageTypeName::new("rcl_interfaces", "ParameterEvent");
         let topic = self
             .node
-            .create_topic(&name, type_name, &profile(ACKNOWLEDGED))
+            .create_topic(&name, type_name, &profile(RESPONSE_DEPTH))
             .map_err(|e| error(e.to_string()))?;
         self.node.create_publisher(&topic, None).map_err(|e| error(e.to_string()))
     }
