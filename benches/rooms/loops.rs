@@ -8,12 +8,15 @@ use std::sync::Arc;
 use criterion::Criterion;
 use virtual_axes_core::config::{AxisKind, FeedforwardConfig, FrictionConfig, PiConfig};
 use virtual_axes_core::control::{
-    Feedforward, Guard, Pi, PiState, PositionController, PositionState, Reach, Rst, SetpointHistory, Transfer,
+    BumplessTransfer, FallbackController, Feedforward, Pi, PiState, PositionController, PositionState, Rst,
+    SetpointHistory, SetpointWindow,
 };
-use virtual_axes_core::design::{GpcTuning, PolePlacement, Weight, gpc, margins, pole_pair, pole_placement};
+use virtual_axes_core::design::{
+    ControlWeight, GpcTuning, PolePlacement, gpc, margins, pole_pair, pole_placement,
+};
 use virtual_axes_core::drive::{Friction, MotorState, Plant};
-use virtual_axes_core::kinematics::{Kinematics, Poses, Turned};
-use virtual_axes_core::machine::{Machine, MachineParameters, Width, prediction_model};
+use virtual_axes_core::kinematics::{Kinematics, Poses, TableAngles};
+use virtual_axes_core::machine::{Machine, MachineParameters, SimdWidth, prediction_model};
 use virtual_axes_core::units::{POSITION_GAIN, seconds};
 
 use crate::{bench, shipped, swing};
@@ -23,7 +26,7 @@ const MANY: usize = 1000;
 /// Position periods of one iteration of a machine.
 const PERIODS: usize = 100;
 /// The preset of the paper.
-const TUNING: GpcTuning = GpcTuning { n1: 1, n2: 15, nu: 1, weight: Weight::Relative(0.01) };
+const TUNING: GpcTuning = GpcTuning { n1: 1, n2: 15, nu: 1, weight: ControlWeight::Relative(0.01) };
 
 /// Of the X axis of the shipped machine: friction, Kt (N·m/A), r (m/rad), loops, largest current (A).
 const FRICTION: FrictionConfig = FrictionConfig { a: 1.576, b: 0.01965, c: -0.5332, d: -0.2801, i0: 1.043 };
@@ -53,9 +56,9 @@ fn kinematics(criterion: &mut Criterion) {
     bench(&mut group, "joints to the tool, one by one", MANY, || {
         joints.chunks(axes).for_each(|joints| _ = black_box(kinematics.forward(joints)));
     });
-    let (mut turned, mut together) = (Turned::default(), Poses::default());
+    let (mut turned, mut together) = (TableAngles::default(), Poses::default());
     bench(&mut group, "joints to the tool, together", MANY, || {
-        kinematics.forward_all(&mut turned, black_box(&columns), MANY, &mut together);
+        kinematics.forward_batch(&mut turned, black_box(&columns), MANY, &mut together);
         together.len()
     });
     let mut found = vec![0.0; axes];
@@ -93,15 +96,16 @@ fn control(criterion: &mut Criterion) {
     let pi = Pi::new(&VELOCITY_LOOP, seconds(periods.velocity), 1.0 / TORQUE_CONSTANT, MAX_CURRENT);
     let mut memory = PiState::default();
     bench(&mut group, "PI with anti-windup", MANY, || {
-        (0..MANY).map(|k| pi.update_with(&mut memory, black_box(swing(0, k)), 0.1)).sum::<f64>()
+        (0..MANY).map(|k| pi.update_with_feedforward(&mut memory, black_box(swing(0, k)), 0.1)).sum::<f64>()
     });
-    let transfer = Transfer { step: 1.0, periods: 10 };
+    let transfer = BumplessTransfer { max_step: 1.0, cycles: 10 };
     let model = prediction_model(x, &periods).expect("a model");
-    let guard = Guard { gain: GAIN, period, rest_after: 100, rest_error: 1e-6 };
+    let fallback =
+        FallbackController { gain: GAIN, period, standstill_cycles: 100, standstill_tolerance: 1e-6 };
     let rst = gpc(&model, &TUNING).expect("a controller");
     let controllers = [
-        ("proportional position controller", PositionController::proportional(guard.gain, transfer)),
-        ("predictive position controller", PositionController::rst(rst, guard, transfer)),
+        ("proportional position controller", PositionController::proportional(fallback.gain, transfer)),
+        ("predictive position controller", PositionController::rst(rst, fallback, transfer)),
     ];
     for (name, controller) in controllers {
         let mut state = PositionState::at_rest(0.0);
@@ -112,13 +116,14 @@ fn control(criterion: &mut Criterion) {
         });
     }
     let ticks = periods.ticks_per_position();
-    let mut history = SetpointHistory::new(0.0, ticks, Reach { delay: 4 * ticks, lookback: 0, ahead: 0 });
+    let mut history =
+        SetpointHistory::new(0.0, ticks, SetpointWindow { delay: 4 * ticks, lookback: 0, preview: 0 });
     let feedforward = Feedforward::new(&FEEDFORWARD, period, RATIO);
     bench(&mut group, "delayed setpoint and feedforward", MANY, || {
         let mut sum = 0.0;
         for k in 0..MANY {
             history.push(swing(0, k));
-            let k = history.present() - 2;
+            let k = history.present_index() - 2;
             sum += history.at(k) + feedforward.velocity(&history, k) + feedforward.torque(&history, k);
         }
         sum
@@ -152,14 +157,15 @@ fn machine(criterion: &mut Criterion) {
     let config = shipped();
     let ticks = config.periods().ticks_per_position() as usize;
     let mut group = criterion.benchmark_group("machine, axis-ticks");
-    for (width, name) in [(Width::Widest, "widest vectors"), (Width::Baseline, "baseline vectors")] {
-        let counts: &[usize] = if width == Width::Widest { &[1, 4, 5, 8, 32] } else { &[1, 5, 8] };
+    for (width, name) in [(SimdWidth::Widest, "widest vectors"), (SimdWidth::Baseline, "baseline vectors")] {
+        let counts: &[usize] = if width == SimdWidth::Widest { &[1, 4, 5, 8, 32] } else { &[1, 5, 8] };
         for &axes in counts {
             let places: Vec<usize> = (0..axes).map(|axis| axis % config.axes().len()).collect();
             let machine = LazyCell::new(|| {
-                let parameters = MachineParameters::of_axes(&config, &places).expect("it can be discretized");
+                let parameters =
+                    MachineParameters::from_axes(&config, &places).expect("it can be discretized");
                 let mut machine = Machine::new(Arc::new(parameters));
-                machine.set_width(width);
+                machine.set_simd_width(width);
                 machine
             });
             let psec: Vec<Vec<f64>> =

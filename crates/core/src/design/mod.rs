@@ -68,7 +68,7 @@ pub enum DesignError {
     #[error("the poles of the closed loop cannot be computed from these polynomials")]
     NoPoles,
     /// Desired pole on or outside the unit circle.
-    #[error("the wanted pole {} has the modulus {modulus}; it must be below 1 − 10⁻⁶", format_complex(*re, *im))]
+    #[error("the desired pole {} has the modulus {modulus}; it must be below 1 − 10⁻⁶", format_complex(*re, *im))]
     PoleOutside {
         /// Real part.
         re: f64,
@@ -78,7 +78,7 @@ pub enum DesignError {
         modulus: f64,
     },
     /// Complex desired pole without its conjugate.
-    #[error("the wanted pole {} must come with its conjugate {}", format_complex(*re, *im), format_complex(*re, -im))]
+    #[error("the desired pole {} must come with its conjugate {}", format_complex(*re, *im), format_complex(*re, -im))]
     NoConjugate {
         /// Real part.
         re: f64,

@@ -183,11 +183,11 @@ fn poles_that_cannot_be_placed_are_rejected_by_name() {
     );
     assert_eq!(
         rejection(&lag, &[1.0.into()]),
-        "the wanted pole 1.000000 has the modulus 1; it must be below 1 − 10⁻⁶"
+        "the desired pole 1.000000 has the modulus 1; it must be below 1 − 10⁻⁶"
     );
     assert_eq!(
         rejection(&lag, &[0.2.into(), Complex::new(0.5, 0.25)]),
-        "the wanted pole 0.500000 + 0.250000j must come with its conjugate 0.500000 − 0.250000j"
+        "the desired pole 0.500000 + 0.250000j must come with its conjugate 0.500000 − 0.250000j"
     );
     assert!(rejection(&lag, &[f64::NAN.into()]).contains("NaN"));
     // A = (1 − 0.8q⁻¹)(1 − 0.3q⁻¹), B = 0.4q⁻¹(1 − 0.3q⁻¹)
