@@ -221,7 +221,7 @@ pub struct Refinement {
 }
 
 impl Refinement {
-    /// Returns the pairs of parameters whose correlation exceeds [`CORRELATED`], with the correlation.
+    /// Returns the pairs of parameters whose correlation exceeds 0.95, with the correlation.
     pub fn correlated_pairs(&self) -> Vec<(RefinedParameter, RefinedParameter, f64)> {
         let mut found = Vec::new();
         for (j, row) in self.correlations.iter().enumerate() {

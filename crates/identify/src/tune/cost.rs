@@ -17,7 +17,7 @@ const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 pub enum CostTerm {
     /// Largest contour error, µm; without contour error the same as [`CostTerm::Following`].
     Contour,
-    /// RMS contour error, µm; without contour error the same as [`CostTerm::Rms`].
+    /// RMS contour error, µm; without contour error the same as [`CostTerm::FollowingRms`].
     ContourRms,
     /// Largest delay-compensated following error of any axis, µm or mdeg.
     Following,

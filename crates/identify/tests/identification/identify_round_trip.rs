@@ -190,7 +190,7 @@ fn x_and_y_are_identified_and_their_ballbar_matches() {
 
 /// Returns the radial deviation on the ballbar: mean, min, max, µm.
 fn ballbar(machine: &MachineConfig) -> [f64; 3] {
-    let figures = virtual_axes_verification::fixtures::machines::watch_scenario("ballbar", machine, |_| {});
+    let figures = virtual_axes_verification::fixtures::machines::trace_scenario("ballbar", machine, |_| {});
     let circle = &figures.circles[0];
     [circle.mean, circle.min, circle.max].map(|meters| meters * 1e6)
 }
