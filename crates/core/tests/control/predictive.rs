@@ -23,13 +23,13 @@ fn tuned(n1: usize, n2: usize, nu: usize, lambda_rel: f64) -> MachineConfig {
 }
 
 fn figures(scenario: &str, machine: &MachineConfig) -> Figures {
-    watch_scenario(scenario, machine, |_| ())
+    trace_scenario(scenario, machine, |_| ())
 }
 
 /// Returns the samples of one axis at every tick of a scenario.
 fn samples(scenario: &str, machine: &MachineConfig, index: usize) -> Vec<AxisSample> {
     let mut samples = Vec::new();
-    watch_scenario(scenario, machine, |tick: Tick<'_>| samples.push(*tick.machine.axis(index).sample()));
+    trace_scenario(scenario, machine, |tick: Tick<'_>| samples.push(*tick.machine.axis(index).sample()));
     samples
 }
 

@@ -9,7 +9,7 @@ use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters, SimdWid
 use virtual_axes_core::trial::{Figures, Trial, run, run_variants, trace};
 use virtual_axes_core::units::seconds;
 use virtual_axes_verification::fixtures::machines::{
-    AXES, TSP, configured, configured_with, program, setpoints, watch_scenario,
+    AXES, TSP, configured, configured_with, program, setpoints, trace_scenario,
 };
 
 /// Position cycles of a run.
@@ -202,7 +202,7 @@ fn contour_error_of_a_position_cycle_equals_that_of_single_poses() {
             let (kinematics, ticks) =
                 (Kinematics::new(&config), config.periods().ticks_per_position() as usize);
             let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
-            watch_scenario(scenario, &config, |tick| {
+            trace_scenario(scenario, &config, |tick| {
                 let joints = (0..AXES).map(|axis| tick.machine.axis(axis).sample().position).collect();
                 seen.push((seconds(tick.time), joints));
             });

@@ -24,7 +24,7 @@ fn config(changes: &[(&str, f64)]) -> MachineConfig {
 
 /// Runs a built-in scenario and calls `look` at every tick.
 fn watch(name: &str, changes: &[(&str, f64)], look: impl FnMut(Tick<'_>)) -> Figures {
-    watch_scenario(name, &config(changes), look)
+    trace_scenario(name, &config(changes), look)
 }
 
 fn figures(name: &str, changes: &[(&str, f64)]) -> Figures {
@@ -280,7 +280,7 @@ fn recorded_signals_have_the_maxima_of_the_figures() {
 fn a_peak_between_two_position_cycles_is_recorded() {
     let config = config(&[]);
     let mut at_instants = 0.0_f64;
-    let figures = watch_scenario("x-there-and-back", &config, |tick| {
+    let figures = trace_scenario("x-there-and-back", &config, |tick| {
         if tick.position_instant {
             at_instants = at_instants.max(tick.machine.axis(X).sample().current.abs());
         }
