@@ -85,7 +85,7 @@ fn corners_are_rounded_by_the_cascade() {
     assert_near("45°", corner(45.0 * DEGREE), 103.7, 1.037);
 }
 
-/// Largest delay-compensated following error at position instants (m or rad), and largest current (A).
+/// Returns the maximum delay-compensated following error at position cycles (m or rad) and the peak current (A).
 fn move_one(axis: usize, profile: RestToRestProfile, changes: &[(&str, f64)]) -> (f64, f64) {
     let (mut error, mut current): (f64, f64) = (0.0, 0.0);
     let psec = |t: f64| {

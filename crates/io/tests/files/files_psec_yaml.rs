@@ -1,12 +1,12 @@
 //! Setpoints as YAML, as `ros2 topic pub` takes it; and what a file is.
 
-use virtual_axes_core::trajectory::{Request, Start};
+use virtual_axes_core::trajectory::{TrajectoryRequest, Start};
 use virtual_axes_core::units::SECOND_NS;
 use virtual_axes_io::files::{FileKind, Input, PsecYamlOut, read_psec_yaml};
 use virtual_axes_io::messages::joint_trajectory;
-use virtual_axes_verification::fixtures::folder::Folder;
+use virtual_axes_verification::fixtures::folder::TestFolder;
 
-fn read(text: &str) -> Vec<Request> {
+fn read(text: &str) -> Vec<TrajectoryRequest> {
     read_psec_yaml(text, "p.yaml").unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -60,7 +60,7 @@ fn faults_name_file_and_line() {
     assert_eq!(error("joint_names: [x]\npoints: 5\n"), "p.yaml:2: expected a list: points: 5");
     assert_eq!(
         error("joint_names: &names [x]\npoints: *names\n"),
-        "p.yaml:2: expected a mapping: points: *names (what the alias stands for is in line 1)"
+        "p.yaml:2: expected a mapping: points: *names (the alias is defined in line 1)"
     );
     assert_eq!(
         error("points:\n- positions: [0]\n  time_from_start: 5\n"),
@@ -77,7 +77,7 @@ fn faults_name_file_and_line() {
     );
     assert_eq!(
         error("joint_names: [x]\njoint_names: [y]\n"),
-        "p.yaml:2: joint_names stands twice in one mapping"
+        "p.yaml:2: duplicate key joint_names"
     );
     assert_eq!(
         error("joint_names: [x]\npoints:\n- {positions: [0.0]}\n- {positions: [0.0, 1.0]}\n"),
@@ -151,7 +151,7 @@ fn what_is_written_is_read_back_bit_for_bit() {
 
 #[test]
 fn what_a_file_is_is_told_by_its_content() {
-    let folder = Folder::new("kind");
+    let folder = TestFolder::new("kind");
     let mcap = b"\x89MCAP0\r\nrest".as_slice();
     for (bytes, kind) in [
         (b"time,x\n0,0\n".as_slice(), FileKind::PsecCsv),
@@ -176,7 +176,7 @@ fn what_a_file_is_is_told_by_its_content() {
 
 #[test]
 fn what_is_not_known_is_said_with_what_is() {
-    let folder = Folder::new("unknown");
+    let folder = TestFolder::new("unknown");
     for (bytes, words) in [
         (b"".as_slice(), "f: it is empty; there are setpoints as CSV"),
         (b"t,x\n0,0\n", "f: its first line is \"t,x\"; there are setpoints as CSV"),

@@ -11,7 +11,7 @@ use virtual_axes_identify::recording::{Finding, RawRecording};
 use virtual_axes_io::files::{
     AxisRecordingError, Columns, RecordingOptions, TraceCsv, read_recording, read_recording_csv,
 };
-use virtual_axes_verification::fixtures::folder::Folder;
+use virtual_axes_verification::fixtures::folder::TestFolder;
 
 /// Screws of 20 mm on x, 2.64 N·m/A; a gear of 180 on a, 0.88 N·m/A.
 fn mill() -> &'static MachineConfig {
@@ -234,7 +234,7 @@ fn a_mapping_that_cannot_be_is_refused() {
 
 #[test]
 fn a_mapping_comes_from_yaml_and_the_command_line_goes_before_it() {
-    let folder = Folder::new("recording_columns");
+    let folder = TestFolder::new("recording_columns");
     let file = folder.file(
         "map.yaml",
         "# of the oscilloscope\ntime: t[ms]\nposition: \"#2[mm]\"\ncurrent: \"[mA]\"\nvelocity: v [m/min]\n\
@@ -277,7 +277,7 @@ fn a_mapping_comes_from_yaml_and_the_command_line_goes_before_it() {
     let message = said("time: #1\nposition: p\n");
     assert!(message.contains("there is no value") && message.contains("quotation marks"), "{message}");
     assert!(said("time: [ms]\n").contains("a text"), "{}", said("time: [ms]\n"));
-    assert!(said("time: t\ntime: u\n").contains("stands twice"));
+    assert!(said("time: t\ntime: u\n").contains("duplicate key time"));
     assert!(said("").contains("not one mapping"));
     assert_eq!(said("time: t[mm/h]\n").find("m.yaml: time=t[mm/h]: there is no unit \"mm/h\""), Some(0));
     let missing = Columns::open("no/such.yaml".as_ref()).expect_err("not there").to_string();
@@ -504,7 +504,7 @@ fn a_file_without_end_is_given_up() {
 
 #[test]
 fn a_file_of_another_kind_is_told() {
-    let folder = Folder::new("recording_kinds");
+    let folder = TestFolder::new("recording_kinds");
     let mill = mill();
     let said = |name: &str, text: &str, texts: &[&str]| {
         let path = folder.file(name, text);

@@ -1,8 +1,8 @@
 //! Tests of the configuration: rejected files and values, accepted values, built-in machines.
 
+mod machines;
 mod rejected_files;
 mod rejected_values;
-mod machines;
 mod setting;
 mod writing;
 

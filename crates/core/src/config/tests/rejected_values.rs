@@ -36,21 +36,13 @@ fn misspelt_key() {
 #[test]
 fn misspelt_type_is_not_reported_as_missing() {
     let text = mikron_with("    x:\n      type: linear", "    x:\n      typ: linear");
-    assert_rejected(
-        &text,
-        " typ:",
-        "my.yaml:{line}: unknown parameter x.typ; the nearest is x.type",
-    );
+    assert_rejected(&text, " typ:", "my.yaml:{line}: unknown parameter x.typ; the nearest is x.type");
 }
 
 #[test]
 fn misspelt_joints_is_not_reported_as_missing() {
     let text = mikron_with("    joints:", "    jonts:");
-    assert_rejected(
-        &text,
-        "jonts:",
-        "my.yaml:{line}: unknown parameter jonts; the nearest is joints",
-    );
+    assert_rejected(&text, "jonts:", "my.yaml:{line}: unknown parameter jonts; the nearest is joints");
 }
 
 #[test]
@@ -74,7 +66,11 @@ fn not_a_number() {
 #[test]
 fn text_for_a_number() {
     let text = mikron_with("inertia_kg_m2: 0.028", "inertia_kg_m2: abc");
-    assert_rejected(&text, "abc", "my.yaml:{line}: x.motor.inertia_kg_m2: found text \"abc\", expected number");
+    assert_rejected(
+        &text,
+        "abc",
+        "my.yaml:{line}: x.motor.inertia_kg_m2: found text \"abc\", expected number",
+    );
 }
 
 #[test]
