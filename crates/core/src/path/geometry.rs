@@ -2,7 +2,7 @@
 
 use super::block::Block;
 use super::error::PathError;
-use crate::kinematics::{Kinematics, AxisRole, ToolPose};
+use crate::kinematics::{AxisRole, Kinematics, ToolPose};
 
 /// Largest gap between two blocks, relative to the coordinate (or to 1 m, 1 rad).
 const GAP_TOLERANCE: f64 = 1e-12;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::assess::{AxisAssessor, NearestPoint, PathDeviations, PathTracker, SetpointTracker};
 use crate::config::{AxisKind, MachineConfig};
-use crate::kinematics::{Kinematics, Poses, AxisRole, TableAngles};
+use crate::kinematics::{AxisRole, Kinematics, Poses, TableAngles};
 use crate::machine::Machine;
 use crate::path::Frame;
 use crate::simulation::{Simulation, contour_preview_cycles};

@@ -94,7 +94,10 @@ impl PathTracker {
             (0..last).for_each(|_| found.push(&first));
             return Some(FollowResult { first, closed_form: false });
         }
-        if poses.constant_axis().is_some() && begin >= self.path.length() && self.all_beyond_end(poses, &first) {
+        if poses.constant_axis().is_some()
+            && begin >= self.path.length()
+            && self.all_beyond_end(poses, &first)
+        {
             for index in 1..=last {
                 found.push(&self.nearest_at_end(&poses.get(index), &first));
             }
