@@ -9,7 +9,8 @@ use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Vis
 
 use super::lines::fields;
 use super::psec_csv::TIME;
-use super::{shortened, yaml};
+use virtual_axes_core::text::shortened;
+use virtual_axes_core::yaml;
 
 /// What a file can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,6 +84,8 @@ pub struct Input {
 
 /// Bytes in which a first line is sought.
 const HEAD: u64 = 1 << 16;
+/// Maximum size of a YAML file, bytes: half an hour of five axes, point by point.
+const MAX_YAML_BYTES: u64 = 64 << 20;
 
 impl Input {
     /// Opens a file and tells what it is: CSV and MCAP by their beginnings, YAML whole.
@@ -99,7 +102,7 @@ impl Input {
         let kind = match kind_by_beginning(&head) {
             Some(kind) => kind,
             None => {
-                (&mut file).take(yaml::LONGEST - HEAD).read_to_end(&mut head).map_err(unreadable)?;
+                (&mut file).take(MAX_YAML_BYTES - HEAD).read_to_end(&mut head).map_err(unreadable)?;
                 kind_of_yaml(&head, &name)?
             }
         };
@@ -147,16 +150,14 @@ fn first_line(text: &str) -> &str {
 
 fn kind_of_yaml(bytes: &[u8], name: &str) -> Result<FileKind, InputError> {
     let unknown = |found: String| InputError::Unknown { at: name.to_owned(), found };
-    if bytes.len() as u64 >= yaml::LONGEST {
-        return Err(unknown(format!("it is longer than {} bytes", yaml::LONGEST)));
+    if bytes.len() as u64 >= MAX_YAML_BYTES {
+        return Err(unknown(format!("it is longer than {} bytes", MAX_YAML_BYTES)));
     }
     let Ok(text) = str::from_utf8(bytes) else {
         return Err(unknown("it is not text".to_owned()));
     };
-    let documents: Vec<Sketch> = yaml::documents(text).map_err(|(line, reason)| {
-        let at = if line > 0 { format!("{name}:{line}") } else { name.to_owned() };
-        InputError::Syntax { at, reason }
-    })?;
+    let documents: Vec<Sketch> = yaml::documents(text)
+        .map_err(|error| InputError::Syntax { at: error.position(name), reason: error.reason })?;
     let first = documents.first();
     if let Some(kind) = first.and_then(Sketch::kind) {
         return Ok(kind);

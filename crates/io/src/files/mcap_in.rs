@@ -9,7 +9,8 @@ use mcap::{McapError, Message};
 use serde::de::{DeserializeOwned, DeserializeSeed};
 
 use super::mcap_messages::{Messages, is_whole};
-use super::{cdr, shortened};
+use super::cdr;
+use virtual_axes_core::text::shortened;
 
 /// The encoding of messages that is read.
 const ENCODING: &str = "cdr";

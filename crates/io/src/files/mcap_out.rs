@@ -29,12 +29,12 @@ pub(super) const QOS_KEY: &str = "offered_qos_profiles";
 const INFINITE: &str = "\n    sec: 9223372036\n    nsec: 854775807";
 
 /// The quality of service of topics that no node offers: reliable, volatile, keep last 10.
-pub(super) const USUAL_QOS: QosConfig = QosConfig { reliable: true, transient_local: false, depth: 10 };
+pub(super) const USUAL_QOS: QosConfig = QosConfig { is_reliable: true, is_transient_local: false, depth: 10 };
 
 /// What `ros2 bag play` offers a topic with, in the words of rosbag2 since Jazzy; the times are infinite.
 pub(super) fn qos_text(qos: QosConfig) -> String {
-    let reliability = if qos.reliable { "reliable" } else { "best_effort" };
-    let durability = if qos.transient_local { "transient_local" } else { "volatile" };
+    let reliability = if qos.is_reliable { "reliable" } else { "best_effort" };
+    let durability = if qos.is_transient_local { "transient_local" } else { "volatile" };
     format!(
         "- history: keep_last\n  depth: {}\n  reliability: {reliability}\n  durability: {durability}\n  \
          deadline:{INFINITE}\n  lifespan:{INFINITE}\n  liveliness: automatic\n  \

@@ -24,7 +24,6 @@ mod recorded;
 mod trace;
 mod trace_csv;
 mod trace_mcap;
-mod yaml;
 
 pub use cdr::encode;
 pub use input::{FileKind, Input, InputError};
@@ -44,10 +43,7 @@ pub use trace::{TraceWriter, trace_writer};
 pub use trace_csv::TraceCsv;
 pub use trace_mcap::TraceMcap;
 
-use virtual_axes_core::config::shortened;
-
-/// Least similarity (Jaro-Winkler) of a name that is offered in place of an unknown one.
-const NEAR_ENOUGH: f64 = 0.7;
+use virtual_axes_core::text::shortened;
 
 /// Most names that a message lists.
 const MOST_LISTED: usize = 10;
@@ -55,18 +51,4 @@ const MOST_LISTED: usize = 10;
 /// Names for a message: the first of them, none longer than is worth reading.
 fn listed<'a>(names: impl IntoIterator<Item = &'a String>) -> Vec<String> {
     names.into_iter().take(MOST_LISTED).map(|name| shortened(name)).collect()
-}
-
-/// The name that looks most like `found`, if one does. Compared is what a message would show of them: comparing takes
-/// a time that is the product of their lengths.
-fn nearest<'a>(found: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
-    let found = shortened(found);
-    let similar = known.map(shortened).map(|name| (strsim::jaro_winkler(&found, &name), name));
-    let (similarity, name) = similar.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (similarity >= NEAR_ENOUGH).then_some(name)
-}
-
-/// The end of a message about an unknown name.
-fn nearest_name(nearest: &Option<String>) -> String {
-    nearest.as_ref().map_or_else(String::new, |name| format!("; the nearest is {name}"))
 }

@@ -6,8 +6,9 @@ use std::path::Path;
 
 use super::lines::{Lines, fields};
 use super::psec_error::PsecError;
+use virtual_axes_core::text::nearest_name;
 use virtual_axes_core::trajectory::JointLimits;
-use virtual_axes_core::trajectory::spline::{Order, Segment, State};
+use virtual_axes_core::trajectory::spline::{SplineDegree, Segment, KinematicState};
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS, seconds};
 
 /// The column of times.
@@ -193,7 +194,7 @@ impl<R: Read> PsecCsv<R> {
         for (value, (&from, &to)) in
             row.iter_mut().zip(self.before.positions.iter().zip(&self.after.positions))
         {
-            let segment = Segment::new(State::rest(from), State::rest(to), duration, Order::Linear);
+            let segment = Segment::new(KinematicState::at_rest(from), KinematicState::at_rest(to), duration, SplineDegree::Linear);
             *value = segment.position(time - self.before.time);
         }
     }
@@ -207,7 +208,7 @@ impl<R: Read> PsecCsv<R> {
             let checked = if time == 0 {
                 joint.check_jump(point.index, before, position, period)
             } else if time - self.period < self.first_time {
-                joint.check_speed(point.index, speed, "speed on the way to it")
+                joint.check_speed(point.index, speed, "speed on the approach to it")
             } else {
                 joint.check_speed(point.index, speed, "speed")
             };
@@ -242,7 +243,7 @@ impl<R: Read> PsecCsv<R> {
                     at,
                     found: super::shortened(column),
                     known: names.clone().collect::<Vec<_>>().join(", "),
-                    nearest: super::nearest(column, names),
+                    nearest: nearest_name(column, names),
                 });
             };
             if self.places.contains(&place) {
@@ -298,7 +299,7 @@ impl<R: Read> PsecCsv<R> {
                 return Err(no_number(column + 1));
             }
             joint
-                .check_stroke(after.index, position)
+                .check_travel_limits(after.index, position)
                 .map_err(|rejection| PsecError::Point { at: at(), rejection })?;
         }
         Ok(true)

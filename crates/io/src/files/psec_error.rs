@@ -1,9 +1,9 @@
 //! Why setpoints from CSV cannot be used.
 
-use super::nearest_name;
 use super::psec_csv::{LONGEST, TIME};
+use virtual_axes_core::text::nearest_hint;
 use virtual_axes_core::trajectory::Rejection;
-use virtual_axes_core::units::Told;
+use virtual_axes_core::units::Rounded;
 
 /// Why a file of setpoints cannot be used; each names file and line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -25,7 +25,7 @@ pub enum PsecError {
         found: String,
     },
     /// A column is headed by what is not a joint.
-    #[error("{at}: there is no joint \"{found}\"; there are {known}{}", nearest_name(.nearest))]
+    #[error("{at}: there is no joint \"{found}\"; there are {known}{}", nearest_hint(.nearest))]
     UnknownJoint {
         /// File and line.
         at: String,
@@ -65,7 +65,7 @@ pub enum PsecError {
         found: String,
     },
     /// A time is out of range.
-    #[error("{at}: {TIME} is {} s, must lie in 0 … {LONGEST} s", Told(*found))]
+    #[error("{at}: {TIME} is {} s, must lie in 0 … {LONGEST} s", Rounded(*found))]
     Time {
         /// File and line.
         at: String,

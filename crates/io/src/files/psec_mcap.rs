@@ -12,9 +12,10 @@ use super::mcap_in::{
     Ending, McapFault, check_chunks, damaged, decode_with, start, type_of, unfinished, unreadable,
 };
 use super::mcap_messages::Messages;
-use super::{listed, nearest, nearest_name, shortened};
+use super::listed;
+use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use crate::messages::RequestSeed;
-use virtual_axes_core::trajectory::{Rejection, Request};
+use virtual_axes_core::trajectory::{Rejection, TrajectoryRequest};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// The type of message that is read.
@@ -43,7 +44,7 @@ pub enum RecordingError {
         topics: Vec<String>,
     },
     /// The topic that was asked for carries none.
-    #[error("{at}: there is no trajectory on {topic}; there are some on {}{}", .topics.join(", "), nearest_name(.nearest))]
+    #[error("{at}: there is no trajectory on {topic}; there are some on {}{}", .topics.join(", "), nearest_hint(.nearest))]
     UnknownTopic {
         /// The file.
         at: String,
@@ -155,7 +156,7 @@ impl<R: Read + Seek> Trajectories<R> {
             (Some(topic), _) => topic.to_owned(),
         };
         let Some(times) = found.remove(&topic) else {
-            let nearest = nearest(&topic, topics.iter().map(String::as_str));
+            let nearest = nearest_name(&topic, topics.iter().map(String::as_str));
             return Err(RecordingError::UnknownTopic {
                 at,
                 topic: shortened(&topic),
@@ -211,7 +212,7 @@ impl<R: Read + Seek> Trajectories<R> {
         &self,
         number: usize,
         message: &Message<'_>,
-    ) -> Result<(Nanoseconds, Request), RecordingError> {
+    ) -> Result<(Nanoseconds, TrajectoryRequest), RecordingError> {
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
         let at = || {
             format!(
@@ -229,7 +230,7 @@ impl<R: Read + Seek> Trajectories<R> {
 }
 
 impl<R: Read + Seek> Iterator for Trajectories<R> {
-    type Item = Result<(Nanoseconds, Request), RecordingError>;
+    type Item = Result<(Nanoseconds, TrajectoryRequest), RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let number = self.order.pop_front()?;

@@ -9,12 +9,12 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
 
-use super::yaml;
 use crate::messages::builtin_interfaces::msg::{Duration, Time};
 use crate::messages::std_msgs::msg::Header;
 use crate::messages::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
 use crate::messages::{self};
-use virtual_axes_core::trajectory::{Rejection, Request};
+use virtual_axes_core::trajectory::{Rejection, TrajectoryRequest};
+use virtual_axes_core::yaml::{self, YamlNumber};
 
 /// What `ros2 topic echo` prints in place of what it leaves out.
 const LEFT_OUT: &str = "'...'";
@@ -51,13 +51,12 @@ pub enum TrajectoryYamlError {
 ///
 /// # Errors
 /// [`TrajectoryYamlError`], the first fault.
-pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<Request>, TrajectoryYamlError> {
-    let at = |line: u64| if line > 0 { format!("{file}:{line}") } else { file.to_owned() };
-    let documents: Vec<Spanned<Message>> = yaml::documents(text).map_err(|(line, mut reason)| {
-        if text.lines().nth(line.saturating_sub(1) as usize).is_some_and(|text| text.contains(LEFT_OUT)) {
-            reason += "; `ros2 topic echo --full-length` leaves nothing out";
+pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<TrajectoryRequest>, TrajectoryYamlError> {
+    let documents: Vec<Spanned<Message>> = yaml::documents(text).map_err(|mut error| {
+        if text.lines().nth(error.line.saturating_sub(1) as usize).is_some_and(|text| text.contains(LEFT_OUT)) {
+            error.reason += "; `ros2 topic echo --full-length` leaves nothing out";
         }
-        TrajectoryYamlError::Syntax { at: at(line), reason }
+        TrajectoryYamlError::Syntax { at: error.position(file), reason: error.reason }
     })?;
     if documents.is_empty() {
         return Err(TrajectoryYamlError::Empty { at: file.to_owned() });
@@ -70,7 +69,7 @@ pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<Request>, Trajectory
             let message = JointTrajectory::from(document.value);
             messages::request(&message, usize::MAX).map_err(|rejection| {
                 let line = rejection.index.and_then(|index| lines.get(index).copied());
-                TrajectoryYamlError::Rejected { at: at(line.unwrap_or(begin)), rejection }
+                TrajectoryYamlError::Rejected { at: yaml::position(file, line.unwrap_or(begin)), rejection }
             })
         })
         .collect()
@@ -94,10 +93,10 @@ struct HeaderFields {
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Point {
-    positions: Vec<Number>,
-    velocities: Vec<Number>,
-    accelerations: Vec<Number>,
-    effort: Vec<Number>,
+    positions: Vec<YamlNumber>,
+    velocities: Vec<YamlNumber>,
+    accelerations: Vec<YamlNumber>,
+    effort: Vec<YamlNumber>,
     time_from_start: TimeFields,
 }
 
@@ -108,40 +107,9 @@ struct TimeFields {
     nanosec: Whole<u32>,
 }
 
-/// A number, with a better message for what is none.
-struct Number(f64);
-
-/// A whole number, likewise.
+/// Integer; the error for any other value names the expected range.
 #[derive(Default)]
 struct Whole<T>(T);
-
-impl<'de> Deserialize<'de> for Number {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(NumberVisitor)
-    }
-}
-
-struct NumberVisitor;
-
-impl Visitor<'_> for NumberVisitor {
-    type Value = Number;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a number")
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<Number, E> {
-        Ok(Number(value))
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<Number, E> {
-        Ok(Number(value as f64))
-    }
-
-    fn visit_u64<E>(self, value: u64) -> Result<Number, E> {
-        Ok(Number(value as f64))
-    }
-}
 
 impl<'de, T: TryFrom<i128> + Bounded> Deserialize<'de> for Whole<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -244,7 +212,7 @@ impl From<Message> for JointTrajectory {
 
 impl From<Point> for JointTrajectoryPoint {
     fn from(point: Point) -> Self {
-        let values = |field: Vec<Number>| field.into_iter().map(|number| number.0).collect();
+        let values = |field: Vec<YamlNumber>| field.into_iter().map(|number| number.0).collect();
         let TimeFields { sec, nanosec } = point.time_from_start;
         JointTrajectoryPoint {
             positions: values(point.positions),

@@ -91,7 +91,7 @@ pub enum Status {
     /// Every point has been executed.
     Completed = 2,
     /// A newer one took axes over.
-    Displaced = 3,
+    Preempted = 3,
     /// Ended by a controlled stop, or called off.
     Stopped = 4,
     /// Ended by a reset, a clock that jumped, or a tolerance that was not kept.

@@ -7,7 +7,7 @@ use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
 use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
 
 use super::trajectory::{point_time, start};
-use virtual_axes_core::trajectory::{Rejection, Request, Row};
+use virtual_axes_core::trajectory::{Rejection, TrajectoryRequest, TrajectoryPoint};
 
 /// Fields of `trajectory_msgs/JointTrajectory` and of its points, in their order.
 const MESSAGE_FIELDS: &[&str] = &["header", "joint_names", "points"];
@@ -21,7 +21,7 @@ const POINT_FIELDS: &[&str] = &["positions", "velocities", "accelerations", "eff
 pub struct RequestSeed;
 
 impl<'de> DeserializeSeed<'de> for RequestSeed {
-    type Value = Result<Request, Rejection>;
+    type Value = Result<TrajectoryRequest, Rejection>;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
         deserializer.deserialize_struct("JointTrajectory", MESSAGE_FIELDS, self)
@@ -29,7 +29,7 @@ impl<'de> DeserializeSeed<'de> for RequestSeed {
 }
 
 impl<'de> Visitor<'de> for RequestSeed {
-    type Value = Result<Request, Rejection>;
+    type Value = Result<TrajectoryRequest, Rejection>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a JointTrajectory")
@@ -42,7 +42,7 @@ impl<'de> Visitor<'de> for RequestSeed {
             Ok(start) => start,
             Err(rejection) => return Ok(Err(rejection)),
         };
-        let request = Request::new(start, joints);
+        let request = TrajectoryRequest::new(start, joints);
         required(fields.next_element_seed(Points(request))?, "points")
     }
 }
@@ -52,10 +52,10 @@ fn required<T, E: Error>(field: Option<T>, name: &'static str) -> Result<T, E> {
 }
 
 /// The points, which are added to a request.
-struct Points(Request);
+struct Points(TrajectoryRequest);
 
 impl<'de> DeserializeSeed<'de> for Points {
-    type Value = Result<Request, Rejection>;
+    type Value = Result<TrajectoryRequest, Rejection>;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
         deserializer.deserialize_seq(self)
@@ -63,7 +63,7 @@ impl<'de> DeserializeSeed<'de> for Points {
 }
 
 impl<'de> Visitor<'de> for Points {
-    type Value = Result<Request, Rejection>;
+    type Value = Result<TrajectoryRequest, Rejection>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("points")
@@ -74,7 +74,7 @@ impl<'de> Visitor<'de> for Points {
         let mut point = Point::default();
         let mut index = 0;
         while let Some(time) = points.next_element_seed(&mut point)? {
-            let row = Row {
+            let row = TrajectoryPoint {
                 positions: &point.positions,
                 velocities: &point.velocities,
                 accelerations: &point.accelerations,
@@ -159,7 +159,7 @@ mod tests {
     use super::*;
 
     /// What the seed makes of a message, and what becomes of the message read whole.
-    fn both<O: ByteOrder>(message: &JointTrajectory) -> [Result<Request, Rejection>; 2] {
+    fn both<O: ByteOrder>(message: &JointTrajectory) -> [Result<TrajectoryRequest, Rejection>; 2] {
         let bytes = to_vec::<_, O>(message).expect("a message");
         let read = RequestSeed.deserialize(&mut CdrDeserializer::<O>::new(&bytes)).expect("it is whole");
         [read, super::super::request(message, usize::MAX)]

@@ -69,8 +69,8 @@ impl Sampled for DriveStates {
         self.header = header(time);
         put(&mut self.psec, samples, |s| s.psec);
         put(&mut self.position, samples, |s| s.position);
-        put(&mut self.tracking_error, samples, AxisSample::tracking_error);
-        put(&mut self.synchronized_tracking_error, samples, AxisSample::synchronized_tracking_error);
+        put(&mut self.tracking_error, samples, AxisSample::following_error);
+        put(&mut self.synchronized_tracking_error, samples, AxisSample::delay_compensated_following_error);
         put(&mut self.velocity, samples, |s| s.velocity);
         put(&mut self.velocity_setpoint, samples, |s| s.velocity_setpoint);
         put(&mut self.velocity_feedforward, samples, |s| s.velocity_feedforward);

@@ -7,7 +7,7 @@ use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
 
 use super::time::{duration, header};
-use virtual_axes_core::trajectory::{Code, Rejection, Request, Row, Start};
+use virtual_axes_core::trajectory::{RejectionCode, Rejection, TrajectoryRequest, TrajectoryPoint, Start};
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
 /// A trajectory message as a request.
@@ -15,19 +15,19 @@ use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 /// # Errors
 /// [`Rejection`] for what no machine could run: wrong array sizes, values that are not finite,
 /// malformed times, more than `max_points` points.
-pub fn request(message: &JointTrajectory, max_points: usize) -> Result<Request, Rejection> {
+pub fn request(message: &JointTrajectory, max_points: usize) -> Result<TrajectoryRequest, Rejection> {
     let start = start(&message.header)?;
     let points = &message.points;
     if points.len() > max_points {
         let text = format!("{} points are more than max_points, {max_points}", points.len());
-        return Err(Rejection::new(Code::TooManyPoints, text).numbers(points.len() as f64, max_points as f64));
+        return Err(Rejection::new(RejectionCode::TooManyPoints, text).numbers(points.len() as f64, max_points as f64));
     }
-    let mut request = Request::new(start, message.joint_names.clone());
+    let mut request = TrajectoryRequest::new(start, message.joint_names.clone());
     request.reserve(points.len());
     for (index, point) in points.iter().enumerate() {
         request.push(
             point_time(&point.time_from_start, index)?,
-            Row {
+            TrajectoryPoint {
                 positions: &point.positions,
                 velocities: &point.velocities,
                 accelerations: &point.accelerations,
@@ -55,7 +55,7 @@ pub(super) fn point_time(time: &Duration, index: usize) -> Result<Nanoseconds, R
 
 /// A request as a message, stamp 0 for [`Start::Now`]; the inverse of [`request`] but for efforts,
 /// which a request does not keep, and for times beyond the 32-bit seconds of a message, which are cut off.
-pub fn joint_trajectory(request: &Request) -> JointTrajectory {
+pub fn joint_trajectory(request: &TrajectoryRequest) -> JointTrajectory {
     let at = match request.start() {
         Start::Now => 0,
         Start::At(at) => at,
@@ -72,7 +72,7 @@ pub fn joint_trajectory(request: &Request) -> JointTrajectory {
 }
 
 /// A point `time` ns after the start.
-pub fn point(time: Nanoseconds, row: Row<'_>) -> JointTrajectoryPoint {
+pub fn point(time: Nanoseconds, row: TrajectoryPoint<'_>) -> JointTrajectoryPoint {
     JointTrajectoryPoint {
         positions: row.positions.to_vec(),
         velocities: row.velocities.to_vec(),
@@ -85,7 +85,7 @@ pub fn point(time: Nanoseconds, row: Row<'_>) -> JointTrajectoryPoint {
 /// Nanoseconds of a ROS time or duration.
 ///
 /// # Errors
-/// [`Code::InvalidTime`] if `nanosec` is a second or more; `what` and `index` say where it stands.
+/// [`RejectionCode::InvalidTime`] if `nanosec` is a second or more; `what` and `index` say where it stands.
 fn nanoseconds(
     sec: i32,
     nanosec: u32,
@@ -95,7 +95,7 @@ fn nanoseconds(
     if i64::from(nanosec) >= SECOND_NS {
         let text = format!("{what}: nanosec is {nanosec}, must be below {SECOND_NS}");
         let rejection =
-            Rejection::new(Code::InvalidTime, text).numbers(f64::from(nanosec), SECOND_NS as f64 - 1.0);
+            Rejection::new(RejectionCode::InvalidTime, text).numbers(f64::from(nanosec), SECOND_NS as f64 - 1.0);
         return Err(match index {
             Some(index) => rejection.index(index),
             None => rejection,
@@ -123,14 +123,14 @@ mod tests {
     #[test]
     fn a_nanosec_field_of_a_second_is_refused_with_its_point() {
         let rejection = request(&trajectory(1_000_000_000), 10).expect_err("must be refused");
-        assert_eq!((rejection.code, rejection.index), (Code::InvalidTime, Some(0)));
+        assert_eq!((rejection.code, rejection.index), (RejectionCode::InvalidTime, Some(0)));
         assert!(request(&trajectory(999_999_999), 10).is_ok());
     }
 
     #[test]
     fn more_points_than_allowed_are_refused_before_they_are_copied() {
         let rejection = request(&trajectory(0), 0).expect_err("must be refused");
-        assert_eq!((rejection.code, rejection.value, rejection.limit), (Code::TooManyPoints, 1.0, 0.0));
+        assert_eq!((rejection.code, rejection.value, rejection.limit), (RejectionCode::TooManyPoints, 1.0, 0.0));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::shapes::{Shapes, Visual};
 use super::{MACHINE_FRAME, TOOL_FRAME, UrdfError, WORKPIECE_FRAME};
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig};
-use virtual_axes_core::kinematics::{Kinematics, Role};
+use virtual_axes_core::kinematics::{Kinematics, AxisRole};
 
 /// What stands for an end of the stroke that a machine file leaves open, m: the widest that one can say.
 const OPEN_STROKE: f64 = 1e3;
@@ -58,7 +58,7 @@ pub(super) struct Limit {
 impl Limit {
     fn of(axis: &AxisConfig) -> Self {
         let limits = axis.limits();
-        let (min, max) = (limits.stroke_min, limits.stroke_max);
+        let (min, max) = (limits.travel_min, limits.travel_max);
         let endless = axis.kind() == AxisKind::Rotary && min.is_infinite() && max.is_infinite();
         let open = match axis.kind() {
             AxisKind::Linear => OPEN_STROKE,
@@ -67,7 +67,7 @@ impl Limit {
         Limit {
             stroke: (!endless).then(|| [min.max(-open), max.min(open)]),
             velocity: limits.velocity,
-            effort: axis.largest_effort(),
+            effort: axis.max_effort(),
         }
     }
 }
@@ -81,12 +81,12 @@ impl Model {
         let home = [0.0; 3];
         let joints = vec![
             // The tables turn against their joints (ISO 841).
-            chain.joint(Role::A, [MACHINE_FRAME, "cradle"], [0.0, a_y, a_z], [-1.0, 0.0, 0.0]),
-            chain.joint(Role::C, ["cradle", "table"], [c_x, c_y - a_y, -a_z], [0.0, 0.0, -1.0]),
+            chain.joint(AxisRole::A, [MACHINE_FRAME, "cradle"], [0.0, a_y, a_z], [-1.0, 0.0, 0.0]),
+            chain.joint(AxisRole::C, ["cradle", "table"], [c_x, c_y - a_y, -a_z], [0.0, 0.0, -1.0]),
             fixed("workpiece_mount", ["table", WORKPIECE_FRAME], [w_x - c_x, w_y - c_y, w_z]),
-            chain.joint(Role::X, [MACHINE_FRAME, "x_slide"], home, [1.0, 0.0, 0.0]),
-            chain.joint(Role::Y, ["x_slide", "y_slide"], home, [0.0, 1.0, 0.0]),
-            chain.joint(Role::Z, ["y_slide", "z_slide"], home, [0.0, 0.0, 1.0]),
+            chain.joint(AxisRole::X, [MACHINE_FRAME, "x_slide"], home, [1.0, 0.0, 0.0]),
+            chain.joint(AxisRole::Y, ["x_slide", "y_slide"], home, [0.0, 1.0, 0.0]),
+            chain.joint(AxisRole::Z, ["y_slide", "z_slide"], home, [0.0, 0.0, 1.0]),
             fixed("tool_mount", ["z_slide", TOOL_FRAME], [0.0, 0.0, -geometry.tool_length]),
         ];
         let shapes = Shapes::new(geometry, |role| chain.axis(role).map(AxisConfig::limits));
@@ -115,7 +115,7 @@ struct Chain<'a> {
 impl<'a> Chain<'a> {
     fn new(machine: &'a MachineConfig, prefix: &'a str) -> Result<Self, UrdfError> {
         let kinematics = Kinematics::new(machine);
-        let places = Role::ALL.map(|role| kinematics.role(role));
+        let places = AxisRole::ALL.map(|role| kinematics.role(role));
         let stranger = machine.axes().iter().enumerate().find(|(place, _)| !places.contains(&Some(*place)));
         if let Some((_, axis)) = stranger {
             let kind = match axis.kind() {
@@ -127,12 +127,12 @@ impl<'a> Chain<'a> {
         Ok(Chain { axes: machine.axes(), kinematics, prefix })
     }
 
-    fn axis(&self, role: Role) -> Option<&'a AxisConfig> {
+    fn axis(&self, role: AxisRole) -> Option<&'a AxisConfig> {
         self.kinematics.role(role).and_then(|place| self.axes.get(place))
     }
 
     /// The joint that has the role; fixed where none has.
-    fn joint(&self, role: Role, between: [&'static str; 2], origin: [f64; 3], axis: [f64; 3]) -> Joint {
+    fn joint(&self, role: AxisRole, between: [&'static str; 2], origin: [f64; 3], axis: [f64; 3]) -> Joint {
         let Some(config) = self.axis(role) else {
             return fixed(&format!("{role}_held"), between, origin);
         };

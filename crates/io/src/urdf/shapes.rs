@@ -1,7 +1,7 @@
 //! What the links look like: boxes and cylinders, for the eye only. Nothing is computed from them.
 
 use virtual_axes_core::config::{KinematicsConfig, LimitsConfig};
-use virtual_axes_core::kinematics::Role;
+use virtual_axes_core::kinematics::AxisRole;
 
 /// Half a stroke that is assumed for the picture where the machine file says none, m.
 const HALF_STROKE: f64 = 0.3;
@@ -86,9 +86,9 @@ pub(super) struct Shapes {
 }
 
 impl Shapes {
-    pub fn new<'a>(geometry: &KinematicsConfig, limits: impl Fn(Role) -> Option<&'a LimitsConfig>) -> Self {
-        let half = Role::LINEAR.map(|role| {
-            let reach = limits(role).map(|limits| limits.stroke_max.max(-limits.stroke_min));
+    pub fn new<'a>(geometry: &KinematicsConfig, limits: impl Fn(AxisRole) -> Option<&'a LimitsConfig>) -> Self {
+        let half = AxisRole::LINEAR.map(|role| {
+            let reach = limits(role).map(|limits| limits.travel_max.max(-limits.travel_min));
             reach.filter(|reach| reach.is_finite()).unwrap_or(HALF_STROKE).min(LARGEST_HALF_STROKE)
         });
         let lowest = (-half[2] - geometry.tool_length).min(geometry.workpiece[2]);
@@ -176,7 +176,7 @@ impl Shapes {
         ]
     }
 
-    /// The carriage on the rails of X, as long as the stroke of Y.
+    /// The carriage on the rails of X, as long as the travel limits of Y.
     pub fn x_slide(&self) -> Vec<Visual> {
         let rails = self.rails();
         let from = [-SLIDE, -self.half[1] - SLIDE, rails - SLIDE];

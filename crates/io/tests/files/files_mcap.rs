@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::trajectory::Start;
 use virtual_axes_io::files::{PsecMcapOut, RecordingError, TraceMcap, Trajectories};
-use virtual_axes_verification::fixtures::folder::Folder;
+use virtual_axes_verification::fixtures::folder::TestFolder;
 
 const TYPE: &str = "trajectory_msgs/msg/JointTrajectory";
 
@@ -376,7 +376,7 @@ fn each_byte_may_be_damaged() {
 
 #[test]
 fn set_points_that_are_written_are_read_back() {
-    let folder = Folder::new("psec_mcap");
+    let folder = TestFolder::new("psec_mcap");
     let path = folder.0.join("p.mcap");
     let joints = ["x".to_owned(), "c".to_owned()];
     let mut out = virtual_axes_io::files::psec_writer(&path, &joints).expect("can be written");

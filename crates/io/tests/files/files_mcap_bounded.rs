@@ -9,7 +9,7 @@ use virtual_axes_core::config::QosConfig;
 use virtual_axes_io::files::{BoundedRecording, RecordedTopic};
 use virtual_axes_io::messages::Schema;
 
-const QOS: QosConfig = QosConfig { reliable: true, transient_local: false, depth: 10 };
+const QOS: QosConfig = QosConfig { is_reliable: true, is_transient_local: false, depth: 10 };
 /// A message without its data.
 const MESSAGE: u64 = 31;
 /// What may be kept free for a message beside its record: its place in an index (16 bytes), the head of its chunk and

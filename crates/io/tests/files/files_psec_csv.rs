@@ -4,9 +4,9 @@ use std::io::{self, Read};
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use virtual_axes_core::simulation::joints;
+use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::trajectory::{
-    Context, JointLimits, MotionId, Request, Row, Start, Timeline, Trajectory,
+    ValidationContext, JointLimits, MotionId, TrajectoryRequest, TrajectoryPoint, Start, Timeline, Trajectory,
 };
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 use virtual_axes_io::files::{PsecCsv, PsecError};
@@ -16,7 +16,7 @@ const TSP: Nanoseconds = 6_000_000;
 
 fn limits() -> Vec<JointLimits> {
     let parameters = virtual_axes_core::config::Parameters::embedded_default().expect("shipped");
-    joints(&parameters.machine_config().expect("valid"), "")
+    joint_limits(&parameters.machine_config().expect("valid"), "")
 }
 
 fn open(text: &str) -> Result<PsecCsv<&[u8]>, PsecError> {
@@ -43,16 +43,16 @@ fn error(text: &str) -> String {
 /// What the timeline commands for the same points, at instants 0 … n−1.
 fn commanded(points: &[(Nanoseconds, Vec<f64>)], names: &[&str], instants: usize) -> Vec<Vec<f64>> {
     let limits = limits();
-    let mut request = Request::new(Start::Now, names.iter().map(|n| (*n).to_owned()).collect());
+    let mut request = TrajectoryRequest::new(Start::Now, names.iter().map(|n| (*n).to_owned()).collect());
     for (time, positions) in points {
-        request.push(*time, Row { positions, ..Row::default() }).expect("finite");
+        request.push(*time, TrajectoryPoint { positions, ..TrajectoryPoint::default() }).expect("finite");
     }
     let context =
-        Context { joints: &limits, period: TSP, max_points: usize::MAX, allow_nonzero_end_velocity: false };
+        ValidationContext { joints: &limits, period: TSP, max_points: usize::MAX, allow_nonzero_end_velocity: false };
     let trajectory = Arc::new(Trajectory::new(request, &context).expect("within the limits"));
     let places = trajectory.joints().to_vec();
     let mut timeline = Timeline::new(limits.clone(), TSP, &vec![0.0; limits.len()]).expect("a timeline");
-    timeline.offer(MotionId(1), trajectory, 0).expect("starts at home");
+    timeline.submit(MotionId(1), trajectory, 0).expect("starts at home");
     let mut rows = Vec::new();
     for _ in 0..instants {
         timeline.next();
@@ -193,7 +193,7 @@ fn faults_name_file_line_and_column() {
     );
     assert_eq!(
         error("time,x\n0,0\n1,0.36\n"),
-        "p.csv:3: x, point 1: position 0.36 m is outside the stroke [-0.355, 0.355] m"
+        "p.csv:3: x, point 1: position 0.36 m is outside the travel limits [-0.355, 0.355] m"
     );
 }
 
@@ -211,11 +211,11 @@ fn a_speed_is_told_with_the_row_that_it_leads_to() {
     // Vmax is 0.5 m/s, 3 mm in a period.
     let message = error("time,x\n0,0\n0.006,0.001\n0.012,0.005\n0.018,0.005\n");
     assert!(message.starts_with("p.csv:4: x, point 2: speed 0.66"), "{message}");
-    assert!(message.ends_with("m/s is beyond the limit 0.5 m/s"), "{message}");
+    assert!(message.ends_with("m/s exceeds the limit 0.5 m/s"), "{message}");
     let message = error("time,x\n0,0\n0.003,0.001\n0.011,0.009\n0.1,0.005\n");
     assert!(message.starts_with("p.csv:4: x, point 2: speed "), "{message}");
     let message = error("time,x\n0.012,0.1\n");
-    assert!(message.starts_with("p.csv:2: x, point 0: speed on the way to it 8.3"), "{message}");
+    assert!(message.starts_with("p.csv:2: x, point 0: speed on the approach to it 8.3"), "{message}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use virtual_axes_identify::recording::{Finding, RawRecording};
 use virtual_axes_io::files::{
     AxisRecordingError, Columns, RecordingOptions, TraceMcap, read_recording, read_recording_mcap,
 };
-use virtual_axes_verification::fixtures::folder::Folder;
+use virtual_axes_verification::fixtures::folder::TestFolder;
 
 const STATE: &str = "sensor_msgs/msg/JointState";
 const CURRENTS: &str = "virtual_axes/msg/MotorCurrents";
@@ -169,7 +169,7 @@ fn a_trace_that_was_written_is_read_back() {
             .row(start + i64::from(k) * 6_000_000, &[sample(-7.0), sample(f64::from(k))])
             .expect("in memory");
     }
-    let folder = Folder::new("recording_mcap");
+    let folder = TestFolder::new("recording_mcap");
     let path = folder.file("r.mcap", trace.finish().expect("in memory"));
     let (found, findings) = read_recording(&path, x(), &RecordingOptions::default()).expect("good");
     assert_eq!(findings, []);

@@ -8,7 +8,8 @@ use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
 use super::unit::{Channel, Unit};
-use crate::files::{nearest, nearest_name, shortened, yaml};
+use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
+use virtual_axes_core::yaml;
 
 /// How the columns of a CSV file are to be read; what is not said is found out or as usual.
 ///
@@ -79,7 +80,7 @@ pub enum ColumnsError {
         found: String,
     },
     /// An entry for what does not exist.
-    #[error("{at}: there is no \"{found}\"; there are {}{}", known_keys(), nearest_name(.nearest))]
+    #[error("{at}: there is no \"{found}\"; there are {}{}", known_keys(), nearest_hint(.nearest))]
     Unknown {
         /// Who said so.
         at: String,
@@ -175,8 +176,7 @@ impl Columns {
         let unreadable = |at: String, reason: String| Err(ColumnsError::Unreadable { at, reason });
         let mut documents: Vec<Entries> = match yaml::documents(text) {
             Ok(documents) => documents,
-            Err((0, reason)) => return unreadable(name.to_owned(), reason),
-            Err((line, reason)) => return unreadable(format!("{name}:{line}"), reason),
+            Err(error) => return unreadable(error.position(name), error.reason),
         };
         let (Some(entries), true) = (documents.pop(), documents.is_empty()) else {
             return unreadable(name.to_owned(), "it is not one mapping of channels to columns".to_owned());
@@ -224,7 +224,7 @@ impl Columns {
                 self.skip_lines = value.parse().map_err(|_| wrong("must be a number of lines, 0 or more"))?;
             }
             _ => {
-                let nearest = nearest(key, keys());
+                let nearest = nearest_name(key, keys());
                 return Err(ColumnsError::Unknown { at: at.to_owned(), found: shortened(key), nearest });
             }
         }

@@ -7,7 +7,7 @@ use super::error::AxisRecordingError;
 use super::layout::{Context, Layout, number};
 use super::unit::Channel;
 use crate::files::lines::{Lines, fields_between};
-use crate::files::shortened;
+use virtual_axes_core::text::shortened;
 use virtual_axes_core::config::AxisConfig;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 

@@ -2,7 +2,8 @@
 
 use super::csv::MOST_ROWS;
 use super::unit::Channel;
-use crate::files::{FileKind, McapFault, nearest_name};
+use crate::files::{FileKind, McapFault};
+use virtual_axes_core::text::nearest_hint;
 
 /// Why a file cannot be used as a recording of an axis; each names the file, and the line or the message
 /// where there is one.
@@ -66,7 +67,7 @@ pub enum AxisRecordingError {
     #[error(
         "{at}: there is no column {wanted} for {channel}; there are {found}{}; time and position are needed: \
          name a column by CHANNEL=COLUMN[UNIT]{hint}",
-        nearest_name(.nearest)
+        nearest_hint(.nearest)
     )]
     NoColumn {
         /// File and line.
@@ -168,7 +169,7 @@ pub enum AxisRecordingError {
         topics: Vec<String>,
     },
     /// A topic that was asked for carries nothing of use.
-    #[error("{at}: no message of an axis on {topic}; there are some on {}{}", .topics.join(", "), nearest_name(.nearest))]
+    #[error("{at}: no message of an axis on {topic}; there are some on {}{}", .topics.join(", "), nearest_hint(.nearest))]
     UnknownTopic {
         /// The file.
         at: String,
@@ -180,7 +181,7 @@ pub enum AxisRecordingError {
         nearest: Option<String>,
     },
     /// The joint is not there, or cannot be told.
-    #[error("{at}: {reason} {joint}; there are {}{}", .joints.join(", "), nearest_name(.nearest))]
+    #[error("{at}: {reason} {joint}; there are {}{}", .joints.join(", "), nearest_hint(.nearest))]
     Joint {
         /// File and topic.
         at: String,

@@ -7,7 +7,7 @@ use super::csv::next_line;
 use super::error::AxisRecordingError;
 use super::unit::Channel;
 use crate::files::lines::{Lines, fields_between};
-use crate::files::{nearest, shortened};
+use virtual_axes_core::text::{nearest_name, shortened};
 use virtual_axes_core::config::{AxisConfig, AxisKind};
 use virtual_axes_identify::recording::Finding;
 
@@ -197,7 +197,7 @@ impl Context<'_> {
         at: String,
     ) -> AxisRecordingError {
         let names = || columns.iter().map(String::as_str);
-        let nearest = wanted.iter().find_map(|name| nearest(name, names()));
+        let nearest = wanted.iter().find_map(|name| nearest_name(name, names()));
         // The bare name of an axis is likely its position.
         let axis = || names().find(|name| *name == self.joint).map(str::to_owned);
         let mut wanted: Vec<String> = wanted.iter().map(|name| format!("\"{}\"", shortened(name))).collect();

@@ -9,7 +9,8 @@ use super::error::AxisRecordingError;
 use super::join::{Clock, Times, put};
 use super::series::{Kind, Row, Series};
 use crate::files::mcap_in::{Ending, check_chunks, damaged, start, type_of};
-use crate::files::{listed, nearest};
+use crate::files::listed;
+use virtual_axes_core::text::nearest_name;
 use virtual_axes_core::config::AxisConfig;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_identify::recording::{Finding, RawRecording};
@@ -145,7 +146,7 @@ impl Contents {
                     at: name.to_owned(),
                     topic: topic.clone(),
                     topics: listed(all()),
-                    nearest: nearest(topic, all().map(String::as_str)),
+                    nearest: nearest_name(topic, all().map(String::as_str)),
                 });
             }
         }

@@ -6,7 +6,7 @@ use mcap::Message;
 
 use super::error::AxisRecordingError;
 use crate::files::mcap_in::decode;
-use crate::files::{nearest, shortened};
+use virtual_axes_core::text::{nearest_name, shortened};
 use crate::messages::builtin_interfaces::msg::Time;
 use crate::messages::sensor_msgs::msg::JointState;
 use crate::messages::{DriveStates, MotorCurrents};
@@ -212,7 +212,7 @@ impl Series {
         };
         let (reason, nearest) = match several {
             true => ("several joints end in", None),
-            false => ("there is no joint", nearest(joint, names.iter().map(|name| name.as_str()))),
+            false => ("there is no joint", nearest_name(joint, names.iter().map(|name| name.as_str()))),
         };
         Err(AxisRecordingError::Joint {
             at: format!("{file}: {}", shortened(&self.topic)),

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::files::shortened;
+use virtual_axes_core::text::shortened;
 use virtual_axes_core::config::{AxisConfig, AxisKind};
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, MILLISECOND, MINUTE, RPM};
 
