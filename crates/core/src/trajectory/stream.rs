@@ -8,7 +8,7 @@
 //! The sender has its own clock and rate, and the network delays messages: two setpoints can arrive in
 //! one position cycle and none in the next. Therefore the setpoint that enters the buffer approaches
 //! the newest accepted setpoint by at most Vmax·Tsp in each position cycle (slew-rate limit).
-//! [`stream_gate`](super::stream_gate) decides which setpoints are accepted.
+//! The module `stream_gate` decides which setpoints are accepted.
 
 use super::event::{JointSet, MotionId};
 use super::limits::JointLimits;
