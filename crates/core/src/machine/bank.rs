@@ -7,13 +7,14 @@ use super::inner_loops::{
 };
 use crate::drive::MotorState;
 
-/// Lanes of the smallest block, used for up to four axes if the widest vector of the processor has at most four lanes.
+/// Lanes of the small block, used for up to four axes if the widest vector of the processor has at most four lanes:
+/// there one axis takes 37 % less time in it than in the large block (docs/performance.md, block sizes).
 const X4: usize = 4;
-/// Lanes of the middle block: one vector of eight lanes, or two interleaved vectors of four lanes, so that the
-/// latencies of one overlap with the operations of the other.
+/// Lanes of the large block: one vector of eight lanes, or two interleaved vectors of four lanes ([`Unroll2`]), so that
+/// the latencies of one overlap with the operations of the other. On vectors of four lanes this saves 10 to 17 %.
+///
+/// [`Unroll2`]: crate::simd::Unroll2
 const X8: usize = 8;
-/// Lanes of the largest block: two interleaved vectors of eight lanes.
-const X16: usize = 16;
 
 /// SIMD width that the inner loops run with. The results are bit-identical for every width.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -41,7 +42,6 @@ pub(super) struct AxisBank {
 enum AxisBlocks {
     X4(Vec<AxisBlock<X4>>),
     X8(Vec<AxisBlock<X8>>),
-    X16(Vec<AxisBlock<X16>>),
 }
 
 /// Evaluates `$body` with the block and the lane of an axis, for any block size.
@@ -53,10 +53,6 @@ macro_rules! with_lane {
                 $body
             }
             AxisBlocks::X8(blocks) => {
-                let ($block, $lane) = $find(blocks, $axis);
-                $body
-            }
-            AxisBlocks::X16(blocks) => {
                 let ($block, $lane) = $find(blocks, $axis);
                 $body
             }
@@ -92,8 +88,7 @@ impl AxisBank {
     pub fn new(loops: &[InnerLoops], ticks: CycleTicks) -> Self {
         let blocks = match loops.len() {
             ..=X4 if Arch::new().dispatch(LaneCount) <= X4 => AxisBlocks::X4(create_blocks(loops, ticks)),
-            ..=X8 => AxisBlocks::X8(create_blocks(loops, ticks)),
-            _ => AxisBlocks::X16(create_blocks(loops, ticks)),
+            _ => AxisBlocks::X8(create_blocks(loops, ticks)),
         };
         AxisBank { blocks, ticks, width: SimdWidth::default() }
     }
@@ -162,7 +157,6 @@ impl AxisBank {
         match &mut self.blocks {
             AxisBlocks::X4(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, record_all }),
             AxisBlocks::X8(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, record_all }),
-            AxisBlocks::X16(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, record_all }),
         }
     }
 }
@@ -257,11 +251,8 @@ mod tests {
             let ticks = parameters.cycle_ticks();
             let mut machine = Machine::new(Arc::new(parameters));
             let wanted = bits_of_run(&mut machine);
-            let sizes = [
-                AxisBlocks::X4(create_blocks(&loops, ticks)),
-                AxisBlocks::X8(create_blocks(&loops, ticks)),
-                AxisBlocks::X16(create_blocks(&loops, ticks)),
-            ];
+            let sizes =
+                [AxisBlocks::X4(create_blocks(&loops, ticks)), AxisBlocks::X8(create_blocks(&loops, ticks))];
             for (size, blocks) in sizes.into_iter().enumerate() {
                 machine.bank.blocks = blocks;
                 for width in [SimdWidth::Widest, SimdWidth::Four, SimdWidth::Baseline] {
