@@ -56,7 +56,7 @@ pub struct IdentifyArguments {
     /// feedforward signals (VFFWS, TFFWS).
     #[arg(long, value_enum, value_delimiter = ',', value_name = "off|velocity|both[,…]")]
     feedforward: Vec<FeedforwardName>,
-    /// RefinementScope i0 independently of a + c; requires several slow starts from rest.
+    /// Refine i0 independently of a + c; requires several slow starts from rest.
     #[arg(long, conflicts_with = "no_refine")]
     free_i0: bool,
     /// Parameter groups that the refinement in closed loop adjusts [default: all].
