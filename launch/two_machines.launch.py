@@ -1,4 +1,4 @@
-"""Two machines side by side in the namespaces left and right, to compare them.
+"""Two machines side by side in the namespaces left and right, for comparison.
 
 ros2 launch virtual_axes two_machines.launch.py right_controller:=gpc rviz:=true
 
@@ -36,11 +36,11 @@ ARGUMENTS = [
 ]
 SIDES = ["left", "right"]
 APART_S = 2.0
-"""Time between their starts: who starts with both at once may miss topics (docs/middleware.md)."""
+"""Delay between their starts, s: a participant that starts with both at once may miss topics (docs/middleware.md)."""
 
 
 def start(context: LaunchContext) -> list[object]:
-    """Make both machines, and the frame `world` that they stand in."""
+    """Returns both machines, and the common frame `world`."""
     argument = {key: LaunchConfiguration(key).perform(context) for key, *_ in ARGUMENTS}
     clock = {"use_sim_time": argument["time"] != "real"}
     source = str(SHARE / "launch" / "virtual_axes.launch.py")
@@ -77,7 +77,7 @@ def start(context: LaunchContext) -> list[object]:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Declare the arguments and start the nodes."""
+    """Declares the arguments and starts the nodes."""
     declared = [
         DeclareLaunchArgument(key, default_value=default, choices=choices, description=description)
         for key, default, choices, description in ARGUMENTS

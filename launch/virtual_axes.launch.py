@@ -1,4 +1,4 @@
-"""Start the virtual axes in a ROS 2 graph, with a model of the machine for RViz.
+"""Starts the virtual axes in a ROS 2 graph, with a model of the machine for RViz.
 
 ros2 launch virtual_axes virtual_axes.launch.py machine:=my_machine.yaml controller:=gpc rviz:=true
 ros2 launch virtual_axes virtual_axes.launch.py namespace:=cell frame_prefix:=cell/ time:=fast record:=run.mcap
@@ -20,7 +20,7 @@ PACKAGE = "virtual_axes"
 SHARE = Path(__file__).resolve().parent.parent
 DEFAULT_MACHINE = "mikron_ucp710"
 PUBLISH_FREQUENCY = 50.0
-"""Transforms of robot_state_publisher a second; its own default of 20 looks jerky."""
+"""Publish rate of robot_state_publisher, Hz; its default of 20 is not smooth."""
 
 ARGUMENTS = [
     ("machine", DEFAULT_MACHINE, None, "Machine file (ROS 2 parameters), or the name of a shipped machine"),
@@ -48,7 +48,7 @@ ARGUMENTS = [
 
 
 def machine_file(machine: str) -> Path:
-    """Find the parameter file of a machine: a path, or the name of a shipped one."""
+    """Returns the parameter file of a machine: a path, or the name of a built-in one."""
     shipped = SHARE / "config" / f"{machine}.yaml"
     for path in (Path(machine).expanduser(), shipped):
         if path.is_file():
@@ -58,7 +58,7 @@ def machine_file(machine: str) -> Path:
 
 
 def joints_of(machine: Path) -> list[str]:
-    """Names of a machine's joints."""
+    """Returns the joint names of a machine."""
 
     def found(node: object) -> list[str]:
         if not isinstance(node, dict):
@@ -76,14 +76,14 @@ def joints_of(machine: Path) -> list[str]:
 
 
 def controller_parameters(controller: str, machine: Path) -> dict[str, object]:
-    """Say which parameters give every joint this controller."""
+    """Returns the parameters that select this controller for every joint."""
     if controller == "as_machine":
         return {}
     return {f"{joint}.position_loop.controller": controller for joint in joints_of(machine)}
 
 
 def robot_description(context: LaunchContext, machine: Path, joint_prefix: str) -> tuple[str, list[LogInfo]]:
-    """Have the package's command write the URDF of the machine; what is to be said comes second."""
+    """Returns the URDF of the machine from the package's command, and messages for the log."""
     try:
         program = ExecutableInPackage(PACKAGE, PACKAGE).perform(context)
     except Exception as error:
@@ -99,7 +99,7 @@ def robot_description(context: LaunchContext, machine: Path, joint_prefix: str) 
 
 
 def rviz_config(namespace: str, name: str, frame_prefix: str) -> Path:
-    """Give the RViz configuration for these names: the installed one, or a copy with other names."""
+    """Returns the RViz configuration for these names: the installed one, or a copy with other names."""
     installed = SHARE / "rviz" / "virtual_axes.rviz"
     if not namespace and name == PACKAGE and not frame_prefix:
         return installed
@@ -125,7 +125,7 @@ def rviz_config(namespace: str, name: str, frame_prefix: str) -> Path:
 
 
 def start(context: LaunchContext) -> list[object]:
-    """Make the nodes."""
+    """Returns the nodes."""
     argument = {key: LaunchConfiguration(key).perform(context) for key, *_ in ARGUMENTS}
     machine = machine_file(argument["machine"])
     namespace, name, frame_prefix = argument["namespace"], argument["name"], argument["frame_prefix"]
@@ -180,7 +180,7 @@ def start(context: LaunchContext) -> list[object]:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Declare the arguments and start the nodes."""
+    """Declares the arguments and starts the nodes."""
     declared = [
         DeclareLaunchArgument(key, default_value=default, choices=choices, description=description)
         for key, default, choices, description in ARGUMENTS

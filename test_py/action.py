@@ -1,4 +1,4 @@
-"""Goals of the node's action, as any client of FollowJointTrajectory sends them.
+"""Client of the node's action FollowJointTrajectory.
 
     with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive, Follow(drive) as follow:
         sent = follow.send(goal(joint_trajectory(["x"], [0, 1], [0, 0.1])))
@@ -29,7 +29,7 @@ from drive import NANOSECONDS, SETTLE_S, Drive, joint_trajectory
 
 Result = FollowJointTrajectory.Result
 FEEDBACK_QOS = QoSProfile(depth=1000)
-"""Deep enough for what a node in `fast` says while this process has other things to do."""
+"""Queue depth of feedback and results, sufficient for a node in `fast` while this process is busy."""
 STATUS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -39,7 +39,7 @@ def goal(
     end: Mapping[str, float] | None = None,
     end_time: float = 0.0,
 ) -> FollowJointTrajectory.Goal:
-    """A goal with position tolerances `path` and `end` by joint (m, rad), and `end_time` s to get there."""
+    """Returns a goal with position tolerances `path` and `end` by joint (m, rad) and time tolerance `end_time`, s."""
 
     def tolerances(values: Mapping[str, float] | None) -> list[JointTolerance]:
         return [JointTolerance(name=name, position=value) for name, value in (values or {}).items()]
@@ -54,10 +54,10 @@ def goal(
 
 
 class Sent:
-    """A goal that was sent, and what came back so far."""
+    """Goal that was sent, with the responses so far."""
 
     def __init__(self, follow: Follow, message: FollowJointTrajectory.Goal, uuid: UUID | None):
-        """Send it."""
+        """Sends the goal."""
         drive = follow.drive
         self._drive = drive
         self._follow = follow
@@ -65,47 +65,47 @@ class Sent:
 
     @property
     def feedback(self) -> list[FollowJointTrajectory.Feedback]:
-        """What the node has said on the way so far."""
+        """Returns the feedback so far."""
         id = self.id
         return [said.feedback for said in list(self._follow.feedback) if bytes(said.goal_id.uuid) == id]
 
     @property
     def handle(self) -> Any:
-        """The client's handle, once the node has answered."""
+        """Returns the client's goal handle, after the node has responded."""
         self._drive.wait_for(self._accepting.done, 20.0, "answer to a goal")
         return self._accepting.result()
 
     @property
     def id(self) -> bytes:
-        """Its name."""
+        """Returns the goal id."""
         return bytes(self.handle.goal_id.uuid)
 
     def ask(self) -> Any:
-        """Ask for status and result; a future."""
+        """Requests status and result; returns a future."""
         handle = self.handle
         return self._drive.in_executor(handle.get_result_async)
 
     def ended(self, timeout: float = 30.0) -> Any:
-        """Status and result."""
+        """Waits for status and result."""
         future = self.ask()
         self._drive.wait_for(future.done, timeout, "result of a goal")
         return future.result()
 
     def status(self, timeout: float = 30.0) -> int:
-        """How it ended, action_msgs/GoalStatus."""
+        """Returns the final status, action_msgs/GoalStatus."""
         return self.ended(timeout).status
 
     def result(self, timeout: float = 30.0) -> Result:
-        """Its result."""
+        """Returns the result."""
         return self.ended(timeout).result
 
     def wait_for_feedback(self, count: int = 1, timeout: float = 20.0) -> FollowJointTrajectory.Feedback:
-        """The newest feedback, once there are `count`."""
+        """Waits for `count` feedback messages and returns the newest."""
         self._drive.wait_for(lambda: len(self.feedback) >= count, timeout, "feedback")
         return self.feedback[-1]
 
     def cancel(self) -> CancelGoal.Response:
-        """Ask for its end."""
+        """Requests cancellation."""
         handle = self.handle
         future = self._drive.in_executor(handle.cancel_goal_async)
         self._drive.wait_for(future.done, 20.0, "answer to a cancel request")
@@ -113,15 +113,15 @@ class Sent:
 
 
 class Follow:
-    """A client of the action, in the graph as part of a Drive."""
+    """Action client in the graph, part of a Drive."""
 
     def __init__(self, drive: Drive, name: str | None = None, timeout: float = 20.0):
-        """Wait until the action is there; `name` if it is remapped."""
+        """Waits for the action server; `name` is the action's remapped name."""
         self.name = name or f"{drive.target}/follow_joint_trajectory"
         self.drive = drive
         self.statuses: list[GoalStatusArray] = []
         self.client = ActionClient(drive.node, FollowJointTrajectory, self.name)
-        # Not the client's: it forgets a goal that is over, and what is still to come for it.
+        # Own subscriptions: the client drops a finished goal and the messages for it that are still in transit.
         self.feedback: list[Any] = []
         self._feedback = drive.node.create_subscription(
             FollowJointTrajectory.Impl.FeedbackMessage,
@@ -138,11 +138,11 @@ class Follow:
         time.sleep(SETTLE_S)
 
     def __enter__(self) -> Follow:
-        """Itself."""
+        """Returns itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave the action; the Drive stays."""
+        """Destroys the client; the Drive stays connected."""
 
         def leave() -> None:
             self.client.destroy()
@@ -153,32 +153,32 @@ class Follow:
         self.drive.in_executor(leave)
 
     def send(self, message: FollowJointTrajectory.Goal, uuid: bytes | None = None) -> Sent:
-        """Send a goal, under an id if it is to have a certain one."""
+        """Sends a goal, with a given id if `uuid` is set."""
         return Sent(self, message, UUID(uuid=list(uuid)) if uuid else None)
 
     def cancel(self, uuid: bytes = bytes(16), stamp: Time | None = None) -> CancelGoal.Response:
-        """Cancel by the rules of action_msgs/CancelGoal."""
+        """Cancels goals by the rules of action_msgs/CancelGoal."""
         info = GoalInfo(goal_id=UUID(uuid=list(uuid)), stamp=stamp or Time())
         future = self._canceling.call_async(CancelGoal.Request(goal_info=info))
         self.drive.wait_for(future.done, 20.0, "answer to a cancel request")
         return future.result()
 
     def status_of(self, uuid: bytes) -> int | None:
-        """What the status topic said last about a goal."""
+        """Returns the newest status of a goal on the status topic."""
         listed = self.statuses[-1].status_list if self.statuses else []
         return next((entry.status for entry in listed if bytes(entry.goal_info.goal_id.uuid) == uuid), None)
 
 
 def line(names: list[str], to: list[float], duration: float) -> JointTrajectory:
-    """From home to `to` by a quintic, at rest at both ends."""
+    """Returns a quintic from home to `to`, at rest at both ends."""
     rest = [[0.0] * len(names)] * 2
     return joint_trajectory(names, [0, duration], [[0.0] * len(names), to], rest, rest)
 
 
 def wave(duration: float = 600.0, joint: str = "x") -> JointTrajectory:
-    """A long motion there and back, at most 0.15 m/s and 0.225 m/s²."""
+    """Returns a long reciprocating motion, at most 0.15 m/s and 0.225 m/s²."""
     time = np.arange(0, duration + 0.05, 0.1)
-    # Rises over the first 2 s, so that it begins at rest.
+    # The amplitude rises over the first 2 s, so that the motion begins at rest.
     phase = 1.5 * time
     size = 0.1 * np.clip(time / 2, 0, 1) ** 2
     rate = 0.1 * np.where(time < 2, time / 2, 0)
@@ -189,12 +189,12 @@ def wave(duration: float = 600.0, joint: str = "x") -> JointTrajectory:
 
 
 def results_of(follow: Follow, sent: Sent) -> list[TrajectoryResult]:
-    """What `~/trajectory_result` said of a goal so far."""
+    """Returns the results of a goal on `~/trajectory_result` so far."""
     return [result for result in follow.drive.results() if bytes(result.goal_id) == sent.id]
 
 
 def ending(follow: Follow, sent: Sent) -> TrajectoryResult:
-    """The last word on `~/trajectory_result`."""
+    """Returns the final result on `~/trajectory_result`."""
     return follow.drive.wait_for(
         lambda: [r for r in results_of(follow, sent) if r.status != TrajectoryResult.ACCEPTED], 10, "its result"
     )[0]

@@ -1,4 +1,4 @@
-"""Headless Chromium over the DevTools protocol: what a page logs, asks for and looks like."""
+"""Headless Chromium over the DevTools protocol: console messages, requests and screenshots of a page."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import numpy as np
 from websockets.sync.client import connect
 
 TIMEOUT = 60.0
-"""s for each thing that is waited for; a start on a busy machine takes seconds."""
+"""Timeout of each wait, s; a start on a busy machine takes seconds."""
 PROGRAMS = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"]
 FLAGS = [
     "--headless=new",
@@ -31,16 +31,16 @@ FLAGS = [
     "--hide-scrollbars",
     "--remote-debugging-port=0",
 ]
-"""No sandbox: Chromium has none for root. The others keep it from talking to anybody by itself."""
+"""Command line options. No sandbox: Chromium has none for root. The other options disable background requests."""
 
 
 def find_browser() -> str | None:
-    """Chromium's program, if there is one."""
+    """Returns the path of Chromium, or None."""
     return next(filter(None, map(shutil.which, PROGRAMS)), None)
 
 
 class Browser:
-    """A browser with one page; a context manager."""
+    """Browser with one page; a context manager."""
 
     def __init__(self, program: str, profile: Path):
         self.events: list[dict] = []
@@ -62,7 +62,7 @@ class Browser:
             raise
 
     def _address(self, profile: Path) -> str:
-        """Where it listens, which it writes into its profile."""
+        """Returns the address of the DevTools server, which the browser writes into its profile."""
         file = profile / "DevToolsActivePort"
         deadline = time.monotonic() + TIMEOUT
         while time.monotonic() < deadline:
@@ -76,7 +76,7 @@ class Browser:
         raise TimeoutError(f"the browser does not listen after {TIMEOUT} s: {self._log.name}")
 
     def send(self, method: str, **params: object) -> dict:
-        """A command's result; events on the way are kept."""
+        """Returns a command's result; keeps events that arrive meanwhile."""
         self._last_id += 1
         message = {"id": self._last_id, "method": method, "params": params}
         if self._session is not None:
@@ -97,11 +97,11 @@ class Browser:
         return message
 
     def events_of(self, *methods: str) -> list[dict]:
-        """What has been said under some names since the page was opened."""
+        """Returns the events of the given names since the page was opened."""
         return [event["params"] for event in self.events if event["method"] in methods]
 
     def open(self, url: str) -> None:
-        """Loads a page, to its end."""
+        """Loads a page completely."""
         self.events.clear()
         failed = self.send("Page.navigate", url=url).get("errorText")
         assert not failed, f"{url}: {failed}"
@@ -110,20 +110,20 @@ class Browser:
             self._receive(deadline)
 
     def show_as(self, *, scheme: str = "light", media: str = "", width: int = 1280) -> None:
-        """Light or dark, screen or print, so wide."""
+        """Sets color scheme, medium (screen or print) and width."""
         features = [{"name": "prefers-color-scheme", "value": scheme}]
         self.send("Emulation.setEmulatedMedia", media=media, features=features)
         size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
         self.send("Emulation.setDeviceMetricsOverride", **size)
 
     def evaluate(self, expression: str) -> object:
-        """A value that the page computes."""
+        """Evaluates a JavaScript expression in the page."""
         result = self.send("Runtime.evaluate", expression=expression, returnByValue=True)
         assert "exceptionDetails" not in result, result
         return result["result"].get("value")
 
     def screenshot(self, keep: Path | None = None) -> np.ndarray:
-        """The whole page: height, width, three colors in 0…1."""
+        """Returns the whole page: height, width, three colors in 0…1."""
         shot = self.send("Page.captureScreenshot", format="png", captureBeyondViewport=True)
         png = base64.b64decode(shot["data"])
         if keep is not None:
@@ -131,7 +131,7 @@ class Browser:
         return matplotlib.image.imread(io.BytesIO(png))[:, :, :3]
 
     def pdf(self) -> bytes:
-        """The page as it is printed."""
+        """Returns the printed page."""
         return base64.b64decode(self.send("Page.printToPDF", printBackground=False)["data"])
 
     def _end(self) -> None:

@@ -1,4 +1,4 @@
-"""Fixtures: nodes to test, each in a domain of its own on this machine only.
+"""Fixtures: nodes under test, each in its own DDS domain on this machine only.
 
 Needs the environment of .build/env.sh (`./test.sh` sees to it) and the node's program: by default
 target/release/virtual_axes_node, another with VIRTUAL_AXES_NODE.
@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-# Before rclpy makes its first context: nothing leaves this machine.
+# Set before rclpy creates its first context: no packet leaves this machine.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
     os.environ.pop(variable, None)
 
-# launch is not on PyPI: what stands in for it is imported by the names of the real one.
+# launch is not on PyPI: its stand-in is imported under the names of the real package.
 sys.path.insert(0, str(Path(__file__).parent / "launch_standin"))
 
 from drive import Drive, Node, node_binary  # noqa: E402
@@ -31,29 +31,29 @@ if TYPE_CHECKING:
 
 
 def pytest_sessionstart() -> None:
-    """Say at once what is missing, not once per test."""
+    """Reports a missing environment once, not once per test."""
     if not node_binary().exists():
         pytest.exit(f"no node to test at {node_binary()}: cargo build --release, or set VIRTUAL_AXES_NODE", 2)
 
 
 @pytest.fixture(scope="module")
 def real() -> Iterator[Drive]:
-    """Axes in real time, shared by a module; the motions there are at most 20 000 points long."""
+    """Yields axes in real time, shared by a module; motions there have at most 20 000 points."""
     with Node(["-p", "time:=real", "-p", "max_points:=20000"]) as process, Drive(process=process) as drive:
         yield drive
 
 
 @pytest.fixture(scope="module")
 def fast() -> Iterator[Drive]:
-    """Axes as fast as they can, shared by a module."""
+    """Yields axes in mode `fast`, shared by a module."""
     with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
         yield drive
 
 
 @pytest.fixture(scope="module")
 def following() -> Iterator[Follow]:
-    """Axes and a client of their action, with feedback at 50 Hz, shared by a module."""
-    # Needs control_msgs, which the other tests do without.
+    """Yields an action client with its axes, with feedback at 50 Hz, shared by a module."""
+    # Needs control_msgs, which the other tests do not need.
     from action import Follow
 
     args = ["-p", "time:=fast", "-p", "action_monitor_rate:=50.0"]
@@ -63,14 +63,14 @@ def following() -> Iterator[Follow]:
 
 @pytest.fixture
 def follow(following: Follow) -> Follow:
-    """The same, with the axes at rest at home."""
+    """Yields the same client, with the axes at rest at home."""
     go_home(following.drive)
     return following
 
 
 @pytest.fixture
 def start() -> Iterator[Callable[..., Drive]]:
-    """Start nodes for one test: start(*ros_args, name=...) gives a connected Drive."""
+    """Starts nodes for one test: start(*ros_args, name=...) returns a connected Drive."""
     with ExitStack() as stack:
 
         def start_one(*ros_args: str, connect: bool = True, **options: object) -> Drive:

@@ -1,4 +1,4 @@
-"""The ballbar of the paper's figure 10, driven over ROS 2: cascade with and without feedforward, predictive.
+"""Ballbar of the paper's figure 10 over ROS 2: cascade with and without feedforward, predictive control.
 
 ./demo.sh [--fast] [--out FILE.png]
 """
@@ -28,22 +28,22 @@ RUNS: dict[str, dict[str, object]] = {
     },
     "predictive control": {f"{axis}.position_loop.controller": "gpc" for axis in AXES},
 }
-"""What is set for each run, one after the other. Feedforward is the cascade's."""
+"""Parameters of each run, in order. Feedforward belongs to the cascade."""
 
 PAPER = {"cascade with feedforward": "50 (fig. 10, left)", "predictive control": "almost 0 (fig. 10, right)"}
 MODEL_UM = {"cascade with feedforward": +49.0, "cascade without feedforward": -283.1, "predictive control": -0.4}
-"""Mean radial deviation that this package's model is specified to have, µm."""
+"""Specified mean radial deviation of this package's model, µm."""
 
 
 def measure(drive: Drive, path: Ballbar) -> Recording:
-    """Run the circle once from home, over the topic `psec`."""
+    """Runs the circle once from home, over the topic `psec`."""
     drive.reset()
     drive.forget()
     return drive.run(joint_trajectory(AXES, path.time, np.column_stack([path.x, path.y])), timeout=60)
 
 
 def report(path: Ballbar, runs: dict[str, Recording]) -> str:
-    """The table of tracking errors, µm."""
+    """Returns the table of radial deviations and following errors, µm."""
     head = ("ballbar R 150 mm, 15 m/min", "mean", "min", "max", "G", "specified", "paper", "X, Y max |e| synchronized")
     rows = [head]
     for title, run in runs.items():
@@ -74,11 +74,11 @@ def report(path: Ballbar, runs: dict[str, Recording]) -> str:
 
 
 def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
-    """Polar plots of the radial deviation, the deviation magnified as on a ballbar's chart."""
+    """Draws polar plots of the radial deviation, magnified as on a ballbar chart."""
     figure, plots = plt.subplots(
         1, len(runs), figsize=(14.5, 6.2), subplot_kw={"projection": "polar"}, layout="constrained"
     )
-    # Black and one strong color, solid and dashed: readable on a gray printer too.
+    # Black and one strong color, solid and dashed: readable in grayscale print.
     for plot, (title, run) in zip(np.atleast_1d(plots), runs.items()):
         steady = run.within(path.steady)
         x, y = (run.joints["position", axis][steady] for axis in AXES)
@@ -95,12 +95,12 @@ def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
             label="programmed circle, R = 150 mm",
         )
         plot.plot(angle, deviation, color="#b2182b", linewidth=1.6, label="simulated position")
-        # The circle is drawn as wide as four steps, so that an inward deviation stays off the center.
+        # The nominal circle has a radius of four grid steps, so that an inward deviation stays off the center.
         plot.set_rorigin(-6 * step)
         plot.set_rlim(-4 * step, 3 * step)
         plot.set_rticks([factor * step for factor in range(-3, 4)])
         plot.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:+g}" if value else "0"))
-        # Upright, where labels one above the other have most room.
+        # Vertical axis: most space for labels one above the other.
         plot.set_rlabel_position(80)
         for label in plot.get_yticklabels():
             label.set(fontsize=8, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})
@@ -117,13 +117,13 @@ def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
 
 
 def _round_step(value: float) -> float:
-    """The next of 1, 2, 5 times a power of ten."""
+    """Rounds up to 1, 2 or 5 times a power of ten."""
     power = 10 ** np.floor(np.log10(max(value, 1e-3)))
     return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= value))
 
 
 def main() -> int:
-    """Run the circles, print, draw."""
+    """Runs the circles, prints the table and draws the plots."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--fast", action="store_true", help="as fast as the machine can, not in real time")
     parser.add_argument("--out", type=Path, default=Path(__file__).resolve().parent.parent / ".build" / "ballbar.png")
@@ -134,7 +134,7 @@ def main() -> int:
         arguments.out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         parser.error(f"--out: {error}")
-    # A polite end for SIGTERM and a closed terminal too, so that the node is stopped.
+    # SIGTERM and a closed terminal also raise, so that the node is stopped.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: sys.exit(1))
 

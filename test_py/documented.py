@@ -1,4 +1,4 @@
-"""The kinematics of the documentation, written out once more: tip and tool axis, with every offset in play."""
+"""Reference implementation of the documented kinematics: tool tip and tool axis, with all offsets."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-# Every offset of the kinematics, each another, so that none can stand for another, mm.
+# All offsets of the kinematics, all different so that swapped offsets are detected, mm.
 OFFSETS = {
     "tool_length": 123.0,
     "pivot_a_y": 11.0,
@@ -20,7 +20,7 @@ OFFSETS = {
 
 
 def turn(axis: int, angle: float) -> np.ndarray:
-    """Right-handed rotation about X (0) or Z (2)."""
+    """Returns the right-handed rotation about X (0) or Z (2)."""
     i, j = {0: (1, 2), 2: (0, 1)}[axis]
     matrix = np.eye(3)
     matrix[i, i] = matrix[j, j] = math.cos(angle)
@@ -29,7 +29,7 @@ def turn(axis: int, angle: float) -> np.ndarray:
 
 
 def tool_pose(x: float, y: float, z: float, a: float, c: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tip (m) and orientation of the tool in the workpiece frame, whose last column is the tool axis."""
+    """Returns tip (m) and orientation of the tool in the workpiece frame; the last column is the tool axis."""
     p = {key: value * 1e-3 for key, value in OFFSETS.items()}
     pivot_a = np.array([0.0, p["pivot_a_y"], p["pivot_a_z"]])
     pivot_c = np.array([p["pivot_c_x"], p["pivot_c_y"], 0.0])

@@ -1,4 +1,4 @@
-"""A graph of four processes: a source of trajectories, the node, a process model, a recorder.
+"""Graph of four processes: trajectory source, node, process model, recorder.
 
 The process model answers the axes' velocity with a load in proportion to it and against the motion, as
 a cutting process does; the recorder keeps what the axes publish and how late it came. `tools/run_graph.py`
@@ -34,13 +34,13 @@ from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, status_values
 
 JOINTS = ("x", "y")
 DAMPING = 4000.0
-"""N s/m: at 15 m/min a load of 1000 N."""
+"""Damping of the process model, N s/m: 1000 N at 15 m/min."""
 SWING = 2.0
-"""s, a swing of the source's there and back."""
+"""Duration of one swing of the source, s."""
 AMPLITUDE = 0.15
-"""m"""
+"""Amplitude of the swing, m."""
 READY = "ready"
-"""What a process says once it is connected."""
+"""Line on stdout when a process is connected."""
 TOPICS = {"joint_states": JointState, "motor_currents": MotorCurrents, "drive_states": DriveStates}
 
 
@@ -48,7 +48,7 @@ TOPICS = {"joint_states": JointState, "motor_currents": MotorCurrents, "drive_st
 
 
 def source(seconds: float) -> None:
-    """Swings of both axes, one trajectory after the other without a gap."""
+    """Sends swings of both axes, one trajectory after the other without a gap."""
     with Drive() as drive:
         print(READY, flush=True)
         periods = round(SWING * 1e9 / TSP_NS)
@@ -58,12 +58,12 @@ def source(seconds: float) -> None:
         for _ in range(math.ceil(seconds / SWING)):
             drive.accept(joint_trajectory(JOINTS, times, np.column_stack([wave, wave]), stamp=start))
             start += periods * TSP_NS
-            # A swing ahead, not more: as one who makes them while the axes move.
+            # At most one swing ahead, as a client that plans during the motion.
             drive.wait_until(start - periods * TSP_NS, 4 * SWING)
 
 
 def process_model(seconds: float) -> None:
-    """A load for each joint state, -DAMPING times the velocity, until the end."""
+    """Publishes a load for each joint state, -DAMPING times the velocity, until the end."""
     with joined("process_model") as node:
         publisher = node.create_publisher(JointState, "/load", 10)
 
@@ -78,7 +78,7 @@ def process_model(seconds: float) -> None:
 
 
 def recorder(seconds: float, file: Path) -> None:
-    """All samples with when they came, and the diagnostics; written to `file` at the end."""
+    """Records all samples with their arrival times, and the diagnostics; writes them to `file`."""
     with joined("recorder") as node:
         samples: dict[str, list[tuple[bytes, int]]] = {topic: [] for topic in TOPICS}
         statuses: list[dict[str, str]] = []
@@ -88,7 +88,7 @@ def recorder(seconds: float, file: Path) -> None:
 
         for topic, kind in TOPICS.items():
             name = f"/{topic}" if topic == "joint_states" else f"/virtual_axes/{topic}"
-            # Raw: taking a sample must not cost more than the node needs to make one.
+            # Raw: receiving a sample must not cost more than the node needs to publish one.
             node.create_subscription(kind, name, lambda message, topic=topic: keep(topic, message), DEEP_QOS, raw=True)
         node.create_subscription(
             DiagnosticArray,
@@ -114,7 +114,7 @@ def recorder(seconds: float, file: Path) -> None:
 
 @contextmanager
 def joined(name: str) -> Iterator[rclpy.node.Node]:
-    """A node in the graph, for a while."""
+    """Yields a node in the graph."""
     rclpy.init()
     node = rclpy.create_node(name)
     try:
@@ -125,7 +125,7 @@ def joined(name: str) -> Iterator[rclpy.node.Node]:
 
 
 def wait_for_match(node: rclpy.node.Node, is_matched: Callable[[], bool]) -> None:
-    """Spin until it is so, 20 s at most."""
+    """Spins until the condition holds, 20 s at most."""
     deadline = time.monotonic() + 20
     while not is_matched():
         if time.monotonic() > deadline:
@@ -135,12 +135,12 @@ def wait_for_match(node: rclpy.node.Node, is_matched: Callable[[], bool]) -> Non
 
 
 def spin(node: rclpy.node.Node, seconds: float) -> None:
-    """Serve the node for a while."""
+    """Spins a node for a given time."""
     executor = rclpy.executors.SingleThreadedExecutor()
     executor.add_node(node)
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
-        # Always the same: with another timeout rclpy begins again at the first subscription, and the last starves.
+        # Constant timeout: with a new timeout rclpy restarts at the first subscription and the last one starves.
         executor.spin_once(timeout_sec=0.1)
 
 
@@ -149,21 +149,21 @@ def spin(node: rclpy.node.Node, seconds: float) -> None:
 
 @dataclass
 class Figures:
-    """What the recorder saw."""
+    """Recorded samples."""
 
     stamps: dict[str, np.ndarray]
-    """By topic, ns, in the order in which they came."""
+    """Stamps by topic, in order of arrival, ns."""
     lateness: dict[str, np.ndarray]
-    """By topic, s from a sample's stamp until it came."""
+    """Latency from stamp to arrival by topic, s."""
     load: np.ndarray
-    """A, a row per sample of motor_currents, a column per joint."""
+    """Load currents, a row per sample of motor_currents, a column per joint, A."""
     velocity: np.ndarray
-    """m/s, likewise of drive_states."""
+    """Velocities, a row per sample of drive_states, a column per joint, m/s."""
     diagnostics: dict[str, str]
-    """The node's last values."""
+    """Newest diagnostics of the node."""
 
     def faults(self) -> list[str]:
-        """What is wrong with the grid of stamps: nothing, if none is missing and none comes twice."""
+        """Returns the defects of the stamp grid: missing and duplicate stamps."""
         found = []
         for topic, stamps in self.stamps.items():
             steps, numbers = np.unique(np.diff(stamps), return_counts=True)
@@ -173,7 +173,7 @@ class Figures:
         return found
 
     def load_per_velocity(self) -> tuple[float, float, float]:
-        """Load current over velocity (A s/m, least squares), its correlation, and the lag in periods.
+        """Returns load current over velocity (A s/m, least squares), its correlation, and the lag in periods.
 
         A load acts some periods after the velocity that it answers.
         """
@@ -189,7 +189,7 @@ class Figures:
         return max((fit(lag) for lag in range(21)), key=lambda found: found[1])
 
     def answered(self, load_per_velocity: float) -> float:
-        """Share of the loads (A, where there is one) that are this times a velocity published before.
+        """Returns the share of nonzero loads (A) that equal this factor times an earlier published velocity.
 
         However late the answer was; `load_per_velocity` in A s/m.
         """
@@ -204,32 +204,32 @@ class Figures:
 
 
 class Process:
-    """One of the three, of this file; ended by its id."""
+    """One of the three processes of this file; terminated by its process id."""
 
     def __init__(self, role: str, seconds: float, domain_id: int, *more: str):
-        """Start it."""
+        """Starts the process."""
         env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         command = [sys.executable, str(Path(__file__).resolve()), role, str(seconds), *more]
         self.role = role
         self._process = subprocess.Popen(command, env=env, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
 
     def wait_until_ready(self) -> None:
-        """It waits 20 s itself."""
+        """Waits for the ready line; the process has its own timeout of 20 s."""
         assert self._process.stdout is not None
         if self._process.stdout.readline().strip() != READY:
             raise ChildProcessError(f"{self.role} did not start")
 
     def wait(self, timeout: float) -> None:
-        """Until it ends by itself."""
+        """Waits until the process exits."""
         if self._process.wait(timeout) != 0:
             raise ChildProcessError(f"{self.role} ended with status {self._process.returncode}")
 
     def __enter__(self) -> Process:
-        """Itself."""
+        """Returns itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End it."""
+        """Terminates the process."""
         if self._process.poll() is None:
             self._process.kill()
             self._process.wait(10)
@@ -238,11 +238,11 @@ class Process:
 
 
 def run_graph(seconds: float, file: Path) -> Figures:
-    """Run the four processes for `seconds` of motion; what the recorder wrote to `file`."""
+    """Runs the four processes for `seconds` of motion; returns the figures that the recorder wrote to `file`."""
     with Node(["-p", "time:=real"]) as node:
         domain = node.domain_id
         assert domain is not None
-        # The others go on while the source ends.
+        # The others continue until the source has exited.
         margin = 1.0
         with (
             Process("process-model", seconds + 30, domain) as model,
@@ -265,7 +265,7 @@ def run_graph(seconds: float, file: Path) -> Figures:
 
 
 def main() -> None:
-    """Be one of the three."""
+    """Runs one of the three processes."""
     role, seconds, *more = sys.argv[1:]
     if role == "source":
         source(float(seconds))

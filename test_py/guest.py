@@ -1,4 +1,4 @@
-"""Others in the node's graph, each a process of its own that can be stopped and killed: this file as a program.
+"""Remote DDS participants, each a separate process that can be stopped and killed: this file as a program.
 
     python test_py/guest.py listen TOPIC DEPTH    reliable; tells the stamps that it got when it is asked
     python test_py/guest.py send POINTS           one trajectory of so many points on psec
@@ -41,11 +41,11 @@ from drive import DEEP_QOS, PSEC_QOS, SETTLE_S, die_with_parent, stamp_of
 
 READY = "ready"
 SPINS = "spins"
-"""Name of the thread that serves a node."""
+"""Name of the thread that spins a node."""
 PATIENCE_S = 120
-"""How long a guest's word is waited for."""
+"""Timeout for a line of a participant, s."""
 ANSWER_S = 40
-"""How long a prober waits for an answer."""
+"""Timeout of a prober for a response, s."""
 LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
   <participant profile_name="lease" is_default_profile="true"><rtps><builtin><discovery_config>
@@ -57,16 +57,16 @@ LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 class Silent(TimeoutError):
-    """A service that did not answer a prober."""
+    """A service that did not respond to a prober."""
 
     def __init__(self, service: str):
-        """The one of this name."""
+        """Keeps the name of the service."""
         super().__init__(f"{service} did not answer within {ANSWER_S} s")
         self.service = service
 
 
 class Guest:
-    """A process that runs this file, ended by its id."""
+    """Process that runs this file, terminated by its process id."""
 
     def __init__(
         self,
@@ -76,8 +76,8 @@ class Guest:
         announces_s: float = 0.3,
         folder: Path | None = None,
     ):
-        """Begin; `lease` is how long it may be silent before it counts as gone, s, by a profile in `folder`, which also
-        says how often it tells that it is there.
+        """Starts the process; `lease` is its lease duration in s, set with the announcement period by a profile in
+        `folder`.
         """
         env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
         if lease is not None:
@@ -96,7 +96,7 @@ class Guest:
         )
 
     def __enter__(self) -> Guest:
-        """Itself, once it is ready."""
+        """Waits until the process is ready and returns itself."""
         try:
             assert self.says() == READY
         except BaseException:
@@ -105,11 +105,11 @@ class Guest:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Kill it."""
+        """Kills the process."""
         self.kill()
 
     def says(self) -> str:
-        """Its next line."""
+        """Returns the next line of its output."""
         out = self._process.stdout
         assert out is not None
         if not select.select([out], [], [], PATIENCE_S)[0]:
@@ -120,14 +120,14 @@ class Guest:
         return line.rstrip("\n")
 
     def stamps(self) -> np.ndarray:
-        """What a listener has got so far, ns."""
+        """Returns the stamps that a listener has received so far, ns."""
         assert self._process.stdin is not None
         self._process.stdin.write("\n")
         self._process.stdin.flush()
         return np.array(json.loads(self.says()), dtype=np.int64)
 
     def latencies_ms(self, calls: int) -> list[float]:
-        """How long a prober's services take, medians of so many calls of each."""
+        """Returns the latencies of a prober's services, medians of this number of calls of each."""
         assert self._process.stdin is not None
         self._process.stdin.write(f"{calls}\n")
         self._process.stdin.flush()
@@ -137,26 +137,26 @@ class Guest:
         return told
 
     def go_on(self) -> None:
-        """Let a sender send."""
+        """Starts the transmission of a sender."""
         assert self._process.stdin is not None
         self._process.stdin.write("\n")
         self._process.stdin.flush()
 
     def stop(self) -> None:
-        """SIGSTOP."""
+        """Sends SIGSTOP."""
         self._process.send_signal(signal.SIGSTOP)
 
     def resume(self) -> None:
-        """SIGCONT."""
+        """Sends SIGCONT."""
         self._process.send_signal(signal.SIGCONT)
 
     def leave(self) -> None:
-        """Let a sink end in order."""
+        """Lets a sink leave the graph regularly."""
         self.go_on()
         self._process.wait(PATIENCE_S)
 
     def kill(self) -> None:
-        """SIGKILL; harmless when called twice."""
+        """Sends SIGKILL; has no effect when called again."""
         self._process.kill()
         self._process.wait(PATIENCE_S)
         for end in (self._process.stdin, self._process.stdout):
@@ -168,12 +168,12 @@ class Guest:
 
 
 def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:
-    """A gentle swing of two joints at a point per millisecond, as it is sent: half a million objects take long."""
+    """Returns a serialized swing of two joints with a point per millisecond: half a million objects take long."""
     values, stamp = (0.25, 0.75), (7, 13)
     known = [*(struct.pack("<d", value) for value in values), struct.pack("<iI", *stamp)]
     point = JointTrajectoryPoint(positions=values, time_from_start=Duration(sec=stamp[0], nanosec=stamp[1]))
     two = serialize_message(JointTrajectory(joint_names=joints, points=[point, point]))
-    # Number of points, then of the first one's positions, which are aligned to 8 octets.
+    # Number of points, then number of positions of the first point, aligned to 8 octets.
     count_at = two[: two.index(known[0])].rindex(struct.pack("<II", 2, len(values)))
     second = two.index(known[-1]) + len(known[-1])
     template = two[second : two.index(known[-1], second) + len(known[-1])]
@@ -195,10 +195,10 @@ def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:
 
 
 def spin(node: Any) -> threading.Thread:
-    """Serve a node in a thread of its own, until rclpy is shut down."""
+    """Spins a node in its own thread until rclpy is shut down."""
 
     def run() -> None:
-        # What rclpy says at its end depends on where it meets it.
+        # The exception of rclpy at shutdown depends on its state.
         with contextlib.suppress(ExternalShutdownException, InvalidHandle, RCLError):
             rclpy.spin(node)
 
@@ -208,7 +208,7 @@ def spin(node: Any) -> threading.Thread:
 
 
 def listen(node: Any, topic: str, depth: int) -> None:
-    """Keep stamps, and tell them all for each line that comes in."""
+    """Keeps stamps and writes all of them for each input line."""
     stamps: list[int] = []
     qos = QoSProfile(depth=depth, reliability=DEEP_QOS.reliability)
     node.create_subscription(JointState, topic, lambda raw: stamps.append(stamp_of(raw)), qos, raw=True)
@@ -221,7 +221,7 @@ def listen(node: Any, topic: str, depth: int) -> None:
 
 
 def send(node: Any, points: int) -> None:
-    """Publish one long trajectory when a line comes in, already serialized, so that all the time goes into sending."""
+    """Publishes one long serialized trajectory after an input line, so that all the time is spent on sending."""
     psec = node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
     message = long_trajectory(points)
     while psec.get_subscription_count() == 0:
@@ -235,7 +235,7 @@ def send(node: Any, points: int) -> None:
 
 
 def sink(node: Any, depth: int) -> None:
-    """Listen, and do nothing with it."""
+    """Subscribes and drops the samples."""
     come = threading.Event()
     for kind, topic in (
         (JointState, "/joint_states"),
@@ -250,20 +250,20 @@ def sink(node: Any, depth: int) -> None:
 
 
 def echo(node: Any, service: str) -> None:
-    """Answer at once, always the same."""
+    """Responds at once, with a constant response."""
     node.create_service(GetParameters, service, lambda _, response: response)
     print(READY, flush=True)
     rclpy.spin(node)
 
 
 def probe(node: Any, services: tuple[str, str]) -> None:
-    """Call in turns."""
+    """Calls two services alternately."""
     clients = [node.create_client(GetParameters, service) for service in services]
     for client in clients:
         if not client.wait_for_service(PATIENCE_S):
             sys.exit("no service")
     time.sleep(SETTLE_S)
-    # In a thread that spins on: rclpy's spin_until_future_complete takes longer with each call.
+    # In a thread that keeps spinning: rclpy's spin_until_future_complete takes longer with each call.
     spins = spin(node)
     print(READY, flush=True)
 
@@ -287,7 +287,7 @@ def probe(node: Any, services: tuple[str, str]) -> None:
 
 
 def main() -> None:
-    """What the command line says."""
+    """Runs the role of the command line."""
     rclpy.init()
     node = rclpy.create_node(f"guest_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
     match sys.argv[1:]:
@@ -307,7 +307,7 @@ def main() -> None:
     for thread in threading.enumerate():
         if thread.name == SPINS:
             thread.join(PATIENCE_S)
-    # Its participant goes with it: who is not told so counts it as there until its lease has ended.
+    # Destroys the participant: without dispose, others count it as present until its lease expires.
     node.destroy_node()
     os._exit(0)
 

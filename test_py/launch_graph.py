@@ -1,4 +1,4 @@
-"""Launch files executed on the stand-in, and the nodes that they would start."""
+"""Launch files, executed with the stand-in of launch, and the nodes that they would start."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ substitutions.PROGRAMS["virtual_axes", "virtual_axes"] = str(node_binary().with_
 
 
 def description(file: str) -> launch.LaunchDescription:
-    """Execute a launch file and have it make its description."""
+    """Executes a launch file and returns its description."""
     return runpy.run_path(str(ROOT / "launch" / file))["generate_launch_description"]()
 
 
 def actions(file: str, **arguments: str) -> list[launch.Action]:
-    """All that `ros2 launch virtual_axes FILE name:=value` would execute."""
+    """Returns the actions that `ros2 launch virtual_axes FILE name:=value` would execute."""
     return launch.run(description(file), arguments)
 
 
 def nodes(file: str, **arguments: str) -> list[NodeAction]:
-    """Make the nodes among them."""
+    """Returns the nodes among the actions of a launch file."""
     return [action for action in actions(file, **arguments) if isinstance(action, NodeAction)]
 
 
 def by_executable(found: list[NodeAction]) -> dict[str, list[NodeAction]]:
-    """Sort them by what they run."""
+    """Groups nodes by executable."""
     sorted_nodes: dict[str, list[NodeAction]] = {}
     for node in found:
         sorted_nodes.setdefault(node.executable, []).append(node)

@@ -1,4 +1,4 @@
-"""Motions that several tests share, and how psec is compared with what was planned."""
+"""Motions for several tests, and the comparison of psec with the plan."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from drive import TSP_NS, Drive, joint_trajectory, to_ns
 
 TSP = TSP_NS / 1e9
-"""Position period, s."""
+"""Position cycle, s."""
 RATIO = 0.02 / (2 * math.pi)
-"""Ball screws of the default machine, m of the axis per rad of the motor."""
+"""Pitch of the default machine's ball screws, m of the axis per rad of the motor."""
 
 
 def swing(duration: float, amplitude: float = 0.05, rest: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Times on the position grid and positions of one gentle swing 0 -> amplitude -> 0, after a rest."""
+    """Returns times on the position grid and positions of one swing 0 -> amplitude -> 0, after a rest."""
     periods = round((duration + rest) / TSP)
     time = np.arange(periods + 1) * TSP_NS / 1e9
     phase = np.clip((time - rest) / (periods * TSP - rest), 0, 1)
@@ -24,7 +24,7 @@ def swing(duration: float, amplitude: float = 0.05, rest: float = 0.0) -> tuple[
 
 
 def on_grid(drive: Drive, instant: int) -> int:
-    """The first position instant at or after `instant`, ns."""
+    """Returns the first position instant at or after `instant`, ns."""
     return grid_after(drive.now(), instant)
 
 
@@ -36,7 +36,7 @@ def assert_psec(
     last: int | None = None,
     timeout: float = 60.0,
 ) -> int:
-    """psec was the plan, bit for bit, at every instant from `first` to `last` (ns), none missing.
+    """Asserts that psec is bit-identical to the plan at all instants from `first` to `last` (ns).
 
     `start` is when the plan begins; returns the number of instants.
     """
@@ -59,28 +59,28 @@ def assert_psec(
 
 
 def grid_after(start: int, instant: int) -> int:
-    """The first position instant at or after `instant` on the grid through `start`, ns."""
+    """Returns the first position instant at or after `instant` on the grid through `start`, ns."""
     return start + -(-(instant - start) // TSP_NS) * TSP_NS
 
 
 def start_swing(drive: Drive, joints: Sequence[str] = ("x",), duration: float = 6.0, **options: float):
-    """Begin a swing on `joints`; returns its acceptance, its start and its plan."""
+    """Starts a swing on `joints`; returns its acceptance, its start and its plan."""
     time, position = swing(duration, **options)
     accepted = drive.accept(joint_trajectory(joints, time, np.column_stack([position] * len(joints))))
     return accepted, to_ns(accepted.start), {joint: position for joint in joints}
 
 
 def go_home(drive: Drive) -> None:
-    """Rest at the start position, old samples dropped."""
+    """Resets the axes to rest at the start position and drops old samples."""
 
     def at_home() -> bool:
         return not any(value for field in ("position", "psec") for value in drive.latest(field).values())
 
-    # A setpoint of a stream that is on its way when the axes are reset takes them away again.
+    # A stream setpoint in transit during the reset moves the axes away again.
     for patience_s in (10, 20, 60):
         drive.reset()
         try:
-            # On a busy machine samples from before the reset are still to come.
+            # On a busy machine samples from before the reset are still in transit.
             drive.wait_for(at_home, patience_s, "rest at home")
             break
         except TimeoutError:

@@ -1,4 +1,4 @@
-"""A clock that tests turn by hand: `/clock` for a node with use_sim_time."""
+"""Simulated clock under test control: `/clock` for a node with use_sim_time."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from rosgraph_msgs.msg import Clock
 from drive import TSP_NS, Drive, to_time
 
 REPEAT_S = 0.1
-"""A clock is best effort: what has not been followed by then is said again."""
+"""Timeout for a response, s. The clock is best effort: after it the time is published again."""
 
 
 class SimClock:
-    """Publishes `/clock` through a Drive's node, best effort as rosbag2 does, or reliable."""
+    """Publisher of `/clock` through a Drive's node, best effort like rosbag2, or reliable."""
 
     def __init__(self, drive: Drive, now: int, reliability: ReliabilityPolicy = ReliabilityPolicy.BEST_EFFORT):
-        """Nothing is published yet; the clock will begin at `now`, ns."""
+        """Creates the publisher; the clock will begin at `now`, ns."""
         self.drive = drive
         self.now = now
         self._publisher = drive.node.create_publisher(Clock, "/clock", QoSProfile(depth=10, reliability=reliability))
 
     def set(self, now: int) -> None:
-        """Say that it is `now`, ns."""
+        """Publishes the time `now`, ns."""
         self.now = now
         self._publisher.publish(Clock(clock=to_time(now)))
 
     def connect(self, timeout: float = 20.0) -> None:
-        """Wait until the node hears the clock and is heard."""
+        """Waits until the clock is matched in both directions."""
         deadline = time.monotonic() + timeout
         while self._publisher.get_subscription_count() == 0 and time.monotonic() < deadline:
             time.sleep(0.01)
@@ -43,7 +43,7 @@ class SimClock:
                     raise
 
     def reach(self, now: int, timeout: float = 20.0) -> None:
-        """Go to `now` (ns) at once, and wait until the axes are there."""
+        """Sets the clock to `now` (ns) and waits for the axes."""
         self.set(now)
         last = now // TSP_NS * TSP_NS
         deadline = time.monotonic() + timeout
@@ -57,14 +57,14 @@ class SimClock:
                 self.set(now)
 
     def advance(self, duration: float, step: float, timeout: float = 20.0) -> None:
-        """Go on for `duration` in steps of `step` s, as fast as they can be said, and wait for the axes."""
+        """Advances by `duration` in steps of `step` s, as fast as possible, and waits for the axes."""
         end = self.now + round(duration * 1e9)
         for instant in np.arange(self.now, end, round(step * 1e9)).tolist()[1:]:
             self.set(instant)
-            # Others on this machine want to hear it too.
+            # Yields the processor to other subscribers on this machine.
             time.sleep(0.0005)
         self.reach(end, timeout)
 
     def close(self) -> None:
-        """Take the publisher away."""
+        """Destroys the publisher."""
         self.drive.in_executor(lambda: self.drive.node.destroy_publisher(self._publisher))

@@ -1,4 +1,4 @@
-"""The tables of README.md: topics, services and actions, and the parameters."""
+"""Tables of README.md: topics, services, actions and parameters."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ README = Path(__file__).resolve().parent.parent / "README.md"
 INTERFACE_HEADINGS = ["direction", "name", "type", "unit, content", "QoS", "rate"]
 PARAMETER_HEADINGS = ["key", "range", "default", "live", "for", "description"]
 KINDS = {"in": "msg", "out": "msg", "service": "srv", "action": "action"}
-"""Of a direction: where its types are defined."""
+"""Package of the types by kind of interface."""
 
 
 def rows(headings: list[str]) -> list[list[str]]:
-    """The cells of the one table that has these headings."""
+    """Returns the cells of the only table with these headings."""
     lines = README.read_text(encoding="utf-8").splitlines()
     table = [number for number, line in enumerate(lines) if _cells(line) == headings]
     assert len(table) == 1, f"README.md: {len(table)} tables with the headings {headings}"
@@ -38,23 +38,23 @@ def _cells(line: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Interface:
-    """One topic, service or action."""
+    """Topic, service or action of the README."""
 
     direction: str
-    """in, out, service or action"""
+    """Direction or kind: in, out, service or action."""
     name: str
-    """as it is written in a node: `x`, `/x` or `~/x`"""
+    """Name as in a node: `x`, `/x` or `~/x`."""
     type: str
-    """in full, as sensor_msgs/msg/JointState"""
+    """Full type name, as sensor_msgs/msg/JointState."""
     reliable: bool
     transient_local: bool
     depth: int | None
-    """samples kept, where the table says so"""
+    """History depth, where the table states it."""
     condition: tuple[str, str] | None
-    """the parameter, and its value, with which alone it is there"""
+    """Parameter and value that the interface requires."""
 
     def resolved(self, node: str, remaps: dict[str, str]) -> str:
-        """Its name in the graph, for a node of this full name."""
+        """Returns the name in the graph, for a node with this full name."""
         if self.name in remaps:
             return remaps[self.name]
         if self.name.startswith("~"):
@@ -63,7 +63,7 @@ class Interface:
 
 
 def interfaces() -> list[Interface]:
-    """Every topic, service and action that the README has."""
+    """Returns all topics, services and actions of the README."""
     found = []
     above = ""
     for direction, names, types, content, qos, _ in rows(INTERFACE_HEADINGS):
@@ -94,38 +94,38 @@ def interfaces() -> list[Interface]:
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """One row of the table of parameters."""
+    """Row of the parameter table."""
 
     key: str
-    """`<joint>.` stands for every joint of the kind"""
+    """Parameter name; `<joint>.` stands for all joints of the kind."""
     range: str
     default: str
     live: bool
     owner: str
-    """machine, node, or the kind of axis that has it"""
+    """Scope: machine, node, or the kind of axis."""
     description: str
 
     def names(self, joints: dict[str, set[str]]) -> list[str]:
-        """The parameters of a machine that it describes; `joints` says what each joint is."""
+        """Returns the parameters of a machine that match this row; `joints` holds the kinds of each joint."""
         if not self.key.startswith("<joint>."):
             return [self.key]
         return [self.key.replace("<joint>", joint) for joint, kinds in joints.items() if self.owner in kinds]
 
     @property
     def bounds(self) -> tuple[float, float] | None:
-        """Of a number: the least and the largest."""
+        """Returns minimum and maximum of a number."""
         found = re.match(r"(\S+) … (\S+)(?! numbers)", self.range)
         return (float(found[1]), float(found[2])) if found and " numbers" not in self.range else None
 
     @property
     def unit(self) -> str:
-        """Of a number or of each in a list."""
+        """Returns the unit of a number or of list elements."""
         found = re.match(r"\S+ … \S+(?: numbers)?(?: in)? (.+)", self.range)
         return found[1] if found and found[1] != "numbers" else ""
 
     @property
     def constraint(self) -> str:
-        """What a descriptor says of it beside range and type."""
+        """Returns the additional constraint of the descriptor, beside range and type."""
         if numbers := re.match(r"(\S+ … \S+) numbers", self.range):
             return f"must be a list of {numbers[1]} finite numbers"
         if self.bounds or self.range in ("text", "list of texts", "true, false"):
@@ -133,7 +133,7 @@ class ParameterRow:
         return "must be " + " or ".join(self.range.split(", "))
 
     def default_value(self, value: Any) -> Any:
-        """The default, as what `value`, the present one, is; None where there is none."""
+        """Returns the default with the type of `value`; None where there is no default."""
         if self.default in ("none", "required"):
             return None
         if self.default == "empty":
@@ -144,7 +144,7 @@ class ParameterRow:
 
 
 def parameters() -> list[ParameterRow]:
-    """Every row of the table of parameters."""
+    """Returns all rows of the parameter table."""
     found = []
     for key, limits, default, live, owner, description in rows(PARAMETER_HEADINGS):
         live = {"yes": True, "no": False}[live]

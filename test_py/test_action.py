@@ -57,7 +57,7 @@ def test_a_goal_is_followed_with_feedback_to_success(follow: Follow) -> None:
     feedback = sent.feedback
     assert all(list(message.joint_names) == ["y", "x"] for message in feedback)
     stamps = np.array([to_ns(message.header.stamp) for message in feedback])
-    # 50 Hz on a grid of 6 ms: every third period, from the first to the last.
+    # 50 Hz on a grid of 6 ms: every third cycle, from the first to the last.
     assert set(np.diff(stamps)) == {3 * TSP_NS}
     start = to_ns(accepted.start)
     assert start <= stamps[0] < start + 3 * TSP_NS and end - 3 * TSP_NS < stamps[-1] <= end
@@ -77,13 +77,13 @@ def test_a_goal_is_followed_with_feedback_to_success(follow: Follow) -> None:
         velocity = np.array([message.actual.velocities[column] for message in feedback])
         assert np.array_equal(velocity, states["velocity", joint][rows])
         asked = np.array([message.desired.velocities[column] for message in feedback])
-        # Of a quintic from rest to rest over T: 15/8 of the mean speed in the middle.
+        # Quintic from rest to rest over T: 15/8 of the mean speed in the middle.
         peak = 15 / 8 * (0.02 if joint == "y" else 0.05) / 2.0
         assert asked.max() == pytest.approx(peak, rel=2e-3)
 
 
 def test_every_field_crosses_the_wire(follow: Follow) -> None:
-    # Strings of odd lengths put what follows them at every alignment.
+    # Strings of odd lengths put the following fields at all alignments.
     trajectory = line(["x", "y", "z"], [0.01, 0.01, -0.01], 0.6)
     trajectory.header.frame_id = "machine"
     message = goal(trajectory, path={"x": 0.5}, end={"z": 0.5, "x": -1.0}, end_time=2.5)
@@ -141,10 +141,10 @@ REFUSED = {
         "ENDED_IN_THE_PAST",
         "",
     ),
-    "outside the stroke": (
+    "outside the travel limits": (
         lambda g: g.trajectory.points[1].positions.__setitem__(0, 9.0),
         Result.INVALID_GOAL,
-        "OUTSIDE_STROKE",
+        "OUTSIDE_TRAVEL_LIMITS",
         "point 1",
     ),
     "jump": (lambda g: g.trajectory.points[0].positions.__setitem__(1, 0.1), Result.INVALID_GOAL, "JUMP", "y"),
@@ -242,7 +242,7 @@ def test_a_result_can_be_asked_for_late_and_by_several_clients(follow: Follow) -
         assert mine.status() == theirs.status() == GoalStatus.STATUS_SUCCEEDED
         # Again, long after the end.
         assert mine.status() == GoalStatus.STATUS_SUCCEEDED
-        # Whoever joins later learns of both by the status topic.
+        # A late subscriber receives both results on the status topic.
         second.drive.wait_for(lambda: second.status_of(mine.id) == GoalStatus.STATUS_SUCCEEDED, 10, "its status")
 
 

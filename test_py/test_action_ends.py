@@ -1,4 +1,4 @@
-"""How goals of the action end before their time: tolerances, canceling, and who takes the axes over."""
+"""Early ends of goals of the action: tolerances, cancellation and preemption."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FEED = 10 / 60
 
 
 def constant(feed: float, distance: float) -> JointTrajectory:
-    """X at constant feed after a ramp of 0.2 s, and the same down."""
+    """Returns a motion of X at constant feed after a ramp of 0.2 s, and the same ramp down."""
     ramp = 0.2
     cruise = distance / feed - ramp
     time = [0.0, ramp, ramp + cruise, 2 * ramp + cruise]
@@ -33,7 +33,7 @@ def constant(feed: float, distance: float) -> JointTrajectory:
 
 @pytest.fixture
 def without_feedforward(follow: Follow) -> Iterator[Follow]:
-    """Without feedforward X trails its setpoint by V/Kp."""
+    """Switches feedforward off: X trails its setpoint by V/Kp."""
     before = follow.drive.get_parameters(["x.feedforward.velocity", "x.feedforward.torque_kg_m2"])
     follow.drive.set_parameters_atomically(dict.fromkeys(before, 0.0))
     yield follow
@@ -71,7 +71,7 @@ def test_default_tolerances_are_parameters_and_minus_one_lifts_them(without_feed
 
 def test_a_goal_tolerance_is_waited_for_as_long_as_the_goal_allows(without_feedforward: Follow) -> None:
     follow = without_feedforward
-    # 6 m/min: 4 mm behind when the setpoint stops; that falls by 1/e every 40 ms, to 0.1 mm in 0.15 s.
+    # 6 m/min: 4 mm following error when the setpoint stops; it decays by 1/e every 40 ms, to 0.1 mm in 0.15 s.
     trajectory = joint_trajectory(["x"], [0, 1.0], [0, 0.1])
     late = follow.send(goal(trajectory, end={"x": 1e-4}, end_time=0.02)).ended()
     assert (late.status, late.result.error_code) == (GoalStatus.STATUS_ABORTED, Result.GOAL_TOLERANCE_VIOLATED)
@@ -97,7 +97,7 @@ def test_canceling_stops_the_axes_within_their_limits(follow: Follow) -> None:
     follow.drive.wait_for(lambda: follow.status_of(sent.id) == GoalStatus.STATUS_CANCELED, 5, "its status")
     told = ending(follow, sent)
     end = to_ns(told.header.stamp)
-    # The stop takes 0.13 s at most; the wave before it is past its first 2 s, whose end is a kink.
+    # The stop takes 0.13 s at most; the wave is past its first 2 s, which end in a kink.
     before, rest = 60, 20
     follow.drive.wait_until(end + rest * TSP_NS, 20)
     psec = follow.drive.record(end - before * TSP_NS, end + rest * TSP_NS).states["psec", "x"]
@@ -136,7 +136,7 @@ def test_a_newer_goal_or_trajectory_displaces_and_both_are_told(follow: Follow) 
     drive = follow.drive
     first = follow.send(goal(wave()))
     first.wait_for_feedback(10)
-    # Starts where X is commanded to be then: the way to a first point that is later is the node's.
+    # Starts at the commanded position of X at that time; the node adds the approach to a later first point.
     onward = joint_trajectory(["x"], [2.0, 600.0], [0.0, 0.1], [[0.0], [0.0]])
     second = follow.send(goal(onward))
     ended = first.ended()

@@ -1,4 +1,4 @@
-"""Every way in which a JointTrajectory is accepted: when it starts, and what the axes then follow."""
+"""Acceptance of JointTrajectory: start time and resulting motion."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ ACCELERATION_LIMIT_X = 2.5
 
 @pytest.fixture
 def home(real: Drive) -> Iterator[Drive]:
-    """Axes at rest at home."""
+    """Yields axes at rest at home."""
     go_home(real)
     yield real
 
 
 def psec_of(drive: Drive, joint: str, first: int, last: int) -> np.ndarray:
-    """psec of a joint from `first` to `last`, ns."""
+    """Returns psec of a joint from `first` to `last`, ns."""
     drive.wait_until(last, 30)
     return drive.record(first, last).states["psec", joint]
 
 
 def test_stamp_zero_starts_at_the_next_position_period(home: Drive):
-    """The start is on the grid, after the decision, by one period at the most."""
+    """The start is on the grid, at most one cycle after the decision."""
     accepted, start, plan = start_swing(home, duration=1.2)
     assert accepted.source == R.SOURCE_TOPIC and accepted.code == R.NONE
     assert 0 < start - to_ns(accepted.header.stamp) <= TSP_NS
@@ -42,7 +42,7 @@ def test_stamp_zero_starts_at_the_next_position_period(home: Drive):
 
 
 def test_every_point_on_the_grid_is_used_as_it_is(home: Drive):
-    """Points without any pattern come out bit for bit."""
+    """Irregular points are published bit for bit."""
     noise = np.cumsum(np.random.default_rng(1).uniform(-1e-5, 1e-5, 400))
     noise[0] = 0.0
     recording = home.run(joint_trajectory(["z"], np.arange(400) * 0.006, noise))
@@ -50,7 +50,7 @@ def test_every_point_on_the_grid_is_used_as_it_is(home: Drive):
 
 
 def test_stamp_in_the_future_waits_and_the_present_one_goes_on(home: Drive):
-    """Until its start the motion under way is followed, from it on the new one."""
+    """The active motion is followed until the start, the new one from the start on."""
     _, start, plan = start_swing(home, duration=1.8)
     end = start + (len(plan["x"]) - 1) * TSP_NS
     time, position = swing(0.6, amplitude=0.01)
@@ -61,7 +61,7 @@ def test_stamp_in_the_future_waits_and_the_present_one_goes_on(home: Drive):
 
 
 def test_start_between_two_periods_is_the_later_one(home: Drive):
-    """So points on the trajectory's own grid stay on it."""
+    """Points on the trajectory's own grid stay on it."""
     time, position = swing(0.6)
     stamp = home.now() + NANOSECONDS + 1_234_567
     accepted = home.accept(joint_trajectory(["x"], time, position, stamp=stamp))
@@ -70,7 +70,7 @@ def test_start_between_two_periods_is_the_later_one(home: Drive):
 
 
 def test_stamp_in_the_past_joins_in_with_a_warning(home: Drive):
-    """At rest where the two meet, so nothing jumps; what is over is left out."""
+    """The two motions meet at rest, so no jump occurs; points in the past are skipped."""
     time, position = swing(1.2, rest=1.8)
     stamp = on_grid(home, home.now() - NANOSECONDS // 2)
     accepted = home.accept(joint_trajectory(["x"], time, position, stamp=stamp))
@@ -89,7 +89,7 @@ def test_stamp_in_the_past_joins_in_with_a_warning(home: Drive):
     ids=["linear", "cubic", "quintic"],
 )
 def test_first_point_later_than_zero_is_moved_to(home: Drive, fields: dict, quarter: float):
-    """From the commanded state, by the fields that are present."""
+    """The approach starts at the commanded state and is interpolated by the given fields."""
     way = 0.01
     accepted = home.accept(joint_trajectory(["x"], [1.2], [[way]], **fields))
     start = to_ns(accepted.start)
@@ -119,7 +119,7 @@ def test_between_points_the_fields_decide(home: Drive, fields: dict, quarter: fl
 
 
 def test_new_one_while_moving_replaces_the_old_one(home: Drive):
-    """From the commanded state, without a jump; the displaced one is told so."""
+    """The transition starts at the commanded state without a jump; the result of the old one is PREEMPTED."""
     first, start, plan = start_swing(home, duration=6.0)
     home.wait_until(start + 150 * TSP_NS, 5)
     second = home.accept(joint_trajectory(["x"], [1.2], [[0.02]], [[0.0]]))
@@ -127,7 +127,7 @@ def test_new_one_while_moving_replaces_the_old_one(home: Drive):
     assert_psec(home, start, plan, last=switch - TSP_NS)
     psec = psec_of(home, "x", switch - 2 * TSP_NS, switch + 200 * TSP_NS)
     assert np.abs(np.diff(psec)).max() <= SPEED_LIMIT_X * 0.006
-    # A cubic starts with the commanded velocity: no step in it beyond what the swing itself has.
+    # A cubic starts with the commanded velocity: no step beyond that of the swing itself.
     assert np.abs(np.diff(psec, 2)).max() <= ACCELERATION_LIMIT_X * 0.006**2
     assert psec[-1] == 0.02
     assert home.end(first.sequence_number, 5).status == R.PREEMPTED
@@ -135,7 +135,7 @@ def test_new_one_while_moving_replaces_the_old_one(home: Drive):
 
 
 def test_chunks_of_a_long_path_join_without_a_gap(home: Drive):
-    """Each chunk's stamp is its absolute start; psec is the whole path."""
+    """The stamp of each chunk is its absolute start; psec is the whole path."""
     time, position = swing(4.8)
     size = 200
     origin = on_grid(home, home.now() + NANOSECONDS)
@@ -153,7 +153,7 @@ def test_chunks_of_a_long_path_join_without_a_gap(home: Drive):
 
 @pytest.mark.parametrize("names", [[], ["x", "y", "z", "a", "c"]], ids=["no joints", "all joints"])
 def test_no_points_is_a_controlled_stop(home: Drive, names: list[str]):
-    """The setpoint comes to rest within the limits of the axis, short of where it was going."""
+    """The setpoint comes to rest within the limits of the axis, short of its destination."""
     first, start, _ = start_swing(home, duration=3.0, amplitude=0.2)
     home.wait_until(start + 125 * TSP_NS, 5)
     home.accept(JointTrajectory(joint_names=names))
@@ -168,7 +168,7 @@ def test_no_points_is_a_controlled_stop(home: Drive, names: list[str]):
 
 
 def test_some_joints_leave_the_others_to_what_they_were_doing(home: Drive):
-    """x goes on with its swing while z is moved."""
+    """x continues its swing while z moves."""
     _, start, plan = start_swing(home, duration=2.4)
     time, position = swing(0.6, amplitude=0.01)
     accepted = home.accept(joint_trajectory(["z"], time, position))
@@ -178,7 +178,7 @@ def test_some_joints_leave_the_others_to_what_they_were_doing(home: Drive):
 
 
 def test_order_of_the_joints_is_the_senders(home: Drive):
-    """Columns go by name."""
+    """Columns are assigned by name."""
     time, position = swing(0.6, amplitude=0.01)
     rows = np.column_stack([position, 2 * position, 0 * position])
     recording = home.run(joint_trajectory(["c", "x", "a"], time, rows))
@@ -186,12 +186,12 @@ def test_order_of_the_joints_is_the_senders(home: Drive):
 
 
 def test_an_unlimited_rotary_axis_turns_on(home: Drive):
-    """C has no travel limits: beyond a full turn is accepted."""
+    """C has no travel limits: more than a full turn is accepted."""
     home.accept(joint_trajectory(["c"], [30.0], [[7.0]]))
 
 
 def test_100_000_points_arrive_and_are_executed(fast: Drive):
-    """At 1 ms; those on the position grid come out bit for bit."""
+    """Points at 1 ms; those on the position grid are published bit for bit."""
     time = np.arange(100_000) / 1000
     position = np.column_stack([0.1 * np.sin(time / 5), 0.1 * (1 - np.cos(time / 5))])
     position *= np.minimum(1, time / 5)[:, None]
@@ -200,5 +200,5 @@ def test_100_000_points_arrive_and_are_executed(fast: Drive):
     ended = fast.end(accepted.sequence_number, 180)
     assert ended.status == R.COMPLETED, ended.text
     on_period = position[::6]
-    # The axes are done in seconds; rclpy takes far longer to hand 50 000 samples over.
+    # The axes finish in seconds; rclpy needs far longer to deliver 50 000 samples.
     assert_psec(fast, to_ns(accepted.start), {"x": on_period[:, 0], "y": on_period[:, 1]}, timeout=240)

@@ -1,4 +1,4 @@
-"""The circle of the paper's figure 10, measured on the positions that the node publishes."""
+"""Circle of the paper's figure 10, measured on the published positions."""
 
 import numpy as np
 import pytest
@@ -11,13 +11,13 @@ FEEDFORWARD = [f"{axis}.feedforward.{part}" for axis in "xy" for part in ("veloc
 
 
 def run(drive: Drive) -> Recording:
-    """The circle once, from home."""
+    """Runs the circle once, from home."""
     go_home(drive)
     return drive.run(joint_trajectory(["x", "y"], PATH.time, np.column_stack([PATH.x, PATH.y])))
 
 
 def deviation_um(recording: Recording) -> np.ndarray:
-    """Radial deviation while the feed is steady, µm."""
+    """Returns the radial deviation at steady feed, µm."""
     return recording.radial_deviation(PATH.center, PATH.radius)[recording.within(PATH.steady)] * 1e6
 
 
@@ -42,7 +42,7 @@ def test_with_feedforward_the_circle_is_49_um_too_large(fast: Drive):
 
 
 def test_without_feedforward_the_circle_is_283_um_too_small(fast: Drive):
-    """Feedforward switched off by parameter while the node runs, and on again."""
+    """Feedforward is switched off by parameter while the node runs, and on again."""
     before = fast.get_parameters(FEEDFORWARD)
     fast.set_parameters(dict.fromkeys(FEEDFORWARD, 0.0))
     try:
@@ -55,13 +55,13 @@ def test_without_feedforward_the_circle_is_283_um_too_small(fast: Drive):
 
 
 def test_errors_in_the_result_are_those_of_the_samples(fast: Drive):
-    """The result's figures per axis, against the samples of the same motion."""
+    """The figures per axis of the result equal those of the samples of the same motion."""
     recording = run(fast)
     result = recording.result
     for column, joint in enumerate(result.name):
         error = np.abs(recording.states["tracking_error", joint])
         synchronized = np.abs(recording.states["synchronized_tracking_error", joint])
-        # The node counts the settling after the last point too, the samples end before it.
+        # The node also evaluates the settling after the last point; the samples end before it.
         assert result.max_tracking_error[column] >= error.max()
         assert result.max_synchronized_tracking_error[column] == pytest.approx(synchronized.max(), rel=1e-9)
         assert result.peak_current[column] >= np.abs(recording.currents["current", joint]).max()
@@ -75,7 +75,7 @@ def test_errors_in_the_result_are_those_of_the_samples(fast: Drive):
 
 
 def test_the_same_circle_twice_is_the_same_bit_for_bit(fast: Drive):
-    """From home, positions and currents do not depend on what was before."""
+    """From home, positions and currents do not depend on earlier motions."""
     first, second = run(fast), run(fast)
     for series in ("joints", "currents", "states"):
         a, b = getattr(first, series), getattr(second, series)

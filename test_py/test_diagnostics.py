@@ -1,4 +1,4 @@
-"""/diagnostics: what an operator is told, once a second."""
+"""Content of /diagnostics, once a second."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from motion import go_home, start_swing
 
 
 def text_of(array: DiagnosticArray) -> str:
-    """All that an array says, in lower case."""
+    """Returns all texts of an array, in lower case."""
     words = []
     for status in array.status:
         words += [status.name, status.message, *(f"{value.key} {value.value}" for value in status.values)]
@@ -21,7 +21,7 @@ def text_of(array: DiagnosticArray) -> str:
 
 
 def worst(array: DiagnosticArray) -> int:
-    """The worst level in an array."""
+    """Returns the worst level in an array."""
     return max((int.from_bytes(status.level, "little") for status in array.status), default=-1)
 
 
@@ -29,7 +29,7 @@ WARN = int.from_bytes(DiagnosticStatus.WARN, "little")
 
 
 def test_once_a_second_by_the_nodes_clock(real: Drive):
-    """REP-107 wants 1 Hz."""
+    """REP-107 requires 1 Hz."""
     seen = len(real.diagnostics())
     arrays = real.wait_for(lambda: real.diagnostics()[seen:][3:] and real.diagnostics()[seen:], 8, "four diagnostics")
     stamps = [to_ns(array.header.stamp) for array in arrays[:4]]
@@ -37,7 +37,7 @@ def test_once_a_second_by_the_nodes_clock(real: Drive):
 
 
 def test_at_rest_and_moving(real: Drive):
-    """Holding or running; at rest everything is well, but for what a busy computer releases late."""
+    """States holding and running; at rest all levels are OK except for late releases on a busy computer."""
     go_home(real)
     at_rest = real.next_diagnostics()
     assert "holding" in text_of(at_rest)
@@ -49,7 +49,7 @@ def test_at_rest_and_moving(real: Drive):
 
 
 def test_friction_law_beyond_its_range_is_a_warning(real: Drive):
-    """It is fitted up to 20 m/min; 24 m/min is beyond."""
+    """The friction law is fitted up to 20 m/min; the motion reaches 24 m/min."""
     go_home(real)
     real.accept(joint_trajectory(["x"], [0.0, 0.4, 1.0, 1.4], [[0.0], [0.08], [0.32], [0.34]]))
     seen = len(real.diagnostics())
@@ -61,15 +61,17 @@ def test_friction_law_beyond_its_range_is_a_warning(real: Drive):
     go_home(real)
 
 
-def test_an_axis_that_leaves_its_stroke_is_logged(real: Drive):
-    """At nearly full speed to the stroke's end, where no axis can stop at once."""
+def test_an_axis_that_leaves_its_travel_limits_is_logged(real: Drive):
+    """Nearly full speed close to a travel limit, so that the axis cannot stop before it."""
     assert real.process is not None
     go_home(real)
     seen = len(real.diagnostics())
     real.accept(joint_trajectory(["x"], [0.0, 0.72], [[0.0], [0.355]]))
-    real.wait_for(lambda: [a for a in real.diagnostics()[seen:] if "outside its stroke" in text_of(a)], 8, "a warning")
+    real.wait_for(
+        lambda: [a for a in real.diagnostics()[seen:] if "outside its travel limits" in text_of(a)], 8, "a warning"
+    )
     process = real.process
-    real.wait_for(lambda: "x has left its stroke" in process.output(), 5, "a line of the log")
+    real.wait_for(lambda: "x has left its travel limits" in process.output(), 5, "a line of the log")
 
 
 def test_the_document_has_every_key_and_no_other(real: Drive):
@@ -82,7 +84,7 @@ def test_the_document_has_every_key_and_no_other(real: Drive):
 
 
 def test_who_has_come_is_counted_and_memory_told(real: Drive):
-    """Each endpoint of others counts once, also when it has gone; memory is what Linux says of the node."""
+    """Each remote endpoint counts once, also after it has left; memory equals Linux's figure of the process."""
 
     def count() -> int:
         return int(real.told()["endpoints_discovered"])

@@ -1,4 +1,4 @@
-"""`time: fast`: its /clock, the one of several machines, and subscribers that are slow."""
+"""Mode `time: fast`: its /clock, the common clock of several machines, and slow subscribers."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from sim_clock import SimClock
 
 DEEP = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
 LONG = 30.0
-"""Duration of a motion that real time would take long for, s."""
+"""Duration of a motion that would take long in real time, s."""
 
 
 def test_fast_outruns_the_wall_clock_on_an_unbroken_grid(start: Callable[..., Drive]):
-    """Half a minute of motion; the clock shows each position instant once, and so do the samples."""
+    """Half a minute of motion; the clock and the samples contain each position instant once."""
     drive = start("-p", "time:=fast")
     ticks: list[int] = []
     drive.node.create_subscription(Clock, "/clock", lambda message: ticks.append(to_ns(message.clock)), DEEP)
@@ -44,7 +44,7 @@ def test_fast_outruns_the_wall_clock_on_an_unbroken_grid(start: Callable[..., Dr
 
 
 def test_an_idle_fast_node_floods_nobody(start: Callable[..., Drive]):
-    """With nothing to do the clock goes at real pace."""
+    """The clock of an idle node runs at wall-clock rate."""
     drive = start("-p", "time:=fast")
     before, began = drive.now(), time.monotonic()
     time.sleep(1.0)
@@ -54,18 +54,18 @@ def test_an_idle_fast_node_floods_nobody(start: Callable[..., Drive]):
 
 
 def node(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> Node:
-    """The process of a machine of a name of its own in a domain that others share."""
+    """Starts the process of a machine with its own name in a shared domain."""
     arguments = ["-r", f"__ns:=/{name}", *(ros_args or ("-p", "time:=fast"))]
     return stack.enter_context(Node(arguments, name=f"/{name}/virtual_axes", domain_id=domain.value))
 
 
 def machine(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> Drive:
-    """Such a machine, and who drives it."""
+    """Starts a machine in a shared domain and returns its Drive."""
     return stack.enter_context(Drive(process=node(stack, name, domain, *ros_args)))
 
 
 def wait_for_topics(process: Node) -> None:
-    """Until all of a node's topics are there: docs/middleware.md, "Processes that start at the same time"."""
+    """Waits until all topics of a node exist: docs/middleware.md, "Processes that start at the same time"."""
     deadline = time.monotonic() + 20
     while "Ctrl-C" not in process.output():
         assert time.monotonic() < deadline, process.output()
@@ -73,24 +73,24 @@ def wait_for_topics(process: Node) -> None:
 
 
 class Ticks:
-    """What /clock shows, in the order in which it comes."""
+    """Messages on /clock, in order of arrival."""
 
     def __init__(self, drive: Drive):
-        """Listen through a Drive's node."""
+        """Subscribes with the node of a Drive."""
         self.shown: list[int] = []
         self._drive = drive
         drive.node.create_subscription(Clock, "/clock", lambda message: self.shown.append(to_ns(message.clock)), DEEP)
         drive.wait_for(lambda: self.shown, 10, "tick of the clock")
 
     def since(self, begin: int) -> np.ndarray:
-        """The ticks from the `begin`-th on, once there are some."""
+        """Returns the messages from index `begin` on, after at least one has arrived."""
         self._drive.wait_for(lambda: len(self.shown) > begin + 10, 10, "ticks of the clock")
         return np.array(self.shown[begin:])
 
 
 @pytest.fixture
 def shared() -> Iterator[tuple[ExitStack, DomainId]]:
-    """A domain for several machines; they end in the reverse order."""
+    """Yields a domain for several machines, which are stopped in reverse order."""
     domain = DomainId()
     with ExitStack() as stack:
         stack.callback(domain.release)
@@ -98,20 +98,20 @@ def shared() -> Iterator[tuple[ExitStack, DomainId]]:
 
 
 def leads(drive: Drive) -> bool:
-    """Whether a machine gives the clock, by what it says about itself."""
+    """Returns true if a machine publishes the clock, by its log."""
     said = [line for line in drive.process.output().splitlines() if "/clock:" in line]
     return bool(said) and said[-1].endswith("publishing it")
 
 
 def assert_unbroken(drive: Drive, begin: int, end: int) -> None:
-    """Every position instant is there, from one time to another, ns."""
+    """Asserts that all position instants between two times exist, ns."""
     drive.wait_until(end // TSP_NS * TSP_NS, 30)
     stamps = drive.record(begin, end).joints.stamp
     assert np.array_equal(stamps, np.arange(-(-begin // TSP_NS) * TSP_NS, end + 1, TSP_NS))
 
 
 def test_the_second_machine_follows_the_first_and_takes_over(shared: tuple[ExitStack, DomainId]):
-    """One clock, that never goes back, for two machines and a third that only follows."""
+    """Two machines and a third that only follows have one clock, which never goes back."""
     stack, domain = shared
     with ExitStack() as first_life:
         first = machine(first_life, "first", domain)
@@ -120,13 +120,13 @@ def test_the_second_machine_follows_the_first_and_takes_over(shared: tuple[ExitS
         ticks = Ticks(third)
         assert leads(first) and not leads(second)
         begin = max(drive.now() for drive in (first, second, third))
-        # The first machine is asked, and goes as fast as it can; the others follow whatever they do.
+        # The first machine has a command and runs as fast as possible; the others follow.
         slow = second.accept(joint_trajectory(["y"], [0.0, 1.0], [[0.0], [0.1]]))
         recording = first.run(joint_trajectory(["x"], [0.0, 2.0], [[0.0], [0.3]]))
         assert second.end(slow.sequence_number, 30).status == TrajectoryResult.COMPLETED
         for drive in (first, second, third):
             assert_unbroken(drive, begin, recording.joints.stamp[-1])
-        # While the first has nothing to do, a trajectory of the second goes at real pace.
+        # While the first machine is idle, a trajectory of the second runs at wall-clock rate.
         began = time.monotonic()
         second.run(joint_trajectory(["y"], [0.0, 0.6], [[0.1], [0.1]]))
         assert time.monotonic() - began > 0.4
@@ -143,7 +143,7 @@ def test_the_second_machine_follows_the_first_and_takes_over(shared: tuple[ExitS
 
 
 def test_of_machines_that_start_together_one_leads(shared: tuple[ExitStack, DomainId]):
-    """Which one, their ids decide."""
+    """The ids of the machines decide which one publishes."""
     stack, domain = shared
     processes = [node(stack, name, domain) for name in ("left", "right")]
     for process in processes:
@@ -158,7 +158,7 @@ def test_of_machines_that_start_together_one_leads(shared: tuple[ExitStack, Doma
 
 
 def test_the_clock_of_somebody_else_is_followed(start: Callable[..., Drive]):
-    """Whoever else publishes /clock wins; when it is gone, the machine goes on from where it was."""
+    """Another publisher of /clock has priority; after it has left, the machine continues from its own time."""
     drive = start("-p", "time:=fast")
     ticks = Ticks(drive)
     begin = -(-(drive.now() + 2 * NANOSECONDS) // TSP_NS) * TSP_NS
@@ -182,7 +182,7 @@ def test_the_clock_of_somebody_else_is_followed(start: Callable[..., Drive]):
 
 
 def stands(drive: Drive, timeout: float = 60.0) -> int:
-    """How many position periods there have been when a slow subscriber has stopped the clock for seconds."""
+    """Returns the number of position cycles at which a slow subscriber has stopped the clock for seconds."""
     seen = len(drive.diagnostics())
 
     def counts() -> list[str]:
@@ -195,8 +195,8 @@ def stands(drive: Drive, timeout: float = 60.0) -> int:
 
 
 def test_a_slow_subscriber_misses_nothing(start: Callable[..., Drive]):
-    """One that keeps all and takes nothing for a while stops the clock, not the services."""
-    # What its middleware keeps (5000), what ours keeps for it (8192), and some more.
+    """A keep-all subscriber that takes no samples for a while stops the clock, not the services."""
+    # Depth of its middleware (5000), of the node's history for it (8192), and a margin.
     instants = 14_000
     drive = start("-p", "time:=fast")
     context = Context()
@@ -212,7 +212,7 @@ def test_a_slow_subscriber_misses_nothing(start: Callable[..., Drive]):
             return taken and to_ns(taken[0].header.stamp)
 
         stamps = [drive.wait_for(take, 10, "joint state")]
-        # A clock that runs freely to a motion in the future has little to compute.
+        # A free-running clock up to a motion in the future needs little computation.
         end = drive.now() + instants * TSP_NS
         sent = drive.send(joint_trajectory(["x"], *swing(0.3, amplitude=0.01), stamp=end))
         drive.decision(sent)

@@ -1,4 +1,4 @@
-"""Clocks that nobody can follow: two that contend, an hour apart, and one that gives what is no time."""
+"""Invalid clocks: two contending clocks an hour apart, and invalid times."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ BEGIN = 1_000 * NANOSECONDS
 APART = 3_600 * NANOSECONDS
 MESSAGES = 300
 LINES_A_SECOND = 55
-"""Of one kind in the log: 50, and what says that the rest is left out."""
+"""Maximum number of log lines of one kind: 50, plus the notice of suppression."""
 
 
 @pytest.fixture(scope="module")
 def clock() -> Iterator[SimClock]:
-    """Axes that follow a clock turned by hand, shared by the module."""
+    """Yields axes that follow a clock under test control, shared by the module."""
     with Node(["-p", "use_sim_time:=true"]) as process, Drive(process=process, connect=False) as drive:
         clock = SimClock(drive, BEGIN, ReliabilityPolicy.RELIABLE)
         clock.connect()
@@ -33,12 +33,12 @@ def clock() -> Iterator[SimClock]:
 
 
 def jumps(drive: Drive) -> int:
-    """Jumps that the node has counted, by diagnostics to come."""
+    """Returns the number of jumps that the node has counted, from the next diagnostics."""
     return int(drive.told()["clock_jumps"])
 
 
 def runs_as_before(clock: SimClock) -> None:
-    """A trajectory by the clock is followed bit for bit, on an unbroken grid."""
+    """Asserts that a trajectory on the clock is followed bit for bit, on an unbroken grid."""
     drive = clock.drive
     drive.reset()
     clock.advance(0.06, 0.006)
@@ -50,7 +50,7 @@ def runs_as_before(clock: SimClock) -> None:
 
 
 def test_two_clocks_that_contend_are_jumps_counted_and_not_a_flood(clock: SimClock):
-    """Each change from one to the other ends what moves; when one has left, the other is followed as ever."""
+    """Each change between the clocks stops the motion; after one clock has left, the other is followed normally."""
     drive = clock.drive
     time_s, position = swing(6.0)
     moving = drive.accept(joint_trajectory(["y"], time_s, position))
@@ -67,7 +67,7 @@ def test_two_clocks_that_contend_are_jumps_counted_and_not_a_flood(clock: SimClo
     counted = jumps(drive) - before
     lines = drive.process.output()[said:].count("the clock jumped")
     seconds = time.monotonic() - begin
-    # A clock is best effort: what is not taken in time is overtaken.
+    # The clock is best effort: a message that is not taken in time is overwritten.
     assert 2 <= counted <= 2 * MESSAGES
     assert 1 <= lines <= LINES_A_SECOND * (seconds + 1)
     other.close()
@@ -76,7 +76,7 @@ def test_two_clocks_that_contend_are_jumps_counted_and_not_a_flood(clock: SimClo
 
 
 def test_what_is_no_time_is_left_out_and_said_once(clock: SimClock):
-    """Before the epoch, or with more nanoseconds than a second has; the newest that there can be is a jump."""
+    """Times before the epoch or with more than 1e9 nanoseconds are ignored; the largest valid time is a jump."""
     drive = clock.drive
     clock.advance(0.06, 0.006)
     stood_at = drive.now()

@@ -1,4 +1,4 @@
-"""The node's process is paused, or dies and is started again, while others stay."""
+"""The node's process is paused, or dies and is restarted, while other participants stay."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from motion import assert_psec, go_home, start_swing, swing
 
 PAUSE_S = 5
 SHALLOW = 10
-"""As subscribers have it by default: a burst of more than that is lost on them."""
+"""Default depth of subscribers: samples of a longer burst are lost."""
 BURST_S = 1.0
-"""Of so much the node makes up for what it has missed."""
+"""Maximum pause of which the node catches up the missed cycles."""
 REANNOUNCED_S = 3.5
-"""Fast DDS tells a node that comes back of publishers and clients again after 3 s in most cases."""
+"""Fast DDS rediscovers publishers and clients for a restarted node after 3 s in most cases."""
 RECOVERY_S = 30.0
 Answer = TypeVar("Answer")
 
 
 def diagnostics(drive: Drive) -> list[dict[str, str]]:
-    """Values of all diagnostics so far."""
+    """Returns the values of all diagnostics so far."""
     return [status_values(array.status[0]) for array in drive.diagnostics()]
 
 
 def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
-    """Missed periods are counted and told, the motion is where it would have been, services are served as before."""
+    """Missed cycles are counted and reported, the motion stays on schedule, services respond as before."""
     go_home(real)
     assert real.process is not None
     stamps: list[int] = []
@@ -54,7 +54,7 @@ def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
     real.wait_until(paused + (PAUSE_S + 1) * NANOSECONDS, 20)
     recording = real.record(start, real.now())
     states = recording.states
-    # One gap, of which nothing is made up for; after it the grid as before, and psec as planned.
+    # One gap without catch-up; after it the grid continues and psec is as planned.
     gaps = np.diff(states.stamp) // TSP_NS
     at = int(np.argmax(gaps))
     assert gaps[at] >= (PAUSE_S - BURST_S) * NANOSECONDS / TSP_NS
@@ -62,11 +62,11 @@ def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
     index = (states.stamp - start) // TSP_NS
     inside = index < len(plan["x"])
     np.testing.assert_array_equal(states["psec", "x"][inside], plan["x"][index[inside]])
-    # One that keeps ten has got what came after it, as one that keeps all.
+    # A subscriber with depth 10 has received the samples after the gap, like a keep-all subscriber.
     resumed = int(states.stamp[at + 1])
     after = [stamp for stamp in stamps if stamp >= resumed]
     assert after[0] - resumed <= SHALLOW * TSP_NS
-    # It is counted, and said once.
+    # The pause is counted and logged once.
     missed = (PAUSE_S - BURST_S) * NANOSECONDS // TSP_NS
 
     def counted(values: dict[str, str]) -> bool:
@@ -76,7 +76,7 @@ def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
     messages = [array.status[0].message for array in real.diagnostics()]
     assert any("the node stood still" in message for message in messages)
     assert "the node stood still for" in real.process.output()
-    # The middleware's threads have outlived it.
+    # The middleware's threads survive the pause.
     assert "poll" not in real.process.output()
     assert real.end(accepted.sequence_number, 20).status == 2
     real.in_executor(lambda: real.node.destroy_subscription(subscription))
@@ -87,7 +87,7 @@ def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
 
 
 def recovers(act: Callable[[], Answer]) -> Answer:
-    """What `act` gives when it does not time out any more."""
+    """Repeats `act` until it does not time out and returns its result."""
     deadline = time.monotonic() + RECOVERY_S
     while True:
         try:
@@ -98,7 +98,7 @@ def recovers(act: Callable[[], Answer]) -> Answer:
 
 
 def test_who_stays_is_served_by_a_node_that_was_killed_and_started_again():
-    """Publishers, subscribers, clients of services and of the action: none of them has to begin anew."""
+    """Existing publishers, subscribers, service clients and action clients work without a restart."""
     with Node(["-p", "max_points:=20000"]) as process, Drive(process=process) as drive, Follow(drive) as follow:
         drive.set_parameters({"x.velocity_loop.gain": 4.9})
         assert follow.send(goal(line(["x"], [0.001], 0.2))).status() == GoalStatus.STATUS_SUCCEEDED
@@ -113,17 +113,17 @@ def test_who_stays_is_served_by_a_node_that_was_killed_and_started_again():
         drive.wait_for(lambda: drive.now() > last, RECOVERY_S, "samples of the new node")
         time.sleep(REANNOUNCED_S)
         assert drive.latest("position")["x"] == 0.0
-        # A publisher: its trajectory is taken, and its results are found by the same numbers.
+        # Publisher: its trajectory is accepted, and its results have the same sequence numbers.
         time_s, position = swing(0.6, amplitude=0.01)
         motion = joint_trajectory(["y"], time_s, position)
         accepted = recovers(lambda: drive.accept(motion, timeout=2))
         assert accepted.sequence_number > lost.sequence_number
         assert_psec(drive, to_ns(accepted.start), {"y": position})
-        # Clients of services.
+        # Service clients.
         gain = "x.velocity_loop.gain"
         found = recovers(lambda: drive.get_parameters([gain]))
         assert found == {gain: 5.0}, "a new node has its own"
         recovers(lambda: drive.set_parameters({gain: 4.8}))
         recovers(drive.reset)
-        # A client of the action.
+        # Action client.
         assert recovers(lambda: follow.send(goal(line(["x"], [0.001], 0.2)))).status() == GoalStatus.STATUS_SUCCEEDED

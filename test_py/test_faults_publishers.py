@@ -1,4 +1,4 @@
-"""Publishers that are killed, send far too much, or contend; the axes move meanwhile as they were asked to."""
+"""Publishers that are killed, flood, or contend, while the axes move as commanded."""
 
 from __future__ import annotations
 
@@ -25,38 +25,38 @@ from motion import TSP, assert_psec, go_home, start_swing, swing
 
 POINTS = 500_000
 MESSAGE_MB = 20
-"""A trajectory of two joints and so many points as it is sent."""
+"""Returns a serialized trajectory of two joints with this number of points."""
 ATTEMPTS = 4
 FLOOD = 10_000
 FLOOD_OF_TRAJECTORIES = 4_000
-"""At the same rate, but each has two results, which this process has to read."""
+"""Messages of a flood with two results each, which this process has to read."""
 LINES_A_SECOND = 55
-"""Of one kind in the log: 50, and what says that the rest is left out."""
+"""Maximum number of log lines of one kind: 50, plus the notice of suppression."""
 GROWTH_MB = 30.0
-"""What queues and histories take once they are full: 8192 results and log lines of the middleware's, above all."""
+"""Memory of full queues and histories, MB: mainly 8192 results and log lines in the middleware."""
 
 
 @pytest.fixture(scope="module")
 def node() -> Iterator[Drive]:
-    """Axes in real time that take trajectories of any length, shared by the module."""
+    """Yields real-time axes that accept trajectories of any length, shared by the module."""
     with Node() as process, Drive(process=process) as drive:
         yield drive
 
 
 def pid_of(drive: Drive) -> int:
-    """Process id of the node."""
+    """Returns the process id of the node."""
     assert drive.process is not None
     return drive.process.pid
 
 
 def kill_while_sending(drive: Drive, folder: Path) -> bool:
-    """Kill a publisher when the node has begun to put its message together; whether it came to that."""
+    """Kills a publisher when the node has begun to assemble its message; returns true if the node had begun."""
     pid, decided = pid_of(drive), len(drive.results())
     with Guest(drive.process.domain_id, "send", POINTS, lease=2, folder=folder) as sender:
         before = resident_mb(pid)
         sender.go_on()
         deadline = time.monotonic() + 5
-        # Room for the whole message is made with its first fragment.
+        # The buffer for the whole message is allocated at its first fragment.
         while resident_mb(pid) < before + 0.8 * MESSAGE_MB and time.monotonic() < deadline:
             time.sleep(0.0005)
         begun = time.monotonic() < deadline
@@ -66,7 +66,7 @@ def kill_while_sending(drive: Drive, folder: Path) -> bool:
 
 
 def test_a_publisher_killed_in_the_middle_of_a_message_harms_nobody(node: Drive, tmp_path: Path):
-    """The next publisher's trajectory runs to the same bits as before; of the message what came is kept."""
+    """The next publisher's trajectory is executed bit-identically; received fragments of the message stay in memory."""
     time_s, position = swing(1.2)
     motion = joint_trajectory(["x", "c"], time_s, np.column_stack([position, 3 * position]))
     go_home(node)
@@ -79,12 +79,12 @@ def test_a_publisher_killed_in_the_middle_of_a_message_harms_nobody(node: Drive,
     after = node.run(motion)
     for kind, field in (("states", "psec"), ("joints", "position"), ("currents", "current")):
         np.testing.assert_array_equal(getattr(after, kind)[field], getattr(before, kind)[field], err_msg=field)
-    # A message that was whole is there twice, as it came and as a trajectory.
+    # A complete message is stored twice, as received and as a trajectory.
     assert resident_mb(pid_of(node)) < memory + 3 * MESSAGE_MB * attempts
 
 
 def test_a_trajectory_of_500_000_points_does_not_disturb_the_motion_under_way(node: Drive):
-    """It is taken, and what moves goes on bit for bit; afterwards its memory is given back."""
+    """The trajectory is accepted, and the active motion continues bit for bit; its memory is released afterwards."""
     go_home(node)
     memory = resident_mb(pid_of(node))
     accepted, start, plan = start_swing(node, duration=4.8)
@@ -97,12 +97,12 @@ def test_a_trajectory_of_500_000_points_does_not_disturb_the_motion_under_way(no
     assert node.end(accepted.sequence_number, 10).status == R.COMPLETED
     node.stop()
     assert node.end(long, 10).status == R.STOPPED
-    # The middleware keeps the message, as it keeps the last 64.
+    # The middleware keeps the message: it stores the last 64.
     node.wait_for(lambda: resident_mb(pid_of(node)) < memory + 4 * MESSAGE_MB, 30, f"memory near {memory} MB")
 
 
 def flood(publisher: Any, message: Any, number: int) -> float:
-    """Publish `number` messages, 10 000 a second and more where the machine can; returns how long it took, s."""
+    """Publishes `number` messages, 10 000 a second or more if the machine is fast enough; returns the duration, s."""
     raw, begin = serialize_message(message), time.monotonic()
     for _ in range(number):
         publisher.publish(raw)
@@ -110,7 +110,7 @@ def flood(publisher: Any, message: Any, number: int) -> float:
 
 
 def forget_results(drive: Drive) -> None:
-    """Drop the results of a flood when no more come: to look through thousands of them takes long."""
+    """Drops the results of a flood after the last has arrived: searching thousands of results takes long."""
     silent_since, known = time.monotonic(), -1
     deadline = silent_since + 30
     while time.monotonic() < min(deadline, silent_since + 0.5):
@@ -122,7 +122,7 @@ def forget_results(drive: Drive) -> None:
 
 
 def move_through(drive: Drive, act: Callable[[], None]) -> str:
-    """A swing of Z while `act` acts, followed bit for bit; returns what the node's log said, checked for its length."""
+    """Runs a swing of Z during `act`, checks psec and the log length, and returns the log."""
     go_home(drive)
     said = len(drive.process.output())
     begin = time.monotonic()
@@ -130,7 +130,7 @@ def move_through(drive: Drive, act: Callable[[], None]) -> str:
     act()
     assert_psec(drive, start, plan)
     assert drive.end(accepted.sequence_number, 30).status == R.COMPLETED
-    # What is told by diagnostics is told by now, and the last of the log is out.
+    # Diagnostics and the last log lines are complete now.
     drive.told()
     log, seconds = drive.process.output()[said:], time.monotonic() - begin
     kinds: dict[str, int] = {}
@@ -153,7 +153,7 @@ FLOODS = {
 
 @pytest.mark.parametrize("what", FLOODS)
 def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
-    """What moves is not disturbed, memory and log are bounded, and commands are taken as before."""
+    """The active motion is undisturbed, memory and log are bounded, and commands are accepted as before."""
     publisher, message = FLOODS[what]
     refused = int(node.told()["stream_setpoints_refused"])
     memory = resident_mb(pid_of(node))
@@ -184,7 +184,7 @@ def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
 
 
 def test_a_flood_of_service_calls(node: Drive):
-    """Thousands at once of two services: those of the last call are answered, and nothing grows."""
+    """Thousands of simultaneous calls of two services: the last calls get a response, and memory does not grow."""
     memory = resident_mb(pid_of(node))
     deep = QoSProfile(depth=FLOOD)
     setter = node.node.create_client(SetParameters, f"{node.target}/set_parameters", qos_profile=deep)
@@ -201,13 +201,13 @@ def test_a_flood_of_service_calls(node: Drive):
     node.wait_for(lambda: sum(call.done() for call in calls) > len(calls) // 10, 60, "answers")
     for client in (setter, stopper):
         node.in_executor(lambda client=client: node.node.destroy_client(client))
-    # Who calls now waits for what is before it, and no more.
+    # A new call waits for earlier ones only.
     assert node.reset(timeout=60)
     assert resident_mb(pid_of(node)) - memory < GROWTH_MB
 
 
 def test_parameters_can_be_set_while_a_stream_floods_the_node(node: Drive):
-    """None is refused for want of room among the commands."""
+    """No parameter is rejected because of a full command queue."""
     go_home(node)
     ended = threading.Event()
     raw = serialize_message(JointState(name=["x"], position=[1e-4]))
@@ -226,13 +226,13 @@ def test_parameters_can_be_set_while_a_stream_floods_the_node(node: Drive):
     finally:
         ended.set()
         thread.join()
-    # What is on its way still.
+    # Messages still in transit.
     time.sleep(0.5)
     node.set_parameters({"x.velocity_loop.gain": 5.0})
 
 
 def test_of_two_publishers_that_contend_the_newest_has_the_joint(node: Drive):
-    """Every instant belongs to one trajectory, whole from its start until the next one's; each is told."""
+    """Each instant belongs to one trajectory, complete from its start until the next start; each has a result."""
     go_home(node)
     with Drive(process=node.process) as other:
         plans: dict[int, tuple[str, np.ndarray]] = {}
@@ -240,7 +240,7 @@ def test_of_two_publishers_that_contend_the_newest_has_the_joint(node: Drive):
         results = []
         for k in range(12):
             drive = (node, other)[k % 2]
-            # Distinct by their values, and within reach of each other.
+            # Distinct by their values, and reachable from each other.
             position = 1e-4 * (k + 1) + np.arange(300) * 1e-7
             trajectory = joint_trajectory(["x", "y"], np.arange(300) * TSP, np.column_stack([position, -position]))
             accepted = drive.accept(trajectory)
@@ -260,14 +260,14 @@ def test_of_two_publishers_that_contend_the_newest_has_the_joint(node: Drive):
 
 
 def test_of_two_streams_that_contend_no_message_is_mixed(node: Drive):
-    """The joints of one message are commanded together: of those of a period the last message counts."""
+    """The joints of one message are commanded together: the last message of a cycle counts."""
     go_home(node)
     with Drive(process=node.process) as other:
         begin = node.now()
         sent: list[tuple[float, float]] = [(0.0, 0.0)]
         turns = random.Random(8)
         for k in range(300):
-            # By lot, so that each of them is the last of a period now and then.
+            # Random order, so that each of them is sometimes the last of a cycle.
             for drive, sign in turns.sample(((node, 1), (other, -1)), 2):
                 sent.append((sign * 1e-6 * (k + 1), sign * 2e-6 * (k + 1)))
                 drive.stream(["x", "y"], sent[-1])

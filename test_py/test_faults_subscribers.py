@@ -1,4 +1,4 @@
-"""Subscribers that are killed or stopped, while the axes move and others listen."""
+"""Subscribers that are killed or stopped while the axes move and others subscribe."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from motion import assert_psec, go_home, start_swing
 
 STOPPED_S = 20
 LEASE_S = 60
-"""Of who is stopped: with Fast DDS's own of 20 s it would be given up."""
+"""Lease of stopped processes, s: with the 20 s of Fast DDS they would be removed."""
 SHALLOW, DEEP = 10, 20_000
 FAST_S = 300.0
-"""Of the axes, in `fast`."""
+"""Machine time of the motion in `fast`, s."""
 GROWTH_MB = 24.0
-"""What 20 s of unread samples of a topic may take, and whoever comes and goes."""
+"""Maximum memory of 20 s of unread samples of a topic, MB, including discovery data."""
 
 
 def test_subscribers_that_are_killed_or_stopped_for_20_s_harm_nobody(real: Drive, tmp_path: Path):
-    """The axes move in real time, others lose nothing, memory is bounded; afterwards each gets what its depth holds."""
+    """The axes move in real time, others lose no sample, memory is bounded; later each gets its history depth."""
     go_home(real)
     assert real.process is not None
     pid, domain = real.process.pid, real.process.domain_id
@@ -44,14 +44,14 @@ def test_subscribers_that_are_killed_or_stopped_for_20_s_harm_nobody(real: Drive
         grown = resident_mb(pid) - before
         for guest in (shallow, deep):
             guest.resume()
-        # Others: every sample, and the motion as planned.
+        # Undisturbed subscribers receive all samples, and the motion is as planned.
         assert_psec(real, start, plan)
         recording = real.record(stopped, resumed)
         for series in (recording.joints, recording.currents, recording.states):
             assert set(np.diff(series.stamp)) == {TSP_NS}
         assert grown < GROWTH_MB, f"{grown:.1f} MB more"
         assert status_values(real.diagnostics()[-1].status[0])["dropped_samples"] == "0"
-        # Those who were stopped: what has come since, and of before what their depth holds.
+        # Resumed subscribers receive all new samples, and of the earlier ones their history depth.
         real.wait_until(resumed + 2 * NANOSECONDS, 30)
         until = real.now()
         stamps = {}
@@ -68,7 +68,7 @@ def test_subscribers_that_are_killed_or_stopped_for_20_s_harm_nobody(real: Drive
 
 
 def test_shallow_subscribers_do_not_bring_fast_axes_to_a_stand(start: Callable[..., Drive]):
-    """As deep as `ros2 topic echo`: what is lost before such a reader has it can be lost for good, unsaid."""
+    """Depth as of `ros2 topic echo`: a sample lost before it reaches such a reader is lost without notice."""
     drive = start("-p", "time:=fast")
     assert drive.process is not None
     with ExitStack() as guests:

@@ -1,4 +1,4 @@
-"""Four processes at once: a source, the node, a process model that loads the axes, a recorder."""
+"""Four processes at once: trajectory source, node, process model with loads, recorder."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ TORQUE_CONSTANT = 2.64
 
 
 def test_four_processes_on_an_unbroken_grid(tmp_path: Path):
-    """No stamp is missing or comes twice; the load acts against the motion, in proportion to the velocity."""
+    """No stamp is missing or duplicated; the load opposes the motion, in proportion to the velocity."""
     figures = run_graph(3.0, tmp_path / "recorded.json")
     assert figures.faults() == []
     assert all(len(stamps) > 3.0 / 0.006 for stamps in figures.stamps.values())
     slope, correlation, lag = figures.load_per_velocity()
     print(f"\nload over velocity {slope:.2f} A s/m, correlation {correlation:.4f}, {lag:g} periods later")
-    # `load` of motor_currents is positive where it opposes motion towards plus.
+    # `load` of motor_currents is positive where it opposes motion in the positive direction.
     assert slope > 0
-    # The first ones answer velocities from before the recording.
+    # The first loads respond to velocities from before the recording.
     assert figures.answered(DAMPING * RATIO / TORQUE_CONSTANT) > 0.98

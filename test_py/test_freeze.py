@@ -1,4 +1,4 @@
-"""The comparison of tools/freeze.py: differences, renames, key paths."""
+"""Comparison of tools/freeze.py: differences, renames, key paths."""
 
 from __future__ import annotations
 

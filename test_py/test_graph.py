@@ -1,4 +1,4 @@
-"""The node in the graph: there soon after its start, gone soon after its end."""
+"""The node in the graph: present soon after its start, absent soon after its end."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tables import interfaces
 
 
 def of_the_node(drive: Drive) -> set[str]:
-    """Topics and services of the node, by name in the graph."""
+    """Returns topics and services of the node by name."""
     namespace, name = drive.target.rsplit("/", 1)
     if not drive.sees():
         return set()
@@ -28,7 +28,7 @@ def of_the_node(drive: Drive) -> set[str]:
 
 
 def test_comes_and_goes_within_two_seconds():
-    """All that it has, and none of it afterwards."""
+    """All interfaces appear, and none remains afterwards."""
     process = Node()
     rows = [row for row in interfaces() if row.condition is None and row.direction != "action"]
     wanted = {row.resolved(process.name, {}) for row in rows}
@@ -56,7 +56,7 @@ def test_comes_and_goes_within_two_seconds():
 
 
 def test_type_hash_is_not_sent(fast: Drive):
-    """A limit of RustDDS (docs/middleware.md). Should this fail, the hash has come: compare it with rclpy's then."""
+    """Limit of RustDDS (docs/middleware.md). If this test fails, the hash is sent: compare it with rclpy's then."""
     fast.node.create_publisher(JointState, "/joint_states", 10)
     hashes = fast.wait_for(
         lambda: (

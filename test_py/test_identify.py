@@ -1,4 +1,4 @@
-"""Identification from MCAP recordings of the real node: every parameter against those of model.md.
+"""Identification from MCAP recordings of the real node: all parameters compared with model.md.
 
 The campaigns of all five axes run side by side on one node, once without feedforward, once with that of the
 velocity, once with both. What was published is spoilt as an oscilloscope spoils it (encoder steps, noise of
@@ -26,9 +26,9 @@ AXES = ("x", "y", "z", "a", "c")
 LINEAR = ("x", "y", "z")
 PARTS = ("off", "velocity", "both")
 STEP = {axis: 1e-6 if axis in LINEAR else math.radians(1e-3) for axis in AXES}
-"""Of the encoder: 1 µm, 1 mdeg."""
+"""Encoder resolution: 1 µm, 1 mdeg."""
 NOISE = 0.02
-"""Standard deviation of the current's noise, part of its largest value."""
+"""Standard deviation of the current noise, relative to the maximum current."""
 
 INERTIA = {"x": 0.028, "y": 0.024, "z": 0.0225, "a": 0.001, "c": 0.001}
 FRICTION = {
@@ -41,7 +41,7 @@ FRICTION = {
 BREAKAWAY = {"x": 1.043, "y": 0.890, "z": 0.790, "a": 0.4, "c": 0.4}
 TORQUE_FEEDFORWARD = {"x": 0.002034, "y": 0.002030, "z": 0.002030, "a": 0.0, "c": 0.0}
 DELAY_MS = 9.0
-"""α = β = γ."""
+"""Pure delays α = β = γ, ms."""
 TSV_MS = 0.25
 
 WRONG = {
@@ -56,7 +56,7 @@ WRONG = {
     "delays.beta_ms": 3.0,
     "delays.gamma_ms": 1.0,
 }
-"""What the identification starts from."""
+"""Deviations of the initial machine file."""
 WRONG_OF = {
     "x": {"motor.inertia_kg_m2": 0.015},
     "y": {"motor.inertia_kg_m2": 0.015},
@@ -67,13 +67,13 @@ WRONG_OF = {
 
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command line beside the node."""
+    """Runs the command beside the node."""
     program = node_binary().with_name("virtual_axes")
     return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False)
 
 
 def campaign(part: str, folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Times and setpoints of a part for all axes; who is done waits for the others."""
+    """Returns times and setpoints of a part for all axes; axes that finish early wait for the others."""
     columns = []
     for axis in AXES:
         file = folder / f"psec-{axis}-{part}.csv"
@@ -86,7 +86,7 @@ def campaign(part: str, folder: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def feedforward(part: str) -> dict[str, object]:
-    """The feedforward of a part on all axes."""
+    """Returns the feedforward parameters of a part for all axes."""
     weights: dict[str, object] = {}
     for axis in AXES:
         weights[f"{axis}.feedforward.velocity"] = 0.0 if part == "off" else 1.0
@@ -95,7 +95,7 @@ def feedforward(part: str) -> dict[str, object]:
 
 
 def write_mcap(file: Path, recording: Recording, seed: int) -> None:
-    """What the node published, with an encoder's steps and a noisy current."""
+    """Writes published messages with encoder quantization and current noise."""
     noise = random.Random(seed)
     states, currents = recording.states, recording.currents
     assert states.stamp.tolist() == currents.stamp.tolist(), "both topics are whole"
@@ -135,7 +135,7 @@ def write_mcap(file: Path, recording: Recording, seed: int) -> None:
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """The three parts of the campaign, all axes in each."""
+    """Returns the three parts of the campaign, all axes in each."""
     folder = tmp_path_factory.mktemp("campaign")
     files = []
     with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
@@ -150,7 +150,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 def identify(recordings: list[Path], axis: str, *more: object) -> dict[str, dict]:
-    """The identified values of an axis by key, without the axis's name."""
+    """Returns the identified values of an axis by key, without the axis name."""
     wrong = [("--set", f"{axis}.{key}={value}") for key, value in (WRONG | WRONG_OF[axis]).items()]
     arguments = [*recordings, "--axis", axis, "--feedforward", ",".join(PARTS), *sum(wrong, ())]
     done = command("identify", *arguments, "--json", *more)
@@ -191,7 +191,7 @@ def test_an_axis_comes_back_from_its_recording(axis: str, recordings: list[Path]
         assert value["gravity.tilt_nm"] == pytest.approx(30.0, rel=0.02)
         assert math.radians(value["gravity.tilt_phase_deg"]) == pytest.approx(0.0, abs=0.02)
 
-    # The machine file holds what was found, and runs.
+    # The written machine file contains the identified values and is valid.
     done = command("check", machine)
     assert done.returncode == 0, done.stderr
     assert f"{value['motor.inertia_kg_m2']}" in machine.read_text()

@@ -1,4 +1,4 @@
-"""Responses that do not fit in one packet of a network: they arrive, all of them, at every client."""
+"""Responses larger than one network packet: all arrive at every client."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from drive import SETTLE_S, Drive, own_mb
 
 TIMES = 20
 MANY = 300
-"""Of 40 kB and more each."""
+"""Number of responses, 40 kB or more each."""
 CLEANING_S = 7
-"""The middleware looks through its histories every 6 s."""
+"""Period of the middleware's history cleanup, s."""
 
 
 def describe_all(drive: Drive, times: int) -> int:
-    """Ask for every parameter's description, look that it is there, and count the octets that came."""
+    """Requests all parameter descriptions, checks them, and returns the number of octets."""
     names = drive.list_parameters()
     octets = 0
     for _ in range(times):
@@ -33,29 +33,29 @@ def describe_all(drive: Drive, times: int) -> int:
 
 
 def test_many_in_a_row(real: Drive):
-    """Each takes milliseconds, not a retry."""
+    """Each response takes milliseconds, without retransmission."""
     describe_all(real, TIMES)
 
 
 def test_every_value_at_once(real: Drive):
-    """What `ros2 param dump` asks for."""
+    """The request of `ros2 param dump`."""
     names = real.list_parameters()
     for _ in range(TIMES):
         assert len(real.get_parameters(names)) == len(names)
 
 
 def test_two_clients_at_once(real: Drive):
-    """The responses to one are samples that the other has to account for, too."""
+    """The responses to one client are samples that the other client must account for."""
     with Drive(process=real.process) as other, ThreadPoolExecutor() as pool:
         for done in [pool.submit(describe_all, drive, TIMES) for drive in (real, other)]:
             done.result()
-        # And one that was there, but had asked for nothing since.
+        # And an idle client that had matched earlier.
         describe_all(other, 1)
         assert len(real.describe(["max_points"])) == 1
 
 
 def test_in_quick_succession(real: Drive):
-    """A hundred on their way at a time, to a client that has room for them."""
+    """A hundred responses in transit at a time, to a client with a sufficient history depth."""
     names = real.list_parameters()
     client = real.node.create_client(
         DescribeParameters, f"{real.target}/describe_parameters", qos_profile=QoSProfile(depth=1000)
@@ -71,7 +71,7 @@ def test_in_quick_succession(real: Drive):
 
 
 def test_what_is_too_long_is_said_and_stops_nothing(real: Drive):
-    """One datagram holds 65 500 octets; the log names the service, and the next response comes."""
+    """A datagram holds 65 500 octets; the log names the service, and the next response is sent."""
     names = (real.list_parameters() * 4)[:1000]
     with pytest.raises(TimeoutError):
         real.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names), timeout=1)
@@ -80,7 +80,7 @@ def test_what_is_too_long_is_said_and_stops_nothing(real: Drive):
 
 
 def test_responses_that_were_taken_are_forgotten(real: Drive):
-    """Hundreds of long ones do not stay with the node.
+    """Hundreds of long responses do not stay in the node's memory.
 
     The last 1000 requests do, which are some 10 kB each, with what came in between.
     """

@@ -1,4 +1,4 @@
-"""Readers that come when a topic has been written for long: what a reader costs the node does not grow with that."""
+"""Late-joining readers of a topic with many samples: their cost does not grow with the number of samples."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, own_mb, stamp
 
 TOPIC = "/joint_states"
 MANY = 1 << 19
-"""Samples after which a topic gets another writer (src/ros/writer_rotation.rs)."""
+"""Samples after which a topic gets a new DataWriter (src/ros/writer_rotation.rs)."""
 MORE = 5_000
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 JOINING = 200
-"""Samples while a reader is being matched: it may get single ones before."""
+"""Maximum loss while a reader is being matched."""
 LATE = 3
 MAY_GROW_MB = 1.5
-"""By each late reader: half a million numbers are some ten times that."""
+"""Maximum memory of each late reader, MB; half a million sequence numbers take ten times that."""
 
 
 def test_a_late_reader_costs_no_more_after_half_a_million_samples():
-    """The topic has another writer by then; who listens meanwhile misses nothing, gets nothing twice, and in order."""
+    """The topic has a new writer by then; a subscriber loses nothing, has no duplicates, and keeps the order."""
     with Node(["-p", "time:=fast"]) as process, Drive(process=process, listen=False) as drive:
         with pytest.raises(ValueError, match="keeps no samples"):
             drive.record(0, TSP_NS)
@@ -47,7 +47,7 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
         before_came = came()
 
         def write_many(target: float) -> None:
-            # Nobody acknowledges, so that the axes wait for nobody.
+            # Best effort: without ACKNACK the axes wait for no reader.
             duration = (MANY + MORE) * TSP_NS / 1e9
             accepted = drive.accept(joint_trajectory(["x"], [duration], [target], [[0.0]]))
             drive.end(accepted.sequence_number, 200)
@@ -59,7 +59,7 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
         drive.wait_for(lambda: len(reliable) > 1000, 30, "samples")
         assert set(np.diff(reliable[JOINING:])) == {TSP_NS}
         second = writers()
-        # The middleware tells of every reader again when there is another publisher.
+        # The middleware announces all readers again when a new publisher appears.
         assert came() == before_came + 1
 
         before = own_mb(process.pid)
@@ -71,7 +71,7 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
         print(f"{LATE} readers that come late: {grown:.1f} MB")
         assert grown < LATE * MAY_GROW_MB
 
-        # Whoever was told that the first has gone hears of the next one.
+        # Readers that have received the dispose of the first writer discover the next writer.
         drive.in_executor(lambda: drive.node.destroy_subscription(subscription))
         write_many(0.0)
         drive.wait_for(lambda: writers() - second, 20, "next publisher")

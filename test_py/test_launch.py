@@ -1,4 +1,4 @@
-"""The launch files, executed as Python on a stand-in of launch's interface, and the nodes with what they pass."""
+"""Launch files, executed with a stand-in of launch's interface, and nodes with the resulting arguments."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ONE, TWO = "virtual_axes.launch.py", "two_machines.launch.py"
 
 
 def process(node: NodeAction, stack: ExitStack, domain_id: int | None = None) -> Node:
-    """Start our node with the arguments that launch gives it."""
+    """Returns the process of this package's node with the arguments from launch."""
     assert node.command[0] == "--ros-args"
     name = f"/{node.namespace.strip('/')}/{node.name}" if node.namespace else f"/{node.name}"
     return stack.enter_context(Node(node.command[1:], name=name, domain_id=domain_id))
@@ -31,7 +31,7 @@ def process(node: NodeAction, stack: ExitStack, domain_id: int | None = None) ->
 
 @pytest.mark.parametrize("file", [ONE, TWO])
 def test_arguments_are_described_and_have_defaults(file: str):
-    """`ros2 launch -s` shows something for each, and none is required."""
+    """`ros2 launch -s` shows a description for each argument, and none is required."""
     declared = [entity for entity in description(file).entities if isinstance(entity, DeclareLaunchArgument)]
     assert len(declared) > 8
     for argument in declared:
@@ -39,7 +39,7 @@ def test_arguments_are_described_and_have_defaults(file: str):
 
 
 def test_by_default_the_node_and_its_model_start():
-    """No RViz, no recording, real time; the model is the checked-in one."""
+    """Without arguments: no RViz, no recording, real time; the model is the checked-in URDF."""
     found = by_executable(nodes(ONE))
     assert sorted(found) == ["robot_state_publisher", "virtual_axes_node"]
     [node], [publisher] = found["virtual_axes_node"], found["robot_state_publisher"]
@@ -51,7 +51,7 @@ def test_by_default_the_node_and_its_model_start():
 
 
 def test_every_argument_arrives(tmp_path: Path):
-    """What is given is what the nodes are started with."""
+    """The given values are passed to the nodes."""
     arguments = {
         "machine": "linear_motor_center",
         "controller": "gpc",
@@ -85,7 +85,7 @@ def test_every_argument_arrives(tmp_path: Path):
 
 
 def test_simulated_time_is_use_sim_time():
-    """And no pace of the node's own; the model can be left out."""
+    """The node gets no `time` parameter; the model can be left out."""
     [node] = nodes(ONE, time="sim", robot_state_publisher="false")
     assert node.values["use_sim_time"] is True
     assert "time" not in node.values
@@ -101,7 +101,7 @@ def test_simulated_time_is_use_sim_time():
     ],
 )
 def test_what_cannot_be_is_refused(arguments: dict[str, str], words: list[str]):
-    """The message names the argument, what was found and what is allowed."""
+    """The message names the argument, the value found and the allowed values."""
     with pytest.raises(RuntimeError) as error:
         nodes(ONE, **arguments)
     for word in words:
@@ -109,7 +109,7 @@ def test_what_cannot_be_is_refused(arguments: dict[str, str], words: list[str]):
 
 
 def test_a_machine_outside_the_chain_is_refused_unless_it_needs_no_model(tmp_path: Path):
-    """The reason is the command's own."""
+    """The message contains the command's own reason."""
     text = (ROOT / "config" / "mikron_ucp710.yaml").read_text()
     changed = text.replace('"a", "c"]', '"a", "b"]').replace("\n    c:\n", "\n    b:\n")
     assert changed.count("b:") > text.count("b:")
@@ -121,7 +121,7 @@ def test_a_machine_outside_the_chain_is_refused_unless_it_needs_no_model(tmp_pat
 
 
 def test_without_the_command_the_shipped_model_serves_its_own_machine(monkeypatch: pytest.MonkeyPatch):
-    """And that is said; another machine is refused."""
+    """A log message reports the fallback; another machine is rejected."""
     monkeypatch.setattr(substitutions, "PROGRAMS", {})
     found = actions(ONE)
     [message] = [action.msg for action in found if isinstance(action, LogInfo)]
@@ -131,7 +131,7 @@ def test_without_the_command_the_shipped_model_serves_its_own_machine(monkeypatc
 
 
 def test_the_node_runs_with_what_launch_passes():
-    """Names, controller and prefix as asked for."""
+    """Names, controller and prefix have the given values."""
     [node] = nodes(
         ONE, namespace="cell", name="mill", joint_prefix="m_", controller="gpc", robot_state_publisher="false"
     )
@@ -143,7 +143,7 @@ def test_the_node_runs_with_what_launch_passes():
 
 
 def test_two_machines_run_in_one_domain():
-    """Each in its namespace with its own controller and frames; setpoints of one leave the other at rest."""
+    """Each machine has its namespace, controller and frames; setpoints of one leave the other at rest."""
     found = by_executable(nodes(TWO, right_controller="gpc", rviz="true"))
     left, right = found["virtual_axes_node"]
     assert (left.namespace, right.namespace) == ("left", "right")
@@ -172,7 +172,7 @@ def test_two_machines_run_in_one_domain():
 
 
 def test_recordings_of_two_machines_do_not_meet(tmp_path: Path):
-    """One file each, in the folder that was asked for."""
+    """One file each, in the given folder."""
     found = by_executable(nodes(TWO, record=str(tmp_path), robot_state_publisher="false"))
     recorded = [node.values["record"] for node in found["virtual_axes_node"]]
     assert recorded == [str(tmp_path / "left.mcap"), str(tmp_path / "right.mcap")]
@@ -180,7 +180,7 @@ def test_recordings_of_two_machines_do_not_meet(tmp_path: Path):
 
 
 def test_the_stand_in_keeps_arguments_as_launch_does():
-    """An include changes what follows it unless a group keeps it in."""
+    """Arguments of an include stay set afterwards unless a group restores them."""
     context = launch.LaunchContext()
     context.launch_configurations["machine"] = "outer"
     include = launch.actions.IncludeLaunchDescription
@@ -204,7 +204,7 @@ def test_what_launch_needs_is_installed():
 
 
 def test_the_command_says_where_the_tool_is():
-    """A joint that the machine does not have is refused, with status 2 and no output."""
+    """A joint that the machine does not have is rejected, with status 2 and no output."""
     program = node_binary().with_name("virtual_axes")
     command = [program, "pose", "--joints", "q=1"]
     answer = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)

@@ -1,4 +1,4 @@
-"""What is shipped for RViz, PlotJuggler and Foxglove names topics, fields and frames that there are."""
+"""Topics, fields and frames in the configurations for RViz, PlotJuggler and Foxglove exist."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FRAMES = {"machine", "workpiece", "tool"}
 
 @pytest.fixture(scope="module")
 def topics(real: Drive) -> dict[str, str]:
-    """Types of the node's topics."""
+    """Returns the types of the node's topics."""
 
     def listed() -> dict[str, str]:
         return {name: types[0] for name, types in real.node.get_topic_names_and_types()}
@@ -35,13 +35,13 @@ def topics(real: Drive) -> dict[str, str]:
 
 
 def fields_of(kind: str) -> dict[str, str]:
-    """Fields of a message type with their types."""
+    """Returns the fields of a message type with their types."""
     package, _, name = kind.split("/")
     return getattr(importlib.import_module(f"{package}.msg"), name).get_fields_and_field_types()
 
 
 def type_at(kind: str, fields: list[str]) -> str:
-    """Follow a path of fields through a message; returns the type at its end."""
+    """Follows a path of fields through a message and returns the type at its end."""
     for field in fields:
         name, index = re.fullmatch(r"(\w+)(?:\[(\d+)\])?", field).groups()
         kind = fields_of(kind)[name]
@@ -55,24 +55,24 @@ def type_at(kind: str, fields: list[str]) -> str:
 
 
 def check(topics: dict[str, str], topic: str, fields: list[str]) -> None:
-    """A number must be there."""
+    """Asserts that the field path is a number."""
     assert topic in topics, topic
     assert type_at(topics[topic], fields) in ("double", "float", "boolean"), (topic, fields)
 
 
 def rviz(name: str) -> dict:
-    """The visualization manager of a configuration."""
+    """Returns the visualization manager of an RViz configuration."""
     return yaml.safe_load((ROOT / "rviz" / name).read_text())["Visualization Manager"]
 
 
 def frames_of(prefix: str = "") -> set[str]:
-    """Links of the shipped model."""
+    """Returns the links of the built-in model."""
     robot = URDF.from_xml_string((ROOT / "urdf" / "mikron_ucp710.urdf").read_text())
     return {f"{prefix}{link}" for link in robot.link_map}
 
 
 def test_rviz_shows_what_the_node_publishes(topics: dict[str, str]):
-    """Model, frames, tool and both paths in two colors; every topic with the type of its display."""
+    """Model, frames, tool and both paths in two colors; each topic has the type of its display."""
     manager = rviz("virtual_axes.rviz")
     assert manager["Global Options"]["Fixed Frame"] in frames_of()
     assert frames_of() >= FRAMES
@@ -93,7 +93,7 @@ def test_rviz_shows_what_the_node_publishes(topics: dict[str, str]):
 
 
 def test_rviz_of_two_machines_has_the_names_of_the_launch_file():
-    """Namespaces, prefixes and the frame that both stand in."""
+    """Namespaces, prefixes and the common frame are those of the launch file."""
     found = by_executable(nodes("two_machines.launch.py", rviz="true"))
     manager = rviz("two_machines.rviz")
     placed = [node.arguments for node in found["static_transform_publisher"]]
@@ -129,7 +129,7 @@ def test_plotjuggler_plots_fields_that_there_are(topics: dict[str, str]):
 
 
 def panels(layout: object) -> Iterator[str]:
-    """Names of the panels of a Foxglove layout."""
+    """Yields the names of the panels of a Foxglove layout."""
     if isinstance(layout, str):
         yield layout
     else:

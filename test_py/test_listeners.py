@@ -1,4 +1,4 @@
-"""A topic that nobody listens to is not made; whoever comes gets it at once, also after others have left."""
+"""Messages without matched subscriptions are not built; new subscribers get samples at once, also after others left."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from drive import TSP_NS, Drive, to_ns
 
 TOPIC = "/virtual_axes/controller_state"
 LOOKED_S = 2.5
-"""The node looks once a second whether its listeners have gone."""
+"""Period at which the node polls its matched subscriptions, s."""
 SAMPLES = 50
 
 
 def test_each_listener_gets_an_unbroken_grid_of_samples_whoever_left_before(real: Drive):
-    """The node's own idea of who listens must not cost anybody a sample."""
+    """The node's count of matched subscriptions must not cause lost samples."""
     for _ in range(2):
         stamps: list[int] = []
         came = threading.Event()

@@ -1,4 +1,4 @@
-"""External forces: what a process model sends on the topic `load`."""
+"""External forces on the topic `load`, as from a process model."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from motion import RATIO, go_home
 
 TORQUE_CONSTANT = 2.64
 FORCE = 2000.0
-"""N, more than friction holds: 2.41 A against 1.04 A."""
+"""Load, N, above static friction: 2.41 A against 1.04 A."""
 
 
 def test_load_moves_the_axis_and_times_out(real: Drive):
-    """Positive is towards plus; the motor works against it; 0.1 s after the last message it is gone."""
+    """A positive load pushes in the positive direction against the motor; it ends 0.1 s after the last message."""
     go_home(real)
     begin = real.now()
     for _ in range(25):
@@ -31,14 +31,14 @@ def test_load_moves_the_axis_and_times_out(real: Drive):
     assert load.max() <= 0.0
     assert load[-1] == 0.0
     assert not recording.currents["load", "y"].any()
-    # Steady under load: the motor holds what friction does not.
+    # Steady state under load: the motor supplies what exceeds friction.
     assert current.min() < -(FORCE * RATIO / TORQUE_CONSTANT - 1.043) * 0.9
     assert recording.joints["position", "x"].max() > 1e-7
     assert np.abs(recording.joints["position", "x"]).max() < 1e-3
 
 
 def test_load_of_an_unknown_joint_does_no_harm(real: Drive):
-    """It is ignored; the axes stay where they are."""
+    """The message is ignored; the axes stay where they are."""
     go_home(real)
     before = real.latest("position")
     real.load({"q": 1e6})

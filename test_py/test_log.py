@@ -1,4 +1,4 @@
-"""The log: on stderr and on /rosout, as of any ROS node, and without the middleware's noise."""
+"""Log on stderr and on /rosout, in the format of ROS nodes, without messages of the middleware."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ from drive import Drive, Node, joint_trajectory
 
 ROSOUT_QOS = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PIPE_BYTES = 4096
-"""What Linux writes to a pipe whole, or not at all."""
+"""Maximum size of an atomic write to a pipe on Linux."""
 IN_THE_CELL = ("-r", "__ns:=/cell", "-r", "__node:=mill")
 LINE = re.compile(r"\[(?P<level>[A-Z]+)\] \[(?P<stamp>\d+\.\d{9})\] \[(?P<logger>[\w.]+)\]: (?P<text>.*)")
 
 
 def rosout(drive: Drive) -> list[Log]:
-    """What comes on /rosout from now on, and what is kept there for late joiners."""
+    """Returns the messages on /rosout from now on, and those kept for late joiners."""
     found: list[Log] = []
     drive.node.create_subscription(Log, "/rosout", found.append, ROSOUT_QOS)
     return found
 
 
 def refuse(drive: Drive) -> None:
-    """Have a trajectory refused, which is logged as a warning."""
+    """Sends a trajectory that is rejected, which is logged as a warning."""
     result = drive.decision(drive.send(joint_trajectory(["no_such_joint"], [1.0], [[0.0]])))
     assert result.code != 0
 
 
 def lines(process: Node) -> list[re.Match[str]]:
-    """The log on the terminal; nothing else may follow the screen at the start."""
+    """Returns the log on the terminal; no other output may follow the start screen."""
     text = process.output()
     log = text[text.index("stop with Ctrl-C") :].splitlines()[1:]
     found = [LINE.fullmatch(line) for line in log]
@@ -53,7 +53,7 @@ def lines(process: Node) -> list[re.Match[str]]:
 
 
 def test_levels_logger_and_time(start: Callable[..., Drive]):
-    """INFO 20, WARN 30, ERROR 40, by the logger that rclpy gives a node of this name, also to late joiners."""
+    """INFO 20, WARN 30, ERROR 40, with the logger name that rclpy uses for this node, also for late joiners."""
     drive = start(*IN_THE_CELL, "-p", "time:=fast", name="/cell/mill")
     process = drive.process
     began = time.time()
@@ -63,18 +63,18 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
     names = (drive.list_parameters() * 4)[:1000]
     with pytest.raises(TimeoutError):
         drive.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names), timeout=0.5)
-    # Only now: all three are history.
+    # Late joiner: all three messages are history.
     found = rosout(drive)
     drive.wait_for(lambda: len(found) >= 3, 5, "messages on /rosout")
     words = ("holding", "no_such_joint", "not sent")
     said = {(message.level, word) for message in found for word in words if word in message.msg}
     assert said == {(20, "holding"), (30, "no_such_joint"), (40, "not sent")}
     assert (Log.INFO, Log.WARN, Log.ERROR) == (20, 30, 40)
-    # The terminal has the same, in the same words.
+    # The terminal has the same texts.
     shown = {match["text"]: (match["level"], match["logger"]) for match in lines(process)}
     level_names = {20: "INFO", 30: "WARN", 40: "ERROR"}
     assert shown == {message.msg: (level_names[message.level], message.name) for message in found}
-    # What rclpy calls the logger of such a node; the two are namesakes, which is said from here on.
+    # Logger name of such a node in rclpy; from here on both nodes log a duplicate node name.
     twin = rclpy.create_node("mill", namespace="/cell", context=drive.node.context, start_parameter_services=False)
     try:
         assert {message.name for message in found} == {twin.get_logger().name}
@@ -86,7 +86,7 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
 
 
 def test_level_of_one_logger(start: Callable[..., Drive]):
-    """--log-level name:=level, on the terminal and on /rosout alike."""
+    """--log-level name:=level applies to the terminal and to /rosout."""
     drive = start(*IN_THE_CELL, "--log-level", "cell.mill:=error", name="/cell/mill")
     found = rosout(drive)
     drive.wait_for(lambda: drive.node.count_publishers("/rosout") > 0, 5, "publisher of /rosout")
@@ -96,7 +96,7 @@ def test_level_of_one_logger(start: Callable[..., Drive]):
 
 
 def test_a_node_of_the_same_name_is_told_of(start: Callable[..., Drive]):
-    """Once by each of the two, and only where the namespace is the same too."""
+    """Each of the two logs it once, and only if the namespace is equal, too."""
     first = start(*IN_THE_CELL, name="/cell/mill")
     domain = first.process.domain_id
     start(*IN_THE_CELL[2:], name="/mill", domain_id=domain)
@@ -110,7 +110,7 @@ def test_a_node_of_the_same_name_is_told_of(start: Callable[..., Drive]):
 
 # ------------------------------------------------------------------------------------------- noise
 
-# A participant that is given up a second after it was last heard of, not after the usual 20.
+# A participant whose lease expires 1 s after its last announcement, not after the usual 20 s.
 SHORT_LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
   <participant profile_name="short" is_default_profile="true"><rtps><builtin><discovery_config>
@@ -138,7 +138,7 @@ rclpy.spin(node)
 
 
 def killed_guest(domain_id: int, profile: Path, failures: list[Any]) -> None:
-    """A guest that comes, and is gone without a word."""
+    """Starts participants that are killed, without dispose or unregister."""
     env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile)}
     with subprocess.Popen([sys.executable, "-c", GUEST], env=env, stdout=subprocess.PIPE, text=True) as guest:
         bounded = threading.Timer(20, guest.kill)
@@ -151,7 +151,7 @@ def killed_guest(domain_id: int, profile: Path, failures: list[Any]) -> None:
 
 
 def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
-    """From the start to the end, while others come, leave, and die."""
+    """From start to end, while participants join, leave, and are killed."""
     drive = start()
     process = drive.process
     found = rosout(drive)
@@ -167,12 +167,12 @@ def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
     for guest in guests:
         guest.join(30)
     assert not failures
-    # Their leases end.
+    # Wait for the expiry of their leases.
     drive.wait_for(lambda: drive.node.count_subscribers("/joint_states") == 1, 10, "end of the guests")
     time.sleep(1.0)
     drive.process = None
     assert process.stop() == 0
-    # What the guests ask for it says, and that it ends; nothing that is worse, and nobody else says anything.
+    # Only INFO messages of the node's own logger: requests of the participants and the end.
     said = lines(process)
     assert {(match["level"], match["logger"]) for match in said} == {("INFO", "virtual_axes")}, [m[0] for m in said]
     assert {(message.level, message.name) for message in found} == {(20, "virtual_axes")}, [m.msg for m in found]
@@ -180,7 +180,7 @@ def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
 
 @contextmanager
 def full_pipe() -> Iterator[tuple[int, int]]:
-    """Both ends of a pipe that takes nothing more until it is read."""
+    """Yields both ends of a pipe that is full until it is read."""
     read, write = os.pipe()
     try:
         os.set_blocking(write, False)
@@ -195,12 +195,12 @@ def full_pipe() -> Iterator[tuple[int, int]]:
 
 
 def test_a_log_that_nobody_reads_does_not_stop_the_node():
-    """stderr is a pipe that is full already; whoever reads it at last finds what was said meanwhile."""
+    """stderr is a full pipe; a later reader finds the messages of the meantime."""
     with full_pipe() as (read, write):
         os.set_blocking(read, False)
         with Node(stderr=write) as process, Drive(process=process) as drive:
             refuse(drive)
-            # The thread of the axes itself says that it stood still.
+            # The axes thread itself logs that it was late.
             os.kill(process.pid, signal.SIGSTOP)
             time.sleep(1.3)
             os.kill(process.pid, signal.SIGCONT)
@@ -221,7 +221,7 @@ def test_a_log_that_nobody_reads_does_not_stop_the_node():
 
 
 def test_a_log_that_nobody_reads_does_not_stop_the_end_of_the_node():
-    """It waits for a reader, but not for long."""
+    """The node waits for a reader only for a short time."""
     with full_pipe() as (_, write):
         with Node(stderr=write) as process, Drive(process=process):
             assert process.stop() == 0

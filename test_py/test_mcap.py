@@ -1,4 +1,4 @@
-"""Recordings, read and written by an independent reader and writer from PyPI; no node, no network."""
+"""Recordings, read and written by an independent library from PyPI; no node, no network."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ COLUMNS = {
     "voltage": ("/virtual_axes/drive_states", "voltage"),
     "friction_current": ("/virtual_axes/motor_currents", "friction"),
 }
-"""Where each column of a CSV trace stands in a recording."""
+"""Field of a recording for each column of a CSV trace."""
 TRAJECTORY_DEFINITION = """std_msgs/Header header
 string[] joint_names
 trajectory_msgs/JointTrajectoryPoint[] points
@@ -59,13 +59,13 @@ builtin_interfaces/Duration time_from_start
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command line beside the node."""
+    """Runs the command beside the node."""
     command = node_binary().with_name("virtual_axes")
     return subprocess.run([command, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False)
 
 
 def psec() -> list[list[float]]:
-    """Rows of time, x and c on the position grid: x there and back by 4 mm, c by 0.3 rad."""
+    """Returns rows of time, x and c on the position grid: x there and back by 4 mm, c by 0.3 rad."""
     rows = []
     for k in range(101):
         way = (1 - math.cos(2 * math.pi * k / 100)) / 2
@@ -86,7 +86,7 @@ def read_csv(path: Path) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def traces(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """The same run traced as CSV and as MCAP."""
+    """Returns the trace of one run as CSV and as MCAP."""
     folder = tmp_path_factory.mktemp("traces")
     points = write_csv(folder / "psec.csv", psec())
     for name in ("trace.csv", "trace.mcap"):
@@ -97,7 +97,7 @@ def traces(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 def test_a_recorded_trace_is_the_csv_trace_field_by_field(traces: tuple[Path, Path]):
-    """Every number of the CSV stands in the recording, bit for bit, at its time; the rest adds up."""
+    """Every number of the CSV is in the recording, bit for bit, at its time; the other fields are consistent."""
     table = read_csv(traces[0])
     found: dict[str, list] = {topic: [] for topic in TRACE_TYPES}
     with traces[1].open("rb") as file:
@@ -120,7 +120,7 @@ def test_a_recorded_trace_is_the_csv_trace_field_by_field(traces: tuple[Path, Pa
             assert values.tobytes() == table[f"{joint}.{column}"].tobytes(), f"{joint}.{column}"
     assert np.ptp(table["x.position"]) > 0.0039 and np.ptp(table["c.position"]) > 0.29
 
-    # What CSV does not hold agrees with what it holds.
+    # Fields that CSV does not have are consistent with those that it has.
     for (_, state), (_, current), (_, drive) in zip(*(found[topic] for topic in TRACE_TYPES), strict=True):
         assert list(drive.position) == list(state.position)
         assert list(drive.velocity) == list(state.velocity)
@@ -128,7 +128,7 @@ def test_a_recorded_trace_is_the_csv_trace_field_by_field(traces: tuple[Path, Pa
         np.testing.assert_array_equal(drive.tracking_error, np.subtract(drive.psec, drive.position))
         assert len(state.effort) == len(current.gravity) == len(current.load) == len(current.saturated) == len(JOINTS)
         assert not any(current.saturated) and not any(current.load)
-    # Effort is what the motor exerts: Kt i / r, in one proportion per axis.
+    # Effort is the motor's force: Kt i / r, one ratio per axis.
     for place in (0, 4):
         efforts = np.array([state.effort[place] for _, state in found["/joint_states"]])
         currents = np.array([current.current[place] for _, current in found["/virtual_axes/motor_currents"]])
@@ -139,7 +139,7 @@ def test_a_recorded_trace_is_the_csv_trace_field_by_field(traces: tuple[Path, Pa
 
 
 def test_a_recording_is_as_rosbag2_wants_it(traces: tuple[Path, Path]):
-    """Profile, encodings, counts and indexes, and the quality of service that `ros2 bag play` reads."""
+    """Profile, encodings, counts, indexes, and the quality of service that `ros2 bag play` reads."""
     with traces[1].open("rb") as file:
         reader = make_reader(file)
         header, summary = reader.get_header(), reader.get_summary()
@@ -170,7 +170,7 @@ def test_a_recording_is_as_rosbag2_wants_it(traces: tuple[Path, Path]):
 
 
 def trajectory(rows: list[list[float]]) -> dict:
-    """A message as the writer and `ros2 topic pub` take it."""
+    """Returns a message in the form of the writer and `ros2 topic pub`."""
     points = []
     for time, *positions in rows:
         sec, nanosec = divmod(round(time * NANOSECONDS), NANOSECONDS)
@@ -182,7 +182,7 @@ def trajectory(rows: list[list[float]]) -> dict:
 def test_set_points_from_a_foreign_recording_run_as_those_from_csv(
     tmp_path: Path, traces: tuple[Path, Path], compression: CompressionType
 ):
-    """A JointTrajectory that another program recorded gives the same trace, byte by byte."""
+    """A JointTrajectory recorded by another program gives the same trace, byte by byte."""
     recording = tmp_path / "psec.mcap"
     message = trajectory(psec())
     message["header"] = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
@@ -199,7 +199,7 @@ def test_set_points_from_a_foreign_recording_run_as_those_from_csv(
 
 
 def test_set_points_as_yaml_run_as_those_from_csv(tmp_path: Path, traces: tuple[Path, Path]):
-    """So does the YAML that PyYAML writes."""
+    """YAML written by PyYAML gives the same trace."""
     for flow in (True, False):
         file = tmp_path / "psec.yaml"
         file.write_text(yaml.safe_dump(trajectory(psec()), default_flow_style=flow))
@@ -209,7 +209,7 @@ def test_set_points_as_yaml_run_as_those_from_csv(tmp_path: Path, traces: tuple[
 
 
 def test_a_damaged_recording_is_refused(tmp_path: Path, traces: tuple[Path, Path]):
-    """With its name, and nothing is left behind."""
+    """The message names the file, and no partial output is left."""
     whole = traces[1].read_bytes()
     damaged = tmp_path / "damaged.mcap"
     damaged.write_bytes(whole[: len(whole) // 2])

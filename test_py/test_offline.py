@@ -1,4 +1,4 @@
-"""Online equals offline: the node's samples and the trace of `virtual_axes run`, bit for bit."""
+"""Online equals offline: the node's samples are bit-identical to the trace of `virtual_axes run`."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from motion import swing
 
 AXES = ["x", "y", "z", "a", "c"]
 AMPLITUDES = [0.05, -0.03, 0.02, 0.4, 1.0]
-"""m on the linear axes, rad on the rotary ones."""
+"""Amplitudes, m on linear axes, rad on rotary axes."""
 
 
 def plan() -> tuple[np.ndarray, np.ndarray]:
-    """All five axes, each at its own tempo, from home and back."""
+    """Returns a motion of all five axes, each with its own frequency, from home and back."""
     time, base = swing(3.0, amplitude=1.0)
     turns = [1, 2, 3, 1, 2]
     phase = np.clip(time / time[-1], 0, 1)
@@ -33,7 +33,7 @@ Offline = Callable[[str], dict[str, np.ndarray]]
 
 @pytest.fixture(scope="module")
 def offline(tmp_path_factory: pytest.TempPathFactory) -> Offline:
-    """The trace of the command line under a position controller, by column."""
+    """Returns a function that runs the command line with a position controller; it returns the trace by column."""
     folder = tmp_path_factory.mktemp("offline")
     psec = folder / "psec.csv"
     time, positions = plan()
@@ -58,7 +58,7 @@ def offline(tmp_path_factory: pytest.TempPathFactory) -> Offline:
 
 
 def record(drive: Drive, controller: str) -> Recording:
-    """The plan, run by the node from home under a position controller."""
+    """Returns the recording of the plan, run by the node from home with a position controller."""
     drive.set_parameters_atomically({f"{axis}.position_loop.controller": controller for axis in AXES})
     drive.reset()
     time, positions = plan()
@@ -70,7 +70,7 @@ def record(drive: Drive, controller: str) -> Recording:
 def test_the_node_computes_what_the_command_line_computes(
     mode: str, controller: str, offline: Offline, request: pytest.FixtureRequest
 ):
-    """Every instant of the motion, every signal that both have."""
+    """Compares every instant of the motion and every signal that both have."""
     recording, wanted = record(request.getfixturevalue(mode), controller), offline(controller)
     instants = len(recording.states.stamp)
     assert instants == len(plan()[0])

@@ -1,4 +1,4 @@
-"""Parameters: described, checked, and live where they are said to be."""
+"""Parameters: descriptors, validation, and changes at run time."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MACHINE_KEYS = [
 
 
 def test_every_parameter_is_described(real: Drive):
-    """Type, text, and for numbers a range."""
+    """Each has a type and a text, and each number a range."""
     names = real.list_parameters()
     assert not [key for key in [GAIN, *MACHINE_KEYS] if key not in names]
     for descriptor in real.describe(names):
@@ -44,7 +44,7 @@ def test_every_parameter_is_described(real: Drive):
 
 
 def test_values_are_those_of_the_default_machine(real: Drive):
-    """In the units of CNC documentation."""
+    """Values have the units of CNC documentation."""
     assert real.get_parameters(
         [GAIN, "x.position_loop.gain", "x.transmission.screw_lead_mm", "periods.position_ms"]
     ) == {
@@ -57,7 +57,7 @@ def test_values_are_those_of_the_default_machine(real: Drive):
 
 @pytest.mark.parametrize("value", [-1.0, 1e12, float("nan"), float("inf")])
 def test_gain_out_of_range_is_refused_with_a_reason(real: Drive, value: float):
-    """And the old one stays."""
+    """The old value stays."""
     with pytest.raises(ParameterRefused, match=r"gain"):
         real.set_parameters({GAIN: value})
     assert real.get_parameters([GAIN]) == {GAIN: 5.0}
@@ -65,21 +65,21 @@ def test_gain_out_of_range_is_refused_with_a_reason(real: Drive, value: float):
 
 @pytest.mark.parametrize("value", ["5.0", True, [5.0]], ids=["string", "bool", "array"])
 def test_wrong_type_is_refused_with_a_reason(real: Drive, value: object):
-    """And the old value stays."""
+    """The old value stays."""
     with pytest.raises(ParameterRefused, match=r"\w"):
         real.set_parameters({GAIN: value})
     assert real.get_parameters([GAIN]) == {GAIN: 5.0}
 
 
 def test_unknown_parameter_is_refused_with_a_reason(real: Drive):
-    """Not taken in silently."""
+    """An unknown parameter is not declared implicitly."""
     with pytest.raises(ParameterRefused, match=r"\w"):
         real.set_parameters({"x.velocity_loop.gian": 5.0})
 
 
 @pytest.mark.parametrize("name", ["periods.position_ms", "time"])
 def test_what_is_not_live_is_refused_with_a_reason(real: Drive, name: str):
-    """Fixed from the start on; the reason names the parameter."""
+    """The parameter is fixed after the start; the reason names it."""
     before = real.get_parameters([name])
     with pytest.raises(ParameterRefused, match=name.rsplit(".", 1)[-1]):
         real.set_parameters({name: 12.0 if name.endswith("_ms") else "fast"})
@@ -87,7 +87,7 @@ def test_what_is_not_live_is_refused_with_a_reason(real: Drive, name: str):
 
 
 def test_live_gain_takes_effect(real: Drive):
-    """An integer serves where a double is wanted, and the node works with the new value."""
+    """An integer is accepted for a double, and the node uses the new value."""
     real.set_parameters({GAIN: 4})
     assert real.get_parameters([GAIN]) == {GAIN: 4.0}
     real.set_parameters({GAIN: 5.0})
@@ -95,7 +95,7 @@ def test_live_gain_takes_effect(real: Drive):
 
 
 def test_feedforward_can_be_halved_while_moving(real: Drive):
-    """From one position period on, VFFWS is half of what it was."""
+    """VFFWS is halved from one position cycle on."""
     go_home(real)
     sent, start, plan = start_swing(real, duration=6.0)
     real.wait_until(start + 100 * TSP_NS, 5)
@@ -108,7 +108,7 @@ def test_feedforward_can_be_halved_while_moving(real: Drive):
     forward = np.abs(states["velocity_feedforward", "x"])
     peak = np.abs(np.diff(plan["x"])).max() / TSP / RATIO
     assert forward[:100].max() > 0
-    # The way back, fastest at point 750, has the same speeds as the way there.
+    # The return motion, fastest at point 750, has the same speeds as the first half.
     assert forward[600:].max() == pytest.approx(peak / 2, rel=1e-3)
 
 
@@ -125,7 +125,7 @@ def test_feedforward_can_be_halved_while_moving(real: Drive):
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_wrong_arguments_are_refused_with_a_message(arguments: list[str], named: str):
-    """One that names what is wrong; the program ends with a status that is not zero."""
+    """The message names the error; the exit status is not zero."""
     with Node(arguments) as process:
         assert process.wait(10) not in (0, 101, -6)
         assert named in process.output()
@@ -138,7 +138,7 @@ def test_an_argument_that_is_not_utf_8_is_refused_and_no_panic():
 
 
 def test_arguments_are_honored(start: Callable[..., Drive], tmp_path):
-    """-p, --params-file, names and namespaces, and -- which ends them."""
+    """-p, --params-file, names and namespaces, and -- as their end."""
     file = tmp_path / "machine.yaml"
     file.write_text("/**:\n  ros__parameters:\n    y:\n      velocity_loop:\n        gain: 4.25\n")
     drive = start(

@@ -1,4 +1,4 @@
-"""Position controllers by their numbers: what is refused, and that what is accepted runs."""
+"""Position controllers by parameters: rejection of invalid ones, execution of valid ones."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from motion import assert_psec, go_home, start_swing, swing
 
 LOOP = "x.position_loop"
 UNSTABLE = {"controller": "rst", "rst.r": [250.0], "rst.s": [1.0], "rst.t": [250.0]}
-"""A proportional law of ten times the gain: more than the lag of the velocity loop can bear."""
+"""Proportional controller with ten times the gain: unstable with the lag of the velocity loop."""
 
 
 def of_x(values: dict[str, object]) -> dict[str, object]:
-    """Parameters of X's position loop."""
+    """Returns parameters of X's position loop."""
     return {f"{LOOP}.{key}": value for key, value in values.items()}
 
 
 def design() -> dict[str, object]:
-    """What `virtual_axes design gpc` makes of X with the machine file's tuning."""
+    """Returns the design of `virtual_axes design gpc` for X with the tuning of the machine file."""
     command = [str(Path(node_binary()).with_name("virtual_axes")), "design", "gpc", "--axis", "x", "--json"]
     done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=60)
     return json.loads(done.stdout)["axes"]["x"]
@@ -39,7 +39,7 @@ def design() -> dict[str, object]:
         ({"gpc.nu": 15}, [f"{LOOP}.gpc.nu", f"{LOOP}.gpc.n2", "15", "14"]),
         ({"gpc.n2": 11}, [f"{LOOP}.gpc.nu", f"{LOOP}.gpc.n2", "12", "11"]),
         ({"controller": "gpc", "gpc.n1": 9, "gpc.n2": 8, "gpc.nu": 6}, [f"{LOOP}.gpc.n1", "9", "8"]),
-        # Without a weight so many increments cannot be told apart.
+        # Without a weight this number of increments is not determined.
         (
             {"controller": "gpc", "gpc.n2": 200, "gpc.nu": 200, "gpc.lambda": 0.0},
             ["axis x", "singular", "n2 = 200", "nu = 200", "lambda = 0"],
@@ -60,7 +60,7 @@ def design() -> dict[str, object]:
 def test_a_controller_that_cannot_be_is_refused_and_the_motion_goes_on(
     values: dict[str, object], words: list[str], real: Drive
 ):
-    """With the key or the axis and the numbers in the reason; all is as it was before."""
+    """The reason has the key or the axis and the numbers; the configuration is unchanged."""
     go_home(real)
     accepted, start, planned = start_swing(real, duration=6.0)
     real.wait_until(start + 20 * TSP_NS, 10)
@@ -77,14 +77,14 @@ def test_a_controller_that_cannot_be_is_refused_and_the_motion_goes_on(
     assert_psec(real, start, planned, last=end)
     states = real.record(start, end).states
     assert set(states["controller", "x"]) == {"cascade"}
-    # What the cascade leaves on a motion as gentle as this one.
+    # Following error of the cascade on a motion as slow as this one.
     assert np.abs(states["synchronized_tracking_error", "x"]).max() < 100e-6
-    # Nobody was told that it ended before its time.
+    # No result reports an early end.
     assert {result.status for result in real.results(accepted.sequence_number)} <= {R.ACCEPTED, R.COMPLETED}
 
 
 def test_an_unstable_loop_is_refused_by_its_pole_and_runs_when_it_is_allowed(start: Callable[..., Drive]):
-    """The pole is that of A S + B R; forced, the axis shows what it means."""
+    """The pole is that of A S + B R; with allow_unstable the axis oscillates."""
     drive = start()
     model = design()["model"]
     (gain,) = UNSTABLE["rst.r"]
@@ -107,7 +107,7 @@ def test_an_unstable_loop_is_refused_by_its_pole_and_runs_when_it_is_allowed(sta
     assert forced.currents["saturated", "x"].any()
     assert not forced.currents["saturated", "y"].any()
 
-    # Not to be taken back under the controller that needs it, only together with it.
+    # The flag cannot be reset while the controller requires it, only together with it.
     with pytest.raises(ParameterRefused, match="unstable"):
         drive.set_parameters({f"{LOOP}.allow_unstable": False})
     drive.set_parameters_atomically(of_x({"allow_unstable": False, "controller": "cascade"}))
@@ -116,7 +116,7 @@ def test_an_unstable_loop_is_refused_by_its_pole_and_runs_when_it_is_allowed(sta
 
 
 def test_the_axis_does_not_know_whether_a_controller_is_predictive(start: Callable[..., Drive]):
-    """The polynomials of `virtual_axes design gpc` as arrays of doubles: the same bits as the design."""
+    """The polynomials of `virtual_axes design gpc` as arrays of doubles give the same bits as the design."""
     found = design()
     polynomials = {
         "rst.r": found["r_per_s"],

@@ -1,4 +1,4 @@
-"""Predictive control on the real node: the circle of figure 10, and switching to it on the way."""
+"""Predictive control on the real node: the circle of figure 10, and switching during motion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROWS = {
     (1, 8, 6, 1e-3): (0.0, -9.5, +10.4),
     (1, 8, 6, 1e-2): (-1.6, -10.4, +10.9),
 }
-"""Radial deviation that the model is specified to have at every tick: mean to ±0.2 µm, extremes to ±1 µm."""
+"""Specified radial deviation of the model at every tick: mean to ±0.2 µm, extremes to ±1 µm."""
 MEAN_UM, EXTREME_UM = 0.2, 1.0
 BETWEEN_SAMPLES_UM = 1.0
 """The top of a spike lies up to 3 ms beside a published position: wherever the grid of 6 ms lies against
@@ -28,37 +28,37 @@ it, less than this is missed (the same circle sampled every 125 µs, at all 48 p
 
 
 def of_axes(values: dict[str, object], axes: tuple[str, ...] = AXES) -> dict[str, object]:
-    """The same parameters of the position loop for several axes."""
+    """Returns the same parameters of the position loop for several axes."""
     return {f"{axis}.position_loop.{key}": value for axis in axes for key, value in values.items()}
 
 
 def tuning(n1: int, n2: int, nu: int, lambda_rel: float) -> dict[str, object]:
-    """A tuning of predictive control for X and Y."""
+    """Returns a tuning of predictive control for X and Y."""
     return of_axes({"gpc.n1": n1, "gpc.n2": n2, "gpc.nu": nu, "gpc.lambda_rel": lambda_rel})
 
 
 @pytest.fixture(scope="module")
 def predictive() -> Iterator[Drive]:
-    """X and Y under predictive control from the start on."""
+    """Yields X and Y with predictive control from the start on."""
     arguments = [word for axis in AXES for word in ("-p", f"{axis}.position_loop.controller:=gpc")]
     with Node(["-p", "time:=fast", *arguments]) as process, Drive(process=process) as drive:
         yield drive
 
 
 def run(drive: Drive) -> Recording:
-    """The circle once, from home."""
+    """Runs the circle once, from home."""
     go_home(drive)
     return drive.run(joint_trajectory(AXES, PATH.time, np.column_stack([PATH.x, PATH.y])))
 
 
 def deviation_um(recording: Recording) -> np.ndarray:
-    """Radial deviation while the feed is steady, µm."""
+    """Returns the radial deviation at steady feed, µm."""
     return recording.radial_deviation(PATH.center, PATH.radius)[recording.within(PATH.steady)] * 1e6
 
 
 @pytest.mark.parametrize("row", ROWS, ids=str)
 def test_the_circle_is_nearly_as_large_as_programmed(row: tuple[int, int, int, float], predictive: Drive):
-    """[P] figure 10, right: almost 0; by the preset that the node starts with, and by parameters."""
+    """[P] figure 10, right: almost 0; with the preset at the start of the node, and by parameters."""
     if row == PRESET:
         assert predictive.get_parameters(list(tuning(*row))) == tuning(*row)
     else:
@@ -76,7 +76,7 @@ def test_the_circle_is_nearly_as_large_as_programmed(row: tuple[int, int, int, f
 
 
 def test_the_drive_states_name_the_controller_of_each_axis(predictive: Drive):
-    """And the cascade's feedforward is off where the controller looks ahead."""
+    """The cascade's feedforward is off while a controller with preview is active."""
     states = run(predictive).states
     for axis, wanted in {"x": "gpc", "y": "gpc", "z": "cascade", "a": "cascade", "c": "cascade"}.items():
         assert set(states["controller", axis]) == {wanted}
@@ -87,7 +87,7 @@ def test_the_drive_states_name_the_controller_of_each_axis(predictive: Drive):
 
 
 def test_compensated_friction_leaves_no_spikes(predictive: Drive):
-    """The friction current of the setpoint's velocity fed forward, switched on while the node runs."""
+    """The friction current of the setpoint velocity is fed forward, switched on while the node runs."""
     weights = [f"{axis}.feedforward.friction" for axis in AXES]
     assert np.abs(deviation_um(run(predictive))).max() > 2
     predictive.set_parameters(dict.fromkeys(weights, 1.0))
@@ -100,27 +100,28 @@ def test_compensated_friction_leaves_no_spikes(predictive: Drive):
 
 # ------------------------------------------------------------------------- switching on the way
 
-# In real time: in `fast` the node is ahead of what a reader has taken, by turns. Three turns are used, the
+# Real time: in `fast` the node runs ahead of the samples that a reader has taken. Three turns are needed; the
+# others are a reserve for a slow machine.
 # others are for a machine that is slow to answer.
 LONG = ballbar(turns=20)
 TURN = round(2 * np.pi * LONG.radius / 0.25 / TSP)
-"""Position periods of a turn."""
+"""Position cycles of one turn."""
 SWITCH = 80
-"""Position periods after which a switch is over."""
+"""Position cycles after which a transition is complete."""
 STEADY_UM = {"cascade": (47.7, 68.6), "gpc": (-8.5, 13.2)}
-"""Smallest and largest radial deviation of the two by themselves, as specified."""
+"""Smallest and largest specified radial deviation of the two controllers."""
 WIDENED_UM = 60.0
 
 
 def switch(drive: Drive, controller: str) -> None:
-    """Let another controller take both axes over at one instant, and see a turn and more of it."""
+    """Switches the controller of both axes at one instant and waits for more than a turn."""
     drive.set_parameters_atomically(of_axes({"controller": controller}))
     drive.wait_for(lambda: drive.latest("controller")["x"] == controller, 10, f"controller {controller}")
     drive.wait_until(drive.now() + (TURN + SWITCH) * TSP_NS, 30)
 
 
 def test_cascade_to_predictive_and_back_on_a_circle_is_not_felt(real: Drive):
-    """Switched by parameter, wherever on the circle the axes happen to be then."""
+    """Switched by parameter, at an arbitrary position on the circle."""
     go_home(real)
     accepted = real.accept(joint_trajectory(AXES, LONG.time, np.column_stack([LONG.x, LONG.y])))
     start = to_ns(accepted.start)
@@ -145,7 +146,7 @@ def test_cascade_to_predictive_and_back_on_a_circle_is_not_felt(real: Drive):
     switches = np.flatnonzero(names[1:] != names[:-1]) + 1
     assert [names[0], *names[switches]] == ["cascade", "gpc", "cascade"]
 
-    # What the velocity loop is asked for; a change belongs to the instant that it leads to.
+    # Velocity setpoint of the position controller; a change belongs to the instant at its end.
     command = np.column_stack(
         [states["velocity_setpoint", axis] + states["velocity_feedforward", axis] for axis in AXES]
     )

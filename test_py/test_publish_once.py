@@ -1,4 +1,4 @@
-"""`ros2 topic pub --once`: waits for one match, sends, and is gone 0.1 s later."""
+"""`ros2 topic pub --once`: waits for one match, publishes, and leaves 0.1 s later."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drive import Drive
 
 TIMES = 20
 
-# What ros2 topic pub does, in a process of its own, without its leisurely polling.
+# Equivalent of ros2 topic pub in a separate process, without its slow polling.
 PUBLISHER = """
 import sys, time
 import rclpy
@@ -34,7 +34,7 @@ rclpy.shutdown()
 
 
 def test_published_once_arrives_every_time(real: Drive):
-    """Each names a joint of its own that does not exist: the refusals tell which have arrived."""
+    """Each publisher names its own nonexistent joint: the rejections identify the messages that arrived."""
     env = {**os.environ, "ROS_DOMAIN_ID": str(real.process.domain_id)}
     for number in range(TIMES):
         subprocess.run([sys.executable, "-c", PUBLISHER, str(number), "/psec"], env=env, check=True, timeout=30)

@@ -1,4 +1,4 @@
-"""README.md's tables against the running node: all that is written is there, and nothing else."""
+"""Tables of README.md and the running node are equal in both directions."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ DEFAULT_MACHINE = CONFIG / "mikron_ucp710.yaml"
 LINEAR_MOTORS = CONFIG / "linear_motor_center.yaml"
 
 HIDDEN = "/_action/"
-"""What an action consists of has this in its names."""
+"""Part of the names of an action's topics and services."""
 ACTION_SERVICES = ["cancel_goal", "get_result", "send_goal"]
 ACTION_TOPICS = ["feedback", "status"]
 EVERY_NODE_HAS = {"/rosout", "/parameter_events"}
-"""And does not put it on the screen; nor the parameter services."""
+"""Interfaces that the start screen omits, in addition to the parameter services."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A way to start the node, and what is to be seen then."""
+    """Way to start the node, with the expected names."""
 
     name: str = DEFAULT_NODE
     settings: dict[str, str] = field(default_factory=dict)
@@ -40,7 +40,7 @@ class Run:
 
     @property
     def ros_args(self) -> list[str]:
-        """What it is started with."""
+        """Returns the node's ROS arguments."""
         namespace, name = self.name.rsplit("/", 1)
         rules = {"__ns": namespace or "/", "__node": name, **self.remaps} if self.name != DEFAULT_NODE else self.remaps
         args = [part for old, new in rules.items() for part in ("-r", f"{old}:={new}")]
@@ -48,7 +48,7 @@ class Run:
         return args + [part for key, value in self.settings.items() for part in ("-p", f"{key}:={value}")]
 
     def expected(self, *directions: str) -> dict[str, Interface]:
-        """By name in the graph, what the README has of these directions."""
+        """Returns the README's interfaces of these directions by name in the graph."""
         return {
             row.resolved(self.name, self.remaps): row
             for row in interfaces()
@@ -60,20 +60,20 @@ class Run:
 CONDITIONS = sorted({row.condition for row in interfaces() if row.condition})
 RUNS = {
     "default": Run(),
-    # Names of every kind, in another namespace, and what is there only with a certain parameter.
+    # Names of every kind, in another namespace, and interfaces that require a parameter.
     **{
         f"{key} {value}": Run("/cell/mill", {key: value}, {"joint_states": "/axes", "~/stop": "halt"})
         for key, value in CONDITIONS
     },
     "linear motors": Run(machine=LINEAR_MOTORS),
 }
-# What a rule puts in a name's place is a name in the node's namespace.
+# A remapping rule's new name is relative to the node's namespace.
 HALT = {"halt": "/cell/halt"}
 
 
 @pytest.fixture(scope="module", params=RUNS)
 def seen(request: pytest.FixtureRequest) -> Iterator[tuple[Run, Drive]]:
-    """A node that was started in one of these ways, once all that the README has of it is there."""
+    """Yields a node started in one of these ways, after all interfaces of the README exist."""
     run = RUNS[request.param]
     with Node(run.ros_args, name=run.name) as process, Drive(process=process, connect=False) as drive:
         drive.wait_for(drive.sees, 10, "node in the graph")
@@ -83,7 +83,7 @@ def seen(request: pytest.FixtureRequest) -> Iterator[tuple[Run, Drive]]:
             return wanted <= {name for what in ("publisher", "subscriber", "service") for name in by_node(drive, what)}
 
         deadline = time.monotonic() + 5
-        # Not an error here: each test says what it misses.
+        # A timeout is not an error here: each test reports the missing interfaces.
         while not there() and time.monotonic() < deadline:
             time.sleep(0.02)
         time.sleep(0.3)
@@ -91,18 +91,18 @@ def seen(request: pytest.FixtureRequest) -> Iterator[tuple[Run, Drive]]:
 
 
 def by_node(drive: Drive, what: str) -> dict[str, list[str]]:
-    """Names and types of the node's publishers, subscribers, services or clients."""
+    """Returns names and types of the node's publishers, subscribers, services or clients."""
     namespace, name = drive.target.rsplit("/", 1)
     return dict(getattr(drive.node, f"get_{what}_names_and_types_by_node")(name, namespace or "/"))
 
 
 def types_of(expected: dict[str, Interface]) -> dict[str, list[str]]:
-    """Names and types as the graph gives them."""
+    """Returns names and types in the form of the graph."""
     return {HALT.get(name, name): [row.type] for name, row in expected.items()}
 
 
 def visible(found: dict[str, list[str]]) -> dict[str, list[str]]:
-    """Without what actions consist of."""
+    """Returns the interfaces without the parts of actions."""
     return {name: types for name, types in found.items() if HIDDEN not in name}
 
 
@@ -110,13 +110,13 @@ def visible(found: dict[str, list[str]]) -> dict[str, list[str]]:
     ("direction", "what"), [("out", "publisher"), ("in", "subscriber"), ("service", "service")], ids=lambda value: value
 )
 def test_names_and_types(seen: tuple[Run, Drive], direction: str, what: str):
-    """Both ways: what is documented, with its type, and nothing else."""
+    """Documented names and types equal those of the graph."""
     run, drive = seen
     assert visible(by_node(drive, what)) == types_of(run.expected(direction))
 
 
 def test_actions(seen: tuple[Run, Drive]):
-    """With their types, and no hidden topic or service but theirs."""
+    """Actions have their types; hidden topics and services are only theirs."""
     run, drive = seen
     namespace, name = run.name.rsplit("/", 1)
     actions = types_of(run.expected("action"))
@@ -127,13 +127,13 @@ def test_actions(seen: tuple[Run, Drive]):
 
 
 def test_the_node_asks_nobody(seen: tuple[Run, Drive]):
-    """It has no client of a service."""
+    """The node has no service client."""
     _, drive = seen
     assert by_node(drive, "client") == {}
 
 
 def test_quality_of_service_and_owner_of_every_topic(seen: tuple[Run, Drive]):
-    """Reliability and durability as documented; every endpoint has its node's name."""
+    """Reliability and durability are as documented; every endpoint has its node's name."""
     run, drive = seen
     infos: dict[str, Callable[[str], Any]] = {
         "out": drive.node.get_publishers_info_by_topic,
@@ -150,12 +150,12 @@ def test_quality_of_service_and_owner_of_every_topic(seen: tuple[Run, Drive]):
 
 
 def quality(info: Any) -> tuple[ReliabilityPolicy, DurabilityPolicy]:
-    """What the graph shows of an endpoint's profile; its depth is not among it."""
+    """Returns the part of an endpoint's profile that discovery transports, which excludes the depth."""
     return info.qos_profile.reliability, info.qos_profile.durability
 
 
 def test_depths(seen: tuple[Run, Drive]):
-    """As the parameters that set them."""
+    """Depths equal the parameters that set them."""
     run, drive = seen
     documented = {
         f"qos.{row.name.removeprefix('~').strip('/')}.depth": row.depth
@@ -166,7 +166,7 @@ def test_depths(seen: tuple[Run, Drive]):
 
 
 def test_the_screen_at_the_start(seen: tuple[Run, Drive]):
-    """It names the same topics, services and actions."""
+    """The start screen lists the same topics, services and actions."""
     run, drive = seen
     lines = drive.wait_for(lambda: drive.process.output(), 5, "screen").splitlines()
     listed: dict[str, set[str]] = {}
@@ -187,17 +187,17 @@ def test_the_screen_at_the_start(seen: tuple[Run, Drive]):
 
 @dataclass(frozen=True)
 class Machine:
-    """What a node's parameters are to be."""
+    """Expected parameters of a node."""
 
     rows: dict[str, Any]
-    """row of the table by parameter"""
+    """Row of the table by parameter."""
     given: dict[str, Any]
-    """values that the machine file or the arguments set"""
+    """Values that the machine file or the arguments set."""
 
 
 @pytest.fixture(scope="module")
 def machine(seen: tuple[Run, Drive]) -> Machine:
-    """Parameters of the node that was started, from the README and from the file that it read."""
+    """Returns the parameters of the started node, from the README and from the file that it read."""
     run, drive = seen
     file = yaml.safe_load((run.machine or DEFAULT_MACHINE).read_text(encoding="utf-8"))
     settings = {key: yaml.safe_load(value) for key, value in run.settings.items()}
@@ -209,29 +209,29 @@ def machine(seen: tuple[Run, Drive]) -> Machine:
 
 
 def flat(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Nested keys joined by dots."""
+    """Returns nested keys joined by dots."""
     found: dict[str, Any] = {}
     for key, value in tree.items():
-        # To YAML a bare y is a flag.
+        # YAML reads a bare y as a boolean.
         key = prefix + {True: "y"}.get(key, key) if not isinstance(key, str) else prefix + key
         found |= flat(value, key + ".") if isinstance(value, dict) else {key: value}
     return found
 
 
 def kinds_of(joint: str, given: dict[str, Any]) -> set[str]:
-    """What the column "for" may call the joint."""
+    """Returns the possible contents of the column "for" of a joint."""
     axis = given[f"{joint}.type"]
     linear_motor = axis == "linear" and given.get(f"{joint}.transmission.direct") is True
     return {"axis", f"{axis} axis", "linear motor" if linear_motor else "rotary motor"}
 
 
 def test_parameter_names(seen: tuple[Run, Drive], machine: Machine):
-    """Both ways."""
+    """Documented parameters equal those of the node."""
     assert sorted(seen[1].list_parameters()) == sorted(machine.rows)
 
 
 def test_parameter_descriptions(seen: tuple[Run, Drive], machine: Machine):
-    """Text, unit, type, range, choices, and whether it can be set while the node runs."""
+    """Text, unit, type, range, choices, and whether the parameter is read-only."""
     for said in seen[1].describe(list(machine.rows)):
         row = machine.rows[said.name]
         assert said.description == row.description + (f" Unit: {row.unit}." if row.unit else ""), said.name
@@ -254,7 +254,7 @@ def test_parameter_descriptions(seen: tuple[Run, Drive], machine: Machine):
 
 
 def test_parameter_values(seen: tuple[Run, Drive], machine: Machine):
-    """What the machine file gives, and the documented default of everything else."""
+    """Values of the machine file, and documented defaults of all other parameters."""
     values = seen[1].get_parameters(list(machine.rows))
     for name, value in values.items():
         row = machine.rows[name]

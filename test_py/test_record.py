@@ -1,4 +1,4 @@
-"""The node's own recording (parameter `record`), read by an independent reader."""
+"""The node's own recording (parameter `record`), read by an independent library."""
 
 from __future__ import annotations
 
@@ -57,14 +57,14 @@ KINDS = {
     "/virtual_axes/tool_path": ToolPath,
     "/virtual_axes/tool_path_setpoint": ToolPath,
 }
-"""What is not sensor_msgs/JointState."""
+"""Message types other than sensor_msgs/JointState."""
 NOT_RECORDED = {"/parameter_events"}
-"""Topics of every node that come with its parameter services."""
+"""Topics of the parameter services, which every node has."""
 
 
 @dataclass
 class Entry:
-    """A message of a recording."""
+    """Message of a recording."""
 
     log: int
     publish: int
@@ -72,7 +72,7 @@ class Entry:
 
 
 def read(path: Path, whole: bool = True) -> tuple[dict[str, list[Entry]], dict[str, Any], dict[str, Any]]:
-    """Messages, channels and types by topic, decoded too; of a file that is not `whole`, up to its end."""
+    """Returns messages, channels and types by topic, with decoding; an incomplete file is read up to its end."""
     messages: dict[str, list[Entry]] = defaultdict(list)
     channels: dict[str, Any] = {}
     types: dict[str, str] = {}
@@ -103,17 +103,17 @@ def read(path: Path, whole: bool = True) -> tuple[dict[str, list[Entry]], dict[s
 
 
 def text(topic: str, data: bytes) -> str:
-    """Every value of a message, each float to its last bit; what fills CDR up between them is nobody's."""
+    """Returns all values of a message, each float to its last bit, without CDR padding."""
     return repr(deserialize_message(data, KINDS.get(topic, JointState)))
 
 
 def stamps(entries: list[Entry]) -> np.ndarray:
-    """Publish times, ns."""
+    """Returns publish times, ns."""
     return np.array([entry.publish for entry in entries], dtype=np.int64)
 
 
 def recording_status(drive: Drive) -> DiagnosticStatus | None:
-    """The newest diagnostics of the recording."""
+    """Returns the newest diagnostics of the recording."""
     for message in reversed(drive.diagnostics()):
         for status in message.status:
             if status.name == f"{drive.target}: recording":
@@ -123,7 +123,7 @@ def recording_status(drive: Drive) -> DiagnosticStatus | None:
 
 @dataclass
 class Session:
-    """A recording of everything, with what was sent and heard meanwhile."""
+    """Recording of all topics, with the messages sent and received meanwhile."""
 
     path: Path
     sent: dict[str, list[bytes]]
@@ -137,7 +137,7 @@ class Session:
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
-    """A node in real time that records, is moved, streamed to and loaded, and ended by SIGTERM."""
+    """Yields a recording of a real-time node that is moved, streamed to, loaded, and ended by SIGTERM."""
     path = tmp_path_factory.mktemp("record") / "session.mcap"
     with Node(["-p", f"record:={path}", "-p", "qos.drive_states.depth:=7"]) as process:
         drive = Drive(process=process)
@@ -180,7 +180,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
 
 
 def test_every_topic_is_there_with_its_type_and_profile(session: Session):
-    """What the graph says the node has, and nothing else."""
+    """Recorded topics equal the node's topics in the graph."""
     assert session.exit == 0, session.output
     messages, channels, types = read(session.path)
     wanted = session.offered
@@ -197,13 +197,13 @@ def test_every_topic_is_there_with_its_type_and_profile(session: Session):
 
 
 def test_what_was_published_is_recorded_bit_for_bit(session: Session):
-    """All that a subscriber got, in its order, without a gap between."""
+    """A subscriber's samples are in the recording, in order, without gaps."""
     messages, _, _ = read(session.path)
     assert set(session.heard) | set(session.sent) == set(messages)
     for topic, heard in session.heard.items():
         heard = [text(topic, data) for data in heard]
         recorded = [text(topic, entry.data) for entry in messages[topic]]
-        # Who publishes for late joiners may hand over old samples first.
+        # A transient local publisher may send old samples first.
         first = recorded.index(heard[0])
         assert recorded[first : first + len(heard)] == heard, topic
         assert len(heard) > 0
@@ -211,7 +211,7 @@ def test_what_was_published_is_recorded_bit_for_bit(session: Session):
 
 
 def test_what_came_in_is_recorded_as_it_came(session: Session):
-    """Bit for bit, at the node's time of receipt."""
+    """Received messages are recorded bit for bit, at the node's time of receipt."""
     messages, _, _ = read(session.path)
     for topic, sent in session.sent.items():
         received = messages[topic]
@@ -219,7 +219,7 @@ def test_what_came_in_is_recorded_as_it_came(session: Session):
         found = [text(topic, entry.data) for entry in received]
         if topic == "/psec":
             assert found == sent
-        else:  # best effort, or reliable with a depth of one
+        else:  # Best effort, or reliable with a depth of one.
             remaining = iter(sent)
             assert found and all(message in remaining for message in found), topic
         assert all(entry.publish == entry.log for entry in received), "they had no stamps"
@@ -228,7 +228,7 @@ def test_what_came_in_is_recorded_as_it_came(session: Session):
 
 
 def test_times_are_the_nodes(session: Session):
-    """Stamps as publish times, not after the log times; the grid of position instants is unbroken."""
+    """Publish times are stamps, not after the log times; the grid of position instants is unbroken."""
     messages, _, _ = read(session.path)
     for topic in (STATES, CURRENTS, DRIVES):
         times = stamps(messages[topic])
@@ -238,12 +238,12 @@ def test_times_are_the_nodes(session: Session):
 
 
 def to_ns_of(data: bytes) -> int:
-    """Stamp of a message with a header (CDR, little endian)."""
+    """Returns the stamp of a message with a header (CDR, little endian)."""
     return int.from_bytes(data[4:8], "little") * NANOSECONDS + int.from_bytes(data[8:12], "little")
 
 
 def test_the_diagnostics_and_the_log_tell_of_it(session: Session):
-    """Where it goes, and that nothing is missing."""
+    """They report the file, and that nothing is missing."""
     found = status_values(session.status)
     assert session.status.level == DiagnosticStatus.OK and found["recording"] == "true"
     assert list(found) == RECORDING_KEYS
@@ -253,14 +253,14 @@ def test_the_diagnostics_and_the_log_tell_of_it(session: Session):
 
 
 def test_our_own_command_takes_set_points_from_it(session: Session):
-    """`virtual_axes run` of the recording."""
+    """`virtual_axes run` accepts the recording."""
     command = node_binary().with_name("virtual_axes")
     done = subprocess.run([command, "run", session.path], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
 
 
 def test_killed_it_is_readable_up_to_its_last_chunk(start: Callable[..., Drive], tmp_path: Path):
-    """SIGKILL: every message up to then, unbroken; identify reads it and says so."""
+    """SIGKILL: all messages up to it, unbroken; identify reads them and reports the truncation."""
     path = tmp_path / "killed.mcap"
     drive = start("-p", f"record:={path}")
     until = drive.now()
@@ -281,10 +281,10 @@ def test_killed_it_is_readable_up_to_its_last_chunk(start: Callable[..., Drive],
 
 
 def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive], tmp_path: Path):
-    """At 1 MB the file is closed, whole and told; in `fast` nothing before that is missing."""
+    """At 1 MB the file is closed, complete and reported; in `fast` no earlier message is missing."""
     path = tmp_path / "bounded.mcap"
     drive = start("-p", f"record:={path}", "-p", "record_max_mb:=1", "-p", "time:=fast")
-    # Setpoints that no compression makes much of.
+    # Setpoints with little compressibility.
     noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (4000, 2))
     times = np.arange(1, len(noise) + 1) * (2 * TSP_NS / NANOSECONDS)
     drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120)
@@ -311,7 +311,7 @@ def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive
 
 
 def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
-    """The system takes no more than 200 KiB in a file, as a full disk: what was written before stays readable.
+    """A file size limit of 200 KiB acts like a full disk: the data written before stay readable.
 
     It is said once, and the next recording is whole.
     """
@@ -348,14 +348,14 @@ def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
 
 
 def refusal(record: object) -> str:
-    """Start a node that must refuse to record there: what it says, with status 2."""
+    """Starts a node that must reject the recording path: returns its output, with status 2."""
     with Node(["-p", f"record:={record}"]) as process:
         assert process.wait(10) == 2, process.output()
         return process.output()
 
 
 def test_what_it_cannot_record_to_is_refused(tmp_path: Path):
-    """An existing file stays as it is; a folder that is missing or takes nothing is named."""
+    """An existing file stays unchanged; a missing or read-only folder is named."""
     existing = tmp_path / "old.mcap"
     existing.write_text("kept")
     assert f"record: {existing} exists already" in refusal(existing)
@@ -363,7 +363,7 @@ def test_what_it_cannot_record_to_is_refused(tmp_path: Path):
     missing = tmp_path / "missing" / "new.mcap"
     assert f"in the folder {missing.parent}: No such file" in refusal(missing)
     assert f"in the folder {existing}: Not a directory" in refusal(existing / "new.mcap")
-    # A folder that takes no file of anybody's.
+    # A folder in which no file can be created.
     assert "in the folder /proc: " in refusal("/proc/new.mcap")
     assert f"record: {tmp_path / 'new.csv'}: a recording is an MCAP file" in refusal(tmp_path / "new.csv")
     assert list(tmp_path.iterdir()) == [existing]

@@ -1,4 +1,4 @@
-"""Every refusal of a JointTrajectory: its code, joint, point, value and limit; the motion goes on."""
+"""All rejections of a JointTrajectory: code, joint, point, value and limit; the active motion continues."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ANY = object()
 
 @dataclass
 class Case:
-    """A trajectory and what the node has to say to it; `ANY` is not looked at."""
+    """A trajectory and the expected result; `ANY` is not compared."""
 
     code: int
     make: Callable[[Drive], JointTrajectory]
@@ -31,31 +31,31 @@ class Case:
 
 
 def line(joint: str, *points: tuple[float, float], **options: Any) -> JointTrajectory:
-    """(time, position) of one joint."""
+    """Returns a trajectory of one joint from (time, position) pairs."""
     return joint_trajectory([joint], [t for t, _ in points], [[p] for _, p in points], **options)
 
 
 def edit(trajectory: JointTrajectory, point: int, **fields: Any) -> JointTrajectory:
-    """The trajectory with other arrays in one of its points."""
+    """Returns the trajectory with other arrays in one of its points."""
     for name, value in fields.items():
         setattr(trajectory.points[point], name, value)
     return trajectory
 
 
 def with_nanosec(trajectory: JointTrajectory, point: int | None) -> JointTrajectory:
-    """The trajectory with 1e9 ns in the stamp or in the time of a point."""
+    """Returns the trajectory with 1e9 ns in the stamp or in the time of a point."""
     time = trajectory.header.stamp if point is None else trajectory.points[point].time_from_start
     time.nanosec = NANOSECONDS
     return trajectory
 
 
 def two(*rows: tuple[float, float]) -> JointTrajectory:
-    """Joints y and z, one second per row."""
+    """Returns a trajectory of joints y and z, one second per row."""
     return joint_trajectory(["y", "z"], np.arange(1, len(rows) + 1), rows)
 
 
 REST = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
-STROKE_A = math.radians(-30)
+TRAVEL_MIN_A = math.radians(-30)
 
 # y, z, a and c rest at 0 while x swings.
 CASES = {
@@ -103,16 +103,16 @@ CASES = {
         index=1,
         value=math.inf,
     ),
-    "above the stroke": Case(
-        R.OUTSIDE_STROKE, lambda d: line("y", (0, 0), (20, 0.3)), joint="y", index=1, value=0.3, limit=0.275
+    "above the travel limits": Case(
+        R.OUTSIDE_TRAVEL_LIMITS, lambda d: line("y", (0, 0), (20, 0.3)), joint="y", index=1, value=0.3, limit=0.275
     ),
-    "below the stroke": Case(
-        R.OUTSIDE_STROKE,
+    "below the travel limits": Case(
+        R.OUTSIDE_TRAVEL_LIMITS,
         lambda d: line("a", (0, 0), (20, math.radians(-31))),
         joint="a",
         index=1,
         value=math.radians(-31),
-        limit=STROKE_A,
+        limit=TRAVEL_MIN_A,
     ),
     "jump to the first point": Case(R.JUMP, lambda d: line("z", (0, 0.1), (1, 0.1)), joint="z", index=0, value=0.1),
     "jump when joining in": Case(
@@ -160,7 +160,7 @@ CASES = {
 
 @dataclass
 class Motion:
-    """A long swing of x under way."""
+    """A long active swing of x."""
 
     drive: Drive
     start: int
@@ -169,7 +169,7 @@ class Motion:
 
 @pytest.fixture(scope="module")
 def motion(real: Drive) -> Iterator[Motion]:
-    """x swings for a minute while the refusals come; at its end none has left a trace."""
+    """Yields a swing of x of a minute; asserts at its end that no rejection has changed psec."""
     go_home(real)
     time, position = swing(60.0)
     accepted = real.accept(joint_trajectory(["x"], time, position))
@@ -182,7 +182,7 @@ def motion(real: Drive) -> Iterator[Motion]:
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 def test_refused_with_its_reason(motion: Motion, case: Case):
-    """The result names what was wrong; psec stays the plan of the motion under way, bit for bit."""
+    """The result names the error; psec stays the plan of the active motion, bit for bit."""
     drive = motion.drive
     before = drive.now()
     trajectory = case.make(drive)
@@ -202,7 +202,7 @@ def test_refused_with_its_reason(motion: Motion, case: Case):
     if case.limit is not ANY:
         assert result.limit == pytest.approx(case.limit, rel=1e-9)
 
-    # Samples can lag behind the acceptance: the plan may not have begun when they say what time it is.
+    # Samples may be older than the acceptance: the plan may not have begun at their stamps.
     after = max(drive.now(), motion.start) + 3 * TSP_NS
     rest = np.zeros_like(motion.plan["x"])
     plan = {**motion.plan, "y": rest, "z": rest, "a": rest, "c": rest}
@@ -210,7 +210,7 @@ def test_refused_with_its_reason(motion: Motion, case: Case):
 
 
 def test_refused_at_rest_stays_at_rest(start: Callable[..., Drive]):
-    """A refusal with nothing under way moves nothing."""
+    """A rejection without an active motion moves no axis."""
     drive = start()
     before = drive.latest("position")
     result = drive.decision(drive.send(line("q", (1, 0.1))))
@@ -220,7 +220,7 @@ def test_refused_at_rest_stays_at_rest(start: Callable[..., Drive]):
 
 
 def test_results_reach_a_late_subscriber(start: Callable[..., Drive]):
-    """~/trajectory_result is transient local: who comes later still reads it."""
+    """~/trajectory_result is transient local: a late subscriber receives the results."""
     drive = start()
     result = drive.decision(drive.send(line("q", (1, 0.1))))
     with Drive(node=drive.target, domain_id=drive.process.domain_id) as late:

@@ -1,4 +1,4 @@
-"""The report in a browser: no errors, nothing from elsewhere, legible in light, dark and print.
+"""The report in a browser: no errors, no external requests, legible in light, dark and print.
 
 VIRTUAL_AXES_REPORT names a page to look at instead of a new one, VIRTUAL_AXES_SCREENSHOTS a folder
 that keeps the pictures.
@@ -20,9 +20,9 @@ from drive import node_binary
 
 LIGHT, DARK = "light", "dark"
 WIDE, NARROW = 1280, 360
-"""Pixels: a screen on a desk, a telephone."""
+"""Viewport widths, pixels: a desktop screen, a telephone."""
 A4_WIDTH = 703
-"""Pixels of 1/96 inch between margins of 12 mm."""
+"""Width of an A4 sheet between margins of 12 mm, pixels of 1/96 inch."""
 
 OVERLAPPING_TEXTS = """
 [...document.querySelectorAll('svg[role=img]')].flatMap(svg => {
@@ -35,28 +35,28 @@ OVERLAPPING_TEXTS = """
     return [...pairs, ...outside].map(pair => [svg.querySelector('title').textContent, ...pair]);
 })
 """
-"""Texts of a picture that lie on each other or outside of it."""
+"""Overlapping texts of a picture, and texts outside it."""
 
 TABLES_CUT_OFF = """
 [...document.querySelectorAll('.table')].filter(frame => frame.scrollWidth > frame.clientWidth)
     .map(frame => [frame.innerText.slice(0, 40), frame.scrollWidth, frame.clientWidth])
 """
-"""Tables that are wider than their place."""
+"""Tables that are wider than their container."""
 
 
 def run(*arguments: object) -> None:
-    """The command line beside the node."""
+    """Runs the command beside the node."""
     command = [Path(node_binary()).with_name("virtual_axes"), *arguments]
     subprocess.run([str(word) for word in command], check=True, timeout=120, stdout=subprocess.DEVNULL)
 
 
 def comparison(page: Path) -> None:
-    """Two runs of the ballbar trial."""
+    """Writes a page with two runs of the ballbar trial."""
     run("run", "ballbar", "--controller", "cascade", "--controller", "cascade-noff", "--report", page)
 
 
 def identification(page: Path) -> None:
-    """An identification of X from a short campaign."""
+    """Writes a page with an identification of X from a short campaign."""
     psec, trace = page.with_name("psec.csv"), page.with_name("off.csv")
     run("psec", "campaign", "--axis", "x", "--part", "off", "--range=-40,40", "--max-feed", 5, "--out", psec)
     off = ["--set", "x.feedforward.velocity=0", "--set", "x.feedforward.torque_kg_m2=0"]
@@ -66,7 +66,7 @@ def identification(page: Path) -> None:
 
 @pytest.fixture(scope="module", params=[comparison, identification], ids=lambda make: make.__name__)
 def report(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page of each kind."""
+    """Returns a page of each kind."""
     if given := os.environ.get("VIRTUAL_AXES_REPORT"):
         return Path(given).resolve()
     page = tmp_path_factory.mktemp("report") / f"{request.param.__name__}.html"
@@ -76,7 +76,7 @@ def report(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
 @pytest.fixture(scope="module")
 def browser(report: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A browser that shows the report."""
+    """Yields a browser that shows the report."""
     program = find_browser()
     if program is None:
         missing = "no Chromium to open the report in (Debian: apt-get install chromium)"
@@ -90,7 +90,7 @@ def browser(report: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 
 def test_it_says_nothing_wrong_and_asks_nobody(browser: Browser, report: Path):
-    """Console, exceptions, requests."""
+    """Checks console, exceptions and requests."""
     entries = [event["entry"] for event in browser.events_of("Log.entryAdded")]
     assert not entries
     assert not browser.events_of("Runtime.consoleAPICalled", "Runtime.exceptionThrown")
@@ -101,7 +101,7 @@ def test_it_says_nothing_wrong_and_asks_nobody(browser: Browser, report: Path):
 
 
 def test_its_pictures_are_well_formed(browser: Browser, report: Path):
-    """Each picture is XML with a title and a description, and the browser has as many as the file."""
+    """Each picture is XML with title and description, and the browser has as many pictures as the file."""
     text = report.read_text(encoding="utf-8")
     pictures = ["<svg role" + part.split("</svg>")[0] + "</svg>" for part in text.split("<svg role")[1:]]
     assert len(pictures) >= 5
@@ -109,7 +109,7 @@ def test_its_pictures_are_well_formed(browser: Browser, report: Path):
     for picture in map(ElementTree.fromstring, pictures):
         title, description = picture.find("title"), picture.find("desc")
         assert title is not None and title.text and description is not None and description.text
-        assert picture.get("aria-labeledby") == f"{title.get('id')} {description.get('id')}"
+        assert picture.get("aria-labelledby") == f"{title.get('id')} {description.get('id')}"
         ids |= {title.get("id"), description.get("id")}
     assert len(ids) == 2 * len(pictures)
     assert browser.evaluate("document.querySelectorAll('svg[role=img]').length") == len(pictures)
@@ -118,14 +118,14 @@ def test_its_pictures_are_well_formed(browser: Browser, report: Path):
 @pytest.mark.parametrize("width", [WIDE, NARROW])
 @pytest.mark.parametrize("scheme", [LIGHT, DARK])
 def test_it_is_seen(browser: Browser, scheme: str, width: int):
-    """A picture that is not blank, on a light or a dark ground."""
+    """The picture is not blank, on a light or a dark background."""
     browser.show_as(scheme=scheme, width=width)
     image = browser.screenshot(keep(f"{scheme}-{width}.png"))
     ground = np.median(image.reshape(-1, 3), axis=0)
     assert (ground.mean() > 0.9) if scheme == LIGHT else (ground.mean() < 0.2)
     drawn = np.abs(image - ground).max(axis=2) > 0.3
     assert 0.005 < drawn.mean() < 0.3
-    # From top to bottom there is no long stretch without anything.
+    # No long blank stretch from top to bottom.
     rows = np.flatnonzero(drawn.any(axis=1))
     assert np.diff(rows).max() < 200
     colored = np.ptp(image, axis=2) > 0.3
@@ -134,14 +134,14 @@ def test_it_is_seen(browser: Browser, scheme: str, width: int):
 
 @pytest.mark.parametrize("width", [WIDE, 700, NARROW])
 def test_its_labels_stand_apart(browser: Browser, width: int):
-    """No text of a picture lies on another, and the page is not wider than its window."""
+    """No text of a picture overlaps another, and the page is not wider than its window."""
     browser.show_as(width=width)
     assert browser.evaluate(OVERLAPPING_TEXTS) == []
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_texts_contrast_with_their_ground(browser: Browser):
-    """4.5 : 1 for text and 3 : 1 for lines, as WCAG 2.1 asks, in both schemes."""
+    """4.5 : 1 for text and 3 : 1 for lines, as WCAG 2.1 requires, in both schemes."""
     for scheme in (LIGHT, DARK):
         browser.show_as(scheme=scheme)
         colors = {name: luminance(browser, name) for name in TEXTS + LINES + ["--page", "--area"]}
@@ -153,7 +153,7 @@ def test_texts_contrast_with_their_ground(browser: Browser):
 
 
 def test_it_prints_in_light_colors(browser: Browser):
-    """Paper is white whatever the screen is; no sheet is left empty."""
+    """Paper is white with every color scheme; no sheet is empty."""
     browser.show_as(scheme=DARK, media="print")
     image = browser.screenshot(keep("print.png"))
     assert np.median(image.reshape(-1, 3), axis=0).mean() > 0.9
@@ -165,7 +165,7 @@ def test_it_prints_in_light_colors(browser: Browser):
 
 
 def test_long_names_push_no_figure_out_of_sight(browser: Browser):
-    """Every table fits a screen of 1200 px and a sheet of A4, whatever the names of the runs are."""
+    """All tables fit a screen of 1200 px and a sheet of A4 with any names of the runs."""
     name = ", x.feedforward.torque_kg_m2=0.028"
     browser.evaluate(f"document.querySelectorAll('th.run').forEach(cell => cell.append('{name}'))")
     for width, media in ((1200, ""), (A4_WIDTH, "print")):
@@ -179,7 +179,7 @@ LINES = [*(f"--run-{i}" for i in range(1, 7)), "--friction", "--gravity", "--loa
 
 
 def luminance(browser: Browser, name: str) -> float:
-    """Relative luminance of a color of the style (WCAG 2.1)."""
+    """Returns the relative luminance of a color of the style (WCAG 2.1)."""
     value = browser.evaluate(f"getComputedStyle(document.documentElement).getPropertyValue('{name}').trim()")
     assert isinstance(value, str) and value.startswith("#") and len(value) == 7, value
     channels = np.array([int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)])
@@ -188,6 +188,6 @@ def luminance(browser: Browser, name: str) -> float:
 
 
 def keep(name: str) -> Path | None:
-    """Where a picture is kept, if it is to be."""
+    """Returns the path for a screenshot, or None without VIRTUAL_AXES_SCREENSHOTS."""
     folder = os.environ.get("VIRTUAL_AXES_SCREENSHOTS")
     return Path(folder, name) if folder else None

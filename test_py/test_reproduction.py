@@ -1,4 +1,4 @@
-"""docs/reproduction.md is what its commands print."""
+"""docs/reproduction.md equals the output of its commands."""
 
 import subprocess
 import sys
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def test_the_page_is_what_comes_out():
-    """Every figure of the page, by the commands that it names."""
+    """All figures of the page are recomputed by its commands."""
     script = Path(__file__).resolve().parent.parent / "tools" / "reproduction.py"
     result = subprocess.run([sys.executable, script, "--check"], timeout=600, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr or "docs/reproduction.md differs: run tools/reproduction.py"

@@ -1,4 +1,4 @@
-"""DDS Security: what a node does that cannot have it, and who takes part where it can (docs/security.md).
+"""DDS Security: nodes without the plugins, and access control of nodes with them (docs/security.md).
 
 Who takes part needs a node that is built with the cargo feature `security`: VIRTUAL_AXES_SECURE_NODE names it.
 """
@@ -25,25 +25,25 @@ needs_secure_node = pytest.mark.skipif(
     "with --features security and name it in VIRTUAL_AXES_SECURE_NODE (docs/security.md)",
 )
 HEARD, UNHEARD = 500, 100
-"""Messages in the recording of a node that hears the clock it follows (a thousand a second), and of another."""
+"""Messages in the recording of a node that receives its clock (a thousand a second), and of another."""
 PATIENCE_S = 60
 
 
 def keystore(folder: Path, domain: int, *enclaves: str) -> Path:
-    """Make one."""
+    """Creates a keystore."""
     words = [sys.executable, str(KEYSTORE), str(folder), "--domain", str(domain), *enclaves]
     subprocess.run(words, check=True, capture_output=True, timeout=30)
     return folder
 
 
 def secured(folder: Path | None, strategy: str = "Enforce") -> dict[str, str]:
-    """Environment of a node of this keystore."""
+    """Returns the environment of a node with this keystore."""
     words = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": strategy}
     return words if folder is None else {**words, "ROS_SECURITY_KEYSTORE": str(folder)}
 
 
 def test_a_node_that_cannot_be_secured_does_not_start_where_that_is_enforced():
-    """One line, status 2, nothing on the network; otherwise it runs open and says so."""
+    """One line, status 2, nothing on the network; without enforcement it runs unsecured and logs a warning."""
     with Node(env=secured(None)) as node:
         assert node.wait(20) == 2
         assert node.output().startswith("virtual_axes_node: ROS_SECURITY_ENABLE is true, but ")
@@ -57,7 +57,7 @@ def test_a_node_that_cannot_be_secured_does_not_start_where_that_is_enforced():
 
 
 def test_the_wheels_of_rclpy_have_no_dds_security(tmp_path: Path):
-    """The minimal case: a keystore as it should be, and a node of rclpy. Fails when the wheels have learnt it."""
+    """Minimal case: a correct keystore and a node of rclpy. Fails when the wheels contain DDS Security."""
     domain = DomainId()
     try:
         store = keystore(tmp_path / "store", domain.value, "/peer")
@@ -72,7 +72,7 @@ def test_the_wheels_of_rclpy_have_no_dds_security(tmp_path: Path):
 
 @needs_secure_node
 def test_only_who_is_authorized_hears_a_secured_node(tmp_path: Path):
-    """One gives the clock; of those who follow it, a peer of its keystore moves on, others stand still."""
+    """One node publishes the clock; a peer of its keystore moves on, the others receive no clock."""
     domain = DomainId()
     with ExitStack() as stack:
         stack.callback(domain.release)
@@ -106,7 +106,7 @@ def test_only_who_is_authorized_hears_a_secured_node(tmp_path: Path):
 
 @needs_secure_node
 def test_a_topic_that_is_denied_keeps_a_node_from_starting(tmp_path: Path):
-    """Permissions are looked at for each endpoint."""
+    """Permissions are checked for each endpoint."""
     domain = DomainId()
     with ExitStack() as stack:
         stack.callback(domain.release)

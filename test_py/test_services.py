@@ -1,4 +1,4 @@
-"""~/reset and ~/stop."""
+"""Services ~/reset and ~/stop."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from motion import go_home, start_swing
 
 
 def test_reset_puts_the_axes_back_to_rest_at_the_start(real: Drive):
-    """The motion under way is told so; positions and currents are those of the start, exactly."""
+    """The active motion gets a result; positions and currents equal those of the start exactly."""
     go_home(real)
     home_position, home_current = real.latest("position"), real.latest("voltage")
     accepted, start, _ = start_swing(real, joints=("x", "z", "a"))
@@ -25,7 +25,7 @@ def test_reset_puts_the_axes_back_to_rest_at_the_start(real: Drive):
 
 
 def test_stop_is_controlled(real: Drive):
-    """Within the limits of the axis, and the motion is told so."""
+    """The stop is within the limits of the axis, and the motion gets a result."""
     go_home(real)
     accepted, start, _ = start_swing(real, duration=3.0, amplitude=0.2)
     real.wait_until(start + 125 * TSP_NS, 5)
@@ -39,7 +39,7 @@ def test_stop_is_controlled(real: Drive):
 
 
 def test_services_at_rest_change_nothing(real: Drive):
-    """Both succeed, and the axes go on from where they are."""
+    """Both succeed, and the axes stay where they are."""
     go_home(real)
     before = real.latest("position")
     real.stop()
@@ -49,7 +49,7 @@ def test_services_at_rest_change_nothing(real: Drive):
 
 
 def test_after_a_stop_a_new_motion_starts_from_there(real: Drive):
-    """Nothing is left of the stop."""
+    """The stop leaves no residual state."""
     go_home(real)
     _, start, _ = start_swing(real, duration=3.0)
     real.wait_until(start + 125 * TSP_NS, 5)

@@ -1,4 +1,4 @@
-"""The node ends when it is asked to, and says goodbye."""
+"""End of the node on a signal: exit status, duration, and dispose of its endpoints."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from motion import start_swing
 @pytest.mark.parametrize("moving", [False, True], ids=["at rest", "moving"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 def test_ends_within_a_second_and_says_goodbye(start: Callable[..., Drive], number: signal.Signals, moving: bool):
-    """Status 0 within 1 s; out of rclpy's graph within 2 s, not after the lease of 50 s."""
+    """Status 0 within 1 s; removed from rclpy's graph within 2 s, not after the lease of 50 s."""
     drive = start()
     drive.wait_for(drive.sees, 5, "node in the graph")
     if moving:

@@ -1,4 +1,4 @@
-"""`use_sim_time`: the axes follow /clock of somebody else, through pauses, changes of speed and jumps."""
+"""`use_sim_time`: the axes follow an external /clock through pauses, changes of speed and jumps."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from motion import assert_psec, swing
 from sim_clock import SimClock
 
 BEGIN = 1_000 * NANOSECONDS + 1_234_567
-"""Between two position instants."""
+"""Position cycle, ns."""
 
 
 @pytest.fixture(scope="module")
 def clock() -> Iterator[SimClock]:
-    """Axes that follow a clock turned by hand, shared by the module."""
+    """Yields axes that follow a clock under test control, shared by the module."""
     with (
         Node(["-p", "use_sim_time:=true"]) as process,
         Drive(process=process, connect=False) as drive,
@@ -33,7 +33,7 @@ def clock() -> Iterator[SimClock]:
 
 
 def state_of(drive: Drive, wanted: str, timeout: float = 8.0) -> dict[str, str]:
-    """The values of the node's diagnostics once its state is the wanted one."""
+    """Returns the values of the node's diagnostics once its state is the expected one."""
     seen = len(drive.diagnostics())
 
     def found() -> dict[str, str] | None:
@@ -47,7 +47,7 @@ def state_of(drive: Drive, wanted: str, timeout: float = 8.0) -> dict[str, str]:
 
 
 def begin_anew(clock: SimClock, first: int) -> None:
-    """Jump to a position instant, and keep no sample from before it."""
+    """Jumps to a position instant and drops all earlier samples."""
     clock.set(first)
     samples = clock.drive._samples.values()
     clock.drive.wait_for(lambda: all(stamp_of(s[-1]) == first for s in samples), 5, f"samples of {first}")
@@ -55,12 +55,12 @@ def begin_anew(clock: SimClock, first: int) -> None:
 
 
 def stamps_since(drive: Drive, begin: int, end: int) -> np.ndarray:
-    """Stamps of all joint states from one time to another, ns."""
+    """Returns the stamps of all joint states between two times, ns."""
     return drive.record(begin, end).joints.stamp
 
 
 def test_before_the_first_message_there_is_no_time(start: Callable[..., Drive]):
-    """Nothing is published, services answer, and a trajectory waits for the clock."""
+    """The node publishes nothing, services respond, and a trajectory waits for the clock."""
     drive = start("-p", "use_sim_time:=true", connect=False)
     drive.wait_for(lambda: drive._psec.get_subscription_count() > 0, 10, "subscription of psec")
     values = state_of(drive, "waiting for /clock")
@@ -87,14 +87,14 @@ def test_before_the_first_message_there_is_no_time(start: Callable[..., Drive]):
     assert to_ns(drive.decision(soon).start) == first
     assert to_ns(drive.decision(later).start) == -(-begin // TSP_NS) * TSP_NS
     assert drive.decision(past).code == 10, "ended in the past"
-    # The stop that was asked for last is what they meet first.
+    # The newest stop is executed first.
     clock.connect()
     clock.advance(0.1, 0.006)
     assert drive.end(soon, 5).status == TrajectoryResult.STOPPED
 
 
 def test_a_goal_canceled_before_the_first_message_takes_no_other_with_it(start: Callable[..., Drive]):
-    """It ends at once; what waits beside it begins when there is a time."""
+    """The goal ends at once; the other goal begins with the first clock message."""
     drive = start("-p", "use_sim_time:=true", connect=False)
     with Follow(drive) as follow:
         kept, gone = (follow.send(goal(line([joint], [0.01], 0.5))) for joint in ("y", "x"))
@@ -109,7 +109,7 @@ def test_a_goal_canceled_before_the_first_message_takes_no_other_with_it(start: 
 
 @pytest.mark.parametrize("step", [0.1, 0.001, 0.0137, 2.0], ids=lambda step: f"{1e3 * step:g} ms")
 def test_the_grid_is_unbroken_whatever_the_clocks_own(clock: SimClock, step: float):
-    """Coarse or fine, every position instant up to the clock is there, and none beyond it."""
+    """Every position instant up to the clock is published at any clock step, and none after it."""
     begin = clock.now
     clock.advance(max(0.3, 2 * step), step)
     stamps = stamps_since(clock.drive, begin, clock.now + NANOSECONDS)
@@ -117,7 +117,7 @@ def test_the_grid_is_unbroken_whatever_the_clocks_own(clock: SimClock, step: flo
 
 
 def test_a_motion_has_the_same_bits_at_any_speed(clock: SimClock, fast: Drive):
-    """Slow, ten times faster, in leaps and with a pause, against the run of another node in `fast`."""
+    """Slow, ten times faster, in leaps and with a pause, compared with another node in `fast`."""
     drive = clock.drive
     drive.set_parameters({"x.velocity_loop.gain": 5.0})
     drive.reset()
@@ -151,7 +151,7 @@ def test_a_motion_has_the_same_bits_at_any_speed(clock: SimClock, fast: Drive):
 
 
 def test_while_the_clock_stands_nothing_moves_and_everything_answers(clock: SimClock):
-    """Also more trajectories than any queue holds: each is told what became of it."""
+    """Also more trajectories than the queue holds: each gets a result."""
     drive = clock.drive
     drive.reset()
     clock.advance(0.06, 0.006)
@@ -177,7 +177,7 @@ def test_while_the_clock_stands_nothing_moves_and_everything_answers(clock: SimC
     assert drive.end(sent, 5).status == TrajectoryResult.ABORTED
     assert {drive.end(number, 5).status for number in many} <= {TrajectoryResult.ABORTED, TrajectoryResult.STOPPED}
     assert drive.now() == stood_at
-    # It goes on where it stood, at rest at home.
+    # The axes continue where they were, at rest at home.
     clock.advance(0.06, 0.006)
     stamps = stamps_since(drive, stood_at, clock.now)
     assert set(np.diff(stamps)) == {TSP_NS}
@@ -195,7 +195,7 @@ def test_while_the_clock_stands_nothing_moves_and_everything_answers(clock: SimC
     ids=["back", "far-ahead", "to-zero", "to-where-it-was"],
 )
 def test_a_jump_ends_the_motion_and_begins_a_new_grid(clock: SimClock, to: Callable[[int], int], what: str):
-    """The axes come to rest within their limits, and take trajectories by the new time."""
+    """The axes come to rest within their limits, and accept trajectories by the new time."""
     drive = clock.drive
     times, position = swing(2.0)
     sent = drive.send(joint_trajectory(["x"], times, position + drive.latest("psec")["x"]))
@@ -210,7 +210,7 @@ def test_a_jump_ends_the_motion_and_begins_a_new_grid(clock: SimClock, to: Calla
     assert end.text == f"the clock jumped from {before // TSP_NS * TSP_NS / 1e9:.3f} s to {first / 1e9:.3f} s"
     assert "the clock jumped from" in drive.process.output()
     begin_anew(clock, first)
-    # More than the axis needs to stop.
+    # Longer than the axis needs to stop.
     clock.advance(1.0, 0.02)
     series = drive.record(first, clock.now)
     assert np.array_equal(series.joints.stamp, np.arange(first, clock.now + 1, TSP_NS)), what
@@ -224,7 +224,7 @@ def test_a_jump_ends_the_motion_and_begins_a_new_grid(clock: SimClock, to: Calla
 
 
 def test_jumps_are_counted(clock: SimClock):
-    """And a stretch of nine seconds is none: it is simulated."""
+    """A step of nine seconds is not a jump: it is simulated."""
     drive = clock.drive
     jumps = int(state_of(drive, "paused")["clock_jumps"])
     begin = clock.now
@@ -242,7 +242,7 @@ def test_jumps_are_counted(clock: SimClock):
 
 
 def test_a_chunk_by_absolute_times_is_followed_by_the_clock(clock: SimClock):
-    """The stamps of trajectories are times of the clock that is followed."""
+    """The stamps of trajectories are times of the followed clock."""
     drive = clock.drive
     drive.reset()
     clock.advance(0.06, 0.006)

@@ -1,4 +1,4 @@
-"""What the node is started with: ROS arguments, machine files, environment."""
+"""Start of the node: ROS arguments, machine files, environment."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CONFIG = Path(__file__).resolve().parent.parent / "config"
 
 
 def refusal(*ros_args: str, **env: str) -> str:
-    """Start a node that must refuse to: what it says, in one line, with status 2."""
+    """Starts a node that must exit: returns its output of one line, with status 2."""
     domain = DomainId()
     try:
         process = Node(ros_args, domain_id=domain.value, env=env)
@@ -27,7 +27,7 @@ def refusal(*ros_args: str, **env: str) -> str:
 
 
 def test_names_prefix_and_remapping(start: Callable[..., Drive]):
-    """Namespace, node name, joint prefix and a topic's other name, all at once."""
+    """Namespace, node name, joint prefix and a remapped topic, all at once."""
     drive = start("-r", "__ns:=/cell", "-r", "__node:=mill", "-p", "joint_prefix:=mill_", name="/cell/mill")
     assert list(drive.latest("position")) == ["mill_x", "mill_y", "mill_z", "mill_a", "mill_c"]
     assert drive.run(joint_trajectory(["mill_x"], [0.0, 0.6], [[0.0], [0.01]])).result.name == ["mill_x"]
@@ -36,20 +36,20 @@ def test_names_prefix_and_remapping(start: Callable[..., Drive]):
 
 
 def test_a_topic_under_another_name(start: Callable[..., Drive]):
-    """The first rule that fits is the one, and nothing is left under the old name."""
+    """The first matching rule applies, and the old name does not exist."""
     drive = start("-r", "joint_states:=/axes", "-r", "/axes:=/nothing", connect=False)
     drive.wait_for(lambda: drive.node.count_publishers("/axes") > 0, 10, "publisher of /axes")
     assert drive.node.count_publishers("/joint_states") == 0
 
 
 def test_an_integer_serves_where_a_double_is_wanted(start: Callable[..., Drive]):
-    """And the later of two values wins."""
+    """The later of two values applies."""
     drive = start("-p", "x.velocity_loop.gain:=3.5", "-p", "x.velocity_loop.gain:=4")
     assert drive.get_parameters(["x.velocity_loop.gain"]) == {"x.velocity_loop.gain": 4.0}
 
 
 def test_the_linear_motor_machine_moves(start: Callable[..., Drive]):
-    """Another machine file: other drives, another position period."""
+    """Another machine file: other drives, another position cycle."""
     file = next(path for path in CONFIG.glob("*.yaml") if "mikron" not in path.name)
     drive = start("--params-file", str(file), "-p", "time:=fast")
     drive.run(joint_trajectory(["x", "y"], [0.0, 1.0], [[0.0, 0.0], [0.1, -0.05]]), settle=0.5)
@@ -59,7 +59,7 @@ def test_the_linear_motor_machine_moves(start: Callable[..., Drive]):
 
 
 def test_quality_of_service_by_parameter(start: Callable[..., Drive]):
-    """What is set is what the graph shows; the rest stays as documented."""
+    """The graph shows the set values; others stay as documented."""
     drive = start("-p", "qos.drive_states.reliability:=best_effort", "-p", "qos.psec.depth:=5", connect=False)
 
     def offered(topic: str) -> tuple[ReliabilityPolicy, DurabilityPolicy] | None:
@@ -102,13 +102,13 @@ def test_publish_rate_thins_the_grid_and_stays_on_it(start: Callable[..., Drive]
     ],
 )
 def test_wrong_arguments_are_refused_by_name(arguments: list[str], words: list[str]):
-    """One message that names what was found, and status 2."""
+    """One message that names the wrong input, and status 2."""
     text = refusal(*arguments)
     assert [word for word in words if word not in text] == [], text
 
 
 def test_a_wrong_domain_is_refused():
-    """The environment is checked like an argument."""
+    """The environment is validated like an argument."""
     status = subprocess.run(
         [str(node_binary())], env={"ROS_DOMAIN_ID": "233"}, capture_output=True, text=True, timeout=10, check=False
     )

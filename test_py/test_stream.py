@@ -1,4 +1,4 @@
-"""psec_stream: setpoints one at a time, as ros2_control's topic-based hardware and teleoperation send them."""
+"""psec_stream: single setpoints, as from ros2_control's topic-based hardware and teleoperation."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from motion import TSP, assert_psec, go_home, start_swing
 
 ATTEMPTS = 4
 REACH = 0.5 * TSP
-"""How far x moves in a position period, m."""
+"""Step of x per position cycle, m."""
 
 
 def follow(drive: Drive, joints: Sequence[str], rows: np.ndarray) -> None:
-    """Stream rows of positions, each once the axes are commanded the one before."""
+    """Streams rows of positions, each after the previous one is commanded."""
     for row in rows:
         drive.stream(joints, row)
         wanted = dict(zip(joints, row))
@@ -31,7 +31,7 @@ def follow(drive: Drive, joints: Sequence[str], rows: np.ndarray) -> None:
 
 
 def commanded(drive: Drive, joint: str, begin: int) -> np.ndarray:
-    """What `joint` was commanded since `begin`, in order, what holds only once; no instant missing."""
+    """Returns the commands of `joint` since `begin`, in order, without repetitions; asserts an unbroken grid."""
     states = drive.record(begin, drive.now()).states
     assert set(np.diff(states.stamp)) <= {TSP_NS}
     psec = states["psec", joint]
@@ -39,7 +39,7 @@ def commanded(drive: Drive, joint: str, begin: int) -> np.ndarray:
 
 
 def node_status(drive: Drive, condition: Callable[[dict[str, str]], bool]) -> DiagnosticStatus:
-    """The node's part of the first diagnostics from now on whose values fulfil `condition`."""
+    """Returns the node's status of the first new diagnostics whose values satisfy `condition`."""
     seen = len(drive.diagnostics())
 
     def found() -> list[DiagnosticStatus]:
@@ -49,25 +49,25 @@ def node_status(drive: Drive, condition: Callable[[dict[str, str]], bool]) -> Di
 
 
 def numbers(drive: Drive, *keys: str) -> tuple[int, ...]:
-    """Counts of the node so far, by the next diagnostics."""
+    """Returns counters of the node, from the next diagnostics."""
     told = drive.told()
     return tuple(int(told[key]) for key in keys)
 
 
 def counts(drive: Drive) -> tuple[int, int]:
-    """Setpoints refused and ignored so far."""
+    """Returns the numbers of rejected and ignored setpoints."""
     refused, ignored = numbers(drive, "stream_setpoints_refused", "stream_setpoints_ignored")
     return refused, ignored
 
 
 def told_of_stream(drive: Drive, begin: int) -> list[R]:
-    """What the results since `begin` (ns) say about the stream."""
+    """Returns the results of the stream since `begin`, ns."""
     found = [result for result in drive.results() if result.source == R.SOURCE_STREAM]
     return [result for result in found if to_ns(result.header.stamp) >= begin]
 
 
 def told_when(drive: Drive, take: Callable[[], object]) -> list[R]:
-    """What is told when `take` takes joints from a stream that rests at x = 0.001, y = 0; a few attempts."""
+    """Returns the results when `take` preempts joints of a stream at rest at x = 0.001, y = 0; a few attempts."""
     for _ in range(ATTEMPTS):
         go_home(drive)
         time.sleep(0.2)
@@ -85,7 +85,7 @@ def told_when(drive: Drive, take: Callable[[], object]) -> list[R]:
             take()
             return drive.wait_for(lambda begin=begin: told_of_stream(drive, begin), 2, "word of the stream's end")
         except TimeoutError:
-            # The machine stood still for so long that the stream had paused.
+            # A stall of the machine has paused the stream.
             continue
         finally:
             ended.set()
@@ -94,13 +94,13 @@ def told_when(drive: Drive, take: Callable[[], object]) -> list[R]:
 
 
 def wave(amplitude: float, count: int = 100) -> np.ndarray:
-    """One swing 0 -> amplitude -> 0."""
+    """Returns one swing 0 -> amplitude -> 0."""
     return amplitude / 2 * (1 - np.cos(2 * np.pi * np.arange(1, count + 1) / count))
 
 
 @pytest.mark.parametrize("mode", ["real", "fast"])
 def test_the_axes_are_commanded_what_was_streamed_sample_by_sample(mode: str, request: pytest.FixtureRequest):
-    """Two axes along their own paths: each setpoint bit for bit, none twice, none left out."""
+    """Two axes on their own paths: each setpoint bit for bit, none duplicated, none missing."""
     drive: Drive = request.getfixturevalue(mode)
     go_home(drive)
     begin = drive.now()
@@ -115,10 +115,10 @@ def test_the_axes_are_commanded_what_was_streamed_sample_by_sample(mode: str, re
 
 
 def test_a_sender_with_its_own_clock_is_followed_in_order(real: Drive):
-    """At the position period by another clock: setpoints may hold or be overtaken, never go back."""
+    """At the position cycle of another clock: setpoints may repeat or be skipped, but never go back."""
     go_home(real)
     begin, refused = real.now(), counts(real)[0]
-    # Slow enough that a sender that was held up is still within reach.
+    # Slow enough that the setpoints after a delay of the sender are still within reach.
     sent = np.arange(1, 301) * REACH / 300
     due = time.monotonic()
     for position in sent:
@@ -149,7 +149,7 @@ def test_nan_and_short_arrays_leave_joints_alone(real: Drive):
 
 
 def test_a_trajectory_takes_over_and_the_stream_is_ignored_meanwhile(real: Drive):
-    """From the joint's streamed setpoint; the joints that it leaves go on with the stream."""
+    """The trajectory starts at the streamed setpoint; other joints continue with the stream."""
     go_home(real)
     follow(real, ["x", "y"], np.array([[0.001, 0.001], [0.002, 0.002]]))
     ignored = counts(real)[1]
@@ -163,13 +163,13 @@ def test_a_trajectory_takes_over_and_the_stream_is_ignored_meanwhile(real: Drive
     assert real.end(accepted.sequence_number, 10).status == R.COMPLETED
     assert_psec(real, start, {"x": plan})
     assert counts(real)[1] == ignored + 10
-    # And then the stream has the joint again.
+    # Then the stream commands the joint again.
     follow(real, ["x"], np.array([[plan[-1] + 0.001]]))
     assert real.latest("psec")["y"] == 0.012
 
 
 def test_a_set_point_that_cannot_be_is_refused_counted_and_told_once_a_second(start: Callable[..., Drive]):
-    """Beyond the travel limits, out of reach, of no joint; the axis stays, and the log is not flooded."""
+    """Beyond the travel limits, out of reach, unknown joint; the axis does not move, and the log is limited."""
     drive = start()
     begin = drive.now()
     assert counts(drive) == (0, 0)
@@ -193,7 +193,7 @@ def test_a_set_point_that_cannot_be_is_refused_counted_and_told_once_a_second(st
 
 
 def test_a_reset_leaves_nothing_of_the_stream(real: Drive):
-    """Home; what goes on where the stream was is out of reach, a stream that begins at home is not."""
+    """After the reset the old stream is out of reach; a stream that begins at home is accepted."""
     go_home(real)
     follow(real, ["x"], REACH * np.arange(1, 11).reshape(-1, 1) * 0.9)
     refused = counts(real)[0]
@@ -206,7 +206,7 @@ def test_a_reset_leaves_nothing_of_the_stream(real: Drive):
 
 
 def test_a_trajectory_that_takes_joints_from_a_stream_is_told_to_it(real: Drive):
-    """Once, with the joints that it takes and drove."""
+    """One result, with the joints that the trajectory preempts."""
     hold = joint_trajectory(["x", "z"], [0.0, 0.1], [[0.001, 0.0], [0.002, 0.0]])
     told = told_when(real, lambda: real.run(hold))
     assert [(result.status, result.name) for result in told] == [(R.PREEMPTED, ["x"])]
@@ -214,7 +214,7 @@ def test_a_trajectory_that_takes_joints_from_a_stream_is_told_to_it(real: Drive)
 
 
 def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):
-    """Though it goes on within reach of where the axis stands; told, and not for ever."""
+    """The stream continues within reach of the axis; it gets a result, and is accepted after a pause."""
     go_home(real)
     told = told_when(real, lambda: real.stop())
     assert [(result.status, result.name) for result in told] == [(R.STOPPED, ["x", "y"])]
@@ -234,7 +234,7 @@ def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):
 
 
 def test_what_comes_twice_counts_once_and_what_was_overtaken_is_left_out(real: Drive):
-    """By the stamps, which nobody has to give."""
+    """Order by stamps, which are optional."""
     go_home(real)
     begin, before = real.now(), numbers(real, "stream_messages_out_of_order", "stream_setpoints_refused")
     base = 10**9
@@ -248,15 +248,15 @@ def test_what_comes_twice_counts_once_and_what_was_overtaken_is_left_out(real: D
 
 
 def test_a_stream_that_breaks_off_in_motion_holds_and_is_told(start: Callable[..., Drive]):
-    """Once in the log, counted in the diagnostics; one that comes to rest and is silent is fine."""
+    """One log line and a counter in the diagnostics; a stream that ends at rest is not reported."""
     drive = start()
     follow(drive, ["x"], REACH * np.arange(1, 6).reshape(-1, 1) * 0.9)
     status = node_status(drive, lambda v: v["stream_gaps"] != "0")
     assert status.level == DiagnosticStatus.WARN and "broke off in motion" in status.message
-    # More than one on a machine that stood still for a tenth of a second.
+    # More than one on a machine that stalled for a tenth of a second.
     gaps = int(status_values(status)["stream_gaps"])
     assert drive.latest("psec")["x"] == REACH * 5 * 0.9
-    # A tenth of the speed that the axis can brake from in one period.
+    # A tenth of the speed from which the axis can stop in one cycle.
     follow(drive, ["x"], REACH * 4.5 + np.arange(1, 6).reshape(-1, 1) * 1e-6)
     time.sleep(0.2)
     assert numbers(drive, "stream_gaps") == (gaps,)
@@ -265,7 +265,7 @@ def test_a_stream_that_breaks_off_in_motion_holds_and_is_told(start: Callable[..
 
 
 def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
-    """Without a controller that looks ahead there is no delay."""
+    """Without a controller with preview there is no delay."""
     go_home(real)
     status = node_status(real, lambda v: v["stream_drives"] == "false" and v["state"] == "holding")
     assert status_values(status)["stream_delay_ms"] == "0"
@@ -282,7 +282,7 @@ def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
 
     real.wait_for(streaming, 5, "diagnostics of a stream that drives")
     node_status(real, lambda v: v["stream_drives"] == "false")
-    # A trajectory is no stream.
+    # A trajectory is not a stream.
     go_home(real)
     start_swing(real, duration=6.0)
     node_status(real, lambda v: v["stream_drives"] == "false" and v["state"] == "running")
@@ -290,7 +290,7 @@ def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
 
 
 def test_a_controller_that_looks_ahead_delays_the_stream(start: Callable[..., Drive]):
-    """By what it reads ahead of the setpoint that alpha holds back, and all joints alike."""
+    """The delay is the preview beyond the part that alpha covers, and equal for all joints."""
     drive = start("-p", "x.position_loop.controller:=gpc")
     found = drive.get_parameters(["x.position_loop.gpc.n2", "x.delays.alpha_ms"])
     delay = found["x.position_loop.gpc.n2"] - math.ceil(found["x.delays.alpha_ms"] * 1e6 / TSP_NS)
@@ -303,19 +303,19 @@ def test_a_controller_that_looks_ahead_delays_the_stream(start: Callable[..., Dr
     states = drive.record(begin, drive.now()).states
     first = {joint: states.stamp[np.flatnonzero(states["psec", joint])[0]] for joint in ("x", "y")}
     assert first["x"] == first["y"]
-    # Sent after `begin`, it entered at the instant after that one at the earliest.
+    # Sent after `begin`, so the earliest instant of its effect is the next but one.
     assert first["x"] >= begin + (1 + delay) * TSP_NS
     rows = np.column_stack([0.001 + wave(0.02, 50)])[:20]
     follow(drive, ["x"], rows)
     np.testing.assert_array_equal(commanded(drive, "x", begin), [0.0, 0.001, *rows[:, 0]])
 
-    # In its place one that does not look ahead: no delay, once the stream has paused.
+    # A controller without preview: no delay, after the stream has paused.
     drive.set_parameters({"x.position_loop.controller": "cascade"})
     node_status(drive, lambda v: v["stream_delay_ms"] == "0")
 
 
 def test_in_fast_a_stream_alone_goes_at_real_pace(fast: Drive):
-    """Its sender does too: nothing is gained by running away from it."""
+    """Its sender runs in real time, too: the axes must not run ahead of it."""
     go_home(fast)
     before, began = fast.now(), time.monotonic()
     for position in wave(0.01, 150):
@@ -327,7 +327,7 @@ def test_in_fast_a_stream_alone_goes_at_real_pace(fast: Drive):
 
 
 def test_the_topic_can_be_renamed_and_is_reliable(start: Callable[..., Drive]):
-    """To the name under which ros2_control's topic-based hardware publishes."""
+    """Renamed to the topic on which ros2_control's topic-based hardware publishes."""
     drive = start("-r", "psec_stream:=/robot_joint_commands", connect=False)
     found = drive.wait_for(
         lambda: drive.node.get_subscriptions_info_by_topic("/robot_joint_commands"), 10, "subscription"

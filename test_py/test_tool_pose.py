@@ -16,16 +16,16 @@ from drive import DEEP_QOS, TSP_NS, Drive, Node, ballbar, joint_trajectory, to_n
 
 JOINTS = ["x", "y", "z", "a", "c"]
 LENGTH = 850
-"""Poses of a path: more than 64 kB."""
+"""Maximum number of poses of a path: more than 64 kB."""
 SPACING = 1e-4
-"""From one pose of a path to the next at least, m."""
+"""Minimum distance between poses of a path, m."""
 
 
 class Tool:
-    """What a node says of its tool."""
+    """Messages of a node about its tool."""
 
     def __init__(self, drive: Drive):
-        """Listen beside a drive, by its spinning thread."""
+        """Subscribes with the node of a drive, in its executor."""
         self.drive = drive
         self.poses: dict[int, PoseStamped] = {}
         self.paths: dict[str, list[Path]] = {"tool_path": [], "tool_path_setpoint": []}
@@ -34,7 +34,7 @@ class Tool:
         self._subscriptions = [
             node.create_subscription(PoseStamped, f"{target}/tool_pose", self._take_pose, DEEP_QOS)
         ] + [
-            # One deep: rclpy takes long to read a path.
+            # Depth 1: rclpy takes long to deserialize a path.
             node.create_subscription(Path, f"{target}/{name}", store.append, 1)
             for name, store in self.paths.items()
         ]
@@ -45,7 +45,7 @@ class Tool:
             self.poses[to_ns(pose.header.stamp)] = pose
 
     def paths_with(self, condition: Callable[[Path], bool], what: str) -> tuple[Path, Path]:
-        """Wait for the newest actual path with a property, and the setpoints' path of the same poses."""
+        """Waits for the newest actual path that satisfies `condition`, and the setpoint path of the same poses."""
 
         def pair() -> tuple[Path, Path] | None:
             for actual in reversed(self.paths["tool_path"][-5:]):
@@ -58,24 +58,24 @@ class Tool:
 
 
 def stamps(path: Path) -> list[int]:
-    """Times of the poses, ns."""
+    """Returns the times of the poses, ns."""
     return [to_ns(pose.header.stamp) for pose in path.poses]
 
 
 def tips(path: Path) -> np.ndarray:
-    """Tips of the poses, m."""
+    """Returns the tips of the poses, m."""
     points = [pose.pose.position for pose in path.poses]
     return np.array([[p.x, p.y, p.z] for p in points])
 
 
 def quaternion(pose: PoseStamped) -> np.ndarray:
-    """x, y, z, w."""
+    """Returns x, y, z, w."""
     q = pose.pose.orientation
     return np.array([q.x, q.y, q.z, q.w])
 
 
 def matrix_of(q: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a unit quaternion x, y, z, w."""
+    """Returns the rotation matrix of a unit quaternion x, y, z, w."""
     v, w = q[:3], q[3]
     cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
     return (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * cross
@@ -83,7 +83,7 @@ def matrix_of(q: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def tool() -> Iterator[Tool]:
-    """A machine with every offset, as fast as it goes, whose paths have at most LENGTH poses."""
+    """Yields a machine with all offsets in `fast`, whose paths have at most LENGTH poses."""
     offsets = [text for key, value in OFFSETS.items() for text in ("-p", f"kinematics.{key}_mm:={value}")]
     arguments = ["-p", "time:=fast", "-p", "tool_path_rate:=10.0", "-p", "workpiece_frame:=left/workpiece"]
     arguments += ["-p", f"tool_path_length:={LENGTH}"]
@@ -92,7 +92,7 @@ def tool() -> Iterator[Tool]:
 
 
 def test_the_pose_is_the_kinematics_of_the_joint_states(tool: Tool):
-    """All five axes move, C by most of a turn: tip and orientation at each stamp, the sign without a jump."""
+    """All five axes move, C by most of a turn: tip and orientation at each stamp, quaternion sign continuous."""
     times = np.arange(0, 4.8, 0.012)
     s = (1 - np.cos(np.pi * times / times[-1])) / 2
     plan = np.column_stack([0.1 * s, -0.08 * s, 0.05 * s, 0.7 * s, 0.9 * 2 * math.pi * s])
@@ -116,7 +116,7 @@ def test_the_pose_is_the_kinematics_of_the_joint_states(tool: Tool):
 
 
 def test_a_reset_clears_the_paths(tool: Tool):
-    """What was before it is gone; the paths begin where the tool is."""
+    """Earlier poses are gone; the paths begin at the present tool position."""
     tool.drive.run(joint_trajectory(["x"], [0.5], [[0.05]]), settle=0.1)
     tool.drive.reset()
     now = tool.drive.now()
@@ -141,19 +141,19 @@ def test_the_paths_show_the_contour_error_of_the_ballbar(fast: Drive):
     steady = (when >= path.steady[0]) & (when <= path.steady[1])
     assert steady.sum() > 400
     outside = radial(tips(actual))[steady]
-    # Where the setpoints are delayed by one and a half periods: one and two of them, no others.
+    # The setpoint is delayed by one and a half cycles: the delay is one or two cycles.
     assert np.abs(radial(tips(setpoint)[steady])).max() < 1e-9
-    # The error that the recorded positions have at the same instants, and the specified figure.
+    # Radial deviation of the recorded positions at the same instants, and the specified figure.
     expected = recording.radial_deviation(path.center, path.radius)
     by_stamp = dict(zip(recording.joints.stamp.tolist(), expected))
     assert outside == pytest.approx([by_stamp[s] for s in np.array(stamps(actual))[steady].tolist()], abs=1e-9)
     assert 1e6 * outside.mean() == pytest.approx(49.0, abs=1.0)
-    # Both paths go together: at equal places in the lists the distance is the synchronized error.
+    # Both paths have the same instants: the distance at equal indices is the delay-compensated following error.
     assert np.linalg.norm(tips(actual) - tips(setpoint), axis=1).max() < 150e-6
 
 
 def test_a_long_path_keeps_its_newest_part_and_arrives_whole(tool: Tool):
-    """The reader gets every pose, no more than asked for, no closer than the spacing."""
+    """The reader gets all poses, at most the configured number, at least the spacing apart."""
     times = np.arange(0, 6.001, 0.006)
     x = 0.1 * np.sin(2 * np.pi * times / 2) * np.clip(np.minimum(times, 6 - times), 0, 1)
     recording = tool.drive.run(joint_trajectory(["x"], times, x[:, None]), settle=0.2)
@@ -167,7 +167,7 @@ def test_a_long_path_keeps_its_newest_part_and_arrives_whole(tool: Tool):
 
 
 def test_a_rate_of_zero_publishes_no_path(start: Callable[..., Drive]):
-    """The pose comes all the same."""
+    """The pose is still published."""
     drive = start("-p", "time:=fast", "-p", "tool_path_rate:=0.0")
     seen: list[object] = []
     subscriptions = [

@@ -1,4 +1,4 @@
-"""The tools: options that make no sense are refused before anything is done; the soak finds what grows."""
+"""The tools: invalid options are rejected before any work; the soak test detects growth."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LOOKS = 60
-"""Of an hour."""
+"""Duration of the synthetic looks: one hour."""
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_what_makes_no_sense_is_refused(tool: str, options: list[str], words: li
 
 @pytest.fixture(scope="module")
 def soak() -> ModuleType:
-    """The tool as a module."""
+    """Loads the tool as a module."""
     tools = str(ROOT / "tools")
     sys.path.insert(0, tools)
     try:
@@ -58,7 +58,7 @@ def soak() -> ModuleType:
 
 
 def an_hour(soak: ModuleType, **growth: float) -> list:
-    """Looks at a process whose figures wander, and grow by so much in the second half."""
+    """Returns looks at a process with fluctuating figures that grow by these amounts in the second half."""
     looks = []
     for k in range(LOOKS):
         passed = max(2 * k / (LOOKS - 1) - 1, 0.0)

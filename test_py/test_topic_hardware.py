@@ -1,4 +1,4 @@
-"""The axes as the hardware of ros2_control, through joint_state_topic_hardware_interface."""
+"""The axes as ros2_control hardware, through joint_state_topic_hardware_interface."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from topic_hardware import COMMANDS_TOPIC, STATES_TOPIC, Network, TopicHardware
 
 REMAPS = (f"psec_stream:={COMMANDS_TOPIC}", f"joint_states:={STATES_TOPIC}")
 JOINTS = ["c", "a", "y", "x", "z"]
-"""In an order of its own; z is not commanded, so that the positions are one short."""
+"""Joints in their own order; z is not commanded, so positions has one element less."""
 VMAX = 0.5
-"""m/s, of the linear axes."""
+"""Speed limit of the linear axes, m/s."""
 ATTEMPTS = 4
-"""A machine that stands still for a tenth of a second breaks a stream off, and is given another try."""
+"""Attempts of a run: a stall of the machine for a tenth of a second interrupts the stream."""
 
 
 @pytest.fixture(scope="module")
 def robot() -> Iterator[Drive]:
-    """Axes under the names that the hardware uses by default."""
+    """Yields axes with the default names of the hardware."""
     arguments = [word for remap in REMAPS for word in ("-r", remap)]
     with Node(arguments) as process, Drive(process=process, remaps=REMAPS) as drive:
         yield drive
@@ -32,7 +32,7 @@ def robot() -> Iterator[Drive]:
 
 @dataclass
 class Run:
-    """What was commanded, what reached the axes, and what the node counted meanwhile."""
+    """Commands, setpoints of the axes, and counters of the node."""
 
     commanded: dict[str, np.ndarray]
     psec: dict[str, np.ndarray]
@@ -50,13 +50,13 @@ COUNTS = (
 
 
 def counts(drive: Drive) -> dict[str, int]:
-    """The node's counts, younger than now."""
+    """Returns new values of the node's counters."""
     told = drive.told()
     return {key: int(told[key]) for key in COUNTS}
 
 
 def rise(amplitude: float, duration: float, t: float) -> float:
-    """From 0 to `amplitude` in `duration` s, without a step in acceleration, and then at rest."""
+    """Returns a motion from 0 to `amplitude` in `duration` s with continuous acceleration, then rest."""
     phase = min(t / duration, 1.0)
     return amplitude * (phase - math.sin(2 * math.pi * phase) / (2 * math.pi))
 
@@ -64,7 +64,7 @@ def rise(amplitude: float, duration: float, t: float) -> float:
 def drive_hardware(
     drive: Drive, moves: Mapping[str, float], duration: float, rate: float, network: Network, threshold: float
 ) -> Run:
-    """Move joints by ros2_control's way and let them settle; what came of it."""
+    """Moves joints through ros2_control and waits until they settle."""
     go_home(drive)
     before, begin = counts(drive), drive.now()
     hardware = TopicHardware(drive, JOINTS, ["x", "y", "a", "c"], threshold)
@@ -90,10 +90,10 @@ def drive_hardware(
 
 
 def attempt(drive: Drive, *args: object) -> Run:
-    """A run in which the machine that the test runs on did not break the stream off."""
+    """Returns a run that was not interrupted by a stall of the test machine."""
     for _ in range(ATTEMPTS):
         run = drive_hardware(drive, *args)
-        # What holds whatever the machine does.
+        # Assertions that hold on a stalled machine, too.
         assert np.abs(np.diff(run.psec["x"])).max() <= VMAX * TSP * (1 + 1e-9)
         if run.counts["stream_gaps"] == 0:
             return run
@@ -102,12 +102,12 @@ def attempt(drive: Drive, *args: object) -> Run:
 
 @pytest.mark.parametrize(("rate", "threshold"), [(100.0, -1.0), (250.0, 1e-5)])
 def test_what_it_commands_reaches_the_axes(robot: Drive, rate: float, threshold: float):
-    """Only what it commanded, in order; joints that it leaves alone stay where they are."""
+    """Only commanded setpoints, in order; other joints do not move."""
     moves = {"x": 0.06, "y": -0.04, "c": 0.1}
     run = attempt(robot, moves, 0.8, rate, Network(), threshold)
     assert run.counts["stream_setpoints_refused"] == run.counts["stream_messages_out_of_order"] == 0
     for joint, way in moves.items():
-        # Besides, on a machine that falters, what was on the way to it at the largest speed.
+        # On a stalled machine, also the setpoints in transit at the maximum speed.
         others = set(run.psec[joint]) - {0.0, *run.commanded[joint]}
         assert len(others) <= run.counts["stream_speed_limited_periods"]
         assert (np.diff(run.psec[joint]) * way >= 0).all()
@@ -117,9 +117,9 @@ def test_what_it_commands_reaches_the_axes(robot: Drive, rate: float, threshold:
 
 
 def test_jitter_duplicates_overtaking_and_gaps_end_where_it_commanded(robot: Drive):
-    """At nine tenths of the largest speed: nothing refused, nothing latched, no step beyond Vmax·Tsp."""
+    """At nine tenths of the maximum speed: nothing rejected, no lockout, no step beyond Vmax·Tsp."""
     network = Network(seed=5, jitter=0.012, duplicates=0.2, gaps=0.02, gap=0.03)
-    # The largest speed of `rise` is twice the mean one.
+    # The maximum speed of `rise` is twice the mean.
     way, duration, rate = 0.27, 1.2, 500.0
     assert 0.89 * VMAX < 2 * way / duration < 0.91 * VMAX
     run = attempt(robot, {"x": way}, duration, rate, network, -1.0)

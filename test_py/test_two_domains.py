@@ -1,4 +1,4 @@
-"""Two machines on one computer, apart by ROS_DOMAIN_ID alone."""
+"""Two machines on one computer, separated by ROS_DOMAIN_ID only."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_domains_do_not_hear_each_other(start: Callable[..., Drive]):
 
 
 def test_two_namespaces_share_a_domain(start: Callable[..., Drive]):
-    """The names keep them apart where the domain does not."""
+    """In one domain the namespaces separate the machines."""
     left = start("-r", "__ns:=/left", name="/left/virtual_axes")
     right = start("-r", "__ns:=/right", name="/right/virtual_axes", domain_id=left.process.domain_id)
     _, begin, plan = start_swing(left, duration=1.2)

@@ -1,4 +1,4 @@
-"""The URDF: read by ROS's own parsers, its limits against the machine file, its geometry against the kinematics.
+"""The URDF: read by ROS's own parsers, limits compared with the machine file, geometry with the kinematics.
 
 `urdf_parser_py` and `check_urdf` (urdfdom, which robot_state_publisher uses) come from PyPI.
 """
@@ -23,25 +23,25 @@ MACHINES = ["mikron_ucp710", "linear_motor_center"]
 
 
 def command(*arguments: str) -> str:
-    """Run `virtual_axes`, which stands beside the node, and return what it prints."""
+    """Runs `virtual_axes` beside the node and returns its output."""
     program = node_binary().with_name("virtual_axes")
     return subprocess.run([program, *arguments], check=True, capture_output=True, text=True, timeout=60).stdout
 
 
 def machine_file(name: str) -> dict:
-    """Read the parameters of a shipped machine by another YAML reader than ours."""
+    """Reads the parameters of a built-in machine with another YAML parser."""
     return yaml.safe_load((ROOT / "config" / f"{name}.yaml").read_text())["/**"]["ros__parameters"]
 
 
 def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Rodrigues: the rotation by `angle` about the unit vector `axis`."""
+    """Returns the rotation by `angle` about the unit vector `axis` (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
 
 
 def transform(joint: Joint, value: float) -> np.ndarray:
-    """Child in parent, as the URDF specification has it."""
+    """Returns the pose of the child in the parent, by the URDF specification."""
     roll, pitch, yaw = joint.origin.rpy
     matrix = np.eye(4)
     matrix[:3, :3] = rotation(np.eye(3)[2], yaw) @ rotation(np.eye(3)[1], pitch) @ rotation(np.eye(3)[0], roll)
@@ -55,7 +55,7 @@ def transform(joint: Joint, value: float) -> np.ndarray:
 
 
 def frame(robot: URDF, link: str, joints: dict[str, float]) -> np.ndarray:
-    """The link in the root."""
+    """Returns the pose of the link in the root."""
     matrix = np.eye(4)
     for name in robot.get_chain(robot.get_root(), link, links=False):
         joint = robot.joint_map[name]
@@ -65,7 +65,7 @@ def frame(robot: URDF, link: str, joints: dict[str, float]) -> np.ndarray:
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_limits_are_the_machine_files(machine: str):
-    """Names and kinds as in joint_states; stroke, velocity and effort in SI."""
+    """Names and kinds as in joint_states; travel limits, velocity and effort in SI."""
     robot = URDF.from_xml_string(command("urdf", "--machine", machine, "--joint-prefix", "mill_"))
     parameters = machine_file(machine)
     moving = {name: joint for name, joint in robot.joint_map.items() if joint.type != "fixed"}
@@ -75,14 +75,14 @@ def test_limits_are_the_machine_files(machine: str):
         limits, motor, transmission = axis["limits"], axis["motor"], axis["transmission"]
         linear = axis["type"] == "linear"
         velocity = limits["velocity_m_min"] / 60 if linear else limits["velocity_rpm"] * 2 * math.pi / 60
-        ends = [limits.get(f"stroke_{end}_{'mm' if linear else 'deg'}") for end in ("min", "max")]
+        ends = [limits.get(f"travel_{end}_{'mm' if linear else 'deg'}") for end in ("min", "max")]
         if ends == [None, None] and not linear:
             assert joint.type == "continuous"
         else:
             assert joint.type == ("prismatic" if linear else "revolute")
             unit = 1e-3 if linear else math.pi / 180
-            stroke = [end * unit for end in ends]
-            assert [joint.limit.lower, joint.limit.upper] == pytest.approx(stroke, rel=1e-12)
+            travel = [end * unit for end in ends]
+            assert [joint.limit.lower, joint.limit.upper] == pytest.approx(travel, rel=1e-12)
         if transmission.get("direct"):
             ratio = 1.0
         else:
@@ -94,7 +94,7 @@ def test_limits_are_the_machine_files(machine: str):
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_the_tool_in_the_workpiece_is_the_kinematics(machine: str):
-    """URDF, `virtual_axes pose` and the documented equations at random joints, with every offset in play."""
+    """URDF, `virtual_axes pose` and the documented equations at random joint positions, with all offsets."""
     settings = [text for key, value in OFFSETS.items() for text in ("--set", f"kinematics.{key}_mm={value}")]
     robot = URDF.from_xml_string(command("urdf", "--machine", machine, *settings))
     assert robot.get_root() == "machine"
@@ -119,7 +119,7 @@ def test_the_tool_in_the_workpiece_is_the_kinematics(machine: str):
 
 
 def test_a_positive_joint_moves_the_tool_relative_to_the_workpiece():
-    """ISO 841, axis by axis: with the tool at home, and what turns seen from the table."""
+    """ISO 841 for each axis: rotations relative to the table, with the tool at home."""
     robot = URDF.from_xml_string(command("urdf"))
 
     def tool(**joints: float) -> np.ndarray:
@@ -127,17 +127,17 @@ def test_a_positive_joint_moves_the_tool_relative_to_the_workpiece():
 
     for place, name in enumerate("xyz"):
         assert tool(**{name: 0.1})[:3, 3] - tool()[:3, 3] == pytest.approx(0.1 * np.eye(3)[place], abs=1e-15)
-    # A right-handed turn of the tool about X brings its axis from Z towards -Y; about Z, X towards Y.
+    # A right-handed rotation of the tool about X turns its axis from Z towards -Y; about Z, X towards Y.
     assert tool(a=math.pi / 2)[:3, 2] == pytest.approx([0.0, -1.0, 0.0], abs=1e-15)
     assert tool(c=math.pi / 2)[:3, 0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-15)
-    # The tables themselves turn the other way.
+    # The tables rotate in the opposite direction.
     assert frame(robot, "cradle", {"a": math.pi / 2})[:3, 2] == pytest.approx([0.0, 1.0, 0.0], abs=1e-15)
     assert frame(robot, "table", {"c": math.pi / 2})[:3, 0] == pytest.approx([0.0, -1.0, 0.0], abs=1e-15)
 
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_urdfdom_takes_it(machine: str, tmp_path: Path):
-    """The parser that robot_state_publisher uses sees one tree without complaints."""
+    """The parser of robot_state_publisher reads one tree without errors."""
     path = tmp_path / "machine.urdf"
     command("urdf", "--machine", machine, "--out", str(path))
     answer = subprocess.run(["check_urdf", path], capture_output=True, text=True, timeout=20, check=False)

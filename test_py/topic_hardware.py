@@ -1,4 +1,4 @@
-"""A stand-in for ros2_control's joint_state_topic_hardware_interface, and a network that is not kind.
+"""Stand-in for ros2_control's joint_state_topic_hardware_interface, and a network with losses.
 
 It does what that hardware does in each update of the controller manager: `read` takes the newest joint
 states over, `write` sends one JointState with the command of every joint in the order of its URDF, and
@@ -24,29 +24,29 @@ from drive import Drive
 COMMANDS_TOPIC = "/robot_joint_commands"
 STATES_TOPIC = "/robot_joint_states"
 THRESHOLD = 1e-5
-"""Below this a command is held back, unless another one is set; -1 sends always."""
+"""Default threshold below which a command is not sent; -1 sends all commands."""
 
 
 @dataclass(frozen=True)
 class Network:
-    """What happens to messages on their way, by a fixed seed."""
+    """Network disturbances, by a fixed seed."""
 
     seed: int = 0
     jitter: float = 0.0
-    """s, each message is late by up to this; one that is later than the next is overtaken."""
+    """Maximum delay of a message, s; a message may be overtaken by the next one."""
     duplicates: float = 0.0
-    """Share of the messages that come twice."""
+    """Share of duplicated messages."""
     gaps: float = 0.0
-    """Share of the messages with which a gap begins."""
+    """Share of messages at which a gap begins."""
     gap: float = 0.0
-    """s, for so long nothing comes."""
+    """Duration of a gap without messages, s."""
 
     def schedule(self, count: int, rate: float) -> list[tuple[float, int]]:
-        """When (s) each of `count` messages at `rate` (Hz) comes, in order; lost ones are left out."""
+        """Returns arrival time (s) and index of `count` messages at `rate` (Hz) in order, without lost messages."""
         rng = random.Random(self.seed)
         arrivals: list[tuple[float, int]] = []
         silent_until = -1.0
-        # Whole to begin with and in the end: what is lost there nobody sends again.
+        # No losses at the beginning and at the end: a message lost there is not sent again.
         for index in range(count):
             sent = index / rate
             if 0.2 < sent < count / rate - 0.5 and sent >= silent_until and rng.random() < self.gaps:
@@ -61,7 +61,7 @@ class Network:
 
 
 class TopicHardware:
-    """The hardware: states in, commands out."""
+    """Hardware interface: states in, commands out."""
 
     def __init__(
         self,
@@ -70,14 +70,14 @@ class TopicHardware:
         position_interfaces: Sequence[str],
         threshold: float = THRESHOLD,
     ):
-        """`joints` in the URDF's order; those of `position_interfaces` can be commanded."""
+        """Creates the interface; `joints` in the order of the URDF, commands only for `position_interfaces`."""
         self.joints = list(joints)
         self.threshold = threshold
         self._has_position = [joint in position_interfaces for joint in joints]
         self.command = dict.fromkeys(joints, math.nan)
-        """m or rad; NaN: no controller has claimed it."""
+        """Commands, m or rad; NaN if no controller has claimed the joint."""
         self.state = dict.fromkeys(joints, math.nan)
-        """m or rad, as of the last `read`."""
+        """States of the newest `read`, m or rad."""
         self._newest: JointState | None = None
         self._drive = drive
         self.node = drive.node
@@ -90,17 +90,17 @@ class TopicHardware:
         self._newest = message
 
     def is_connected(self) -> bool:
-        """Whether somebody takes the commands and states have come."""
+        """Returns true if the commands have a subscriber and states have arrived."""
         return self._publisher.get_subscription_count() > 0 and self._newest is not None
 
     def read(self) -> None:
-        """Take the newest states over."""
+        """Copies the newest states."""
         if (newest := self._newest) is not None:
             self.state.update({j: p for j, p in zip(newest.name, newest.position) if j in self.state})
 
     def write(self) -> JointState | None:
-        """The message with the commands, or none while it is held back."""
-        # A NaN makes the sum one, which is not below any threshold.
+        """Returns the message with the commands, or None below the threshold."""
+        # NaN makes the sum NaN, which is not below any threshold.
         difference = sum(abs(self.state[joint] - self.command[joint]) for joint in self.joints)
         if difference <= self.threshold:
             return None
@@ -110,11 +110,11 @@ class TopicHardware:
         return message
 
     def send(self, message: JointState) -> None:
-        """Publish it."""
+        """Publishes the message."""
         self._publisher.publish(message)
 
     def close(self) -> None:
-        """Leave."""
+        """Destroys publisher and subscription."""
 
         def leave() -> None:
             self.node.destroy_publisher(self._publisher)
@@ -129,7 +129,7 @@ class TopicHardware:
         rate: float,
         network: Network | None = None,
     ) -> list[dict[str, float]]:
-        """Update at `rate` (Hz) for `duration` s; `controller(t)` commands joints at t s.
+        """Updates at `rate` (Hz) for `duration` s; `controller(t)` commands joints at t s.
 
         The controller's time is the count of updates, as with a controller that is given the period.
         Returns what was commanded at each update.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The paper's figure 11 by the tuner: better on the circle, worse at a corner; writes docs/figure-11.svg.
+"""Figure 11 of the paper by `tune`: better on the circle, worse at a corner; writes docs/figure-11.svg.
 
 Needs `cargo build --release` and `source .build/env.sh`. Takes minutes: the tuner looks at the whole grid.
 """
@@ -23,20 +23,20 @@ COMMAND = ROOT / "target" / "release" / "virtual_axes"
 PICTURE = ROOT / "docs" / "figure-11.svg"
 CIRCLE, CORNER = "ballbar", "corner-45"
 RADIUS_MM = 150.0
-# The end of the first leg, and how much of the corner is shown.
+# End of the first leg, and the displayed range around the corner, mm.
 LEG_MM, AROUND_MM = 50.0, 2.5
-# Between the ramps, as the radial deviation is defined, s.
+# Span between the ramps, as in the definition of the radial deviation, s.
 STEADY = (1.5, 8.04)
 
 
 def search() -> dict:
-    """The contrast that the tuner finds."""
+    """Returns the contrast that `tune` finds."""
     arguments = ["tune", CIRCLE, "--controller", "gpc", "--also", CORNER, "--contrast", "--json"]
     return json.loads(subprocess.run([COMMAND, *arguments], check=True, capture_output=True).stdout)
 
 
 def trace(scenario: str, changes: list[str]) -> dict[str, list[float]]:
-    """Positions of X and Y in mm, every millisecond."""
+    """Returns positions of X and Y in mm, every millisecond."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace.csv"
         arguments = ["run", scenario, "--trace", path, "--trace-period", "1ms"]
@@ -51,7 +51,7 @@ def trace(scenario: str, changes: list[str]) -> dict[str, list[float]]:
 
 
 def draw(contrast: dict) -> None:
-    """The circle's deviation over its angle and the corner, of both controllers."""
+    """Draws the circle's deviation over its angle and the corner, of both controllers."""
     tuning = contrast["best"]["tuning"]
     names = {"n1": "N1", "n2": "N2", "nu": "Nu", "lambda_rel": "λ_rel"}
     changes = [f"{axis}.position_loop.controller=gpc" for axis in "xy"]
@@ -84,7 +84,7 @@ def draw(contrast: dict) -> None:
 
 
 def main() -> int:
-    """Searches, draws and says what was found."""
+    """Searches, draws and prints the result."""
     options.parser(__doc__).parse_args()
     contrast = search()
     draw(contrast)

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Fuzzes everything that comes from outside (fuzz/), on stable Rust and without cargo-fuzz.
+# Fuzzes all external inputs (fuzz/) on stable Rust, without cargo-fuzz.
 #
-#     tools/fuzz.sh build            only builds the targets
-#     tools/fuzz.sh short            each target so many runs from its seeds, the same on every machine
-#     tools/fuzz.sh long MINUTES     all targets for so long together, on all cores; a table in Markdown
+#     tools/fuzz.sh build            builds the targets
+#     tools/fuzz.sh short            runs each target for a fixed number of inputs from its seeds; reproducible
+#     tools/fuzz.sh long MINUTES     runs all targets on all cores for MINUTES in total; prints a Markdown table
 #
-# FUZZ_TARGETS names some of them. What the long run finds worth keeping is in fuzz/corpus, what breaks
-# a target in fuzz/artifacts; `tools/fuzz.sh run TARGET FILE` runs one input.
+# FUZZ_TARGETS selects targets. The long run adds inputs with new coverage to fuzz/corpus and failing inputs to
+# fuzz/artifacts; `tools/fuzz.sh run TARGET FILE` runs one input.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 host=$(rustc -vV | sed -n 's/^host: //p')
@@ -14,15 +14,15 @@ binaries=fuzz/target/$host/release
 targets=${FUZZ_TARGETS:-$(sed -nE 's/^name = "(.*)"$/\1/p' fuzz/Cargo.toml | grep -v virtual_axes)}
 mode=${1:-short}
 
-# An input may take so many seconds and MiB.
+# Limits of one input: seconds and MiB.
 limits=(-timeout=20 -rss_limit_mb=1024)
-# Of the short run.
+# Seed and number of inputs of the short run.
 seed=20240607
 runs=2500
 
-# As cargo-fuzz does it, without a sanitizer: the library forbids unsafe code.
+# The flags of cargo-fuzz without a sanitizer: the library forbids unsafe code.
 build() {
-  command -v g++ >/dev/null || { echo "fuzz: needs g++, in which libFuzzer is written (Debian: apt-get install g++)" >&2; exit 1; }
+  command -v g++ >/dev/null || { echo "fuzz: g++ is required to build libFuzzer (Debian: apt-get install g++)" >&2; exit 1; }
   local flag coverage="-Cpasses=sancov-module"
   for flag in level=4 inline-8bit-counters pc-table trace-compares; do
     coverage+=" -Cllvm-args=-sanitizer-coverage-$flag"
@@ -37,7 +37,7 @@ fuzz_one() { # target, log, options of libFuzzer
   "$binaries/$target" "${limits[@]}" -dict=fuzz/words.dict -artifact_prefix="fuzz/artifacts/$target/" "$@" >"$log" 2>&1
 }
 
-# The log of a run that failed, cut to what matters.
+# Prints the end of the log of a failed run.
 show_failure() { # target, log
   echo "fuzz: $1 failed:" >&2
   grep -vE '^#[0-9]' "$2" | tail -n 40 >&2
@@ -45,7 +45,7 @@ show_failure() { # target, log
 
 short_one() {
   local target=$1 status=0 scratch
-  # What is found goes into the first folder: the corpus stays out of it, so that each run is the same.
+  # libFuzzer writes new inputs to the first folder: the corpus is not used, so that each run is reproducible.
   scratch=$(mktemp -d)
   mkdir "$scratch/found"
   fuzz_one "$target" "$scratch/log" -seed="$seed" -runs="$runs" -max_len=4096 "$scratch/found" \
@@ -90,7 +90,7 @@ case $mode in
     printf '%s\n' $targets | xargs -P "$(nproc)" -I{} bash -euc 'limits=($LIMITS); short_one {}'
     ;;
   long)
-    minutes=${2:?minutes, for all targets together}
+    minutes=${2:?MINUTES in total for all targets}
     build
     mkdir -p .build/fuzz
     rm -f .build/fuzz/*.row
@@ -100,13 +100,13 @@ case $mode in
     export binaries
     export LIMITS="${limits[*]}"
     printf '%s\n' $targets | xargs -P "$(nproc)" -I{} bash -euc 'limits=($LIMITS); long_one {} '"$seconds"' .build/fuzz/{}.log'
-    echo "| target | inputs | edges from the seeds | edges | features | edges of the program | kept | broken |"
+    echo "| target | inputs | edges from the seeds | edges | features | edges of the program | kept | failed |"
     echo "|---|---|---|---|---|---|---|---|"
     cat .build/fuzz/*.row
     ! grep -q '| 1 |$' .build/fuzz/*.row
     ;;
   *)
-    echo "fuzz: $mode? tools/fuzz.sh build | short | long MINUTES | run TARGET FILE" >&2
+    echo "fuzz: unknown mode $mode, allowed: build | short | long MINUTES | run TARGET FILE" >&2
     exit 1
     ;;
 esac

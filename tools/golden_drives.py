@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes tests/golden/drives.csv and loops.csv: drives at the edges of their ranges, by exponentials of 120 digits.
+"""Writes tests/golden/drives.csv and loops.csv: drives at the limits of their ranges, computed with 120 digits.
 
     pip install mpmath==1.4.1
     python tools/golden_drives.py
@@ -17,12 +17,12 @@ from mpmath import mpf
 
 import options
 
-# Digits: the largest exponent has 14, the least of the entries that count 60.
+# Digits: the largest exponent has 14, the smallest significant entries need 60.
 mpmath.mp.dps = 120
 GOLDEN = pathlib.Path(__file__).parent.parent / "tests" / "golden"
 SEED = 8
 
-# SI, smallest and largest as the schema allows them, deviations of the plant included; one in the middle.
+# SI, minimum and maximum of the schema, deviations of the plant included; one value between them.
 RANGES = {
     "inertia": (1e-10, 0.028, 1e7),
     "torque_constant": (1e-10, 2.64, 1e6),
@@ -31,16 +31,16 @@ RANGES = {
     "inductance": (1e-9, 8.5e-3, 1e2),
     "tick": (1e-6, 125e-6, 50e-3),
 }
-# Of a range that begins with nothing, the smallest value that is drawn.
+# Smallest value drawn from a range that begins at 0.
 SMALLEST = 1e-9
-# How far from a double pole: as parts of the resistance that makes one.
+# Relative distances of the resistance from the value that gives a double pole.
 NEAR = (0.0, 1e-15, 1e-12, 1e-8, 1e-4, 1e-2)
 # The double pole times the tick.
 DOUBLE = (0.01, 0.39, 0.41, 0.99, 1.01, 3.0, 30.0)
 
 
 def exponential(matrix):
-    """e^matrix by a Taylor series on a halved interval, squared back."""
+    """Returns e^matrix by a Taylor series with scaling and squaring."""
     norm = max(mpmath.fsum(abs(matrix[i, j]) for j in range(matrix.cols)) for i in range(matrix.rows))
     halvings = 0
     while norm > mpf("0.01"):
@@ -58,7 +58,7 @@ def exponential(matrix):
 
 
 def step(motor, tick):
-    """States i, ω, θ and the held inputs u and τ over a tick."""
+    """Returns the step matrix of the states i, ω, θ and the held inputs u and τ over a tick."""
     j, kt, ke, r, ind = (mpf(motor[k]) for k in list(RANGES)[:5])
     a = mpmath.zeros(5)
     a[0, 0], a[0, 1], a[0, 3] = -r / ind, -ke / ind, 1 / ind
@@ -68,13 +68,13 @@ def step(motor, tick):
 
 
 def turns_back(motor, tick):
-    """Whether a torque turns the speed against itself within the tick: the condition of a refusal."""
+    """Returns true if a torque step reverses the sign of the speed within the tick: the condition of a rejection."""
     j, kt, ke, r, ind = (mpf(motor[k]) for k in list(RANGES)[:5])
     p, square = r / ind / 2, ke * kt / (j * ind)
     if square <= p * p:
         return False
     nu = mpmath.sqrt(square - p * p)
-    # The response falls from the angle π − atan(ν/p) on, until a whole π later.
+    # The response decreases from the angle π − atan(ν/p) on, for an angle of π.
     fall = mpmath.atan2(nu, -p)
     end = min(mpf(tick) * nu, fall + mpmath.pi)
     if end <= fall:
@@ -83,7 +83,7 @@ def turns_back(motor, tick):
 
 
 def step_response(p, nu, square, t):
-    """J times ω after a torque of 1 from rest."""
+    """Returns J times ω after a torque of 1 from rest."""
     decay = mpmath.exp(-p * t)
     g = decay * mpmath.sin(nu * t) / nu
     integral = (1 - decay * (mpmath.cos(nu * t) + p / nu * mpmath.sin(nu * t))) / square
@@ -91,7 +91,7 @@ def step_response(p, nu, square, t):
 
 
 def motors():
-    """Each value at its edges, pairs of edges, numbers drawn from the whole of the ranges, and nearly double poles."""
+    """Returns motors at the limits of each value, pairs of limits, random values, and nearly double poles."""
     names = list(RANGES)
     middle = {name: RANGES[name][1] for name in names}
     yield dict(middle)
@@ -101,7 +101,7 @@ def motors():
     for first, second in itertools.combinations(names, 2):
         for one, other in itertools.product((0, 2), repeat=2):
             yield middle | {first: RANGES[first][one], second: RANGES[second][other]}
-    # All corners: what is worst need not be worst by two.
+    # All corners: the worst case need not be at a pair of limits.
     for corner in itertools.product((0, 2), repeat=len(names)):
         yield {name: RANGES[name][edge] for name, edge in zip(names, corner)}
     source = random.Random(SEED)
@@ -119,7 +119,7 @@ def motors():
 
 
 def number(value):
-    """As an f64 is written; what is smaller than any is 0."""
+    """Returns the text of an f64; numbers below the smallest f64 become 0."""
     value = float(value)
     return repr(0.0 if abs(value) < 1e-290 else value)
 
@@ -137,7 +137,7 @@ def drives():
     return lines
 
 
-# Of the X axis of the default machine, in the units of machine files: value, and the factor to SI.
+# X axis of the default machine, in the units of machine files: value, and the factor to SI.
 LOOPS = {
     "motor.inertia_kg_m2": (0.028, 1),
     "motor.torque_constant_nm_a": (2.64, 1),
@@ -161,7 +161,7 @@ PERIODS = [
     (62_500, 2, 8),
     (500_000, 100, 1),
 ]
-# Periods for which an impulse of Ω* is followed.
+# Position cycles of the impulse response.
 IMPULSE = 12
 
 
@@ -175,7 +175,7 @@ def power(matrix, n):
 
 
 def impulse(values, tick_ns, ticks, instants):
-    """θ at the position instants after Ω* was 1 for one period: loops folded as powers of matrices."""
+    """Returns θ at the position instants after an impulse of Ω* of one cycle: loops as powers of matrices."""
     j, kt, ke, r, ind, kv, tv, ki, ti = (mpf(v) * mpf(repr(f)) for v, (_, f) in zip(values, LOOPS.values()))
     tick = mpf(tick_ns) / 10**9
     # i, ω, θ, integral of the velocity loop, of the current loop, held u, i*, Ω*.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes an SROS2 keystore with openssl, for where `ros2 security` is not at hand.
+"""Creates an SROS2 keystore with openssl, for systems without `ros2 security`.
 
     tools/keystore.py FOLDER --domain 42 /cell/mill                       an enclave that may do everything
     tools/keystore.py FOLDER --domain 42 /cell/watcher:-rt/psec           one that may do everything but that topic
@@ -70,17 +70,17 @@ DENY = """    <deny_rule>
 
 
 def openssl(*words: object) -> None:
-    """Run it; what it says is told only when it fails."""
+    """Runs openssl; prints its output only on failure."""
     done = subprocess.run(["openssl", *map(str, words)], capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(f"keystore: openssl {words[0]} failed: {done.stderr.strip()}")
 
 
 class Keystore:
-    """A folder with public/, private/ and enclaves/, as SROS2 lays it out."""
+    """Folder with public/, private/ and enclaves/ in the layout of SROS2."""
 
     def __init__(self, folder: Path, domain: int, rtps: str):
-        """Open it, or make the authority and the governance of the domain."""
+        """Opens the keystore, or creates the authority and the governance of the domain."""
         self.folder, self.domain = folder, domain
         self.public, self.private, self.enclaves = (folder / part for part in ("public", "private", "enclaves"))
         for part in (self.public, self.private, self.enclaves):
@@ -106,7 +106,7 @@ class Keystore:
             openssl(*words, "-signer", self.certificate, "-inkey", self.key)
 
     def enclave(self, name: str, denied: list[str]) -> Path:
-        """Make the files of an enclave that may do everything but with the topics `denied`."""
+        """Creates the files of an enclave with all permissions except for the topics `denied`."""
         folder = self.enclaves / name.strip("/")
         folder.mkdir(parents=True, exist_ok=True)
         self._key(folder / "key.pem")
@@ -119,7 +119,7 @@ class Keystore:
             openssl(*words, "-sha256", *serial, "-out", folder / "cert.pem")
         for part in ("identity_ca.cert.pem", "permissions_ca.cert.pem"):
             shutil.copy(self.certificate, folder / part)
-        if folder != self.enclaves:  # That of / has it already.
+        if folder != self.enclaves:  # The enclave / has it already.
             shutil.copy(self.enclaves / "governance.p7s", folder)
         topics = "".join(f"<topic>{topic}</topic>" for topic in denied)
         deny = DENY.format(domain=self.domain, topics=topics) if denied else ""
@@ -129,7 +129,7 @@ class Keystore:
 
 
 def main() -> None:
-    """Take the command line."""
+    """Runs the command line."""
     words = options.parser(__doc__)
     words.add_argument("folder", type=Path)
     words.add_argument("--domain", type=options.domain_id, default=0, help="ROS_DOMAIN_ID that the keystore is for")

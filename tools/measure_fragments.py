@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What one datagram makes the middleware of a node keep: a fragment that says how long its message will be.
+"""Measures the memory that one datagram allocates in a node: a fragment that announces a long message.
 
     tools/measure_fragments.py [MB]     the length that is announced, of one message on psec
 
@@ -25,25 +25,25 @@ from trajectory_msgs.msg import JointTrajectory
 from drive import PSEC_QOS, Drive, Node, resident_mb
 
 FRAGMENT = 1024
-"""Octets of the only one that is sent."""
+"""Octets of the only fragment that is sent."""
 LONGEST = 2**32 - 1
-"""Octets of a message: its length has 32 bits."""
+"""Maximum octets of a message: its length has 32 bits."""
 PROTOCOL, VENDOR = bytes((2, 3)), bytes((1, 15))
 DATA_FRAG, LITTLE_ENDIAN = 0x16, 0x01
 TO_INLINE_QOS = 28
 PARTICIPANTS = 10
-"""Participants of this machine that may be the node."""
+"""Participant ids of this machine that may be the node."""
 
 
 def fragment(writer: bytes, number: int, length: int) -> bytes:
-    """The first of a message of `length` octets, in the name of a writer (RTPS 2.5, 9.4.5.5)."""
+    """Returns the first fragment of a message of `length` octets, with a writer's GUID (RTPS 2.5, 9.4.5.5)."""
     body = struct.pack("<HH4s4siIIHHI", 0, TO_INLINE_QOS, bytes(4), writer[12:], 0, number, 1, 1, FRAGMENT, length)
     body += bytes(FRAGMENT)
     return b"RTPS" + PROTOCOL + VENDOR + writer[:12] + struct.pack("<BBH", DATA_FRAG, LITTLE_ENDIAN, len(body)) + body
 
 
 def main() -> None:
-    """Measure."""
+    """Runs the measurement."""
     parser = options.parser(__doc__)
     parser.add_argument("megabytes", type=options.positive, nargs="?", default=256, help="that are announced (256)")
     length = round(parser.parse_args().megabytes * 1_000_000)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How long a setpoint of `psec_stream` takes to the joint state that contains its effect.
+"""Measures the latency from a setpoint on `psec_stream` to the joint state with its effect.
 
     cargo build --release && source .build/env.sh
     tools/measure_latency.py --messages 500
@@ -35,15 +35,15 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 from drive import DEEP_QOS, TSP_NS, Drive, Node  # noqa: E402
 
 STEP = 2e-3
-"""m, within reach of the axis in one period."""
+"""Step of the setpoint within reach of the axis in one cycle, m."""
 MOVED = 1e-7
-"""m, more than an axis at rest creeps in the time that is measured."""
+"""Threshold of motion, m: above the creep of an axis at rest during the measurement."""
 REST = 0.4
-"""s until the axis stands again."""
+"""Time until the axis is at rest again, s."""
 
 
 def measure(drive: Drive, messages: int, seed: int) -> dict[str, np.ndarray]:
-    """Latencies of either kind, s."""
+    """Returns the latencies of both kinds, s."""
     rng = random.Random(seed)
     came: dict[str, list[tuple[int, float]]] = {"psec": [], "position": []}
 
@@ -78,7 +78,7 @@ def measure(drive: Drive, messages: int, seed: int) -> dict[str, np.ndarray]:
 
 
 def main() -> int:
-    """Measure and print."""
+    """Runs the measurement and prints the result."""
     parser = options.parser(__doc__)
     parser.add_argument("--messages", type=options.whole, default=300, help="setpoints (300)")
     parser.add_argument("--seed", type=int, default=1, help="of the phases (1)")

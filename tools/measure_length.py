@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How time and memory of `virtual_axes run` grow with the length of the setpoints.
+"""Measures time and memory of `virtual_axes run` over the length of the setpoints.
 
     cargo build --release
     tools/measure_length.py                        # a minute, ten minutes, an hour, ten hours
@@ -29,19 +29,19 @@ import options
 
 COMMAND = Path(__file__).resolve().parent.parent / "target" / "release" / "virtual_axes"
 LENGTHS = [60, 600, 3600, 36000]
-# The position period of the default machine, ms.
+# Position cycle of the default machine, ms.
 PERIOD_MS = 6
-# After so many instants, a minute, the motion begins anew: its text is made once.
+# The motion repeats after this number of instants, a minute: its text is generated once.
 CYCLE = 10_000
-# Amplitude (m, rad) and turns a cycle of the axes: each begins and ends a cycle at rest.
+# Amplitude (m, rad) and periods per minute of the axes: each minute begins and ends at rest.
 AXES = {"x": (0.1, 6), "y": (0.08, 7), "z": (0.05, 5), "a": (0.3, 3), "c": (0.6, 4)}
 MEBIBYTE = 1 << 20
-# How often the memory of a run is looked at, s.
+# Interval between samples of a run's memory, s.
 LOOK_EVERY = 0.005
 
 
 def write_psec(path: Path, seconds: int) -> None:
-    """Setpoints of so many seconds, with all digits of their numbers."""
+    """Writes setpoints of this duration, with all digits."""
     rows = []
     for k in range(CYCLE):
         values = (size * (1.0 - math.cos(math.tau * turns * k / CYCLE)) for size, turns in AXES.values())
@@ -55,17 +55,17 @@ def write_psec(path: Path, seconds: int) -> None:
 
 
 class Run(NamedTuple):
-    """What a run took and left."""
+    """Resources and outputs of a run."""
 
-    processor: float  # s
-    clock: float  # s
-    memory: int  # largest resident, bytes
-    written: list[int]  # bytes of each output
+    processor: float  # CPU time, s
+    clock: float  # Wall-clock time, s
+    memory: int  # Maximum resident memory, bytes
+    written: list[int]  # Size of each output, bytes
 
 
 def resident(pid: int) -> int:
-    """The most memory that a process has held since it began, bytes; 0 where it is no more."""
-    # Not ru_maxrss: that begins with what this interpreter holds.
+    """Returns the maximum resident memory of a process so far, bytes; 0 after its end."""
+    # Not ru_maxrss: its initial value is the size of this interpreter.
     try:
         lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     except OSError:
@@ -113,7 +113,7 @@ def measure(arguments: argparse.Namespace, folder: Path) -> None:
 
 
 def row(seconds: int, runs: list[Run], read: int, first: tuple[int, list[Run]]) -> None:
-    """Prints the medians of a length's runs; the heads before the first."""
+    """Prints the medians of a length's runs; the heading before the first."""
     if seconds == first[0]:
         heads = ["length, s", "processor, s", "clock, s", "× real time", "per s", "memory, MiB"]
         heads += ["read, MB", "written, MB"]

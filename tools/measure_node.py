@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the node costs in real time: its share of a core, its memory and its open files.
+"""Measures the node's cost in real time: CPU share, memory and open files.
 
     cargo build --release && source .build/env.sh
     tools/measure_node.py --seconds 20 --minutes 10
@@ -68,19 +68,19 @@ ALL = JOINTS | {
     "/diagnostics": DiagnosticArray,
 }
 STARTED_S = 2.0
-"""The node is up and has been discovered long before."""
+"""Time from start to complete discovery, with a margin, s."""
 LOOK_S = 5.0
-"""From one look at the memory to the next."""
+"""Interval between samples of the memory, s."""
 KEPT = 64
-"""Trajectories that the middleware keeps: depth of psec."""
+"""Trajectories that the middleware stores: depth of psec."""
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class Guest:
-    """Somebody in the node's graph who subscribes and may send setpoints."""
+    """Client node that subscribes and can send setpoints."""
 
     def __init__(self, process: Node, topics: dict[str, Any]):
-        """Subscribe to `topics`."""
+        """Subscribes to `topics`."""
         self.process = process
         self.stamps: list[int] = []
         self._context = Context()
@@ -117,7 +117,7 @@ class Guest:
             time.sleep(0.02)
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Leaves the graph."""
         self._executor.shutdown(timeout_sec=2.0)
         self._thread.join(timeout=2.0)
         self.node.destroy_node()
@@ -125,28 +125,28 @@ class Guest:
 
 
 def cpu_seconds(pid: int) -> float:
-    """User and system time of a process so far, s."""
+    """Returns user and system time of a process so far, s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
 def wakeups(pid: int) -> int:
-    """How often the threads of a process have gone to sleep so far."""
+    """Returns the number of voluntary context switches of all threads of a process so far."""
     label = "voluntary_ctxt_switches:"
     lines = (line for status in Path(f"/proc/{pid}/task").glob("*/status") for line in status.open())
     return sum(int(line.removeprefix(label)) for line in lines if line.startswith(label))
 
 
 def open_files(pid: int) -> int:
-    """Number of a process's file descriptors."""
+    """Returns the number of file descriptors of a process."""
     return len(os.listdir(f"/proc/{pid}/fd"))
 
 
 class Motion:
-    """What a guest asks of the axes again and again."""
+    """Repeated motion commands of a client."""
 
     def __init__(self, guest: Guest, kind: str):
-        """Ask for `kind`: rest, trajectory or stream."""
+        """Sets `kind`: rest, trajectory or stream."""
         self.guest, self.kind = guest, kind
         circle = ballbar()
         self._circle = joint_trajectory(["x", "y"], circle.time, np.column_stack([circle.x, circle.y]))
@@ -167,7 +167,7 @@ class Motion:
                 self._end.wait(TSP_NS / 1e9)
 
     def fill(self) -> None:
-        """Send as many trajectories as are kept, and stop."""
+        """Sends as many trajectories as the middleware stores, and stops."""
         for _ in range(2 * KEPT):
             self.guest.psec.publish(self._circle)
             time.sleep(0.1)
@@ -175,14 +175,14 @@ class Motion:
         time.sleep(1.0)
 
     def __enter__(self) -> Motion:
-        """Begin."""
+        """Starts the motion."""
         if self.kind != "rest":
             self._thread.start()
             time.sleep(1.0)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End, and wait until the axes stand."""
+        """Stops, and waits until the axes are at rest."""
         self._end.set()
         if self.kind != "rest":
             self._thread.join(timeout=5.0)
@@ -191,7 +191,7 @@ class Motion:
 
 
 def check(process: Node, stamps: Iterable[int] | None, seconds: float) -> None:
-    """End the program unless the node lives and every sample of the span has come."""
+    """Exits with an error unless the node runs and all samples of the span have arrived."""
     if process.poll() is not None:
         raise SystemExit(f"the node ended; its output:\n{process.output()}")
     if stamps is None:
@@ -203,7 +203,7 @@ def check(process: Node, stamps: Iterable[int] | None, seconds: float) -> None:
 
 
 def share(process: Node, guest: Guest | None, seconds: float) -> str:
-    """Share of a core over a span, and wake-ups in a position period."""
+    """Returns the share of a core over a span, and the wake-ups per position cycle."""
     first = len(guest.stamps) if guest else 0
     before, slept, start = cpu_seconds(process.pid), wakeups(process.pid), time.monotonic()
     time.sleep(seconds)
@@ -214,7 +214,7 @@ def share(process: Node, guest: Guest | None, seconds: float) -> str:
 
 
 def memory(process: Node, guest: Guest, minutes: float) -> None:
-    """Print how memory and open files go while the axes move."""
+    """Prints memory and open files while the axes move."""
     looks: list[tuple[float, int, int]] = []
     motion = Motion(guest, "trajectory")
     motion.fill()
@@ -237,7 +237,7 @@ def memory(process: Node, guest: Guest, minutes: float) -> None:
 
 
 def main() -> int:
-    """Measure and print."""
+    """Runs the measurement and prints the result."""
     parser = options.parser(__doc__)
     parser.add_argument("--seconds", type=options.positive, default=20, help="of each span (20)")
     parser.add_argument("--minutes", type=options.from_zero, default=10, help="of motion, for memory (10)")

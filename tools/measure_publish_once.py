@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How many trajectories arrive from publishers that send as soon as they are matched, and are gone.
+"""Measures the share of trajectories that arrive from publishers that publish at the match and leave.
 
     cargo build --release && source .build/env.sh
     tools/measure_publish_once.py --runs 200              # the hardest case, transient local
@@ -67,7 +67,7 @@ for number in range(int(first), int(first) + int(runs)):
 
 
 def arguments() -> argparse.Namespace:
-    """The command line."""
+    """Returns the parsed command line."""
     parser = options.parser(__doc__)
     parser.add_argument("--runs", type=options.whole, default=100, help="publishers, one after another (100)")
     parser.add_argument("--durability", choices=["transient_local", "volatile"], default="transient_local")
@@ -85,7 +85,7 @@ def arguments() -> argparse.Namespace:
 
 
 def publish(args: argparse.Namespace, first: int, runs: int, domain_id: int) -> dict[int, float]:
-    """Run publishers in one process; returns when each sent."""
+    """Runs publishers in one process; returns the time of each message."""
     command = [sys.executable, "-c", PUBLISHERS, str(first), str(runs), args.durability]
     command += [str(value) for value in (args.poll, args.settle, args.keep_alive, args.times, args.points)]
     env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
@@ -94,7 +94,7 @@ def publish(args: argparse.Namespace, first: int, runs: int, domain_id: int) -> 
 
 
 def publish_to_a_node_yet_to_start(args: argparse.Namespace, number: int) -> bool:
-    """Start a publisher, then the node; returns whether it arrived."""
+    """Starts a publisher, then the node; returns true if the message arrived."""
     domain = DomainId()
     try:
         with ThreadPoolExecutor(1) as pool:
@@ -103,7 +103,7 @@ def publish_to_a_node_yet_to_start(args: argparse.Namespace, number: int) -> boo
             with Node(["-p", "time:=real"], domain_id=domain.value) as process:
                 sent.result()
                 with Drive(process=process) as drive:
-                    # Results are kept for late joiners.
+                    # Results are transient local.
                     time.sleep(1.0)
                     return any(result.joint == f"once_{number}" for result in drive.results())
     finally:
@@ -111,7 +111,7 @@ def publish_to_a_node_yet_to_start(args: argparse.Namespace, number: int) -> boo
 
 
 def main() -> int:
-    """Measure; the exit status tells whether all arrived, each as often as it was sent."""
+    """Runs the measurement; the exit status is 0 if all messages arrived exactly as often as they were sent."""
     args = arguments()
     if args.node_last:
         arrived = sum(publish_to_a_node_yet_to_start(args, number) for number in range(args.runs))

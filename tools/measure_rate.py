@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The highest rate at which the node's joint_states reach a subscriber whole.
+"""Measures the maximum rate at which a subscriber receives joint_states without loss.
 
     cargo build --release --bins --examples && source .build/env.sh
     tools/measure_rate.py --seconds 5
@@ -41,17 +41,17 @@ from drive import PSEC_QOS, TSP_NS, Node, joint_trajectory, to_ns  # noqa: E402
 from measure_node import STARTED_S, cpu_seconds  # noqa: E402
 
 PERIODS_MS = (6, 3, 2, 1, 0.5, 0.25)
-"""Down to the period of the velocity loop."""
+"""Position cycles, down to the velocity cycle."""
 LAST = QoSProfile(depth=100)
-"""Late by more, the reader loses some."""
+"""Lateness above which the reader loses samples."""
 ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 COUNTER = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "examples" / "count_joint_states"
-# Longer than any span of `fast`: half an hour of the machine's time.
+# Longer than any span in `fast`: half an hour of machine time.
 LONG_S = 1800
 
 
 class Count(NamedTuple):
-    """What a subscriber got."""
+    """Samples that a subscriber received."""
 
     samples: int
     seconds: float
@@ -59,15 +59,15 @@ class Count(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Samples a second."""
+        """Returns the rate in samples per second."""
         return (self.samples - 1) / self.seconds
 
 
 class Subscriber:
-    """rclpy, with messages and callbacks as everybody has them."""
+    """rclpy subscriber with messages and callbacks, as in usual nodes."""
 
     def __init__(self, process: Node, qos: QoSProfile):
-        """Join the node's graph."""
+        """Joins the node's graph."""
         self._process = process
         self._stamps: list[int] = []
         self._context = Context()
@@ -84,7 +84,7 @@ class Subscriber:
         self._stamps.append(to_ns(message.header.stamp))
 
     def count(self, seconds: float, period_ns: int) -> Count:
-        """Samples that come within `seconds` of the first one."""
+        """Counts the samples within `seconds` after the first one."""
         deadline = time.monotonic() + 10
         while not self._stamps:
             if time.monotonic() > deadline or self._process.poll() is not None:
@@ -98,21 +98,21 @@ class Subscriber:
         return Count(len(stamps), time.monotonic() - start, int(np.sum(np.rint(np.diff(stamps) / period_ns) - 1)))
 
     def send(self, trajectory: JointTrajectory) -> None:
-        """Publish setpoints once the node listens."""
+        """Publishes setpoints once the node is matched."""
         while not self._psec.get_subscription_count():
             self._executor.spin_once(timeout_sec=0.1)
         time.sleep(0.2)
         self._psec.publish(trajectory)
 
     def close(self) -> None:
-        """Leave."""
+        """Leaves the graph."""
         self._executor.shutdown(timeout_sec=2.0)
         self._node.destroy_node()
         rclpy.shutdown(context=self._context)
 
 
 def count_in_rust(process: Node, seconds: float, period_ns: int) -> Count:
-    """What examples/count_joint_states.rs counts."""
+    """Returns the count of examples/count_joint_states.rs."""
     env = os.environ | {"ROS_DOMAIN_ID": str(process.domain_id)}
     command = [str(COUNTER), str(seconds), str(period_ns / 1e6)]
     done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=seconds + 20, check=False)
@@ -123,7 +123,7 @@ def count_in_rust(process: Node, seconds: float, period_ns: int) -> Count:
 
 
 def count_in_rclpy(process: Node, seconds: float, period_ns: int) -> Count:
-    """What rclpy counts."""
+    """Returns the count of rclpy."""
     subscriber = Subscriber(process, LAST)
     try:
         return subscriber.count(seconds, period_ns)
@@ -132,7 +132,7 @@ def count_in_rclpy(process: Node, seconds: float, period_ns: int) -> Count:
 
 
 def real_time(seconds: float) -> None:
-    """Print rates, losses and shares of a core, and the highest rate without loss."""
+    """Prints rates, losses and CPU shares, and the maximum rate without loss."""
     print(f"{'multiple':>10}{'period, ms':>12}{'subscriber':>12}{'a second':>10}{'lost':>8}{'node, of a core':>17}")
     best: dict[str, float] = {}
     for period_ms in PERIODS_MS:
@@ -146,7 +146,7 @@ def real_time(seconds: float) -> None:
                 if process.stop() != 0:
                     raise SystemExit(f"the node failed; its output:\n{process.output()}")
             multiple = TSP_NS / period_ns
-            # At the grid's own rate: what is late at the end of the span is not lost.
+            # At the grid's own rate: samples in transit at the end of the span are not lost.
             is_whole = found.lost == 0 and found.rate > 0.97e9 / period_ns
             if is_whole:
                 best[name] = max(best.get(name, 0), multiple)
@@ -160,13 +160,13 @@ def real_time(seconds: float) -> None:
 
 
 def fast(seconds: float) -> None:
-    """Print samples a second while the simulation waits for its subscribers."""
+    """Prints samples per second while the simulation waits for its subscribers."""
     default = 1e9 / TSP_NS
     for name in ("Rust", "rclpy"):
         with Node(["-p", "time:=fast"]) as process:
             time.sleep(STARTED_S)
             sender = Subscriber(process, ALL)
-            # To and fro in x, a point a second.
+            # Reciprocating motion in x, a point per second.
             points = np.arange(LONG_S + 1)
             sender.send(joint_trajectory(["x"], points, 0.05 * (points % 2)[:, None]))
             if name == "rclpy":
@@ -184,7 +184,7 @@ def fast(seconds: float) -> None:
 
 
 def main() -> int:
-    """Measure and print."""
+    """Runs the measurement and prints the result."""
     parser = options.parser(__doc__)
     parser.add_argument("--seconds", type=options.positive, default=5, help="of each span (5)")
     args = parser.parse_args()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How many tunings are screened in which time, and what a second core is worth.
+"""Measures the time to screen tunings, and the speedup by a second core.
 
     cargo build --release --no-default-features --bin virtual_axes
     tools/measure_screening.py                          # 100 000 designs on the ballbar
@@ -26,7 +26,7 @@ PROGRAM = Path(__file__).resolve().parent.parent / "target" / "release" / "virtu
 
 
 def screen(arguments: argparse.Namespace, designs: int, threads: int) -> float:
-    """Screens, prints what it took, and returns the machine-seconds per second."""
+    """Screens, prints the duration, and returns the machine-seconds per second."""
     command = [
         str(arguments.program), "tune", arguments.scenario, "--controller", "gpc", "--designs", str(designs),
         "--modulus-margin", "0", "--delay-margin-ms", "0", "--json",

@@ -1,4 +1,4 @@
-"""Command lines of tools: what makes no sense is refused before anything is done."""
+"""Command line options of the tools: invalid values are rejected before any work."""
 
 from __future__ import annotations
 
@@ -7,44 +7,44 @@ import math
 from collections.abc import Callable
 
 LARGEST_DOMAIN_ID = 232
-"""Beyond, ports of RTPS are too large."""
+"""Maximum domain id; above it, RTPS ports exceed 65535."""
 DIGITS = 18
-"""Of a whole number at most."""
+"""Maximum number of digits of a whole number."""
 
 
 def parser(doc: str | None) -> argparse.ArgumentParser:
-    """For a tool that says of itself what `doc` says."""
+    """Returns a parser with the description `doc`."""
     return argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
 
 
 def positive(text: str) -> float:
-    """A finite number above 0."""
+    """Returns a finite number above 0."""
     return _number(text, "no finite number above 0", lambda value: value > 0)
 
 
 def from_zero(text: str) -> float:
-    """A finite number from 0 on."""
+    """Returns a finite number that is not negative."""
     return _number(text, "no finite number from 0 on", lambda value: value >= 0)
 
 
 def whole(text: str) -> int:
-    """A whole number from 1 on."""
+    """Returns a whole number from 1 on."""
     return _whole(text, 1)
 
 
 def whole_from_zero(text: str) -> int:
-    """A whole number from 0 on."""
+    """Returns a whole number from 0 on."""
     return _whole(text, 0)
 
 
 def domain_id(text: str) -> int:
-    """A ROS_DOMAIN_ID."""
+    """Returns a ROS_DOMAIN_ID."""
     return _whole(text, 0, LARGEST_DOMAIN_ID)
 
 
 def _whole(text: str, least: int, most: int | None = None) -> int:
     wrong = f"{text!r} is no whole number from {least} {'on' if most is None else f'to {most}'}"
-    # int() is slow with very many digits.
+    # int() is slow for very long numbers.
     if not (text.isascii() and text.isdecimal()) or len(text) > DIGITS:
         raise argparse.ArgumentTypeError(wrong)
     value = int(text)

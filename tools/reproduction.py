@@ -35,10 +35,10 @@ to see the plots, `--trace signals.csv` for the signals.
 
 
 WIDTH = 120
-"""Of the page's text, in characters."""
+"""Line width of the page's text, characters."""
 
 CONTINUED = " \\\n        "
-"""Where a command goes on in the next line, as a shell reads it."""
+"""Continuation of a command on the next line in shell syntax."""
 
 
 TUNINGS = ("gpc 1, 8, 6, 10⁻³", "gpc 1, 8, 6, 10⁻²")
@@ -47,19 +47,19 @@ PRESET = "gpc 1, 14, 12, 0.005"
 
 
 def run(arguments: str) -> list[dict]:
-    """The runs of `virtual_axes run … --json`."""
+    """Returns the runs of `virtual_axes run … --json`."""
     command = [PROGRAM, "run", *arguments.replace("\\\n", " ").split(), "--json"]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True, timeout=300).stdout)["runs"]
 
 
 def number(value: float, digits: int = 1) -> str:
-    """With a real minus sign, and without a negative zero."""
+    """Returns a number with a real minus sign, and without a negative zero."""
     text = f"{value:.{digits}f}"
     return (text if float(text) else text.removeprefix("-")).replace("-", "−")
 
 
 def section(title: str, text: str, command: str, rows: list[tuple[str, str, str, str]]) -> str:
-    """One figure of the paper."""
+    """Returns the section of one figure of the paper."""
     lines = [
         f"\n## {title}\n",
         textwrap.fill(text, WIDTH, break_on_hyphens=False),
@@ -71,7 +71,7 @@ def section(title: str, text: str, command: str, rows: list[tuple[str, str, str,
 
 
 def axis_rows(run: dict, axis: str, specified: tuple[str, str], paper: str = "—") -> list[tuple[str, str, str, str]]:
-    """Largest delay-compensated following error and current of an axis."""
+    """Returns the largest delay-compensated following error and current of an axis."""
     figures = run["axes"][axis]
     unit = {"um": "µm", "mdeg": "mdeg"}[figures["unit"]]
     name = axis.upper()
@@ -83,7 +83,7 @@ def axis_rows(run: dict, axis: str, specified: tuple[str, str], paper: str = "�
 
 
 def contour_rows(run: dict) -> list[tuple[str, str, str, str]]:
-    """Contour and orientation errors."""
+    """Returns contour and orientation errors."""
     contour, orientation = run["contour_error_um"], run["orientation_error_mdeg"]
     rows = [
         ("contour error, max, µm", "—", "—", number(contour["max"])),
@@ -96,7 +96,7 @@ def contour_rows(run: dict) -> list[tuple[str, str, str, str]]:
 
 
 def following_error_rows(run: dict) -> list[tuple[str, str, str, str]]:
-    """Largest delay-compensated following error of each axis that moves."""
+    """Returns the largest delay-compensated following error of each moving axis."""
     units = {"um": "µm", "mdeg": "mdeg"}
     return [
         (
@@ -111,12 +111,12 @@ def following_error_rows(run: dict) -> list[tuple[str, str, str, str]]:
 
 
 def in_x_and_y(**values: object) -> list[str]:
-    """Assignments of parameters of both axes; two underscores stand for a dot."""
+    """Returns parameter assignments for both axes; two underscores stand for a dot."""
     return [f"{axis}.{key.replace('__', '.')}={value}" for key, value in values.items() for axis in "xy"]
 
 
 def predictive(scenario: str) -> str:
-    """A scenario with N1, N2, Nu = 1, 8, 6 and λ_rel = 10⁻³, and once more with 10⁻²."""
+    """Returns arguments for a scenario with N1, N2, Nu = 1, 8, 6 and λ_rel = 10⁻³, and again with 10⁻²."""
     horizons = in_x_and_y(position_loop__gpc__n2=8, position_loop__gpc__nu=6)
     first, second = (in_x_and_y(position_loop__gpc__lambda_rel=weight) for weight in ("1e-3", "1e-2"))
     lines = [" ".join(f"--set {change}" for change in pair) for pair in (horizons[:2], horizons[2:], first)]
@@ -126,7 +126,7 @@ def predictive(scenario: str) -> str:
 def circle_rows(
     run: dict, paper: str, specified: tuple[str, str, str], title: str | None = None
 ) -> list[tuple[str, str, str, str]]:
-    """Radial deviation of the first circle."""
+    """Returns the radial deviation of the first circle."""
     deviation = run["circles"][0]["radial_deviation_um"]
     title = title or run["controller"]
     return [
@@ -137,7 +137,7 @@ def circle_rows(
 
 
 def page() -> str:
-    """The whole page."""
+    """Returns the whole page."""
     parts = [HEAD]
     validated = "measured and simulated agree to {}"
     [single] = run("x-constant")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Four processes in real time: how whole the grid of stamps is, and how late samples come.
+"""Runs four processes in real time; checks the stamp grid and measures the latency of samples.
 
     cargo build --release && source .build/env.sh
     tools/run_graph.py --seconds 60
@@ -29,7 +29,7 @@ TORQUE_CONSTANT = 2.64
 
 
 def main() -> int:
-    """Run and print."""
+    """Runs the graph and prints the figures."""
     parser = options.parser(__doc__)
     parser.add_argument("--seconds", type=options.positive, default=60.0, help="of motion (60)")
     args = parser.parse_args()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A picture of a page, if there is a Chromium: tools/screenshot.py PAGE.html PICTURE.png"""
+"""Saves a screenshot of a page, if Chromium is installed: tools/screenshot.py PAGE.html PICTURE.png"""
 
 import sys
 import tempfile
@@ -12,7 +12,7 @@ from browser import Browser, find_browser  # noqa: E402  (the path to it is set 
 
 
 def main() -> int:
-    """Takes the picture, or says why there is none."""
+    """Takes the screenshot, or reports why that is impossible."""
     parser = options.parser(__doc__)
     parser.add_argument("page", type=Path)
     parser.add_argument("picture", type=Path)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Random traffic for a long time: whether the node's memory, open files, threads and latency stay as they are.
+"""Soak test with random traffic: the node's memory, open files, threads and latency must not grow.
 
     cargo build --release && source .build/env.sh
     tools/soak.py --minutes 1                  # does the tool work; too short to judge memory
@@ -69,86 +69,86 @@ WEIGHTS = {
     "reset": 1,
     "goal": 8,
 }
-"""Kinds of traffic, and how often each is sent against the others: methods of Traffic."""
+"""Kinds of traffic with their relative frequency: methods of Traffic."""
 COMING_S = {"listener": 4.0, "visitor": 30.0, "killed": 120.0}
-"""Kinds of those who come, and the wall time from one to the next on average: methods of Traffic."""
+"""Kinds of changing participants, with the mean wall time between them, s: methods of Traffic."""
 JOINTS = {"x": 0.05, "y": 0.05, "z": 0.05, "a": 0.2, "c": 1.0}
-"""How far trajectories go from home, m or rad."""
+"""Maximum distance of trajectories from home, m or rad."""
 GAIN = "x.velocity_loop.gain"
 ECHO = "/echo"
-"""The service that only echoes."""
+"""Service that only echoes."""
 TICK_S = 0.003
-"""Wall time between two messages of the clock."""
+"""Wall time between two messages of the clock, s."""
 FILL = 12_000
-"""More than the 8192 samples that the middleware keeps of a topic."""
+"""Depth above the 8192 samples that the middleware keeps of a topic."""
 CROWD = 4096
-"""Announcements that the middleware keeps of publishers, of subscriptions, and of participants."""
+"""Announcements of publishers, of subscriptions, and of participants that the middleware keeps."""
 AT_A_TIME = 512
-"""Of the crowd, in one participant: of more than 2048 events at once RustDDS does not tell some."""
+"""Endpoints of the crowd in one participant: of more than 2048 events at once RustDDS reports only a part."""
 LEASE_S = 20
-"""For so long a participant of Fast DDS that was killed counts as there."""
+"""Lease of a killed participant of Fast DDS, s."""
 SHORT_LEASE_S = 2
-"""That of those who are killed while the soak runs."""
+"""Lease of the participants that are killed during the soak test, s."""
 KEPT = 64
-"""Trajectories that the middleware keeps: depth of psec."""
+"""Trajectories that the middleware stores: depth of psec."""
 LONG = 5_000
 """Points of the longest trajectories."""
 SAMPLE_S = 0.25
-"""Wall time between two samples of memory."""
+"""Wall time between two samples of memory, s."""
 KEPT_MB = 0.83e-3
-"""What the middleware keeps of an endpoint that has left (docs/middleware.md)."""
+"""Memory that the middleware keeps for an endpoint that has left, MB (docs/middleware.md)."""
 LOOKS = 60
 LOOK_S = 12.0
-"""From one look to the next at least: twice the 6 s after which the middleware looks through its histories."""
+"""Minimum interval of looks, s: twice the 6 s of the middleware's history cleanup."""
 FEWEST = 3
-"""In the second half, to tell whether something grew."""
+"""Minimum number of looks in the second half for a verdict on growth."""
 TOLD_EVERY = 6
-"""Looks, one is printed."""
+"""Looks per printed row."""
 PROBERS = 3
-"""That may end by themselves before the soak is given up."""
+"""Maximum number of probers that end by themselves before the soak test fails."""
 CALLS = 15
-"""Whose median is the latency of a look."""
+"""Calls per look; their median is the latency."""
 MARKS = (0, 25, 50, 75, 100)
-"""Of the time, for the table, %."""
+"""Percentiles for the table, %."""
 
 
 @dataclass
 class Look:
-    """What was seen at one time."""
+    """Figures of the process at one time."""
 
     minutes: float
     memory_mb: float
-    """On average since the look before."""
+    """Mean since the previous look."""
     least_mb: float
-    """The least since then."""
+    """Minimum since the previous look."""
     peak_mb: float
-    """The most since then."""
+    """Maximum since the previous look."""
     files: float
     threads: float
     latency_ms: float
-    """Of the node's service."""
+    """Latency of the node's service, ms."""
     echo_ms: float
-    """Of the process that only echoes."""
+    """Latency of the echo process, ms."""
     load: float
-    """Of the machine, over a minute."""
+    """Load average of the machine over a minute."""
     endpoints: int
-    """Of others, that have come since the start."""
+    """Remote endpoints discovered since the start."""
 
     @property
     def latency_ratio(self) -> float:
-        """The node's service over the echo."""
+        """Returns the ratio of the node's latency to the echo's."""
         return self.latency_ms / self.echo_ms
 
 
 MAY_GROW = {"memory_mb": (3.0, 0.02), "files": (2.5, 0.0), "threads": (1.5, 0.0), "latency_ratio": (0.0, 0.5)}
-"""Over the second half: so much, and this share of its median there."""
+"""Limits of growth over the second half: an absolute amount, and a share of the median there."""
 
 
 class SoakClock:
-    """`/clock` at a multiple of real time."""
+    """Publisher of `/clock` at a multiple of real time."""
 
     def __init__(self, drive: Drive, speed: float):
-        """Begin to tick."""
+        """Starts the clock."""
         self._publisher = drive.node.create_publisher(Clock, "/clock", 10)
         self._speed, self._end = speed, threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -161,19 +161,19 @@ class SoakClock:
             self._publisher.publish(Clock(clock=to_time(now)))
 
     def close(self) -> None:
-        """Stand still."""
+        """Stops the clock."""
         self._end.set()
         self._thread.join(timeout=5)
 
 
 class Traffic:
-    """What is asked of the node, one thing after the other, by chance."""
+    """Random sequential traffic to the node."""
 
     def __init__(self, drive: Drive, follow: Follow, seed: int, kinds: set[str], churn: float, folder: Path):
-        """Of these kinds, with so many times as many who come; nothing is sent yet. Files are written to `folder`."""
+        """Creates traffic of these kinds, with `churn` times the participants; files go to `folder`."""
         self.drive, self.follow = drive, follow
         self.chance = random.Random(seed)
-        # Of its own: those who come by the clock do not change what is sent.
+        # Separate generator: the timed participants do not change the traffic.
         self._comings = random.Random(seed + 1)
         self.count: Counter[str] = Counter()
         self._folder = folder
@@ -185,7 +185,7 @@ class Traffic:
         self._due = {kind: now + self._comings.expovariate(1 / every) for kind, every in self._every.items()}
 
     def step(self) -> None:
-        """Whoever is due to come, or else one of what is sent."""
+        """Runs the next due participant change, or else one random kind of traffic."""
         now = time.monotonic()
         due = next((kind for kind, at in self._due.items() if at <= now), None)
         if due is not None:
@@ -207,7 +207,7 @@ class Traffic:
         except (ChildProcessError, BrokenPipeError) as ended:
             if self.drive.process is None or self.drive.process.poll() is not None:
                 raise
-            # Of a guest: what is judged is the node.
+            # Error of a participant: the soak test evaluates the node.
             self.count["guests_ended"] += 1
             print(f"{kind}: {ended}", flush=True)
 
@@ -219,12 +219,12 @@ class Traffic:
         self.drive.send(trajectory)
 
     def trajectory(self) -> None:
-        """From where it is to somewhere, in a while."""
+        """Sends a trajectory from the present position to a random one."""
         names, to, duration = self._way()
         self._send(joint_trajectory(names, [duration], [to], [[0.0] * len(names)]))
 
     def invalid(self) -> None:
-        """Refused for one reason or another."""
+        """Sends an invalid trajectory of a random kind."""
         names, to, duration = self._way()
         bad = self.chance.choice(["joint", "nan", "size", "times", "travel", "past"])
         rows, times, stamp = [to, to], [duration, duration + 1], None
@@ -244,18 +244,18 @@ class Traffic:
         self._send(message)
 
     def long_trajectory(self) -> None:
-        """Many points, most of which nobody waits for."""
+        """Sends a trajectory with many points without waiting for its end."""
         self._send(long_trajectory())
 
     def halt(self) -> None:
-        """A controlled stop, by the topic or the service."""
+        """Sends a controlled stop, by the topic or the service."""
         if self.chance.random() < 0.5:
             self._send(JointTrajectory())
         else:
             self.drive.stop()
 
     def stream(self) -> None:
-        """A burst of setpoints, within reach or not."""
+        """Sends a burst of setpoints, within reach or not."""
         at = self.drive.latest("psec")["y"]
         for k in range(50):
             far = 1.0 if self.chance.random() < 0.05 else 0.0
@@ -263,16 +263,16 @@ class Traffic:
             time.sleep(0.004)
 
     def load(self) -> None:
-        """A burst of forces."""
+        """Sends a burst of forces."""
         for _ in range(10):
             self.drive.load({"x": self.chance.uniform(-300, 300), "q" if self.chance.random() < 0.1 else "y": 1.0})
 
     def parameters(self) -> None:
-        """One that is taken."""
+        """Sets a valid parameter."""
         self.drive.set_parameters({GAIN: self.chance.uniform(4.5, 5.0)})
 
     def wrong_parameter(self) -> None:
-        """One that is not."""
+        """Sets an invalid parameter."""
         wrong: Any = self.chance.choice([(GAIN, -1.0), ("no.such", 1), ("time", "fast"), (GAIN, "text")])
         try:
             self.drive.set_parameters(dict([wrong]))
@@ -281,15 +281,15 @@ class Traffic:
         raise SystemExit(f"{wrong} was taken")
 
     def descriptions(self) -> None:
-        """Long answers."""
+        """Requests long responses."""
         self.drive.describe(self.drive.list_parameters()[:60])
 
     def reset(self) -> None:
-        """Home."""
+        """Resets the axes."""
         self.drive.reset()
 
     def goal(self) -> None:
-        """A goal, canceled now and then."""
+        """Sends a goal and sometimes cancels it."""
         names, to, duration = self._way()
         cancels = self.chance.random() < 0.5
         sent = self.follow.send(goal(joint_trajectory(names, [duration], [to], [[0.0] * len(names)])))
@@ -299,7 +299,7 @@ class Traffic:
         self.follow.statuses.clear()
 
     def listener(self) -> None:
-        """A subscription comes; the oldest of some goes."""
+        """Creates a subscription and destroys the oldest one above a limit."""
         kind, topic = self._comings.choice(
             [(JointState, "/joint_states"), (MotorCurrents, "/virtual_axes/motor_currents"),
              (DriveStates, "/virtual_axes/drive_states")]
@@ -315,15 +315,15 @@ class Traffic:
         self.drive.in_executor(change)
 
     def visitor(self) -> None:
-        """A participant comes and leaves."""
+        """Starts a participant that joins and leaves."""
         assert self.drive.process is not None
         with Guest(self.drive.process.domain_id, "sink", 10) as guest:
             guest.leave()
 
     def killed(self) -> None:
-        """A process listens; one of those that do is killed."""
+        """Starts a subscribing process and kills an earlier one."""
         assert self.drive.process is not None
-        # By a clock the node waits for a listener until its lease has ended.
+        # With /clock the node waits for a subscriber until its lease expires.
         domain = self.drive.process.domain_id
         guest = Guest(domain, "sink", 10, lease=SHORT_LEASE_S, folder=self._folder)
         self._guests.append(guest.__enter__())
@@ -331,7 +331,7 @@ class Traffic:
             self._guests.pop(0).kill()
 
     def forget(self) -> None:
-        """Drop what this process has kept."""
+        """Drops the messages that this process has kept."""
         self.drive.forget()
         with self.drive._changed:
             self.drive._results.clear()
@@ -339,19 +339,19 @@ class Traffic:
         gc.collect()
 
     def close(self) -> None:
-        """End the guests."""
+        """Ends the participants."""
         for guest in self._guests:
             guest.kill()
 
 
 def long_trajectory() -> JointTrajectory:
-    """Ten seconds and more of C at 2 ms, after a second to get there."""
+    """Returns more than ten seconds of C at 2 ms, after an approach of one second."""
     times = 1 + np.arange(LONG) / 500
     return joint_trajectory(["c"], times, 0.2 * np.sin(times - 1))
 
 
 def crowd(drive: Drive) -> None:
-    """Publishers and subscriptions that leave with their participants, by names and types as long as most."""
+    """Creates publishers and subscriptions that leave with their participants, with long names and types."""
     assert drive.process is not None
     kind, name = JointTrajectoryControllerState, "/crowd/of_those_who_leave_together"
 
@@ -364,7 +364,7 @@ def crowd(drive: Drive) -> None:
 
             def come() -> None:
                 for _ in range(AT_A_TIME):
-                    # Of different topics, or each would be matched with all others.
+                    # On different topics: otherwise each would match all others.
                     other.node.create_subscription(kind, f"{name}/in", lambda _: None, 1)
                     other.node.create_publisher(kind, f"{name}/out", 1)
 
@@ -373,14 +373,14 @@ def crowd(drive: Drive) -> None:
 
 
 def announce(drive: Drive, folder: Path) -> None:
-    """A participant that says again and again that it is there."""
+    """Runs a participant that announces itself frequently."""
     assert drive.process is not None
     with Guest(drive.process.domain_id, "sink", 10, lease=LEASE_S, announces_s=0.005, folder=folder):
         time.sleep(CROWD * 0.005 * 1.5)
 
 
 def kill_listener(drive: Drive) -> None:
-    """Samples are kept for one that has not acknowledged them, until its lease has ended."""
+    """Kills a subscriber whose samples are kept until its lease expires."""
     assert drive.process is not None
     with Guest(drive.process.domain_id, "sink", 10) as guest:
         guest.kill()
@@ -388,7 +388,7 @@ def kill_listener(drive: Drive) -> None:
 
 
 def fill(drive: Drive, folder: Path) -> None:
-    """Bring histories and queues to their bounds."""
+    """Fills histories and queues to their bounds."""
     kill_listener(drive)
     drive.forget()
     crowd(drive)
@@ -407,14 +407,14 @@ def fill(drive: Drive, folder: Path) -> None:
     for _ in range(KEPT + 16):
         drive.send(long_trajectory())
         time.sleep(0.05)
-    time.sleep(7)  # The middleware looks through its histories every 6 s.
+    time.sleep(7)  # Period of the middleware's history cleanup: 6 s.
 
 
 class Memory:
-    """What a process has had of its own, looked at all the time."""
+    """Continuous sampling of a process's own memory."""
 
     def __init__(self, pid: int):
-        """Begin to look."""
+        """Starts sampling."""
         self._pid = pid
         self._found_mb: list[float] = []
         self._end = threading.Event()
@@ -428,22 +428,22 @@ class Memory:
                 return
 
     def since_mb(self) -> tuple[float, float, float]:
-        """On average, the least and the most since this was asked last."""
+        """Returns mean, minimum and maximum since the previous call."""
         found, self._found_mb = [*self._found_mb, own_mb(self._pid)], []
         return sum(found) / len(found), min(found), max(found)
 
     def close(self) -> None:
-        """End."""
+        """Stops sampling."""
         self._end.set()
 
 
 class Prober:
-    """Two guests: one echoes, the other calls that one and the node in turns."""
+    """Two participants: one echoes, the other calls the echo and the node alternately."""
 
     def __init__(self, process: Node):
-        """Begin."""
+        """Starts both participants."""
         self.failed = 0
-        """How often it had to begin anew."""
+        """Number of restarts."""
         self._process = process
         self._guests = ExitStack()
         self._begin()
@@ -455,21 +455,21 @@ class Prober:
         self._caller = self._guests.enter_context(Guest(domain, "probe", *names))
 
     def __enter__(self) -> Prober:
-        """Itself."""
+        """Returns itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End both."""
+        """Ends both participants."""
         self._guests.close()
 
     def begin_anew(self) -> None:
-        """With others in their places."""
+        """Restarts both participants."""
         self.failed += 1
         self._guests.close()
         self._begin()
 
     def latencies_ms(self) -> list[float]:
-        """Of the node's service and of the echo; ChildProcessError where one of the guests no longer works."""
+        """Returns the latencies of the node and of the echo; raises ChildProcessError if a participant has failed."""
         try:
             return self._caller.latencies_ms(CALLS)
         except Silent as silent:
@@ -479,7 +479,7 @@ class Prober:
 
 
 def look(drive: Drive, prober: Prober, memory: Memory, began: float) -> Look:
-    """The process as it is now."""
+    """Returns the present figures of the process."""
     assert drive.process is not None
     pid = drive.process.pid
     status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
@@ -501,7 +501,7 @@ def look(drive: Drive, prober: Prober, memory: Memory, began: float) -> Look:
 
 
 def table(looks: list[Look]) -> str:
-    """Some of them, as Markdown."""
+    """Returns some looks as a Markdown table."""
     rows = [
         "| of the time | memory, MB | at least | at most | files | threads | service, ms | echo, ms | ratio | load |",
         "|" + "---|" * 10,
@@ -517,13 +517,13 @@ def table(looks: list[Look]) -> str:
 
 
 def slope(minutes: np.ndarray, values: np.ndarray) -> float:
-    """Theil and Sen's: the median of the slopes of all pairs, per minute."""
+    """Returns the Theil-Sen slope: the median of the slopes of all pairs, per minute."""
     first, second = np.triu_indices(len(minutes), 1)
     return float(np.median((values[second] - values[first]) / (minutes[second] - minutes[first])))
 
 
 def verdict(looks: list[Look]) -> bool:
-    """Print how each figure went, and whether one grew."""
+    """Prints the course of each figure; returns true if none has grown."""
     half = looks[len(looks) // 2 :]
     if len(half) < FEWEST:
         print(f"{len(looks)} looks are too few to tell")
@@ -547,7 +547,7 @@ def verdict(looks: list[Look]) -> bool:
 
 
 def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple[list[Look], dict[str, str]]:
-    """Traffic for so long; what was seen, and what the node told at the end, unless it was broken off."""
+    """Runs traffic for a duration; returns the looks and the node's final diagnostics, if the run was not aborted."""
     process = drive.process
     assert process is not None
     memory = Memory(process.pid)
@@ -565,7 +565,7 @@ def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple
             try:
                 looks.append(look(drive, prober, memory, began))
             except (ChildProcessError, BrokenPipeError) as ended:
-                # One of the prober's processes: what is judged is the node.
+                # A prober process has failed: the soak test evaluates the node.
                 print(f"a prober has ended: {ended}", flush=True)
                 if prober.failed >= PROBERS or process.poll() is not None:
                     raise
@@ -578,7 +578,7 @@ def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple
         lived_s = (int(told["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
         print(f"\n{lived_s:.0f} s of the axes in {time.monotonic() - began:.0f} s")
         return looks, told
-    except OSError as failed:  # A timeout, too, and a process that has ended.
+    except OSError as failed:  # Includes timeouts and processes that have ended.
         print(f"broken off after {time.monotonic() - began:.0f} s: {failed}", flush=True)
         return looks, {}
     finally:
@@ -587,7 +587,7 @@ def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple
 
 
 def main() -> int:
-    """Run and judge."""
+    """Runs the soak test and its evaluation."""
     parser = options.parser(__doc__)
     parser.add_argument("--minutes", type=options.positive, default=1, help="of the wall clock (1)")
     parser.add_argument("--speed", type=options.positive, default=1, help="of the node's clock against the wall's (1)")

@@ -1,4 +1,4 @@
-"""One axis of the table in SI units, as plain numbers that every Python contender takes."""
+"""One axis of the machine table in SI units, as plain numbers for all Python contenders."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Row = tuple[float, float, float, float]
 
 
 class Axis(NamedTuple):
-    """Everything that does not change; the names are those of drive.h."""
+    """Constants of an axis; the names are those of drive.h."""
 
     current: Row
     speed: Row
@@ -51,7 +51,7 @@ class Axis(NamedTuple):
 
 
 def read_axis(path: Path, joint: str) -> Axis:
-    """The axis of a table. Only what the single-axis case needs: no weight, and one delay for all three."""
+    """Returns an axis of a table. Restricted to the single-axis case: no weight, and equal delays."""
     rows = [line.split() for line in path.read_text().splitlines() if line and not line.startswith("#")]
     table = {key: values for key, *values in rows}
     column = table["joint"].index(joint)
@@ -105,6 +105,6 @@ def read_axis(path: Path, joint: str) -> Axis:
 
 
 def padded(psec: list[float], axis: Axis) -> tuple[list[float], int]:
-    """Setpoints with the first one repeated before the start, and where the start is."""
+    """Returns the setpoints with the first one repeated before the start, and the index of the start."""
     before = axis.delay_periods + 2
     return [psec[0]] * before + psec, before

@@ -1,4 +1,4 @@
-"""The cases of the comparison: setpoints of each, and the default machine's axes in SI units.
+"""Cases of the comparison: setpoints of each, and the default machine's axes in SI units.
 
 Setpoints are written as text that every contender reads: names of the axes, then a row per position period.
 """
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TABLE = Path(__file__).with_name("mikron_ucp710.txt")
-"""The default machine, a row per quantity."""
+"""Table of the default machine, a row per quantity."""
 
 POSITION_PERIOD = 6e-3
 """Tsp, s."""
@@ -23,7 +23,7 @@ SWEEP_MACHINES = 256
 
 @dataclass(frozen=True)
 class Case:
-    """One comparison: what moves, and for how long."""
+    """A comparison: moving axes and duration."""
 
     name: str
     joints: tuple[str, ...]
@@ -34,7 +34,7 @@ class Case:
     machines: int = 1
 
     def arguments(self) -> list[str]:
-        """What the programs are told beside the setpoints."""
+        """Returns the arguments of the programs beside the setpoints."""
         words: list[str] = []
         if self.circle is not None:
             radius, first, last = self.circle
@@ -45,15 +45,15 @@ class Case:
         return words
 
     def periods(self) -> int:
-        """Number of position periods."""
+        """Returns the number of position cycles."""
         return math.ceil(self.duration / POSITION_PERIOD - 1e-9)
 
     def simulated_seconds(self) -> float:
-        """Machine-seconds of one run."""
+        """Returns the machine-seconds of one run."""
         return self.periods() * POSITION_PERIOD * self.machines
 
     def write(self, folder: Path) -> Path:
-        """Writes the setpoints; returns where."""
+        """Writes the setpoints; returns their path."""
         path = folder / f"{self.name}.txt"
         rows = (self.psec(k * POSITION_PERIOD) for k in range(self.periods()))
         lines = [" ".join(self.joints), *(" ".join(map(repr, row)) for row in rows)]
@@ -62,7 +62,7 @@ class Case:
 
 
 def line(length: float, velocity: float, acceleration: float, jerk: float) -> tuple[float, Callable[[float], float]]:
-    """Rest to rest with limited jerk, both limits reached: duration (s), and way (m) at a time (s)."""
+    """Returns duration (s) and position (m) over time (s) of a jerk-limited motion from rest to rest."""
     t_jerk = acceleration / jerk
     t_even = velocity / acceleration - t_jerk
     ramp = 2 * t_jerk + t_even
@@ -89,7 +89,7 @@ def line(length: float, velocity: float, acceleration: float, jerk: float) -> tu
 
 
 def single_axis() -> Case:
-    """X over 200 mm at 10 m/min, rest to rest, 2.5 m/s², 50 m/s³, and half a second of rest."""
+    """Returns X over 200 mm at 10 m/min, rest to rest, 2.5 m/s², 50 m/s³, and half a second of rest."""
     duration, way = line(0.200, 10 * M_MIN, 2.5, 50.0)
     return Case("single-axis", ("x",), duration + 0.5, lambda t: (way(t),))
 
@@ -103,7 +103,7 @@ class Shuttle:
     moves: int
 
     def at(self, t: float) -> float:
-        """Position at a time."""
+        """Returns the position at a time."""
         done = min(int(t / self.time), self.moves)
         start = self.length * (done % 2)
         if done == self.moves:
@@ -114,7 +114,7 @@ class Shuttle:
 
 
 def five_axis() -> Case:
-    """All five axes there and back at once for 10 s, each with its own time; within the limits of each."""
+    """Returns simultaneous reciprocating motions of all five axes for 10 s, each with its own period."""
     shuttles = (
         Shuttle(0.300, 1.9, 5),
         Shuttle(0.250, 1.35, 7),
@@ -126,7 +126,7 @@ def five_axis() -> Case:
 
 
 def sweep() -> Case:
-    """The ballbar of the model's page on many X-Y machines: 150 mm at 15 m/min, two turns between cosine ramps."""
+    """Returns the ballbar of the model's page on many X-Y machines: 150 mm at 15 m/min, two turns, cosine ramps."""
     radius, velocity, rest, ramp, turns = 0.150, 15 * M_MIN, 0.5, 0.5, 2
     steady = turns * 2 * math.pi * radius / velocity
     moving = 2 * ramp + steady
@@ -150,11 +150,11 @@ def sweep() -> Case:
 
 
 CASES = {case.name: case for case in (single_axis(), five_axis(), sweep())}
-"""The cases by name."""
+"""Cases by name."""
 
 
 def read_setpoints(path: Path) -> tuple[list[str], list[list[float]]]:
-    """Names of the axes, and setpoints by axis."""
+    """Returns names of the axes, and setpoints by axis."""
     first, *rows = path.read_text().splitlines()
     columns = zip(*([float(word) for word in row.split()] for row in rows))
     return first.split(), [list(column) for column in columns]

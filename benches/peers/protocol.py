@@ -1,4 +1,4 @@
-"""How a contender in Python is run: a line `run N` in, a line of JSON with seconds per run and figures out."""
+"""Protocol of a Python contender: a line `run N` in, a line of JSON with seconds per run and figures out."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from axis import Axis, padded, read_axis
 from cases import read_setpoints
 
 Figures = dict[str, float]
-"""Figures of the one axis, by the names of the C loop."""
+"""Figures of the single axis, by the names of the C loop."""
 
 
 class Asked(NamedTuple):
-    """The one axis that is to be run."""
+    """Input of a run of a single axis."""
 
     joint: str
     axis: Axis
     psec: list[float]
-    """Setpoints, one a position period."""
+    """Setpoints, one per position cycle."""
     values: list[float]
-    """The same with what the delay reaches behind the first."""
+    """Setpoints with a lead-in of the length of the delay."""
     start: int
-    """Where the first stands in `values`."""
+    """Index of the first setpoint in `values`."""
 
 
 def asked() -> Asked:
-    """What the command line names: the table of the machine and the setpoints."""
+    """Returns the input named on the command line: the machine table and the setpoints."""
     table, setpoints = map(Path, sys.argv[1:3])
     (joint,), (psec,) = read_setpoints(setpoints)
     axis = read_axis(table, joint)
@@ -38,7 +38,7 @@ def asked() -> Asked:
 
 
 def figures(max_synchronized: float, peak_current: float, **more: float) -> Figures:
-    """The figures that every contender has, and those that it has beside them."""
+    """Returns the figures common to all contenders, and additional ones."""
     return {
         "max_delay_compensated_following_error": float(max_synchronized),
         "peak_current": float(peak_current),
@@ -47,7 +47,7 @@ def figures(max_synchronized: float, peak_current: float, **more: float) -> Figu
 
 
 def serve(run: Callable[[], Figures], joint: str = "x") -> None:
-    """Answers until there is no more input. What compiles or is built at the first run is not in the time."""
+    """Responds until the end of input. The first run, which may compile or build, is not timed."""
     run()
     for line in sys.stdin:
         runs = int(line.split()[1])

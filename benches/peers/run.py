@@ -1,4 +1,4 @@
-"""Runs this library and its peers against each other: same cases, same setpoints, in turns.
+"""Compares this library with its peers: same cases, same setpoints, alternating runs.
 
     benches/peers/setup.sh                 # once: the peers, into .build/peers
     python3 benches/peers/run.py [--case NAME]... [--rounds 10] [--cpu] [--json FILE] [--contender PROGRAM]
@@ -37,26 +37,26 @@ from cases import CASES, TABLE, Case  # noqa: E402
 
 VENV = ROOT / ".build" / "peers"
 C_FLAGS = ("-std=gnu11", "-O3", "-march=native", "-ffast-math")
-"""Of the C loop."""
+"""Flags of the C loop."""
 REFERENCE = "C loop"
 LIBRARY = "virtual_axes"
 ON_TWO = ", 2 cores"
-"""After the name of who has two cores; of the C loop two processes run at once, which have nothing to share."""
+"""Suffix of contenders with two cores; for the C loop, two independent processes run at once."""
 ROUND_SECONDS = 0.2
-"""Time that a contender gets in a round, about; it runs at least once."""
+"""Approximate duration of a contender per round; at least one run."""
 SAME = 1e-6
-"""Relative bound for those that step the model exactly: rounding, and the order of operations."""
+"""Relative bound for contenders with an exact step: rounding and the order of operations."""
 PATIENCE = 300.0
-"""Seconds after which a contender that does not answer is ended; compiling takes some."""
+"""Timeout of a contender, s; compilation takes part of it."""
 
 
 class NotToBeHad(Exception):
-    """A contender that cannot be run here, and why."""
+    """A contender that cannot run here, with the reason."""
 
 
 @dataclass
 class Contender:
-    """One program that takes part."""
+    """Program in the comparison."""
 
     name: str
     command: list[str]
@@ -68,9 +68,9 @@ class Contender:
     differs: float = 0.0
 
     def start(self) -> None:
-        """Starts it."""
+        """Starts the program."""
         threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
-        # Not a pipe: nobody reads it before the end.
+        # Not a pipe: it is only read after the program's end.
         self.errors = tempfile.TemporaryFile("w+")
         try:
             self.process = subprocess.Popen(
@@ -86,19 +86,19 @@ class Contender:
             raise NotToBeHad(str(reason)) from reason
 
     def on_core(self) -> float:
-        """Seconds that its threads have been on a core so far."""
+        """Returns the CPU time of its threads so far, s."""
         assert self.process
         tasks = Path(f"/proc/{self.process.pid}/task").iterdir()
         return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) * 1e-9
 
     def time(self, cpu: bool) -> float:
-        """Seconds of a run, by one clock or the other."""
+        """Returns the CPU or wall-clock time, s."""
         before = self.on_core() if cpu else 0.0
         seconds = self.run(self.runs)["seconds"]
         return (self.on_core() - before) / self.runs if cpu else seconds
 
     def run(self, runs: int) -> dict:
-        """Makes some runs; the answer."""
+        """Makes some runs and returns the response."""
         assert self.process and self.process.stdin and self.process.stdout and self.errors
         watch = threading.Timer(PATIENCE, self.process.kill)
         watch.start()
@@ -124,7 +124,7 @@ class Contender:
         return answer
 
     def end(self) -> None:
-        """Ends it, and waits for that."""
+        """Ends the program and waits for it."""
         if self.process:
             self.process.kill()
             self.process.communicate()
@@ -136,34 +136,34 @@ class Contender:
 
 @dataclass
 class AtOnce(Contender):
-    """As many processes of one program at once as `copies` says: what the machine's cores are worth to it."""
+    """Simultaneous processes of one program, `copies` of them: the throughput of several cores."""
 
     copies: int = 2
     others: list[Contender] = field(default_factory=list)
 
     def start(self) -> None:
-        """Starts them."""
+        """Starts the processes."""
         super().start()
         for _ in range(1, self.copies):
             self.others.append(Contender(self.name, self.command, self.bound))
             self.others[-1].start()
 
     def run(self, runs: int) -> dict:
-        """Lets each make these runs; an answer, with the seconds of the slowest divided by their number."""
+        """Makes the runs in each process; returns one response with the slowest time over their number."""
         with ThreadPoolExecutor(self.copies) as pool:
             others = [pool.submit(other.run, runs) for other in self.others]
             answers = [super().run(runs), *(other.result() for other in others)]
         return {**answers[0], "seconds": max(answer["seconds"] for answer in answers) / self.copies}
 
     def end(self) -> None:
-        """Ends them."""
+        """Ends the processes."""
         super().end()
         for other in self.others:
             other.end()
 
 
 def build(source: str, folder: Path, *more: str) -> str:
-    """Builds a C program with the flags of the C loop, unless `more` has others."""
+    """Builds a C program with the flags of the C loop plus `more`."""
     gcc = shutil.which("gcc")
     if not gcc:
         raise NotToBeHad("there is no gcc")
@@ -180,7 +180,7 @@ def build(source: str, folder: Path, *more: str) -> str:
 
 
 def library(program: str | None) -> str:
-    """This library's program, built by cargo."""
+    """Returns this library's program, built by cargo."""
     if program:
         return program
     command = ["cargo", "bench", "--bench", "contender", "--no-run", "--locked", "--message-format=json"]
@@ -193,7 +193,7 @@ def library(program: str | None) -> str:
 
 
 def python_peer(module: str, script: str) -> list[str]:
-    """The command of a peer in Python, which has its package."""
+    """Returns the command of a Python peer, if its package is installed."""
     python = VENV / "bin" / "python"
     if not python.exists() or subprocess.run([python, "-c", f"import {module}"], capture_output=True).returncode:
         raise NotToBeHad(f"there is no {module} in .build/peers: benches/peers/setup.sh")
@@ -201,7 +201,7 @@ def python_peer(module: str, script: str) -> list[str]:
 
 
 def mujoco(folder: Path) -> str:
-    """The program against the library in MuJoCo's wheel."""
+    """Builds the program with the library of MuJoCo's wheel."""
     package = next(VENV.glob("lib/python3*/site-packages/mujoco"), None)
     shared = next(package.glob("libmujoco.so*"), None) if package else None
     if not package or not shared:
@@ -210,7 +210,7 @@ def mujoco(folder: Path) -> str:
 
 
 def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tuple[list[Contender], dict[str, str]]:
-    """Who takes part in a case; and who cannot, with the reason."""
+    """Returns the contenders of a case, and the reasons for missing ones."""
     setpoints = [str(case.write(folder)), *case.arguments()]
     table_first = [str(TABLE), *setpoints]
     found: list[Contender] = []
@@ -227,7 +227,7 @@ def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tupl
         return found, missing
     add("C loop, -O2", lambda: [build("scalar.c", folder, "-O2"), *table_first])
     add(LIBRARY, lambda: [library(program), *setpoints])
-    # The time on a core is that of all cores together.
+    # CPU time is the sum over all cores.
     if case.machines > 1 and not cpu and (os.cpu_count() or 1) > 1:
         add(LIBRARY + ON_TWO, lambda: [library(program), *setpoints, "--cores", "2"])
         add(REFERENCE + ON_TWO, lambda: found[0].command, kind=AtOnce)
@@ -239,7 +239,8 @@ def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tupl
             ("Drake", "pydrake", "with_drake.py"),
         ):
             add(name, lambda module=module, script=script: [*python_peer(module, script), *table_first])
-        # It integrates with an error of the order of its step: as the model's tick, as the tolerance of the model's
+        # Its integration error depends on its step: step sizes of the model's tick, of the tolerance on the model's
+        # page, and of a tenth of that.
         # page, and for a tenth of that.
         for steps, bound in ((1, 0.025), (3, 0.01), (25, 0.001)):
             name = f"MuJoCo, 125 µs / {steps}"
@@ -248,7 +249,7 @@ def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tupl
 
 
 def compared(reference: dict, answer: dict) -> float:
-    """The largest relative difference of a figure that both have; infinite where one has none."""
+    """Returns the largest relative difference of a common figure; infinite where one is missing."""
     worst = 0.0
 
     def compare(value: float | None, wanted: float, scale: float) -> None:
@@ -265,7 +266,7 @@ def compared(reference: dict, answer: dict) -> float:
                 raise ValueError(f"no figure of {joint}")
             for key in both:
                 compare(other["axes"][joint][key], figures[key], abs(figures[key]))
-        # A mean may be next to nothing: each is taken against the largest of the three.
+        # A mean may be close to 0: each is relative to the largest of the three.
         circle = mine.get("circle", {})
         for key, value in circle.items():
             compare(other["circle"][key], value, max(map(abs, circle.values())))
@@ -273,7 +274,7 @@ def compared(reference: dict, answer: dict) -> float:
 
 
 def check_all(all_of_them: list[Contender], missing: dict[str, str]) -> list[Contender]:
-    """Starts each, warms it up and compares its figures; those that keep their bound."""
+    """Starts and warms up each contender and compares its figures; returns those within their bound."""
     kept: list[Contender] = []
     reference: dict = {}
     for contender in all_of_them:
@@ -297,14 +298,14 @@ def check_all(all_of_them: list[Contender], missing: dict[str, str]) -> list[Con
 
 
 def measure(case: Case, rounds: int, cpu: bool, program: str | None) -> dict:
-    """Runs a case; its results."""
+    """Runs a case and returns its results."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         everyone, missing = contenders(case, folder, cpu, program)
         try:
             kept = check_all(everyone, missing)
             for turn in range(rounds):
-                # Who comes first changes from round to round.
+                # The order changes from round to round.
                 shift = turn % max(len(kept), 1)
                 for contender in kept[shift:] + kept[:shift]:
                     contender.seconds.append(contender.time(cpu))
@@ -337,7 +338,7 @@ def measure(case: Case, rounds: int, cpu: bool, program: str | None) -> dict:
 
 
 def worth_of_two(kept: list[Contender]) -> dict[str, float]:
-    """How much sooner each that has two cores is done than with one, as the median over the rounds."""
+    """Returns the speedup by a second core for each contender that uses it, as the median over the rounds."""
     times = {contender.name: contender.seconds for contender in kept}
     return {
         name: statistics.median(one / two for one, two in zip(seconds, times[name + ON_TWO], strict=True))
@@ -347,7 +348,7 @@ def worth_of_two(kept: list[Contender]) -> dict[str, float]:
 
 
 def table(measured: dict) -> str:
-    """A case as a table in Markdown."""
+    """Returns the results of a case as a Markdown table."""
     rounds = measured["rounds"]
     lines = [
         f"### {measured['case']}: " + (f"median of {rounds} rounds" if rounds > 1 else "one round"),
@@ -368,7 +369,7 @@ def table(measured: dict) -> str:
 
 
 def main() -> int:
-    """Runs what the command line asks for."""
+    """Runs the cases of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--case", action="append", choices=list(CASES), help="one case; all of them without")
     parser.add_argument("--rounds", type=int, default=10, help="rounds, ten at least for a figure that is told")
@@ -379,7 +380,7 @@ def main() -> int:
     if arguments.rounds < 1:
         parser.error("--rounds: one at least")
     if arguments.json:
-        # What cannot be written is said before anything is measured.
+        # An output that cannot be written is reported before the measurement.
         try:
             arguments.json.touch()
         except OSError as reason:

@@ -23,12 +23,12 @@ FLAGS = ("-O3", "-march=native", "-ffast-math", "-fPIC", "-shared")
 
 
 def clamp(value: ca.SX, limit: ca.SX | float) -> ca.SX:
-    """Within ±limit."""
+    """Returns the value limited to ±limit."""
     return ca.fmax(ca.fmin(value, limit), -limit)
 
 
 def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
-    """A PI controller at an instant: output and integral."""
+    """Returns output and integral of a PI controller."""
     new = integral + integral_gain * error
     wanted = (gain * error + new + feedforward) * scale
     output = clamp(wanted, limit)
@@ -36,11 +36,11 @@ def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
 
 
 def position_period(p: Axis) -> ca.Function:
-    """State and setpoints (the delayed one, then those of both feedforwards) to the state a period later."""
+    """Returns the map from state and setpoints (delayed, then those of both feedforwards) to the next state."""
     state = ca.SX.sym("state", 7)
     psec = ca.SX.sym("psec", 4)
     i, omega, theta, velocity_integral, current_integral, synchronized, peak = ca.vertsplit(state)
-    # Newest first: one after the delayed setpoint, that itself, and two before it.
+    # Newest first: one after the delayed setpoint, the delayed setpoint, and two before it.
     after, delayed, before, oldest = ca.vertsplit(psec)
     synchronized = ca.fmax(synchronized, ca.fabs(delayed - theta * p.ratio))
     velocity_setpoint = clamp(p.position_gain * (delayed / p.ratio - theta), p.max_speed)
@@ -75,7 +75,7 @@ def position_period(p: Axis) -> ca.Function:
 
 
 def compiled(function: ca.Function) -> ca.Function:
-    """The function as C code, compiled."""
+    """Returns the function compiled as C code."""
     with tempfile.TemporaryDirectory() as folder:
         here = os.getcwd()
         os.chdir(folder)
@@ -88,16 +88,16 @@ def compiled(function: ca.Function) -> ca.Function:
 
 
 def main() -> None:
-    """Runs what standard input asks for."""
+    """Runs the requests on standard input."""
     joint, axis, psec, values, start = asked()
     array = np.array(values)
     count = len(values) - start
     at = np.arange(start, len(values)) - axis.delay_periods
-    # Before its step the staircase behind the delay shows the delayed setpoint, then the one after it.
+    # Before its switch the zero-order hold behind the delay has the delayed setpoint, then the next one.
     shifted = ca.DM(np.vstack([array[at + 1], array[at], array[at - 1], array[at - 2]]))
     function = compiled(position_period(axis).mapaccum("run", count, {"base": count}))
     initial = ca.DM([0, 0, psec[0] / axis.ratio, 0, 0, 0, 0])
-    # The buffers of the call are made once: CasADi's way to call without conversions.
+    # The call's buffers are allocated once: CasADi's call without conversions.
     buffer, call = function.buffer()
     arguments = [np.array(initial).ravel(order="F"), np.array(shifted).ravel(order="F")]
     result = np.zeros(function.nnz_out(0))

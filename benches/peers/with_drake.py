@@ -18,7 +18,7 @@ from protocol import Figures, asked, figures, serve
 
 
 class Drive(LeafSystem):
-    """One axis; its state is i, omega, theta, both integrals, what the loops hold, and the figures."""
+    """One axis; its state is i, omega, theta, both integrals, held outputs of the loops, and the figures."""
 
     STATE = 11
 
@@ -29,7 +29,7 @@ class Drive(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(CURRENT_PERIOD, 0.0, self.tick)
 
     def tick(self, context: Context, values: DiscreteValues) -> EventStatus:
-        """The loops that are due, then the plant."""
+        """Runs the loops that are due, then the plant."""
         p, psec = self.axis, self.psec
         (
             i, omega, theta, velocity_integral, current_integral,
@@ -86,12 +86,12 @@ class Drive(LeafSystem):
 
 
 def main() -> None:
-    """Runs what standard input asks for."""
+    """Runs the requests on standard input."""
     joint, axis, psec, values, start = asked()
     simulator = Simulator(Drive(axis, values, start))
     context = simulator.get_mutable_context()
     initial = [0.0, 0.0, psec[0] / axis.ratio] + [0.0] * (Drive.STATE - 3)
-    # The update at the end of the last period is not wanted.
+    # The update at the end of the last cycle must not run.
     end = (len(psec) * TICKS_PER_POSITION - 0.5) * CURRENT_PERIOD
 
     def run() -> Figures:

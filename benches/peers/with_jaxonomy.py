@@ -22,7 +22,7 @@ from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis  #
 
 
 def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
-    """A PI controller at an instant: output and integral."""
+    """Returns output and integral of a PI controller."""
     new = integral + integral_gain * error
     wanted = (gain * error + new + feedforward) * scale
     output = jnp.clip(wanted, -limit, limit)
@@ -30,7 +30,7 @@ def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
 
 
 class Drive(jaxonomy.LeafSystem):
-    """One axis; its state is i, omega, theta, both integrals, what the loops hold, and the figures."""
+    """One axis; its state is i, omega, theta, both integrals, held outputs of the loops, and the figures."""
 
     STATE = 10
 
@@ -42,7 +42,7 @@ class Drive(jaxonomy.LeafSystem):
         self.declare_periodic_update(self.tick, period=CURRENT_PERIOD, offset=0.0)
 
     def tick(self, time, state, *_inputs, **_parameters):
-        """The loops that are due, then the plant."""
+        """Runs the loops that are due, then the plant."""
         p, psec = self.axis, self.psec
         (
             i, omega, theta, velocity_integral, current_integral,
@@ -92,11 +92,11 @@ class Drive(jaxonomy.LeafSystem):
 
 
 def main() -> None:
-    """Runs what standard input asks for."""
+    """Runs the requests on standard input."""
     joint, axis, psec, values, start = asked()
     system = Drive(axis, values, start)
     ticks = len(psec) * TICKS_PER_POSITION
-    # The update at the end of the last period is not wanted.
+    # The update at the end of the last cycle must not run.
     end = (ticks - 0.5) * CURRENT_PERIOD
     options = SimulatorOptions(precision="float64", save_time_series=False)
     context = system.create_context()

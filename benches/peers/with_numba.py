@@ -16,13 +16,13 @@ from protocol import Figures, asked, figures, serve
 
 @njit(fastmath=True)
 def clamp(value: float, limit: float) -> float:
-    """Within ±limit."""
+    """Returns the value limited to ±limit."""
     return limit if value > limit else -limit if value < -limit else value
 
 
 @njit(fastmath=True)
 def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
-    """A PI controller at an instant: output, integral, whether it is limited."""
+    """Returns output, integral and saturation of a PI controller."""
     new = integral + integral_gain * error
     wanted = (gain * error + new + feedforward) * scale
     output = clamp(wanted, limit)
@@ -32,13 +32,13 @@ def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
 
 @njit(fastmath=True)
 def row(r, i, omega, voltage, torque):
-    """A row of the discretized motor."""
+    """Returns a row of the discretized motor."""
     return r[0] * i + r[1] * omega + r[2] * voltage + r[3] * torque
 
 
 @njit(fastmath=True)
 def simulate(p: Axis, psec: np.ndarray, start: int):
-    """The whole run from rest at home; the figures."""
+    """Returns the figures of a run from rest at home."""
     i = omega = velocity_integral = current_integral = 0.0
     theta = psec[0] / p.ratio
     current_setpoint = 0.0
@@ -97,7 +97,7 @@ def simulate(p: Axis, psec: np.ndarray, start: int):
 
 
 def main() -> None:
-    """Runs what standard input asks for."""
+    """Runs the requests on standard input."""
     joint, axis, _, values, start = asked()
     array = np.array(values)
 

@@ -1,4 +1,4 @@
-"""Drive the virtual axes from Python: the example to copy, and what the tests and the demo use.
+"""Python client of the virtual axes: an example for users, used by the tests and the demo.
 
     with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
         path = ballbar()

@@ -1,4 +1,4 @@
-"""A ROS 2 node that speaks with the virtual axes."""
+"""ROS 2 client node of the virtual axes."""
 
 from __future__ import annotations
 
@@ -38,30 +38,30 @@ from .recording import CURRENT_FIELDS, JOINT_FIELDS, STATE_FIELDS, Recording, Se
 from .trajectories import NANOSECONDS, to_ns, to_time
 
 RECORDING_KEYS = ["file", "recording", "size_mb", "messages", "left_out"]
-"""Of the status in /diagnostics of a node that records (docs/graph.md)."""
+"""Name of the recording's status in /diagnostics (docs/graph.md)."""
 SAMPLES_AT_ONCE = 200
-"""Few enough that other callbacks have their turn."""
+"""Samples taken per callback, few enough that other callbacks are executed in time."""
 TURN_S = 20.0
-"""Until it is the turn of a call in the executor, at most."""
+"""Timeout for a call to be executed by the executor, s."""
 SETTLE_S = 0.2
-"""A reliable sample written in the instant after matching can wait for the next heartbeat."""
+"""Timeout for a reliable sample written at matching: it may wait for the next heartbeat, s."""
 
 
 class Refused(Exception):
-    """The node refused a trajectory; `result` says why."""
+    """Rejection of a trajectory; `result` holds the reason."""
 
     def __init__(self, result: TrajectoryResult):
-        """Keep the result beside its text."""
+        """Keeps the result beside its text."""
         super().__init__(f"code {result.code}: {result.text}")
         self.result = result
 
 
 class ParameterRefused(Exception):
-    """The node refused a parameter's value; the text is its reason."""
+    """Rejection of a parameter value; the text is the reason."""
 
 
 class Drive:
-    """A ROS 2 node that sends setpoints to the virtual axes and keeps what they publish.
+    """ROS 2 node that sends setpoints to the virtual axes and keeps their messages.
 
     It spins in a thread of its own; every wait is bounded and raises TimeoutError.
     """
@@ -113,7 +113,7 @@ class Drive:
         self._psec = self.node.create_publisher(JointTrajectory, f"{namespace}/psec", PSEC_QOS)
         self._stream = self.node.create_publisher(JointState, f"{namespace}/psec_stream", STREAM_QOS)
         self._load = self.node.create_publisher(JointState, f"{namespace}/load", 10)
-        # Raw: taking a sample must not cost more than the node needs to make one.
+        # Raw: receiving a sample must not cost more than the node needs to publish one.
         self._subscriptions = [
             self._keep_samples(key, kind, topic)
             for key, kind, topic in (
@@ -146,15 +146,15 @@ class Drive:
     # ---- life
 
     def __enter__(self) -> Drive:
-        """Itself."""
+        """Returns itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave the graph."""
+        """Closes the client."""
         self.close()
 
     def close(self) -> None:
-        """Leave the graph; harmless when called twice."""
+        """Leaves the graph; has no effect when called again."""
         if self._context.ok():
             self._closing = True
             self._executor.shutdown(timeout_sec=2.0)
@@ -168,13 +168,13 @@ class Drive:
         except ExternalShutdownException:
             pass
         except (InvalidHandle, AttributeError):
-            # A callback, or a wait of rclpy's executor, that was under way when the node left.
+            # A callback, or a wait of rclpy's executor, that was active when the node was destroyed.
             if not self._closing:
                 raise
 
     def _keep_samples(self, key: str, kind: type, topic: str) -> Any:
-        """A subscription that takes what has come at one go: a turn of rclpy's executor costs ten times
-        as much as a sample, and axes in `fast` would run away from it.
+        """Creates a subscription that takes all received samples at once: one iteration of rclpy's executor costs ten
+        times as much as a sample, and axes in `fast` would run ahead.
         """
         store = self._samples[key]
 
@@ -200,15 +200,16 @@ class Drive:
         return callback
 
     def in_executor(self, call: Callable[[], Any]) -> Any:
-        """What `call()` gives in the thread that spins. From another one rclpy's ActionClient can meet a response
-        before it has noted the request, and drops it; nor does the executor bear that what it waits for goes.
+        """Runs `call()` in the executor's thread and returns its result. From another thread rclpy's ActionClient can
+        receive a response before it has stored the request, and drops it; the executor fails if an entity is destroyed
+        during a wait.
         """
         task = self._executor.create_task(call)
         self.wait_for(task.done, TURN_S, "turn of the executor")
         return task.result()
 
     def wait_for(self, condition: Callable[[], Any], timeout: float, what: str) -> Any:
-        """Wait until `condition()` holds and return what it gave; `what` is for the error."""
+        """Waits until `condition()` is true and returns its value; `what` is for the error message."""
         deadline = time.monotonic() + timeout
         with self._changed:
             while not (answer := condition()):
@@ -217,7 +218,7 @@ class Drive:
                     raise TimeoutError(f"no {what} within {timeout:g} s{self._account()}")
                 if self.process is not None and self.process.poll() is not None:
                     raise ChildProcessError(f"the node ended while waiting for {what}{self._account()}")
-                # Some conditions ask the graph, which tells nobody when it changes.
+                # Some conditions query the graph, which sends no event when it changes.
                 self._changed.wait(min(left, 0.02))
             return answer
 
@@ -225,7 +226,7 @@ class Drive:
         return f"; the node's output:\n{self.process.output()}" if self.process is not None else ""
 
     def connect(self, timeout: float = 20.0) -> None:
-        """Wait until both directions are matched and the first samples have come."""
+        """Waits until both directions are matched and the first samples have arrived."""
 
         def matched() -> bool:
             return (
@@ -239,20 +240,20 @@ class Drive:
         time.sleep(SETTLE_S)
 
     def sees(self, name: str | None = None) -> bool:
-        """Whether a node of this full name (the axes', by default) is in the graph."""
+        """Returns true if a node of this full name (default: the axes') is in the graph."""
         full = [f"{ns.rstrip('/')}/{node}" for node, ns in self.node.get_node_names_and_namespaces()]
         return (name or self.target) in full
 
     # ---- time
 
     def now(self) -> int:
-        """The newest position instant that the axes have published, ns of the node's clock."""
+        """Returns the newest position instant that the axes have published, ns of the node's clock."""
         self._must_listen()
         with self._changed:
             return stamp_of(self._samples["states"][-1])
 
     def wait_until(self, stamp_ns: int, timeout: float) -> None:
-        """Wait until everything up to `stamp_ns` has been published."""
+        """Waits until everything up to `stamp_ns` has been published."""
         self._must_listen()
         self.wait_for(
             lambda: all(samples and stamp_of(samples[-1]) >= stamp_ns for samples in self._samples.values()),
@@ -264,14 +265,14 @@ class Drive:
 
     @property
     def gid(self) -> bytes:
-        """The middleware's id of the publisher of `psec`, as in TrajectoryResult.publisher_gid."""
+        """Returns the GID of the publisher of `psec`, as in TrajectoryResult.publisher_gid."""
         for info in self.node.get_publishers_info_by_topic(self._psec.topic_name):
             if info.node_name == self.name:
                 return bytes(info.endpoint_gid[:16])
         raise LookupError(f"{self.name} does not see its own publisher of {self._psec.topic_name}")
 
     def send(self, trajectory: JointTrajectory) -> int:
-        """Publish setpoints; returns the sequence number by which the results name them."""
+        """Publishes setpoints; returns the sequence number that identifies them in the results."""
         with self._changed:
             self._sent += 1
             sequence_number = self._sent
@@ -279,7 +280,7 @@ class Drive:
         return sequence_number
 
     def results(self, sequence_number: int | None = None) -> list[TrajectoryResult]:
-        """The results so far: all, or those of one trajectory from here."""
+        """Returns the results so far: all, or those of one trajectory of this client."""
         if sequence_number is None:
             with self._changed:
                 return list(self._results)
@@ -294,13 +295,13 @@ class Drive:
             ]
 
     def decision(self, sequence_number: int, timeout: float = 10.0) -> TrajectoryResult:
-        """Whether the trajectory was accepted or rejected."""
+        """Waits for acceptance or rejection of the trajectory."""
         return self.wait_for(
             lambda: self.results(sequence_number)[:1], timeout, f"decision on trajectory {sequence_number}"
         )[0]
 
     def end(self, sequence_number: int, timeout: float) -> TrajectoryResult:
-        """How the trajectory ended: COMPLETED, PREEMPTED, STOPPED, ABORTED, or REJECTED."""
+        """Waits for the final result of the trajectory: COMPLETED, PREEMPTED, STOPPED, ABORTED, or REJECTED."""
         return self.wait_for(
             lambda: [r for r in self.results(sequence_number) if r.status != TrajectoryResult.ACCEPTED],
             timeout,
@@ -308,14 +309,14 @@ class Drive:
         )[0]
 
     def accept(self, trajectory: JointTrajectory, timeout: float = 10.0) -> TrajectoryResult:
-        """Publish setpoints and return their acceptance; raises Refused."""
+        """Publishes setpoints and returns their acceptance; raises TrajectoryRejected."""
         result = self.decision(self.send(trajectory), timeout)
         if result.status == TrajectoryResult.REJECTED:
             raise Refused(result)
         return result
 
     def run(self, trajectory: JointTrajectory, timeout: float = 60.0, settle: float = 0.0) -> Recording:
-        """Execute setpoints to their end and `settle` s on; raises Refused."""
+        """Executes setpoints to their end plus `settle` s; raises TrajectoryRejected."""
         self._must_listen()
         accepted = self.accept(trajectory)
         result = self.end(accepted.sequence_number, timeout)
@@ -327,7 +328,7 @@ class Drive:
         return self.record(start, end, result)
 
     def record(self, start: int, end: int, result: TrajectoryResult | None = None) -> Recording:
-        """What was published from `start` to `end`, ns of the node's clock, both included."""
+        """Returns the messages from `start` to `end`, ns of the node's clock, both included."""
         self._must_listen()
 
         def gather(key: str, kind: type, fields: Sequence[str]) -> Series:
@@ -348,20 +349,20 @@ class Drive:
             raise ValueError("with listen=False a drive keeps no samples")
 
     def forget(self) -> None:
-        """Drop the samples so far but the newest of each topic."""
+        """Drops all samples but the newest of each topic."""
         with self._changed:
             for samples in self._samples.values():
                 del samples[:-1]
 
     def latest(self, field: str = "position") -> dict[str, Any]:
-        """A field of the newest drive states, by joint."""
+        """Returns a field of the newest drive states, by joint."""
         self._must_listen()
         with self._changed:
             message = deserialize_message(self._samples["states"][-1], DriveStates)
         return dict(zip(message.name, getattr(message, field)))
 
     def stream(self, names: Sequence[str], positions: Sequence[float], stamp: int = 0) -> None:
-        """Publish one setpoint of a stream (m, rad); NaN, or none, leaves the joint alone.
+        """Publishes one setpoint of a stream (m, rad); NaN or a missing position does not command the joint.
 
         `stamp` is when it was sent, ns of a clock of the sender's own; 0 does not say.
         """
@@ -370,28 +371,28 @@ class Drive:
         self._stream.publish(message)
 
     def load(self, effort: Mapping[str, float]) -> None:
-        """Apply external forces or torques (N, N.m of the axis, towards plus); they time out."""
+        """Applies external forces or torques (N, N.m of the axis, positive direction); they time out."""
         message = JointState(name=list(effort), effort=[float(value) for value in effort.values()])
         self._load.publish(message)
 
     def diagnostics(self) -> list[DiagnosticArray]:
-        """The diagnostics so far."""
+        """Returns the diagnostics so far."""
         with self._changed:
             return list(self._diagnostics)
 
     def next_diagnostics(self, timeout: float = 8.0) -> DiagnosticArray:
-        """The diagnostics after now, past what is on its way."""
+        """Waits for the next diagnostics, without those in transit."""
         seen = len(self.diagnostics())
         return self.wait_for(lambda: self.diagnostics()[seen + 1 :], timeout, "diagnostics")[0]
 
     def told(self) -> dict[str, str]:
-        """What the next diagnostics say of the node, by key."""
+        """Returns the values of the node's next diagnostics, by key."""
         return status_values(self.next_diagnostics().status[0])
 
     # ---- services
 
     def call(self, kind: Any, service: str, request: Any, timeout: float = 10.0) -> Any:
-        """Call one of the node's services, `service` without the node's name."""
+        """Calls one of the node's services, `service` without the node's name."""
         client = self._clients.get(service)
         if client is None:
             client = self._clients[service] = self.node.create_client(kind, f"{self.target}/{service}")
@@ -402,11 +403,11 @@ class Drive:
         return future.result()
 
     def reset(self, timeout: float = 10.0) -> str:
-        """Put the axes back to rest at the start position; returns the node's message."""
+        """Resets the axes to rest at the start position; returns the node's message."""
         return self._trigger("reset", timeout)
 
     def stop(self, timeout: float = 10.0) -> str:
-        """Stop the axes within their limits; returns the node's message."""
+        """Stops the axes within their limits; returns the node's message."""
         return self._trigger("stop", timeout)
 
     def _trigger(self, service: str, timeout: float) -> str:
@@ -416,21 +417,21 @@ class Drive:
         return answer.message
 
     def list_parameters(self) -> list[str]:
-        """Names of all parameters."""
+        """Returns the names of all parameters."""
         return list(self.call(ListParameters, "list_parameters", ListParameters.Request()).result.names)
 
     def describe(self, names: Sequence[str]) -> list[ParameterDescriptor]:
-        """Descriptions, types and ranges of parameters."""
+        """Returns descriptions, types and ranges of parameters."""
         request = DescribeParameters.Request(names=list(names))
         return list(self.call(DescribeParameters, "describe_parameters", request).descriptors)
 
     def get_parameters(self, names: Sequence[str]) -> dict[str, Any]:
-        """Values of parameters."""
+        """Returns values of parameters."""
         answer = self.call(GetParameters, "get_parameters", GetParameters.Request(names=list(names)))
         return {name: parameter_value_to_python(value) for name, value in zip(names, answer.values)}
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
-        """Set parameters, each by itself; raises ParameterRefused with the node's reasons."""
+        """Sets parameters one by one; raises ParameterRejected with the node's reasons."""
         request = SetParameters.Request(parameters=parameter_messages(values))
         results = self.call(SetParameters, "set_parameters", request).results
         reasons = [result.reason for result in results if not result.successful]
@@ -438,7 +439,7 @@ class Drive:
             raise ParameterRefused("; ".join(reasons))
 
     def set_parameters_atomically(self, values: Mapping[str, Any]) -> None:
-        """Set parameters, all at the same position instant or none; raises ParameterRefused."""
+        """Sets all parameters at the same position instant or none; raises ParameterRejected."""
         request = SetParametersAtomically.Request(parameters=parameter_messages(values))
         result = self.call(SetParametersAtomically, "set_parameters_atomically", request).result
         if not result.successful:
@@ -446,16 +447,16 @@ class Drive:
 
 
 def parameter_messages(values: Mapping[str, Any]) -> list[ParameterMsg]:
-    """As requests to set them carry them."""
+    """Returns parameters as messages of the set requests."""
     return [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
 
 
 def status_values(status: DiagnosticStatus) -> dict[str, str]:
-    """Values of a status of /diagnostics, by key."""
+    """Returns the values of a status of /diagnostics, by key."""
     return {value.key: value.value for value in status.values}
 
 
 def stamp_of(sample: bytes) -> int:
-    """Stamp of a serialized message that begins with a header (CDR, little endian)."""
+    """Returns the stamp of a serialized message that begins with a header (CDR, little endian)."""
     sec, nanosec = struct.unpack_from("<iI", sample, 4)
     return sec * NANOSECONDS + nanosec

@@ -1,4 +1,4 @@
-"""The node's process, in a domain of its own."""
+"""Process of the node, in its own DDS domain."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ DEFAULT_NODE = "/virtual_axes"
 
 
 class DomainId:
-    """A ROS_DOMAIN_ID that nobody on this machine uses, ours until released."""
+    """A ROS_DOMAIN_ID that is free on this machine, reserved until released."""
 
-    # DDS listens at 7400 + 250 id: above 101 that reaches into Linux's ephemeral ports.
+    # DDS listens on port 7400 + 250 id: above 101 that overlaps Linux's ephemeral ports.
     RANGE = "1-101"
 
     def __init__(self) -> None:
-        """Take a free one; VIRTUAL_AXES_DOMAIN_IDS=50-59 narrows the choice."""
+        """Reserves a free id; VIRTUAL_AXES_DOMAIN_IDS=50-59 limits the choice."""
         first, last = map(int, os.environ.get("VIRTUAL_AXES_DOMAIN_IDS", self.RANGE).split("-"))
         for value in random.sample(range(first, last + 1), last - first + 1):
-            # Ours against other runs of this file, by a lock that the kernel takes back.
+            # Reserved against other runs of this file by a lock that the kernel releases.
             path = Path(tempfile.gettempdir()) / f"virtual_axes_domain_{os.getuid()}_{value}.lock"
             lock = path.open("w")
             try:
@@ -42,12 +42,12 @@ class DomainId:
         raise RuntimeError(f"no free ROS_DOMAIN_ID in {first}-{last}")
 
     def release(self) -> None:
-        """Give it back."""
+        """Releases the id."""
         self._lock.close()
 
 
 def _port_is_free(port: int) -> bool:
-    """Whether nobody listens at the port: DDS shares its ports, so binding alone must fail."""
+    """Returns true if the port is free: DDS shares its ports, so a normal bind must succeed."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("", port))
@@ -57,26 +57,26 @@ def _port_is_free(port: int) -> bool:
 
 
 def own_mb(pid: int) -> float:
-    """Resident memory of a process without pages of files, MB."""
+    """Returns the resident memory of a process without file pages, MB."""
     return status_of(pid, "RssAnon") * 1.024e-3
 
 
 def resident_mb(pid: int) -> float:
-    """Resident set of a process, MB."""
+    """Returns the resident set size of a process, MB."""
     return status_of(pid, "VmRSS") * 1.024e-3
 
 
 def status_of(pid: int, key: str) -> int:
-    """A number that Linux tells of a process: kB, where it is memory."""
+    """Returns a number of /proc/PID/status; memory in kB."""
     for line in Path(f"/proc/{pid}/status").read_text().splitlines():
         if line.startswith(f"{key}:"):
             return int(line.split()[1])
-    # It has ended, and nobody has asked for its exit status.
+    # The process is a zombie: its exit status has not been read.
     raise ProcessLookupError(f"process {pid} has no {key}")
 
 
 def node_binary() -> Path:
-    """The node's program: VIRTUAL_AXES_NODE, or what `cargo build --release` made."""
+    """Returns the node's program: VIRTUAL_AXES_NODE, or the output of `cargo build --release`."""
     if named := os.environ.get("VIRTUAL_AXES_NODE"):
         return Path(named)
     root = Path(__file__).resolve().parents[2]
@@ -84,13 +84,13 @@ def node_binary() -> Path:
 
 
 def die_with_parent() -> None:
-    """Linux: end the child when this process dies, however it dies."""
+    """Makes Linux terminate the child when this process dies for any reason."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
 
 
 class Node:
-    """A process that runs the node, in a domain of its own, on this machine only."""
+    """Process that runs the node, in its own domain, on this machine only."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ class Node:
         binary: Path | None = None,
         stderr: int | None = None,
     ):
-        """Say what to start; `ros_args` are what follows --ros-args, `name` is the full name they give.
+        """Sets what to start; `ros_args` follow --ros-args, `name` is the resulting full name.
 
         `stderr` is a file descriptor for it instead of `output()`.
         """
@@ -117,23 +117,23 @@ class Node:
         }
         self._stderr = stderr
         self._process: subprocess.Popen[bytes] | None = None
-        # Appending: the child shares this file, reading it must not move where it writes.
+        # Append mode: the child shares this file, and reading must not move the write position.
         self._output = tempfile.TemporaryFile("a+b")
 
     def __enter__(self) -> Node:
-        """Start."""
+        """Starts the node."""
         self.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Stop, by force if need be."""
+        """Stops the node, with SIGKILL if necessary."""
         if self._process is not None and self.poll() is None:
             self.stop()
         if self._own_domain is not None:
             self._own_domain.release()
 
     def start(self) -> None:
-        """Start the program; `Drive(process=...)` waits until it is heard."""
+        """Starts the program; `Drive(process=...)` waits until it is discovered."""
         self._process = subprocess.Popen(
             self._command,
             env=self._env,
@@ -145,21 +145,21 @@ class Node:
 
     @property
     def pid(self) -> int:
-        """Process id."""
+        """Returns the process id."""
         assert self._process is not None, "not started"
         return self._process.pid
 
     def poll(self) -> int | None:
-        """Exit status, or None while it runs."""
+        """Returns the exit status, or None while it runs."""
         return self._process.poll() if self._process is not None else None
 
     def wait(self, timeout: float) -> int:
-        """Exit status of a program that ends by itself; subprocess.TimeoutExpired if it does not."""
+        """Waits for the exit status; raises subprocess.TimeoutExpired if the program continues to run."""
         assert self._process is not None, "not started"
         return self._process.wait(timeout)
 
     def stop(self, number: signal.Signals = signal.SIGINT, timeout: float = 5.0) -> int:
-        """Ask the program to end and return its exit status; kills it when it does not (status -9)."""
+        """Signals the program and returns its exit status; kills it after the timeout (status -9)."""
         assert self._process is not None, "not started"
         if self._process.poll() is None:
             self._process.send_signal(number)
@@ -171,6 +171,6 @@ class Node:
         return self._process.returncode
 
     def output(self) -> str:
-        """What it wrote so far to stdout and stderr."""
+        """Returns the output so far on stdout and stderr."""
         descriptor = self._output.fileno()
         return os.pread(descriptor, os.fstat(descriptor).st_size, 0).decode(errors="replace")

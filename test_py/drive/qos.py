@@ -1,13 +1,13 @@
-"""Quality of service of the topics, as whoever drives the axes wants it."""
+"""Quality of service of the topics, for clients of the axes."""
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 PSEC_QOS = QoSProfile(depth=64, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 STREAM_QOS = QoSProfile(depth=1)
-"""Reliable, of one sample: as ros2_control's topic-based hardware publishes."""
+"""Reliable, depth 1: the profile of ros2_control's topic-based hardware."""
 DEEP_QOS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST)
-"""Deep enough that a reader which is late by two minutes at 6 ms loses nothing."""
-# Deeper than the node's own 50: a burst of trajectories has two results each.
+"""Depth at which a reader that is two minutes late at 6 ms loses no sample."""
+# Deeper than the node's own 50: each trajectory of a burst has two results.
 RESULT_QOS = QoSProfile(
     depth=20_000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )

@@ -1,4 +1,4 @@
-"""What the axes said, as arrays."""
+"""Published messages of the axes as arrays."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .trajectories import NANOSECONDS, to_ns
 
 
 class Series:
-    """What one topic said over a span of time: a row per message, a column per joint."""
+    """Messages of one topic over a time span: a row per message, a column per joint."""
 
     def __init__(self, messages: Sequence[Any], fields: Sequence[str]):
-        """Keep `fields` of `messages`, which carry header and name."""
+        """Keeps `fields` of `messages`, which have header and name."""
         self.stamp = np.array([to_ns(m.header.stamp) for m in messages], dtype=np.int64)
-        """ns"""
+        """Stamps, ns."""
         self.name: list[str] = list(messages[0].name) if messages else []
         for message in messages:
             if list(message.name) != self.name:
@@ -27,13 +27,13 @@ class Series:
         self._columns = {field: np.array([getattr(m, field) for m in messages]) for field in fields}
 
     def __getitem__(self, key: str | tuple[str, str]) -> np.ndarray:
-        """`series["position"]` is rows by joints, `series["position", "x"]` one joint's."""
+        """Returns rows by joints for `series["position"]`, one joint for `series["position", "x"]`."""
         if isinstance(key, tuple):
             return self._columns[key[0]][:, self.name.index(key[1])]
         return self._columns[key]
 
     def __len__(self) -> int:
-        """Number of messages."""
+        """Returns the number of messages."""
         return len(self.stamp)
 
 
@@ -55,10 +55,10 @@ JOINT_FIELDS = ("position", "velocity", "effort")
 
 @dataclass(frozen=True)
 class Recording:
-    """All that the node published while it executed a trajectory."""
+    """All messages that the node published while it executed a trajectory."""
 
     start: int
-    """When time 0 of the trajectory was, ns."""
+    """Time 0 of the trajectory, ns."""
     joints: Series
     """`joint_states`: position, velocity (m, m/s; rad, rad/s), effort (N, N.m)."""
     currents: Series
@@ -66,23 +66,23 @@ class Recording:
     states: Series
     """`~/drive_states`: psec, position, ..., see DriveStates.msg."""
     result: TrajectoryResult | None = None
-    """How it ended."""
+    """Final result of the trajectory."""
 
     @property
     def time(self) -> np.ndarray:
-        """Time of the joint states, s from the start of the trajectory."""
+        """Returns the times of the joint states, s from the start of the trajectory."""
         return (self.joints.stamp - self.start) / NANOSECONDS
 
     def within(self, span: tuple[float, float]) -> np.ndarray:
-        """Mask of the joint states from span[0] to span[1], s from the start."""
+        """Returns a mask of the joint states from span[0] to span[1], s from the start."""
         return (self.time >= span[0]) & (self.time <= span[1])
 
     def tracking_error(self, joint: str) -> np.ndarray:
-        """PSEC - SP at every position instant; contains the pure delay."""
+        """Returns the following error PSEC - SP at all position instants; contains the pure delay."""
         return self.states["psec", joint] - self.states["position", joint]
 
     def synchronized_tracking_error(self, joint: str, alpha_periods: float = 1.5) -> np.ndarray:
-        """PSEC_floor(k - alpha) - SP_k: what the controller is asked to follow."""
+        """Returns the delay-compensated following error PSEC_floor(k - alpha) - SP_k."""
         shift = math.ceil(alpha_periods)
         psec = self.states["psec", joint]
         delayed = np.concatenate([np.full(shift, psec[0]), psec])[: len(psec)]
@@ -91,11 +91,11 @@ class Recording:
     def radial_deviation(
         self, center: tuple[float, float], radius: float, axes: tuple[str, str] = ("x", "y")
     ) -> np.ndarray:
-        """Distance from the center less the radius, at every joint state, m (ISO 230-4)."""
+        """Returns the distance from the center minus the radius, at all joint states, m (ISO 230-4)."""
         x, y = (self.joints["position", axis] for axis in axes)
         return np.hypot(x - center[0], y - center[1]) - radius
 
 
 def circular_deviation(radial_deviation: np.ndarray) -> float:
-    """Circular deviation G after ISO 230-4: the largest less the smallest radial deviation, m."""
+    """Returns the circular deviation G of ISO 230-4: maximum minus minimum radial deviation, m."""
     return float(np.ptp(radial_deviation))

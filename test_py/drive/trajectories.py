@@ -1,4 +1,4 @@
-"""Setpoints to send: any trajectory, and the circular test."""
+"""Setpoints: arbitrary trajectories and the circular test."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 NANOSECONDS = 1_000_000_000
 TSP_NS = 6_000_000
-"""Position period of the default machine, ns."""
+"""Position cycle of the default machine, ns."""
 
 
 def to_time(stamp_ns: int) -> Time:
-    """A ROS time from integer ns."""
+    """Returns a ROS time from integer ns."""
     return Time(sec=stamp_ns // NANOSECONDS, nanosec=stamp_ns % NANOSECONDS)
 
 
 def to_ns(stamp: Time) -> int:
-    """Integer ns from a ROS time."""
+    """Returns integer ns from a ROS time."""
     return stamp.sec * NANOSECONDS + stamp.nanosec
 
 
@@ -35,7 +35,7 @@ def joint_trajectory(
     accelerations: Any = None,
     stamp: int | None = None,
 ) -> JointTrajectory:
-    """Setpoints for `names`: `times` in s from the start, a row of positions (m, rad) per time.
+    """Returns setpoints for `names`: `times` in s from the start, a row of positions (m, rad) per time.
 
     Without velocities the axes go from point to point linearly, with them along cubics, with
     accelerations too along quintics. `stamp` is the start in ns; None starts at once.
@@ -69,20 +69,20 @@ def joint_trajectory(
 
 
 class Ballbar(NamedTuple):
-    """A circle at constant feed with ramps, sampled on the position grid."""
+    """Circle at constant feed with ramps, sampled on the position grid."""
 
     time: np.ndarray
-    """s from the start, one per position period."""
+    """Times from the start, one per position cycle, s."""
     x: np.ndarray
-    """m"""
+    """X positions, m."""
     y: np.ndarray
-    """m"""
+    """Y positions, m."""
     steady: tuple[float, float]
-    """From when to when the feed is steady, 0.5 s clear of both ramps, s."""
+    """Span of steady feed, 0.5 s clear of both ramps, s."""
     center: tuple[float, float]
-    """m"""
+    """Center, m."""
     radius: float
-    """m"""
+    """Radius, m."""
 
 
 def ballbar(
@@ -94,7 +94,7 @@ def ballbar(
     period_ns: int = TSP_NS,
     clear: float = 0.5,
 ) -> Ballbar:
-    """The circular test: counter-clockwise from (0, 0) about (-radius, 0).
+    """Returns the circular test: counter-clockwise from (0, 0) about (-radius, 0).
 
     `rest` s at rest, the feed (m/s) rises as feed/2 (1 - cos(pi t/ramp)), `turns` full turns at full
     feed, the same ramp down, `rest` s at rest. The ramps are extra path.
@@ -105,13 +105,13 @@ def ballbar(
     time_s = time_ns / NANOSECONDS
 
     def ramp_path(t: np.ndarray) -> np.ndarray:
-        """Integral of the rising feed, m."""
+        """Returns the integral of the rising feed, m."""
         return feed / 2 * (t - ramp / math.pi * np.sin(math.pi * t / ramp))
 
     up = np.clip(time_s - rest, 0, ramp)
     at_feed = np.clip(time_s - rest - ramp, 0, cruise)
     down = np.clip(time_s - rest - ramp - cruise, 0, ramp)
-    # The ramp down is the ramp up run backwards from its end.
+    # The ramp down is the time-reversed ramp up.
     half = feed * ramp / 2
     path = ramp_path(up) + feed * at_feed + half - ramp_path(ramp - down)
     angle = path / radius

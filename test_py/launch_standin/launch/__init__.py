@@ -1,4 +1,4 @@
-"""A stand-in for the part of ROS 2's `launch` that the launch files here use; it is not on PyPI.
+"""Stand-in for the part of ROS 2's `launch` that the launch files here use; it is not on PyPI.
 
 Same names, signatures and rules: arguments have defaults and choices, configurations are texts, an
 included file sees and changes the configurations of the one that includes it unless a group keeps them
@@ -11,55 +11,55 @@ from collections.abc import Iterable, Iterator, Mapping
 
 
 class LaunchContext:
-    """What is known while a description is executed."""
+    """State of the execution of a description."""
 
     def __init__(self) -> None:
-        """Begin without configurations."""
+        """Creates a context without configurations."""
         self.launch_configurations: dict[str, str] = {}
 
     def perform_substitution(self, substitution: object) -> str:
-        """Evaluate a substitution."""
+        """Evaluates a substitution."""
         return perform(self, substitution)
 
 
 class Substitution:
-    """What becomes a text when it is performed."""
+    """Value that is converted to text during execution."""
 
     def perform(self, context: LaunchContext) -> str:
-        """Give the text."""
+        """Returns the text."""
         raise NotImplementedError
 
 
 class SubstitutionFailure(Exception):
-    """A substitution that has no text."""
+    """Failure of a substitution without text."""
 
 
 class Action:
-    """What a description is made of."""
+    """Element of a description."""
 
     def __init__(self, *, condition: object = None) -> None:
-        """Keep the condition."""
+        """Keeps the condition."""
         self.condition = condition
 
     def execute(self, context: LaunchContext) -> list[Action] | None:
-        """Give the actions that this one leads to."""
+        """Returns the actions that follow from this one."""
         return None
 
 
 class LaunchDescription:
-    """A list of actions."""
+    """List of actions."""
 
     def __init__(self, initial_entities: Iterable[Action] | None = None) -> None:
-        """Keep the actions."""
+        """Keeps the actions."""
         self.entities = list(initial_entities or [])
 
     def add_action(self, action: Action) -> None:
-        """Append one."""
+        """Appends an action."""
         self.entities.append(action)
 
 
 def perform(context: LaunchContext, value: object) -> str:
-    """Evaluate some substitutions: a text, one, or a list that is joined."""
+    """Evaluates substitutions: a text, a substitution, or a list that is concatenated."""
     if isinstance(value, str):
         return value
     if isinstance(value, Substitution):
@@ -70,7 +70,7 @@ def perform(context: LaunchContext, value: object) -> str:
 
 
 def visit(context: LaunchContext, entities: Iterable[object]) -> Iterator[Action]:
-    """Execute actions in their order, and yield each of them."""
+    """Executes actions in order, and yields each of them."""
     for entity in entities:
         if isinstance(entity, LaunchDescription):
             yield from visit(context, entity.entities)
@@ -84,7 +84,7 @@ def visit(context: LaunchContext, entities: Iterable[object]) -> Iterator[Action
 
 
 def run(description: LaunchDescription, arguments: Mapping[str, str]) -> list[Action]:
-    """Execute a description as `ros2 launch` does with `name:=value` arguments."""
+    """Executes a description as `ros2 launch` does with `name:=value` arguments."""
     context = LaunchContext()
     for name, value in arguments.items():
         if not isinstance(value, str):

@@ -8,7 +8,7 @@ from . import Action, LaunchContext, LaunchDescription, perform
 
 
 class DeclareLaunchArgument(Action):
-    """An argument of the file."""
+    """Argument of the file."""
 
     def __init__(
         self,
@@ -19,14 +19,14 @@ class DeclareLaunchArgument(Action):
         choices: Sequence[str] | None = None,
         **kwargs: object,
     ) -> None:
-        """Refuse a default that is not among the choices."""
+        """Rejects a default that is not among the choices."""
         super().__init__(**kwargs)
         if choices is not None and isinstance(default_value, str) and default_value not in choices:
             raise ValueError(f"default {default_value!r} of {name} is not one of {choices}")
         self.name, self.default_value, self.description, self.choices = name, default_value, description, choices
 
     def execute(self, context: LaunchContext) -> None:
-        """Set the default where no value has been given; refuse what is not to be chosen."""
+        """Sets the default where no value is given; rejects values that are not among the choices."""
         if self.name not in context.launch_configurations:
             if self.default_value is None:
                 raise RuntimeError(f"required launch argument '{self.name}' was not provided")
@@ -37,39 +37,39 @@ class DeclareLaunchArgument(Action):
 
 
 class OpaqueFunction(Action):
-    """A function that gives actions."""
+    """Function that returns actions."""
 
     def __init__(self, *, function: Callable, args: Iterable = (), kwargs: dict | None = None) -> None:
-        """Keep the call."""
+        """Keeps the call."""
         super().__init__()
         self.function, self.args, self.kwargs = function, list(args), kwargs or {}
 
     def execute(self, context: LaunchContext) -> list[Action] | None:
-        """Call it."""
+        """Calls the function."""
         return self.function(context, *self.args, **self.kwargs)
 
 
 class LogInfo(Action):
-    """A message."""
+    """Log message."""
 
     def __init__(self, *, msg: object) -> None:
-        """Keep it."""
+        """Keeps the message."""
         super().__init__()
         self.msg = msg
 
 
 class IncludeLaunchDescription(Action):
-    """Another file, with arguments."""
+    """Another launch file, with arguments."""
 
     def __init__(
         self, launch_description_source: object, *, launch_arguments: Iterable[tuple[str, object]] = ()
     ) -> None:
-        """Keep both."""
+        """Keeps source and arguments."""
         super().__init__()
         self.source, self.launch_arguments = launch_description_source, list(launch_arguments)
 
     def execute(self, context: LaunchContext) -> list[object]:
-        """Set the arguments, which stay set, and go on with the file's actions."""
+        """Sets the arguments, which stay set, and continues with the file's actions."""
         description = self.source.get_launch_description(context)
         declared = {e.name for e in description.entities if isinstance(e, DeclareLaunchArgument)}
         for name, value in self.launch_arguments:
@@ -89,29 +89,29 @@ class _Restore(Action):
 
 
 class GroupAction(Action):
-    """Actions whose configurations end with them."""
+    """Actions with scoped configurations."""
 
     def __init__(self, actions: Iterable[Action], *, scoped: bool = True, **kwargs: object) -> None:
-        """Keep them."""
+        """Keeps the actions."""
         super().__init__(**kwargs)
         self.actions, self.scoped = list(actions), scoped
 
     def execute(self, context: LaunchContext) -> list[Action]:
-        """Put the configurations back behind the last action."""
+        """Returns the actions, followed by one that restores the configurations."""
         after: list[Action] = [_Restore(dict(context.launch_configurations))] if self.scoped else []
         return [*self.actions, *after]
 
 
 class TimerAction(Action):
-    """Actions after a time; nothing is waited for here."""
+    """Actions after a delay, which the stand-in does not wait for."""
 
     def __init__(self, *, period: float, actions: Iterable[Action], **kwargs: object) -> None:
-        """Keep them, and the time in s."""
+        """Keeps the actions, and the delay in s."""
         super().__init__(**kwargs)
         self.period, self.actions = period, list(actions)
 
     def execute(self, context: LaunchContext) -> list[Action]:
-        """Give the actions."""
+        """Returns the actions."""
         return self.actions
 
 

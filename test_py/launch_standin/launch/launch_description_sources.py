@@ -1,4 +1,4 @@
-"""Where included descriptions come from."""
+"""Sources of included descriptions."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from . import LaunchContext, LaunchDescription, perform
 
 
 class PythonLaunchDescriptionSource:
-    """A launch file in Python."""
+    """Launch file in Python."""
 
     def __init__(self, launch_file_path: object) -> None:
-        """Keep the path."""
+        """Keeps the path."""
         self.path = launch_file_path
 
     def get_launch_description(self, context: LaunchContext) -> LaunchDescription:
-        """Execute the file and call its generator."""
+        """Executes the file and calls its generator."""
         return runpy.run_path(perform(context, self.path))["generate_launch_description"]()

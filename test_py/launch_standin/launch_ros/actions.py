@@ -13,7 +13,7 @@ from .parameter_descriptions import ParameterValue
 
 
 class Node(Action):
-    """A program with ROS arguments; executing it works out its command line."""
+    """Program with ROS arguments; its execution creates the command line."""
 
     def __init__(
         self,
@@ -29,21 +29,21 @@ class Node(Action):
         output: str = "log",
         **kwargs: object,
     ) -> None:
-        """Keep all of it."""
+        """Keeps the arguments."""
         super().__init__(**kwargs)
         self.package, self.executable, self.name, self.output = package, executable, name, output
         self.namespace = namespace or ""
         self.parameters, self.remappings = list(parameters or []), list(remappings or [])
         self.arguments, self.ros_arguments = list(arguments or []), list(ros_arguments or [])
         self.values: dict[str, object] = {}
-        """The parameters of the dictionaries, evaluated."""
+        """Parameters of the dictionaries, evaluated."""
         self.files: list[str] = []
-        """Parameter files, in their order."""
+        """Parameter files, in order."""
         self.command: list[str] = []
-        """What follows the program."""
+        """Arguments after the program."""
 
     def execute(self, context: LaunchContext) -> None:
-        """Write parameter dictionaries to files, as launch_ros does, and put the command line together."""
+        """Writes parameter dictionaries to files, as launch_ros does, and creates the command line."""
         namespace = "/" + self.namespace.strip("/") if self.namespace.strip("/") else ""
         command = [perform(context, argument) for argument in self.arguments]
         command.append("--ros-args")
@@ -76,7 +76,7 @@ class Node(Action):
             return value.evaluate(context)
         if isinstance(value, bool | int | float):
             return value
-        # launch_ros reads texts as YAML unless their type is said.
+        # launch_ros parses texts as YAML unless their type is given.
         text = perform(context, value)
         read = yaml.safe_load(text)
         if not isinstance(read, bool | int | float | str):

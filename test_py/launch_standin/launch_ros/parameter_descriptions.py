@@ -1,4 +1,4 @@
-"""Parameters whose type is said."""
+"""Parameters with an explicit type."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from launch import LaunchContext, perform
 
 
 class ParameterValue:
-    """A value that is not guessed from its text."""
+    """Value with an explicit type instead of a type guessed from its text."""
 
     def __init__(self, value: object, *, value_type: type | None = None) -> None:
-        """Keep both."""
+        """Keeps value and type."""
         self.value, self.value_type = value, value_type
 
     def evaluate(self, context: LaunchContext) -> object:
-        """Give the value as its type."""
+        """Returns the value converted to its type."""
         if self.value_type is str:
             return perform(context, self.value)
         return self.value

@@ -7,18 +7,18 @@ import os
 from launch import LaunchContext, Substitution, SubstitutionFailure, perform
 
 PROGRAMS: dict[tuple[str, str], str] = {}
-"""What stands for the package index: path by package and executable."""
+"""Replacement of the package index: path by package and executable."""
 
 
 class ExecutableInPackage(Substitution):
     """Path of a package's program."""
 
     def __init__(self, executable: object, package: object) -> None:
-        """Keep both."""
+        """Keeps executable and package."""
         self.executable, self.package = executable, package
 
     def perform(self, context: LaunchContext) -> str:
-        """Find it."""
+        """Returns the path."""
         executable, package = perform(context, self.executable), perform(context, self.package)
         path = PROGRAMS.get((package, executable))
         if path is None or not os.access(path, os.X_OK):
