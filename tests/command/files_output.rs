@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use virtual_axes_core::machine::AxisSample;
-use virtual_axes_io::files::{OutputFile, TraceCsv, psec_writer, trace_writer};
+use virtual_axes_io::files::{OutputFile, TraceCsvWriter, psec_writer, trace_writer};
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
 fn joints() -> Vec<String> {
@@ -156,17 +156,17 @@ fn an_unknown_extension_is_rejected_with_the_supported_ones() {
         Ok(_) => panic!("{path} must be rejected"),
         Err(error) => error.to_string(),
     };
-    assert_eq!(rejected("t.bag"), "t.bag: its extension must say what to write: .csv, .mcap");
-    assert_eq!(rejected("t"), "t: its extension must say what to write: .csv, .mcap");
+    assert_eq!(rejected("t.bag"), "t.bag: the file extension must be one of .csv, .mcap");
+    assert_eq!(rejected("t"), "t: the file extension must be one of .csv, .mcap");
     let Err(error) = psec_writer("p.json".as_ref(), &joints()) else { panic!("must be rejected") };
-    assert_eq!(error.to_string(), "p.json: its extension must say what to write: .csv, .mcap, .yaml");
+    assert_eq!(error.to_string(), "p.json: the file extension must be one of .csv, .mcap, .yaml");
     assert!(!Path::new("t.bag").exists());
 }
 
 #[test]
 fn a_trace_row_can_be_at_any_tick() {
     let joints = ["x".to_owned(), "c".to_owned()];
-    let mut trace = TraceCsv::new(Vec::new(), &joints).expect("in memory");
+    let mut trace = TraceCsvWriter::new(Vec::new(), &joints).expect("in memory");
     let sample = AxisSample { psec: 0.1, position: 1e-7, voltage: -3.0, ..AxisSample::default() };
     trace.row(6_125_000, &[sample, AxisSample::default()]).expect("in memory");
     let text = String::from_utf8(trace.finish().expect("in memory")).expect("text");

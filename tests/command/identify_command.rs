@@ -246,7 +246,7 @@ fn invalid_input_is_rejected_with_its_name() {
     assert_rejected(&["identify", &header, "--axis", "x"], &["header.csv"]);
     assert_rejected(
         &["identify", &scenario, "--axis", "x"],
-        &["scenario.yaml: it is a scenario, not a recording"],
+        &["scenario.yaml: the file is a scenario, must be a recording"],
     );
     // Wrong units and columns.
     rejected(&["--column", "time=time[ms]"], &["off.csv: sampling period 6e-6 s", "time=COLUMN[s]"]);

@@ -13,7 +13,7 @@ use virtual_axes_core::scenario::Scenario;
 use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::trajectory::TrajectoryRequest;
 use virtual_axes_core::trial::{GridSource, ProgramSource, SetpointSource, SourceError, TrialError};
-use virtual_axes_io::files::{self, FileKind, PsecCsv, Trajectories, read_psec_yaml};
+use virtual_axes_io::files::{self, FileKind, McapTrajectories, PsecCsvReader, read_psec_yaml};
 
 /// Scenario or file with setpoints.
 #[derive(Debug)]
@@ -103,14 +103,14 @@ impl CommandInput {
                     Some(file) => file,
                     None => files::Input::open(Path::new(&self.name))?,
                 };
-                let psec = PsecCsv::new(file.into_reader(), &self.name, period, &limits)?;
-                Ok(SetpointSource::Grid(Box::new(CsvSource(psec.starting_at_first_row()))))
+                let psec = PsecCsvReader::new(file.into_reader(), &self.name, period, &limits)?;
+                Ok(SetpointSource::Grid(Box::new(CsvSource(psec.with_start_at_first_row()))))
             }
             Content::Yaml(requests) => Ok(SetpointSource::Requests(Box::new(
                 requests.iter().map(|request| Ok((0, request.clone()))),
             ))),
             Content::Mcap { topic } => {
-                let trajectories = Trajectories::open(Path::new(&self.name), topic.as_deref())?;
+                let trajectories = McapTrajectories::open(Path::new(&self.name), topic.as_deref())?;
                 Ok(SetpointSource::Requests(Box::new(
                     trajectories.map(|next| next.map_err(SourceError::from)),
                 )))
@@ -160,7 +160,7 @@ fn content_of(file: files::Input, topic: Option<&str>) -> Result<Content, Box<dy
 }
 
 /// Setpoints of a CSV file, read row by row.
-struct CsvSource<R>(PsecCsv<R>);
+struct CsvSource<R>(PsecCsvReader<R>);
 
 impl<R: Read> GridSource for CsvSource<R> {
     fn joints(&self) -> &[usize] {

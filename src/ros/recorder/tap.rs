@@ -13,7 +13,7 @@ use crate::ros::outputs::OverflowPolicy;
 use crate::ros::pace::Health;
 use virtual_axes_core::config::TimeMode;
 use virtual_axes_core::units::Nanoseconds;
-use virtual_axes_io::files::encode;
+use virtual_axes_io::files::encode_cdr;
 use virtual_axes_io::messages::Recorded;
 
 /// Overhead of a queued message, bytes.
@@ -112,7 +112,7 @@ impl<M: Serialize> TopicTap<M> {
         let log = if self.direction == Direction::Out { now.max(stamp) } else { now };
         let publish = if stamp == 0 { log } else { stamp };
         let mut data = Vec::new();
-        encode(message, &mut data).ok()?;
+        encode_cdr(message, &mut data).ok()?;
         // A message longer than the queue takes the whole queue.
         let size = u32::try_from(data.len() + ENTRY_BYTES).map_or(QUEUE_BYTES, |size| size.min(QUEUE_BYTES));
         Some((RecordingEntry::Message { topic: self.topic, log, publish, data, permit: None }, size))

@@ -60,7 +60,7 @@ impl RecordingWriter {
         // Waiting taps leave their messages out from here on.
         self.shared.free_bytes.close();
         let RecordingWriter { recording, entries, truncate, shared, done } = self;
-        let whole = recording.whole();
+        let whole = recording.complete_bytes();
         let finished = written.and_then(|end| {
             if matches!(end, WriteEnd::SizeLimit) {
                 _ = shared.end_reason.set(format!("it has reached {} MB", recording.bound() / MEGABYTE));

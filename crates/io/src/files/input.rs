@@ -1,4 +1,4 @@
-//! What a file is, told by its content.
+//! Detection of the kind of an input file by its content.
 
 use std::fmt;
 use std::fs::File;
@@ -8,22 +8,22 @@ use std::path::Path;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::lines::fields;
-use super::psec_csv::TIME;
+use super::psec_error::TIME;
 use virtual_axes_core::text::shortened;
 use virtual_axes_core::yaml;
 
-/// What a file can be.
+/// Kind of an input file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
-    /// Setpoints as CSV.
+    /// Position setpoints as CSV.
     PsecCsv,
-    /// Setpoints as YAML, a `JointTrajectory`.
+    /// Position setpoints as YAML, a `JointTrajectory`.
     PsecYaml,
-    /// A recording.
+    /// MCAP recording.
     Mcap,
-    /// Parameters of a machine.
+    /// Machine file with `ros__parameters`.
     Machine,
-    /// A scenario.
+    /// Scenario.
     Scenario,
 }
 
@@ -39,41 +39,41 @@ impl fmt::Display for FileKind {
     }
 }
 
-/// What there is, for messages.
-const KNOWN: &str = "there are setpoints as CSV (the first line is `time,x,…`), as YAML (a mapping with \
+/// Supported kinds of files, for error messages.
+const KNOWN: &str = "supported are setpoints as CSV (the first line is `time,x,…`), as YAML (a mapping with \
                      joint_names and points) and as MCAP recordings, machine files (ros__parameters) and \
                      scenarios (a mapping with moves)";
 
-/// Why a file cannot be told.
+/// Error of detecting the kind of a file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum InputError {
-    /// It cannot be opened or read.
+    /// The file cannot be opened or read.
     #[error("{at}: {reason}")]
     Unreadable {
-        /// The file.
+        /// Name of the file.
         at: String,
-        /// What the operating system says.
+        /// Error message of the operating system.
         reason: String,
     },
-    /// It is nothing that is known.
+    /// The content is of no supported kind.
     #[error("{at}: {found}; {KNOWN}")]
     Unknown {
-        /// The file.
+        /// Name of the file.
         at: String,
-        /// What stands there.
+        /// Description of the content.
         found: String,
     },
-    /// It looks like YAML and is not.
+    /// The content is not valid YAML.
     #[error("{at}: not YAML: {reason}; {KNOWN}")]
     Syntax {
         /// File and line.
         at: String,
-        /// What the reader says.
+        /// Error message of the YAML parser.
         reason: String,
     },
 }
 
-/// A file that was opened, with its kind; what was read to tell it is not lost, so that a pipe will do.
+/// Opened input file and its kind. The bytes read for the detection are kept, so that pipes work.
 #[derive(Debug)]
 pub struct Input {
     name: String,
@@ -82,44 +82,44 @@ pub struct Input {
     file: File,
 }
 
-/// Bytes in which a first line is sought.
-const HEAD: u64 = 1 << 16;
-/// Maximum size of a YAML file, bytes: half an hour of five axes, point by point.
+/// Number of bytes searched for the first line.
+const HEAD_BYTES: u64 = 1 << 16;
+/// Maximum size of a YAML file, bytes: about half an hour of setpoints for five axes.
 const MAX_YAML_BYTES: u64 = 64 << 20;
 
 impl Input {
-    /// Opens a file and tells what it is: CSV and MCAP by their beginnings, YAML whole.
+    /// Opens a file and detects its kind: CSV and MCAP by their first bytes, YAML by the whole text.
     ///
     /// # Errors
-    /// [`InputError`].
+    /// Returns an [`InputError`] if the file cannot be read or is of no supported kind.
     pub fn open(path: &Path) -> Result<Self, InputError> {
         let name = path.display().to_string();
         let unreadable =
             |error: io::Error| InputError::Unreadable { at: name.clone(), reason: error.to_string() };
         let mut file = File::open(path).map_err(unreadable)?;
         let mut head = Vec::new();
-        (&mut file).take(HEAD).read_to_end(&mut head).map_err(unreadable)?;
-        let kind = match kind_by_beginning(&head) {
+        (&mut file).take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
+        let kind = match kind_from_head(&head) {
             Some(kind) => kind,
             None => {
-                (&mut file).take(MAX_YAML_BYTES - HEAD).read_to_end(&mut head).map_err(unreadable)?;
-                kind_of_yaml(&head, &name)?
+                (&mut file).take(MAX_YAML_BYTES - HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
+                kind_from_yaml(&head, &name)?
             }
         };
         Ok(Input { name, kind, head, file })
     }
 
-    /// What it is.
+    /// Returns the kind of the file.
     pub fn kind(&self) -> FileKind {
         self.kind
     }
 
-    /// Its name as it was given.
+    /// Returns the file name as given by the user.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The text, if it is YAML.
+    /// Returns the text of a YAML file.
     pub fn text(&self) -> Option<&str> {
         match self.kind {
             FileKind::PsecCsv | FileKind::Mcap => None,
@@ -127,13 +127,13 @@ impl Input {
         }
     }
 
-    /// All of it, from the beginning.
+    /// Returns a reader of the whole content.
     pub fn into_reader(self) -> impl Read + fmt::Debug {
         Cursor::new(self.head).chain(self.file)
     }
 }
 
-pub(super) fn kind_by_beginning(head: &[u8]) -> Option<FileKind> {
+pub(super) fn kind_from_head(head: &[u8]) -> Option<FileKind> {
     if head.starts_with(mcap::MAGIC) {
         return Some(FileKind::Mcap);
     }
@@ -142,45 +142,45 @@ pub(super) fn kind_by_beginning(head: &[u8]) -> Option<FileKind> {
     (line.contains(',') && fields(line).next() == Some(TIME)).then_some(FileKind::PsecCsv)
 }
 
-/// The first line that is not blank.
+/// Returns the first line that is not blank.
 fn first_line(text: &str) -> &str {
     let text = text.trim_start_matches('\u{feff}').trim_start();
     text.lines().next().unwrap_or_default().trim_end()
 }
 
-fn kind_of_yaml(bytes: &[u8], name: &str) -> Result<FileKind, InputError> {
+fn kind_from_yaml(bytes: &[u8], name: &str) -> Result<FileKind, InputError> {
     let unknown = |found: String| InputError::Unknown { at: name.to_owned(), found };
     if bytes.len() as u64 >= MAX_YAML_BYTES {
-        return Err(unknown(format!("it is longer than {} bytes", MAX_YAML_BYTES)));
+        return Err(unknown(format!("the file is longer than {} bytes", MAX_YAML_BYTES)));
     }
     let Ok(text) = str::from_utf8(bytes) else {
-        return Err(unknown("it is not text".to_owned()));
+        return Err(unknown("the file is not UTF-8 text".to_owned()));
     };
-    let documents: Vec<Sketch> = yaml::documents(text)
+    let documents: Vec<YamlOutline> = yaml::documents(text)
         .map_err(|error| InputError::Syntax { at: error.position(name), reason: error.reason })?;
     let first = documents.first();
-    if let Some(kind) = first.and_then(Sketch::kind) {
+    if let Some(kind) = first.and_then(YamlOutline::kind) {
         return Ok(kind);
     }
     Err(unknown(match first {
-        None => "it is empty".to_owned(),
-        Some(Sketch::Map(entries)) => {
+        None => "the file is empty".to_owned(),
+        Some(YamlOutline::Map(entries)) => {
             let keys: Vec<&str> = entries.iter().map(|(key, _)| key.as_str()).collect();
-            format!("it is a mapping of {}", shortened(&keys.join(", ")))
+            format!("the file is a mapping with keys {}", shortened(&keys.join(", ")))
         }
-        Some(Sketch::Other) => format!("its first line is \"{}\"", shortened(first_line(text))),
+        Some(YamlOutline::Other) => format!("the first line is \"{}\"", shortened(first_line(text))),
     }))
 }
 
-/// YAML without its values.
-enum Sketch {
-    Map(Vec<(String, Sketch)>),
+/// Structure of a YAML document: its keys without scalar values.
+enum YamlOutline {
+    Map(Vec<(String, YamlOutline)>),
     Other,
 }
 
-impl Sketch {
+impl YamlOutline {
     fn kind(&self) -> Option<FileKind> {
-        let Sketch::Map(entries) = self else { return None };
+        let YamlOutline::Map(entries) = self else { return None };
         let has = |key: &str| entries.iter().any(|(k, _)| k == key);
         if has("moves") {
             Some(FileKind::Scenario)
@@ -192,60 +192,60 @@ impl Sketch {
     }
 
     fn has_parameters(&self) -> bool {
-        let Sketch::Map(entries) = self else { return false };
+        let YamlOutline::Map(entries) = self else { return false };
         entries.iter().any(|(key, value)| key == "ros__parameters" || value.has_parameters())
     }
 }
 
-impl<'de> Deserialize<'de> for Sketch {
+impl<'de> Deserialize<'de> for YamlOutline {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(SketchVisitor)
+        deserializer.deserialize_any(YamlOutlineVisitor)
     }
 }
 
-struct SketchVisitor;
+struct YamlOutlineVisitor;
 
-impl<'de> Visitor<'de> for SketchVisitor {
-    type Value = Sketch;
+impl<'de> Visitor<'de> for YamlOutlineVisitor {
+    type Value = YamlOutline;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str("YAML")
     }
 
-    fn visit_unit<E>(self) -> Result<Sketch, E> {
-        Ok(Sketch::Other)
+    fn visit_unit<E>(self) -> Result<YamlOutline, E> {
+        Ok(YamlOutline::Other)
     }
 
-    fn visit_bool<E>(self, _: bool) -> Result<Sketch, E> {
-        Ok(Sketch::Other)
+    fn visit_bool<E>(self, _: bool) -> Result<YamlOutline, E> {
+        Ok(YamlOutline::Other)
     }
 
-    fn visit_i64<E>(self, _: i64) -> Result<Sketch, E> {
-        Ok(Sketch::Other)
+    fn visit_i64<E>(self, _: i64) -> Result<YamlOutline, E> {
+        Ok(YamlOutline::Other)
     }
 
-    fn visit_u64<E>(self, _: u64) -> Result<Sketch, E> {
-        Ok(Sketch::Other)
+    fn visit_u64<E>(self, _: u64) -> Result<YamlOutline, E> {
+        Ok(YamlOutline::Other)
     }
 
-    fn visit_f64<E>(self, _: f64) -> Result<Sketch, E> {
-        Ok(Sketch::Other)
+    fn visit_f64<E>(self, _: f64) -> Result<YamlOutline, E> {
+        Ok(YamlOutline::Other)
     }
 
-    fn visit_str<E>(self, _: &str) -> Result<Sketch, E> {
-        Ok(Sketch::Other)
+    fn visit_str<E>(self, _: &str) -> Result<YamlOutline, E> {
+        Ok(YamlOutline::Other)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Sketch, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<YamlOutline, A::Error> {
         while items.next_element::<IgnoredAny>()?.is_some() {}
-        Ok(Sketch::Other)
+        Ok(YamlOutline::Other)
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Sketch, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<YamlOutline, A::Error> {
         let mut entries = Vec::new();
         while let Some(entry) = map.next_entry()? {
             entries.push(entry);
         }
-        Ok(Sketch::Map(entries))
+        Ok(YamlOutline::Map(entries))
     }
 }

@@ -1,41 +1,42 @@
-//! Lines of a text, one at a time, each of bounded length, and the fields of a line.
+//! Streaming line reader with a maximum line length, and a splitter of CSV fields.
 
 use std::io::{ErrorKind, Read};
 
 use memchr::memchr;
 
-/// Longest line, bytes: far more than a setpoint of any machine needs.
-const LONGEST: usize = 1 << 16;
-/// Bytes that are held: reading has few calls then, and stays within a processor's cache.
-const HELD: usize = 4 * LONGEST;
-/// What some programs put before a text in UTF-8.
+/// Maximum length of a line, bytes.
+const MAX_LINE_BYTES: usize = 1 << 16;
+/// Size of the read buffer, bytes: few system calls, and within the processor cache.
+const BUFFER_BYTES: usize = 4 * MAX_LINE_BYTES;
+/// Byte order mark in front of a UTF-8 text.
 const BYTE_ORDER_MARK: char = '\u{feff}';
-/// What is said of bytes that are no text.
-const NOT_TEXT: &str = "stream did not contain valid UTF-8";
+/// Error message for bytes that are not UTF-8.
+const NOT_UTF8: &str = "stream did not contain valid UTF-8";
 
-/// Lines that are not blank, with their numbers.
+/// Reader of the lines that are not blank, with their numbers.
 #[derive(Debug)]
 pub(super) struct Lines<R> {
     input: R,
-    held: Vec<u8>,
-    /// Where the next line begins, and where what was read ends.
+    buffer: Vec<u8>,
+    /// Start of the next line in `buffer`.
     begin: usize,
+    /// End of the bytes read into `buffer`.
     end: usize,
     number: u64,
-    /// Whether the line that was read last has an end.
+    /// True if the last line read ends with a line break.
     ended: bool,
 }
 
 impl<R: Read> Lines<R> {
     pub fn new(input: R) -> Self {
-        Lines { input, held: vec![0; HELD], begin: 0, end: 0, number: 0, ended: false }
+        Lines { input, buffer: vec![0; BUFFER_BYTES], begin: 0, end: 0, number: 0, ended: false }
     }
 
-    /// The next line that is not blank, without what ends it, and its number from 1. A line of tabs is
-    /// blank.
+    /// Returns the next line that is not blank, without its line break, and its number from 1. Lines of white
+    /// space are blank.
     ///
     /// # Errors
-    /// What is wrong with the file, and the line that is read.
+    /// Returns the line number and the reason if the line is too long, not UTF-8 or cannot be read.
     pub fn next(&mut self) -> Result<Option<(u64, &str)>, (u64, String)> {
         loop {
             self.number += 1;
@@ -46,41 +47,42 @@ impl<R: Read> Lines<R> {
             }
             let begin = self.begin;
             self.begin += length;
-            let line = &self.held[begin..begin + length];
-            // A line that begins with a digit or a letter needs no further look.
+            let line = &self.buffer[begin..begin + length];
+            // A line that begins with a digit or a letter is not blank.
             if !line[0].is_ascii_graphic() {
-                let text = str::from_utf8(line).map_err(|_| (number, NOT_TEXT.to_owned()))?;
+                let text = str::from_utf8(line).map_err(|_| (number, NOT_UTF8.to_owned()))?;
                 if text.trim_matches(BYTE_ORDER_MARK).trim().is_empty() {
                     continue;
                 }
             }
             let bare = bare_length(line);
             self.ended = bare < length;
-            let text =
-                str::from_utf8(&self.held[begin..begin + bare]).map_err(|_| (number, NOT_TEXT.to_owned()))?;
+            let text = str::from_utf8(&self.buffer[begin..begin + bare])
+                .map_err(|_| (number, NOT_UTF8.to_owned()))?;
             let text = if number == 1 { text.trim_start_matches(BYTE_ORDER_MARK) } else { text };
             return Ok(Some((number, text)));
         }
     }
 
-    /// Reads until a whole line stands at `begin`; its length with what ends it, 0 at the end of the file.
+    /// Reads until the buffer holds a complete line at `begin`, and returns its length with its line break; 0 at
+    /// the end of the file.
     fn fill(&mut self) -> Result<usize, String> {
         let mut searched = 0;
         loop {
-            let there = &self.held[self.begin..self.end];
-            let within = &there[..there.len().min(LONGEST)];
-            if let Some(place) = memchr(b'\n', &within[searched..]) {
-                return Ok(searched + place + 1);
+            let there = &self.buffer[self.begin..self.end];
+            let within = &there[..there.len().min(MAX_LINE_BYTES)];
+            if let Some(index) = memchr(b'\n', &within[searched..]) {
+                return Ok(searched + index + 1);
             }
-            if within.len() == LONGEST {
-                return Err(format!("the line is longer than {LONGEST} bytes"));
+            if within.len() == MAX_LINE_BYTES {
+                return Err(format!("the line is longer than {MAX_LINE_BYTES} bytes"));
             }
             searched = within.len();
             if self.begin > 0 {
-                self.held.copy_within(self.begin..self.end, 0);
+                self.buffer.copy_within(self.begin..self.end, 0);
                 (self.begin, self.end) = (0, self.end - self.begin);
             }
-            match self.input.read(&mut self.held[self.end..]) {
+            match self.input.read(&mut self.buffer[self.end..]) {
                 Ok(0) => return Ok(searched),
                 Ok(read) => self.end += read,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
@@ -89,44 +91,45 @@ impl<R: Read> Lines<R> {
         }
     }
 
-    /// Whether the line that was read last has an end.
+    /// Returns true if the last line read ends with a line break.
     pub fn is_ended(&self) -> bool {
         self.ended
     }
 }
 
-/// Length of a line without what ends it.
+/// Returns the length of a line without its line break.
 fn bare_length(line: &[u8]) -> usize {
     line.len() - line.iter().rev().take_while(|byte| matches!(byte, b'\r' | b'\n')).count()
 }
 
-/// The fields of a line of CSV, without the spaces and the quotation marks around them.
+/// Splits a comma-separated line into fields, without surrounding spaces and quotation marks.
 pub(super) fn fields(line: &str) -> Fields<'_> {
     fields_between(line, ',')
 }
 
-/// The fields of a line between delimiters, likewise; one within quotation marks is part of the field.
+/// Splits a line at a delimiter into fields, without surrounding spaces and quotation marks. A delimiter within
+/// quotation marks belongs to the field.
 pub(super) fn fields_between(line: &str, delimiter: char) -> Fields<'_> {
     let plain = u8::try_from(delimiter).ok().filter(u8::is_ascii);
     let plain = plain.filter(|_| memchr(b'"', line.as_bytes()).is_none());
     Fields { rest: Some(line), delimiter, plain }
 }
 
-/// Fields of a line.
+/// Iterator over the fields of a line.
 #[derive(Debug, Clone)]
 pub(super) struct Fields<'a> {
-    /// What is left; none behind the last field.
+    /// Rest of the line; `None` after the last field.
     rest: Option<&'a str>,
     delimiter: char,
-    /// The delimiter as a byte, where it is one and no field has quotation marks.
+    /// Delimiter as a byte, if it is ASCII and the line has no quotation marks.
     plain: Option<u8>,
 }
 
 impl Fields<'_> {
-    /// Where the next field ends in `rest`, if not with it.
+    /// Returns the end of the first field of `rest`; `None` if `rest` is the last field.
     fn end(&self, rest: &str) -> Option<usize> {
         if let Some(delimiter) = self.plain {
-            // Fields are too short for a search to pay.
+            // Fields are too short for memchr.
             return rest.bytes().position(|byte| byte == delimiter);
         }
         let mut quoted = false;
@@ -167,10 +170,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Hands out a few bytes at a time.
-    struct Few<'a>(&'a [u8], usize);
+    /// Reader that returns a few bytes per call.
+    struct ShortReads<'a>(&'a [u8], usize);
 
-    impl Read for Few<'_> {
+    impl Read for ShortReads<'_> {
         fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
             let count = self.1.min(self.0.len()).min(into.len());
             into[..count].copy_from_slice(&self.0[..count]);
@@ -190,28 +193,29 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_bare_and_numbered_and_blank_ones_are_left_out() {
+    fn blank_lines_are_skipped_and_lines_have_numbers_and_no_line_break() {
         let text = "\u{feff}a,b\r\n\r\n \t\n\u{feff}\n1\n\nlast";
         let wanted = [(1, "a,b"), (5, "1"), (7, "last")].map(|(n, text)| (n, text.to_owned()));
         for step in [1, 3, 1000] {
-            assert_eq!(all(Few(text.as_bytes(), step)), (wanted.to_vec(), false));
+            assert_eq!(all(ShortReads(text.as_bytes(), step)), (wanted.to_vec(), false));
         }
         assert!(all("1\r".as_bytes()).1 && all("1\n\n".as_bytes()).1);
     }
 
     #[test]
-    fn the_longest_line_is_read_and_one_byte_more_is_not() {
-        let line = "1".repeat(LONGEST - 1) + "\n";
+    fn a_line_longer_than_the_maximum_is_rejected() {
+        let line = "1".repeat(MAX_LINE_BYTES - 1) + "\n";
         let text = "0\n".to_owned() + &line.repeat(9);
         assert_eq!(all(text.as_bytes()).0.len(), 10);
-        let mut lines = Lines::new(Few(b"0\n", 1).chain(std::io::repeat(b'1').take(LONGEST as u64)));
+        let mut lines =
+            Lines::new(ShortReads(b"0\n", 1).chain(std::io::repeat(b'1').take(MAX_LINE_BYTES as u64)));
         assert_eq!(lines.next(), Ok(Some((1, "0"))));
-        assert_eq!(lines.next(), Err((2, format!("the line is longer than {LONGEST} bytes"))));
+        assert_eq!(lines.next(), Err((2, format!("the line is longer than {MAX_LINE_BYTES} bytes"))));
     }
 
     proptest! {
         #[test]
-        fn fields_are_split_where_no_quotation_mark_is_open(
+        fn fields_are_split_at_delimiters_outside_quotation_marks(
             text in "[a;, \"\u{e9}0-9.]{0,30}", delimiter in prop::sample::select(vec![',', ';', '\u{e9}'])
         ) {
             let mut quoted = false;
@@ -227,14 +231,14 @@ mod tests {
         }
 
         #[test]
-        fn lines_are_those_of_the_text_however_it_arrives(text in "[a\r\n \t]{0,60}", step in 1usize..9) {
+        fn lines_do_not_depend_on_the_sizes_of_reads(text in "[a\r\n \t]{0,60}", step in 1usize..9) {
             let wanted: Vec<(u64, String)> = text
                 .split_inclusive('\n')
                 .zip(1..)
                 .filter(|(line, _)| !line.trim().is_empty())
                 .map(|(line, number)| (number, line.trim_end_matches(['\r', '\n']).to_owned()))
                 .collect();
-            prop_assert_eq!(all(Few(text.as_bytes(), step)).0, wanted);
+            prop_assert_eq!(all(ShortReads(text.as_bytes(), step)).0, wanted);
         }
     }
 }

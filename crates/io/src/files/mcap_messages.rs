@@ -1,8 +1,7 @@
-//! The messages of an MCAP recording, one after the other.
+//! Iterator over the messages of an MCAP recording, robust against damaged lengths.
 //!
-//! As [`mcap::io::MessageReader`], but only the records that messages need are parsed, and not before their
-//! lengths have been looked at: that one makes room for what a length says before it looks whether it is
-//! there, up to 4 GiB, and ends the program at an attachment that is too short.
+//! Replaces [`mcap::io::MessageReader`], which allocates up to 4 GiB for an unchecked length and panics at a short
+//! attachment. This reader parses only schemas, channels and messages, after checking their lengths.
 
 use std::borrow::Cow;
 use std::io::{self, Read};
@@ -12,16 +11,16 @@ use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult, Message};
 
-use super::mcap_in::BLOCK;
-
-/// Number of a schema, in its record before the texts.
+/// Maximum number of bytes per read: buffers grow with the file content, not with a length field.
+pub(super) const BLOCK: usize = 1 << 18;
+/// Schema record before its strings: id, bytes.
 const SCHEMA_HEAD: usize = 2;
-/// Numbers of a channel and its schema, likewise.
+/// Channel record before its strings: channel id and schema id, bytes.
 const CHANNEL_HEAD: usize = 2 + 2;
-/// Two times, length and checksum of a chunk, before the name of its compression.
+/// Chunk record before the name of its compression: two times, length and checksum, bytes.
 const CHUNK_HEAD: usize = 8 + 8 + 8 + 4;
 
-/// The messages of a recording in the order of the file, each with its channel.
+/// Iterator over the messages of a recording in file order, each with its channel.
 pub(super) struct Messages<R> {
     source: R,
     reader: LinearReader,
@@ -30,13 +29,13 @@ pub(super) struct Messages<R> {
 }
 
 impl<R: Read> Messages<R> {
-    /// Those of `source`, which is read from where it stands.
+    /// Creates an iterator that reads `source` from its current position.
     pub fn new(source: R, options: LinearReaderOptions) -> Self {
         let reader = LinearReader::new_with_options(options.with_emit_chunks(false));
         Messages { source, reader, channels: ChannelAccumulator::default(), is_done: false }
     }
 
-    /// What it reads from.
+    /// Returns the source.
     pub fn into_inner(self) -> R {
         self.source
     }
@@ -53,9 +52,9 @@ impl<R: Read> Messages<R> {
                     };
                     self.reader.notify_read(read);
                 }
-                // The summary says schemas and channels once more, which does no harm.
+                // The summary repeats schemas and channels.
                 LinearReadEvent::Record { opcode, data } => {
-                    if let Some(message) = take(&mut self.channels, opcode, data)? {
+                    if let Some(message) = process_record(&mut self.channels, opcode, data)? {
                         return Ok(Some(message));
                     }
                 }
@@ -78,8 +77,8 @@ impl<R: Read> Iterator for Messages<R> {
     }
 }
 
-/// Takes a record in; the message, if it is one.
-fn take(
+/// Processes a record and returns its message, if it is a message record.
+fn process_record(
     channels: &mut ChannelAccumulator<'static>,
     opcode: u8,
     data: &[u8],
@@ -87,7 +86,7 @@ fn take(
     if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
         return Ok(None);
     }
-    if !is_whole(opcode, data) {
+    if !has_complete_fields(opcode, data) {
         return Err(McapError::UnexpectedEoc);
     }
     match mcap::parse_record(opcode, data)? {
@@ -108,28 +107,28 @@ fn take(
     Ok(None)
 }
 
-/// Whether the texts in a schema, a channel or a chunk are as long as they say.
-pub(super) fn is_whole(opcode: u8, record: &[u8]) -> bool {
+/// Returns true if the strings and maps of a schema, channel or chunk record lie within the record.
+pub(super) fn has_complete_fields(opcode: u8, record: &[u8]) -> bool {
     let texts = match opcode {
-        op::SCHEMA => record.get(SCHEMA_HEAD..).and_then(behind_text).and_then(behind_text),
+        op::SCHEMA => record.get(SCHEMA_HEAD..).and_then(after_string).and_then(after_string),
         op::CHANNEL => {
-            record.get(CHANNEL_HEAD..).and_then(behind_text).and_then(behind_text).and_then(|map| {
-                let rest = behind_text(map)?;
+            record.get(CHANNEL_HEAD..).and_then(after_string).and_then(after_string).and_then(|map| {
+                let rest = after_string(map)?;
                 let mut entries = map.get(size_of::<u32>()..map.len() - rest.len())?;
                 while !entries.is_empty() {
-                    entries = behind_text(entries)?;
+                    entries = after_string(entries)?;
                 }
                 Some(rest)
             })
         }
-        op::CHUNK => record.get(CHUNK_HEAD..).and_then(behind_text),
+        op::CHUNK => record.get(CHUNK_HEAD..).and_then(after_string),
         _ => Some(record),
     };
     texts.is_some()
 }
 
-/// What follows a text, or a map, which begin with their length in bytes.
-fn behind_text(bytes: &[u8]) -> Option<&[u8]> {
+/// Returns the bytes after a string or a map with a length prefix.
+fn after_string(bytes: &[u8]) -> Option<&[u8]> {
     let (length, rest) = bytes.split_first_chunk()?;
     rest.get(usize::try_from(u32::from_le_bytes(*length)).ok()?..)
 }
@@ -143,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn records_are_whole_as_long_as_every_text_in_them_is() {
+    fn records_with_truncated_strings_are_incomplete() {
         let map = text(&String::from_utf8([text("a"), text("bc")].concat()).expect("text"));
         let data = [4, 0, 0, 0, 1, 2, 3, 4].to_vec();
         for (opcode, record, least) in [
@@ -152,18 +151,22 @@ mod tests {
             (op::CHUNK, [vec![0; 28], text("zstd"), vec![0; 8]].concat(), 28 + 8),
         ] {
             for length in 0..=record.len() {
-                assert_eq!(is_whole(opcode, &record[..length]), length >= least, "{opcode} {length}");
+                assert_eq!(
+                    has_complete_fields(opcode, &record[..length]),
+                    length >= least,
+                    "{opcode} {length}"
+                );
             }
         }
     }
 
-    /// Its length in the file stands before any of its bytes, and memory was taken for it.
+    /// The parser of the `mcap` crate allocates memory for an unchecked length.
     #[test]
-    fn a_text_that_says_it_is_gibibytes_long_is_refused_before_it_is_made_room_for() {
+    fn a_string_with_a_length_of_gibibytes_is_rejected_without_allocation() {
         let record = [&[1, 0][..], &u32::MAX.to_le_bytes(), b"n"].concat();
         let used = allocation_counter::measure(|| {
-            let taken = take(&mut ChannelAccumulator::default(), op::SCHEMA, &record);
-            assert!(matches!(taken, Err(McapError::UnexpectedEoc)));
+            let processed = process_record(&mut ChannelAccumulator::default(), op::SCHEMA, &record);
+            assert!(matches!(processed, Err(McapError::UnexpectedEoc)));
         });
         assert!(used.bytes_max < 10_000, "{} bytes", used.bytes_max);
     }

@@ -1,54 +1,54 @@
-//! Files: setpoints, traces and recordings, in and out.
+//! Reading and writing of files: setpoints, traces and recordings.
 //!
-//! What a file is, is told by its content ([`Input`]) when it is read and by its extension when it is
-//! written. Setpoints come from CSV ([`PsecCsv`], a stream), YAML ([`read_psec_yaml`]) and MCAP
-//! recordings ([`Trajectories`]); what was recorded of an axis from CSV and MCAP ([`read_recording`]).
-//! Traces ([`TraceWriter`]) and setpoints ([`PsecWriter`]) go into [`OutputFile`]s, which stand under their
-//! names only when they are whole; what the node records ([`BoundedRecording`]) can be read from the start.
+//! The kind of an input file is detected by its content ([`Input`]), that of an output file by its extension.
+//! Position setpoints are read from CSV ([`PsecCsvReader`], streaming), YAML ([`read_psec_yaml`]) and MCAP
+//! ([`McapTrajectories`]), measured axis data from CSV and MCAP ([`read_recording`]). Traces ([`TraceWriter`]) and
+//! setpoints ([`PsecWriter`]) are written atomically ([`OutputFile`]); recordings of the node
+//! ([`BoundedRecording`]) are readable up to the last complete chunk.
 
+mod bounded_recording;
 mod cdr;
+mod decimal;
 mod input;
 mod lines;
-mod mcap_bounded;
-mod mcap_in;
 mod mcap_messages;
-mod mcap_out;
-mod number;
+mod mcap_reader;
+mod mcap_writer;
 mod output;
 mod psec_csv;
 mod psec_error;
 mod psec_mcap;
-mod psec_out;
+mod psec_writer;
 mod psec_yaml;
-mod recorded;
+mod recording;
 mod trace;
 mod trace_csv;
 mod trace_mcap;
 
-pub use cdr::encode;
+pub use bounded_recording::{BoundedRecording, RecordedTopic};
+pub use cdr::encode_cdr;
 pub use input::{FileKind, Input, InputError};
-pub use mcap_bounded::{BoundedRecording, RecordedTopic};
-pub use mcap_in::McapFault;
+pub use mcap_reader::McapFileError;
 pub use output::OutputFile;
-pub use psec_csv::PsecCsv;
+pub use psec_csv::PsecCsvReader;
 pub use psec_error::PsecError;
-pub use psec_mcap::{RecordingError, Trajectories};
-pub use psec_out::{PsecCsvOut, PsecMcapOut, PsecWriter, PsecYamlOut, psec_writer};
+pub use psec_mcap::{McapTrajectories, TrajectoryRecordingError};
+pub use psec_writer::{PsecCsvWriter, PsecMcapWriter, PsecWriter, PsecYamlWriter, psec_writer};
 pub use psec_yaml::{TrajectoryYamlError, read_psec_yaml};
-pub use recorded::{
+pub use recording::{
     AxisRecordingError, Channel, Columns, ColumnsError, RecordingOptions, read_recording, read_recording_csv,
     read_recording_mcap,
 };
 pub use trace::{TraceWriter, trace_writer};
-pub use trace_csv::TraceCsv;
-pub use trace_mcap::TraceMcap;
+pub use trace_csv::TraceCsvWriter;
+pub use trace_mcap::TraceMcapWriter;
 
 use virtual_axes_core::text::shortened;
 
-/// Most names that a message lists.
-const MOST_LISTED: usize = 10;
+/// Maximum number of names in an error message.
+const MAX_LISTED: usize = 10;
 
-/// Names for a message: the first of them, none longer than is worth reading.
-fn listed<'a>(names: impl IntoIterator<Item = &'a String>) -> Vec<String> {
-    names.into_iter().take(MOST_LISTED).map(|name| shortened(name)).collect()
+/// Returns the first names, each shortened, for an error message.
+fn shorten_names<'a>(names: impl IntoIterator<Item = &'a String>) -> Vec<String> {
+    names.into_iter().take(MAX_LISTED).map(|name| shortened(name)).collect()
 }

@@ -1,28 +1,28 @@
-//! Output files that stand under their names only when they are whole.
+//! Atomic output files: written to a temporary file and renamed when complete.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Stdout, Write};
 use std::path::{Path, PathBuf};
 
-/// The standard output by its name; it is the same stream then, not the file behind it opened anew.
+/// Path of the standard output; writes go to the open stream, not to a newly opened file.
 const STDOUT: &str = "/dev/stdout";
-/// Most links that are followed from one to the next; as many as Linux follows.
-const MOST_LINKS: usize = 40;
-/// Bytes that are gathered before they are handed over: few calls, within a processor's cache.
-const GATHERED: usize = 1 << 18;
-/// Most names that are tried for a partial file: earlier runs that were killed can have left some.
-const MOST_NAMES: usize = 100;
+/// Maximum number of symbolic links followed in a row, as in Linux.
+const MAX_LINKS: usize = 40;
+/// Size of the write buffer, bytes: few system calls, and within the processor cache.
+const BUFFER_BYTES: usize = 1 << 18;
+/// Maximum number of names tried for the temporary file; terminated runs can leave some behind.
+const MAX_NAMES: usize = 100;
 
-/// A file to write. It is written beside its place and takes it in [`finish`](Self::finish); dropped
-/// before, it leaves nothing behind, and what stood there stays.
+/// Output file that is written atomically: to a temporary file in the same folder, renamed by
+/// [`finish`](Self::finish). Dropping it before removes the temporary file and keeps an existing file.
 ///
-/// Links are followed. A device or a pipe is written to as it is. Each error names the file.
+/// Symbolic links are followed. Devices and pipes are written directly. Each error names the file.
 #[derive(Debug)]
 pub struct OutputFile {
-    /// As the user wrote it.
+    /// Name as given by the user.
     name: String,
     target: PathBuf,
-    /// Where it is written until it is whole; none for what is written in place.
+    /// Temporary file; `None` if the target is written directly.
     partial: Option<PathBuf>,
     sink: BufWriter<Sink>,
 }
@@ -50,41 +50,41 @@ impl Write for Sink {
 }
 
 impl OutputFile {
-    /// Opens what becomes `path`.
+    /// Creates the temporary file for `path`, or opens a device or pipe.
     ///
     /// # Errors
-    /// Those of the file system, with `path`.
+    /// Returns the errors of the file system, with `path`.
     pub fn create(path: &Path) -> io::Result<Self> {
         let name = path.display().to_string();
-        let target = resolved(path);
+        let target = resolve_links(path);
         let opened = if is_stdout(path) {
             Ok((Sink::Stdout(io::stdout()), None))
-        } else if is_in_place(path) {
+        } else if is_device_or_pipe(path) {
             File::options().write(true).open(path).map(|file| (Sink::File(file), None))
         } else {
-            create_beside(&target).map(|(file, partial)| (Sink::File(file), Some(partial)))
+            create_temporary(&target).map(|(file, partial)| (Sink::File(file), Some(partial)))
         };
-        let (sink, partial) = opened.map_err(|error| named(&name, &error))?;
-        Ok(OutputFile { name, target, partial, sink: BufWriter::with_capacity(GATHERED, sink) })
+        let (sink, partial) = opened.map_err(|error| with_file_name(&name, &error))?;
+        Ok(OutputFile { name, target, partial, sink: BufWriter::with_capacity(BUFFER_BYTES, sink) })
     }
 
-    /// The file's name as it was given.
+    /// Returns the file name as given by the user.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Hands everything over and puts the file in its place.
+    /// Writes the buffer and renames the temporary file to its target.
     ///
     /// # Errors
-    /// Those of the file system, with the file's name; what stood there before stays then.
+    /// Returns the errors of the file system, with the file's name. An existing file is kept.
     pub fn finish(mut self) -> io::Result<()> {
         self.flush()?;
         let Some(partial) = &self.partial else { return Ok(()) };
         if let Ok(old) = fs::metadata(&self.target) {
-            // What replaces a file is as readable as that was; where that cannot be, it is as new.
+            // Keeps the permissions of a replaced file where possible.
             let _ = fs::set_permissions(partial, old.permissions());
         }
-        fs::rename(partial, &self.target).map_err(|error| named(&self.name, &error))?;
+        fs::rename(partial, &self.target).map_err(|error| with_file_name(&self.name, &error))?;
         self.partial = None;
         Ok(())
     }
@@ -92,18 +92,18 @@ impl OutputFile {
 
 impl Write for OutputFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.sink.write(bytes).map_err(|error| named(&self.name, &error))
+        self.sink.write(bytes).map_err(|error| with_file_name(&self.name, &error))
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.sink.flush().map_err(|error| named(&self.name, &error))
+        self.sink.flush().map_err(|error| with_file_name(&self.name, &error))
     }
 }
 
 impl Drop for OutputFile {
     fn drop(&mut self) {
         if let Some(partial) = &self.partial {
-            // It was made here, and is of no use to anybody.
+            // An incomplete file is removed.
             let _ = fs::remove_file(partial);
         }
     }
@@ -113,35 +113,35 @@ fn is_stdout(path: &Path) -> bool {
     path == Path::new(STDOUT)
 }
 
-/// Whether there is something that is written to as it is: a device, a pipe.
-pub(super) fn is_in_place(path: &Path) -> bool {
+/// Returns true for a device or a pipe, which is written directly.
+pub(super) fn is_device_or_pipe(path: &Path) -> bool {
     is_stdout(path) || fs::metadata(path).is_ok_and(|found| !found.is_file())
 }
 
-/// Where links from `path` lead, also to what is not there yet.
-fn resolved(path: &Path) -> PathBuf {
+/// Resolves symbolic links of `path`; the target does not need to exist.
+fn resolve_links(path: &Path) -> PathBuf {
     let mut path = path.to_owned();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         let Ok(next) = fs::read_link(&path) else { break };
         path = path.parent().unwrap_or(Path::new("")).join(next);
     }
     path
 }
 
-/// A new file beside `target`, under a name that no other run uses.
-fn create_beside(target: &Path) -> io::Result<(File, PathBuf)> {
+/// Creates a temporary file in the folder of `target`, with a name unique to this process.
+fn create_temporary(target: &Path) -> io::Result<(File, PathBuf)> {
     let name = target.file_name().unwrap_or_default().to_string_lossy();
     let mut tried = 0;
     loop {
         let partial = target.with_file_name(format!(".{name}.{}.{tried}.partial", std::process::id()));
         tried += 1;
         match File::options().write(true).create_new(true).open(&partial) {
-            Err(error) if error.kind() == ErrorKind::AlreadyExists && tried < MOST_NAMES => {}
+            Err(error) if error.kind() == ErrorKind::AlreadyExists && tried < MAX_NAMES => {}
             opened => return opened.map(|file| (file, partial)),
         }
     }
 }
 
-fn named(name: &str, error: &io::Error) -> io::Error {
+fn with_file_name(name: &str, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{name}: {error}"))
 }

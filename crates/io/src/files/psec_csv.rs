@@ -1,70 +1,64 @@
-//! PSEC from CSV: `time,x,y,z,a,c` in s, m and rad, as a stream on the grid of positions.
+//! Streaming reader of PSEC (position setpoint at the entrance of the controller) from CSV: `time,x,y,z,a,c` in s,
+//! m and rad, interpolated at position cycles.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use super::lines::{Lines, fields};
-use super::psec_error::PsecError;
+use super::psec_error::{MAX_TIME, PsecError, TIME};
 use virtual_axes_core::text::nearest_name;
 use virtual_axes_core::trajectory::JointLimits;
-use virtual_axes_core::trajectory::spline::{SplineDegree, Segment, KinematicState};
+use virtual_axes_core::trajectory::spline::{KinematicState, Segment, SplineDegree};
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS, seconds};
 
-/// The column of times.
-pub(super) const TIME: &str = "time";
-/// The largest time, s: three years, more than anybody waits for.
-pub(super) const LONGEST: f64 = 1e8;
-
-/// A row of the file.
+/// Row of the file.
 #[derive(Debug, Clone, Default)]
 struct Point {
-    /// ns.
+    /// Time, ns.
     time: Nanoseconds,
-    /// m or rad, one per column.
+    /// Position per column, m or rad.
     positions: Vec<f64>,
     line: u64,
-    /// Number of the row, from 0.
+    /// Row index, from 0.
     index: usize,
 }
 
-/// PSEC of a file at the instants k·Tsp, k = 0, 1, …, read as they are asked for: two rows are held,
-/// however long the file is.
+/// Streaming reader of the position setpoints of a CSV file at the times k·Tsp, k = 0, 1, …, with constant memory.
 ///
-/// Between rows it interpolates linearly, with the arithmetic of a trajectory of positions: rows on
-/// the grid are used bit for bit. The time of the first row may be later than 0: the axes go there in
-/// a straight line from where they stand, at home (0) unless [`starting_at`](Self::starting_at) says
-/// otherwise. The last instant is the first that is not before the last row.
+/// Rows are interpolated linearly with the arithmetic of a trajectory of positions; rows at a position cycle are used
+/// bit for bit. If the first row is later than 0, the axes move there in a straight line from their start positions,
+/// which are 0 unless set by [`with_start_positions`](Self::with_start_positions). The last cycle is the first that is
+/// not before the last row.
 ///
-/// Each row is checked when it is read, each setpoint before it is given: strokes, and speeds from
-/// instant to instant, the first from where the axes stand.
+/// Rows are checked against the travel limits, setpoints against the velocity limits from cycle to cycle.
 #[derive(Debug)]
-pub struct PsecCsv<R> {
+pub struct PsecCsvReader<R> {
     lines: Lines<R>,
     name: String,
     period: Nanoseconds,
     columns: Vec<String>,
     limits: Vec<JointLimits>,
-    places: Vec<usize>,
-    /// The row not after the instant, once the first has been reached; before it, the start at time 0.
+    joint_indices: Vec<usize>,
+    /// Last row not after the current cycle; before the first row, the start positions at time 0.
     before: Point,
-    /// The row after it; with the one before it, the segment.
+    /// Next row: end of the interpolated segment.
     after: Point,
-    /// Number of the instant that comes next.
+    /// Index of the next position cycle.
     next_k: i64,
-    /// What was given last.
-    given: Vec<f64>,
+    /// Last setpoints returned, m or rad.
+    previous: Vec<f64>,
     first_time: Nanoseconds,
-    /// Whether there is no row after `after`.
-    at_end: bool,
-    done: bool,
+    /// True if `after` is the last row.
+    is_last_row: bool,
+    is_done: bool,
 }
 
-impl PsecCsv<File> {
-    /// Opens a file; see [`PsecCsv::new`].
+impl PsecCsvReader<File> {
+    /// Opens a file; see [`PsecCsvReader::new`].
     ///
     /// # Errors
-    /// [`PsecError`].
+    /// Returns a [`PsecError`] if the file, its header or its first row is invalid.
     pub fn open(path: &Path, period: Nanoseconds, joints: &[JointLimits]) -> Result<Self, PsecError> {
         let name = path.display().to_string();
         let unreadable =
@@ -74,109 +68,109 @@ impl PsecCsv<File> {
     }
 }
 
-impl<R: Read> PsecCsv<R> {
-    /// Reads the header and the first row; `name` is for messages, `period` (Tsp) more than 0 ns, `joints`
-    /// are the machine's.
+impl<R: Read> PsecCsvReader<R> {
+    /// Reads the header and the first row. `name` is the file name in errors, `period` is Tsp in ns and positive,
+    /// `joints` are all joints of the machine.
     ///
     /// # Errors
-    /// [`PsecError`].
+    /// Returns a [`PsecError`] if the header or the first row is invalid.
     pub fn new(input: R, name: &str, period: Nanoseconds, joints: &[JointLimits]) -> Result<Self, PsecError> {
-        debug_assert!(period > 0, "a period lasts");
-        let mut psec = PsecCsv {
+        debug_assert!(period > 0, "the period is positive");
+        let mut psec = PsecCsvReader {
             lines: Lines::new(input),
             name: name.to_owned(),
             period,
             columns: Vec::new(),
             limits: Vec::new(),
-            places: Vec::new(),
+            joint_indices: Vec::new(),
             before: Point::default(),
             after: Point::default(),
             next_k: 0,
-            given: Vec::new(),
+            previous: Vec::new(),
             first_time: 0,
-            at_end: false,
-            done: false,
+            is_last_row: false,
+            is_done: false,
         };
         psec.read_header(joints)?;
         if !psec.read_point()? {
             return Err(PsecError::Empty { at: psec.name });
         }
         psec.first_time = psec.after.time;
-        psec.given = vec![0.0; psec.places.len()];
-        psec.before = Point { positions: psec.given.clone(), ..psec.after.clone() };
+        psec.previous = vec![0.0; psec.joint_indices.len()];
+        psec.before = Point { positions: psec.previous.clone(), ..psec.after.clone() };
         psec.before.time = 0;
         Ok(psec)
     }
 
-    /// Where the axes stand before the first instant, m or rad, one value per joint of the machine; to be
-    /// said before the first row is asked for.
+    /// Sets the positions before the first cycle, m or rad, one value per joint of the machine. Call it before
+    /// [`next`](Self::next).
     #[must_use]
-    pub fn starting_at(mut self, positions: &[f64]) -> Self {
-        for (column, &place) in self.places.iter().enumerate() {
-            let position = positions.get(place).copied().unwrap_or_default();
-            self.given[column] = position;
+    pub fn with_start_positions(mut self, positions: &[f64]) -> Self {
+        for (column, &index) in self.joint_indices.iter().enumerate() {
+            let position = positions.get(index).copied().unwrap_or_default();
+            self.previous[column] = position;
             self.before.positions[column] = position;
         }
         self
     }
 
-    /// With a first row at time 0 the axes stand there before the first instant.
+    /// Sets the positions before the first cycle to the first row, if its time is 0.
     #[must_use]
-    pub fn starting_at_first_row(mut self) -> Self {
+    pub fn with_start_at_first_row(mut self) -> Self {
         if self.first_time == 0 {
-            self.given.copy_from_slice(&self.after.positions);
+            self.previous.copy_from_slice(&self.after.positions);
             self.before.positions.copy_from_slice(&self.after.positions);
         }
         self
     }
 
-    /// The joints that it moves, as places in the machine, one per value of a row.
+    /// Returns the joint index in the machine of each value of a row.
     pub fn joints(&self) -> &[usize] {
-        &self.places
+        &self.joint_indices
     }
 
-    /// Time of the first row, ns: later than 0 if the axes first go there.
+    /// Returns the time of the first row, ns. A time after 0 includes an approach motion.
     pub fn first_time(&self) -> Nanoseconds {
         self.first_time
     }
 
-    /// Number of the instant that comes next, from 0.
+    /// Returns the index of the next position cycle, from 0.
     pub fn next_instant(&self) -> i64 {
         self.next_k
     }
 
-    /// PSEC at the next instant, m or rad, into `row`, which has a value for each of
-    /// [`joints`](Self::joints); `false` after the last instant.
+    /// Writes the setpoints of the next position cycle, m or rad, to `row`, one value per element of
+    /// [`joints`](Self::joints). Returns false after the last cycle.
     ///
     /// # Errors
-    /// [`PsecError`], the first fault from the top. There is nothing after it.
+    /// Returns a [`PsecError`] for the first invalid row or setpoint; later calls return false.
     // An iterator could not lend the row.
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self, row: &mut [f64]) -> Result<bool, PsecError> {
-        debug_assert_eq!(row.len(), self.places.len(), "a value per joint");
-        if self.done {
+        debug_assert_eq!(row.len(), self.joint_indices.len(), "a value per joint");
+        if self.is_done {
             return Ok(false);
         }
-        // Faults are told once.
-        self.done = true;
+        // An error is returned once.
+        self.is_done = true;
         let time = self.next_k * self.period;
-        while self.after.time <= time && !self.at_end {
+        while self.after.time <= time && !self.is_last_row {
             self.advance()?;
         }
         self.interpolate(time, row);
         self.check(time, row)?;
-        self.given.copy_from_slice(row);
+        self.previous.copy_from_slice(row);
         self.next_k += 1;
-        self.done = self.at_end && self.after.time <= time;
+        self.is_done = self.is_last_row && self.after.time <= time;
         Ok(true)
     }
 
     fn advance(&mut self) -> Result<(), PsecError> {
         std::mem::swap(&mut self.before, &mut self.after);
         if !self.read_point()? {
-            // The last row stays where it was.
+            // The last row stays in `after`.
             std::mem::swap(&mut self.before, &mut self.after);
-            self.at_end = true;
+            self.is_last_row = true;
         }
         Ok(())
     }
@@ -194,16 +188,21 @@ impl<R: Read> PsecCsv<R> {
         for (value, (&from, &to)) in
             row.iter_mut().zip(self.before.positions.iter().zip(&self.after.positions))
         {
-            let segment = Segment::new(KinematicState::at_rest(from), KinematicState::at_rest(to), duration, SplineDegree::Linear);
+            let segment = Segment::new(
+                KinematicState::at_rest(from),
+                KinematicState::at_rest(to),
+                duration,
+                SplineDegree::Linear,
+            );
             *value = segment.position(time - self.before.time);
         }
     }
 
     fn check(&self, time: Nanoseconds, row: &[f64]) -> Result<(), PsecError> {
         let period = seconds(self.period);
-        // The row that the way to this instant leads to.
+        // End of the segment of this cycle.
         let point = if self.before.time == time { &self.before } else { &self.after };
-        for ((joint, &position), &before) in self.limits.iter().zip(row).zip(&self.given) {
+        for ((joint, &position), &before) in self.limits.iter().zip(row).zip(&self.previous) {
             let speed = (position - before) / period;
             let checked = if time == 0 {
                 joint.check_jump(point.index, before, position, period)
@@ -237,7 +236,7 @@ impl<R: Read> PsecCsv<R> {
             return Err(PsecError::Header { at, found: super::shortened(text.trim()) });
         }
         for column in &self.columns {
-            let Some(place) = joints.iter().position(|joint| joint.name == *column) else {
+            let Some(index) = joints.iter().position(|joint| joint.name == *column) else {
                 let names = joints.iter().map(|joint| joint.name.as_str());
                 return Err(PsecError::UnknownJoint {
                     at,
@@ -246,18 +245,18 @@ impl<R: Read> PsecCsv<R> {
                     nearest: nearest_name(column, names),
                 });
             };
-            if self.places.contains(&place) {
+            if self.joint_indices.contains(&index) {
                 return Err(PsecError::DuplicateJoint { at, joint: column.clone() });
             }
-            self.places.push(place);
-            self.limits.push(joints[place].clone());
+            self.joint_indices.push(index);
+            self.limits.push(joints[index].clone());
         }
         Ok(())
     }
 
-    /// Reads the next row into `after`, checked by itself and against `before`; `false` at the end.
+    /// Reads and checks the next row into `after`; returns false at the end of the file.
     fn read_point(&mut self) -> Result<bool, PsecError> {
-        let PsecCsv { lines, name, columns, limits, before, after, .. } = self;
+        let PsecCsvReader { lines, name, columns, limits, before, after, .. } = self;
         let found = lines.next().map_err(|(line, reason)| {
             let at = format!("{name}:{line}");
             PsecError::Unreadable { at, reason }
@@ -265,7 +264,7 @@ impl<R: Read> PsecCsv<R> {
         let Some((line, text)) = found else { return Ok(false) };
         let at = || format!("{name}:{line}");
         let wanted = columns.len() + 1;
-        let mut values = fields(text).map(number);
+        let mut values = fields(text).map(parse_number);
         let time = values.next().unwrap_or(f64::NAN);
         after.positions.clear();
         after.positions.extend(values.by_ref().take(columns.len()));
@@ -273,7 +272,7 @@ impl<R: Read> PsecCsv<R> {
         if found != wanted {
             return Err(PsecError::Columns { at: at(), found, wanted });
         }
-        let no_number = |column: usize| {
+        let number_error = |column: usize| {
             let name = column.checked_sub(1).and_then(|column| columns.get(column));
             PsecError::Number {
                 at: at(),
@@ -282,9 +281,9 @@ impl<R: Read> PsecCsv<R> {
             }
         };
         if !time.is_finite() {
-            return Err(no_number(0));
+            return Err(number_error(0));
         }
-        if !(0.0..=LONGEST).contains(&time) {
+        if !(0.0..=MAX_TIME).contains(&time) {
             return Err(PsecError::Time { at: at(), found: time });
         }
         let first = before.positions.is_empty();
@@ -296,7 +295,7 @@ impl<R: Read> PsecCsv<R> {
         }
         for (column, (joint, &position)) in limits.iter().zip(&after.positions).enumerate() {
             if !position.is_finite() {
-                return Err(no_number(column + 1));
+                return Err(number_error(column + 1));
             }
             joint
                 .check_travel_limits(after.index, position)
@@ -306,12 +305,12 @@ impl<R: Read> PsecCsv<R> {
     }
 }
 
-/// A number, or NaN.
-fn number(text: &str) -> f64 {
+/// Parses a number; NaN if invalid.
+fn parse_number(text: &str) -> f64 {
     text.parse().unwrap_or(f64::NAN)
 }
 
-/// A time in s as ns.
+/// Converts a time from s to ns, rounded to nearest.
 fn nearest_nanosecond(time: f64) -> Nanoseconds {
     let whole = time.floor();
     let rest = ((time - whole) * SECOND_NS as f64).round() as Nanoseconds;
@@ -323,7 +322,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_on_the_position_grid_are_whole_nanoseconds() {
+    fn times_of_position_cycles_are_integer_nanoseconds() {
         assert_eq!(nearest_nanosecond(0.006 * 1111.0), 6_666_000_000);
     }
 }

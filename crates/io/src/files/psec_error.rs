@@ -1,39 +1,43 @@
-//! Why setpoints from CSV cannot be used.
+//! Errors of position setpoints from CSV.
 
-use super::psec_csv::{LONGEST, TIME};
 use virtual_axes_core::text::nearest_hint;
 use virtual_axes_core::trajectory::Rejection;
 use virtual_axes_core::units::Rounded;
 
-/// Why a file of setpoints cannot be used; each names file and line.
+/// Header of the time column.
+pub(super) const TIME: &str = "time";
+/// Maximum time, s: about three years.
+pub(super) const MAX_TIME: f64 = 1e8;
+
+/// Error of reading position setpoints from CSV, with file and line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PsecError {
     /// The file cannot be read, or is not text.
     #[error("{at}: {reason}")]
     Unreadable {
-        /// File, and line where there is one.
+        /// File, and line if known.
         at: String,
-        /// What the reader says.
+        /// Error message of the reader.
         reason: String,
     },
-    /// The first line is not a header that begins with `time` and names joints.
-    #[error("{at}: the header is \"{found}\"; it begins with \"{TIME}\", then a joint for each column")]
+    /// The first line is not a header of `time` and joint names.
+    #[error("{at}: the header is \"{found}\", must be \"{TIME}\", then one joint name per column")]
     Header {
         /// File and line.
         at: String,
-        /// What stands there.
+        /// Line found.
         found: String,
     },
-    /// A column is headed by what is not a joint.
+    /// A column header is not a joint name.
     #[error("{at}: there is no joint \"{found}\"; there are {known}{}", nearest_hint(.nearest))]
     UnknownJoint {
         /// File and line.
         at: String,
-        /// What stands there.
+        /// Header found.
         found: String,
-        /// The joints, with commas.
+        /// Joint names, separated by commas.
         known: String,
-        /// The joint that looks most like it.
+        /// Most similar joint name.
         nearest: Option<String>,
     },
     /// A joint has two columns.
@@ -41,7 +45,7 @@ pub enum PsecError {
     DuplicateJoint {
         /// File and line.
         at: String,
-        /// Its name.
+        /// Name of the joint.
         joint: String,
     },
     /// A line has too many or too few values.
@@ -49,9 +53,9 @@ pub enum PsecError {
     Columns {
         /// File and line.
         at: String,
-        /// Values there are.
+        /// Number of values found.
         found: usize,
-        /// Columns there are.
+        /// Number of columns in the header.
         wanted: usize,
     },
     /// A field is not a number.
@@ -61,39 +65,39 @@ pub enum PsecError {
         at: String,
         /// Header of the column.
         column: String,
-        /// What stands there.
+        /// Field found.
         found: String,
     },
     /// A time is out of range.
-    #[error("{at}: {TIME} is {} s, must lie in 0 … {LONGEST} s", Rounded(*found))]
+    #[error("{at}: {TIME} is {} s, must lie in 0 … {MAX_TIME} s", Rounded(*found))]
     Time {
         /// File and line.
         at: String,
-        /// What stands there.
+        /// Time found, s.
         found: f64,
     },
-    /// A time is not after the one before it.
-    #[error("{at}: {TIME} is {found} s, must be later than {before} s of the line before it")]
+    /// Times do not increase strictly.
+    #[error("{at}: {TIME} is {found} s, must be later than {before} s of the previous row")]
     NotIncreasing {
         /// File and line.
         at: String,
-        /// What stands there.
+        /// Time found, s.
         found: f64,
-        /// The time before it, s.
+        /// Time of the previous row, s.
         before: f64,
     },
-    /// The axes cannot do it.
+    /// A setpoint exceeds the limits of a joint.
     #[error("{at}: {rejection}")]
     Point {
         /// File and line.
         at: String,
-        /// Why.
+        /// Violated limit.
         rejection: Rejection,
     },
-    /// There is no point.
+    /// The file has no row below the header.
     #[error("{at}: there is no setpoint below the header")]
     Empty {
-        /// The file.
+        /// Name of the file.
         at: String,
     },
 }

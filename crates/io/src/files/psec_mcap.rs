@@ -8,132 +8,132 @@ use std::path::Path;
 
 use mcap::Message;
 
-use super::mcap_in::{
-    Ending, McapFault, check_chunks, damaged, decode_with, start, type_of, unfinished, unreadable,
-};
 use super::mcap_messages::Messages;
-use super::listed;
-use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
+use super::mcap_reader::{
+    Completeness, McapFileError, check_chunks, decode_with, parse_error, read_error, read_messages, type_of,
+    unfinished_error,
+};
+use super::shorten_names;
 use crate::messages::RequestSeed;
+use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_core::trajectory::{Rejection, TrajectoryRequest};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// The type of message that is read.
+/// Message type of trajectories.
 const TYPE: &str = "trajectory_msgs/msg/JointTrajectory";
 
-/// Why a recording cannot be used.
+/// Error of reading trajectories from an MCAP recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum RecordingError {
-    /// The file cannot be read, or is not whole.
+pub enum TrajectoryRecordingError {
+    /// The file cannot be read, is incomplete or damaged.
     #[error(transparent)]
-    File(#[from] McapFault),
-    /// There is no trajectory in it.
+    File(#[from] McapFileError),
+    /// The recording contains no trajectory.
     #[error("{at}: there is no message {TYPE}; {}", topics_text(.topics))]
     NoTrajectory {
-        /// The file.
+        /// Name of the file.
         at: String,
-        /// The topics with messages.
+        /// Topics with messages of other types.
         topics: Vec<String>,
     },
     /// Several topics carry trajectories.
-    #[error("{at}: several topics carry trajectories, {}: name one", .topics.join(", "))]
+    #[error("{at}: several topics carry trajectories, {}: select one by its name", .topics.join(", "))]
     SeveralTopics {
-        /// The file.
+        /// Name of the file.
         at: String,
-        /// The topics.
+        /// Topics with trajectories.
         topics: Vec<String>,
     },
-    /// The topic that was asked for carries none.
+    /// The selected topic has no trajectory.
     #[error("{at}: there is no trajectory on {topic}; there are some on {}{}", .topics.join(", "), nearest_hint(.nearest))]
     UnknownTopic {
-        /// The file.
+        /// Name of the file.
         at: String,
-        /// What was asked for.
+        /// Selected topic.
         topic: String,
-        /// The topics that carry trajectories.
+        /// Topics with trajectories.
         topics: Vec<String>,
-        /// The one that looks most like it.
+        /// Most similar topic.
         nearest: Option<String>,
     },
-    /// A message cannot be read.
+    /// A message cannot be decoded.
     #[error("{at}: {reason}")]
     Message {
-        /// File, topic, number of the message from 0 and log time.
+        /// File, topic, message index from 0 and log time.
         at: String,
-        /// What is wrong.
+        /// Reason of the decoder.
         reason: String,
     },
-    /// A message that no machine could run.
+    /// A trajectory is invalid for every machine.
     #[error("{at}: {rejection}")]
     Rejected {
-        /// File, topic, number of the message from 0 and log time.
+        /// File, topic, message index from 0 and log time.
         at: String,
-        /// Why.
+        /// Reason of the rejection.
         rejection: Rejection,
     },
 }
 
 fn topics_text(topics: &[String]) -> String {
     match topics {
-        [] => "it holds no message at all".to_owned(),
+        [] => "the file contains no messages".to_owned(),
         topics => format!("there are messages on {}", topics.join(", ")),
     }
 }
 
-/// The trajectories of one topic of a recording in the order of their log times, each with its log time
-/// in ns.
+/// Iterator over the trajectories of one topic of an MCAP recording in log time order, each with its log time in ns.
 ///
-/// The file is read three times and never held: chunks are checked, then the log times are taken down, then
-/// messages are handed out as they come. Only those are held that come before an earlier one.
-pub struct Trajectories<R> {
+/// The file is read three times: to check its chunks, to collect the log times, and to return the messages. Only
+/// messages that are out of log time order are kept in memory.
+pub struct McapTrajectories<R> {
     messages: Messages<BufReader<R>>,
     name: String,
     topic: String,
-    /// Numbers of the messages in the file, in the order of log times.
+    /// Message indices of the topic in log time order.
     order: VecDeque<usize>,
-    /// Messages read before their turn, by number.
+    /// Messages that are out of log time order, by index.
     early: BTreeMap<usize, Message<'static>>,
-    /// Number of the message that is read next.
+    /// Index of the next message in the file.
     next: usize,
 }
 
-impl<R> fmt::Debug for Trajectories<R> {
+impl<R> fmt::Debug for McapTrajectories<R> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut out = f.debug_struct("Trajectories");
-        out.field("name", &self.name).field("topic", &self.topic).field("left", &self.order.len());
+        let mut out = f.debug_struct("McapTrajectories");
+        out.field("name", &self.name).field("topic", &self.topic).field("remaining", &self.order.len());
         out.finish_non_exhaustive()
     }
 }
 
-impl Trajectories<File> {
-    /// Opens a recording; see [`Trajectories::new`].
+impl McapTrajectories<File> {
+    /// Opens a recording; see [`McapTrajectories::new`].
     ///
     /// # Errors
-    /// [`RecordingError`].
-    pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, RecordingError> {
+    /// Returns a [`TrajectoryRecordingError`] as [`McapTrajectories::new`].
+    pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, TrajectoryRecordingError> {
         let name = path.display().to_string();
-        let file = File::open(path).map_err(|error| unreadable(&name, &error))?;
+        let file = File::open(path).map_err(|error| read_error(&name, &error))?;
         Self::new(file, &name, topic)
     }
 }
 
-impl<R: Read + Seek> Trajectories<R> {
-    /// Reads all of a recording and finds the trajectories, those of `topic` if one is named; `name` is for
-    /// messages.
+impl<R: Read + Seek> McapTrajectories<R> {
+    /// Reads the whole recording and finds the trajectories of `topic`, or of the only topic with trajectories.
+    /// `name` is the file name in errors.
     ///
     /// # Errors
-    /// [`RecordingError`] if the recording is damaged, or if there is not exactly one topic with
-    /// trajectories and none is named.
-    pub fn new(mut input: R, name: &str, topic: Option<&str>) -> Result<Self, RecordingError> {
-        if check_chunks(&mut input, name)? == Ending::Unfinished {
-            // What was still to come would be left out of the motion.
-            return Err(unfinished(name).into());
+    /// Returns a [`TrajectoryRecordingError`] if the recording is incomplete or damaged, if `topic` has no trajectory,
+    /// or if several topics have trajectories and `topic` is `None`.
+    pub fn new(mut input: R, name: &str, topic: Option<&str>) -> Result<Self, TrajectoryRecordingError> {
+        if check_chunks(&mut input, name)? == Completeness::Unfinished {
+            // The motion would be incomplete.
+            return Err(unfinished_error(name).into());
         }
         let mut others = Vec::new();
         let mut found: BTreeMap<String, Vec<u64>> = BTreeMap::new();
-        let mut reader = start(input, name)?;
+        let mut reader = read_messages(input, name)?;
         for message in reader.by_ref() {
-            let message = message.map_err(|error| damaged(name, &error))?;
+            let message = message.map_err(|error| parse_error(name, &error))?;
             let topic = &message.channel.topic;
             if is_trajectory(&message) {
                 match found.get_mut(topic) {
@@ -149,26 +149,28 @@ impl<R: Read + Seek> Trajectories<R> {
         let topic = match (topic, topics.as_slice()) {
             (_, []) => {
                 others.sort();
-                return Err(RecordingError::NoTrajectory { at, topics: listed(&others) });
+                return Err(TrajectoryRecordingError::NoTrajectory { at, topics: shorten_names(&others) });
             }
             (None, [topic]) => topic.clone(),
-            (None, _) => return Err(RecordingError::SeveralTopics { at, topics: listed(&topics) }),
+            (None, _) => {
+                return Err(TrajectoryRecordingError::SeveralTopics { at, topics: shorten_names(&topics) });
+            }
             (Some(topic), _) => topic.to_owned(),
         };
         let Some(times) = found.remove(&topic) else {
             let nearest = nearest_name(&topic, topics.iter().map(String::as_str));
-            return Err(RecordingError::UnknownTopic {
+            return Err(TrajectoryRecordingError::UnknownTopic {
                 at,
                 topic: shortened(&topic),
-                topics: listed(&topics),
+                topics: shorten_names(&topics),
                 nearest,
             });
         };
         let mut order: Vec<usize> = (0..times.len()).collect();
-        // Stable: messages of one time stay in the order of the file.
+        // Stable sort: messages of equal log time stay in file order.
         order.sort_by_key(|&number| times[number]);
-        Ok(Trajectories {
-            messages: start(reader.into_inner().into_inner(), name)?,
+        Ok(McapTrajectories {
+            messages: read_messages(reader.into_inner().into_inner(), name)?,
             name: at,
             topic,
             order: order.into(),
@@ -177,23 +179,23 @@ impl<R: Read + Seek> Trajectories<R> {
         })
     }
 
-    /// The topic that they are read from.
+    /// Returns the topic of the trajectories.
     pub fn topic(&self) -> &str {
         &self.topic
     }
 
-    /// How many are left.
+    /// Returns the number of trajectories not yet returned.
     pub fn remaining(&self) -> usize {
         self.order.len()
     }
 
-    /// Message `number` of the topic, in the order of the file.
-    fn message(&mut self, number: usize) -> Result<Message<'static>, RecordingError> {
+    /// Returns the message at index `number` of the topic in file order.
+    fn message(&mut self, number: usize) -> Result<Message<'static>, TrajectoryRecordingError> {
         if let Some(message) = self.early.remove(&number) {
             return Ok(message);
         }
         for message in self.messages.by_ref() {
-            let message = message.map_err(|error| damaged(&self.name, &error))?;
+            let message = message.map_err(|error| parse_error(&self.name, &error))?;
             if message.channel.topic != self.topic || !is_trajectory(&message) {
                 continue;
             }
@@ -204,15 +206,15 @@ impl<R: Read + Seek> Trajectories<R> {
             }
             self.early.insert(found, message);
         }
-        let reason = "it has become shorter while it was read".to_owned();
-        Err(McapFault::Damaged { at: self.name.clone(), reason }.into())
+        let reason = "the file was truncated while it was read".to_owned();
+        Err(McapFileError::Damaged { at: self.name.clone(), reason }.into())
     }
 
     fn request(
         &self,
         number: usize,
         message: &Message<'_>,
-    ) -> Result<(Nanoseconds, TrajectoryRequest), RecordingError> {
+    ) -> Result<(Nanoseconds, TrajectoryRequest), TrajectoryRecordingError> {
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
         let at = || {
             format!(
@@ -223,14 +225,14 @@ impl<R: Read + Seek> Trajectories<R> {
             )
         };
         let request = decode_with(RequestSeed, message)
-            .map_err(|reason| RecordingError::Message { at: at(), reason })?
-            .map_err(|rejection| RecordingError::Rejected { at: at(), rejection })?;
+            .map_err(|reason| TrajectoryRecordingError::Message { at: at(), reason })?
+            .map_err(|rejection| TrajectoryRecordingError::Rejected { at: at(), rejection })?;
         Ok((log_time, request))
     }
 }
 
-impl<R: Read + Seek> Iterator for Trajectories<R> {
-    type Item = Result<(Nanoseconds, TrajectoryRequest), RecordingError>;
+impl<R: Read + Seek> Iterator for McapTrajectories<R> {
+    type Item = Result<(Nanoseconds, TrajectoryRequest), TrajectoryRecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let number = self.order.pop_front()?;

@@ -1,5 +1,5 @@
-//! PSEC from YAML: messages `trajectory_msgs/JointTrajectory` as `ros2 topic pub` takes them and
-//! `ros2 topic echo` prints them.
+//! Reading of position setpoints from YAML: messages `trajectory_msgs/JointTrajectory` in the format of
+//! `ros2 topic pub` and `ros2 topic echo`.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -16,45 +16,46 @@ use crate::messages::{self};
 use virtual_axes_core::trajectory::{Rejection, TrajectoryRequest};
 use virtual_axes_core::yaml::{self, YamlNumber};
 
-/// What `ros2 topic echo` prints in place of what it leaves out.
-const LEFT_OUT: &str = "'...'";
+/// Placeholder of `ros2 topic echo` for omitted values.
+const ELLIPSIS: &str = "'...'";
 
-/// Why YAML is not setpoints; each names the file, and the line where there is one.
+/// Error of reading trajectories from YAML, with file and line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TrajectoryYamlError {
-    /// Not YAML, or not a message.
+    /// The text is not YAML or not a message.
     #[error("{at}: {reason}")]
     Syntax {
         /// File and line.
         at: String,
-        /// What the reader says.
+        /// Error message of the YAML parser.
         reason: String,
     },
-    /// A message that no machine could run.
+    /// A trajectory is invalid for every machine.
     #[error("{at}: {rejection}")]
     Rejected {
         /// File and line.
         at: String,
-        /// Why.
+        /// Reason of the rejection.
         rejection: Rejection,
     },
-    /// There is no message.
-    #[error("{at}: there is no trajectory; it is a mapping with joint_names and points")]
+    /// The text contains no message.
+    #[error("{at}: the file contains no trajectory, a mapping with joint_names and points")]
     Empty {
-        /// The file.
+        /// Name of the file.
         at: String,
     },
 }
 
-/// The trajectories of a text, one per document; fields that are missing have their defaults. `file` is
-/// for messages.
+/// Reads the trajectories of a YAML text, one per document; missing fields have default values. `file` is the file
+/// name in errors.
 ///
 /// # Errors
-/// [`TrajectoryYamlError`], the first fault.
+/// Returns a [`TrajectoryYamlError`] for the first error in the text.
 pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<TrajectoryRequest>, TrajectoryYamlError> {
     let documents: Vec<Spanned<Message>> = yaml::documents(text).map_err(|mut error| {
-        if text.lines().nth(error.line.saturating_sub(1) as usize).is_some_and(|text| text.contains(LEFT_OUT)) {
-            error.reason += "; `ros2 topic echo --full-length` leaves nothing out";
+        if text.lines().nth(error.line.saturating_sub(1) as usize).is_some_and(|text| text.contains(ELLIPSIS))
+        {
+            error.reason += "; use `ros2 topic echo --full-length` to print all values";
         }
         TrajectoryYamlError::Syntax { at: error.position(file), reason: error.reason }
     })?;
@@ -117,7 +118,7 @@ impl<'de, T: TryFrom<i128> + Bounded> Deserialize<'de> for Whole<T> {
     }
 }
 
-/// A type with bounds to name.
+/// Integer type with its range for error messages.
 trait Bounded {
     const BOUNDS: (i64, i64);
 }
@@ -150,11 +151,11 @@ impl<T: TryFrom<i128> + Bounded> Visitor<'_> for WholeVisitor<T> {
     }
 }
 
-/// A header, or `auto`, which `ros2 topic pub` fills in: here it is the default.
+/// Header, or `auto` of `ros2 topic pub`, which is read as the default header.
 #[derive(Default)]
 struct Stamped(HeaderFields);
 
-/// A stamp, or `now`, likewise.
+/// Stamp, or `now` of `ros2 topic pub`, which is read as 0.
 #[derive(Default)]
 struct Stamp(TimeFields);
 
@@ -170,7 +171,7 @@ impl<'de> Deserialize<'de> for Stamp {
     }
 }
 
-/// A mapping, or a word or nothing in its place.
+/// Visitor of a mapping, a keyword or an empty value.
 struct WordOr<F, T> {
     word: &'static str,
     build: fn(F) -> T,

@@ -1,61 +1,61 @@
-//! Traces: what the axes did, row by row, in the format that the file's extension names.
+//! Writing of simulation traces as CSV or MCAP, selected by the file extension.
 
 use std::io;
 use std::path::Path;
 
-use super::output::{OutputFile, is_in_place};
-use super::{TraceCsv, TraceMcap};
+use super::output::{OutputFile, is_device_or_pipe};
+use super::{TraceCsvWriter, TraceMcapWriter};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::units::Nanoseconds;
 
-/// A trace that is being written. Dropped before [`finish`](Self::finish), it leaves no file behind.
+/// Writer of a trace. Dropping it before [`finish`](Self::finish) leaves no file.
 pub trait TraceWriter {
-    /// Adds a row at `time` (ns), later than the one before; one sample per joint.
+    /// Adds a row with one sample per joint at `time`, ns, later than the previous row.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     fn row(&mut self, time: Nanoseconds, samples: &[AxisSample]) -> io::Result<()>;
 
-    /// Makes the file whole.
+    /// Completes the file.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     fn finish(self: Box<Self>) -> io::Result<()>;
 }
 
-/// Begins a trace of `joints` in the format that the extension of `path` names: `.csv` or `.mcap`. A
-/// device or a pipe without an extension gets CSV.
+/// Creates a trace of `joints` in the format of the extension of `path`: `.csv` or `.mcap`. The format for a
+/// device or a pipe without an extension is CSV.
 ///
 /// # Errors
-/// An unknown extension; those of the output.
+/// Returns the errors of the output, and an error for an unknown extension.
 pub fn trace_writer(path: &Path, joints: &[String]) -> io::Result<Box<dyn TraceWriter>> {
     match extension(path, &["csv", "mcap"])? {
-        "mcap" => Ok(Box::new(TraceMcap::new(OutputFile::create(path)?, joints)?)),
-        _ => Ok(Box::new(TraceCsv::new(OutputFile::create(path)?, joints)?)),
+        "mcap" => Ok(Box::new(TraceMcapWriter::new(OutputFile::create(path)?, joints)?)),
+        _ => Ok(Box::new(TraceCsvWriter::new(OutputFile::create(path)?, joints)?)),
     }
 }
 
-impl TraceWriter for TraceCsv<OutputFile> {
+impl TraceWriter for TraceCsvWriter<OutputFile> {
     fn row(&mut self, time: Nanoseconds, samples: &[AxisSample]) -> io::Result<()> {
-        TraceCsv::row(self, time, samples)
+        TraceCsvWriter::row(self, time, samples)
     }
 
     fn finish(self: Box<Self>) -> io::Result<()> {
-        TraceCsv::finish(*self)?.finish()
+        TraceCsvWriter::finish(*self)?.finish()
     }
 }
 
-impl TraceWriter for TraceMcap<OutputFile> {
+impl TraceWriter for TraceMcapWriter<OutputFile> {
     fn row(&mut self, time: Nanoseconds, samples: &[AxisSample]) -> io::Result<()> {
-        TraceMcap::row(self, time, samples)
+        TraceMcapWriter::row(self, time, samples)
     }
 
     fn finish(self: Box<Self>) -> io::Result<()> {
-        TraceMcap::finish(*self)?.finish()
+        TraceMcapWriter::finish(*self)?.finish()
     }
 }
 
-/// The extension of `path` among `known`; the first of them for a device or a pipe that has none.
+/// Returns the extension of `path` if it is in `known`, or the first one for a device or pipe without extension.
 pub(super) fn extension(path: &Path, known: &[&'static str]) -> io::Result<&'static str> {
     let found = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if let Some(extension) = known.iter().find(|e| **e == found) {
@@ -63,11 +63,11 @@ pub(super) fn extension(path: &Path, known: &[&'static str]) -> io::Result<&'sta
     }
     if let [first, ..] = known
         && found.is_empty()
-        && is_in_place(path)
+        && is_device_or_pipe(path)
     {
         return Ok(first);
     }
     let known: Vec<String> = known.iter().map(|e| format!(".{e}")).collect();
-    let text = format!("{}: its extension must say what to write: {}", path.display(), known.join(", "));
+    let text = format!("{}: the file extension must be one of {}", path.display(), known.join(", "));
     Err(io::Error::new(io::ErrorKind::InvalidInput, text))
 }

@@ -1,15 +1,15 @@
-//! Traces as CSV: a row per position instant.
+//! Writing of simulation traces as CSV.
 
 use std::io::{self, Write};
 
-use super::number;
+use super::decimal;
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// Name of a column, and what stands in it.
+/// Column name and its value in a sample.
 type Signal = (&'static str, fn(&AxisSample) -> f64);
 
-/// The signals of an axis in a trace, in the order of the columns.
+/// Signals of an axis in a trace, in column order.
 const SIGNALS: [Signal; 7] = [
     ("psec", |s| s.psec),
     ("position", |s| s.position),
@@ -20,19 +20,19 @@ const SIGNALS: [Signal; 7] = [
     ("friction_current", |s| s.friction_current),
 ];
 
-/// Writes a trace; numbers are as short as they can be read back exactly.
+/// Writer of a trace as CSV; numbers are the shortest decimals that parse to the same value.
 #[derive(Debug)]
-pub struct TraceCsv<W> {
+pub struct TraceCsvWriter<W> {
     output: W,
-    /// A row as text.
+    /// Buffer of a row.
     row: Vec<u8>,
 }
 
-impl<W: Write> TraceCsv<W> {
-    /// Begins a trace of `joints` with its header: `time`, then `x.psec, x.position, …` per joint.
+impl<W: Write> TraceCsvWriter<W> {
+    /// Creates a trace of `joints` and writes its header: `time`, then `x.psec, x.position, …` per joint.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn new(mut output: W, joints: &[String]) -> io::Result<Self> {
         output.write_all(b"time")?;
         for joint in joints {
@@ -41,30 +41,30 @@ impl<W: Write> TraceCsv<W> {
             }
         }
         output.write_all(b"\n")?;
-        Ok(TraceCsv { output, row: Vec::new() })
+        Ok(TraceCsvWriter { output, row: Vec::new() })
     }
 
-    /// Adds a row at `time` ns: s, m, m/s, A, V (rad and rad/s on rotary axes).
+    /// Adds a row at `time`, ns. The units in the file are s, m, m/s, A, V (rad, rad/s for rotary axes).
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn row(&mut self, time: Nanoseconds, samples: &[AxisSample]) -> io::Result<()> {
         self.row.clear();
-        number::push(&mut self.row, seconds(time));
+        decimal::push(&mut self.row, seconds(time));
         for sample in samples {
             for (_, value) in SIGNALS {
                 self.row.push(b',');
-                number::push(&mut self.row, value(sample));
+                decimal::push(&mut self.row, value(sample));
             }
         }
         self.row.push(b'\n');
         self.output.write_all(&self.row)
     }
 
-    /// Hands everything over and gives the output back.
+    /// Flushes and returns the output.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn finish(mut self) -> io::Result<W> {
         self.output.flush()?;
         Ok(self.output)

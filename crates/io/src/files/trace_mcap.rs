@@ -1,35 +1,35 @@
-//! Traces as MCAP recordings, with the messages that the node publishes.
+//! Writing of simulation traces as MCAP recordings, with the messages of the ROS node.
 
 use std::io::{self, Write};
 
-use super::mcap_out::{Recording, Topic, USUAL_QOS};
+use super::mcap_writer::{DEFAULT_QOS, McapTopic, McapWriter};
 use crate::messages::sensor_msgs::msg::JointState;
 use crate::messages::{DriveStates, MotorCurrents, Sampled, Schema};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::units::Nanoseconds;
 
-/// Writes a trace on the topics of a node of the default name: `/joint_states`,
-/// `/virtual_axes/motor_currents` and `/virtual_axes/drive_states`, a message of each per row.
+/// Writer of a trace as MCAP, with one message per row on the default topics of the node: `/joint_states`,
+/// `/virtual_axes/motor_currents` and `/virtual_axes/drive_states`.
 #[derive(Debug)]
-pub struct TraceMcap<W: Write> {
-    recording: Recording<W>,
-    states: (Topic, JointState),
-    currents: (Topic, MotorCurrents),
-    drives: (Topic, DriveStates),
+pub struct TraceMcapWriter<W: Write> {
+    recording: McapWriter<W>,
+    states: (McapTopic, JointState),
+    currents: (McapTopic, MotorCurrents),
+    drives: (McapTopic, DriveStates),
 }
 
-impl<W: Write> TraceMcap<W> {
-    /// Begins a trace of `joints`; `output` need not be able to seek.
+impl<W: Write> TraceMcapWriter<W> {
+    /// Creates a trace of `joints`; `output` does not need to be seekable.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn new(output: W, joints: &[String]) -> io::Result<Self> {
-        let mut recording = Recording::new(output)?;
-        let states = recording.topic("/joint_states", &Schema::joint_state(), USUAL_QOS)?;
+        let mut recording = McapWriter::new(output)?;
+        let states = recording.topic("/joint_states", &Schema::joint_state(), DEFAULT_QOS)?;
         let currents =
-            recording.topic("/virtual_axes/motor_currents", &Schema::motor_currents(), USUAL_QOS)?;
-        let drives = recording.topic("/virtual_axes/drive_states", &Schema::drive_states(), USUAL_QOS)?;
-        Ok(TraceMcap {
+            recording.topic("/virtual_axes/motor_currents", &Schema::motor_currents(), DEFAULT_QOS)?;
+        let drives = recording.topic("/virtual_axes/drive_states", &Schema::drive_states(), DEFAULT_QOS)?;
+        Ok(TraceMcapWriter {
             recording,
             states: (states, JointState::named(joints)),
             currents: (currents, MotorCurrents::named(joints)),
@@ -37,29 +37,29 @@ impl<W: Write> TraceMcap<W> {
         })
     }
 
-    /// Adds a row at `time`, ns since the Unix epoch and not before it: stamp, log time and publish time.
+    /// Adds a row with `time` as stamp, log time and publish time, ns since the Unix epoch.
     ///
     /// # Errors
-    /// Those of the output; a time before the epoch.
+    /// Returns the errors of the output, and an error for a time before the epoch.
     pub fn row(&mut self, time: Nanoseconds, samples: &[AxisSample]) -> io::Result<()> {
-        fn put<W: Write, M: Sampled + serde::Serialize>(
-            recording: &mut Recording<W>,
-            (topic, message): &mut (Topic, M),
+        fn write_sample<W: Write, M: Sampled + serde::Serialize>(
+            recording: &mut McapWriter<W>,
+            (topic, message): &mut (McapTopic, M),
             time: Nanoseconds,
             samples: &[AxisSample],
         ) -> io::Result<()> {
             message.fill(time, samples);
             recording.write(topic, time, message)
         }
-        put(&mut self.recording, &mut self.states, time, samples)?;
-        put(&mut self.recording, &mut self.currents, time, samples)?;
-        put(&mut self.recording, &mut self.drives, time, samples)
+        write_sample(&mut self.recording, &mut self.states, time, samples)?;
+        write_sample(&mut self.recording, &mut self.currents, time, samples)?;
+        write_sample(&mut self.recording, &mut self.drives, time, samples)
     }
 
-    /// Hands everything over and gives the output back.
+    /// Completes the recording, flushes and returns the output.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn finish(self) -> io::Result<W> {
         let mut output = self.recording.finish()?;
         output.flush()?;

@@ -1,9 +1,9 @@
-//! TODO
+//! Tests of file formats: setpoints, traces, recordings and URDF.
 
-mod files_mcap;
-mod files_mcap_bounded;
-mod files_psec_csv;
-mod files_psec_yaml;
-mod files_recording_csv;
-mod files_recording_mcap;
+mod bounded_recording;
+mod psec_csv;
+mod psec_mcap;
+mod psec_yaml;
+mod recording_csv;
+mod recording_mcap;
 mod urdf;

@@ -1,5 +1,5 @@
-//! The URDF that is shipped, and machines that have none. What is in it is tested against an independent
-//! parser and the kinematics in test_py/test_urdf.py.
+//! The shipped URDF, and machines without a URDF. Its content is tested in test_py/test_urdf.py with an independent
+//! parser and the kinematics.
 
 use virtual_axes_core::config::Parameters;
 use virtual_axes_io::urdf::urdf;
@@ -14,14 +14,14 @@ fn of(machine: &str, prefix: &str) -> Result<String, String> {
     urdf(&config, prefix).map_err(|error| error.to_string())
 }
 
-/// The default machine with `from` replaced, which must be there.
+/// Returns the default machine file with `from` replaced by `to`.
 fn changed(from: &str, to: &str) -> String {
     assert!(DEFAULT.contains(from), "{from}");
     DEFAULT.replacen(from, to, 1)
 }
 
 #[test]
-fn the_shipped_urdf_is_what_the_command_prints() {
+fn the_shipped_urdf_equals_the_output_of_the_command() {
     let shipped = include_str!("../../../../urdf/mikron_ucp710.urdf");
     let written = of(DEFAULT, "").expect("a URDF");
     assert!(shipped == written, "urdf/mikron_ucp710.urdf: put the output of `virtual_axes urdf` there");
@@ -44,7 +44,7 @@ fn a_role_that_no_joint_has_is_fixed() {
 }
 
 #[test]
-fn texts_are_escaped_and_what_xml_lacks_is_refused() {
+fn texts_are_escaped_and_invalid_xml_characters_are_rejected() {
     let machine = changed("machine: Mikron UCP 710", "machine: 'a < b & \"c\"'");
     let text = of(&machine, "<&>").expect("a URDF");
     assert!(text.contains(r#"<robot name="a &lt; b &amp; &quot;c&quot;">"#), "{text}");

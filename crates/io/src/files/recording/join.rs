@@ -1,51 +1,51 @@
-//! Values of one topic at the stamps of another.
+//! Resampling of the values of one topic at the stamps of another.
 
 use super::series::Row;
 use virtual_axes_core::units::{MILLISECOND, Nanoseconds, seconds};
 use virtual_axes_identify::recording::Finding;
 
-/// By what messages are put in time.
+/// Source of message times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Clock {
-    /// `header.stamp`.
+pub(super) enum TimeSource {
+    /// Field `header.stamp`.
     Stamp,
-    /// When they were recorded.
+    /// Log time of the recorder.
     Log,
 }
 
-/// The part of a period beyond which stamps that differ are mentioned.
-const WORTH_MENTION: f64 = 0.01;
+/// Minimum difference of stamps that is reported, as a fraction of the period.
+const REPORTED_DIFFERENCE: f64 = 0.01;
 
-/// The stamps that values are wanted at.
+/// Stamps at which values are resampled.
 #[derive(Debug)]
-pub(super) struct Times {
+pub(super) struct TargetStamps {
     stamps: Vec<Nanoseconds>,
-    /// Median time from stamp to stamp, ns.
+    /// Median interval between stamps, ns.
     period: Nanoseconds,
 }
 
-impl Times {
+impl TargetStamps {
     pub fn new(stamps: Vec<Nanoseconds>) -> Self {
         let mut steps: Vec<Nanoseconds> =
             stamps.windows(2).map(|pair| pair[1].saturating_sub(pair[0]).saturating_abs()).collect();
         let middle = steps.len() / 2;
         let period = if steps.is_empty() { 0 } else { *steps.select_nth_unstable(middle).1 };
-        Times { stamps, period }
+        TargetStamps { stamps, period }
     }
 }
 
-/// The values at `place` of `rows` with the stamps of `times`: of the nearest row, if it is less than half
-/// a period away; else NaN.
-pub(super) fn put(
+/// Returns the values at `index` of the nearest of `rows` for each stamp of `times`; NaN if the nearest row is half a
+/// period or more away.
+pub(super) fn values_at_stamps(
     rows: &[Row],
-    place: usize,
-    clock: Clock,
-    times: &Times,
+    index: usize,
+    clock: TimeSource,
+    times: &TargetStamps,
     what: &str,
     findings: &mut Vec<Finding>,
 ) -> Vec<f64> {
     let mut others: Vec<(Nanoseconds, f64)> =
-        rows.iter().map(|row| (clock.of(row), row.values[place])).collect();
+        rows.iter().map(|row| (clock.of(row), row.values[index])).collect();
     others.sort_by_key(|(time, _)| *time);
     let mut missing = 0_usize;
     let mut farthest = 0;
@@ -70,14 +70,14 @@ pub(super) fn put(
         findings.push(Finding::warning(
             "unmatched",
             format!("{what}: no value at {missing} of {} stamps of the positions", times.stamps.len()),
-            "record every message of both topics, stamped alike",
+            "record every message of both topics with equal stamps",
         ));
     }
-    if farthest as f64 > WORTH_MENTION * times.period as f64 {
+    if farthest as f64 > REPORTED_DIFFERENCE * times.period as f64 {
         findings.push(Finding::note(
             "stamps-differ",
             format!(
-                "{what}: stamps differ from those of the positions by up to {:.3} ms: the nearest value is taken",
+                "{what}: stamps differ from those of the positions by up to {:.3} ms: the nearest value is used",
                 seconds(farthest) / MILLISECOND
             ),
         ));

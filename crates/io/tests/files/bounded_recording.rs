@@ -1,4 +1,4 @@
-//! Recordings of a node: their bound, and what can be read of them at any moment.
+//! Recordings of the node: bounded size, and readability at any moment.
 
 use std::io::{self, Cursor, Write};
 use std::sync::{Arc, Mutex};
@@ -10,40 +10,40 @@ use virtual_axes_io::files::{BoundedRecording, RecordedTopic};
 use virtual_axes_io::messages::Schema;
 
 const QOS: QosConfig = QosConfig { is_reliable: true, is_transient_local: false, depth: 10 };
-/// A message without its data.
+/// Message record without its data, bytes.
 const MESSAGE: u64 = 31;
-/// What may be kept free for a message beside its record: its place in an index (16 bytes), the head of its chunk and
-/// zstd's frame (53 + 128), three indexes of messages (3 × 15), the chunk's index (107) and its offset in the
-/// summary (26), and the counts of three channels in the statistics (3 × 10).
+/// Maximum overhead reserved for a message besides its record: message index entry (16 bytes), chunk header and zstd
+/// frame (53 + 128), three message indexes (3 × 15), chunk index (107) and its summary offset (26), and the counts of
+/// three channels in the statistics (3 × 10).
 const OVERHEAD: u64 = 16 + 53 + 128 + 3 * 15 + 107 + 26 + 3 * 10;
 
 fn topics() -> Vec<RecordedTopic> {
     let schemas = [Schema::joint_state(), Schema::motor_currents(), Schema::diagnostic_array()];
-    let topic = |(place, schema)| RecordedTopic { name: format!("/topic_{place}"), schema, qos: QOS };
+    let topic = |(index, schema)| RecordedTopic { name: format!("/topic_{index}"), schema, qos: QOS };
     schemas.into_iter().enumerate().map(topic).collect()
 }
 
-/// What zstd makes of so many bytes at most, beside its frame: a byte more for each 256.
+/// Returns the maximum size of compressed data without the zstd frame: one more byte per 256 bytes.
 fn stored(length: u64) -> u64 {
     length + length.div_ceil(256)
 }
 
-/// What stands in the first chunk before its first message: schemas and channels. How much shorter compression makes
-/// them is known only once the chunk has been written, which takes a message.
+/// Returns the maximum size of the schemas and channels in the first chunk. Their compressed size is known only after
+/// the chunk with its first message has been written.
 fn unwritten_head() -> u64 {
-    // Both without the schema's text, most of it the QoS of the channel.
+    // Both records without the schema text; most of it is the QoS of the channel.
     const RECORDS: u64 = 400;
     let length = |topic: &RecordedTopic| RECORDS + topic.schema.text.len() as u64;
     stored(topics().iter().map(length).sum())
 }
 
-/// What stands in the file without a message.
+/// Returns the size of a file without messages.
 fn empty() -> u64 {
     let recording = BoundedRecording::new(Vec::new(), u64::MAX, &topics()).expect("in memory");
     recording.finish().expect("in memory").len() as u64
 }
 
-/// A message of `length` bytes: noise that no compression makes shorter, or all the same.
+/// Returns a message of `length` bytes: incompressible noise, or constant.
 fn data(length: usize, is_noise: bool, seed: u64) -> Vec<u8> {
     let mut state = 2 * seed + 1;
     let mut noise = || {
@@ -74,19 +74,19 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever is written, the file is whole, no longer than its bound, holds the messages up to the first that
-    /// was left out, and had no room for that one. There is room for what must be there before the first one.
+    /// The file is complete, not longer than its bound, contains all messages before the first rejected one, and the
+    /// rejected message would have exceeded the bound.
     #[test]
-    fn a_recording_is_whole_and_within_its_bound(steps in steps(), room in unwritten_head() + OVERHEAD..1_500_000) {
-        let bound = empty() + room;
-        let mut recording = BoundedRecording::new(Vec::new(), bound, &topics()).expect("room for no message");
+    fn a_recording_is_complete_and_within_its_bound(steps in steps(), spare in unwritten_head() + OVERHEAD..1_500_000) {
+        let bound = empty() + spare;
+        let mut recording = BoundedRecording::new(Vec::new(), bound, &topics()).expect("large enough without messages");
         let mut written = Vec::new();
-        let mut left_out = None;
+        let mut rejected = None;
         for (k, step) in steps.iter().enumerate() {
             let time = 1_000 * k as u64;
             let bytes = data(step.length, step.is_noise, k as u64);
             if !recording.write(step.topic, time, time + 1, &bytes).expect("in memory") {
-                left_out = Some(step.length as u64);
+                rejected = Some(step.length as u64);
                 break;
             }
             written.push((format!("/topic_{}", step.topic), time, bytes));
@@ -96,10 +96,10 @@ proptest! {
         }
         let file = recording.finish().expect("in memory");
         prop_assert!(file.len() as u64 <= bound, "{} of {bound}", file.len());
-        if let Some(length) = left_out {
+        if let Some(length) = rejected {
             let head = if written.is_empty() { unwritten_head() } else { 0 };
             let longest = file.len() as u64 + stored(MESSAGE + length) + OVERHEAD + head;
-            prop_assert!(longest > bound, "{} of {bound}, {length} left out", file.len());
+            prop_assert!(longest > bound, "{} of {bound}, {length} rejected", file.len());
         }
         let summary = Summary::read(&file).expect("whole").expect("a summary");
         prop_assert_eq!(summary.stats.expect("statistics").message_count, written.len() as u64);
@@ -114,15 +114,16 @@ proptest! {
 }
 
 #[test]
-fn chunks_with_few_topics_leave_no_room_unused() {
+fn chunks_with_few_topics_use_the_whole_bound() {
     let bound = empty() + 150_000;
-    let mut recording = BoundedRecording::new(Vec::new(), bound, &topics()).expect("room for no message");
+    let mut recording =
+        BoundedRecording::new(Vec::new(), bound, &topics()).expect("large enough without messages");
     let message = |k: u64| data(1_000, true, k);
-    // Each a chunk of its own, of one of three topics.
+    // One chunk per message, of one of three topics.
     let written = (0..).take_while(|&k| {
-        let room = recording.write(0, k, k, &message(k)).expect("in memory");
+        let is_written = recording.write(0, k, k, &message(k)).expect("in memory");
         recording.flush().expect("in memory");
-        room
+        is_written
     });
     assert!(written.count() > 100);
     let file = recording.finish().expect("in memory");
@@ -130,7 +131,7 @@ fn chunks_with_few_topics_leave_no_room_unused() {
     assert!(file.len() as u64 <= bound && longest > bound, "{} of {bound}", file.len());
 }
 
-/// An output that others can look at, with so much room.
+/// Output of limited size with shared access to its content.
 #[derive(Clone)]
 struct Disk {
     bytes: Arc<Mutex<Vec<u8>>>,
@@ -150,7 +151,7 @@ impl Write for Disk {
     }
 }
 
-/// The messages of a file that was not finished, and how reading ended.
+/// Returns the number of messages of an unfinished file, and the error at its end.
 fn read(file: &[u8]) -> (usize, McapError) {
     let mut reader = mcap::io::MessageReader::new(Cursor::new(file));
     let mut count = 0;
@@ -164,7 +165,7 @@ fn read(file: &[u8]) -> (usize, McapError) {
 }
 
 #[test]
-fn what_has_been_flushed_can_be_read_though_nothing_follows() {
+fn flushed_messages_of_an_unfinished_recording_are_readable() {
     let disk = Disk { bytes: Arc::default(), size: usize::MAX };
     let mut recording = BoundedRecording::new(disk.clone(), u64::MAX, &topics()).expect("in memory");
     for k in 0..100 {
@@ -174,16 +175,16 @@ fn what_has_been_flushed_can_be_read_though_nothing_follows() {
         }
     }
     let file = disk.bytes.lock().expect("one thread").clone();
-    assert_eq!(recording.whole(), file.len() as u64);
+    assert_eq!(recording.complete_bytes(), file.len() as u64);
     let (count, error) = read(&file);
     assert_eq!(count, 70);
     assert!(matches!(error, McapError::UnexpectedEof), "{error}");
 }
 
 #[test]
-fn a_full_disk_leaves_the_chunks_before_it_readable() {
+fn complete_chunks_are_readable_after_a_full_disk() {
     let disk = Disk { bytes: Arc::default(), size: 60_000 };
-    let mut recording = BoundedRecording::new(disk.clone(), u64::MAX, &topics()).expect("room enough");
+    let mut recording = BoundedRecording::new(disk.clone(), u64::MAX, &topics()).expect("large enough");
     let mut flushed = 0;
     let error = (0..100_usize)
         .find_map(|k| {
@@ -196,15 +197,15 @@ fn a_full_disk_leaves_the_chunks_before_it_readable() {
         })
         .expect("it does not fit");
     assert_eq!(error.kind(), io::ErrorKind::StorageFull);
-    let whole = recording.whole() as usize;
+    let whole = recording.complete_bytes() as usize;
     assert!(recording.finish().is_err());
     let file = disk.bytes.lock().expect("one thread")[..whole].to_vec();
-    // Thirty do not fit, and two chunks of ten do.
+    // Two chunks of ten messages fit, three do not.
     assert_eq!((flushed, read(&file).0), (20, 20));
 }
 
 #[test]
-fn a_bound_that_holds_no_recording_is_refused() {
+fn a_bound_below_the_size_of_an_empty_recording_is_rejected() {
     let error = BoundedRecording::new(Vec::new(), 1_000, &topics()).expect_err("too small").to_string();
-    assert!(error.starts_with("1000 bytes are too few for a recording, it needs "), "{error}");
+    assert!(error.starts_with("the maximum size of a recording is 1000 bytes, must be at least "), "{error}");
 }

@@ -11,7 +11,7 @@ use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 use virtual_axes_io::files::{
-    AxisRecordingError, Columns, RecordingOptions, TraceMcap, read_recording, read_recording_mcap,
+    AxisRecordingError, Columns, RecordingOptions, TraceMcapWriter, read_recording, read_recording_mcap,
 };
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
@@ -20,18 +20,18 @@ const CURRENTS: &str = "virtual_axes/msg/MotorCurrents";
 const DRIVES: &str = "virtual_axes/msg/DriveStates";
 const MS: u64 = 1_000_000;
 
-/// x: a screw of 20 mm, 2.64 N·m/A.
+/// Returns axis x with a screw of 20 mm, 2.64 N·m/A.
 fn x() -> &'static AxisConfig {
     static MILL: LazyLock<MachineConfig> =
         LazyLock::new(|| Parameters::embedded_default().expect("shipped").machine_config().expect("valid"));
     MILL.axes().iter().find(|axis| axis.name() == "x").expect("it has one")
 }
 
-/// CDR by hand: little-endian, values at multiples of their sizes behind the header.
+/// Little-endian CDR encoder: values are aligned to their sizes after the header.
 struct Cdr(Vec<u8>);
 
 impl Cdr {
-    /// A header with a stamp in ns, and names.
+    /// Encodes a header with a stamp in ns, and names.
     fn stamped(stamp: u64, names: &[&str]) -> Self {
         let mut cdr = Cdr(vec![0, 1, 0, 0]);
         cdr.word((stamp / 1_000_000_000) as u32).word((stamp % 1_000_000_000) as u32).text("");
@@ -87,7 +87,7 @@ fn currents(stamp: u64, names: &[&str], current: &[f64]) -> Vec<u8> {
     cdr.word(0).bytes()
 }
 
-/// psec, position, velocity, velocity_feedforward, torque_feedforward of x.
+/// Encodes drive states of x: psec, position, velocity, velocity_feedforward, torque_feedforward.
 fn drives(stamp: u64, values: [f64; 5]) -> Vec<u8> {
     let [psec, position, velocity, vffws, tffws] = values;
     let mut cdr = Cdr::stamped(stamp, &["x"]);
@@ -97,7 +97,7 @@ fn drives(stamp: u64, values: [f64; 5]) -> Vec<u8> {
     cdr.word(1).text("cascade").bytes()
 }
 
-/// A message: topic, type, log time, data.
+/// Message: topic, type, log time, data.
 type Entry<'a> = (&'a str, &'a str, u64, Vec<u8>);
 
 fn record(entries: &[Entry<'_>]) -> Vec<u8> {
@@ -135,10 +135,10 @@ fn codes(findings: &[Finding]) -> Vec<&'static str> {
 
 #[track_caller]
 fn error(entries: &[Entry<'_>], options: &RecordingOptions) -> String {
-    read_with(&record(entries), options).expect_err("must be refused").to_string()
+    read_with(&record(entries), options).expect_err("must be rejected").to_string()
 }
 
-/// Equal, and NaN where the other is.
+/// Asserts that values are equal; NaN equals NaN.
 #[track_caller]
 fn assert_values(found: Option<Vec<f64>>, wanted: &[f64]) {
     let found = found.expect("it is there");
@@ -150,9 +150,9 @@ fn assert_values(found: Option<Vec<f64>>, wanted: &[f64]) {
 }
 
 #[test]
-fn a_trace_that_was_written_is_read_back() {
+fn a_written_trace_is_read_back() {
     let joints = ["y".to_owned(), "x".to_owned()];
-    let mut trace = TraceMcap::new(Vec::new(), &joints).expect("in memory");
+    let mut trace = TraceMcapWriter::new(Vec::new(), &joints).expect("in memory");
     let sample = |v: f64| AxisSample {
         psec: v,
         position: 0.1 * v,
@@ -197,7 +197,7 @@ fn joint_states_and_currents_are_joined_by_their_stamps() {
     let mut entries = Vec::new();
     for k in 0..6_u64 {
         let (stamp, v) = (k * MS, k as f64);
-        // Log times are of no account: currents come late, and out of order.
+        // Log times have no effect: currents are late and out of order.
         entries.push((
             "/joint_states",
             STATE,
@@ -229,12 +229,12 @@ fn joint_states_and_currents_are_joined_by_their_stamps() {
 }
 
 #[test]
-fn stamps_that_differ_a_little_meet_and_that_is_said() {
+fn slightly_different_stamps_are_joined_and_reported() {
     let mut entries = Vec::new();
     for k in 0..4_u64 {
         let stamp = 1_000 * MS + k * MS;
         entries.push(("/s", STATE, stamp, state(stamp, &["x"], &[k as f64], &[1.0], &[])));
-        // 0.3 ms later: nearer to its own than to the next.
+        // 0.3 ms later: the nearest stamp is that of the same row.
         entries.push(("/i", CURRENTS, stamp, currents(stamp + 3 * MS / 10, &["x"], &[k as f64])));
     }
     let (found, findings) = read(&entries).expect("good");
@@ -244,7 +244,7 @@ fn stamps_that_differ_a_little_meet_and_that_is_said() {
 }
 
 #[test]
-fn without_currents_the_effort_gives_them_and_that_is_said() {
+fn missing_currents_are_computed_from_the_effort_and_reported() {
     let row = |k: u64, effort: f64| {
         ("/s", STATE, k * MS, state(1_000 * MS + k * MS, &["x"], &[0.1], &[0.2], &[effort]))
     };
@@ -271,7 +271,7 @@ fn without_currents_the_effort_gives_them_and_that_is_said() {
 }
 
 #[test]
-fn a_joint_is_found_behind_a_prefix_if_it_is_the_only_one() {
+fn a_joint_with_a_prefix_is_found_if_it_is_unique() {
     let entries = |names: [&str; 3]| {
         let row = |k: u64| {
             ("/s", STATE, k, state((1_000 + k) * MS, &names, &[1.0, 2.0, 3.0], &[], &[1.0, 1.0, 1.0]))
@@ -311,14 +311,14 @@ fn a_joint_is_found_behind_a_prefix_if_it_is_the_only_one() {
 }
 
 #[test]
-fn topics_are_named_where_there_are_several() {
+fn several_topics_require_a_selection() {
     let s = |topic, v| (topic, STATE, 1, state(1_000 * MS, &["x"], &[v], &[], &[]));
     let i = |topic, v| (topic, CURRENTS, 1, currents(1_000 * MS, &["x"], &[v]));
     let entries = [s("/mill/s", 1.0), s("/mill2/s", 2.0), i("/mill/i", 3.0), i("/mill2/i", 4.0)];
     assert_eq!(
         error(&entries, &RecordingOptions::default()),
-        "r.mcap: several topics carry virtual_axes/msg/MotorCurrents, /mill/i, /mill2/i: name one of them or the \
-         beginning of its name"
+        "r.mcap: several topics carry virtual_axes/msg/MotorCurrents, /mill/i, /mill2/i: select one by its name or a \
+         prefix of it"
     );
     for names in [&["/mill"][..], &["/mill/"], &["/mill/s", "/mill/i"]] {
         let (found, findings) = read_with(&record(&entries), &topics(names)).expect("good");
@@ -342,23 +342,23 @@ fn topics_are_named_where_there_are_several() {
 }
 
 #[test]
-fn log_times_stand_in_for_stamps_that_were_never_set() {
+fn log_times_replace_stamps_that_were_never_set() {
     let s = |log: u64, stamp| ("/s", STATE, log * MS, state(stamp, &["x"], &[log as f64], &[], &[]));
     let (found, findings) = read(&[s(30, 0), s(10, 0), s(20, 0)]).expect("good");
     assert_values(Some(found.time), &[0.0, 0.01, 0.02]);
     assert_values(found.position, &[10.0, 20.0, 30.0]);
     assert_eq!(codes(&findings), ["no-stamps"]);
-    // A clock that begins at 0 is one.
+    // A clock that starts at 0 is valid.
     let (found, findings) = read(&[s(10, 0), s(20, MS), s(30, 2 * MS)]).expect("good");
     assert_values(Some(found.time), &[0.0, 0.001, 0.002]);
     assert_eq!(findings, []);
-    // Stamps are given as they are, whatever their order.
+    // Stamps are returned in any order.
     let (found, _) = read(&[s(10, 5 * MS), s(20, 4 * MS), s(30, 4 * MS)]).expect("good");
     assert_values(Some(found.time), &[0.0, -0.001, -0.001]);
 }
 
 #[test]
-fn a_bad_message_is_told_with_its_topic_number_and_log_time() {
+fn the_error_of_a_message_names_topic_index_and_log_time() {
     let with = |data| {
         let good = state(1_000 * MS, &["x"], &[1.0], &[], &[]);
         error(&[("/s", STATE, 0, good), ("/s", STATE, 2_500 * MS, data)], &RecordingOptions::default())
@@ -372,7 +372,7 @@ fn a_bad_message_is_told_with_its_topic_number_and_log_time() {
     late[8..12].copy_from_slice(&1_000_000_000_u32.to_le_bytes());
     assert_eq!(with(late), format!("{at}header.stamp: nanosec is 1000000000, must be below 1000000000"));
     let message = with(vec![0, 1, 0, 0, 5]);
-    assert!(message.starts_with(&format!("{at}it is not a message of this type: ")), "{message}");
+    assert!(message.starts_with(&format!("{at}not a message of this type: ")), "{message}");
     let none = state(1_000 * MS, &["x"], &[], &[], &[]);
     assert_eq!(
         error(&[("/s", STATE, 0, none)], &RecordingOptions::default()),
@@ -392,7 +392,7 @@ fn sample_recording() -> Vec<u8> {
 }
 
 #[test]
-fn a_file_that_is_cut_off_is_said() {
+fn truncated_files_are_rejected() {
     let bytes = sample_recording();
     let (found, findings) = read_with(&bytes, &RecordingOptions::default()).expect("good");
     assert_eq!((found.current, findings), (Some(vec![0.0, 1.0, 2.0, 3.0]), vec![]));
@@ -400,18 +400,20 @@ fn a_file_that_is_cut_off_is_said() {
         let error =
             read_with(&bytes[..length], &RecordingOptions::default()).expect_err("cut off").to_string();
         assert!(
-            error.starts_with("r.mcap: not a whole MCAP recording: it ends in the middle of a record"),
+            error.starts_with(
+                "r.mcap: not a complete MCAP recording: the file ends in the middle of a record"
+            ),
             "{length}: {error}"
         );
     }
 }
 
 #[test]
-fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
+fn an_unfinished_recording_is_read_up_to_its_last_complete_chunk() {
     let bytes = sample_recording();
     let (whole, _) = read_with(&bytes, &RecordingOptions::default()).expect("good");
     let summary = mcap::Summary::read(&bytes).expect("whole").expect("has a summary");
-    // Behind a chunk and its indexes.
+    // End of a chunk and its indexes.
     let ends: Vec<usize> = summary
         .chunk_indexes
         .iter()
@@ -436,14 +438,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
-    fn damaged_recordings_do_no_harm(
+    fn damaged_recordings_cause_no_panic(
         flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         keep in prop_oneof![Just(1.0), 0.0_f64..1.0],
     ) {
         let mut bytes = sample_recording();
-        for (place, value) in flips {
-            let place = place.index(bytes.len());
-            bytes[place] = value;
+        for (index, value) in flips {
+            let index = index.index(bytes.len());
+            bytes[index] = value;
         }
         bytes.truncate((bytes.len() as f64 * keep) as usize);
         if let Ok((found, _)) = read_with(&bytes, &RecordingOptions::default()) {
@@ -455,7 +457,7 @@ proptest! {
     }
 
     #[test]
-    fn a_message_of_any_bytes_does_no_harm(
+    fn a_message_of_any_bytes_causes_no_panic(
         kind in prop::sample::select(vec![STATE, CURRENTS, DRIVES]),
         data in prop::collection::vec(any::<u8>(), 0..80),
         little in any::<bool>(),

@@ -1,41 +1,40 @@
-//! Where the channels of an axis stand in the lines of a CSV file.
+//! Detection of the CSV layout: header, delimiter, and the columns of the channels.
 
 use std::io::Read;
 
 use super::columns::{Column, Columns};
-use super::csv::next_line;
 use super::error::AxisRecordingError;
 use super::unit::Channel;
 use crate::files::lines::{Lines, fields_between};
-use virtual_axes_core::text::{nearest_name, shortened};
 use virtual_axes_core::config::{AxisConfig, AxisKind};
+use virtual_axes_core::text::{nearest_name, shortened};
 use virtual_axes_identify::recording::Finding;
 
-/// Lines in which a header is sought for a hint.
+/// Number of lines searched for a header, for a hint.
 const PREAMBLE: u64 = 100;
-/// Most names that a message lists.
-const MOST_NAMES: usize = 40;
-/// Delimiters that are found out, the one that stands least in other places first.
+/// Maximum number of names in an error message.
+const MAX_NAMES: usize = 40;
+/// Detected delimiters; the one with the fewest other uses first.
 const DELIMITERS: [char; 3] = [';', '\t', ','];
 
 type Found<T> = Result<T, AxisRecordingError>;
 
-/// Where the channels stand in the lines.
+/// Layout of the lines of a CSV file.
 #[derive(Debug)]
 pub(super) struct Layout {
     pub delimiter: char,
     pub decimal_comma: bool,
-    /// Headers, or numbers where there are none.
+    /// Headers, or column numbers if there is no header.
     pub columns: Vec<String>,
-    /// Per column: the place of its channel in [`Channel::ALL`] and the factor to SI.
+    /// Per column: index of its channel in [`Channel::ALL`], and factor to SI.
     pub slots: Vec<Option<(usize, f64)>>,
-    /// The places of the channels that were found by their usual names.
-    pub usual: Vec<usize>,
-    /// Whether the line is one of values.
+    /// Indices of the channels found by their default headers.
+    pub default_channels: Vec<usize>,
+    /// True if the first line contains values instead of a header.
     pub is_data: bool,
 }
 
-/// What is the same for every line.
+/// File, axis and column mapping of a CSV file.
 pub(super) struct Context<'a> {
     pub name: &'a str,
     pub axis: &'a AxisConfig,
@@ -43,13 +42,13 @@ pub(super) struct Context<'a> {
     pub columns: &'a Columns,
 }
 
-/// A number, NaN where nothing was recorded.
-pub(super) fn number(text: &str, decimal_comma: bool) -> Option<f64> {
+/// Parses a number: NaN for an empty field, `None` if invalid.
+pub(super) fn parse_number(text: &str, decimal_comma: bool) -> Option<f64> {
     if text.is_empty() {
         return Some(f64::NAN);
     }
     let parsed = if decimal_comma {
-        // A point would be one of thousands.
+        // A point would be a thousands separator.
         if text.contains('.') {
             return None;
         }
@@ -60,16 +59,28 @@ pub(super) fn number(text: &str, decimal_comma: bool) -> Option<f64> {
     parsed.ok().filter(|value: &f64| !value.is_infinite())
 }
 
-/// Names for a message.
-fn listed(names: &[String]) -> String {
-    let shown: Vec<String> = names.iter().take(MOST_NAMES).map(|name| shortened(name)).collect();
+/// Formats names for an error message.
+fn format_names(names: &[String]) -> String {
+    let shown: Vec<String> = names.iter().take(MAX_NAMES).map(|name| shortened(name)).collect();
     let more =
-        if names.len() > MOST_NAMES { format!(", … ({} columns)", names.len()) } else { String::new() };
+        if names.len() > MAX_NAMES { format!(", … ({} columns)", names.len()) } else { String::new() };
     shown.join(", ") + &more
 }
 
+/// Returns the next line that is not blank; rejects zero bytes.
+pub(super) fn next_line<'a>(lines: &'a mut Lines<impl Read>, name: &str) -> Found<Option<(u64, &'a str)>> {
+    let not_text = |line, reason| AxisRecordingError::NotText { at: format!("{name}:{line}"), reason };
+    match lines.next() {
+        Ok(Some((line, text))) if text.contains('\0') => {
+            Err(not_text(line, "the line contains zero bytes".to_owned()))
+        }
+        Ok(found) => Ok(found),
+        Err((line, reason)) => Err(not_text(line, reason)),
+    }
+}
+
 impl Context<'_> {
-    /// Factors to SI of the channels, in the order of [`Channel::ALL`].
+    /// Returns the factors to SI of the channels, in the order of [`Channel::ALL`].
     pub fn factors(&self) -> Found<[f64; Channel::ALL.len()]> {
         let mut factors = [1.0; Channel::ALL.len()];
         for (factor, channel) in factors.iter_mut().zip(Channel::ALL) {
@@ -102,7 +113,7 @@ impl Context<'_> {
         self.columns.delimiter.unwrap_or_else(found)
     }
 
-    /// How lines are to be read if this is the header, or the first of values.
+    /// Determines the layout from the header, or from the first line of values.
     pub fn layout(&self, line: u64, text: &str, factors: &[f64]) -> Found<Layout> {
         let at = || format!("{}:{line}", self.name);
         let delimiter = self.delimiter(text);
@@ -112,12 +123,13 @@ impl Context<'_> {
             columns.pop();
         }
         let mut slots = vec![None; columns.len()];
-        let mut usual = Vec::new();
-        let headed = Channel::ALL.iter().any(|c| *c != Channel::Time && columns.contains(&self.headed(*c)));
-        for (place, channel) in Channel::ALL.into_iter().enumerate() {
-            let wanted = self.wanted(channel, headed);
+        let mut default_channels = Vec::new();
+        let is_trace =
+            Channel::ALL.iter().any(|c| *c != Channel::Time && columns.contains(&self.trace_header(*c)));
+        for (index, channel) in Channel::ALL.into_iter().enumerate() {
+            let wanted = self.candidate_headers(channel, is_trace);
             let Some(column) = self.find(channel, &wanted, &columns, &at)? else {
-                if channel.is_needed() || self.columns.mapping(channel).is_some() {
+                if channel.is_required() || self.columns.mapping(channel).is_some() {
                     return Err(self.no_column(channel, &wanted, &columns, at()));
                 }
                 continue;
@@ -127,41 +139,42 @@ impl Context<'_> {
                 let first = Channel::ALL[first];
                 return Err(AxisRecordingError::SameColumn { at: at(), first, second: channel, number });
             }
-            slots[column] = Some((place, factors[place]));
+            slots[column] = Some((index, factors[index]));
             if self.columns.mapping(channel).is_none() {
-                usual.push(place);
+                default_channels.push(index);
             }
         }
-        let by_place = Channel::ALL.into_iter().filter(|channel| channel.is_needed()).all(|channel| {
-            matches!(self.columns.mapping(channel), Some(m) if matches!(m.column, Column::Place(_)))
+        let is_by_index = Channel::ALL.into_iter().filter(|channel| channel.is_required()).all(|channel| {
+            matches!(self.columns.mapping(channel), Some(m) if matches!(m.column, Column::Index(_)))
         });
-        let is_number = |column: &String| number(column, decimal_comma).is_some_and(|v| !v.is_nan());
-        let is_data = by_place && slots.iter().zip(&columns).all(|(slot, c)| slot.is_none() || is_number(c));
+        let is_number = |column: &String| parse_number(column, decimal_comma).is_some_and(|v| !v.is_nan());
+        let is_data =
+            is_by_index && slots.iter().zip(&columns).all(|(slot, c)| slot.is_none() || is_number(c));
         if is_data {
             columns = (1..=columns.len()).map(|number| format!("#{number}")).collect();
         }
-        Ok(Layout { delimiter, decimal_comma, columns, slots, usual, is_data })
+        Ok(Layout { delimiter, decimal_comma, columns, slots, default_channels, is_data })
     }
 
-    /// The header of a channel in a trace.
-    fn headed(&self, channel: Channel) -> String {
+    /// Returns the header of a channel in a trace.
+    fn trace_header(&self, channel: Channel) -> String {
         format!("{}.{channel}", self.joint)
     }
 
-    /// The headers that a channel can have, the first that is there being the one.
-    fn wanted(&self, channel: Channel, headed: bool) -> Vec<String> {
-        let usual = || match channel {
+    /// Returns the possible headers of a channel; the first one found is used.
+    fn candidate_headers(&self, channel: Channel, is_trace: bool) -> Vec<String> {
+        let defaults = || match channel {
             Channel::Time => vec![channel.name().to_owned()],
-            // Not one channel from a trace and another from who knows where.
-            channel if headed => vec![self.headed(channel)],
-            channel => vec![self.headed(channel), channel.name().to_owned()],
+            // In a trace, only trace headers are used.
+            channel if is_trace => vec![self.trace_header(channel)],
+            channel => vec![self.trace_header(channel), channel.name().to_owned()],
         };
         match self.columns.mapping(channel) {
-            None => usual(),
+            None => defaults(),
             Some(mapping) => match &mapping.column {
-                Column::Usual => usual(),
+                Column::Default => defaults(),
                 Column::Named(name) => vec![name.clone(), mapping.text.clone()],
-                Column::Place(place) => vec![format!("#{}", place + 1)],
+                Column::Index(index) => vec![format!("#{}", index + 1)],
             },
         }
     }
@@ -173,8 +186,8 @@ impl Context<'_> {
         columns: &[String],
         at: &dyn Fn() -> String,
     ) -> Found<Option<usize>> {
-        if let Some(Column::Place(place)) = self.columns.mapping(channel).map(|mapping| &mapping.column) {
-            return Ok((*place < columns.len()).then_some(*place));
+        if let Some(Column::Index(index)) = self.columns.mapping(channel).map(|mapping| &mapping.column) {
+            return Ok((*index < columns.len()).then_some(*index));
         }
         for name in wanted {
             let count = columns.iter().filter(|column| *column == name).count();
@@ -198,7 +211,7 @@ impl Context<'_> {
     ) -> AxisRecordingError {
         let names = || columns.iter().map(String::as_str);
         let nearest = wanted.iter().find_map(|name| nearest_name(name, names()));
-        // The bare name of an axis is likely its position.
+        // A column named after the axis is probably its position.
         let axis = || names().find(|name| *name == self.joint).map(str::to_owned);
         let mut wanted: Vec<String> = wanted.iter().map(|name| format!("\"{}\"", shortened(name))).collect();
         wanted.dedup();
@@ -206,45 +219,48 @@ impl Context<'_> {
             at,
             channel,
             wanted: wanted.join(" or "),
-            found: listed(columns),
+            found: format_names(columns),
             nearest: nearest.or_else(axis),
             hint: Box::default(),
         }
     }
 
-    /// What may help where columns are not found in the first line.
+    /// Returns a hint if the columns are not found in the first line.
     pub fn hint(&self, line: u64, text: &str, lines: &mut Lines<impl Read>, factors: &[f64]) -> String {
         let delimiter = self.delimiter(text);
-        if fields_between(text, delimiter).all(|field| number(field, self.columns.decimal_comma).is_some()) {
-            return "; without a header, by numbers: time=#1, position=#2".to_owned();
+        if fields_between(text, delimiter)
+            .all(|field| parse_number(field, self.columns.decimal_comma).is_some())
+        {
+            return "; for a file without a header select columns by number: time=#1, position=#2".to_owned();
         }
         while let Ok(Some((found, text))) = next_line(lines, self.name) {
             if found > line + PREAMBLE {
                 break;
             }
             if self.layout(found, text, factors).is_ok() {
-                return format!("; line {found} has all that is needed: skip_lines={}", found - 1);
+                return format!("; line {found} contains the required columns: set skip_lines={}", found - 1);
             }
         }
         String::new()
     }
 
-    /// Says which channels were taken by their usual names beside those that were named.
-    pub fn tell_usual(&self, layout: &Layout, findings: &mut Vec<Finding>) {
-        if self.columns.mappings.is_empty() || layout.usual.is_empty() {
+    /// Reports the channels found by their default headers, if a mapping selects others.
+    pub fn report_default_columns(&self, layout: &Layout, findings: &mut Vec<Finding>) {
+        if self.columns.mappings.is_empty() || layout.default_channels.is_empty() {
             return;
         }
         let taken: Vec<String> = layout
-            .usual
+            .default_channels
             .iter()
-            .filter_map(|&place| {
-                let channel = Channel::ALL[place];
-                let slot = layout.slots.iter().position(|slot| slot.is_some_and(|(p, _)| p == place))?;
+            .filter_map(|&index| {
+                let channel = Channel::ALL[index];
+                let slot = layout.slots.iter().position(|slot| slot.is_some_and(|(p, _)| p == index))?;
                 let unit = channel.units(self.axis).first().map_or("", |(symbol, _)| *symbol);
                 Some(format!("{channel} from column {} in {unit}", shortened(&layout.columns[slot])))
             })
             .collect();
-        let what = format!("{}: not named and taken as usual: {}", self.name, taken.join(", "));
+        let what =
+            format!("{}: channels without a mapping use default columns: {}", self.name, taken.join(", "));
         findings.push(Finding::note("usual-columns", what));
     }
 }

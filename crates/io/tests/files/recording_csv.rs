@@ -9,18 +9,18 @@ use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 use virtual_axes_io::files::{
-    AxisRecordingError, Columns, RecordingOptions, TraceCsv, read_recording, read_recording_csv,
+    AxisRecordingError, Columns, RecordingOptions, TraceCsvWriter, read_recording, read_recording_csv,
 };
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
-/// Screws of 20 mm on x, 2.64 N·m/A; a gear of 180 on a, 0.88 N·m/A.
+/// Returns the default machine: x with a screw of 20 mm, 2.64 N·m/A; a with a gear ratio of 180, 0.88 N·m/A.
 fn mill() -> &'static MachineConfig {
     static MILL: LazyLock<MachineConfig> =
         LazyLock::new(|| Parameters::embedded_default().expect("shipped").machine_config().expect("valid"));
     &MILL
 }
 
-/// A linear motor of 70 N/A on x.
+/// Returns a machine with a linear motor of 70 N/A on x.
 fn linear() -> MachineConfig {
     let text = include_str!("../../../../config/linear_motor_center.yaml");
     Parameters::from_yaml(text, "linear").expect("shipped").machine_config().expect("valid")
@@ -50,10 +50,10 @@ fn good(text: &str, texts: &[&str]) -> RawRecording {
 
 #[track_caller]
 fn error(bytes: impl AsRef<[u8]>, texts: &[&str]) -> String {
-    read(bytes, texts).expect_err("must be refused").to_string()
+    read(bytes, texts).expect_err("must be rejected").to_string()
 }
 
-/// The one value of a channel of that axis, recorded as `number` of `unit`.
+/// Returns the value of a channel of an axis, recorded as `number` in `unit`.
 fn value(axis: &AxisConfig, channel: &str, number: &str, unit: &str) -> Result<f64, AxisRecordingError> {
     let mapping = format!("{channel}=it{unit}");
     let text = match channel {
@@ -75,24 +75,24 @@ fn value(axis: &AxisConfig, channel: &str, number: &str, unit: &str) -> Result<f
 }
 
 #[test]
-fn a_refusal_names_a_unit_in_one_line() {
+fn an_error_with_a_unit_has_one_line() {
     for text in ["position=act [m\0m]", "position=act [1\0 mm]"] {
-        let text = Columns::default().set(text, "--column").expect_err("must be refused").to_string();
+        let text = Columns::default().set(text, "--column").expect_err("must be rejected").to_string();
         assert!(!text.contains(char::is_control), "{text:?}");
     }
 }
 
 #[test]
-fn a_refusal_names_a_column_in_one_line() {
+fn an_error_with_a_column_has_one_line() {
     let text = error("{time: p1\u{c}osition: \"#2\"}\n0 0\n", &[]);
     assert!(!text.contains(char::is_control) && text.contains("the nearest is"), "{text:?}");
 }
 
 #[test]
-fn each_unit_is_worth_what_it_is() {
+fn units_are_converted_to_si() {
     let (mill, linear) = (mill(), linear());
     let (x, a, lx) = (axis(mill, "x"), axis(mill, "a"), axis(&linear, "x"));
-    // Axis, channel, unit, number, value in SI by hand.
+    // Axis, channel, unit, number, expected value in SI.
     let table = [
         (x, "time", "", "0.25", 0.25),
         (x, "time", "[s]", "0.25", 0.25),
@@ -150,90 +150,92 @@ fn each_unit_is_worth_what_it_is() {
 }
 
 #[test]
-fn a_unit_that_does_not_fit_is_refused_with_those_that_do() {
+fn an_error_of_a_unit_lists_the_allowed_units() {
     let (mill, linear) = (mill(), linear());
     let (x, a, lx) = (axis(mill, "x"), axis(mill, "a"), axis(&linear, "x"));
-    let said = |axis, channel, unit| value(axis, channel, "1", unit).expect_err("does not fit").to_string();
+    let message_of =
+        |axis, channel, unit| value(axis, channel, "1", unit).expect_err("does not fit").to_string();
     assert_eq!(
-        said(x, "position", "[deg]"),
-        "--column: position in [deg]: must be in m, mm, um on the linear axis x"
+        message_of(x, "position", "[deg]"),
+        "--column: the unit of position is [deg], must be one of m, mm, um for the linear axis x"
     );
     assert_eq!(
-        said(a, "velocity", "[m/min]"),
-        "--column: velocity in [m/min]: must be in rad/s, deg/s, deg/min, rpm on the rotary axis a"
+        message_of(a, "velocity", "[m/min]"),
+        "--column: the unit of velocity is [m/min], must be one of rad/s, deg/s, deg/min, rpm for the rotary axis a"
     );
     assert_eq!(
-        said(x, "time", "[mm]"),
-        "--column: time in [mm]: must be in s, ms, us, ns on the linear axis x"
+        message_of(x, "time", "[mm]"),
+        "--column: the unit of time is [mm], must be one of s, ms, us, ns for the linear axis x"
     );
     assert_eq!(
-        said(a, "current", "[N]"),
-        "--column: current in [N]: must be in A, mA, N.m on the rotary axis a"
+        message_of(a, "current", "[N]"),
+        "--column: the unit of current is [N], must be one of A, mA, N.m for the rotary axis a"
     );
     assert_eq!(
-        said(lx, "current", "[N.m]"),
-        "--column: current in [N.m]: must be in A, mA, N on the linear axis x"
+        message_of(lx, "current", "[N.m]"),
+        "--column: the unit of current is [N.m], must be one of A, mA, N for the linear axis x"
     );
     assert_eq!(
-        said(lx, "velocity_feedforward", "[rpm]"),
-        "--column: velocity_feedforward in [rpm]: must be in m/s, mm/s, m/min, mm/min on the linear axis x"
+        message_of(lx, "velocity_feedforward", "[rpm]"),
+        "--column: the unit of velocity_feedforward is [rpm], must be one of m/s, mm/s, m/min, mm/min for the linear axis x"
     );
     assert_eq!(
-        said(a, "velocity_feedforward", "[deg/s]"),
-        "--column: velocity_feedforward in [deg/s]: must be in rad/s, rpm on the rotary axis a"
+        message_of(a, "velocity_feedforward", "[deg/s]"),
+        "--column: the unit of velocity_feedforward is [deg/s], must be one of rad/s, rpm for the rotary axis a"
     );
     assert_eq!(
-        said(x, "torque_feedforward", "[mm]"),
-        "--column: torque_feedforward in [mm]: must be in N.m, N, A, mA on the linear axis x"
+        message_of(x, "torque_feedforward", "[mm]"),
+        "--column: the unit of torque_feedforward is [mm], must be one of N.m, N, A, mA for the linear axis x"
     );
 }
 
 #[test]
-fn a_mapping_that_cannot_be_is_refused() {
-    let said = |text: &str| Columns::read(None, &[text], "--column").expect_err("cannot be").to_string();
+fn invalid_mappings_are_rejected() {
+    let message_of =
+        |text: &str| Columns::read(None, &[text], "--column").expect_err("must be rejected").to_string();
     assert_eq!(
-        said("position"),
-        "--column: \"position\" maps nothing, must be CHANNEL=COLUMN[UNIT] as in position=Pos1[mm]"
+        message_of("position"),
+        "--column: \"position\" is not a column mapping, must be CHANNEL=COLUMN[UNIT], for example position=Pos1[mm]"
     );
     assert_eq!(
-        said("positon=p"),
-        "--column: there is no \"positon\"; there are time, psec, position, velocity, current, \
+        message_of("positon=p"),
+        "--column: unknown key \"positon\"; known are time, psec, position, velocity, current, \
          velocity_feedforward, torque_feedforward, delimiter, decimal_comma, skip_lines; the nearest is position"
     );
-    assert_eq!(said("time="), "--column: time=: there is no column");
+    assert_eq!(message_of("time="), "--column: time=: the column is missing");
     for wrong in ["#0", "#", "#x", "#-1", "#1.5"] {
-        let wanted =
-            format!("--column: time={wrong}: a column's number is whole and begins with 1, as in #3");
-        assert_eq!(said(&format!("time={wrong}")), wanted);
+        let wanted = format!(
+            "--column: time={wrong}: a column number must be an integer of at least 1, for example #3"
+        );
+        assert_eq!(message_of(&format!("time={wrong}")), wanted);
     }
-    let message = said("time=t[sec]");
-    assert!(
-        message.starts_with("--column: time=t[sec]: there is no unit \"sec\"; there are s, ms, us, ns, ")
-    );
+    let message = message_of("time=t[sec]");
+    assert!(message.starts_with("--column: time=t[sec]: unknown unit \"sec\"; known are s, ms, us, ns, "));
     for wrong in ["0", "nan", "inf", "1e999", "one"] {
         assert_eq!(
-            said(&format!("time=t[{wrong} s]")),
+            message_of(&format!("time=t[{wrong} s]")),
             format!(
-                "--column: time=t[{wrong} s]: the factor \"{wrong}\" is not a finite number other than 0"
+                "--column: time=t[{wrong} s]: the factor is \"{wrong}\", must be a finite number other than 0"
             )
         );
     }
-    assert!(said("time=t[]").contains("there is no unit \"\""));
-    assert!(said("delimiter=ab").contains("must be one character"));
-    assert!(said("delimiter=5").contains("must be one character"));
-    assert_eq!(said("decimal_comma=yes"), "--column: decimal_comma=yes: must be true or false");
-    assert_eq!(said("skip_lines=-1"), "--column: skip_lines=-1: must be a number of lines, 0 or more");
-    let twice = Columns::read(None, &["time=t", "time=u"], "--column").expect_err("which?").to_string();
+    assert!(message_of("time=t[]").contains("unknown unit \"\""));
+    assert!(message_of("delimiter=ab").contains("must be one character"));
+    assert!(message_of("delimiter=5").contains("must be one character"));
+    assert_eq!(message_of("decimal_comma=yes"), "--column: decimal_comma=yes: must be true or false");
+    assert_eq!(message_of("skip_lines=-1"), "--column: skip_lines=-1: must be an integer of at least 0");
+    let twice =
+        Columns::read(None, &["time=t", "time=u"], "--column").expect_err("must be rejected").to_string();
     assert_eq!(twice, "--column: time is given twice");
     let comma = Columns::read(None, &["delimiter=,", "decimal_comma=true"], "--column");
     assert_eq!(
-        comma.expect_err("which?").to_string(),
-        "--column: decimal_comma=true: a comma cannot be both between numbers and in them"
+        comma.expect_err("must be rejected").to_string(),
+        "--column: decimal_comma=true: a comma cannot be both the delimiter and the decimal separator"
     );
 }
 
 #[test]
-fn a_mapping_comes_from_yaml_and_the_command_line_goes_before_it() {
+fn the_command_line_takes_precedence_over_a_mapping_file() {
     let folder = TestFolder::new("recording_columns");
     let file = folder.file(
         "map.yaml",
@@ -268,26 +270,27 @@ fn a_mapping_comes_from_yaml_and_the_command_line_goes_before_it() {
     texts[2] = "current=i";
     assert_eq!(good(text, &texts), by_hand);
 
-    let said = |text: &str| Columns::from_yaml(text, "m.yaml").expect_err("cannot be").to_string();
-    let message = said("time: t\npositon: p\n");
+    let message_of =
+        |text: &str| Columns::from_yaml(text, "m.yaml").expect_err("must be rejected").to_string();
+    let message = message_of("time: t\npositon: p\n");
     assert!(
         message.starts_with("m.yaml:2: unknown field positon") && message.contains("nearest is position")
     );
-    // In YAML, what stands behind # is a comment.
-    let message = said("time: #1\nposition: p\n");
-    assert!(message.contains("there is no value") && message.contains("quotation marks"), "{message}");
-    assert!(said("time: [ms]\n").contains("a text"), "{}", said("time: [ms]\n"));
-    assert!(said("time: t\ntime: u\n").contains("duplicate key time"));
-    assert!(said("").contains("not one mapping"));
-    assert_eq!(said("time: t[mm/h]\n").find("m.yaml: time=t[mm/h]: there is no unit \"mm/h\""), Some(0));
+    // In YAML, # starts a comment.
+    let message = message_of("time: #1\nposition: p\n");
+    assert!(message.contains("the value is missing") && message.contains("quotation marks"), "{message}");
+    assert!(message_of("time: [ms]\n").contains("a text"), "{}", message_of("time: [ms]\n"));
+    assert!(message_of("time: t\ntime: u\n").contains("duplicate key time"));
+    assert!(message_of("").contains("exactly one mapping"));
+    assert_eq!(message_of("time: t[mm/h]\n").find("m.yaml: time=t[mm/h]: unknown unit \"mm/h\""), Some(0));
     let missing = Columns::open("no/such.yaml".as_ref()).expect_err("not there").to_string();
     assert!(missing.starts_with("no/such.yaml: "), "{missing}");
 }
 
 #[test]
-fn a_trace_of_the_project_needs_no_mapping() {
+fn a_trace_of_this_package_requires_no_mapping() {
     let joints = ["x".to_owned(), "y".to_owned()];
-    let mut trace = TraceCsv::new(Vec::new(), &joints).expect("in memory");
+    let mut trace = TraceCsvWriter::new(Vec::new(), &joints).expect("in memory");
     for k in 0..3 {
         let v = f64::from(k);
         let sample = |v: f64| AxisSample {
@@ -317,7 +320,7 @@ fn a_trace_of_the_project_needs_no_mapping() {
 }
 
 #[test]
-fn plain_headers_need_no_mapping() {
+fn channel_names_as_headers_require_no_mapping() {
     let text =
         "\u{feff}\"time\", position ,note,current,psec,velocity\r\n0,1,9,2,3,4\r\n\r\n0.5,5,9,,nan,6\r\n";
     let found = good(text, &[]);
@@ -326,12 +329,12 @@ fn plain_headers_need_no_mapping() {
     let (current, psec) = (found.current.expect("there"), found.psec.expect("there"));
     assert!(current[0] == 2.0 && current[1].is_nan() && psec[0] == 3.0 && psec[1].is_nan());
     assert_eq!((found.velocity_feedforward, found.torque_feedforward), (None, None));
-    // Stamps may leap and repeat: that is dealt with later.
+    // Stamps that jump or repeat are handled after reading.
     assert_eq!(good("time,position\n3,0\n1,0\n1,0\n", &[]).time, [3.0, 1.0, 1.0]);
 }
 
 #[test]
-fn what_an_oscilloscope_writes_is_read() {
+fn csv_variants_of_oscilloscopes_are_read() {
     // Semicolons, decimal commas, a preamble, units in headers, a delimiter at the end of each line.
     let text = "Messung 3;\nAchse;X\n\nZeit [ms];Istposition [mm];\"Strom; Motor [A]\";\n\
                 0,0;-1,25;+2,5e-1;\n1,0;-1,5;;\n";
@@ -349,7 +352,7 @@ fn what_an_oscilloscope_writes_is_read() {
     let tabs = "time\tposition\tcurrent\n0,5\t1,5\t\n1\t2\t3\n";
     let found = good(tabs, &["decimal_comma=true"]);
     assert_eq!((found.time, found.position), (vec![0.5, 1.0], Some(vec![1.5, 2.0])));
-    // No header at all.
+    // No header.
     let found = good("0;1;2\n1;3;4\n", &["time=#1", "position=#3[mm]"]);
     assert_eq!((found.time, found.position), (vec![0.0, 1.0], Some(vec![0.002, 0.004])));
     // A line of units below the header.
@@ -358,16 +361,16 @@ fn what_an_oscilloscope_writes_is_read() {
 }
 
 #[test]
-fn columns_that_are_not_found_are_told_with_those_there_are() {
+fn an_error_of_a_missing_column_lists_the_columns() {
     assert_eq!(
         error("time,Position,i\n0,0,0\n", &[]),
         "r.csv:1: there is no column \"x.position\" or \"position\" for position; there are time, Position, i; \
-         the nearest is Position; time and position are needed: name a column by CHANNEL=COLUMN[UNIT]"
+         the nearest is Position; time and position are required: select a column by CHANNEL=COLUMN[UNIT]"
     );
     assert_eq!(
         error("time,y.position,y.current\n0,0,0\n", &[]),
         "r.csv:1: there is no column \"x.position\" or \"position\" for position; there are time, y.position, \
-         y.current; the nearest is y.position; time and position are needed: name a column by \
+         y.current; the nearest is y.position; time and position are required: select a column by \
          CHANNEL=COLUMN[UNIT]"
     );
     // Setpoints, not a recording.
@@ -389,61 +392,64 @@ fn columns_that_are_not_found_are_told_with_those_there_are() {
     );
     assert_eq!(
         error("time,p,p\n0,0,0\n", &["position=p"]),
-        "r.csv:1: 2 columns are called \"p\"; name the one of position by its number, as in #3"
+        "r.csv:1: 2 columns have the header \"p\"; select the column of position by number, for example #3"
     );
     assert_eq!(
         error("time,position\n0,0\n", &["psec=position"]),
-        "r.csv:1: psec and position are both column #2"
+        "r.csv:1: psec and position both use column #2"
     );
     let preamble = error("Trace of today\nby me\ntime;position\n0;0\n", &[]);
-    assert!(preamble.ends_with("; line 3 has all that is needed: skip_lines=2"), "{preamble}");
+    assert!(preamble.ends_with("; line 3 contains the required columns: set skip_lines=2"), "{preamble}");
     let bare = error("0.1,0.2\n0.2,0.3\n", &[]);
-    assert!(bare.ends_with("; without a header, by numbers: time=#1, position=#2"), "{bare}");
-    // A channel of a trace is not filled with a column of another origin.
+    assert!(
+        bare.ends_with("; for a file without a header select columns by number: time=#1, position=#2"),
+        "{bare}"
+    );
+    // In a trace, only trace headers are used.
     assert_eq!(good("time,x.position,current\n0,1,2\n", &[]).current, None);
 }
 
 #[test]
-fn what_was_not_named_but_taken_is_said() {
+fn default_columns_beside_a_mapping_are_reported() {
     let (found, findings) = read("t,position,velocity\n1000,2,3\n", &["time=t[ms]"]).expect("good");
     assert_eq!((found.time, found.velocity), (vec![1.0], Some(vec![3.0])));
     let [finding] = findings.as_slice() else { panic!("one: {findings:?}") };
     assert_eq!(finding.code, "usual-columns");
     assert_eq!(
         finding.what,
-        "r.csv: not named and taken as usual: position from column position in m, velocity from column velocity \
-         in m/s"
+        "r.csv: channels without a mapping use default columns: position from column position in m, velocity \
+         from column velocity in m/s"
     );
 }
 
 #[test]
-fn faults_are_told_with_their_lines() {
+fn errors_name_their_lines() {
     assert_eq!(error("", &[]), "r.csv: the file is empty");
     assert_eq!(error("\n \n", &[]), "r.csv: the file is empty");
     assert_eq!(error("time,position\n", &[]), "r.csv: no row below the header");
-    assert_eq!(error("a\nb\n", &["skip_lines=2"]), "r.csv: no line after those to skip");
+    assert_eq!(error("a\nb\n", &["skip_lines=2"]), "r.csv: no line after the skipped lines");
     assert_eq!(
         error("time,position,current\n0,0,0\n1,0", &[]),
-        "r.csv:3: 2 values, 3 columns; it is the last line: the file was cut off"
+        "r.csv:3: 2 values, 3 columns; this is the last line: the file is truncated"
     );
     assert_eq!(error("time,position,current\n0,0\n1,0,0\n", &[]), "r.csv:2: 2 values, 3 columns");
     assert_eq!(
         error("time,position\n0,049,0,00138\n", &[]),
-        "r.csv:2: 4 values, 2 columns; do the numbers have decimal commas? then something else must stand \
-         between them"
+        "r.csv:2: 4 values, 2 columns; if the numbers have decimal commas, the delimiter must be another \
+         character"
     );
     assert_eq!(
         error("time;position\n0;0\n0,5;1\n", &[]),
-        "r.csv:3: time is \"0,5\", must be a finite number; decimal commas are told by decimal_comma=true"
+        "r.csv:3: time is \"0,5\", must be a finite number; set decimal_comma=true for decimal commas"
     );
     assert_eq!(
         error("time;position\n0;1.234,5\n", &["decimal_comma=true"]),
-        "r.csv:2: position is \"1.234,5\", must be a finite number, or nothing or NaN"
+        "r.csv:2: position is \"1.234,5\", must be a finite number, empty or NaN"
     );
     assert_eq!(
         error("time;position\n0;1.5\n", &["decimal_comma=true"]),
-        "r.csv:2: position is \"1.5\", must be a finite number, or nothing or NaN; it was said that decimals \
-         stand behind a comma (decimal_comma)"
+        "r.csv:2: position is \"1.5\", must be a finite number, empty or NaN; decimal_comma=true requires \
+         decimal commas"
     );
     for time in ["", "nan", "inf", "1e999", "now"] {
         assert_eq!(
@@ -454,7 +460,7 @@ fn faults_are_told_with_their_lines() {
     for position in ["inf", "-1e999", "?"] {
         assert_eq!(
             error(format!("time,position\n0,{position}\n"), &[]),
-            format!("r.csv:2: position is \"{position}\", must be a finite number, or nothing or NaN")
+            format!("r.csv:2: position is \"{position}\", must be a finite number, empty or NaN")
         );
     }
     assert_eq!(error("time,position\n0,\n1,nan\n", &[]), "r.csv: position has no value in any of 2 rows");
@@ -465,12 +471,12 @@ fn faults_are_told_with_their_lines() {
     let utf16: Vec<u8> = "time,position\n0,0\n".bytes().flat_map(|byte| [byte, 0]).collect();
     assert_eq!(
         error(utf16, &[]),
-        "r.csv:1: there are bytes of zero; a recording is text in UTF-8 (CSV) or MCAP"
+        "r.csv:1: the line contains zero bytes; a recording is text in UTF-8 (CSV) or MCAP"
     );
 }
 
 #[test]
-fn a_channel_without_values_and_a_last_line_without_end_are_said() {
+fn an_empty_channel_and_a_missing_last_line_break_are_reported() {
     let (found, findings) = read("time,position,current\n0,1,\n1,2,\n2,3,", &[]).expect("good");
     assert_eq!((found.time.len(), found.current), (3, None));
     let codes: Vec<_> = findings.iter().map(|finding| finding.code).collect();
@@ -478,15 +484,15 @@ fn a_channel_without_values_and_a_last_line_without_end_are_said() {
     assert!(findings[0].what.starts_with("r.csv:4: "), "{}", findings[0]);
 }
 
-/// A header, then the same row for ever.
+/// Reader of a header and an endless number of equal rows.
 struct Endless(usize);
 
 impl Read for Endless {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let text: &[u8] = if self.0 == 0 { b"time,position\n" } else { b"0,0\n" };
         self.0 += 1;
-        let whole = buffer.len() / text.len() * text.len();
-        let length = if self.0 == 1 { text.len() } else { whole };
+        let rows = buffer.len() / text.len() * text.len();
+        let length = if self.0 == 1 { text.len() } else { rows };
         for (k, byte) in buffer[..length].iter_mut().enumerate() {
             *byte = text[k % text.len()];
         }
@@ -495,35 +501,35 @@ impl Read for Endless {
 }
 
 #[test]
-fn a_file_without_end_is_given_up() {
+fn an_endless_file_is_rejected() {
     let mill = mill();
     let options = RecordingOptions::default();
     let error = read_recording_csv(Endless(0), "r.csv", axis(mill, "x"), &options).expect_err("too long");
-    assert_eq!(error.to_string(), "r.csv:10000002: more than 10000000 samples; cut it into parts");
+    assert_eq!(error.to_string(), "r.csv:10000002: more than 10000000 samples; split the recording");
 }
 
 #[test]
-fn a_file_of_another_kind_is_told() {
+fn files_of_other_kinds_are_rejected() {
     let folder = TestFolder::new("recording_kinds");
     let mill = mill();
-    let said = |name: &str, text: &str, texts: &[&str]| {
+    let message_of = |name: &str, text: &str, texts: &[&str]| {
         let path = folder.file(name, text);
         let error = read_recording(&path, axis(mill, "x"), &options(texts)).expect_err("no recording");
         error.to_string().replace(&*path.to_string_lossy(), name)
     };
-    let end = ", not a recording (CSV with a column of time and one of positions, or MCAP)";
+    let end = ", must be a recording (CSV with columns of time and position, or MCAP)";
     let psec = "joint_names: [x]\npoints:\n- {positions: [0.0], time_from_start: {sec: 1}}\n";
-    assert_eq!(said("p.yaml", psec, &[]), format!("p.yaml: it is setpoints as YAML{end}"));
+    assert_eq!(message_of("p.yaml", psec, &[]), format!("p.yaml: the file is setpoints as YAML{end}"));
     assert_eq!(
-        said("p.yaml", psec, &["time=#1", "position=#2"]),
-        format!("p.yaml: it is setpoints as YAML{end}")
+        message_of("p.yaml", psec, &["time=#1", "position=#2"]),
+        format!("p.yaml: the file is setpoints as YAML{end}")
     );
     let scenario = include_str!("../../../../config/scenarios/ballbar.yaml");
-    assert_eq!(said("s.yaml", scenario, &[]), format!("s.yaml: it is a scenario{end}"));
+    assert_eq!(message_of("s.yaml", scenario, &[]), format!("s.yaml: the file is a scenario{end}"));
     let machine = include_str!("../../../../config/mikron_ucp710.yaml");
-    assert_eq!(said("m.yaml", machine, &[]), format!("m.yaml: it is a machine file{end}"));
-    assert!(said("t.txt", "some text\nof no use\n", &[]).starts_with("t.txt:1: there is no column"));
-    assert_eq!(said("e.csv", "", &[]), "e.csv: the file is empty");
+    assert_eq!(message_of("m.yaml", machine, &[]), format!("m.yaml: the file is a machine file{end}"));
+    assert!(message_of("t.txt", "some text\nof no use\n", &[]).starts_with("t.txt:1: there is no column"));
+    assert_eq!(message_of("e.csv", "", &[]), "e.csv: the file is empty");
     let path = folder.file("r.csv", "time,position\n0,1\n");
     let (found, _) = read_recording(&path, axis(mill, "x"), &options(&[])).expect("good");
     assert_eq!((found.name, found.position), (path.display().to_string(), Some(vec![1.0])));
@@ -532,8 +538,8 @@ fn a_file_of_another_kind_is_told() {
     assert!(read_recording(&folder.0, axis(mill, "x"), &options(&[])).is_err(), "a folder");
 }
 
-/// Texts near to recordings.
-fn scribble() -> impl Strategy<Value = Vec<u8>> {
+/// Returns a strategy of texts similar to recordings.
+fn any_csv() -> impl Strategy<Value = Vec<u8>> {
     let piece = prop_oneof![
         Just("time,position\n".to_owned()),
         Just("time;x.position;x.current\n".to_owned()),
@@ -549,8 +555,8 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn what_is_read_is_whole_whatever_the_bytes(
-        bytes in scribble(),
+    fn accepted_recordings_are_complete_for_any_bytes(
+        bytes in any_csv(),
         mapping in prop_oneof![
             Just(&[][..]),
             Just(&["time=#1", "position=#2[mm]"][..]),
@@ -570,7 +576,7 @@ proptest! {
     }
 
     #[test]
-    fn no_mapping_does_harm(text in "([a-z_]{0,9}|time|position|delimiter|skip_lines)=?[-#A-Za-z0-9. \\[\\];,°µ]{0,12}") {
+    fn no_mapping_causes_a_panic(text in "([a-z_]{0,9}|time|position|delimiter|skip_lines)=?[-#A-Za-z0-9. \\[\\];,°µ]{0,12}") {
         let mut columns = Columns::default();
         _ = columns.set(&text, "--column");
         _ = Columns::from_yaml(&text.replace('=', ": "), "m.yaml");
@@ -580,7 +586,7 @@ proptest! {
     }
 
     #[test]
-    fn numbers_come_through_bit_for_bit(
+    fn numbers_are_read_bit_for_bit(
         rows in prop::collection::vec((-1e9_f64..1e9, prop::num::f64::NORMAL), 1..50),
     ) {
         let mut text = "time,position\n".to_owned();

@@ -1,23 +1,23 @@
-//! What the messages of one topic say of one joint.
+//! Values of one joint from the messages of one topic.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use mcap::Message;
 
 use super::error::AxisRecordingError;
-use crate::files::mcap_in::decode;
-use virtual_axes_core::text::{nearest_name, shortened};
+use crate::files::mcap_reader::decode;
 use crate::messages::builtin_interfaces::msg::Time;
 use crate::messages::sensor_msgs::msg::JointState;
 use crate::messages::{DriveStates, MotorCurrents};
+use virtual_axes_core::text::{nearest_name, shortened};
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS, seconds};
 
-/// Most joints that a message about an unknown one lists.
-const MOST_NAMES: usize = 60;
+/// Maximum number of joints in an error message.
+const MAX_NAMES: usize = 60;
 
-/// A type of message that is of use.
+/// Message types with values of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Kind {
+pub(super) enum MessageKind {
     /// `sensor_msgs/msg/JointState`.
     JointState,
     /// `virtual_axes/msg/MotorCurrents`.
@@ -26,42 +26,50 @@ pub(super) enum Kind {
     DriveStates,
 }
 
-impl Kind {
-    /// Places in a row.
+impl MessageKind {
+    /// Index of the position in a row.
     pub const POSITION: usize = 0;
+    /// Index of the velocity in a row.
     pub const VELOCITY: usize = 1;
+    /// Index of the effort in a row of joint states.
     pub const EFFORT: usize = 2;
+    /// Index of PSEC in a row of drive states.
     pub const PSEC: usize = 2;
+    /// Index of the velocity feedforward in a row of drive states.
     pub const VELOCITY_FEEDFORWARD: usize = 3;
+    /// Index of the torque feedforward in a row of drive states.
     pub const TORQUE_FEEDFORWARD: usize = 4;
+    /// Index of the current in a row of motor currents.
     pub const CURRENT: usize = 0;
 
-    /// Name of the type.
+    /// Returns the ROS name of the type.
     pub const fn name(self) -> &'static str {
         match self {
-            Kind::JointState => "sensor_msgs/msg/JointState",
-            Kind::MotorCurrents => "virtual_axes/msg/MotorCurrents",
-            Kind::DriveStates => "virtual_axes/msg/DriveStates",
+            MessageKind::JointState => "sensor_msgs/msg/JointState",
+            MessageKind::MotorCurrents => "virtual_axes/msg/MotorCurrents",
+            MessageKind::DriveStates => "virtual_axes/msg/DriveStates",
         }
     }
 
-    /// The one of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        [Kind::JointState, Kind::MotorCurrents, Kind::DriveStates].into_iter().find(|k| k.name() == name)
+    /// Returns the kind with this ROS type name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [MessageKind::JointState, MessageKind::MotorCurrents, MessageKind::DriveStates]
+            .into_iter()
+            .find(|k| k.name() == name)
     }
 
     fn decode(self, message: &Message<'_>) -> Result<Decoded, String> {
         Ok(match self {
-            Kind::JointState => {
+            MessageKind::JointState => {
                 let m: JointState = decode(message)?;
                 let fields = vec![("position", m.position), ("velocity", m.velocity), ("effort", m.effort)];
                 Decoded { stamp: m.header.stamp, names: m.name, fields }
             }
-            Kind::MotorCurrents => {
+            MessageKind::MotorCurrents => {
                 let m: MotorCurrents = decode(message)?;
                 Decoded { stamp: m.header.stamp, names: m.name, fields: vec![("current", m.current)] }
             }
-            Kind::DriveStates => {
+            MessageKind::DriveStates => {
                 let m: DriveStates = decode(message)?;
                 let fields = vec![
                     ("position", m.position),
@@ -76,59 +84,59 @@ impl Kind {
     }
 }
 
-/// A message, whatever its type.
+/// Decoded message of any kind.
 struct Decoded {
     stamp: Time,
     names: Vec<String>,
-    /// Names and values, in the order of the places in a row.
+    /// Field names and values per joint, in the order of a row.
     fields: Vec<(&'static str, Vec<f64>)>,
 }
 
-/// One joint in one message.
+/// Values of one joint in one message.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
-    /// ns.
+    /// Log time, ns.
     pub log_time: Nanoseconds,
-    /// `header.stamp`, ns.
+    /// Field `header.stamp`, ns.
     pub stamp: Nanoseconds,
-    /// Values at the places that [`Kind`] names, NaN where there are none.
+    /// Values at the indices of [`MessageKind`]; NaN if missing.
     pub values: [f64; 5],
 }
 
-/// The messages of one type on one topic.
+/// Messages of one type on one topic.
 #[derive(Debug)]
 pub(super) struct Series {
-    pub kind: Kind,
+    pub kind: MessageKind,
     pub topic: String,
-    /// Joints that can be the one, with what is said of them.
+    /// Rows of the joints whose names match.
     candidates: BTreeMap<String, Vec<Row>>,
-    /// The first of the joints that there are.
+    /// First joint names of the topic, for errors.
     names: BTreeSet<String>,
     messages: u64,
-    stamped: bool,
+    is_stamped: bool,
 }
 
 impl Series {
-    pub fn new(kind: Kind, topic: &str) -> Self {
+    pub fn new(kind: MessageKind, topic: &str) -> Self {
         let (candidates, names) = Default::default();
-        Series { kind, topic: topic.to_owned(), candidates, names, messages: 0, stamped: false }
+        Series { kind, topic: topic.to_owned(), candidates, names, messages: 0, is_stamped: false }
     }
 
-    /// Takes a message in; how many rows it gave.
+    /// Adds a message and returns the number of rows added.
     ///
     /// # Errors
-    /// [`AxisRecordingError::Message`].
+    /// Returns [`AxisRecordingError::Message`] if the message cannot be decoded.
     pub fn add(
         &mut self,
         message: &Message<'_>,
         file: &str,
         joint: &str,
-        is_whole: bool,
+        is_full_name: bool,
     ) -> Result<usize, AxisRecordingError> {
         let number = self.messages;
         self.messages += 1;
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
-        self.take(message, log_time, joint, is_whole).map_err(|reason| AxisRecordingError::Message {
+        self.add_rows(message, log_time, joint, is_full_name).map_err(|reason| AxisRecordingError::Message {
             at: format!(
                 "{file}: {}, message {number}, log time {} s",
                 shortened(&self.topic),
@@ -138,36 +146,36 @@ impl Series {
         })
     }
 
-    fn take(
+    fn add_rows(
         &mut self,
         message: &Message<'_>,
         log_time: Nanoseconds,
         joint: &str,
-        is_whole: bool,
+        is_full_name: bool,
     ) -> Result<usize, String> {
         let Decoded { stamp, names, fields } = self.kind.decode(message)?;
         if i64::from(stamp.nanosec) >= SECOND_NS {
             return Err(format!("header.stamp: nanosec is {}, must be below {SECOND_NS}", stamp.nanosec));
         }
         let stamp = i64::from(stamp.sec) * SECOND_NS + i64::from(stamp.nanosec);
-        self.stamped |= stamp != 0;
+        self.is_stamped |= stamp != 0;
         if let Some((field, values)) = fields.iter().find(|(_, v)| !v.is_empty() && v.len() != names.len()) {
             return Err(format!("{field} has {} values for {} joints", values.len(), names.len()));
         }
         let mut rows = 0;
-        for (place, found) in names.iter().enumerate() {
-            if self.names.len() < MOST_NAMES && !self.names.contains(found) {
+        for (index, found) in names.iter().enumerate() {
+            if self.names.len() < MAX_NAMES && !self.names.contains(found) {
                 self.names.insert(found.clone());
             }
-            let is_meant = found == joint || (!is_whole && found.ends_with(joint));
-            if !is_meant || names[..place].contains(found) {
+            let is_match = found == joint || (!is_full_name && found.ends_with(joint));
+            if !is_match || names[..index].contains(found) {
                 continue;
             }
             let mut row = Row { log_time, stamp, values: [f64::NAN; 5] };
             for (value, (field, values)) in row.values.iter_mut().zip(&fields) {
-                let Some(found) = values.get(place) else { continue };
+                let Some(found) = values.get(index) else { continue };
                 if found.is_infinite() {
-                    return Err(format!("{field} of {} is {found}", shortened(&names[place])));
+                    return Err(format!("{field} of {} is {found}", shortened(&names[index])));
                 }
                 *value = *found;
             }
@@ -180,23 +188,23 @@ impl Series {
         Ok(rows)
     }
 
-    /// Whether some message has a stamp.
+    /// Returns true if at least one message has a stamp.
     pub fn is_stamped(&self) -> bool {
-        self.stamped
+        self.is_stamped
     }
 
-    /// The rows of the joint and its whole name: `alike` if that is there, `joint` itself, or the only one
-    /// that ends so.
+    /// Returns the full name and the rows of the joint: `preferred` if present, else `joint`, else the only joint
+    /// whose name ends in `joint`.
     ///
     /// # Errors
-    /// [`AxisRecordingError::Joint`].
+    /// Returns [`AxisRecordingError::Joint`] if the joint does not exist or is ambiguous.
     pub fn into_rows(
         mut self,
         file: &str,
         joint: &str,
-        alike: Option<&str>,
+        preferred: Option<&str>,
     ) -> Result<(String, Vec<Row>), AxisRecordingError> {
-        for name in alike.into_iter().chain([joint]) {
+        for name in preferred.into_iter().chain([joint]) {
             if let Some(rows) = self.candidates.remove(name) {
                 return Ok((name.to_owned(), rows));
             }
@@ -206,7 +214,7 @@ impl Series {
             return Ok(found);
         }
         let names: Vec<&String> = if several {
-            self.candidates.keys().take(MOST_NAMES).collect()
+            self.candidates.keys().take(MAX_NAMES).collect()
         } else {
             self.names.iter().collect()
         };

@@ -1,21 +1,19 @@
-//! One axis from a CSV file.
+//! Reading of a recording of one axis from CSV.
 
 use std::io::Read;
 
 use super::columns::Columns;
-use super::error::AxisRecordingError;
-use super::layout::{Context, Layout, number};
+use super::error::{AxisRecordingError, MAX_ROWS};
+use super::layout::{Context, Layout, next_line, parse_number};
 use super::unit::Channel;
 use crate::files::lines::{Lines, fields_between};
-use virtual_axes_core::text::shortened;
 use virtual_axes_core::config::AxisConfig;
+use virtual_axes_core::text::shortened;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
-/// Most samples of a recording: at 1 kHz almost three hours.
-pub(super) const MOST_ROWS: usize = 10_000_000;
 type Found<T> = Result<T, AxisRecordingError>;
 
-/// Reads the axis from CSV; `name` is for messages, `joint` heads the columns of a trace.
+/// Reads the recording of an axis from CSV. `name` is the file name in errors, `joint` the prefix of trace headers.
 pub(super) fn read(
     input: impl Read,
     name: &str,
@@ -27,7 +25,8 @@ pub(super) fn read(
     let factors = context.factors()?;
     let mut lines = Lines::new(input);
     let Some((line, text)) = first_line(&mut lines, columns.skip_lines, name)? else {
-        let what = if columns.skip_lines > 0 { "no line after those to skip" } else { "the file is empty" };
+        let what =
+            if columns.skip_lines > 0 { "no line after the skipped lines" } else { "the file is empty" };
         return Err(AxisRecordingError::Empty { at: name.to_owned(), what });
     };
     let layout = match context.layout(line, &text, &factors) {
@@ -41,14 +40,14 @@ pub(super) fn read(
     };
     let mut channels: [Vec<f64>; Channel::ALL.len()] = Default::default();
     let mut rows = 0;
-    let mut ended = true;
+    let mut is_ended = true;
     if layout.is_data {
         layout.row(name, line, &text, &mut channels)?;
         rows = 1;
     }
     let mut last = line;
     while let Some((line, text)) = next_line(&mut lines, name)? {
-        if rows == MOST_ROWS {
+        if rows == MAX_ROWS {
             return Err(AxisRecordingError::TooLong { at: format!("{name}:{line}") });
         }
         let read = layout.row(name, line, text, &mut channels);
@@ -57,32 +56,32 @@ pub(super) fn read(
                 && found < wanted
                 && matches!(lines.next(), Ok(None))
             {
-                *hint = "; it is the last line: the file was cut off";
+                *hint = "; this is the last line: the file is truncated";
             }
             return Err(error);
         }
         rows += 1;
         last = line;
-        ended = lines.is_ended();
+        is_ended = lines.is_ended();
     }
     if rows == 0 {
         let what = "no row below the header";
         return Err(AxisRecordingError::Empty { at: name.to_owned(), what });
     }
     let mut findings = Vec::new();
-    if !ended {
+    if !is_ended {
         findings.push(Finding::warning(
             "unended",
-            format!("{name}:{last}: the last line has no end: if the file was cut off, its last value is not whole"),
-            "let the last line end, or leave it out",
+            format!("{name}:{last}: the last line has no line break: if the file is truncated, its last value is incomplete"),
+            "end the last line with a line break, or delete it",
         ));
     }
-    context.tell_usual(&layout, &mut findings);
-    Ok((recording(name, channels, &layout, rows, &mut findings)?, findings))
+    context.report_default_columns(&layout, &mut findings);
+    Ok((build_recording(name, channels, &layout, rows, &mut findings)?, findings))
 }
 
-/// The channels that have values.
-fn recording(
+/// Builds a recording from the channels that have values.
+fn build_recording(
     name: &str,
     channels: [Vec<f64>; Channel::ALL.len()],
     layout: &Layout,
@@ -90,16 +89,16 @@ fn recording(
     findings: &mut Vec<Finding>,
 ) -> Found<RawRecording> {
     let mut recording = RawRecording { name: name.to_owned(), ..RawRecording::default() };
-    for (place, (channel, values)) in Channel::ALL.into_iter().zip(channels).enumerate() {
-        let Some(column) = layout.slots.iter().position(|slot| slot.is_some_and(|(p, _)| p == place)) else {
+    for (index, (channel, values)) in Channel::ALL.into_iter().zip(channels).enumerate() {
+        let Some(column) = layout.slots.iter().position(|slot| slot.is_some_and(|(p, _)| p == index)) else {
             continue;
         };
         if values.iter().all(|value| value.is_nan()) {
-            if channel.is_needed() {
+            if channel.is_required() {
                 return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel, rows });
             }
             let column = &layout.columns[column];
-            let what = format!("{name}: column {column} ({channel}) has no value: as if it were not there");
+            let what = format!("{name}: column {column} ({channel}) has no values and is ignored");
             findings.push(Finding::note("empty-channel", what));
             continue;
         }
@@ -116,19 +115,7 @@ fn recording(
     Ok(recording)
 }
 
-/// The next line that is not blank.
-pub(super) fn next_line<'a>(lines: &'a mut Lines<impl Read>, name: &str) -> Found<Option<(u64, &'a str)>> {
-    let not_text = |line, reason| AxisRecordingError::NotText { at: format!("{name}:{line}"), reason };
-    match lines.next() {
-        Ok(Some((line, text))) if text.contains('\0') => {
-            Err(not_text(line, "there are bytes of zero".to_owned()))
-        }
-        Ok(found) => Ok(found),
-        Err((line, reason)) => Err(not_text(line, reason)),
-    }
-}
-
-/// The first line that is not blank nor to be skipped.
+/// Returns the first line that is neither blank nor skipped.
 fn first_line(lines: &mut Lines<impl Read>, skip: u64, name: &str) -> Found<Option<(u64, String)>> {
     while let Some((line, text)) = next_line(lines, name)? {
         if line > skip {
@@ -152,33 +139,33 @@ impl Layout {
                 surplus_is_blank &= field.is_empty();
                 continue;
             };
-            let Some((place, factor)) = *slot else { continue };
-            match number(field, self.decimal_comma) {
-                Some(value) if place > 0 || value.is_finite() => values[place] = factor * value,
-                _ => wrong = wrong.or(Some((column, place, field))),
+            let Some((index, factor)) = *slot else { continue };
+            match parse_number(field, self.decimal_comma) {
+                Some(value) if index > 0 || value.is_finite() => values[index] = factor * value,
+                _ => wrong = wrong.or(Some((column, index, field))),
             }
         }
         let at = || format!("{name}:{line}");
-        // Many programs end each line with a delimiter.
+        // Many programs write a delimiter at the end of each line.
         if found != wanted && !(found == wanted + 1 && surplus_is_blank) {
             let hint = if found > wanted && self.delimiter == ',' {
-                "; do the numbers have decimal commas? then something else must stand between them"
+                "; if the numbers have decimal commas, the delimiter must be another character"
             } else {
                 ""
             };
             return Err(AxisRecordingError::Fields { at: at(), found, wanted, hint });
         }
-        if let Some((column, place, field)) = wrong {
+        if let Some((column, index, field)) = wrong {
             let hint = match self.decimal_comma {
-                false if field.contains(',') && number(field, true).is_some() => {
-                    "; decimal commas are told by decimal_comma=true"
+                false if field.contains(',') && parse_number(field, true).is_some() => {
+                    "; set decimal_comma=true for decimal commas"
                 }
-                true if field.contains('.') && number(field, false).is_some() => {
-                    "; it was said that decimals stand behind a comma (decimal_comma)"
+                true if field.contains('.') && parse_number(field, false).is_some() => {
+                    "; decimal_comma=true requires decimal commas"
                 }
                 _ => "",
             };
-            let wanted = if place == 0 { "a finite number" } else { "a finite number, or nothing or NaN" };
+            let wanted = if index == 0 { "a finite number" } else { "a finite number, empty or NaN" };
             let column = shortened(&self.columns[column]);
             return Err(AxisRecordingError::Number {
                 at: at(),

@@ -1,4 +1,4 @@
-//! Recordings of one axis, from CSV and MCAP, for identification.
+//! Reading of recordings of one axis from CSV and MCAP, for identification.
 
 mod columns;
 mod csv;
@@ -17,18 +17,18 @@ pub use columns::{Columns, ColumnsError};
 pub use error::AxisRecordingError;
 pub use unit::Channel;
 
-use super::input::{FileKind, Input, kind_by_beginning};
+use super::input::{FileKind, Input, kind_from_head};
 use virtual_axes_core::config::AxisConfig;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
-/// How recordings are to be read; by default as this project's own traces and recordings are.
+/// Options of reading a recording. The defaults fit traces and recordings of this package.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RecordingOptions {
-    /// Of CSV: which column is what.
+    /// Column mapping and format of CSV files.
     pub columns: Columns,
-    /// Of MCAP: topics, or beginnings of their names (`/mill`), where one type of message is on several.
+    /// Topics of MCAP recordings, or prefixes of their names (`/mill`), if several topics have the same type.
     pub topics: Vec<String>,
-    /// The joint's whole name, if it is not the axis's, nor that behind a prefix.
+    /// Full name of the joint; default is the name of the axis, with or without a prefix.
     pub joint: Option<String>,
 }
 
@@ -38,12 +38,12 @@ impl RecordingOptions {
     }
 }
 
-/// Reads what a file tells of one axis, with what must be said about it; CSV or MCAP is told by content.
+/// Reads the recording of one axis with its findings from CSV or MCAP, detected by content.
 ///
-/// The axis gives the units that fit and what turns a torque into a current.
+/// The axis determines the allowed units and the conversion from torque to current.
 ///
 /// # Errors
-/// [`AxisRecordingError`], the first fault.
+/// Returns an [`AxisRecordingError`] for the first error in the file.
 pub fn read_recording(
     path: &Path,
     axis: &AxisConfig,
@@ -57,25 +57,25 @@ pub fn read_recording(
     let mut file = File::open(path).map_err(unreadable)?;
     let mut head = Vec::new();
     (&mut file).take(::mcap::MAGIC.len() as u64).read_to_end(&mut head).map_err(unreadable)?;
-    if kind_by_beginning(&head) == Some(FileKind::Mcap) {
+    if kind_from_head(&head) == Some(FileKind::Mcap) {
         let (recording, mut findings) = read_recording_mcap(file, &name, axis, options)?;
         if !options.columns.mappings.is_empty() {
-            let what = format!("{name}: MCAP has no columns: their mapping is not used");
+            let what = format!("{name}: the column mapping is ignored for MCAP");
             findings.push(Finding::note("unused-columns", what));
         }
         return Ok((recording, findings));
     }
     let read = read_recording_csv(Cursor::new(head).chain(file), &name, axis, options);
-    read.map_err(|error| match other_kind(path, &error) {
+    read.map_err(|error| match detect_other_kind(path, &error) {
         Some(kind) => AxisRecordingError::OtherKind { at: name, kind },
         None => error,
     })
 }
 
-/// Reads the axis from CSV; `name` is for messages.
+/// Reads the recording of one axis from CSV. `name` is the file name in errors.
 ///
 /// # Errors
-/// [`AxisRecordingError`], the first fault from the top.
+/// Returns an [`AxisRecordingError`] for the first error in the file.
 pub fn read_recording_csv(
     input: impl Read,
     name: &str,
@@ -85,14 +85,13 @@ pub fn read_recording_csv(
     csv::read(input, name, axis, options.joint(axis), &options.columns)
 }
 
-/// Reads the axis from an MCAP recording; `name` is for messages.
+/// Reads the recording of one axis from MCAP. `name` is the file name in errors.
 ///
-/// Positions are those of `virtual_axes/msg/DriveStates` or else of `sensor_msgs/msg/JointState`, currents
-/// those of `virtual_axes/msg/MotorCurrents` or else from the joint states' effort; time begins at the
-/// first.
+/// Positions are read from `virtual_axes/msg/DriveStates` or else from `sensor_msgs/msg/JointState`, currents from
+/// `virtual_axes/msg/MotorCurrents` or else from the effort of the joint states. Time starts at the first message.
 ///
 /// # Errors
-/// [`AxisRecordingError`], the first fault.
+/// Returns an [`AxisRecordingError`] for the first error in the file.
 pub fn read_recording_mcap(
     input: impl Read + Seek,
     name: &str,
@@ -102,8 +101,8 @@ pub fn read_recording_mcap(
     mcap::read(input, name, axis, (options.joint(axis), options.joint.is_some()), &options.topics)
 }
 
-/// What a file is that is not CSV of an axis.
-fn other_kind(path: &Path, error: &AxisRecordingError) -> Option<FileKind> {
+/// Detects the kind of a file that is not CSV of an axis.
+fn detect_other_kind(path: &Path, error: &AxisRecordingError) -> Option<FileKind> {
     let by_content = matches!(
         error,
         AxisRecordingError::NoColumn { .. }

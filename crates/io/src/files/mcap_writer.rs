@@ -1,4 +1,4 @@
-//! MCAP recordings as rosbag2 writes them: profile `ros2`, encoding `cdr`, schemas `ros2msg`.
+//! Writing of MCAP recordings in the format of rosbag2: profile `ros2`, encoding `cdr`, schemas `ros2msg`.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -14,24 +14,25 @@ use crate::messages::Schema;
 use virtual_axes_core::config::QosConfig;
 use virtual_axes_core::units::Nanoseconds;
 
-/// How the whole file is to be understood.
+/// MCAP profile.
 pub(super) const PROFILE: &str = "ros2";
-/// Who writes it.
+/// Name and version of the writing library.
 pub(super) const LIBRARY: &str = concat!("virtual_axes ", env!("CARGO_PKG_VERSION"));
-/// How messages are encoded.
+/// Message encoding.
 pub(super) const ENCODING: &str = "cdr";
-/// How their definitions are written.
+/// Schema encoding.
 pub(super) const SCHEMAS: &str = "ros2msg";
-/// Where a channel says what it was offered with.
+/// Channel metadata key of the offered QoS profiles.
 pub(super) const QOS_KEY: &str = "offered_qos_profiles";
 
-/// The time that stands for none, in seconds and nanoseconds: 2^63 - 1 ns.
+/// Infinite duration in seconds and nanoseconds: 2^63 - 1 ns.
 const INFINITE: &str = "\n    sec: 9223372036\n    nsec: 854775807";
 
-/// The quality of service of topics that no node offers: reliable, volatile, keep last 10.
-pub(super) const USUAL_QOS: QosConfig = QosConfig { is_reliable: true, is_transient_local: false, depth: 10 };
+/// Default QoS of recorded topics without a publishing node: reliable, volatile, keep last 10.
+pub(super) const DEFAULT_QOS: QosConfig =
+    QosConfig { is_reliable: true, is_transient_local: false, depth: 10 };
 
-/// What `ros2 bag play` offers a topic with, in the words of rosbag2 since Jazzy; the times are infinite.
+/// Formats a QoS profile as metadata of rosbag2 since Jazzy, with infinite durations.
 pub(super) fn qos_text(qos: QosConfig) -> String {
     let reliability = if qos.is_reliable { "reliable" } else { "best_effort" };
     let durability = if qos.is_transient_local { "transient_local" } else { "volatile" };
@@ -43,45 +44,44 @@ pub(super) fn qos_text(qos: QosConfig) -> String {
     )
 }
 
-/// A recording that is being written.
-pub(super) struct Recording<W: Write> {
+/// Writer of an MCAP recording.
+pub(super) struct McapWriter<W: Write> {
     writer: Writer<NoSeek<W>>,
-    /// A message as bytes.
+    /// Buffer of a serialized message.
     bytes: Vec<u8>,
 }
 
-impl<W: Write> fmt::Debug for Recording<W> {
+impl<W: Write> fmt::Debug for McapWriter<W> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Recording").finish_non_exhaustive()
+        f.debug_struct("McapWriter").finish_non_exhaustive()
     }
 }
 
-/// A topic of a recording.
+/// Topic of a recording that is written.
 #[derive(Debug)]
-pub(super) struct Topic {
+pub(super) struct McapTopic {
     channel: u16,
-    /// Number of the next message.
+    /// Sequence number of the next message.
     sequence: u32,
 }
 
-impl Topic {
-    fn next(&mut self, log_time: u64, publish_time: u64) -> MessageHeader {
+impl McapTopic {
+    fn next_header(&mut self, log_time: u64, publish_time: u64) -> MessageHeader {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
         MessageHeader { channel_id: self.channel, sequence, log_time, publish_time }
     }
 }
 
-impl<W: Write> Recording<W> {
-    /// Begins a recording; `output` need not be able to seek.
+impl<W: Write> McapWriter<W> {
+    /// Starts a recording with LZ4 compression; `output` does not need to be seekable.
     ///
-    /// It is compressed by LZ4, three times as fast as zstd for a file that is a seventh longer (traces at each tick):
-    /// who computes a trace waits for it.
+    /// LZ4 is three times as fast as zstd, and files are one seventh longer (traces at each current cycle).
     pub fn new(output: W) -> io::Result<Self> {
         Self::with_chunks(output, Some(WriteOptions::DEFAULT_CHUNK_SIZE), Compression::Lz4)
     }
 
-    /// Likewise, with chunks that end when they hold `chunk` bytes, or at each [`flush`](Self::flush) only.
+    /// Starts a recording with chunks of `chunk` bytes, or with a chunk per [`flush`](Self::flush) if `None`.
     pub fn with_chunks(output: W, chunk: Option<u64>, compression: Compression) -> io::Result<Self> {
         let options = WriteOptions::new()
             .profile(PROFILE)
@@ -89,49 +89,55 @@ impl<W: Write> Recording<W> {
             .disable_seeking(true)
             .chunk_size(chunk)
             .compression(Some(compression))
-            // In the thread that writes: the same bytes on each machine.
+            // Compression in the writing thread: identical files on each computer.
             .compression_threads(0);
         let writer = options.create(NoSeek::new(output)).map_err(into_io)?;
-        Ok(Recording { writer, bytes: Vec::new() })
+        Ok(McapWriter { writer, bytes: Vec::new() })
     }
 
-    /// Adds a topic with the profile that it is offered with.
-    pub fn topic(&mut self, name: &str, schema: &Schema, qos: QosConfig) -> io::Result<Topic> {
+    /// Adds a topic with its offered QoS profile.
+    pub fn topic(&mut self, name: &str, schema: &Schema, qos: QosConfig) -> io::Result<McapTopic> {
         let schema =
             self.writer.add_schema(&schema.name, SCHEMAS, schema.text.as_bytes()).map_err(into_io)?;
         let metadata = BTreeMap::from([(QOS_KEY.to_owned(), qos_text(qos))]);
         let channel = self.writer.add_channel(schema, name, ENCODING, &metadata).map_err(into_io)?;
-        Ok(Topic { channel, sequence: 0 })
+        Ok(McapTopic { channel, sequence: 0 })
     }
 
-    /// Adds a message that was published and recorded at `time` (ns since the Unix epoch).
+    /// Adds a message with `time` as log time and publish time, ns since the Unix epoch.
     pub fn write(
         &mut self,
-        topic: &mut Topic,
+        topic: &mut McapTopic,
         time: Nanoseconds,
         message: &impl Serialize,
     ) -> io::Result<()> {
         let Ok(time) = u64::try_from(time) else {
-            let text = format!("{time} ns: a recording has no times before the Unix epoch");
+            let text = format!("the time is {time} ns, must not be before the Unix epoch (0 ns)");
             return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
         };
-        cdr::encode(message, &mut self.bytes).map_err(io::Error::other)?;
-        let header = topic.next(time, time);
+        cdr::encode_cdr(message, &mut self.bytes).map_err(io::Error::other)?;
+        let header = topic.next_header(time, time);
         self.writer.write_to_known_channel(&header, &self.bytes).map_err(into_io)
     }
 
-    /// Adds a message that was recorded and published at these times (ns since the Unix epoch).
-    pub fn write_bytes(&mut self, topic: &mut Topic, log: u64, publish: u64, cdr: &[u8]) -> io::Result<()> {
-        let header = topic.next(log, publish);
+    /// Adds a serialized message with log time and publish time in ns since the Unix epoch.
+    pub fn write_bytes(
+        &mut self,
+        topic: &mut McapTopic,
+        log: u64,
+        publish: u64,
+        cdr: &[u8],
+    ) -> io::Result<()> {
+        let header = topic.next_header(log, publish);
         self.writer.write_to_known_channel(&header, cdr).map_err(into_io)
     }
 
-    /// Ends the chunk and hands it over, so that all of it can be read.
+    /// Closes the chunk and writes it to the output.
     pub fn flush(&mut self) -> io::Result<()> {
         self.writer.flush().map_err(into_io)
     }
 
-    /// Writes the summary and gives the output back.
+    /// Writes the summary and returns the output.
     pub fn finish(mut self) -> io::Result<W> {
         self.writer.finish().map_err(into_io)?;
         Ok(self.writer.into_inner().into_inner())

@@ -1,17 +1,17 @@
-//! Channels of a recording, and the units that they can be recorded in.
+//! Channels of a recording and their units.
 
 use std::fmt;
 
-use virtual_axes_core::text::shortened;
 use virtual_axes_core::config::{AxisConfig, AxisKind};
+use virtual_axes_core::text::shortened;
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, MILLISECOND, MINUTE, RPM};
 
-/// What is recorded of an axis, as in [`RawRecording`](virtual_axes_identify::recording::RawRecording).
+/// Channels of a recording of an axis, as in [`RawRecording`](virtual_axes_identify::recording::RawRecording).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Channel {
-    /// Stamps.
+    /// Time stamp.
     Time,
-    /// Setpoint at the entrance of the controller.
+    /// Position setpoint at the entrance of the controller.
     Psec,
     /// Actual position.
     Position,
@@ -19,14 +19,14 @@ pub enum Channel {
     Velocity,
     /// Motor current.
     Current,
-    /// VFFWS.
+    /// Velocity feedforward (VFFWS).
     VelocityFeedforward,
-    /// TFFWS.
+    /// Torque feedforward (TFFWS).
     TorqueFeedforward,
 }
 
 impl Channel {
-    /// All of them; time and position are needed, the others are not.
+    /// All channels. Only time and position are required.
     pub const ALL: [Channel; 7] = [
         Channel::Time,
         Channel::Psec,
@@ -37,7 +37,7 @@ impl Channel {
         Channel::TorqueFeedforward,
     ];
 
-    /// Its name in mappings.
+    /// Returns the name in column mappings.
     pub const fn name(self) -> &'static str {
         match self {
             Channel::Time => "time",
@@ -50,25 +50,25 @@ impl Channel {
         }
     }
 
-    /// The one of this name.
-    pub fn named(name: &str) -> Option<Self> {
+    /// Returns the channel with this name.
+    pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|channel| channel.name() == name)
     }
 
-    /// Whether a recording without it is of no use.
-    pub(super) fn is_needed(self) -> bool {
+    /// Returns true if every recording must have the channel.
+    pub(super) fn is_required(self) -> bool {
         matches!(self, Channel::Time | Channel::Position)
     }
 
-    /// The units in which it can be recorded of `axis`, with their factors to SI; SI comes first.
+    /// Returns the allowed units for `axis` with their factors to SI; the SI unit comes first.
     pub(super) fn units(self, axis: &AxisConfig) -> Vec<(&'static str, f64)> {
         let linear = axis.kind == AxisKind::Linear;
         let ratio = axis.transmission_ratio;
         let constant = axis.motor.torque_constant;
-        // A transmission of 1 m per rad is none: the motor is linear.
+        // A transmission ratio of 1 m/rad is a linear motor.
         let linear_motor = linear && ratio == 1.0;
         let speeds = || if linear { LINEAR_SPEEDS.to_vec() } else { ANGULAR_SPEEDS.to_vec() };
-        // Torque of the motor: N·m at its shaft, or N on the axis.
+        // Motor torque: N·m at the shaft, or N on the axis.
         let mut torques = Vec::new();
         if !linear_motor {
             torques.push(("N.m", 1.0));
@@ -108,28 +108,28 @@ impl fmt::Display for Channel {
     }
 }
 
-/// A thousandth.
+/// SI prefix m.
 const MILLI: f64 = 1e-3;
-/// A millionth.
+/// SI prefix µ.
 const MICRO: f64 = 1e-6;
-/// A thousand-millionth.
+/// SI prefix n.
 const NANO: f64 = 1e-9;
 
-/// Speeds of a linear axis in m/s.
+/// Units of the velocity of a linear axis, with factors to m/s.
 const LINEAR_SPEEDS: [(&str, f64); 4] =
     [("m/s", 1.0), ("mm/s", MILLIMETER), ("m/min", METER_PER_MINUTE), ("mm/min", MILLIMETER / MINUTE)];
-/// Speeds of a rotary axis in rad/s.
+/// Units of the velocity of a rotary axis, with factors to rad/s.
 const ANGULAR_SPEEDS: [(&str, f64); 4] =
     [("rad/s", 1.0), ("deg/s", DEGREE), ("deg/min", DEGREE / MINUTE), ("rpm", RPM)];
-/// Currents in A.
+/// Units of the current, with factors to A.
 const CURRENTS: [(&str, f64); 2] = [("A", 1.0), ("mA", MILLI)];
 
-/// Every symbol.
+/// Symbols of all units except N.m.
 const SYMBOLS: [&str; 21] = [
     "s", "ms", "us", "ns", "m", "mm", "um", "rad", "deg", "mdeg", "m/s", "mm/s", "m/min", "mm/min", "rad/s",
     "deg/s", "deg/min", "rpm", "A", "mA", "N",
 ];
-/// Other ways to write a symbol.
+/// Alternative spellings of symbols.
 const SPELLINGS: [(&str, &str); 12] = [
     ("N.m", "N.m"),
     ("Nm", "N.m"),
@@ -145,7 +145,7 @@ const SPELLINGS: [(&str, &str); 12] = [
     ("1/min", "rpm"),
 ];
 
-/// A unit as it was given: what one of its numbers is worth is `factor` of `symbol`.
+/// Unit of a column: `factor` times the unit `symbol`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unit {
     pub factor: f64,
@@ -153,10 +153,10 @@ pub(super) struct Unit {
 }
 
 impl Unit {
-    /// From the text between the brackets: a factor, if there is one, and a symbol.
+    /// Parses the text between the brackets: an optional factor and a symbol.
     ///
     /// # Errors
-    /// A sentence that says what is wrong.
+    /// Returns the reason if the factor or the symbol is invalid.
     pub fn parse(text: &str) -> Result<Self, String> {
         let text = text.trim();
         let (factor, symbol) = match text.split_once(char::is_whitespace) {
@@ -165,17 +165,19 @@ impl Unit {
         };
         let factor = match factor {
             None => 1.0,
-            Some(factor) => {
-                factor.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor != 0.0).ok_or_else(
-                    || format!("the factor \"{}\" is not a finite number other than 0", shortened(factor)),
-                )?
-            }
+            Some(factor) => factor
+                .parse()
+                .ok()
+                .filter(|factor: &f64| factor.is_finite() && *factor != 0.0)
+                .ok_or_else(|| {
+                format!("the factor is \"{}\", must be a finite number other than 0", shortened(factor))
+            })?,
         };
         let known = SYMBOLS.iter().map(|symbol| (*symbol, *symbol)).chain(SPELLINGS);
         match known.clone().find(|(spelling, _)| *spelling == symbol) {
             Some((_, symbol)) => Ok(Unit { factor, symbol }),
             None => Err(format!(
-                "there is no unit \"{}\"; there are {}, N.m, each behind a factor if need be: [0.1 um]",
+                "unknown unit \"{}\"; known are {}, N.m, each with an optional factor: [0.1 um]",
                 shortened(symbol),
                 SYMBOLS.join(", ")
             )),

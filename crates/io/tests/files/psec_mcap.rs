@@ -1,4 +1,4 @@
-//! Setpoints from recordings, and traces as recordings.
+//! Setpoints and traces as MCAP recordings.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -10,12 +10,12 @@ use mcap::{Compression, WriteOptions};
 use proptest::prelude::*;
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::trajectory::Start;
-use virtual_axes_io::files::{PsecMcapOut, RecordingError, TraceMcap, Trajectories};
+use virtual_axes_io::files::{McapTrajectories, PsecMcapWriter, TraceMcapWriter, TrajectoryRecordingError};
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
 const TYPE: &str = "trajectory_msgs/msg/JointTrajectory";
 
-/// A trajectory of `x` with one point at 1 s, in CDR by hand.
+/// Encodes a trajectory of `x` with one point at 1 s as CDR.
 fn trajectory(position: f64, big_endian: bool) -> Vec<u8> {
     let mut bytes = vec![0, u8::from(!big_endian), 0, 0];
     let put = |value: u32, at: &mut Vec<u8>| {
@@ -34,7 +34,7 @@ fn trajectory(position: f64, big_endian: bool) -> Vec<u8> {
     for word in [1, 1] {
         put(word, &mut bytes);
     }
-    // Behind the header of 4 bytes, f64 stand at multiples of 8.
+    // An f64 is aligned to 8 bytes after the header of 4 bytes.
     while (bytes.len() - 4) % 8 != 0 {
         bytes.push(0);
     }
@@ -46,7 +46,7 @@ fn trajectory(position: f64, big_endian: bool) -> Vec<u8> {
     bytes
 }
 
-/// A message: topic, type, log time, data.
+/// Message: topic, type, log time, data.
 type Entry<'a> = (&'a str, &'a str, u64, Vec<u8>);
 
 fn record(entries: &[Entry<'_>], options: WriteOptions) -> Vec<u8> {
@@ -70,12 +70,15 @@ fn options(compression: Option<Compression>) -> WriteOptions {
     WriteOptions::new().compression(compression).chunk_size(Some(200)).compression_threads(0)
 }
 
-fn open(bytes: &[u8], topic: Option<&str>) -> Result<Trajectories<Cursor<Vec<u8>>>, RecordingError> {
-    Trajectories::new(Cursor::new(bytes.to_vec()), "r.mcap", topic)
+fn open(
+    bytes: &[u8],
+    topic: Option<&str>,
+) -> Result<McapTrajectories<Cursor<Vec<u8>>>, TrajectoryRecordingError> {
+    McapTrajectories::new(Cursor::new(bytes.to_vec()), "r.mcap", topic)
 }
 
-/// Log times and first positions.
-fn read(bytes: &[u8], topic: Option<&str>) -> Result<Vec<(i64, f64)>, RecordingError> {
+/// Returns log times and first positions.
+fn read(bytes: &[u8], topic: Option<&str>) -> Result<Vec<(i64, f64)>, TrajectoryRecordingError> {
     open(bytes, topic)?
         .map(|found| {
             let (time, request) = found?;
@@ -89,11 +92,11 @@ fn read(bytes: &[u8], topic: Option<&str>) -> Result<Vec<(i64, f64)>, RecordingE
 
 #[track_caller]
 fn error(bytes: &[u8], topic: Option<&str>) -> String {
-    read(bytes, topic).expect_err("must be refused").to_string()
+    read(bytes, topic).expect_err("must be rejected").to_string()
 }
 
 #[test]
-fn trajectories_come_in_the_order_of_their_log_times() {
+fn trajectories_are_returned_in_log_time_order() {
     let times = [30, 10, 20, 50, 40, 41, 41, 5];
     let entries: Vec<Entry<'_>> = times
         .iter()
@@ -116,12 +119,12 @@ fn trajectories_come_in_the_order_of_their_log_times() {
 }
 
 #[test]
-fn the_topic_is_named_where_there_are_several() {
+fn several_topics_require_a_selection() {
     let entry = |topic| (topic, TYPE, 1, trajectory(0.5, false));
     let two = record(&[entry("/mill/psec"), entry("/lathe/psec")], options(None));
     assert_eq!(
         error(&two, None),
-        "r.mcap: several topics carry trajectories, /lathe/psec, /mill/psec: name one"
+        "r.mcap: several topics carry trajectories, /lathe/psec, /mill/psec: select one by its name"
     );
     assert_eq!(read(&two, Some("/lathe/psec")), Ok(vec![(1, 0.5)]));
     assert_eq!(
@@ -139,12 +142,12 @@ fn the_topic_is_named_where_there_are_several() {
     );
     assert_eq!(
         error(&record(&[], options(None)), None),
-        "r.mcap: there is no message trajectory_msgs/msg/JointTrajectory; it holds no message at all"
+        "r.mcap: there is no message trajectory_msgs/msg/JointTrajectory; the file contains no messages"
     );
 }
 
 #[test]
-fn a_bad_message_is_told_with_its_topic_number_and_log_time() {
+fn the_error_of_a_message_names_topic_index_and_log_time() {
     let with = |data| {
         record(
             &[("/psec", TYPE, 0, trajectory(0.0, false)), ("/psec", TYPE, 2_500_000_000, data)],
@@ -161,10 +164,10 @@ fn a_bad_message_is_told_with_its_topic_number_and_log_time() {
     let mut short = trajectory(0.0, false);
     short.truncate(50);
     let message = error(&with(short), None);
-    assert!(message.starts_with(&format!("{at}it is not a message of this type: ")), "{message}");
+    assert!(message.starts_with(&format!("{at}not a message of this type: ")), "{message}");
 }
 
-/// A recording of one message, `{}`, on `topic`.
+/// Returns a recording of one message, `{}`, on `topic`.
 fn record_encoded(topic: &str, encoding: &str) -> Vec<u8> {
     let mut writer = options(None).create(Cursor::new(Vec::new())).expect("in memory");
     let schema = Some(Arc::new(mcap::Schema {
@@ -189,15 +192,15 @@ fn record_encoded(topic: &str, encoding: &str) -> Vec<u8> {
 }
 
 #[test]
-fn another_encoding_is_refused() {
+fn encodings_other_than_cdr_are_rejected() {
     assert_eq!(
         error(&record_encoded("/psec", "json"), None),
-        "r.mcap: /psec, message 0, log time 0 s: its encoding is \"json\", must be \"cdr\""
+        "r.mcap: /psec, message 0, log time 0 s: the message encoding is \"json\", must be \"cdr\""
     );
 }
 
 #[test]
-fn a_refusal_names_an_encoding_and_topics_in_one_line() {
+fn errors_with_encodings_and_topics_have_one_line() {
     let long = "a\nb\u{1b}[2J\u{2028}c\u{202e}d\u{2066}e\u{200f}f\u{61c}".repeat(10_000);
     fn entry<'a>(topic: &'a str, kind: &'a str) -> Entry<'a> {
         (topic, kind, 1, trajectory(0.5, false))
@@ -205,7 +208,7 @@ fn a_refusal_names_an_encoding_and_topics_in_one_line() {
     let other = format!("/b{long}");
     let several = record(&[entry(&long, TYPE), entry(&other, TYPE)], options(None));
     let foreign = record(&[entry(&long, "std_msgs/msg/Empty")], options(None));
-    let refusals = [
+    let errors = [
         error(&record_encoded("/psec", &long), None),
         error(&record_encoded(&long, "json"), None),
         error(&several, None),
@@ -213,54 +216,55 @@ fn a_refusal_names_an_encoding_and_topics_in_one_line() {
         error(&several, Some(&format!("{long}c"))),
         error(&foreign, None),
     ];
-    for refusal in refusals {
-        assert!(refusal.starts_with("r.mcap: ") && refusal.len() < 2_000, "{} bytes", refusal.len());
+    for error in errors {
+        assert!(error.starts_with("r.mcap: ") && error.len() < 2_000, "{} bytes", error.len());
         assert!(
-            !refusal
+            !error
                 .contains(|c: char| c.is_control() || "\u{2028}\u{202e}\u{2066}\u{200f}\u{61c}".contains(c)),
-            "{refusal:?}"
+            "{error:?}"
         );
     }
 }
 
 #[test]
-fn a_refusal_names_schemas_that_differ_in_one_line() {
-    let refusal = error(include_bytes!("../../../../fuzz/seeds/psec_mcap/schemas_that_differ"), None);
-    assert!(refusal.starts_with("r.mcap: not a whole MCAP recording: Schema"), "{refusal}");
-    assert!(!refusal.contains(char::is_control), "{refusal:?}");
+fn an_error_of_differing_schemas_has_one_line() {
+    let error = error(include_bytes!("../../../../fuzz/seeds/psec_mcap/schemas_that_differ"), None);
+    assert!(error.starts_with("r.mcap: not a complete MCAP recording: Schema"), "{error}");
+    assert!(!error.contains(char::is_control), "{error:?}");
 }
 
 #[test]
-fn a_file_whose_chunk_is_damaged_is_said_not_to_be_whole() {
+fn a_damaged_chunk_is_rejected() {
     let mut bytes =
         record(&[("/psec", TYPE, 1, trajectory(0.5, false))], options(Some(mcap::Compression::Lz4)));
-    // Of the frame in the first chunk, behind its heads.
+    // Bytes of the LZ4 frame in the first chunk, after its header.
     let frame = bytes.windows(4).position(|w| w == [0x04, 0x22, 0x4d, 0x18]).expect("an LZ4 frame");
     bytes[frame + 12..frame + 40].fill(0xff);
-    let refusal = error(&bytes, None);
-    assert!(refusal.starts_with("r.mcap: not a whole MCAP recording: "), "{refusal}");
+    let error = error(&bytes, None);
+    assert!(error.starts_with("r.mcap: not a complete MCAP recording: "), "{error}");
 }
 
 #[test]
-fn a_file_that_is_cut_off_or_no_recording_is_said() {
+fn truncated_files_and_other_formats_are_rejected() {
     let bytes = record(&[("/psec", TYPE, 1, trajectory(0.5, false))], options(None));
     for length in [0, 5, 40, bytes.len() / 2, bytes.len() - 1] {
         assert_eq!(
             error(&bytes[..length], None),
-            "r.mcap: not a whole MCAP recording: it ends in the middle of a record (`mcap recover` saves what there \
-             is)",
+            "r.mcap: not a complete MCAP recording: the file ends in the middle of a record (`mcap recover` repairs \
+             the file)",
             "{length}"
         );
     }
     assert_eq!(
         error(b"time,x\n0,0\n0.006,0\n", None),
-        "r.mcap: not a whole MCAP recording: it does not begin and end as MCAP does"
+        "r.mcap: not a complete MCAP recording: the MCAP magic bytes are missing at the start or the end"
     );
-    let message = Trajectories::open("no/such.mcap".as_ref(), None).expect_err("must be refused").to_string();
+    let message =
+        McapTrajectories::open("no/such.mcap".as_ref(), None).expect_err("must be rejected").to_string();
     assert!(message.starts_with("no/such.mcap: "), "{message}");
 }
 
-/// `bytes` with a record put in behind the magic and the header record.
+/// Inserts a record after the magic bytes and the header record.
 fn with_record(bytes: &[u8], opcode: u8, body: &[u8]) -> Vec<u8> {
     const MAGIC: usize = 8;
     let length = u64::from_le_bytes(bytes[MAGIC + 1..MAGIC + 9].try_into().expect("eight bytes"));
@@ -268,9 +272,9 @@ fn with_record(bytes: &[u8], opcode: u8, body: &[u8]) -> Vec<u8> {
     [before, &[opcode], &(body.len() as u64).to_le_bytes(), body, behind].concat()
 }
 
-/// The reader of the `mcap` crate slices it from byte 32 to 28.
+/// The reader of the `mcap` crate panics: it slices from byte 32 to 28.
 #[test]
-fn an_attachment_that_is_too_short_is_passed_over() {
+fn a_too_short_attachment_is_ignored() {
     let good = record(
         &[("/psec", TYPE, 1, trajectory(0.5, false))],
         options(None).calculate_data_section_crc(false),
@@ -281,9 +285,9 @@ fn an_attachment_that_is_too_short_is_passed_over() {
     assert_eq!(found, [true]);
 }
 
-/// The reader of the `mcap` crate makes room for as much before it looks.
+/// The reader of the `mcap` crate allocates memory for an unchecked length.
 #[test]
-fn a_text_that_says_it_is_gibibytes_long_takes_no_memory() {
+fn a_string_with_a_length_of_gibibytes_allocates_no_memory() {
     let good = record(
         &[("/psec", TYPE, 1, trajectory(0.5, false))],
         options(None).calculate_data_section_crc(false),
@@ -295,26 +299,26 @@ fn a_text_that_says_it_is_gibibytes_long_takes_no_memory() {
         let bytes = with_record(&good, opcode, &body);
         let used = allocation_counter::measure(|| {
             let text = error(&bytes, None);
-            assert!(text.starts_with("r.mcap: not a whole MCAP recording: "), "{text}");
+            assert!(text.starts_with("r.mcap: not a complete MCAP recording: "), "{text}");
         });
         // Buffers of readers.
         assert!(used.bytes_max < 10 << 20, "{} bytes for opcode {opcode}", used.bytes_max);
     }
 }
 
-/// The reader of the `mcap` crate made room for all of it at once.
+/// The reader of the `mcap` crate allocated memory for the whole record at once.
 #[test]
-fn a_record_that_says_it_is_long_takes_no_memory_before_it_is_there() {
+fn a_record_with_a_large_length_allocates_no_memory_in_advance() {
     let good = record(&[("/psec", TYPE, 1, trajectory(0.5, false))], options(None));
     let bytes = [&good[..8], &[3], &(200_u64 << 20).to_le_bytes(), &[0; 1000]].concat();
     let used = allocation_counter::measure(|| {
         let text = error(&bytes, None);
-        assert!(text.contains("it ends in the middle of a record"), "{text}");
+        assert!(text.contains("the file ends in the middle of a record"), "{text}");
     });
     assert!(used.bytes_max < 10 << 20, "{} bytes", used.bytes_max);
 }
 
-/// A damaged recording gives what it gives, or one error; it never panics nor takes memory without bound.
+/// Reads a damaged recording: no panic, and nothing after the first error.
 fn read_damaged(bytes: &[u8]) {
     if let Ok(trajectories) = open(bytes, None) {
         let mut found: Vec<_> = trajectories.take(100).collect();
@@ -335,7 +339,7 @@ fn sample_recording(kind: u8) -> Vec<u8> {
         1 => options(Some(Compression::Zstd)),
         2 => options(Some(Compression::Lz4)),
         3 => options(None).use_chunks(false),
-        // As rosbag2 does by default.
+        // Default of rosbag2.
         _ => options(None).calculate_chunk_crcs(false),
     };
     record(&entries, options)
@@ -345,15 +349,15 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
-    fn damaged_recordings_do_no_harm(
+    fn damaged_recordings_cause_no_panic(
         kind in 0_u8..5,
         flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         keep in prop_oneof![Just(1.0), 0.0_f64..1.0],
     ) {
         let mut bytes = sample_recording(kind);
-        for (place, value) in flips {
-            let place = place.index(bytes.len());
-            bytes[place] = value;
+        for (index, value) in flips {
+            let index = index.index(bytes.len());
+            bytes[index] = value;
         }
         bytes.truncate((bytes.len() as f64 * keep) as usize);
         read_damaged(&bytes);
@@ -361,13 +365,13 @@ proptest! {
 }
 
 #[test]
-fn each_byte_may_be_damaged() {
+fn damage_of_any_byte_causes_no_panic() {
     for kind in [0, 3, 4] {
         let good = sample_recording(kind);
-        for place in 0..good.len() {
+        for index in 0..good.len() {
             for value in [0x00, 0x7f, 0xff] {
                 let mut bytes = good.clone();
-                bytes[place] = value;
+                bytes[index] = value;
                 read_damaged(&bytes);
             }
         }
@@ -375,7 +379,7 @@ fn each_byte_may_be_damaged() {
 }
 
 #[test]
-fn set_points_that_are_written_are_read_back() {
+fn written_setpoints_are_read_back() {
     let folder = TestFolder::new("psec_mcap");
     let path = folder.0.join("p.mcap");
     let joints = ["x".to_owned(), "c".to_owned()];
@@ -385,7 +389,7 @@ fn set_points_that_are_written_are_read_back() {
         out.row(k as i64 * 6_000_000, row).expect("can be written");
     }
     out.finish().expect("can be written");
-    let mut read = Trajectories::open(&path, None).expect("good");
+    let mut read = McapTrajectories::open(&path, None).expect("good");
     assert_eq!((read.topic(), read.remaining()), ("/psec", 1));
     let (log_time, request) = read.next().expect("one").expect("good");
     assert_eq!((log_time, request.start(), request.joints()), (0, Start::Now, &joints[..]));
@@ -398,23 +402,23 @@ fn set_points_that_are_written_are_read_back() {
 }
 
 #[test]
-fn times_that_a_recording_cannot_say_are_refused() {
+fn times_out_of_the_range_of_a_recording_are_rejected() {
     let joints = ["x".to_owned()];
-    let mut trace = TraceMcap::new(Vec::new(), &joints).expect("in memory");
+    let mut trace = TraceMcapWriter::new(Vec::new(), &joints).expect("in memory");
     let error = trace.row(-1, &[AxisSample::default()]).expect_err("before the epoch");
-    assert_eq!(error.to_string(), "-1 ns: a recording has no times before the Unix epoch");
-    let mut psec = PsecMcapOut::new(Vec::new(), &joints).expect("in memory");
+    assert_eq!(error.to_string(), "the time is -1 ns, must not be before the Unix epoch (0 ns)");
+    let mut psec = PsecMcapWriter::new(Vec::new(), &joints).expect("in memory");
     let error = psec.row(i64::MAX, &[0.0]).expect_err("32 bits");
     assert_eq!(
         error.to_string(),
-        "9223372036.854776 s is beyond the seconds that a message has, ±2147483647"
+        "the time is 9223372036.854776 s, must be within ±2147483647 s, the range of a message"
     );
 }
 
 #[test]
-fn a_trace_has_what_rosbag2_and_viewers_need() {
+fn a_trace_contains_the_records_that_rosbag2_and_viewers_require() {
     let joints = ["x".to_owned()];
-    let mut trace = TraceMcap::new(Vec::new(), &joints).expect("in memory");
+    let mut trace = TraceMcapWriter::new(Vec::new(), &joints).expect("in memory");
     for k in 0..3 {
         trace
             .row(k * 125_000, &[AxisSample { controller: "cascade", ..AxisSample::default() }])
@@ -424,7 +428,7 @@ fn a_trace_has_what_rosbag2_and_viewers_need() {
     let summary = mcap::Summary::read(&bytes).expect("whole").expect("there is one");
     let stats = summary.stats.as_ref().expect("rosbag2 takes counts from it");
     assert_eq!((stats.message_count, stats.message_start_time, stats.message_end_time), (9, 0, 250_000));
-    // rosbag2 reads in the order of log times by the indexes of messages.
+    // rosbag2 reads in log time order with the message indexes.
     assert!(summary.chunk_indexes.iter().all(|index| !index.message_index_offsets.is_empty()));
     let mut topics: Vec<_> = summary
         .channels

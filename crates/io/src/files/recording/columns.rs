@@ -1,4 +1,4 @@
-//! Which column of a file is which channel of a recording, and in which unit.
+//! Mapping of CSV columns to recording channels and units.
 
 use std::fs;
 use std::io::Read;
@@ -11,9 +11,9 @@ use super::unit::{Channel, Unit};
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_core::yaml;
 
-/// How the columns of a CSV file are to be read; what is not said is found out or as usual.
+/// Mapping of CSV columns to channels and units, with the CSV format. Unset values are detected or have defaults.
 ///
-/// One entry is a text `CHANNEL=COLUMN[UNIT]`:
+/// An entry is a text `CHANNEL=COLUMN[UNIT]`:
 ///
 /// ```
 /// use virtual_axes::files::Columns;
@@ -25,9 +25,8 @@ use virtual_axes_core::yaml;
 /// # Ok::<(), virtual_axes::files::ColumnsError>(())
 /// ```
 ///
-/// COLUMN is a header, or a number from 1 behind `#`; without it, the usual header of the channel. UNIT is
-/// a symbol, behind a factor if need be; without it, SI. `delimiter`, `decimal_comma` and `skip_lines`
-/// are set likewise.
+/// COLUMN is a header, or `#` and a number from 1; default is the channel name. UNIT is a symbol with an optional
+/// factor; default is SI. The keys `delimiter`, `decimal_comma` and `skip_lines` set the format.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Columns {
     pub(super) mappings: Vec<Mapping>,
@@ -36,86 +35,88 @@ pub struct Columns {
     pub(super) skip_lines: u64,
 }
 
-/// Where a channel stands.
+/// Column and unit of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Mapping {
     pub channel: Channel,
     pub column: Column,
-    /// SI if there is none.
+    /// Unit of the column; SI if `None`.
     pub unit: Option<Unit>,
-    /// All that was given as column and unit: a header can end in its unit.
+    /// Text of column and unit: a header can end in its unit.
     pub text: String,
-    /// Who said so.
+    /// Origin of the entry, for errors: option or file.
     pub at: String,
 }
 
-/// A column.
+/// Selector of a column.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Column {
-    /// By its usual name.
-    Usual,
-    /// By its header.
+    /// Default header of the channel.
+    Default,
+    /// Header of the column.
     Named(String),
-    /// By its place, from 0.
-    Place(usize),
+    /// Column index, from 0.
+    Index(usize),
 }
 
-/// Why a mapping of columns cannot be used.
+/// Error of a column mapping.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ColumnsError {
-    /// The file of the mapping cannot be read.
+    /// The mapping file cannot be read.
     #[error("{at}: {reason}")]
     Unreadable {
-        /// The file, and line where there is one.
+        /// File, and line if known.
         at: String,
-        /// What the reader says.
+        /// Error message of the reader.
         reason: String,
     },
-    /// An entry without `=`.
-    #[error("{at}: \"{found}\" maps nothing, must be CHANNEL=COLUMN[UNIT] as in position=Pos1[mm]")]
+    /// An entry has no `=`.
+    #[error(
+        "{at}: \"{found}\" is not a column mapping, must be CHANNEL=COLUMN[UNIT], for example position=Pos1[mm]"
+    )]
     Syntax {
-        /// Who said so.
+        /// Origin of the entry: option or file.
         at: String,
-        /// What stands there.
+        /// Text found.
         found: String,
     },
-    /// An entry for what does not exist.
-    #[error("{at}: there is no \"{found}\"; there are {}{}", known_keys(), nearest_hint(.nearest))]
+    /// The key of an entry is unknown.
+    #[error("{at}: unknown key \"{found}\"; known are {}{}", known_keys(), nearest_hint(.nearest))]
     Unknown {
-        /// Who said so.
+        /// Origin of the entry: option or file.
         at: String,
-        /// What stands there.
+        /// Key found.
         found: String,
-        /// What looks most like it.
+        /// Most similar key.
         nearest: Option<String>,
     },
-    /// An entry that is given twice by one.
+    /// A key occurs twice.
     #[error("{at}: {key} is given twice")]
-    Twice {
-        /// Who said so.
+    Duplicate {
+        /// Origin of the entry: option or file.
         at: String,
-        /// What is given twice.
+        /// Duplicate key.
         key: String,
     },
-    /// A value that cannot be.
+    /// The value of a key is invalid.
     #[error("{at}: {key}={found}: {reason}")]
     Value {
-        /// Who said so.
+        /// Origin of the entry: option or file.
         at: String,
-        /// What is set.
+        /// Key of the value.
         key: String,
-        /// To what.
+        /// Value found.
         found: String,
-        /// What is wrong with it.
+        /// Reason, with the allowed values.
         reason: String,
     },
 }
 
-/// Keys besides the channels.
+/// Key of the delimiter character.
 const DELIMITER: &str = "delimiter";
 const DECIMAL_COMMA: &str = "decimal_comma";
 const SKIP_LINES: &str = "skip_lines";
-/// What a tab can be called.
+/// Word for the tab character.
 const TAB: &str = "tab";
 
 fn keys() -> impl Iterator<Item = &'static str> {
@@ -127,10 +128,10 @@ fn known_keys() -> String {
 }
 
 impl Columns {
-    /// From a YAML file, if there is one, and `texts` that go before it; `at` names where those are from.
+    /// Reads an optional YAML file, then applies `texts`, which take precedence. `at` is the origin of `texts` in errors.
     ///
     /// # Errors
-    /// [`ColumnsError`]; one text must not contradict another.
+    /// Returns a [`ColumnsError`] if the file or a text is invalid, or if two texts set the same key.
     pub fn read<T: AsRef<str>>(file: Option<&Path>, texts: &[T], at: &str) -> Result<Self, ColumnsError> {
         let mut columns = match file {
             Some(file) => Self::open(file)?,
@@ -142,36 +143,36 @@ impl Columns {
             columns.set(text, at)?;
             let key = text.split('=').next().unwrap_or_default().trim();
             if given.contains(&key) {
-                return Err(ColumnsError::Twice { at: at.to_owned(), key: key.to_owned() });
+                return Err(ColumnsError::Duplicate { at: at.to_owned(), key: key.to_owned() });
             }
             given.push(key);
         }
         Ok(columns)
     }
 
-    /// From a YAML file; see [`Columns::from_yaml`].
+    /// Reads a YAML file; see [`Columns::from_yaml`].
     ///
     /// # Errors
-    /// [`ColumnsError`].
+    /// Returns a [`ColumnsError`] if the file cannot be read or is invalid.
     pub fn open(path: &Path) -> Result<Self, ColumnsError> {
         let at = path.display().to_string();
         let unreadable =
             |error: std::io::Error| ColumnsError::Unreadable { at: at.clone(), reason: error.to_string() };
         let mut text = String::new();
         let file = fs::File::open(path).map_err(unreadable)?;
-        file.take(LONGEST_FILE).read_to_string(&mut text).map_err(unreadable)?;
-        if text.len() as u64 == LONGEST_FILE {
-            let reason = format!("a mapping of columns is shorter than {LONGEST_FILE} bytes");
+        file.take(MAX_FILE_BYTES).read_to_string(&mut text).map_err(unreadable)?;
+        if text.len() as u64 == MAX_FILE_BYTES {
+            let reason = format!("a column mapping file must be shorter than {MAX_FILE_BYTES} bytes");
             return Err(ColumnsError::Unreadable { at, reason });
         }
         Self::from_yaml(&text, &at)
     }
 
-    /// From YAML: a mapping from channels to texts `COLUMN[UNIT]`, and the other keys; `name` is for
-    /// messages.
+    /// Parses YAML: a mapping from channels to texts `COLUMN[UNIT]`, and from format keys to values. `name` is the
+    /// file name in errors.
     ///
     /// # Errors
-    /// [`ColumnsError`].
+    /// Returns a [`ColumnsError`] for the first invalid entry.
     pub fn from_yaml(text: &str, name: &str) -> Result<Self, ColumnsError> {
         let unreadable = |at: String, reason: String| Err(ColumnsError::Unreadable { at, reason });
         let mut documents: Vec<Entries> = match yaml::documents(text) {
@@ -179,7 +180,10 @@ impl Columns {
             Err(error) => return unreadable(error.position(name), error.reason),
         };
         let (Some(entries), true) = (documents.pop(), documents.is_empty()) else {
-            return unreadable(name.to_owned(), "it is not one mapping of channels to columns".to_owned());
+            return unreadable(
+                name.to_owned(),
+                "the file must contain exactly one mapping of channels to columns".to_owned(),
+            );
         };
         let mut columns = Columns::default();
         for (key, Scalar(value)) in entries.into_all() {
@@ -188,10 +192,10 @@ impl Columns {
         Ok(columns)
     }
 
-    /// Sets one thing from `KEY=VALUE`, in place of what was said before; `at` names where it is from.
+    /// Sets one entry from `KEY=VALUE`, replacing an earlier one. `at` is the origin of the text in errors.
     ///
     /// # Errors
-    /// [`ColumnsError`].
+    /// Returns a [`ColumnsError`] if the key or the value is invalid.
     pub fn set(&mut self, text: &str, at: &str) -> Result<(), ColumnsError> {
         let Some((key, value)) = text.split_once('=') else {
             return Err(ColumnsError::Syntax { at: at.to_owned(), found: shortened(text) });
@@ -200,7 +204,7 @@ impl Columns {
     }
 
     fn put(&mut self, key: &str, value: &str, at: &str) -> Result<(), ColumnsError> {
-        // A delimiter can be a blank.
+        // White space can be a delimiter.
         let value = if key == DELIMITER { value } else { value.trim() };
         let wrong = |reason: &str| ColumnsError::Value {
             at: at.to_owned(),
@@ -208,7 +212,7 @@ impl Columns {
             found: shortened(value),
             reason: reason.to_owned(),
         };
-        if let Some(channel) = Channel::named(key) {
+        if let Some(channel) = Channel::from_name(key) {
             let (column, unit) = column_and_unit(value).map_err(|reason| wrong(&reason))?;
             self.mappings.retain(|mapping| mapping.channel != channel);
             let (text, at) = (value.to_owned(), at.to_owned());
@@ -221,7 +225,7 @@ impl Columns {
                 self.decimal_comma = value.parse().map_err(|_| wrong("must be true or false"))?;
             }
             SKIP_LINES => {
-                self.skip_lines = value.parse().map_err(|_| wrong("must be a number of lines, 0 or more"))?;
+                self.skip_lines = value.parse().map_err(|_| wrong("must be an integer of at least 0"))?;
             }
             _ => {
                 let nearest = nearest_name(key, keys());
@@ -229,22 +233,23 @@ impl Columns {
             }
         }
         if self.decimal_comma && self.delimiter == Some(',') {
-            return Err(wrong("a comma cannot be both between numbers and in them"));
+            return Err(wrong("a comma cannot be both the delimiter and the decimal separator"));
         }
         Ok(())
     }
 
-    /// Where `channel` stands, if that was said.
+    /// Returns the mapping of a channel, if set.
     pub(super) fn mapping(&self, channel: Channel) -> Option<&Mapping> {
         self.mappings.iter().find(|mapping| mapping.channel == channel)
     }
 }
 
-/// Longest file of a mapping, bytes.
-const LONGEST_FILE: u64 = 1 << 16;
+/// Maximum size of a mapping file, bytes.
+const MAX_FILE_BYTES: u64 = 1 << 16;
 
-/// What a delimiter can be.
-const DELIMITERS: &str = "must be one character such as ; or | or the word tab, and none of numbers";
+/// Allowed delimiters, for error messages.
+const DELIMITERS: &str =
+    "must be one character that does not occur in numbers, such as ; or |, or the word tab";
 
 fn delimiter(text: &str) -> Option<char> {
     let text = match text {
@@ -264,39 +269,39 @@ fn column_and_unit(text: &str) -> Result<(Column, Option<Unit>), String> {
     };
     let column = match column.strip_prefix('#') {
         Some(number) => match number.trim().parse::<usize>() {
-            Ok(number) if number > 0 => Column::Place(number - 1),
-            _ => return Err("a column's number is whole and begins with 1, as in #3".to_owned()),
+            Ok(number) if number > 0 => Column::Index(number - 1),
+            _ => return Err("a column number must be an integer of at least 1, for example #3".to_owned()),
         },
-        None if column.is_empty() && unit.is_some() => Column::Usual,
-        None if column.is_empty() => return Err("there is no column".to_owned()),
+        None if column.is_empty() && unit.is_some() => Column::Default,
+        None if column.is_empty() => return Err("the column is missing".to_owned()),
         None => Column::Named(column.to_owned()),
     };
     Ok((column, unit))
 }
 
-/// The file, by its keys.
+/// Entries of a mapping file, by key.
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Entries {
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     time: Option<Scalar>,
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     psec: Option<Scalar>,
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     position: Option<Scalar>,
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     velocity: Option<Scalar>,
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     current: Option<Scalar>,
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     velocity_feedforward: Option<Scalar>,
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     torque_feedforward: Option<Scalar>,
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     delimiter: Option<Scalar>,
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     decimal_comma: Option<Scalar>,
-    #[serde(deserialize_with = "given")]
+    #[serde(deserialize_with = "non_empty_value")]
     skip_lines: Option<Scalar>,
 }
 
@@ -318,12 +323,12 @@ impl Entries {
     }
 }
 
-/// A key that stands there has a value.
-fn given<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Scalar>, D::Error> {
+/// Deserializes the value of a key that is present; rejects an empty value.
+fn non_empty_value<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Scalar>, D::Error> {
     deserializer.deserialize_any(ScalarVisitor).map(Some)
 }
 
-/// A text, whatever YAML takes it for.
+/// YAML scalar of any type as text.
 struct Scalar(String);
 
 struct ScalarVisitor;
@@ -332,7 +337,7 @@ impl Visitor<'_> for ScalarVisitor {
     type Value = Scalar;
 
     fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str("a text (a column by its number stands in quotation marks: \"#3[mm]\")")
+        f.write_str("a text (put a column number in quotation marks: \"#3[mm]\")")
     }
 
     fn visit_str<E>(self, value: &str) -> Result<Scalar, E> {
@@ -352,6 +357,6 @@ impl Visitor<'_> for ScalarVisitor {
     }
 
     fn visit_unit<E: de::Error>(self) -> Result<Scalar, E> {
-        Err(E::custom("there is no value; a column by its number stands in quotation marks: \"#3[mm]\""))
+        Err(E::custom("the value is missing; put a column number in quotation marks: \"#3[mm]\""))
     }
 }

@@ -1,171 +1,170 @@
-//! Setpoints out: CSV, YAML as `ros2 topic pub` takes it, MCAP.
+//! Writing of position setpoints as CSV, YAML (format of `ros2 topic pub`) or MCAP.
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use serde::ser::{Serialize, Serializer};
 
-use super::mcap_out::{Recording, Topic, USUAL_QOS};
-use super::psec_csv::TIME;
+use super::mcap_writer::{DEFAULT_QOS, McapTopic, McapWriter};
+use super::psec_error::TIME;
 use super::trace::extension;
-use super::{OutputFile, number};
+use super::{OutputFile, decimal};
 use crate::messages::builtin_interfaces::msg::Duration;
 use crate::messages::std_msgs::msg::Header;
 use crate::messages::{self, Schema};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// Topic of the trajectory in a recording.
+/// McapTopic of the trajectory in a recording.
 const TOPIC: &str = "/psec";
 
-/// Setpoints that are being written. Dropped before [`finish`](Self::finish), they leave no file behind.
+/// Writer of position setpoints. Dropping it before [`finish`](Self::finish) leaves no file.
 pub trait PsecWriter {
-    /// Adds the setpoints (m or rad, one per joint) of an instant, `time` ns from the start.
+    /// Adds one setpoint per joint, m or rad, at `time`, ns from the start.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()>;
 
-    /// Makes the file whole.
+    /// Completes the file.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     fn finish(self: Box<Self>) -> io::Result<()>;
 }
 
-/// Begins setpoints of `joints` in the format that the extension of `path` names: `.csv`, `.yaml` or
-/// `.mcap`. A device or a pipe without an extension gets CSV.
+/// Creates a setpoint file of `joints` in the format of the extension of `path`: `.csv`, `.yaml` or `.mcap`. The
+/// format for a device or a pipe without an extension is CSV.
 ///
 /// # Errors
-/// An unknown extension; those of the output.
+/// Returns the errors of the output, and an error for an unknown extension.
 pub fn psec_writer(path: &Path, joints: &[String]) -> io::Result<Box<dyn PsecWriter>> {
     match extension(path, &["csv", "mcap", "yaml"])? {
-        "mcap" => Ok(Box::new(PsecMcapOut::new(OutputFile::create(path)?, joints)?)),
-        "yaml" => Ok(Box::new(PsecYamlOut::new(OutputFile::create(path)?, joints)?)),
-        _ => Ok(Box::new(PsecCsvOut::new(OutputFile::create(path)?, joints)?)),
+        "mcap" => Ok(Box::new(PsecMcapWriter::new(OutputFile::create(path)?, joints)?)),
+        "yaml" => Ok(Box::new(PsecYamlWriter::new(OutputFile::create(path)?, joints)?)),
+        _ => Ok(Box::new(PsecCsvWriter::new(OutputFile::create(path)?, joints)?)),
     }
 }
 
-/// Writes `time,x,…`; numbers are as short as they can be read back exactly.
+/// Writer of setpoints as CSV, `time,x,…`; numbers are the shortest decimals that parse to the same value.
 #[derive(Debug)]
-pub struct PsecCsvOut<W> {
+pub struct PsecCsvWriter<W> {
     output: W,
-    /// A row as text.
+    /// Buffer of a row.
     row: Vec<u8>,
 }
 
-impl<W: Write> PsecCsvOut<W> {
-    /// Begins with the header.
+impl<W: Write> PsecCsvWriter<W> {
+    /// Creates a writer and writes the header.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn new(mut output: W, joints: &[String]) -> io::Result<Self> {
         writeln!(output, "{TIME},{}", joints.join(","))?;
-        Ok(PsecCsvOut { output, row: Vec::new() })
+        Ok(PsecCsvWriter { output, row: Vec::new() })
     }
 
-    /// Adds the setpoints (m or rad) of an instant, ns from the start.
+    /// Adds one setpoint per joint, m or rad, at `time`, ns from the start.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
         self.row.clear();
-        number::push(&mut self.row, seconds(time));
+        decimal::push(&mut self.row, seconds(time));
         for &position in positions {
             self.row.push(b',');
-            number::push(&mut self.row, position);
+            decimal::push(&mut self.row, position);
         }
         self.row.push(b'\n');
         self.output.write_all(&self.row)
     }
 
-    /// Hands everything over and gives the output back.
+    /// Flushes and returns the output.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn finish(mut self) -> io::Result<W> {
         self.output.flush()?;
         Ok(self.output)
     }
 }
 
-/// Writes a `JointTrajectory` with stamp 0 for `ros2 topic pub --once … "$(cat F.yaml)"`, a line per point;
-/// numbers are as short as they can be read back exactly, by readers of YAML 1.1 too.
+/// Writer of a `JointTrajectory` with stamp 0 as YAML for `ros2 topic pub --once … "$(cat F.yaml)"`, one line per
+/// point; numbers are the shortest decimals that YAML 1.1 parsers read as the same value.
 #[derive(Debug)]
-pub struct PsecYamlOut<W> {
+pub struct PsecYamlWriter<W> {
     output: W,
-    empty: bool,
-    /// A point as text.
+    is_empty: bool,
+    /// Buffer of a point.
     row: Vec<u8>,
 }
 
-impl<W: Write> PsecYamlOut<W> {
-    /// Begins with the joints.
+impl<W: Write> PsecYamlWriter<W> {
+    /// Creates a writer and writes the joint names.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn new(mut output: W, joints: &[String]) -> io::Result<Self> {
-        // A list of texts in JSON is one in YAML, whatever the names are.
+        // A JSON list of strings is valid YAML.
         let names = serde_json::to_string(joints).map_err(io::Error::other)?;
         write!(output, "joint_names: {names}\npoints:")?;
-        Ok(PsecYamlOut { output, empty: true, row: Vec::new() })
+        Ok(PsecYamlWriter { output, is_empty: true, row: Vec::new() })
     }
 
-    /// Adds the setpoints (m or rad) of an instant, ns from the start.
+    /// Adds one setpoint per joint, m or rad, at `time`, ns from the start.
     ///
     /// # Errors
-    /// Those of the output; a time beyond the 32-bit seconds of a message.
+    /// Returns the errors of the output, and an error for a time beyond the 32-bit seconds of a message.
     pub fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
         let (sec, nanosec) = message_time(time)?;
         self.row.clear();
         self.row.extend_from_slice(b"\n- {positions: [");
-        self.empty = false;
+        self.is_empty = false;
         for (column, &position) in positions.iter().enumerate() {
             self.row.extend_from_slice(if column > 0 { b", " } else { b"" });
-            // Without an exponent, which YAML 1.1 wants in a form of its own, and with a point, so that
-            // it is no integer.
-            number::push(&mut self.row, position);
+            // YAML 1.1 has another syntax of exponents, and reads a number without a point as an integer.
+            decimal::push(&mut self.row, position);
             self.row.extend_from_slice(if position.fract() == 0.0 { b".0" } else { b"" });
         }
         write!(self.row, "], time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}")?;
         self.output.write_all(&self.row)
     }
 
-    /// Hands everything over and gives the output back.
+    /// Flushes and returns the output.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn finish(mut self) -> io::Result<W> {
-        self.output.write_all(if self.empty { b" []\n" } else { b"\n" })?;
+        self.output.write_all(if self.is_empty { b" []\n" } else { b"\n" })?;
         self.output.flush()?;
         Ok(self.output)
     }
 }
 
-/// Writes a recording with one `JointTrajectory` on `/psec`, stamp and log time 0. The message is held
-/// until it is whole.
+/// Writer of setpoints as an MCAP recording with one `JointTrajectory` on `/psec`, stamp and log time 0. The message
+/// is kept in memory until [`finish`](Self::finish).
 #[derive(Debug)]
-pub struct PsecMcapOut<W: Write> {
-    recording: Recording<W>,
-    topic: Topic,
-    message: Trajectory,
+pub struct PsecMcapWriter<W: Write> {
+    recording: McapWriter<W>,
+    topic: McapTopic,
+    message: FlatTrajectory,
 }
 
-impl<W: Write> PsecMcapOut<W> {
-    /// Begins a recording.
+impl<W: Write> PsecMcapWriter<W> {
+    /// Starts a recording.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn new(output: W, joints: &[String]) -> io::Result<Self> {
-        let mut recording = Recording::new(output)?;
-        let topic = recording.topic(TOPIC, &Schema::joint_trajectory(), USUAL_QOS)?;
-        let message = Trajectory { joint_names: joints.to_vec(), ..Trajectory::default() };
-        Ok(PsecMcapOut { recording, topic, message })
+        let mut recording = McapWriter::new(output)?;
+        let topic = recording.topic(TOPIC, &Schema::joint_trajectory(), DEFAULT_QOS)?;
+        let message = FlatTrajectory { joint_names: joints.to_vec(), ..FlatTrajectory::default() };
+        Ok(PsecMcapWriter { recording, topic, message })
     }
 
-    /// Adds the setpoints (m or rad) of an instant, ns from the start.
+    /// Adds one setpoint per joint, m or rad, at `time`, ns from the start.
     ///
     /// # Errors
-    /// A time beyond the 32-bit seconds of a message.
+    /// Returns an error for a time beyond the 32-bit seconds of a message.
     pub fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
         message_time(time)?;
         let Points { times, positions: all, begins } = &mut self.message.points;
@@ -175,10 +174,10 @@ impl<W: Write> PsecMcapOut<W> {
         Ok(())
     }
 
-    /// Writes the message and gives the output back.
+    /// Writes the message and returns the output.
     ///
     /// # Errors
-    /// Those of the output.
+    /// Returns the errors of the output.
     pub fn finish(mut self) -> io::Result<W> {
         self.recording.write(&mut self.topic, 0, &self.message)?;
         let mut output = self.recording.finish()?;
@@ -187,26 +186,26 @@ impl<W: Write> PsecMcapOut<W> {
     }
 }
 
-/// `trajectory_msgs/JointTrajectory` with positions only, field by field, without a list for each point.
+/// Message `trajectory_msgs/JointTrajectory` with positions only, in contiguous memory.
 #[derive(Debug, Default, serde::Serialize)]
-struct Trajectory {
+struct FlatTrajectory {
     header: Header,
     joint_names: Vec<String>,
     points: Points,
 }
 
-/// The points of a trajectory, one after the other.
+/// Points of a trajectory in contiguous memory.
 #[derive(Debug, Default)]
 struct Points {
-    /// ns from the start.
+    /// Time of each point, ns from the start.
     times: Vec<Nanoseconds>,
-    /// m or rad.
+    /// Positions of all points, m or rad.
     positions: Vec<f64>,
-    /// Where the positions of each point begin.
+    /// Start of each point in `positions`.
     begins: Vec<usize>,
 }
 
-/// `trajectory_msgs/JointTrajectoryPoint`, field by field.
+/// Message `trajectory_msgs/JointTrajectoryPoint`.
 #[derive(serde::Serialize)]
 struct Point<'a> {
     positions: &'a [f64],
@@ -231,13 +230,14 @@ impl Serialize for Points {
     }
 }
 
-/// Seconds and nanoseconds of a time that a message can say.
+/// Splits a time into the seconds and nanoseconds of a message.
 fn message_time(time: Nanoseconds) -> io::Result<(i32, u32)> {
     let (sec, nanosec) = messages::parts(time);
     if i64::from(sec) == time.div_euclid(virtual_axes_core::units::SECOND_NS) {
         return Ok((sec, nanosec));
     }
-    let text = format!("{} s is beyond the seconds that a message has, ±{}", seconds(time), i32::MAX);
+    let text =
+        format!("the time is {} s, must be within ±{} s, the range of a message", seconds(time), i32::MAX);
     Err(io::Error::new(io::ErrorKind::InvalidInput, text))
 }
 
@@ -255,4 +255,4 @@ macro_rules! writers {
     )*};
 }
 
-writers!(PsecCsvOut, PsecYamlOut, PsecMcapOut);
+writers!(PsecCsvWriter, PsecYamlWriter, PsecMcapWriter);

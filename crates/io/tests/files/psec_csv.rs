@@ -1,4 +1,4 @@
-//! Setpoints as CSV: a stream on the position grid.
+//! Position setpoints as CSV, read as a stream at position cycles.
 
 use std::io::{self, Read};
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::trajectory::{
-    ValidationContext, JointLimits, MotionId, TrajectoryRequest, TrajectoryPoint, Start, Timeline, Trajectory,
+    JointLimits, MotionId, Start, Timeline, Trajectory, TrajectoryPoint, TrajectoryRequest, ValidationContext,
 };
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
-use virtual_axes_io::files::{PsecCsv, PsecError};
+use virtual_axes_io::files::{PsecCsvReader, PsecError};
 
 /// Tsp of the machine, ns.
 const TSP: Nanoseconds = 6_000_000;
@@ -19,11 +19,11 @@ fn limits() -> Vec<JointLimits> {
     joint_limits(&parameters.machine_config().expect("valid"), "")
 }
 
-fn open(text: &str) -> Result<PsecCsv<&[u8]>, PsecError> {
-    PsecCsv::new(text.as_bytes(), "p.csv", TSP, &limits())
+fn open(text: &str) -> Result<PsecCsvReader<&[u8]>, PsecError> {
+    PsecCsvReader::new(text.as_bytes(), "p.csv", TSP, &limits())
 }
 
-/// Every row, or the first fault.
+/// Returns all rows, or the first error.
 fn rows(text: &str) -> Result<Vec<Vec<f64>>, PsecError> {
     let mut psec = open(text)?;
     let mut row = vec![0.0; psec.joints().len()];
@@ -37,26 +37,30 @@ fn rows(text: &str) -> Result<Vec<Vec<f64>>, PsecError> {
 
 #[track_caller]
 fn error(text: &str) -> String {
-    rows(text).expect_err("must be refused").to_string()
+    rows(text).expect_err("must be rejected").to_string()
 }
 
-/// What the timeline commands for the same points, at instants 0 … n−1.
+/// Returns the setpoints of the timeline for the same points, at position cycles 0 … n−1.
 fn commanded(points: &[(Nanoseconds, Vec<f64>)], names: &[&str], instants: usize) -> Vec<Vec<f64>> {
     let limits = limits();
     let mut request = TrajectoryRequest::new(Start::Now, names.iter().map(|n| (*n).to_owned()).collect());
     for (time, positions) in points {
         request.push(*time, TrajectoryPoint { positions, ..TrajectoryPoint::default() }).expect("finite");
     }
-    let context =
-        ValidationContext { joints: &limits, period: TSP, max_points: usize::MAX, allow_nonzero_end_velocity: false };
+    let context = ValidationContext {
+        joints: &limits,
+        period: TSP,
+        max_points: usize::MAX,
+        allow_nonzero_end_velocity: false,
+    };
     let trajectory = Arc::new(Trajectory::new(request, &context).expect("within the limits"));
-    let places = trajectory.joints().to_vec();
+    let indices = trajectory.joints().to_vec();
     let mut timeline = Timeline::new(limits.clone(), TSP, &vec![0.0; limits.len()]).expect("a timeline");
     timeline.submit(MotionId(1), trajectory, 0).expect("starts at home");
     let mut rows = Vec::new();
     for _ in 0..instants {
         timeline.next();
-        rows.push(places.iter().map(|&place| timeline.psec()[place]).collect());
+        rows.push(indices.iter().map(|&index| timeline.psec()[index]).collect());
     }
     assert!(!timeline.is_moving(), "the stream ends where the timeline does");
     rows
@@ -79,7 +83,7 @@ fn bits(rows: &[Vec<f64>]) -> Vec<Vec<u64>> {
 }
 
 #[track_caller]
-fn assert_as_timeline(points: &[(Nanoseconds, Vec<f64>)], names: &[&str]) {
+fn assert_equals_timeline(points: &[(Nanoseconds, Vec<f64>)], names: &[&str]) {
     let streamed = rows(&csv(points, names)).expect("within the limits");
     let last = points.last().expect("points").0;
     assert_eq!(streamed.len() as i64, (last + TSP - 1) / TSP + 1);
@@ -87,7 +91,7 @@ fn assert_as_timeline(points: &[(Nanoseconds, Vec<f64>)], names: &[&str]) {
     assert_eq!(bits(&streamed), bits(&commanded));
 }
 
-/// Positions that wander within Vmax, at the given times.
+/// Returns smooth positions within Vmax at the given times.
 fn wander(times: &[Nanoseconds]) -> Vec<(Nanoseconds, Vec<f64>)> {
     times
         .iter()
@@ -99,33 +103,33 @@ fn wander(times: &[Nanoseconds]) -> Vec<(Nanoseconds, Vec<f64>)> {
 }
 
 #[test]
-fn rows_on_the_grid_are_used_bit_for_bit() {
+fn rows_at_position_cycles_are_used_bit_for_bit() {
     let points = wander(&(0..500).map(|k| k * TSP).collect::<Vec<_>>());
     let streamed = rows(&csv(&points, &["x", "c"])).expect("within the limits");
     let given: Vec<Vec<f64>> = points.iter().map(|(_, positions)| positions.clone()).collect();
     assert_eq!(bits(&streamed), bits(&given));
-    assert_as_timeline(&points, &["x", "c"]);
+    assert_equals_timeline(&points, &["x", "c"]);
 }
 
 #[test]
-fn off_the_grid_it_is_the_timeline_bit_for_bit() {
+fn interpolated_rows_equal_the_timeline_bit_for_bit() {
     let coarse: Vec<i64> = (0..40).map(|k| k * 71_234_567).collect();
-    assert_as_timeline(&wander(&coarse), &["y", "a"]);
+    assert_equals_timeline(&wander(&coarse), &["y", "a"]);
     let fine: Vec<i64> = (0..4000).map(|k| k * 999_999).collect();
-    assert_as_timeline(&wander(&fine), &["z", "c"]);
+    assert_equals_timeline(&wander(&fine), &["z", "c"]);
 }
 
 #[test]
-fn a_first_row_after_the_start_is_gone_to_from_home_as_the_timeline_does() {
+fn the_approach_to_a_late_first_row_equals_the_timeline() {
     for first in [1, TSP, 2 * TSP + 1, 100 * TSP + 17] {
         let times: Vec<i64> = (0..30).map(|k| first + k * 31_000_000).collect();
         let mut points = wander(&times);
         for (_, positions) in &mut points {
-            // Near enough for one period.
+            // Reachable within one period.
             positions.iter_mut().for_each(|p| *p *= 1e-3);
             positions[0] += 5e-5;
         }
-        assert_as_timeline(&points, &["x", "a"]);
+        assert_equals_timeline(&points, &["x", "a"]);
         let text = csv(&points, &["x", "a"]);
         let psec = open(&text).expect("good");
         assert_eq!(psec.first_time(), first);
@@ -135,11 +139,11 @@ fn a_first_row_after_the_start_is_gone_to_from_home_as_the_timeline_does() {
 }
 
 #[test]
-fn it_starts_where_the_axes_stand() {
+fn the_first_row_is_checked_against_the_start_positions() {
     let text = "time,z,x\n0,0.1,0.2\n0.006,0.101,0.2\n";
     let message = error(text);
     assert!(message.starts_with("p.csv:2: z: starts at 0.1 m, 0.1 m away from"), "{message}");
-    let mut psec = open(text).expect("good").starting_at(&[0.2, 0.0, 0.1, 0.0, 0.0]);
+    let mut psec = open(text).expect("good").with_start_positions(&[0.2, 0.0, 0.1, 0.0, 0.0]);
     assert_eq!(psec.joints(), [2, 0]);
     let mut row = [0.0; 2];
     assert!(psec.next(&mut row).expect("at the start"));
@@ -148,7 +152,7 @@ fn it_starts_where_the_axes_stand() {
 
 proptest! {
     #[test]
-    fn any_times_give_what_the_timeline_commands(
+    fn rows_at_any_times_equal_the_timeline(
         steps in prop::collection::vec(1_i64..50_000_000, 1..60),
         first in prop_oneof![Just(0_i64), 1_i64..20_000_000],
         tail in prop::collection::vec(-1.0_f64..1.0, 60),
@@ -158,22 +162,22 @@ proptest! {
         let mut points = vec![(time, vec![if first == 0 { 0.0 } else { 1e-12 * first as f64 }])];
         for (step, way) in steps.iter().zip(&tail) {
             time += step;
-            // A tenth of Vmax at most.
+            // At most a tenth of Vmax.
             position += way * 0.05 * *step as f64 / SECOND_NS as f64;
             points.push((time, vec![position]));
         }
-        assert_as_timeline(&points, &["x"]);
+        assert_equals_timeline(&points, &["x"]);
     }
 }
 
 #[test]
-fn faults_name_file_line_and_column() {
-    let header = "it begins with \"time\", then a joint for each column";
-    assert_eq!(error(""), format!("p.csv:1: the header is \"\"; {header}"));
-    assert_eq!(error("t,x\n0,0\n"), format!("p.csv:1: the header is \"t,x\"; {header}"));
-    assert_eq!(error("time\n0\n"), format!("p.csv:1: the header is \"time\"; {header}"));
-    assert_eq!(error("time,x,\n0,0,0\n"), format!("p.csv:1: the header is \"time,x,\"; {header}"));
-    assert_eq!(error("time;x\n0;0\n"), format!("p.csv:1: the header is \"time;x\"; {header}"));
+fn errors_name_file_line_and_column() {
+    let header = "must be \"time\", then one joint name per column";
+    assert_eq!(error(""), format!("p.csv:1: the header is \"\", {header}"));
+    assert_eq!(error("t,x\n0,0\n"), format!("p.csv:1: the header is \"t,x\", {header}"));
+    assert_eq!(error("time\n0\n"), format!("p.csv:1: the header is \"time\", {header}"));
+    assert_eq!(error("time,x,\n0,0,0\n"), format!("p.csv:1: the header is \"time,x,\", {header}"));
+    assert_eq!(error("time;x\n0;0\n"), format!("p.csv:1: the header is \"time;x\", {header}"));
     assert_eq!(error("time,x,q\n0,0,0\n"), "p.csv:1: there is no joint \"q\"; there are x, y, z, a, c");
     assert_eq!(error("time,x,x\n0,0,0\n"), "p.csv:1: joint x has two columns");
     assert_eq!(error("time,x\n"), "p.csv: there is no setpoint below the header");
@@ -189,7 +193,7 @@ fn faults_name_file_line_and_column() {
     assert_eq!(error("time,x\n0,0\n2e8,1\n"), "p.csv:3: time is 200000000 s, must lie in 0 … 100000000 s");
     assert_eq!(
         error("time,x\n0,0\n0.006,0\n0.006,0\n"),
-        "p.csv:4: time is 0.006 s, must be later than 0.006 s of the line before it"
+        "p.csv:4: time is 0.006 s, must be later than 0.006 s of the previous row"
     );
     assert_eq!(
         error("time,x\n0,0\n1,0.36\n"),
@@ -198,7 +202,7 @@ fn faults_name_file_line_and_column() {
 }
 
 #[test]
-fn a_fault_far_down_is_told_with_its_line() {
+fn an_error_in_a_late_row_names_its_line() {
     let mut text = "time,x\r\n".to_owned();
     for k in 0..4711 {
         text += &format!("{},{}\r\n", k as f64 * 0.006, if k == 4709 { "NaN" } else { "0" });
@@ -207,7 +211,7 @@ fn a_fault_far_down_is_told_with_its_line() {
 }
 
 #[test]
-fn a_speed_is_told_with_the_row_that_it_leads_to() {
+fn a_speed_error_names_the_row_at_the_end_of_the_segment() {
     // Vmax is 0.5 m/s, 3 mm in a period.
     let message = error("time,x\n0,0\n0.006,0.001\n0.012,0.005\n0.018,0.005\n");
     assert!(message.starts_with("p.csv:4: x, point 2: speed 0.66"), "{message}");
@@ -219,7 +223,7 @@ fn a_speed_is_told_with_the_row_that_it_leads_to() {
 }
 
 #[test]
-fn what_other_programs_write_is_read() {
+fn csv_variants_of_other_programs_are_read() {
     let plain = rows("time,x,c\n0,0,0\n0.006,0.001,-0.01\n").expect("plain");
     assert_eq!(plain, [[0.0, 0.0], [0.001, -0.01]]);
     for text in [
@@ -234,21 +238,24 @@ fn what_other_programs_write_is_read() {
 }
 
 #[test]
-fn what_is_not_text_is_refused() {
-    let read = |bytes: &'static [u8]| PsecCsv::new(bytes, "p.csv", TSP, &limits()).expect_err("refused");
+fn binary_files_and_missing_files_are_rejected() {
+    let read = |bytes: &'static [u8]| {
+        PsecCsvReader::new(bytes, "p.csv", TSP, &limits()).expect_err("must be rejected")
+    };
     assert_eq!(read(b"time,x\n0,0\xff\n").to_string(), "p.csv:2: stream did not contain valid UTF-8");
-    let endless = PsecCsv::new(io::repeat(b'7'), "/dev/zero", TSP, &limits()).expect_err("refused");
+    let endless =
+        PsecCsvReader::new(io::repeat(b'7'), "/dev/zero", TSP, &limits()).expect_err("must be rejected");
     assert_eq!(endless.to_string(), "/dev/zero:1: the line is longer than 65536 bytes");
-    let missing = PsecCsv::open("no/such.csv".as_ref(), TSP, &limits()).expect_err("refused");
+    let missing = PsecCsvReader::open("no/such.csv".as_ref(), TSP, &limits()).expect_err("must be rejected");
     assert!(missing.to_string().starts_with("no/such.csv: "), "{missing}");
 }
 
-/// Rows that are made as they are read; counts the bytes that have been asked for.
+/// Reader that generates rows on demand and counts the bytes read.
 struct Generator<'a> {
     row: u64,
     rows: u64,
     rest: Vec<u8>,
-    given: &'a std::cell::Cell<u64>,
+    bytes_read: &'a std::cell::Cell<u64>,
 }
 
 impl Read for Generator<'_> {
@@ -264,24 +271,28 @@ impl Read for Generator<'_> {
         let length = self.rest.len().min(buffer.len());
         buffer[..length].copy_from_slice(&self.rest[..length]);
         self.rest.drain(..length);
-        self.given.set(self.given.get() + length as u64);
+        self.bytes_read.set(self.bytes_read.get() + length as u64);
         Ok(length)
     }
 }
 
 #[test]
-fn a_million_rows_are_read_as_they_are_asked_for() {
-    let given = std::cell::Cell::new(0);
+fn a_million_rows_are_streamed() {
+    let bytes_read = std::cell::Cell::new(0);
     let rows = 1_000_000;
-    let generator = Generator { row: 0, rows, rest: Vec::new(), given: &given };
-    let mut psec = PsecCsv::new(generator, "p.csv", TSP, &limits()).expect("good");
+    let generator = Generator { row: 0, rows, rest: Vec::new(), bytes_read: &bytes_read };
+    let mut psec = PsecCsvReader::new(generator, "p.csv", TSP, &limits()).expect("good");
     let mut row = [0.0];
     let mut instants = 0;
     while psec.next(&mut row).expect("good") {
         instants += 1;
         assert_eq!(row[0], (instants % 2) as f64 * 1e-4);
-        // A row has 7 to 20 bytes: no more is read than is given, but for two rows and a buffer.
-        assert!(given.get() < 20 * (instants + 2) + 8192 + 64, "{} bytes at {instants}", given.get());
+        // A row has 7 to 20 bytes: at most two rows and a buffer are read in advance.
+        assert!(
+            bytes_read.get() < 20 * (instants + 2) + 8192 + 64,
+            "{} bytes at {instants}",
+            bytes_read.get()
+        );
     }
     assert_eq!(instants, rows);
 }

@@ -1,26 +1,25 @@
-//! Numbers as text: the shortest decimal that is read back exactly, without an exponent, as `{}` has it.
+//! Formatting of numbers as the shortest decimal that parses to the same value, without an exponent, equal to `{}`.
 
 use std::io::Write;
 
-/// Below this, and with fewer zeros at the end of its fraction in binary than [`FEW_ZEROS`], a number has one
-/// shortest decimal that is nearest: two are equally near only where the number ends right between them,
-/// within as many binary places as there are decimals.
-const PLAIN: f64 = (1_u32 << 20) as f64;
-/// From 2^0 to 2^20 seventeen digits leave at most 17 binary places to end in: of 52, 20 at least are zeros then.
-const FEW_ZEROS: u32 = 20;
-/// What stands before the digits of the exponent of a small number.
+/// Upper limit of the fast path. Below it, a number with fewer trailing zero bits than [`FAST_PATH_ZEROS`] has a
+/// unique nearest shortest decimal. A tie between two decimals needs a binary fraction as short as the decimals.
+const FAST_PATH_LIMIT: f64 = (1_u32 << 20) as f64;
+/// Minimum number of trailing zero bits of a tie: 17 digits from 2^0 to 2^20 have at most 17 binary places.
+const FAST_PATH_ZEROS: u32 = 20;
+/// Prefix of the exponent of a small number.
 const EXPONENT: &[u8] = b"e-";
-/// What stands behind a whole number.
+/// Suffix of an integer.
 const POINT_ZERO: &[u8] = b".0";
 
-/// Adds `value` to `text`.
+/// Appends `value` to `text`.
 pub(super) fn push(text: &mut Vec<u8>, value: f64) {
-    // Axes at rest are at 0 of most signals.
+    // Most signals of axes at rest are 0.
     if value == 0.0 {
         text.extend_from_slice(if value.is_sign_negative() { b"-0" } else { b"0" });
         return;
     }
-    if value.abs() < PLAIN && value.to_bits().trailing_zeros() < FEW_ZEROS {
+    if value.abs() < FAST_PATH_LIMIT && value.to_bits().trailing_zeros() < FAST_PATH_ZEROS {
         let mut buffer = zmij::Buffer::new();
         let shortest = buffer.format_finite(value).as_bytes();
         match shortest.iter().rposition(|&byte| byte == b'e') {
@@ -29,12 +28,12 @@ pub(super) fn push(text: &mut Vec<u8>, value: f64) {
         }
         return;
     }
-    // A vector takes everything in.
+    // Writing to a vector cannot fail.
     let _ = write!(text, "{value}");
 }
 
-/// Adds a number below 1 that is told as `mantissa`, with a point behind its first digit at most, and the digits
-/// of its exponent without their sign.
+/// Appends a number below 1, given as `mantissa` with one digit before the point, and the digits of its negative
+/// exponent.
 fn push_small(text: &mut Vec<u8>, mantissa: &[u8], exponent: &[u8]) {
     let digits = mantissa.strip_prefix(b"-").unwrap_or(mantissa);
     text.extend_from_slice(&mantissa[..mantissa.len() - digits.len()]);
@@ -56,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn usual_and_unusual_numbers_are_as_display_has_them() {
+    fn selected_numbers_equal_their_display_format() {
         let numbers = [
             0.0,
             -0.0,
@@ -87,16 +86,16 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
 
         #[test]
-        fn any_number_is_as_display_has_it(bits in any::<u64>(), small in -2e6..2e6f64) {
+        fn any_number_equals_its_display_format(bits in any::<u64>(), small in -2e6..2e6f64) {
             let exact = f64::from_bits(bits);
             for number in [exact, small, small * 1e-6, small * 1e-12, exact.fract()] {
                 prop_assert_eq!(text(number), format!("{number}"));
             }
         }
 
-        /// Numbers that end between two shortest decimals.
+        /// Ties between two shortest decimals.
         #[test]
-        fn a_number_between_two_decimals_is_as_display_has_it(whole in any::<i64>(), places in 0..80i32, cut in 0..60u32) {
+        fn a_tie_between_two_decimals_equals_its_display_format(whole in any::<i64>(), places in 0..80i32, cut in 0..60u32) {
             let number = ((whole >> cut) | 1) as f64 * 2f64.powi(-places);
             prop_assert_eq!(text(number), format!("{number}"));
         }

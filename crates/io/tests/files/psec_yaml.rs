@@ -1,8 +1,8 @@
-//! Setpoints as YAML, as `ros2 topic pub` takes it; and what a file is.
+//! Position setpoints as YAML in the format of `ros2 topic pub`, and detection of kinds of files.
 
-use virtual_axes_core::trajectory::{TrajectoryRequest, Start};
+use virtual_axes_core::trajectory::{Start, TrajectoryRequest};
 use virtual_axes_core::units::SECOND_NS;
-use virtual_axes_io::files::{FileKind, Input, PsecYamlOut, read_psec_yaml};
+use virtual_axes_io::files::{FileKind, Input, PsecYamlWriter, read_psec_yaml};
 use virtual_axes_io::messages::joint_trajectory;
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
@@ -12,7 +12,7 @@ fn read(text: &str) -> Vec<TrajectoryRequest> {
 
 #[track_caller]
 fn error(text: &str) -> String {
-    read_psec_yaml(text, "p.yaml").expect_err("must be refused").to_string()
+    read_psec_yaml(text, "p.yaml").expect_err("must be rejected").to_string()
 }
 
 #[test]
@@ -29,7 +29,7 @@ fn flow_style_with_missing_fields_is_a_request() {
 }
 
 #[test]
-fn what_topic_echo_prints_is_read_document_by_document() {
+fn documents_of_topic_echo_are_read() {
     let requests = read(
         "header:\n  stamp:\n    sec: 12\n    nanosec: 500000000\n  frame_id: ''\njoint_names:\n- y\npoints:\n\
          - positions:\n  - 0.0\n  velocities:\n  - 0.5\n  accelerations: []\n  effort: []\n  time_from_start:\n    \
@@ -44,7 +44,7 @@ fn what_topic_echo_prints_is_read_document_by_document() {
 }
 
 #[test]
-fn stamps_that_topic_pub_fills_in_are_now() {
+fn keywords_of_topic_pub_start_now() {
     for header in ["auto", "{stamp: now}", "{}", "{frame_id: map, stamp: {sec: 0}}"] {
         let text = format!("header: {header}\njoint_names: [x]\npoints: [{{positions: [0]}}]\n");
         assert_eq!(read(&text)[0].start(), Start::Now, "{header}");
@@ -54,9 +54,12 @@ fn stamps_that_topic_pub_fills_in_are_now() {
 }
 
 #[test]
-fn faults_name_file_and_line() {
-    assert_eq!(error(""), "p.yaml: there is no trajectory; it is a mapping with joint_names and points");
-    assert_eq!(error("---\n"), "p.yaml: there is no trajectory; it is a mapping with joint_names and points");
+fn errors_name_file_and_line() {
+    assert_eq!(error(""), "p.yaml: the file contains no trajectory, a mapping with joint_names and points");
+    assert_eq!(
+        error("---\n"),
+        "p.yaml: the file contains no trajectory, a mapping with joint_names and points"
+    );
     assert_eq!(error("joint_names: [x]\npoints: 5\n"), "p.yaml:2: expected a list: points: 5");
     assert_eq!(
         error("joint_names: &names [x]\npoints: *names\n"),
@@ -75,10 +78,7 @@ fn faults_name_file_and_line() {
         error("joint_names: [x]\nspeed: 3\n"),
         "p.yaml:2: unknown field speed; there are header, joint_names, points"
     );
-    assert_eq!(
-        error("joint_names: [x]\njoint_names: [y]\n"),
-        "p.yaml:2: duplicate key joint_names"
-    );
+    assert_eq!(error("joint_names: [x]\njoint_names: [y]\n"), "p.yaml:2: duplicate key joint_names");
     assert_eq!(
         error("joint_names: [x]\npoints:\n- {positions: [0.0]}\n- {positions: [0.0, 1.0]}\n"),
         "p.yaml:4: point 1: 2 positions for 1 joints"
@@ -109,7 +109,7 @@ fn faults_name_file_and_line() {
 }
 
 #[test]
-fn thousands_of_points_are_within_the_bounds_of_the_reader() {
+fn thousands_of_points_are_within_the_limits_of_the_parser() {
     let mut text = "joint_names: [x, y, z, a, c]\npoints:\n".to_owned();
     for k in 0..100_000 {
         text += &format!("- {{positions: [0, 0, 0, 0, 0], time_from_start: {{sec: {k}}}}}\n");
@@ -118,7 +118,7 @@ fn thousands_of_points_are_within_the_bounds_of_the_reader() {
 }
 
 #[test]
-fn what_is_written_is_read_back_bit_for_bit() {
+fn written_setpoints_are_read_back_bit_for_bit() {
     let joints = ["y".to_owned(), "on: \"1\"".to_owned()];
     let values = [
         [0.1, -1e-300],
@@ -127,7 +127,7 @@ fn what_is_written_is_read_back_bit_for_bit() {
         [1e22, 3.0],
         [0.30000000000000004, 5e-324],
     ];
-    let mut out = PsecYamlOut::new(Vec::new(), &joints).expect("in memory");
+    let mut out = PsecYamlWriter::new(Vec::new(), &joints).expect("in memory");
     for (k, row) in values.iter().enumerate() {
         out.row(k as i64 * 6_000_000 + 2_000_000_000, row).expect("in memory");
     }
@@ -145,12 +145,12 @@ fn what_is_written_is_read_back_bit_for_bit() {
     }
     assert_eq!(request.points(), values.len());
     assert_eq!(joint_trajectory(request).header.stamp.sec, 0);
-    let none = PsecYamlOut::new(Vec::new(), &joints).expect("in memory").finish().expect("in memory");
+    let none = PsecYamlWriter::new(Vec::new(), &joints).expect("in memory").finish().expect("in memory");
     assert_eq!(read(&String::from_utf8(none).expect("text"))[0].points(), 0);
 }
 
 #[test]
-fn what_a_file_is_is_told_by_its_content() {
+fn the_kind_of_a_file_is_detected_by_its_content() {
     let folder = TestFolder::new("kind");
     let mcap = b"\x89MCAP0\r\nrest".as_slice();
     for (bytes, kind) in [
@@ -170,29 +170,29 @@ fn what_a_file_is_is_told_by_its_content() {
         assert_eq!(input.text().map(str::as_bytes), yaml.then_some(bytes));
         let mut whole = Vec::new();
         std::io::Read::read_to_end(&mut input.into_reader(), &mut whole).expect("readable");
-        assert_eq!(whole, bytes, "nothing is lost to the telling");
+        assert_eq!(whole, bytes, "the reader returns the whole content");
     }
 }
 
 #[test]
-fn what_is_not_known_is_said_with_what_is() {
+fn errors_of_unknown_files_list_the_supported_kinds() {
     let folder = TestFolder::new("unknown");
     for (bytes, words) in [
-        (b"".as_slice(), "f: it is empty; there are setpoints as CSV"),
-        (b"t,x\n0,0\n", "f: its first line is \"t,x\"; there are setpoints as CSV"),
-        (b"foo: 1\nbar: [2]\n", "f: it is a mapping of foo, bar; there are"),
-        (b"- 1\n", "f: its first line is \"- 1\"; there are"),
-        (b"\x89PNG\r\n\x1a\n\0\0\0", "f: it is not text; there are"),
+        (b"".as_slice(), "f: the file is empty; supported are setpoints as CSV"),
+        (b"t,x\n0,0\n", "f: the first line is \"t,x\"; supported are setpoints as CSV"),
+        (b"foo: 1\nbar: [2]\n", "f: the file is a mapping with keys foo, bar; supported are"),
+        (b"- 1\n", "f: the first line is \"- 1\"; supported are"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0", "f: the file is not UTF-8 text; supported are"),
         (b"moves:\n- {x: 1\n- y\n", "f:2: not YAML: "),
     ] {
         let path = folder.file("f", bytes);
-        let message = Input::open(&path).expect_err("must be refused").to_string();
+        let message = Input::open(&path).expect_err("must be rejected").to_string();
         assert!(message.contains(words), "{message}");
         assert!(message.contains("scenarios (a mapping with moves)"), "{message}");
         assert_eq!(message.lines().count(), 1, "{message}");
     }
-    let message = Input::open("no/such".as_ref()).expect_err("must be refused").to_string();
+    let message = Input::open("no/such".as_ref()).expect_err("must be rejected").to_string();
     assert!(message.starts_with("no/such: "), "{message}");
-    let message = Input::open("/".as_ref()).expect_err("must be refused").to_string();
+    let message = Input::open("/".as_ref()).expect_err("must be rejected").to_string();
     assert!(message.starts_with("/: "), "{message}");
 }
