@@ -54,7 +54,7 @@ def machine_file(machine: str) -> Path:
         if path.is_file():
             return path.resolve()
     names = ", ".join(sorted(path.stem for path in shipped.parent.glob("*.yaml")))
-    raise RuntimeError(f"machine:={machine}: there is no such file, and the shipped machines are {names}")
+    raise RuntimeError(f"machine:={machine}: file not found; built-in machines: {names}")
 
 
 def joints_of(machine: Path) -> list[str]:
@@ -94,7 +94,7 @@ def robot_description(context: LaunchContext, machine: Path, joint_prefix: str) 
     command = [program, "urdf", "--machine", str(machine), "--joint-prefix", joint_prefix]
     result = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
     if result.returncode:
-        raise RuntimeError(f"{result.stderr.strip()} (or leave the model out: robot_state_publisher:=false)")
+        raise RuntimeError(f"{result.stderr.strip()} (without the model: robot_state_publisher:=false)")
     return result.stdout, []
 
 

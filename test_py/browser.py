@@ -73,7 +73,7 @@ class Browser:
                 port, path = lines
                 return f"ws://127.0.0.1:{port}{path}"
             time.sleep(0.05)
-        raise TimeoutError(f"the browser does not listen after {TIMEOUT} s: {self._log.name}")
+        raise TimeoutError(f"no DevTools connection after {TIMEOUT} s: {self._log.name}")
 
     def send(self, method: str, **params: object) -> dict:
         """Returns a command's result; keeps events that arrive meanwhile."""

@@ -1,6 +1,6 @@
 """Fixtures: nodes under test, each in its own DDS domain on this machine only.
 
-Needs the environment of .build/env.sh (`./test.sh` sees to it) and the node's program: by default
+Needs the environment of .build/env.sh (created by `./test.sh`) and the node's program: by default
 target/release/virtual_axes_node, another with VIRTUAL_AXES_NODE.
 """
 

@@ -44,7 +44,16 @@ def measure(drive: Drive, path: Ballbar) -> Recording:
 
 def report(path: Ballbar, runs: dict[str, Recording]) -> str:
     """Returns the table of radial deviations and following errors, µm."""
-    head = ("ballbar R 150 mm, 15 m/min", "mean", "min", "max", "G", "specified", "paper", "X, Y max |e| synchronized")
+    head = (
+        "ballbar R 150 mm, 15 m/min",
+        "mean",
+        "min",
+        "max",
+        "G",
+        "specified",
+        "paper",
+        "X, Y max |e| delay-compensated",
+    )
     rows = [head]
     for title, run in runs.items():
         deviation = run.radial_deviation(path.center, path.radius)[run.within(path.steady)] * 1e6
@@ -125,7 +134,7 @@ def _round_step(value: float) -> float:
 def main() -> int:
     """Runs the circles, prints the table and draws the plots."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--fast", action="store_true", help="as fast as the machine can, not in real time")
+    parser.add_argument("--fast", action="store_true", help="run as fast as possible, not in real time")
     parser.add_argument("--out", type=Path, default=Path(__file__).resolve().parent.parent / ".build" / "ballbar.png")
     arguments = parser.parse_args()
     if arguments.out.suffix.lower() not in (".png", ".pdf", ".svg"):

@@ -1,8 +1,8 @@
 """Graph of four processes: trajectory source, node, process model, recorder.
 
-The process model answers the axes' velocity with a load in proportion to it and against the motion, as
-a cutting process does; the recorder keeps what the axes publish and how late it came. `tools/run_graph.py`
-runs it for a minute, a test for a few seconds. Each of the three is this file as a program:
+The process model responds to the axes' velocity with a load in proportion to it and against the motion, like a cutting
+process; the recorder keeps the published samples and their latency. `tools/run_graph.py` runs it for a minute, a test
+for a few seconds. Each of the three is this file as a program:
 
     python test_py/four_processes.py source|process-model|recorder SECONDS [FILE]
 """
@@ -129,7 +129,7 @@ def wait_for_match(node: rclpy.node.Node, is_matched: Callable[[], bool]) -> Non
     deadline = time.monotonic() + 20
     while not is_matched():
         if time.monotonic() > deadline:
-            sys.exit("nobody there")
+            sys.exit("no match with the node")
         rclpy.spin_once(node, timeout_sec=0.05)
     print(READY, flush=True)
 

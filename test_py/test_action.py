@@ -115,14 +115,14 @@ def test_a_goal_without_points_is_a_controlled_stop(follow: Follow) -> None:
     assert "stop" in ended.result.error_string
 
 
-# ---- goals that are refused
+# ---- goals that are rejected
 
 
 def tolerance(name: str, **values: float) -> list[JointTolerance]:
     return [JointTolerance(name=name, **values)]
 
 
-REFUSED = {
+REJECTED_GOALS = {
     "unknown joint": (
         lambda g: g.trajectory.joint_names.__setitem__(0, "q"),
         Result.INVALID_JOINTS,
@@ -205,10 +205,10 @@ REFUSED = {
 }
 
 
-def test_a_goal_that_cannot_be_run_is_aborted_with_the_reason_and_disturbs_nothing(follow: Follow) -> None:
+def test_an_invalid_goal_is_aborted_with_the_reason_and_the_motion_continues(follow: Follow) -> None:
     running = follow.send(goal(wave(joint="z")))
     running.wait_for_feedback()
-    for case, (spoil, code, name, words) in REFUSED.items():
+    for case, (spoil, code, name, words) in REJECTED_GOALS.items():
         message = goal(line(["x", "y"], [0.05, 0.02], 1.0))
         spoil(message)
         sent = follow.send(message)
@@ -217,9 +217,9 @@ def test_a_goal_that_cannot_be_run_is_aborted_with_the_reason_and_disturbs_nothi
         assert (ended.status, ended.result.error_code) == (GoalStatus.STATUS_ABORTED, code), (case, ended.result)
         assert ended.result.error_string.startswith(f"{name}: "), (case, ended.result)
         assert words in ended.result.error_string, (case, ended.result)
-        told = ending(follow, sent)
-        assert told.status == TrajectoryResult.REJECTED and told.text in ended.result.error_string
-        assert told.code == getattr(TrajectoryResult, name)
+        reported = ending(follow, sent)
+        assert reported.status == TrajectoryResult.REJECTED and reported.text in ended.result.error_string
+        assert reported.code == getattr(TrajectoryResult, name)
     count = len(running.feedback)
     running.wait_for_feedback(count + 5)
     assert follow.status_of(running.id) == GoalStatus.STATUS_EXECUTING
@@ -235,7 +235,7 @@ def test_only_an_id_that_is_in_use_is_rejected(follow: Follow) -> None:
 # ---- clients
 
 
-def test_a_result_can_be_asked_for_late_and_by_several_clients(follow: Follow) -> None:
+def test_a_result_can_be_requested_late_and_by_several_clients(follow: Follow) -> None:
     with Drive(process=follow.drive.process) as other, Follow(other) as second:
         mine = follow.send(goal(line(["x"], [0.01], 0.5)))
         theirs = second.send(goal(line(["y"], [0.01], 0.5)))
@@ -258,7 +258,7 @@ def test_a_goal_can_start_later(follow: Follow) -> None:
     assert to_ns(ending(follow, sent).start) == start
 
 
-def test_controller_state_compares_the_axes_with_their_set_points(follow: Follow) -> None:
+def test_controller_state_compares_the_axes_with_their_setpoints(follow: Follow) -> None:
     drive, messages = follow.drive, []
     topic = f"{drive.target}/controller_state"
 

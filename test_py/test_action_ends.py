@@ -51,7 +51,7 @@ def test_path_tolerances_are_kept_on_the_way_and_end_the_goal_when_not(without_f
     broken = follow.send(goal(constant(FEED, 0.15), path={"x": 0.95 * trailing})).ended()
     assert (broken.status, broken.result.error_code) == (GoalStatus.STATUS_ABORTED, Result.PATH_TOLERANCE_VIOLATED)
     text = broken.result.error_string
-    assert text.startswith("joint x: position error ") and f"path tolerance {0.95 * trailing}" in text
+    assert text.startswith("joint x: position error ") and f"path tolerance {0.95 * trailing:.6g}" in text
     error = float(text.split("error ")[1].split(" m ")[0])
     assert 0.95 * trailing < error < trailing
 
@@ -95,8 +95,8 @@ def test_canceling_stops_the_axes_within_their_limits(follow: Follow) -> None:
     ended = sent.ended()
     assert ended.status == GoalStatus.STATUS_CANCELED, ended.result
     follow.drive.wait_for(lambda: follow.status_of(sent.id) == GoalStatus.STATUS_CANCELED, 5, "its status")
-    told = ending(follow, sent)
-    end = to_ns(told.header.stamp)
+    reported = ending(follow, sent)
+    end = to_ns(reported.header.stamp)
     # The stop takes 0.13 s at most; the wave is past its first 2 s, which end in a kink.
     before, rest = 60, 20
     follow.drive.wait_until(end + rest * TSP_NS, 20)
@@ -110,7 +110,7 @@ def test_canceling_stops_the_axes_within_their_limits(follow: Follow) -> None:
     assert np.abs(jerk).max() <= limits["x.limits.jerk_m_s3"] * (1 + 1e-6)
 
 
-def test_canceling_what_is_over_or_unknown_says_so(follow: Follow) -> None:
+def test_canceling_a_finished_or_unknown_goal_returns_its_code(follow: Follow) -> None:
     over = follow.send(goal(line(["x"], [0.001], 0.1)))
     assert over.status() == GoalStatus.STATUS_SUCCEEDED
     assert follow.cancel(over.id).return_code == CancelGoal.Response.ERROR_GOAL_TERMINATED
@@ -132,7 +132,7 @@ def test_canceling_all_and_by_time(follow: Follow) -> None:
     assert second.status() == third.status() == GoalStatus.STATUS_CANCELED
 
 
-def test_a_newer_goal_or_trajectory_displaces_and_both_are_told(follow: Follow) -> None:
+def test_a_newer_goal_or_trajectory_preempts_and_both_get_results(follow: Follow) -> None:
     drive = follow.drive
     first = follow.send(goal(wave()))
     first.wait_for_feedback(10)
@@ -141,7 +141,7 @@ def test_a_newer_goal_or_trajectory_displaces_and_both_are_told(follow: Follow) 
     second = follow.send(goal(onward))
     ended = first.ended()
     assert (ended.status, ended.result.error_code) == (GoalStatus.STATUS_ABORTED, Result.INVALID_GOAL)
-    assert ended.result.error_string == f"axes were taken over by goal {second.id.hex()}"
+    assert ended.result.error_string == f"preempted by goal {second.id.hex()}"
     assert ending(follow, first).status == TrajectoryResult.PREEMPTED
 
     second.wait_for_feedback(5)
@@ -151,8 +151,8 @@ def test_a_newer_goal_or_trajectory_displaces_and_both_are_told(follow: Follow) 
     assert f"trajectory {number} of psec" in ended.result.error_string
 
     third = follow.send(goal(onward))
-    told = drive.end(number, 20)
-    assert told.status == TrajectoryResult.PREEMPTED and f"goal {third.id.hex()}" in told.text
+    reported = drive.end(number, 20)
+    assert reported.status == TrajectoryResult.PREEMPTED and f"goal {third.id.hex()}" in reported.text
     third.wait_for_feedback(1)
     drive.stop()
     ended = third.ended()

@@ -79,15 +79,15 @@ def test_the_document_has_every_key_and_no_other(real: Drive):
     section = document.split("## What `/diagnostics` tells")[1].split("\n## ")[0]
     documented = re.findall(r"^\| [^|]*\| `(\w+)` \|", section, re.MULTILINE)
     found = real.next_diagnostics().status
-    told = dict.fromkeys(key for status in found for key in status_values(status))
-    assert [*told, *RECORDING_KEYS] == documented
+    reported = dict.fromkeys(key for status in found for key in status_values(status))
+    assert [*reported, *RECORDING_KEYS] == documented
 
 
-def test_who_has_come_is_counted_and_memory_told(real: Drive):
+def test_endpoints_are_counted_and_memory_is_reported(real: Drive):
     """Each remote endpoint counts once, also after it has left; memory equals Linux's figure of the process."""
 
     def count() -> int:
-        return int(real.told()["endpoints_discovered"])
+        return int(real.next_status()["endpoints_discovered"])
 
     before = count()
 
@@ -100,6 +100,6 @@ def test_who_has_come_is_counted_and_memory_told(real: Drive):
 
     real.in_executor(come_and_go)
     real.wait_for(lambda: count() >= before + 25, 20, "20 subscriptions and 5 publishers counted")
-    after = real.told()
+    after = real.next_status()
     assert int(after["endpoints_discovered"]) == before + 25
     assert abs(float(after["memory_mb"]) - own_mb(real.process.pid)) < 5.0

@@ -32,7 +32,7 @@ def diagnostics(drive: Drive) -> list[dict[str, str]]:
     return [status_values(array.status[0]) for array in drive.diagnostics()]
 
 
-def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
+def test_a_paused_node_continues_without_a_burst(real: Drive):
     """Missed cycles are counted and reported, the motion stays on schedule, services respond as before."""
     go_home(real)
     assert real.process is not None
@@ -74,8 +74,8 @@ def test_a_node_that_was_paused_goes_on_without_a_burst(real: Drive):
 
     real.wait_for(lambda: counted(diagnostics(real)[-1]), 10, "count of the missed periods")
     messages = [array.status[0].message for array in real.diagnostics()]
-    assert any("the node stood still" in message for message in messages)
-    assert "the node stood still for" in real.process.output()
+    assert any("the node stalled" in message for message in messages)
+    assert "the node stalled for" in real.process.output()
     # The middleware's threads survive the pause.
     assert "poll" not in real.process.output()
     assert real.end(accepted.sequence_number, 20).status == 2
@@ -97,7 +97,7 @@ def recovers(act: Callable[[], Answer]) -> Answer:
                 raise
 
 
-def test_who_stays_is_served_by_a_node_that_was_killed_and_started_again():
+def test_existing_participants_work_with_a_node_that_was_killed_and_started_again():
     """Existing publishers, subscribers, service clients and action clients work without a restart."""
     with Node(["-p", "max_points:=20000"]) as process, Drive(process=process) as drive, Follow(drive) as follow:
         drive.set_parameters({"x.velocity_loop.gain": 4.9})

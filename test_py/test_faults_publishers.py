@@ -20,8 +20,8 @@ from std_srvs.srv import Trigger
 from virtual_axes.msg import TrajectoryResult as R
 
 from drive import TSP_NS, Drive, Node, joint_trajectory, parameter_messages, resident_mb, to_ns
-from guest import Guest, long_trajectory
 from motion import TSP, assert_psec, go_home, start_swing, swing
+from participant import Participant, long_trajectory
 
 POINTS = 500_000
 MESSAGE_MB = 20
@@ -52,7 +52,7 @@ def pid_of(drive: Drive) -> int:
 def kill_while_sending(drive: Drive, folder: Path) -> bool:
     """Kills a publisher when the node has begun to assemble its message; returns true if the node had begun."""
     pid, decided = pid_of(drive), len(drive.results())
-    with Guest(drive.process.domain_id, "send", POINTS, lease=2, folder=folder) as sender:
+    with Participant(drive.process.domain_id, "send", POINTS, lease=2, folder=folder) as sender:
         before = resident_mb(pid)
         sender.go_on()
         deadline = time.monotonic() + 5
@@ -65,7 +65,7 @@ def kill_while_sending(drive: Drive, folder: Path) -> bool:
     return len(drive.results()) == decided and begun
 
 
-def test_a_publisher_killed_in_the_middle_of_a_message_harms_nobody(node: Drive, tmp_path: Path):
+def test_a_publisher_killed_within_a_message_does_not_affect_others(node: Drive, tmp_path: Path):
     """The next publisher's trajectory is executed bit-identically; received fragments of the message stay in memory."""
     time_s, position = swing(1.2)
     motion = joint_trajectory(["x", "c"], time_s, np.column_stack([position, 3 * position]))
@@ -131,7 +131,7 @@ def move_through(drive: Drive, act: Callable[[], None]) -> str:
     assert_psec(drive, start, plan)
     assert drive.end(accepted.sequence_number, 30).status == R.COMPLETED
     # Diagnostics and the last log lines are complete now.
-    drive.told()
+    drive.next_status()
     log, seconds = drive.process.output()[said:], time.monotonic() - begin
     kinds: dict[str, int] = {}
     for line in log.splitlines():
@@ -143,11 +143,11 @@ def move_through(drive: Drive, act: Callable[[], None]) -> str:
 
 FLOODS = {
     "trajectories that are taken": ("_psec", joint_trajectory(["x"], [0.0, 0.06], [[0.0]] * 2)),
-    "trajectories that are refused": ("_psec", joint_trajectory(["q"], [0.0], [[0.0]])),
+    "trajectories that are rejected": ("_psec", joint_trajectory(["q"], [0.0], [[0.0]])),
     "setpoints that are taken": ("_stream", JointState(name=["x"], position=[1e-4])),
-    "setpoints that are refused": ("_stream", JointState(name=["x"], position=[0.4])),
+    "setpoints that are rejected": ("_stream", JointState(name=["x"], position=[0.4])),
     "loads": ("_load", JointState(name=["x"], effort=[1.0])),
-    "loads that are refused": ("_load", JointState(name=["q"], effort=[1.0])),
+    "loads that are rejected": ("_load", JointState(name=["q"], effort=[1.0])),
 }
 
 
@@ -155,7 +155,7 @@ FLOODS = {
 def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
     """The active motion is undisturbed, memory and log are bounded, and commands are accepted as before."""
     publisher, message = FLOODS[what]
-    refused = int(node.told()["stream_setpoints_refused"])
+    rejected = int(node.next_status()["stream_setpoints_rejected"])
     memory = resident_mb(pid_of(node))
 
     def act() -> None:
@@ -172,11 +172,11 @@ def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
     if publisher == "_psec":
         assert "lines of this kind" in log, "nothing was left out"
         forget_results(node)
-    if what == "setpoints that are refused":
-        assert int(node.told()["stream_setpoints_refused"]) > refused
-        assert log.count("setpoint of the stream refused") <= 10
-    if what == "loads that are refused":
-        assert 1 <= log.count("a message on load is left out") <= 10
+    if what == "setpoints that are rejected":
+        assert int(node.next_status()["stream_setpoints_rejected"]) > rejected
+        assert log.count("streamed setpoint rejected") <= 10
+    if what == "loads that are rejected":
+        assert 1 <= log.count("load message ignored") <= 10
     node.set_parameters({"x.velocity_loop.gain": 5.0})
     time_s, position = swing(0.6, amplitude=0.01)
     recording = node.run(joint_trajectory(["y"], time_s, position))
@@ -231,7 +231,7 @@ def test_parameters_can_be_set_while_a_stream_floods_the_node(node: Drive):
     node.set_parameters({"x.velocity_loop.gain": 5.0})
 
 
-def test_of_two_publishers_that_contend_the_newest_has_the_joint(node: Drive):
+def test_of_two_contending_publishers_the_newest_commands_the_joint(node: Drive):
     """Each instant belongs to one trajectory, complete from its start until the next start; each has a result."""
     go_home(node)
     with Drive(process=node.process) as other:
@@ -259,7 +259,7 @@ def test_of_two_publishers_that_contend_the_newest_has_the_joint(node: Drive):
         assert x == -y
 
 
-def test_of_two_streams_that_contend_no_message_is_mixed(node: Drive):
+def test_messages_of_two_contending_streams_are_not_mixed(node: Drive):
     """The joints of one message are commanded together: the last message of a cycle counts."""
     go_home(node)
     with Drive(process=node.process) as other:

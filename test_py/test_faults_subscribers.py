@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory, resident_mb, status_values
-from guest import Guest
 from motion import assert_psec, go_home, start_swing
+from participant import Participant
 
 STOPPED_S = 20
 LEASE_S = 60
@@ -22,28 +22,28 @@ GROWTH_MB = 24.0
 """Maximum memory of 20 s of unread samples of a topic, MB, including discovery data."""
 
 
-def test_subscribers_that_are_killed_or_stopped_for_20_s_harm_nobody(real: Drive, tmp_path: Path):
+def test_killed_and_stopped_subscribers_do_not_affect_others(real: Drive, tmp_path: Path):
     """The axes move in real time, others lose no sample, memory is bounded; later each gets its history depth."""
     go_home(real)
     assert real.process is not None
     pid, domain = real.process.pid, real.process.domain_id
     topic = "/joint_states"
     with (
-        Guest(domain, "listen", topic, 100) as killed,
-        Guest(domain, "listen", topic, SHALLOW, lease=LEASE_S, folder=tmp_path) as shallow,
-        Guest(domain, "listen", topic, DEEP, lease=LEASE_S, folder=tmp_path) as deep,
+        Participant(domain, "listen", topic, 100) as killed,
+        Participant(domain, "listen", topic, SHALLOW, lease=LEASE_S, folder=tmp_path) as shallow,
+        Participant(domain, "listen", topic, DEEP, lease=LEASE_S, folder=tmp_path) as deep,
     ):
         before = resident_mb(pid)
         accepted, start, plan = start_swing(real, duration=STOPPED_S + 1.0)
         killed.kill()
-        for guest in (shallow, deep):
-            guest.stop()
+        for participant in (shallow, deep):
+            participant.stop()
         stopped = real.now()
         real.wait_until(stopped + STOPPED_S * NANOSECONDS, STOPPED_S + 30)
         resumed = real.now()
         grown = resident_mb(pid) - before
-        for guest in (shallow, deep):
-            guest.resume()
+        for participant in (shallow, deep):
+            participant.resume()
         # Undisturbed subscribers receive all samples, and the motion is as planned.
         assert_psec(real, start, plan)
         recording = real.record(stopped, resumed)
@@ -55,10 +55,10 @@ def test_subscribers_that_are_killed_or_stopped_for_20_s_harm_nobody(real: Drive
         real.wait_until(resumed + 2 * NANOSECONDS, 30)
         until = real.now()
         stamps = {}
-        for name, guest in (("shallow", shallow), ("deep", deep)):
+        for name, participant in (("shallow", shallow), ("deep", deep)):
 
-            def caught_up(guest: Guest = guest, name: str = name) -> bool:
-                stamps[name] = guest.stamps()
+            def caught_up(participant: Participant = participant, name: str = name) -> bool:
+                stamps[name] = participant.stamps()
                 return bool(stamps[name][-1] >= until)
 
             real.wait_for(caught_up, 20, f"samples of the {name} one that goes on")
@@ -67,13 +67,13 @@ def test_subscribers_that_are_killed_or_stopped_for_20_s_harm_nobody(real: Drive
         assert real.end(accepted.sequence_number, 10).status == 2
 
 
-def test_shallow_subscribers_do_not_bring_fast_axes_to_a_stand(start: Callable[..., Drive]):
+def test_shallow_subscribers_do_not_stall_fast_axes(start: Callable[..., Drive]):
     """Depth as of `ros2 topic echo`: a sample lost before it reaches such a reader is lost without notice."""
     drive = start("-p", "time:=fast")
     assert drive.process is not None
-    with ExitStack() as guests:
+    with ExitStack() as participants:
         for _ in range(3):
-            guests.enter_context(Guest(drive.process.domain_id, "sink", SHALLOW))
+            participants.enter_context(Participant(drive.process.domain_id, "sink", SHALLOW))
         recording = drive.run(joint_trajectory(["x"], [0.0, FAST_S], [[0.0], [0.3]]), timeout=120)
     assert set(np.diff(recording.joints.stamp)) == {TSP_NS}
     assert len(recording.joints) == FAST_S * NANOSECONDS / TSP_NS + 1

@@ -74,7 +74,7 @@ def test_stress_is_a_program_where_there_is_one(freeze: ModuleType, tmp_path: Pa
     assert programs.command(["stress", "--json"]) == [f"{tmp_path}/virtual_axes_stress", "--json"]
 
 
-def test_the_exit_status_tells_whether_recordings_differ(tmp_path: Path):
+def test_the_exit_status_is_1_if_recordings_differ(tmp_path: Path):
     a, b, renames = (tmp_path / name for name in ("a.json", "b.json", "renames.tsv"))
     a.write_text('{"old": 1}')
     b.write_text('{"new": 1}')

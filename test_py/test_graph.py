@@ -27,7 +27,7 @@ def of_the_node(drive: Drive) -> set[str]:
     }
 
 
-def test_comes_and_goes_within_two_seconds():
+def test_appears_and_disappears_within_two_seconds():
     """All interfaces appear, and none remains afterwards."""
     process = Node()
     rows = [row for row in interfaces() if row.condition is None and row.direction != "action"]

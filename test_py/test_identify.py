@@ -1,8 +1,8 @@
 """Identification from MCAP recordings of the real node: all parameters compared with model.md.
 
-The campaigns of all five axes run side by side on one node, once without feedforward, once with that of the
-velocity, once with both. What was published is spoilt as an oscilloscope spoils it (encoder steps, noise of
-the current), written to MCAP, and the command starts from a machine whose values are wrong.
+The campaigns of all five axes run simultaneously on one node, once without feedforward, once with velocity feedforward,
+once with both. The published signals are disturbed like those of an oscilloscope (encoder quantization, current noise),
+written to MCAP, and the command starts from a machine with wrong values.
 """
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ def identify(recordings: list[Path], axis: str, *more: object) -> dict[str, dict
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_an_axis_comes_back_from_its_recording(axis: str, recordings: list[Path], tmp_path: Path):
+def test_parameters_of_an_axis_are_identified_from_its_recording(axis: str, recordings: list[Path], tmp_path: Path):
     """Inertia to 1 %, friction to 2 %, i0 to 3 %, gravity to 2 %, feedforward to 0.5 %, β to Tsv."""
     machine = tmp_path / "found.yaml"
     values = identify(recordings, axis, "--out", machine)

@@ -38,7 +38,7 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
             return {bytes(info.endpoint_gid) for info in drive.node.get_publishers_info_by_topic(TOPIC)}
 
         def came() -> int:
-            return int(drive.told()["endpoints_discovered"])
+            return int(drive.next_status()["endpoints_discovered"])
 
         early: list[int] = []
         listen(BEST_EFFORT, early)

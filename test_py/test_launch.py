@@ -100,7 +100,7 @@ def test_simulated_time_is_use_sim_time():
         ({"rviz": "yes"}, ["rviz", "yes", "true"]),
     ],
 )
-def test_what_cannot_be_is_refused(arguments: dict[str, str], words: list[str]):
+def test_what_cannot_be_is_rejected(arguments: dict[str, str], words: list[str]):
     """The message names the argument, the value found and the allowed values."""
     with pytest.raises(RuntimeError) as error:
         nodes(ONE, **arguments)
@@ -108,7 +108,7 @@ def test_what_cannot_be_is_refused(arguments: dict[str, str], words: list[str]):
         assert word in str(error.value)
 
 
-def test_a_machine_outside_the_chain_is_refused_unless_it_needs_no_model(tmp_path: Path):
+def test_a_machine_without_kinematics_is_rejected_unless_the_model_is_off(tmp_path: Path):
     """The message contains the command's own reason."""
     text = (ROOT / "config" / "mikron_ucp710.yaml").read_text()
     changed = text.replace('"a", "c"]', '"a", "b"]').replace("\n    c:\n", "\n    b:\n")
@@ -120,7 +120,7 @@ def test_a_machine_outside_the_chain_is_refused_unless_it_needs_no_model(tmp_pat
     assert len(nodes(ONE, machine=str(machine), robot_state_publisher="false")) == 1
 
 
-def test_without_the_command_the_shipped_model_serves_its_own_machine(monkeypatch: pytest.MonkeyPatch):
+def test_without_the_command_the_built_in_model_is_used(monkeypatch: pytest.MonkeyPatch):
     """A log message reports the fallback; another machine is rejected."""
     monkeypatch.setattr(substitutions, "PROGRAMS", {})
     found = actions(ONE)
@@ -130,7 +130,7 @@ def test_without_the_command_the_shipped_model_serves_its_own_machine(monkeypatc
         nodes(ONE, machine="linear_motor_center")
 
 
-def test_the_node_runs_with_what_launch_passes():
+def test_the_node_runs_with_the_arguments_from_launch():
     """Names, controller and prefix have the given values."""
     [node] = nodes(
         ONE, namespace="cell", name="mill", joint_prefix="m_", controller="gpc", robot_state_publisher="false"
@@ -171,7 +171,7 @@ def test_two_machines_run_in_one_domain():
         assert poses[0].header.frame_id == "right/workpiece"
 
 
-def test_recordings_of_two_machines_do_not_meet(tmp_path: Path):
+def test_recordings_of_two_machines_are_separate_files(tmp_path: Path):
     """One file each, in the given folder."""
     found = by_executable(nodes(TWO, record=str(tmp_path), robot_state_publisher="false"))
     recorded = [node.values["record"] for node in found["virtual_axes_node"]]
@@ -179,7 +179,7 @@ def test_recordings_of_two_machines_do_not_meet(tmp_path: Path):
     assert list(found) == ["virtual_axes_node"]
 
 
-def test_the_stand_in_keeps_arguments_as_launch_does():
+def test_the_stand_in_scopes_arguments_as_launch_does():
     """Arguments of an include stay set afterwards unless a group restores them."""
     context = launch.LaunchContext()
     context.launch_configurations["machine"] = "outer"
@@ -192,7 +192,7 @@ def test_the_stand_in_keeps_arguments_as_launch_does():
     assert context.launch_configurations["machine"] == "mikron_ucp710"
 
 
-def test_what_launch_needs_is_installed():
+def test_files_of_the_launch_files_are_installed():
     """Folders in CMakeLists.txt, packages in package.xml."""
     cmake = (ROOT / "CMakeLists.txt").read_text()
     [folders] = re.findall(r"foreach\(folder ([^)]*)\)", cmake)
@@ -203,7 +203,7 @@ def test_what_launch_needs_is_installed():
         assert f"<exec_depend>{package}</exec_depend>" in manifest, package
 
 
-def test_the_command_says_where_the_tool_is():
+def test_the_command_prints_the_tool_pose():
     """A joint that the machine does not have is rejected, with status 2 and no output."""
     program = node_binary().with_name("virtual_axes")
     command = [program, "pose", "--joints", "q=1"]

@@ -111,7 +111,7 @@ def test_rviz_of_two_machines_has_the_names_of_the_launch_file():
     assert own == {f"/{node.namespace}/{node.name}/{n}" for node in found["virtual_axes_node"] for n in names}
 
 
-def test_plotjuggler_plots_fields_that_there_are(topics: dict[str, str]):
+def test_plotjuggler_plots_existing_fields(topics: dict[str, str]):
     """Each curve is /topic/field[index], or a pair of them."""
     root = ElementTree.parse(ROOT / "layouts" / "plotjuggler.xml").getroot()
     curves = [
@@ -137,7 +137,7 @@ def panels(layout: object) -> Iterator[str]:
         yield from panels(layout["second"])
 
 
-def test_foxglove_plots_fields_that_there_are(topics: dict[str, str]):
+def test_foxglove_plots_existing_fields(topics: dict[str, str]):
     """Each panel has a configuration, each path a number, each topic of the 3D panel a message."""
     layout = json.loads((ROOT / "layouts" / "foxglove.json").read_text())
     configurations = layout["configById"]

@@ -37,7 +37,7 @@ def test_load_moves_the_axis_and_times_out(real: Drive):
     assert np.abs(recording.joints["position", "x"]).max() < 1e-3
 
 
-def test_load_of_an_unknown_joint_does_no_harm(real: Drive):
+def test_load_of_an_unknown_joint_is_ignored(real: Drive):
     """The message is ignored; the axes stay where they are."""
     go_home(real)
     before = real.latest("position")

@@ -37,7 +37,7 @@ def rosout(drive: Drive) -> list[Log]:
     return found
 
 
-def refuse(drive: Drive) -> None:
+def reject_one(drive: Drive) -> None:
     """Sends a trajectory that is rejected, which is logged as a warning."""
     result = drive.decision(drive.send(joint_trajectory(["no_such_joint"], [1.0], [[0.0]])))
     assert result.code != 0
@@ -58,17 +58,17 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
     process = drive.process
     began = time.time()
     drive.node.create_publisher(Clock, "/clock", 10)
-    drive.wait_for(lambda: "holding back" in process.output(), 5, "notice of another clock")
-    refuse(drive)
+    drive.wait_for(lambda: "another node publishes it" in process.output(), 5, "notice of another clock")
+    reject_one(drive)
     names = (drive.list_parameters() * 4)[:1000]
     with pytest.raises(TimeoutError):
         drive.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names), timeout=0.5)
     # Late joiner: all three messages are history.
     found = rosout(drive)
     drive.wait_for(lambda: len(found) >= 3, 5, "messages on /rosout")
-    words = ("holding", "no_such_joint", "not sent")
+    words = ("publishes it", "no_such_joint", "no response of")
     said = {(message.level, word) for message in found for word in words if word in message.msg}
-    assert said == {(20, "holding"), (30, "no_such_joint"), (40, "not sent")}
+    assert said == {(20, "publishes it"), (30, "no_such_joint"), (40, "no response of")}
     assert (Log.INFO, Log.WARN, Log.ERROR) == (20, 30, 40)
     # The terminal has the same texts.
     shown = {match["text"]: (match["level"], match["logger"]) for match in lines(process)}
@@ -90,12 +90,12 @@ def test_level_of_one_logger(start: Callable[..., Drive]):
     drive = start(*IN_THE_CELL, "--log-level", "cell.mill:=error", name="/cell/mill")
     found = rosout(drive)
     drive.wait_for(lambda: drive.node.count_publishers("/rosout") > 0, 5, "publisher of /rosout")
-    refuse(drive)
+    reject_one(drive)
     time.sleep(0.3)
     assert found == [] and lines(drive.process) == []
 
 
-def test_a_node_of_the_same_name_is_told_of(start: Callable[..., Drive]):
+def test_a_duplicate_node_name_is_logged(start: Callable[..., Drive]):
     """Each of the two logs it once, and only if the namespace is equal, too."""
     first = start(*IN_THE_CELL, name="/cell/mill")
     domain = first.process.domain_id
@@ -127,7 +127,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
 rclpy.init()
-node = rclpy.create_node("guest")
+node = rclpy.create_node("participant")
 psec = node.create_publisher(JointTrajectory, "/psec", 10)
 node.create_publisher(JointState, "/psec_stream", 10)
 node.create_subscription(JointState, "/joint_states", lambda _: psec.publish(JointTrajectory()), 10)
@@ -137,15 +137,15 @@ rclpy.spin(node)
 """
 
 
-def killed_guest(domain_id: int, profile: Path, failures: list[Any]) -> None:
+def killed_participant(domain_id: int, profile: Path, failures: list[Any]) -> None:
     """Starts participants that are killed, without dispose or unregister."""
     env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile)}
-    with subprocess.Popen([sys.executable, "-c", GUEST], env=env, stdout=subprocess.PIPE, text=True) as guest:
-        bounded = threading.Timer(20, guest.kill)
+    with subprocess.Popen([sys.executable, "-c", GUEST], env=env, stdout=subprocess.PIPE, text=True) as participant:
+        bounded = threading.Timer(20, participant.kill)
         bounded.start()
-        said = guest.stdout.readline() if guest.stdout else ""
+        said = participant.stdout.readline() if participant.stdout else ""
         bounded.cancel()
-        guest.kill()
+        participant.kill()
     if said != "matched\n":
         failures.append(said)
 
@@ -158,17 +158,19 @@ def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
     profile = tmp_path / "profile.xml"
     profile.write_text(SHORT_LEASE)
     failures: list[Any] = []
-    guests = [threading.Thread(target=killed_guest, args=(process.domain_id, profile, failures)) for _ in range(2)]
-    for guest in guests:
-        guest.start()
+    participants = [
+        threading.Thread(target=killed_participant, args=(process.domain_id, profile, failures)) for _ in range(2)
+    ]
+    for participant in participants:
+        participant.start()
     for _ in range(3):
         with Drive(process=process) as other:
             other.list_parameters()
-    for guest in guests:
-        guest.join(30)
+    for participant in participants:
+        participant.join(30)
     assert not failures
     # Wait for the expiry of their leases.
-    drive.wait_for(lambda: drive.node.count_subscribers("/joint_states") == 1, 10, "end of the guests")
+    drive.wait_for(lambda: drive.node.count_subscribers("/joint_states") == 1, 10, "end of the participants")
     time.sleep(1.0)
     drive.process = None
     assert process.stop() == 0
@@ -194,12 +196,12 @@ def full_pipe() -> Iterator[tuple[int, int]]:
         os.close(read)
 
 
-def test_a_log_that_nobody_reads_does_not_stop_the_node():
+def test_a_full_stderr_pipe_does_not_stop_the_node():
     """stderr is a full pipe; a later reader finds the messages of the meantime."""
     with full_pipe() as (read, write):
         os.set_blocking(read, False)
         with Node(stderr=write) as process, Drive(process=process) as drive:
-            refuse(drive)
+            reject_one(drive)
             # The axes thread itself logs that it was late.
             os.kill(process.pid, signal.SIGSTOP)
             time.sleep(1.3)
@@ -214,13 +216,13 @@ def test_a_log_that_nobody_reads_does_not_stop_the_node():
                     text += os.read(read, PIPE_BYTES).decode()
                 except BlockingIOError:
                     pass
-                return "no_such_joint" in text and "the node stood still" in text
+                return "no_such_joint" in text and "the node stalled" in text
 
             drive.wait_for(said, 10, "log")
             assert process.stop() == 0
 
 
-def test_a_log_that_nobody_reads_does_not_stop_the_end_of_the_node():
+def test_a_full_stderr_pipe_does_not_delay_the_end_of_the_node():
     """The node waits for a reader only for a short time."""
     with full_pipe() as (_, write):
         with Node(stderr=write) as process, Drive(process=process):

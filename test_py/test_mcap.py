@@ -138,7 +138,7 @@ def test_a_recorded_trace_is_the_csv_trace_field_by_field(traces: tuple[Path, Pa
         np.testing.assert_allclose(ratio, ratio[0], rtol=1e-12)
 
 
-def test_a_recording_is_as_rosbag2_wants_it(traces: tuple[Path, Path]):
+def test_a_recording_has_the_format_of_rosbag2(traces: tuple[Path, Path]):
     """Profile, encodings, counts, indexes, and the quality of service that `ros2 bag play` reads."""
     with traces[1].open("rb") as file:
         reader = make_reader(file)
@@ -179,7 +179,7 @@ def trajectory(rows: list[list[float]]) -> dict:
 
 
 @pytest.mark.parametrize("compression", CompressionType)
-def test_set_points_from_a_foreign_recording_run_as_those_from_csv(
+def test_setpoints_from_a_foreign_recording_equal_those_from_csv(
     tmp_path: Path, traces: tuple[Path, Path], compression: CompressionType
 ):
     """A JointTrajectory recorded by another program gives the same trace, byte by byte."""
@@ -198,7 +198,7 @@ def test_set_points_from_a_foreign_recording_run_as_those_from_csv(
     assert (tmp_path / "trace.csv").read_bytes() == traces[0].read_bytes()
 
 
-def test_set_points_as_yaml_run_as_those_from_csv(tmp_path: Path, traces: tuple[Path, Path]):
+def test_setpoints_as_yaml_equal_those_from_csv(tmp_path: Path, traces: tuple[Path, Path]):
     """YAML written by PyYAML gives the same trace."""
     for flow in (True, False):
         file = tmp_path / "psec.yaml"
@@ -208,7 +208,7 @@ def test_set_points_as_yaml_run_as_those_from_csv(tmp_path: Path, traces: tuple[
         assert (tmp_path / "trace.csv").read_bytes() == traces[0].read_bytes()
 
 
-def test_a_damaged_recording_is_refused(tmp_path: Path, traces: tuple[Path, Path]):
+def test_a_damaged_recording_is_rejected(tmp_path: Path, traces: tuple[Path, Path]):
     """The message names the file, and no partial output is left."""
     whole = traces[1].read_bytes()
     damaged = tmp_path / "damaged.mcap"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rcl_interfaces.msg import ParameterType
 
-from drive import TSP_NS, Drive, Node, ParameterRefused
+from drive import TSP_NS, Drive, Node, ParameterRejected
 from motion import RATIO, TSP, go_home, start_swing
 
 GAIN = "x.velocity_loop.gain"
@@ -56,32 +56,32 @@ def test_values_are_those_of_the_default_machine(real: Drive):
 
 
 @pytest.mark.parametrize("value", [-1.0, 1e12, float("nan"), float("inf")])
-def test_gain_out_of_range_is_refused_with_a_reason(real: Drive, value: float):
+def test_gain_out_of_range_is_rejected_with_a_reason(real: Drive, value: float):
     """The old value stays."""
-    with pytest.raises(ParameterRefused, match=r"gain"):
+    with pytest.raises(ParameterRejected, match=r"gain"):
         real.set_parameters({GAIN: value})
     assert real.get_parameters([GAIN]) == {GAIN: 5.0}
 
 
 @pytest.mark.parametrize("value", ["5.0", True, [5.0]], ids=["string", "bool", "array"])
-def test_wrong_type_is_refused_with_a_reason(real: Drive, value: object):
+def test_wrong_type_is_rejected_with_a_reason(real: Drive, value: object):
     """The old value stays."""
-    with pytest.raises(ParameterRefused, match=r"\w"):
+    with pytest.raises(ParameterRejected, match=r"\w"):
         real.set_parameters({GAIN: value})
     assert real.get_parameters([GAIN]) == {GAIN: 5.0}
 
 
-def test_unknown_parameter_is_refused_with_a_reason(real: Drive):
+def test_unknown_parameter_is_rejected_with_a_reason(real: Drive):
     """An unknown parameter is not declared implicitly."""
-    with pytest.raises(ParameterRefused, match=r"\w"):
+    with pytest.raises(ParameterRejected, match=r"\w"):
         real.set_parameters({"x.velocity_loop.gian": 5.0})
 
 
 @pytest.mark.parametrize("name", ["periods.position_ms", "time"])
-def test_what_is_not_live_is_refused_with_a_reason(real: Drive, name: str):
+def test_a_read_only_parameter_is_rejected_with_a_reason(real: Drive, name: str):
     """The parameter is fixed after the start; the reason names it."""
     before = real.get_parameters([name])
-    with pytest.raises(ParameterRefused, match=name.rsplit(".", 1)[-1]):
+    with pytest.raises(ParameterRejected, match=name.rsplit(".", 1)[-1]):
         real.set_parameters({name: 12.0 if name.endswith("_ms") else "fast"})
     assert real.get_parameters([name]) == before
 
@@ -124,20 +124,20 @@ def test_feedforward_can_be_halved_while_moving(real: Drive):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_wrong_arguments_are_refused_with_a_message(arguments: list[str], named: str):
+def test_wrong_arguments_are_rejected_with_a_message(arguments: list[str], named: str):
     """The message names the error; the exit status is not zero."""
     with Node(arguments) as process:
         assert process.wait(10) not in (0, 101, -6)
         assert named in process.output()
 
 
-def test_an_argument_that_is_not_utf_8_is_refused_and_no_panic():
+def test_an_argument_that_is_not_utf_8_is_rejected_and_no_panic():
     with Node(["-p", os.fsdecode(b"x:=\xff")]) as process:
         assert process.wait(10) == 2
         assert "is not UTF-8" in process.output()
 
 
-def test_arguments_are_honored(start: Callable[..., Drive], tmp_path):
+def test_arguments_are_applied(start: Callable[..., Drive], tmp_path):
     """-p, --params-file, names and namespaces, and -- as their end."""
     file = tmp_path / "machine.yaml"
     file.write_text("/**:\n  ros__parameters:\n    y:\n      velocity_loop:\n        gain: 4.25\n")

@@ -57,7 +57,7 @@ def deviation_um(recording: Recording) -> np.ndarray:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=str)
-def test_the_circle_is_nearly_as_large_as_programmed(row: tuple[int, int, int, float], predictive: Drive):
+def test_the_radial_deviation_is_close_to_zero(row: tuple[int, int, int, float], predictive: Drive):
     """[P] figure 10, right: almost 0; with the preset at the start of the node, and by parameters."""
     if row == PRESET:
         assert predictive.get_parameters(list(tuning(*row))) == tuning(*row)
@@ -120,7 +120,7 @@ def switch(drive: Drive, controller: str) -> None:
     drive.wait_until(drive.now() + (TURN + SWITCH) * TSP_NS, 30)
 
 
-def test_cascade_to_predictive_and_back_on_a_circle_is_not_felt(real: Drive):
+def test_switching_to_predictive_and_back_on_a_circle_is_bumpless(real: Drive):
     """Switched by parameter, at an arbitrary position on the circle."""
     go_home(real)
     accepted = real.accept(joint_trajectory(AXES, LONG.time, np.column_stack([LONG.x, LONG.y])))

@@ -126,13 +126,13 @@ def test_actions(seen: tuple[Run, Drive]):
         assert hidden == {f"{action}{HIDDEN}{part}" for action in actions for part in parts}, what
 
 
-def test_the_node_asks_nobody(seen: tuple[Run, Drive]):
+def test_the_node_has_no_service_client(seen: tuple[Run, Drive]):
     """The node has no service client."""
     _, drive = seen
     assert by_node(drive, "client") == {}
 
 
-def test_quality_of_service_and_owner_of_every_topic(seen: tuple[Run, Drive]):
+def test_quality_of_service_and_node_name_of_every_endpoint(seen: tuple[Run, Drive]):
     """Reliability and durability are as documented; every endpoint has its node's name."""
     run, drive = seen
     infos: dict[str, Callable[[str], Any]] = {

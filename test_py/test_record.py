@@ -172,14 +172,14 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
                 offered[topic] = (kind, reliability, durability)
         drive.process = None
         exit_status = process.stop(signal.SIGTERM)
-        drive.wait_for(lambda: not drive.sees(), 5, "goodbye")
+        drive.wait_for(lambda: not drive.sees(), 5, "dispose")
         for topic, key in ((STATES, "joints"), (CURRENTS, "currents"), (DRIVES, "states")):
             heard[topic] = list(drive._samples[key])
         drive.close()
         yield Session(path, sent, heard, offered, status, exit_status, process.output())
 
 
-def test_every_topic_is_there_with_its_type_and_profile(session: Session):
+def test_every_topic_is_recorded_with_its_type_and_profile(session: Session):
     """Recorded topics equal the node's topics in the graph."""
     assert session.exit == 0, session.output
     messages, channels, types = read(session.path)
@@ -196,7 +196,7 @@ def test_every_topic_is_there_with_its_type_and_profile(session: Session):
     assert profile["depth"] == 7
 
 
-def test_what_was_published_is_recorded_bit_for_bit(session: Session):
+def test_published_messages_are_recorded_bit_for_bit(session: Session):
     """A subscriber's samples are in the recording, in order, without gaps."""
     messages, _, _ = read(session.path)
     assert set(session.heard) | set(session.sent) == set(messages)
@@ -210,7 +210,7 @@ def test_what_was_published_is_recorded_bit_for_bit(session: Session):
     assert len(session.heard[DRIVES]) > 100
 
 
-def test_what_came_in_is_recorded_as_it_came(session: Session):
+def test_received_messages_are_recorded_bit_for_bit(session: Session):
     """Received messages are recorded bit for bit, at the node's time of receipt."""
     messages, _, _ = read(session.path)
     for topic, sent in session.sent.items():
@@ -227,7 +227,7 @@ def test_what_came_in_is_recorded_as_it_came(session: Session):
     assert all(began <= entry.log <= ended for topic in session.sent for entry in messages[topic])
 
 
-def test_times_are_the_nodes(session: Session):
+def test_publish_times_are_the_stamps(session: Session):
     """Publish times are stamps, not after the log times; the grid of position instants is unbroken."""
     messages, _, _ = read(session.path)
     for topic in (STATES, CURRENTS, DRIVES):
@@ -242,7 +242,7 @@ def to_ns_of(data: bytes) -> int:
     return int.from_bytes(data[4:8], "little") * NANOSECONDS + int.from_bytes(data[8:12], "little")
 
 
-def test_the_diagnostics_and_the_log_tell_of_it(session: Session):
+def test_the_diagnostics_and_the_log_report_the_recording(session: Session):
     """They report the file, and that nothing is missing."""
     found = status_values(session.status)
     assert session.status.level == DiagnosticStatus.OK and found["recording"] == "true"
@@ -252,14 +252,14 @@ def test_the_diagnostics_and_the_log_tell_of_it(session: Session):
     assert f"{sum(map(len, messages.values()))} messages, 0 left out" in session.output
 
 
-def test_our_own_command_takes_set_points_from_it(session: Session):
+def test_the_command_reads_setpoints_from_the_recording(session: Session):
     """`virtual_axes run` accepts the recording."""
     command = node_binary().with_name("virtual_axes")
     done = subprocess.run([command, "run", session.path], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
 
 
-def test_killed_it_is_readable_up_to_its_last_chunk(start: Callable[..., Drive], tmp_path: Path):
+def test_a_recording_of_a_killed_node_is_readable_up_to_its_last_chunk(start: Callable[..., Drive], tmp_path: Path):
     """SIGKILL: all messages up to it, unbroken; identify reads them and reports the truncation."""
     path = tmp_path / "killed.mcap"
     drive = start("-p", f"record:={path}")
@@ -277,10 +277,10 @@ def test_killed_it_is_readable_up_to_its_last_chunk(start: Callable[..., Drive],
         assert times[-1] >= until - TSP_NS and set(np.diff(times)) == {TSP_NS}
     command = [node_binary().with_name("virtual_axes"), "identify", path, "--axis", "x"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    assert "its writer was killed" in done.stdout + done.stderr
+    assert "its writer was terminated" in done.stdout + done.stderr
 
 
-def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive], tmp_path: Path):
+def test_a_recording_ends_at_its_maximum_size_and_the_axes_continue(start: Callable[..., Drive], tmp_path: Path):
     """At 1 MB the file is closed, complete and reported; in `fast` no earlier message is missing."""
     path = tmp_path / "bounded.mcap"
     drive = start("-p", f"record:={path}", "-p", "record_max_mb:=1", "-p", "time:=fast")
@@ -310,7 +310,7 @@ def test_it_stays_within_its_bound_and_the_axes_go_on(start: Callable[..., Drive
     assert drive.process.output().count("has ended: it has reached 1 MB; the axes go on") == 1
 
 
-def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
+def test_a_failed_write_ends_the_recording_but_not_the_node(tmp_path: Path):
     """A file size limit of 200 KiB acts like a full disk: the data written before stay readable.
 
     It is said once, and the next recording is whole.
@@ -347,23 +347,23 @@ def test_a_write_that_fails_ends_the_recording_and_not_the_axes(tmp_path: Path):
     assert len(read(again)[0][DRIVES]) > 100
 
 
-def refusal(record: object) -> str:
+def rejection(record: object) -> str:
     """Starts a node that must reject the recording path: returns its output, with status 2."""
     with Node(["-p", f"record:={record}"]) as process:
         assert process.wait(10) == 2, process.output()
         return process.output()
 
 
-def test_what_it_cannot_record_to_is_refused(tmp_path: Path):
+def test_an_invalid_recording_path_is_rejected(tmp_path: Path):
     """An existing file stays unchanged; a missing or read-only folder is named."""
     existing = tmp_path / "old.mcap"
     existing.write_text("kept")
-    assert f"record: {existing} exists already" in refusal(existing)
+    assert f"record: {existing} exists already" in rejection(existing)
     assert existing.read_text() == "kept"
     missing = tmp_path / "missing" / "new.mcap"
-    assert f"in the folder {missing.parent}: No such file" in refusal(missing)
-    assert f"in the folder {existing}: Not a directory" in refusal(existing / "new.mcap")
+    assert f"in the folder {missing.parent}: No such file" in rejection(missing)
+    assert f"in the folder {existing}: Not a directory" in rejection(existing / "new.mcap")
     # A folder in which no file can be created.
-    assert "in the folder /proc: " in refusal("/proc/new.mcap")
-    assert f"record: {tmp_path / 'new.csv'}: a recording is an MCAP file" in refusal(tmp_path / "new.csv")
+    assert "in the folder /proc: " in rejection("/proc/new.mcap")
+    assert f"record: {tmp_path / 'new.csv'}: a recording is an MCAP file" in rejection(tmp_path / "new.csv")
     assert list(tmp_path.iterdir()) == [existing]

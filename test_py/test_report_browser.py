@@ -89,7 +89,7 @@ def browser(report: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         yield browser
 
 
-def test_it_says_nothing_wrong_and_asks_nobody(browser: Browser, report: Path):
+def test_there_are_no_errors_and_no_external_requests(browser: Browser, report: Path):
     """Checks console, exceptions and requests."""
     entries = [event["entry"] for event in browser.events_of("Log.entryAdded")]
     assert not entries
@@ -100,7 +100,7 @@ def test_it_says_nothing_wrong_and_asks_nobody(browser: Browser, report: Path):
     assert browser.evaluate("document.compatMode") == "CSS1Compat"
 
 
-def test_its_pictures_are_well_formed(browser: Browser, report: Path):
+def test_pictures_are_well_formed(browser: Browser, report: Path):
     """Each picture is XML with title and description, and the browser has as many pictures as the file."""
     text = report.read_text(encoding="utf-8")
     pictures = ["<svg role" + part.split("</svg>")[0] + "</svg>" for part in text.split("<svg role")[1:]]
@@ -117,7 +117,7 @@ def test_its_pictures_are_well_formed(browser: Browser, report: Path):
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
 @pytest.mark.parametrize("scheme", [LIGHT, DARK])
-def test_it_is_seen(browser: Browser, scheme: str, width: int):
+def test_pictures_are_visible(browser: Browser, scheme: str, width: int):
     """The picture is not blank, on a light or a dark background."""
     browser.show_as(scheme=scheme, width=width)
     image = browser.screenshot(keep(f"{scheme}-{width}.png"))
@@ -133,14 +133,14 @@ def test_it_is_seen(browser: Browser, scheme: str, width: int):
 
 
 @pytest.mark.parametrize("width", [WIDE, 700, NARROW])
-def test_its_labels_stand_apart(browser: Browser, width: int):
+def test_labels_do_not_overlap(browser: Browser, width: int):
     """No text of a picture overlaps another, and the page is not wider than its window."""
     browser.show_as(width=width)
     assert browser.evaluate(OVERLAPPING_TEXTS) == []
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
 
 
-def test_texts_contrast_with_their_ground(browser: Browser):
+def test_texts_contrast_with_their_background(browser: Browser):
     """4.5 : 1 for text and 3 : 1 for lines, as WCAG 2.1 requires, in both schemes."""
     for scheme in (LIGHT, DARK):
         browser.show_as(scheme=scheme)
@@ -164,7 +164,7 @@ def test_it_prints_in_light_colors(browser: Browser):
     assert pdf.startswith(b"%PDF") and len(pdf) > 10_000
 
 
-def test_long_names_push_no_figure_out_of_sight(browser: Browser):
+def test_tables_fit_the_page_with_long_names(browser: Browser):
     """All tables fit a screen of 1200 px and a sheet of A4 with any names of the runs."""
     name = ", x.feedforward.torque_kg_m2=0.028"
     browser.evaluate(f"document.querySelectorAll('th.run').forEach(cell => cell.append('{name}'))")

@@ -42,7 +42,7 @@ def secured(folder: Path | None, strategy: str = "Enforce") -> dict[str, str]:
     return words if folder is None else {**words, "ROS_SECURITY_KEYSTORE": str(folder)}
 
 
-def test_a_node_that_cannot_be_secured_does_not_start_where_that_is_enforced():
+def test_an_insecure_node_does_not_start_with_enforced_security():
     """One line, status 2, nothing on the network; without enforcement it runs unsecured and logs a warning."""
     with Node(env=secured(None)) as node:
         assert node.wait(20) == 2
@@ -71,7 +71,7 @@ def test_the_wheels_of_rclpy_have_no_dds_security(tmp_path: Path):
 
 
 @needs_secure_node
-def test_only_who_is_authorized_hears_a_secured_node(tmp_path: Path):
+def test_only_authorized_participants_receive_from_a_secured_node(tmp_path: Path):
     """One node publishes the clock; a peer of its keystore moves on, the others receive no clock."""
     domain = DomainId()
     with ExitStack() as stack:
@@ -94,18 +94,18 @@ def test_only_who_is_authorized_hears_a_secured_node(tmp_path: Path):
         while time.monotonic() < deadline and not (recording.exists() and recording.stat().st_size > 1_000_000):
             time.sleep(0.2)
 
-        def messages(guest: Node) -> int:
-            assert guest.stop(timeout=20) == 0, guest.output()
-            found = re.search(r"\.mcap: (\d+) messages", guest.output())
-            assert found, guest.output()
+        def messages(participant: Node) -> int:
+            assert participant.stop(timeout=20) == 0, participant.output()
+            found = re.search(r"\.mcap: (\d+) messages", participant.output())
+            assert found, participant.output()
             return int(found[1])
 
         assert messages(peer) > HEARD
-        assert [messages(guest) < UNHEARD for guest in strangers] == [True, True]
+        assert [messages(participant) < UNHEARD for participant in strangers] == [True, True]
 
 
 @needs_secure_node
-def test_a_topic_that_is_denied_keeps_a_node_from_starting(tmp_path: Path):
+def test_a_node_with_a_denied_topic_does_not_start(tmp_path: Path):
     """Permissions are checked for each endpoint."""
     domain = DomainId()
     with ExitStack() as stack:

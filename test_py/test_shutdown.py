@@ -14,7 +14,9 @@ from motion import start_swing
 
 @pytest.mark.parametrize("moving", [False, True], ids=["at rest", "moving"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
-def test_ends_within_a_second_and_says_goodbye(start: Callable[..., Drive], number: signal.Signals, moving: bool):
+def test_exits_within_a_second_and_disposes_its_endpoints(
+    start: Callable[..., Drive], number: signal.Signals, moving: bool
+):
     """Status 0 within 1 s; removed from rclpy's graph within 2 s, not after the lease of 50 s."""
     drive = start()
     drive.wait_for(drive.sees, 5, "node in the graph")
@@ -26,6 +28,6 @@ def test_ends_within_a_second_and_says_goodbye(start: Callable[..., Drive], numb
     took = time.monotonic() - began
     assert status == 0, process.output()
     assert took <= 1.0
-    drive.wait_for(lambda: not drive.sees(), 2, "goodbye")
+    drive.wait_for(lambda: not drive.sees(), 2, "dispose")
     assert "ERROR" not in process.output()
     assert "panicked" not in process.output()

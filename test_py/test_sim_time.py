@@ -59,7 +59,7 @@ def stamps_since(drive: Drive, begin: int, end: int) -> np.ndarray:
     return drive.record(begin, end).joints.stamp
 
 
-def test_before_the_first_message_there_is_no_time(start: Callable[..., Drive]):
+def test_before_the_first_message_the_axes_wait(start: Callable[..., Drive]):
     """The node publishes nothing, services respond, and a trajectory waits for the clock."""
     drive = start("-p", "use_sim_time:=true", connect=False)
     drive.wait_for(lambda: drive._psec.get_subscription_count() > 0, 10, "subscription of psec")
@@ -93,7 +93,7 @@ def test_before_the_first_message_there_is_no_time(start: Callable[..., Drive]):
     assert drive.end(soon, 5).status == TrajectoryResult.STOPPED
 
 
-def test_a_goal_canceled_before_the_first_message_takes_no_other_with_it(start: Callable[..., Drive]):
+def test_canceling_a_goal_before_the_first_message_keeps_other_goals(start: Callable[..., Drive]):
     """The goal ends at once; the other goal begins with the first clock message."""
     drive = start("-p", "use_sim_time:=true", connect=False)
     with Follow(drive) as follow:
@@ -108,7 +108,7 @@ def test_a_goal_canceled_before_the_first_message_takes_no_other_with_it(start: 
 
 
 @pytest.mark.parametrize("step", [0.1, 0.001, 0.0137, 2.0], ids=lambda step: f"{1e3 * step:g} ms")
-def test_the_grid_is_unbroken_whatever_the_clocks_own(clock: SimClock, step: float):
+def test_the_grid_is_unbroken_at_any_clock_step(clock: SimClock, step: float):
     """Every position instant up to the clock is published at any clock step, and none after it."""
     begin = clock.now
     clock.advance(max(0.3, 2 * step), step)
@@ -150,7 +150,7 @@ def test_a_motion_has_the_same_bits_at_any_speed(clock: SimClock, fast: Drive):
     assert end.max_tracking_error == free.result.max_tracking_error
 
 
-def test_while_the_clock_stands_nothing_moves_and_everything_answers(clock: SimClock):
+def test_with_a_paused_clock_the_axes_rest_and_services_respond(clock: SimClock):
     """Also more trajectories than the queue holds: each gets a result."""
     drive = clock.drive
     drive.reset()
@@ -194,7 +194,7 @@ def test_while_the_clock_stands_nothing_moves_and_everything_answers(clock: SimC
     ],
     ids=["back", "far-ahead", "to-zero", "to-where-it-was"],
 )
-def test_a_jump_ends_the_motion_and_begins_a_new_grid(clock: SimClock, to: Callable[[int], int], what: str):
+def test_a_jump_stops_the_motion_and_starts_a_new_grid(clock: SimClock, to: Callable[[int], int], what: str):
     """The axes come to rest within their limits, and accept trajectories by the new time."""
     drive = clock.drive
     times, position = swing(2.0)

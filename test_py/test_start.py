@@ -14,7 +14,7 @@ from drive import DomainId, Drive, Node, joint_trajectory, node_binary
 CONFIG = Path(__file__).resolve().parent.parent / "config"
 
 
-def refusal(*ros_args: str, **env: str) -> str:
+def rejection(*ros_args: str, **env: str) -> str:
     """Starts a node that must exit: returns its output of one line, with status 2."""
     domain = DomainId()
     try:
@@ -42,7 +42,7 @@ def test_a_topic_under_another_name(start: Callable[..., Drive]):
     assert drive.node.count_publishers("/joint_states") == 0
 
 
-def test_an_integer_serves_where_a_double_is_wanted(start: Callable[..., Drive]):
+def test_an_integer_is_accepted_for_a_double(start: Callable[..., Drive]):
     """The later of two values applies."""
     drive = start("-p", "x.velocity_loop.gain:=3.5", "-p", "x.velocity_loop.gain:=4")
     assert drive.get_parameters(["x.velocity_loop.gain"]) == {"x.velocity_loop.gain": 4.0}
@@ -75,7 +75,7 @@ def test_quality_of_service_by_parameter(start: Callable[..., Drive]):
         assert drive.wait_for(lambda: offered(topic), 10, f"publisher of {topic}") == wanted
 
 
-def test_publish_rate_thins_the_grid_and_stays_on_it(start: Callable[..., Drive]):
+def test_publish_rate_decimates_the_grid(start: Callable[..., Drive]):
     """At 1/12 ms every second instant is published."""
     drive = start("-p", f"publish_rate:={1 / 0.012}", "-p", "time:=fast")
     recording = drive.run(joint_trajectory(["x"], [0.0, 0.6], [[0.0], [0.01]]))
@@ -101,13 +101,13 @@ def test_publish_rate_thins_the_grid_and_stays_on_it(start: Callable[..., Drive]
         (["--frobnicate"], ["--frobnicate"]),
     ],
 )
-def test_wrong_arguments_are_refused_by_name(arguments: list[str], words: list[str]):
+def test_wrong_arguments_are_rejected_by_name(arguments: list[str], words: list[str]):
     """One message that names the wrong input, and status 2."""
-    text = refusal(*arguments)
+    text = rejection(*arguments)
     assert [word for word in words if word not in text] == [], text
 
 
-def test_a_wrong_domain_is_refused():
+def test_a_wrong_domain_is_rejected():
     """The environment is validated like an argument."""
     status = subprocess.run(
         [str(node_binary())], env={"ROS_DOMAIN_ID": "233"}, capture_output=True, text=True, timeout=10, check=False

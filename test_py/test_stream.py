@@ -50,23 +50,23 @@ def node_status(drive: Drive, condition: Callable[[dict[str, str]], bool]) -> Di
 
 def numbers(drive: Drive, *keys: str) -> tuple[int, ...]:
     """Returns counters of the node, from the next diagnostics."""
-    told = drive.told()
-    return tuple(int(told[key]) for key in keys)
+    reported = drive.next_status()
+    return tuple(int(reported[key]) for key in keys)
 
 
 def counts(drive: Drive) -> tuple[int, int]:
     """Returns the numbers of rejected and ignored setpoints."""
-    refused, ignored = numbers(drive, "stream_setpoints_refused", "stream_setpoints_ignored")
-    return refused, ignored
+    rejected, ignored = numbers(drive, "stream_setpoints_rejected", "stream_setpoints_ignored")
+    return rejected, ignored
 
 
-def told_of_stream(drive: Drive, begin: int) -> list[R]:
+def stream_results(drive: Drive, begin: int) -> list[R]:
     """Returns the results of the stream since `begin`, ns."""
     found = [result for result in drive.results() if result.source == R.SOURCE_STREAM]
     return [result for result in found if to_ns(result.header.stamp) >= begin]
 
 
-def told_when(drive: Drive, take: Callable[[], object]) -> list[R]:
+def results_of_preemption(drive: Drive, take: Callable[[], object]) -> list[R]:
     """Returns the results when `take` preempts joints of a stream at rest at x = 0.001, y = 0; a few attempts."""
     for _ in range(ATTEMPTS):
         go_home(drive)
@@ -83,7 +83,7 @@ def told_when(drive: Drive, take: Callable[[], object]) -> list[R]:
         begin = drive.now()
         try:
             take()
-            return drive.wait_for(lambda begin=begin: told_of_stream(drive, begin), 2, "word of the stream's end")
+            return drive.wait_for(lambda begin=begin: stream_results(drive, begin), 2, "word of the stream's end")
         except TimeoutError:
             # A stall of the machine has paused the stream.
             continue
@@ -99,7 +99,7 @@ def wave(amplitude: float, count: int = 100) -> np.ndarray:
 
 
 @pytest.mark.parametrize("mode", ["real", "fast"])
-def test_the_axes_are_commanded_what_was_streamed_sample_by_sample(mode: str, request: pytest.FixtureRequest):
+def test_streamed_setpoints_are_executed_sample_by_sample(mode: str, request: pytest.FixtureRequest):
     """Two axes on their own paths: each setpoint bit for bit, none duplicated, none missing."""
     drive: Drive = request.getfixturevalue(mode)
     go_home(drive)
@@ -117,7 +117,7 @@ def test_the_axes_are_commanded_what_was_streamed_sample_by_sample(mode: str, re
 def test_a_sender_with_its_own_clock_is_followed_in_order(real: Drive):
     """At the position cycle of another clock: setpoints may repeat or be skipped, but never go back."""
     go_home(real)
-    begin, refused = real.now(), counts(real)[0]
+    begin, rejected = real.now(), counts(real)[0]
     # Slow enough that the setpoints after a delay of the sender are still within reach.
     sent = np.arange(1, 301) * REACH / 300
     due = time.monotonic()
@@ -129,26 +129,26 @@ def test_a_sender_with_its_own_clock_is_followed_in_order(real: Drive):
     followed = commanded(real, "x", begin)[1:]
     assert set(followed) <= set(sent)
     assert (np.diff(followed) > 0).all()
-    assert counts(real)[0] == refused
+    assert counts(real)[0] == rejected
 
 
-def test_nan_and_short_arrays_leave_joints_alone(real: Drive):
+def test_nan_and_short_arrays_do_not_command_joints(real: Drive):
     """NaN and a missing position mean that the message does not command the joint."""
     go_home(real)
     begin = real.now()
-    refused = counts(real)[0]
+    rejected = counts(real)[0]
     follow(real, ["y"], np.array([[0.001]]))
     real.stream(["z", "x", "y"], [math.nan, 0.002])
     real.wait_for(lambda: real.latest("psec")["x"] == 0.002, 5, "setpoint of x")
     real.stream(["x", "y"], [])
     real.stream(["x"], [math.nan])
-    assert counts(real)[0] == refused
+    assert counts(real)[0] == rejected
     np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, 0.002])
     np.testing.assert_array_equal(commanded(real, "y", begin), [0.0, 0.001])
     assert not commanded(real, "z", begin).any()
 
 
-def test_a_trajectory_takes_over_and_the_stream_is_ignored_meanwhile(real: Drive):
+def test_a_trajectory_preempts_a_stream(real: Drive):
     """The trajectory starts at the streamed setpoint; other joints continue with the stream."""
     go_home(real)
     follow(real, ["x", "y"], np.array([[0.001, 0.001], [0.002, 0.002]]))
@@ -168,7 +168,7 @@ def test_a_trajectory_takes_over_and_the_stream_is_ignored_meanwhile(real: Drive
     assert real.latest("psec")["y"] == 0.012
 
 
-def test_a_set_point_that_cannot_be_is_refused_counted_and_told_once_a_second(start: Callable[..., Drive]):
+def test_invalid_streamed_setpoints_are_rejected_counted_and_logged_once_a_second(start: Callable[..., Drive]):
     """Beyond the travel limits, out of reach, unknown joint; the axis does not move, and the log is limited."""
     drive = start()
     begin = drive.now()
@@ -183,41 +183,41 @@ def test_a_set_point_that_cannot_be_is_refused_counted_and_told_once_a_second(st
     lasted = time.monotonic() - sent
     assert counts(drive) == (60, 0)
     statuses = [array.status[0] for array in drive.diagnostics()[seen:]]
-    assert any(s.level == DiagnosticStatus.WARN and "stream were refused" in s.message for s in statuses)
+    assert any(s.level == DiagnosticStatus.WARN and "streamed setpoints were rejected" in s.message for s in statuses)
     assert not commanded(drive, "x", begin).any()
     np.testing.assert_array_equal(commanded(drive, "y", begin), [0.0, 0.001])
-    told = [line for line in drive.process.output().splitlines() if "setpoint of the stream refused" in line]
+    reported = [line for line in drive.process.output().splitlines() if "streamed setpoint rejected" in line]
     for words in ("outside the travel limits", "away from the previous setpoint", "unknown joint q"):
-        lines = [line for line in told if words in line]
-        assert 1 <= len(lines) <= 1 + lasted, told
+        lines = [line for line in reported if words in line]
+        assert 1 <= len(lines) <= 1 + lasted, reported
 
 
-def test_a_reset_leaves_nothing_of_the_stream(real: Drive):
+def test_a_reset_ends_the_stream(real: Drive):
     """After the reset the old stream is out of reach; a stream that begins at home is accepted."""
     go_home(real)
     follow(real, ["x"], REACH * np.arange(1, 11).reshape(-1, 1) * 0.9)
-    refused = counts(real)[0]
+    rejected = counts(real)[0]
     go_home(real)
     begin = real.now()
     real.stream(["x"], [10 * REACH])
-    assert counts(real)[0] == refused + 1
+    assert counts(real)[0] == rejected + 1
     follow(real, ["x"], np.array([[REACH / 2]]))
     np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, REACH / 2])
 
 
-def test_a_trajectory_that_takes_joints_from_a_stream_is_told_to_it(real: Drive):
+def test_a_stream_that_is_preempted_gets_a_result(real: Drive):
     """One result, with the joints that the trajectory preempts."""
     hold = joint_trajectory(["x", "z"], [0.0, 0.1], [[0.001, 0.0], [0.002, 0.0]])
-    told = told_when(real, lambda: real.run(hold))
-    assert [(result.status, result.name) for result in told] == [(R.PREEMPTED, ["x"])]
-    assert re.fullmatch(r"axes were taken over by trajectory \d+ of psec", told[0].text)
+    reported = results_of_preemption(real, lambda: real.run(hold))
+    assert [(result.status, result.name) for result in reported] == [(R.PREEMPTED, ["x"])]
+    assert re.fullmatch(r"preempted by trajectory \d+ of psec", reported[0].text)
 
 
 def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):
     """The stream continues within reach of the axis; it gets a result, and is accepted after a pause."""
     go_home(real)
-    told = told_when(real, lambda: real.stop())
-    assert [(result.status, result.name) for result in told] == [(R.STOPPED, ["x", "y"])]
+    reported = results_of_preemption(real, lambda: real.stop())
+    assert [(result.status, result.name) for result in reported] == [(R.STOPPED, ["x", "y"])]
     seen = len(real.diagnostics())
     positions = iter(np.linspace(0.001, 0.002, 10_000))
 
@@ -233,26 +233,26 @@ def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):
     node_status(real, lambda v: v["stream_held_off"] == "false")
 
 
-def test_what_comes_twice_counts_once_and_what_was_overtaken_is_left_out(real: Drive):
+def test_duplicate_and_reordered_setpoints_are_ignored(real: Drive):
     """Order by stamps, which are optional."""
     go_home(real)
-    begin, before = real.now(), numbers(real, "stream_messages_out_of_order", "stream_setpoints_refused")
+    begin, before = real.now(), numbers(real, "stream_messages_out_of_order", "stream_setpoints_rejected")
     base = 10**9
     for stamp, position in [(1, 0.001), (1, 0.001), (3, 0.003), (2, 0.002), (0, 0.0031), (4, 0.004), (4, 0.004)]:
         real.stream(["x"], [position], stamp and base + stamp * TSP_NS)
         if stamp != 2:
             real.wait_for(lambda p=position: real.latest("psec")["x"] == p, 5, f"setpoint {position}")
-    after = numbers(real, "stream_messages_out_of_order", "stream_setpoints_refused")
+    after = numbers(real, "stream_messages_out_of_order", "stream_setpoints_rejected")
     assert (after[0] - before[0], after[1] - before[1]) == (1, 0)
     np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, 0.001, 0.003, 0.0031, 0.004])
 
 
-def test_a_stream_that_breaks_off_in_motion_holds_and_is_told(start: Callable[..., Drive]):
+def test_a_gap_in_the_stream_during_motion_holds_the_axes_and_is_logged(start: Callable[..., Drive]):
     """One log line and a counter in the diagnostics; a stream that ends at rest is not reported."""
     drive = start()
     follow(drive, ["x"], REACH * np.arange(1, 6).reshape(-1, 1) * 0.9)
     status = node_status(drive, lambda v: v["stream_gaps"] != "0")
-    assert status.level == DiagnosticStatus.WARN and "broke off in motion" in status.message
+    assert status.level == DiagnosticStatus.WARN and "gap in the stream during motion" in status.message
     # More than one on a machine that stalled for a tenth of a second.
     gaps = int(status_values(status)["stream_gaps"])
     assert drive.latest("psec")["x"] == REACH * 5 * 0.9
@@ -260,11 +260,11 @@ def test_a_stream_that_breaks_off_in_motion_holds_and_is_told(start: Callable[..
     follow(drive, ["x"], REACH * 4.5 + np.arange(1, 6).reshape(-1, 1) * 1e-6)
     time.sleep(0.2)
     assert numbers(drive, "stream_gaps") == (gaps,)
-    lines = [line for line in drive.process.output().splitlines() if "broke off" in line]
+    lines = [line for line in drive.process.output().splitlines() if "gap in the stream" in line]
     assert 1 <= len(lines) <= gaps, lines
 
 
-def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
+def test_diagnostics_contain_stream_state_and_delay(real: Drive):
     """Without a controller with preview there is no delay."""
     go_home(real)
     status = node_status(real, lambda v: v["stream_drives"] == "false" and v["state"] == "holding")
@@ -289,7 +289,7 @@ def test_diagnostics_say_whether_a_stream_drives_and_its_delay(real: Drive):
     real.stop()
 
 
-def test_a_controller_that_looks_ahead_delays_the_stream(start: Callable[..., Drive]):
+def test_a_controller_with_preview_delays_the_stream(start: Callable[..., Drive]):
     """The delay is the preview beyond the part that alpha covers, and equal for all joints."""
     drive = start("-p", "x.position_loop.controller:=gpc")
     found = drive.get_parameters(["x.position_loop.gpc.n2", "x.delays.alpha_ms"])
@@ -314,7 +314,7 @@ def test_a_controller_that_looks_ahead_delays_the_stream(start: Callable[..., Dr
     node_status(drive, lambda v: v["stream_delay_ms"] == "0")
 
 
-def test_in_fast_a_stream_alone_goes_at_real_pace(fast: Drive):
+def test_in_fast_a_stream_runs_at_wall_clock_rate(fast: Drive):
     """Its sender runs in real time, too: the axes must not run ahead of it."""
     go_home(fast)
     before, began = fast.now(), time.monotonic()

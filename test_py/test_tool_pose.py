@@ -11,8 +11,8 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 
-from documented import OFFSETS, tool_pose
 from drive import DEEP_QOS, TSP_NS, Drive, Node, ballbar, joint_trajectory, to_ns
+from reference_kinematics import OFFSETS, tool_pose
 
 JOINTS = ["x", "y", "z", "a", "c"]
 LENGTH = 850
@@ -152,7 +152,7 @@ def test_the_paths_show_the_contour_error_of_the_ballbar(fast: Drive):
     assert np.linalg.norm(tips(actual) - tips(setpoint), axis=1).max() < 150e-6
 
 
-def test_a_long_path_keeps_its_newest_part_and_arrives_whole(tool: Tool):
+def test_a_long_path_keeps_its_newest_poses(tool: Tool):
     """The reader gets all poses, at most the configured number, at least the spacing apart."""
     times = np.arange(0, 6.001, 0.006)
     x = 0.1 * np.sin(2 * np.pi * times / 2) * np.clip(np.minimum(times, 6 - times), 0, 1)

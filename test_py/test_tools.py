@@ -22,7 +22,7 @@ LOOKS = 60
         ("soak", ["--minutes", "nan"], ["--minutes", "'nan'", "above 0"]),
         ("soak", ["--speed", "0"], ["--speed", "'0'", "above 0"]),
         ("soak", ["--speed=-1"], ["--speed", "'-1'", "above 0"]),
-        ("soak", ["--only", "visitor,rain"], ["no such traffic: rain", "visitor"]),
+        ("soak", ["--only", "visitor,rain"], ["unknown traffic: rain", "visitor"]),
         ("measure_node", ["--minutes=-1"], ["--minutes", "'-1'", "from 0 on"]),
         ("measure_rate", ["--seconds", "inf"], ["--seconds", "'inf'"]),
         ("measure_latency", ["--messages", "0"], ["--messages", "'0'", "from 1 on"]),
@@ -34,7 +34,7 @@ LOOKS = 60
         ("figure11", ["--fast"], ["unrecognized arguments: --fast"]),
     ],
 )
-def test_what_makes_no_sense_is_refused(tool: str, options: list[str], words: list[str]):
+def test_invalid_options_are_rejected(tool: str, options: list[str], words: list[str]):
     command = [sys.executable, ROOT / "tools" / f"{tool}.py", *options]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert ended.returncode == 2 and not ended.stdout
@@ -74,17 +74,17 @@ def an_hour(soak: ModuleType, **growth: float) -> list:
     return looks
 
 
-def test_the_soak_calls_flat_what_wanders(soak: ModuleType, capsys: pytest.CaptureFixture[str]):
+def test_the_soak_test_accepts_fluctuating_figures(soak: ModuleType, capsys: pytest.CaptureFixture[str]):
     assert not soak.verdict(an_hour(soak))
-    told = capsys.readouterr().out
-    assert told.count(": flat") == len(soak.MAY_GROW) and "GROWS" not in told
+    out = capsys.readouterr().out
+    assert out.count(": flat") == len(soak.MAY_GROW) and "GROWS" not in out
 
 
 @pytest.mark.parametrize("growth", [{"memory_mb": 6.0}, {"files": 4.0}, {"threads": 3.0}, {"latency_ms": 0.8}])
-def test_the_soak_finds_what_grows(soak: ModuleType, capsys: pytest.CaptureFixture[str], growth: dict[str, float]):
+def test_the_soak_test_detects_growth(soak: ModuleType, capsys: pytest.CaptureFixture[str], growth: dict[str, float]):
     assert soak.verdict(an_hour(soak, **growth))
     assert capsys.readouterr().out.count("GROWS") == 1
 
 
-def test_the_soak_does_not_judge_by_few_looks(soak: ModuleType):
+def test_the_soak_test_fails_with_too_few_looks(soak: ModuleType):
     assert soak.verdict(an_hour(soak)[:4])

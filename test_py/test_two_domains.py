@@ -8,7 +8,7 @@ from drive import TSP_NS, Drive
 from motion import assert_psec, start_swing
 
 
-def test_domains_do_not_hear_each_other(start: Callable[..., Drive]):
+def test_domains_are_separate(start: Callable[..., Drive]):
     """A motion in one domain leaves the other at rest, without a result."""
     moved, still = start(), start()
     assert moved.process.domain_id != still.process.domain_id

@@ -15,8 +15,8 @@ import pytest
 import yaml
 from urdf_parser_py.urdf import URDF, Joint
 
-from documented import OFFSETS, tool_pose
 from drive import node_binary
+from reference_kinematics import OFFSETS, tool_pose
 
 ROOT = Path(__file__).resolve().parent.parent
 MACHINES = ["mikron_ucp710", "linear_motor_center"]
@@ -64,7 +64,7 @@ def frame(robot: URDF, link: str, joints: dict[str, float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_limits_are_the_machine_files(machine: str):
+def test_limits_equal_the_machine_file(machine: str):
     """Names and kinds as in joint_states; travel limits, velocity and effort in SI."""
     robot = URDF.from_xml_string(command("urdf", "--machine", machine, "--joint-prefix", "mill_"))
     parameters = machine_file(machine)
@@ -93,7 +93,7 @@ def test_limits_are_the_machine_files(machine: str):
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_the_tool_in_the_workpiece_is_the_kinematics(machine: str):
+def test_the_tool_in_the_workpiece_equals_the_kinematics(machine: str):
     """URDF, `virtual_axes pose` and the documented equations at random joint positions, with all offsets."""
     settings = [text for key, value in OFFSETS.items() for text in ("--set", f"kinematics.{key}_mm={value}")]
     robot = URDF.from_xml_string(command("urdf", "--machine", machine, *settings))
@@ -136,7 +136,7 @@ def test_a_positive_joint_moves_the_tool_relative_to_the_workpiece():
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_urdfdom_takes_it(machine: str, tmp_path: Path):
+def test_urdfdom_parses_it(machine: str, tmp_path: Path):
     """The parser of robot_state_publisher reads one tree without errors."""
     path = tmp_path / "machine.urdf"
     command("urdf", "--machine", machine, "--out", str(path))

@@ -1,10 +1,9 @@
 """Stand-in for ros2_control's joint_state_topic_hardware_interface, and a network with losses.
 
-It does what that hardware does in each update of the controller manager: `read` takes the newest joint
-states over, `write` sends one JointState with the command of every joint in the order of its URDF, and
-holds it back while commands and states differ by no more than the threshold, in sum. A joint that no
-controller has claimed is sent as NaN. One without a position command interface is in `name` and not in
-`position`, which is then shorter: such joints stand last.
+In each update of the controller manager, `read` copies the newest joint states, and `write` sends one JointState with
+the command of every joint in the order of its URDF, unless commands and states differ by no more than the threshold, in
+sum. A joint that no controller has claimed is NaN. A joint without a position command interface is in `name` but
+not in `position`, which is then shorter: such joints are last.
 """
 
 from __future__ import annotations

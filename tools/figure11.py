@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Figure 11 of the paper by `tune`: better on the circle, worse at a corner; writes docs/figure-11.svg.
 
-Needs `cargo build --release` and `source .build/env.sh`. Takes minutes: the tuner looks at the whole grid.
+Needs `cargo build --release` and `source .build/env.sh`. Takes minutes: `tune` searches the whole grid.
 """
 
 import csv

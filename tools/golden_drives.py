@@ -125,7 +125,7 @@ def number(value):
 
 
 def drives():
-    lines = [",".join([*RANGES, "refused", *(f"{row}_{column}" for row in "iwt" for column in "iwuq")])]
+    lines = [",".join([*RANGES, "rejected", *(f"{row}_{column}" for row in "iwt" for column in "iwuq")])]
     for motor in motors():
         fields = [number(motor[name]) for name in RANGES]
         if turns_back(motor, motor["tick"]):

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Creates an SROS2 keystore with openssl, for systems without `ros2 security`.
 
-    tools/keystore.py FOLDER --domain 42 /cell/mill                       an enclave that may do everything
-    tools/keystore.py FOLDER --domain 42 /cell/watcher:-rt/psec           one that may do everything but that topic
+    tools/keystore.py FOLDER --domain 42 /cell/mill                       an enclave with all permissions
+    tools/keystore.py FOLDER --domain 42 /cell/watcher:-rt/psec           one without permission for this topic
 
-A keystore that is there gets more enclaves, signed by the same authority; what FOLDER/private holds makes more
-of them, and belongs to nobody but who grants access. Topics have their names in DDS: rt/ before that of a topic,
-rq/ and rr/ before that of a service.
+An existing keystore gets more enclaves, signed by the same authority. FOLDER/private contains the keys of the authority
+and must only be readable by the administrator. Topics have their DDS names: prefix rt/ for a topic, rq/ and rr/ for
+the request and response topics of a service.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def main() -> None:
     """Runs the command line."""
     words = options.parser(__doc__)
     words.add_argument("folder", type=Path)
-    words.add_argument("--domain", type=options.domain_id, default=0, help="ROS_DOMAIN_ID that the keystore is for")
+    words.add_argument("--domain", type=options.domain_id, default=0, help="ROS_DOMAIN_ID of the keystore")
     kinds = ("NONE", "SIGN", "ENCRYPT")
     words.add_argument("--rtps", choices=kinds, default="SIGN", help="protection of whole messages")
     words.add_argument("enclaves", nargs="+", metavar="/ENCLAVE[:-TOPIC]...")

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Measures the memory that one datagram allocates in a node: a fragment that announces a long message.
 
-    tools/measure_fragments.py [MB]     the length that is announced, of one message on psec
+    tools/measure_fragments.py [MB]     announced length of one message on psec
 
-Needs the environment of .build/env.sh. Nothing leaves this machine.
+Needs the environment of .build/env.sh. No packet leaves this machine.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def fragment(writer: bytes, number: int, length: int) -> bytes:
 def main() -> None:
     """Runs the measurement."""
     parser = options.parser(__doc__)
-    parser.add_argument("megabytes", type=options.positive, nargs="?", default=256, help="that are announced (256)")
+    parser.add_argument("megabytes", type=options.positive, nargs="?", default=256, help="announced length in MB (256)")
     length = round(parser.parse_args().megabytes * 1_000_000)
     if not FRAGMENT < length <= LONGEST:
         parser.error(f"a message of {length} octets: it must be longer than a fragment, {FRAGMENT}, up to {LONGEST}")
@@ -62,7 +62,7 @@ def main() -> None:
                 link.sendto(fragment(writer, 1, length), ("127.0.0.1", port))
         for wait in (1, 5, 10, 10):
             time.sleep(wait)
-            print(f"{resident_mb(process.pid) - before:+.0f} MB after {wait} s more")
+            print(f"{resident_mb(process.pid) - before:+.0f} MB after {wait} s")
 
 
 if __name__ == "__main__":

@@ -4,15 +4,15 @@
     cargo build --release && source .build/env.sh
     tools/measure_latency.py --messages 500
 
-One setpoint at a time at a random phase of the position period; wall-clock time from the call of
-publish to the callback of the first message
+One setpoint at a time at a random phase of the position cycle; wall-clock time from the call of publish to the callback
+of the first message
 
-- of ~/drive_states that has it as psec: what the graph costs;
-- of joint_states in which the axis has moved: that, and the pure delay of the drive that is simulated.
+- of ~/drive_states that contains it as psec: the latency of the graph;
+- of joint_states in which the axis has moved: also the pure delay of the simulated drive.
 
-As ratios to the position period. A sample is published once its period has been computed. What bounds
-the first: the next position instant (uniform between 0 and 1 period), the computing of that period, and
-the transport there and back.
+Figures are ratios to the position cycle. A sample is published after its cycle has been computed. The first latency
+consists of the wait for the next position instant (uniform between 0 and 1 cycle), the computation of that cycle, and
+the transport in both directions.
 """
 
 from __future__ import annotations
@@ -81,11 +81,11 @@ def main() -> int:
     """Runs the measurement and prints the result."""
     parser = options.parser(__doc__)
     parser.add_argument("--messages", type=options.whole, default=300, help="setpoints (300)")
-    parser.add_argument("--seed", type=int, default=1, help="of the phases (1)")
+    parser.add_argument("--seed", type=int, default=1, help="random seed of the phases (1)")
     args = parser.parse_args()
     with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:
         latencies = measure(drive, args.messages, args.seed)
-    print(f"{args.messages} setpoints, position period {TSP_NS / 1e6:g} ms, {os.cpu_count()} cores; in periods:")
+    print(f"{args.messages} setpoints, position cycle {TSP_NS / 1e6:g} ms, {os.cpu_count()} cores; in cycles:")
     for key, name in (("psec", "commanded"), ("position", "axis has moved")):
         periods = latencies[key] * 1e9 / TSP_NS
         low, median, high = np.percentile(periods, [5, 50, 95])

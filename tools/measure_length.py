@@ -6,10 +6,10 @@
     tools/measure_length.py --seconds 60 600 --report --trace
     tools/measure_length.py --write 36000 psec.csv # only the setpoints, five axes every 6 ms
 
-A row per length: seconds of the processor (and of the clock, which a busy machine makes longer), times real time,
-time per simulated second relative to the first length, largest resident memory, and the length of what was read and
-written. `--report` and `--trace` have a page and a trace (at position instants) written too. Of several `--rounds`,
-which take the lengths in turns, the medians are told.
+A row per length: CPU time and wall-clock time in s, ratio to real time, time per simulated second relative to the first
+length, maximum resident memory, and the sizes of the input and the outputs. `--report` and `--trace` also write a page
+and a trace (at position instants). With several `--rounds`, which alternate between the lengths, the figures are
+medians.
 """
 
 from __future__ import annotations
@@ -132,14 +132,14 @@ def row(seconds: int, runs: list[Run], read: int, first: tuple[int, list[Run]]) 
 
 def main() -> None:
     parser = options.parser(__doc__)
-    parser.add_argument("--command", type=Path, default=COMMAND, help="the program virtual_axes")
+    parser.add_argument("--command", type=Path, default=COMMAND, help="path of the program virtual_axes")
     parser.add_argument(
         "--seconds", type=options.whole, nargs="+", default=LENGTHS, metavar="S", help="lengths of the setpoints"
     )
-    parser.add_argument("--report", action="store_true", help="write a page, too")
-    parser.add_argument("--trace", action="store_true", help="write a trace, too")
-    parser.add_argument("--rounds", type=options.whole, default=1, metavar="N", help="how often each length is run")
-    parser.add_argument("--folder", type=Path, help="where setpoints and outputs are for a while")
+    parser.add_argument("--report", action="store_true", help="also write a page")
+    parser.add_argument("--trace", action="store_true", help="also write a trace")
+    parser.add_argument("--rounds", type=options.whole, default=1, metavar="N", help="runs of each length")
+    parser.add_argument("--folder", type=Path, help="folder for temporary setpoints and outputs")
     parser.add_argument("--write", nargs=2, metavar=("S", "FILE"), help="write setpoints and run nothing")
     arguments = parser.parse_args()
     if arguments.write:

@@ -4,16 +4,14 @@
     cargo build --release && source .build/env.sh
     tools/measure_node.py --seconds 20 --minutes 10
 
-The share is what the kernel counts for the process, user and system time of all its threads, over
-wall-clock time, of one core: at rest and in motion, alone and with subscribers (rclpy, reliable, raw).
-Beside it stands how often a thread of the process is woken in a position period, which depends less on
-the machine and its load than the share does.
-Every span is checked: the node lives at its end, it says itself that no period was missed, and
-whoever listens has got every sample.
+The CPU share is user and system time of all threads of the process over wall-clock time, of one core: at rest and in
+motion, alone and with subscribers (rclpy, reliable, raw). The number of wake-ups of its threads per position cycle
+depends less on the machine and its load than the share does. Each span is checked: the node still runs at its end, its
+diagnostics report no missed cycle, and all subscribers have received all samples.
 
-Memory: resident set and open files while a trajectory follows the other and a subscriber listens to
-joint_states, over --minutes (0: not at all). First as many trajectories are sent as psec keeps, so that
-what is bounded has grown to its bound: the middleware keeps the last 64.
+Memory: resident set and open files during successive trajectories and a subscription to joint_states, for --minutes
+(0: skipped). First, as many trajectories are sent as the middleware stores for psec (64), so that bounded histories
+are full.
 """
 
 from __future__ import annotations
@@ -76,7 +74,7 @@ KEPT = 64
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
-class Guest:
+class Client:
     """Client node that subscribes and can send setpoints."""
 
     def __init__(self, process: Node, topics: dict[str, Any]):
@@ -86,7 +84,7 @@ class Guest:
         self._context = Context()
         rclpy.init(context=self._context, domain_id=process.domain_id, signal_handler_options=SignalHandlerOptions.NO)
         self.node = rclpy.create_node(
-            "guest", context=self._context, enable_rosout=False, start_parameter_services=False
+            "client", context=self._context, enable_rosout=False, start_parameter_services=False
         )
         for topic, kind in topics.items():
             keep = self._keep if topic == "/joint_states" else lambda _: None
@@ -145,9 +143,9 @@ def open_files(pid: int) -> int:
 class Motion:
     """Repeated motion commands of a client."""
 
-    def __init__(self, guest: Guest, kind: str):
+    def __init__(self, client: Client, kind: str):
         """Sets `kind`: rest, trajectory or stream."""
-        self.guest, self.kind = guest, kind
+        self.client, self.kind = client, kind
         circle = ballbar()
         self._circle = joint_trajectory(["x", "y"], circle.time, np.column_stack([circle.x, circle.y]))
         self._duration = circle.time[-1]
@@ -158,20 +156,20 @@ class Motion:
         start = time.monotonic()
         while not self._end.is_set():
             if self.kind == "trajectory":
-                self.guest.psec.publish(self._circle)
+                self.client.psec.publish(self._circle)
                 self._end.wait(self._duration + 0.1)
             else:
                 phase = 2 * np.pi * 0.5 * (time.monotonic() - start)
                 position = [0.01 * np.sin(phase), 0.01 * (1 - np.cos(phase))]
-                self.guest.psec_stream.publish(JointState(name=["x", "y"], position=position))
+                self.client.psec_stream.publish(JointState(name=["x", "y"], position=position))
                 self._end.wait(TSP_NS / 1e9)
 
     def fill(self) -> None:
         """Sends as many trajectories as the middleware stores, and stops."""
         for _ in range(2 * KEPT):
-            self.guest.psec.publish(self._circle)
+            self.client.psec.publish(self._circle)
             time.sleep(0.1)
-        self.guest.psec.publish(JointTrajectory())
+        self.client.psec.publish(JointTrajectory())
         time.sleep(1.0)
 
     def __enter__(self) -> Motion:
@@ -186,7 +184,7 @@ class Motion:
         self._end.set()
         if self.kind != "rest":
             self._thread.join(timeout=5.0)
-            self.guest.psec.publish(JointTrajectory())
+            self.client.psec.publish(JointTrajectory())
             time.sleep(1.0)
 
 
@@ -199,64 +197,66 @@ def check(process: Node, stamps: Iterable[int] | None, seconds: float) -> None:
     grid = np.diff(np.array(list(stamps)))
     lost = int(np.sum(grid // TSP_NS - 1))
     if len(grid) < 0.98 * seconds * 1e9 / TSP_NS or lost:
-        raise SystemExit(f"{len(grid) + 1} samples came in {seconds:.1f} s, {lost} were lost")
+        raise SystemExit(f"{len(grid) + 1} samples in {seconds:.1f} s, {lost} lost")
 
 
-def share(process: Node, guest: Guest | None, seconds: float) -> str:
+def share(process: Node, client: Client | None, seconds: float) -> str:
     """Returns the share of a core over a span, and the wake-ups per position cycle."""
-    first = len(guest.stamps) if guest else 0
+    first = len(client.stamps) if client else 0
     before, slept, start = cpu_seconds(process.pid), wakeups(process.pid), time.monotonic()
     time.sleep(seconds)
     used, took = cpu_seconds(process.pid) - before, time.monotonic() - start
     slept = wakeups(process.pid) - slept
-    check(process, guest.stamps[first:] if guest else None, took)
+    check(process, client.stamps[first:] if client else None, took)
     return f"{used / took:6.2%}{slept * TSP_NS / 1e9 / took:6.1f} wake-ups a period"
 
 
-def memory(process: Node, guest: Guest, minutes: float) -> None:
+def memory(process: Node, client: Client, minutes: float) -> None:
     """Prints memory and open files while the axes move."""
     looks: list[tuple[float, int, int]] = []
-    motion = Motion(guest, "trajectory")
+    motion = Motion(client, "trajectory")
     motion.fill()
     start = time.monotonic()
     with motion:
         while (passed := time.monotonic() - start) < minutes * 60:
             looks.append((passed, status_of(process.pid, "VmRSS"), open_files(process.pid)))
-            first = len(guest.stamps)
+            first = len(client.stamps)
             time.sleep(LOOK_S)
-            check(process, guest.stamps[first:], LOOK_S)
+            check(process, client.stamps[first:], LOOK_S)
     passed, resident, files = np.array(looks).T
-    print(f"memory over {minutes:g} minutes of motion, {len(looks)} looks:")
+    print(f"memory over {minutes:g} minutes of motion, {len(looks)} samples:")
     span = f"{resident.min():.0f} to {resident.max():.0f}"
-    print(f"  resident: {resident[0]:.0f} kB at first, {span}, {resident[-1]:.0f} at last")
+    print(f"  resident: {resident[0]:.0f} kB initially, {span}, {resident[-1]:.0f} finally")
     half = passed > minutes * 30
     if half.sum() > 2:
         slope = np.polyfit(passed[half] / 60, resident[half], 1)[0]
-        print(f"  growth over the second half: {slope:+.1f} kB a minute")
-    print(f"  open files: {files[0]:.0f} at first, at most {files.max():.0f}, {files[-1]:.0f} at last")
+        print(f"  growth over the second half: {slope:+.1f} kB per minute")
+    print(f"  open files: {files[0]:.0f} initially, at most {files.max():.0f}, {files[-1]:.0f} finally")
 
 
 def main() -> int:
     """Runs the measurement and prints the result."""
     parser = options.parser(__doc__)
-    parser.add_argument("--seconds", type=options.positive, default=20, help="of each span (20)")
-    parser.add_argument("--minutes", type=options.from_zero, default=10, help="of motion, for memory (10)")
+    parser.add_argument("--seconds", type=options.positive, default=20, help="duration of each span, s (20)")
+    parser.add_argument(
+        "--minutes", type=options.from_zero, default=10, help="duration of the memory measurement, min (10)"
+    )
     args = parser.parse_args()
     with Node(["-p", "time:=real"]) as process:
         time.sleep(STARTED_S)
-        print(f"share of one core in real time, position period {TSP_NS / 1e6:g} ms, spans of {args.seconds:g} s:")
-        print(f"  {'at rest, nobody listens':<44}{share(process, None, args.seconds)}", flush=True)
+        print(f"share of one core in real time, position cycle {TSP_NS / 1e6:g} ms, spans of {args.seconds:g} s:")
+        print(f"  {'at rest, no subscriber':<44}{share(process, None, args.seconds)}", flush=True)
         for topics, who in ((JOINTS, "joint_states"), (ALL, f"{len(ALL)} topics")):
-            guest = Guest(process, topics)
+            client = Client(process, topics)
             for kind in ("rest", "trajectory", "stream"):
-                with Motion(guest, kind):
-                    found = share(process, guest, args.seconds)
+                with Motion(client, kind):
+                    found = share(process, client, args.seconds)
                 print(f"  {f'{kind}, a subscriber of {who}':<44}{found}", flush=True)
-            guest.close()
+            client.close()
         if args.minutes > 0:
-            guest = Guest(process, JOINTS)
-            memory(process, guest, args.minutes)
-            guest.close()
+            client = Client(process, JOINTS)
+            memory(process, client, args.minutes)
+            client.close()
         check(process, None, 0)
         if process.stop() != 0:
             raise SystemExit(f"the node ended with status {process.poll()}; its output:\n{process.output()}")

@@ -4,11 +4,11 @@
     cargo build --release && source .build/env.sh
     tools/measure_publish_once.py --runs 200              # the hardest case, transient local
     tools/measure_publish_once.py --durability volatile --settle 0.3 --keep-alive 0.5
-    tools/measure_publish_once.py --poll 0.1 --load 2     # the pace of ros2 topic pub, a busy machine
-    tools/measure_publish_once.py --node-last --runs 20   # publishers that wait for a node yet to start
+    tools/measure_publish_once.py --poll 0.1 --load 2     # the polling of ros2 topic pub, a busy machine
+    tools/measure_publish_once.py --node-last --runs 20   # publishers that start before the node
 
-Every publisher is a participant of its own, does what `ros2 topic pub --once` does, and names a
-joint of its own that does not exist: the refusals tell which trajectories have arrived.
+Each publisher is a separate participant that acts like `ros2 topic pub --once`, and names its own nonexistent joint:
+the rejections identify the trajectories that arrived.
 """
 
 from __future__ import annotations
@@ -69,17 +69,23 @@ for number in range(int(first), int(first) + int(runs)):
 def arguments() -> argparse.Namespace:
     """Returns the parsed command line."""
     parser = options.parser(__doc__)
-    parser.add_argument("--runs", type=options.whole, default=100, help="publishers, one after another (100)")
+    parser.add_argument("--runs", type=options.whole, default=100, help="number of successive publishers (100)")
     parser.add_argument("--durability", choices=["transient_local", "volatile"], default="transient_local")
-    parser.add_argument("--poll", type=options.from_zero, default=0.001, help="s between looks for a match (0.001)")
-    parser.add_argument("--settle", type=options.from_zero, default=0.0, help="s from the match to the sample (0)")
-    parser.add_argument("--keep-alive", type=options.from_zero, default=0.1, help="s from the sample to the end (0.1)")
-    parser.add_argument("--times", type=options.whole, default=1, help="samples, one a second (1)")
-    parser.add_argument("--points", type=options.whole, default=1, help="of each trajectory; 2000 need fragments (1)")
-    parser.add_argument("--load", type=options.whole_from_zero, default=0, help="busy processes beside (0)")
-    parser.add_argument("--node-last", action="store_true", help="a new node for each publisher, started after it")
+    parser.add_argument("--poll", type=options.from_zero, default=0.001, help="polling period for the match, s (0.001)")
+    parser.add_argument(
+        "--settle", type=options.from_zero, default=0.0, help="delay from the match to the sample, s (0)"
+    )
+    parser.add_argument(
+        "--keep-alive", type=options.from_zero, default=0.1, help="delay from the sample to the end, s (0.1)"
+    )
+    parser.add_argument("--times", type=options.whole, default=1, help="samples per publisher, one per second (1)")
+    parser.add_argument(
+        "--points", type=options.whole, default=1, help="points per trajectory; 2000 need fragments (1)"
+    )
+    parser.add_argument("--load", type=options.whole_from_zero, default=0, help="busy processes on the machine (0)")
+    parser.add_argument("--node-last", action="store_true", help="start a new node after each publisher")
     parser.add_argument("--per-process", type=options.whole, default=1, help="publishers in one process (1)")
-    parser.add_argument("--log-level", help="of the node, as for --ros-args; its output goes to --output")
+    parser.add_argument("--log-level", help="log level of the node; its output goes to --output")
     parser.add_argument("--output", type=Path, help="file for the node's output")
     return parser.parse_args()
 

@@ -4,12 +4,11 @@
     cargo build --release --bins --examples && source .build/env.sh
     tools/measure_rate.py --seconds 5
 
-In real time, with shorter and shorter position periods, to a subscriber in Rust
-(examples/count_joint_states.rs) and to one in rclpy, each alone with the node: samples a second, how
-many of them are missing on the grid of their stamps, and the share of a core that the node takes. Both
-subscribers are reliable and look at every message; the one in Rust keeps the last 100 000 samples, the
-one in rclpy the last 100. Then in `fast`, in motion, where the simulation waits for whoever listens and
-rclpy keeps all too: samples a second. Rates are multiples of the default one, all of one run.
+In real time, with decreasing position cycles, to a subscriber in Rust (examples/count_joint_states.rs) and to one in
+rclpy, each alone with the node: samples per second, missing samples on the stamp grid, and the CPU share of the node.
+Both subscribers are reliable and deserialize each message; the history depth is 100 000 in Rust and 100 in rclpy. Then
+in `fast`, in motion, where the simulation waits for its subscribers and rclpy keeps all samples: samples per second.
+Rates are multiples of the default one in the same run.
 """
 
 from __future__ import annotations
@@ -88,7 +87,7 @@ class Subscriber:
         deadline = time.monotonic() + 10
         while not self._stamps:
             if time.monotonic() > deadline or self._process.poll() is not None:
-                raise SystemExit(f"nothing is published; the node's output:\n{self._process.output()}")
+                raise SystemExit(f"no samples received; the node's output:\n{self._process.output()}")
             self._executor.spin_once(timeout_sec=0.1)
         self._stamps.clear()
         start = time.monotonic()
@@ -133,7 +132,7 @@ def count_in_rclpy(process: Node, seconds: float, period_ns: int) -> Count:
 
 def real_time(seconds: float) -> None:
     """Prints rates, losses and CPU shares, and the maximum rate without loss."""
-    print(f"{'multiple':>10}{'period, ms':>12}{'subscriber':>12}{'a second':>10}{'lost':>8}{'node, of a core':>17}")
+    print(f"{'multiple':>10}{'cycle, ms':>12}{'subscriber':>12}{'per second':>12}{'lost':>8}{'node CPU share':>17}")
     best: dict[str, float] = {}
     for period_ms in PERIODS_MS:
         period_ns = round(period_ms * 1e6)
@@ -156,7 +155,7 @@ def real_time(seconds: float) -> None:
                 flush=True,
             )
     for name, multiple in best.items():
-        print(f"highest rate without loss to {name}: {multiple:g} times the default rate")
+        print(f"maximum rate without loss to {name}: {multiple:g} times the default rate")
 
 
 def fast(seconds: float) -> None:
@@ -180,13 +179,13 @@ def fast(seconds: float) -> None:
             if process.poll() is not None:
                 raise SystemExit(f"the node ended; its output:\n{process.output()}")
         times = f"{found.rate / default:.1f} times real time"
-        print(f"fast, to {name}: {found.rate:.0f} samples a second, {found.lost} lost, {times}")
+        print(f"fast, to {name}: {found.rate:.0f} samples per second, {found.lost} lost, {times}")
 
 
 def main() -> int:
     """Runs the measurement and prints the result."""
     parser = options.parser(__doc__)
-    parser.add_argument("--seconds", type=options.positive, default=5, help="of each span (5)")
+    parser.add_argument("--seconds", type=options.positive, default=5, help="duration of each span, s (5)")
     args = parser.parse_args()
     real_time(args.seconds)
     fast(args.seconds)

@@ -5,8 +5,8 @@
     tools/measure_screening.py                          # 100 000 designs on the ballbar
     tools/measure_screening.py --designs 5000 --scenario corner-90
 
-Each design of a predictive controller that is stable is run on the scenario; the best are refined. A machine-second is
-a second of one machine on the path, all of its axes.
+Each stable design of a predictive controller is run on the scenario; the best designs are refined. A machine-second is
+a simulated second of one machine with all of its axes.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ def screen(arguments: argparse.Namespace, designs: int, threads: int) -> float:
     seconds = time.monotonic() - start
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}: ended with {done.returncode}: {done.stderr.decode(errors='replace').strip()}")
+        sys.exit(f"{' '.join(command)}: exit status {done.returncode}: {done.stderr.decode(errors='replace').strip()}")
     found = json.loads(done.stdout)
     runs, duration = found["runs"], found["best"]["figures"]["duration_s"]
     core = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     rate = runs * duration / seconds
     print(f"{threads} threads: {found['designs']} designs, {runs} tunings run in {seconds:.1f} s")
-    print(f"  {rate:.0f} machine-seconds per second; {core:.1f} s on the cores, ", end="")
-    print(f"{runs * duration / core:.0f} machine-seconds per second on one", flush=True)
+    print(f"  {rate:.0f} machine-seconds per second; {core:.1f} s CPU time, ", end="")
+    print(f"{runs * duration / core:.0f} machine-seconds per second of one core", flush=True)
     return rate
 
 
@@ -53,13 +53,13 @@ def main() -> None:
     parser.add_argument("--program", type=Path, default=PROGRAM)
     parser.add_argument("--scenario", default="ballbar")
     parser.add_argument("--designs", type=options.whole, default=100_000)
-    parser.add_argument("--part", type=options.whole, default=10, help="one core screens the designs divided by this")
+    parser.add_argument("--part", type=options.whole, default=10, help="divisor of the designs for one core")
     arguments = parser.parse_args()
     if not arguments.program.is_file():
         parser.error(f"there is no {arguments.program}: cargo build --release --bin virtual_axes")
     two = screen(arguments, arguments.designs, 2)
     one = screen(arguments, max(arguments.designs // arguments.part, 1), 1)
-    print(f"two cores are worth {two / one:.2f} of one")
+    print(f"speedup by a second core: {two / one:.2f}")
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def domain_id(text: str) -> int:
 
 
 def _whole(text: str, least: int, most: int | None = None) -> int:
-    wrong = f"{text!r} is no whole number from {least} {'on' if most is None else f'to {most}'}"
+    wrong = f"{text!r} is not a whole number from {least} {'on' if most is None else f'to {most}'}"
     # int() is slow for very long numbers.
     if not (text.isascii() and text.isdecimal()) or len(text) > DIGITS:
         raise argparse.ArgumentTypeError(wrong)
@@ -53,11 +53,11 @@ def _whole(text: str, least: int, most: int | None = None) -> int:
     return value
 
 
-def _number(text: str, wrong: str, right: Callable[[float], bool]) -> float:
+def _number(text: str, wrong: str, is_valid: Callable[[float], bool]) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not (math.isfinite(value) and right(value)):
+    if not (math.isfinite(value) and is_valid(value)):
         raise argparse.ArgumentTypeError(f"{text!r} is {wrong}")
     return value

@@ -2,9 +2,9 @@
 """Writes docs/reproduction.md: the paper figure by figure, with the command for each number.
 
     cargo build --release && tools/reproduction.py            # rewrites the page
-    tools/reproduction.py --check                             # status 1 if the page is not what comes out
+    tools/reproduction.py --check                             # status 1 if the page is out of date
 
-Each number is what the command beside it prints.
+Each number is the output of the command beside it.
 """
 
 from __future__ import annotations
@@ -279,7 +279,7 @@ def page() -> str:
 def main() -> int:
     """Writes or checks the page."""
     parser = options.parser(__doc__)
-    parser.add_argument("--check", action="store_true", help="write nothing")
+    parser.add_argument("--check", action="store_true", help="only check the page; write nothing")
     checks = parser.parse_args().check
     text = page()
     if checks:

@@ -4,8 +4,8 @@
     cargo build --release && source .build/env.sh
     tools/run_graph.py --seconds 60
 
-A source of trajectories, the node, a process model that loads the axes in proportion to their velocity,
-and a recorder. The exit status tells whether a stamp was missing or came twice.
+Trajectory source, node, process model with loads in proportion to the velocity, and recorder. The exit status is 1 if a
+stamp is missing or duplicated.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ TORQUE_CONSTANT = 2.64
 def main() -> int:
     """Runs the graph and prints the figures."""
     parser = options.parser(__doc__)
-    parser.add_argument("--seconds", type=options.positive, default=60.0, help="of motion (60)")
+    parser.add_argument("--seconds", type=options.positive, default=60.0, help="duration of the motion, s (60)")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         figures = run_graph(args.seconds, Path(folder) / "recorded.json")
@@ -47,7 +47,7 @@ def main() -> int:
     print(
         f"  load over velocity: {slope:.3f} A s/m ({nominal:.3f}), correlation {correlation:.5f}, lag {lag:g} periods"
     )
-    print(f"  loads that are a published velocity times that: {figures.answered(nominal) * 100:.2f} %")
+    print(f"  loads equal to a published velocity times this factor: {figures.answered(nominal) * 100:.2f} %")
     for key in ("position_periods", "missed_periods", "dropped_samples", "mean_lateness_ms", "max_lateness_ms"):
         print(f"  {key}: {figures.diagnostics[key]}")
     return int(bool(figures.faults()))

@@ -20,13 +20,13 @@ def main() -> int:
     page, picture = arguments.page.resolve(), arguments.picture.resolve()
     program = find_browser()
     if program is None:
-        print("no Chromium here to make a picture of it")
+        print("no Chromium found: no screenshot")
         return 0
     with tempfile.TemporaryDirectory() as folder, Browser(program, Path(folder)) as browser:
         browser.show_as()
         browser.open(page.as_uri())
         browser.screenshot(picture)
-    print(f"its picture: {picture}")
+    print(f"screenshot: {picture}")
     return 0
 
 

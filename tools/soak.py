@@ -2,24 +2,24 @@
 """Soak test with random traffic: the node's memory, open files, threads and latency must not grow.
 
     cargo build --release && source .build/env.sh
-    tools/soak.py --minutes 1                  # does the tool work; too short to judge memory
+    tools/soak.py --minutes 1                  # test of the tool; too short for a verdict on memory
     tools/soak.py --minutes 10                 # ten minutes in real time
-    tools/soak.py --minutes 60 --speed 10      # an hour, in which the axes live ten
+    tools/soak.py --minutes 60 --speed 10      # an hour of wall time, ten hours of machine time
 
-Valid and invalid trajectories, streams, loads, services, parameters, goals that are canceled or not, one after the
-other as fast as they are answered, the same for the same --seed; beside them, by the wall clock, subscriptions that
-come and go, processes that come, leave and are killed: a subscription every 4 s, a process every 24 s, or --churn times
-as many. With --speed the node follows a /clock of this tool's. At first what is bounded is filled to its bound: floods,
-endpoints that come and go, announcements of participants, and a listener that is killed, for whom samples are kept
-until its lease has ended.
+Traffic: valid and invalid trajectories, streams, loads, services, parameters, goals with and without cancellation, one
+after the other as fast as the node responds, reproducible by --seed. By wall time, subscriptions are created and
+destroyed, and processes join, leave and are killed: a subscription every 4 s, a process every 24 s, or --churn times as
+many. With --speed the node follows a /clock of this tool. First, bounded histories are filled: floods, endpoints that
+join and leave, participant announcements, and a subscriber that is killed, for which samples are kept until its lease
+expires.
 
-Latency is that of a service to a client that does nothing else, over that of the same client at a process that only
-echoes, call by call in turns: what else the machine does slows both. Memory is what the process has of its own
-(RssAnon), without pages of files, on average between two looks: the middleware looks every 6 s for what it need not
-keep, for each topic at another time, so that the least depends on whether they coincide.
+The latency is the ratio of a service call to the node and a call of the same idle client to an echo process,
+alternating, so that other load on the machine slows both. The memory is the process's own (RssAnon), without files,
+as the mean between two looks: the middleware cleans up its histories every 6 s, for each topic at another time, so that
+the minimum depends on coincidence.
 
-The exit status is 1 if over the second half something grew by more than it may, if the node died or no longer
-answered, or if the fourth prober ended by itself.
+The exit status is 1 if a figure has grown by more than its limit in the second half, if the node died or stopped
+responding, or if the fourth prober ended by itself.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from action import Follow, goal  # noqa: E402
-from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRefused, joint_trajectory, own_mb, status_values, to_time  # noqa: E402
-from guest import Guest, Silent  # noqa: E402
+from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRejected, joint_trajectory, own_mb, status_values, to_time  # noqa: E402
+from participant import NoResponse, Participant  # noqa: E402
 
 WEIGHTS = {
     "trajectory": 20,
@@ -177,7 +177,7 @@ class Traffic:
         self._comings = random.Random(seed + 1)
         self.count: Counter[str] = Counter()
         self._folder = folder
-        self._guests: list[Guest] = []
+        self._participants: list[Participant] = []
         self._listening: list[Any] = []
         self._kinds = {kind: weight for kind, weight in WEIGHTS.items() if kind in kinds}
         now = time.monotonic()
@@ -208,7 +208,7 @@ class Traffic:
             if self.drive.process is None or self.drive.process.poll() is not None:
                 raise
             # Error of a participant: the soak test evaluates the node.
-            self.count["guests_ended"] += 1
+            self.count["participants_ended"] += 1
             print(f"{kind}: {ended}", flush=True)
 
     def _way(self) -> tuple[list[str], list[float], float]:
@@ -276,9 +276,9 @@ class Traffic:
         wrong: Any = self.chance.choice([(GAIN, -1.0), ("no.such", 1), ("time", "fast"), (GAIN, "text")])
         try:
             self.drive.set_parameters(dict([wrong]))
-        except ParameterRefused:
+        except ParameterRejected:
             return
-        raise SystemExit(f"{wrong} was taken")
+        raise SystemExit(f"{wrong} was accepted")
 
     def descriptions(self) -> None:
         """Requests long responses."""
@@ -317,18 +317,18 @@ class Traffic:
     def visitor(self) -> None:
         """Starts a participant that joins and leaves."""
         assert self.drive.process is not None
-        with Guest(self.drive.process.domain_id, "sink", 10) as guest:
-            guest.leave()
+        with Participant(self.drive.process.domain_id, "sink", 10) as participant:
+            participant.leave()
 
     def killed(self) -> None:
         """Starts a subscribing process and kills an earlier one."""
         assert self.drive.process is not None
         # With /clock the node waits for a subscriber until its lease expires.
         domain = self.drive.process.domain_id
-        guest = Guest(domain, "sink", 10, lease=SHORT_LEASE_S, folder=self._folder)
-        self._guests.append(guest.__enter__())
-        if len(self._guests) > 2:
-            self._guests.pop(0).kill()
+        participant = Participant(domain, "sink", 10, lease=SHORT_LEASE_S, folder=self._folder)
+        self._participants.append(participant.__enter__())
+        if len(self._participants) > 2:
+            self._participants.pop(0).kill()
 
     def forget(self) -> None:
         """Drops the messages that this process has kept."""
@@ -340,8 +340,8 @@ class Traffic:
 
     def close(self) -> None:
         """Ends the participants."""
-        for guest in self._guests:
-            guest.kill()
+        for participant in self._participants:
+            participant.kill()
 
 
 def long_trajectory() -> JointTrajectory:
@@ -356,7 +356,7 @@ def crowd(drive: Drive) -> None:
     kind, name = JointTrajectoryControllerState, "/crowd/of_those_who_leave_together"
 
     def count() -> int:
-        return int(drive.told()["endpoints_discovered"])
+        return int(drive.next_status()["endpoints_discovered"])
 
     for _ in range(CROWD // AT_A_TIME):
         before = count()
@@ -375,15 +375,15 @@ def crowd(drive: Drive) -> None:
 def announce(drive: Drive, folder: Path) -> None:
     """Runs a participant that announces itself frequently."""
     assert drive.process is not None
-    with Guest(drive.process.domain_id, "sink", 10, lease=LEASE_S, announces_s=0.005, folder=folder):
+    with Participant(drive.process.domain_id, "sink", 10, lease=LEASE_S, announces_s=0.005, folder=folder):
         time.sleep(CROWD * 0.005 * 1.5)
 
 
 def kill_listener(drive: Drive) -> None:
     """Kills a subscriber whose samples are kept until its lease expires."""
     assert drive.process is not None
-    with Guest(drive.process.domain_id, "sink", 10) as guest:
-        guest.kill()
+    with Participant(drive.process.domain_id, "sink", 10) as participant:
+        participant.kill()
     time.sleep(LEASE_S + 5)
 
 
@@ -403,7 +403,7 @@ def fill(drive: Drive, folder: Path) -> None:
             drive._sent += 1
         time.sleep(0.02)
     if len(drive.results()) < FILL:
-        print(f"only {len(drive.results())} of {FILL} trajectories were answered in a minute", flush=True)
+        print(f"only {len(drive.results())} of {FILL} trajectories got a result within a minute", flush=True)
     for _ in range(KEPT + 16):
         drive.send(long_trajectory())
         time.sleep(0.05)
@@ -445,14 +445,14 @@ class Prober:
         self.failed = 0
         """Number of restarts."""
         self._process = process
-        self._guests = ExitStack()
+        self._participants = ExitStack()
         self._begin()
 
     def _begin(self) -> None:
         domain = self._process.domain_id
-        self._guests.enter_context(Guest(domain, "echo", ECHO))
+        self._participants.enter_context(Participant(domain, "echo", ECHO))
         names = (f"{self._process.name}/get_parameters", ECHO)
-        self._caller = self._guests.enter_context(Guest(domain, "probe", *names))
+        self._caller = self._participants.enter_context(Participant(domain, "probe", *names))
 
     def __enter__(self) -> Prober:
         """Returns itself."""
@@ -460,22 +460,22 @@ class Prober:
 
     def __exit__(self, *_: object) -> None:
         """Ends both participants."""
-        self._guests.close()
+        self._participants.close()
 
     def begin_anew(self) -> None:
         """Restarts both participants."""
         self.failed += 1
-        self._guests.close()
+        self._participants.close()
         self._begin()
 
     def latencies_ms(self) -> list[float]:
         """Returns the latencies of the node and of the echo; raises ChildProcessError if a participant has failed."""
         try:
             return self._caller.latencies_ms(CALLS)
-        except Silent as silent:
-            if silent.service != ECHO:
+        except NoResponse as no_response:
+            if no_response.service != ECHO:
                 raise
-            raise ChildProcessError("the echo does not answer") from None
+            raise ChildProcessError("the echo process does not respond") from None
 
 
 def look(drive: Drive, prober: Prober, memory: Memory, began: float) -> Look:
@@ -526,7 +526,7 @@ def verdict(looks: list[Look]) -> bool:
     """Prints the course of each figure; returns true if none has grown."""
     half = looks[len(looks) // 2 :]
     if len(half) < FEWEST:
-        print(f"{len(looks)} looks are too few to tell")
+        print(f"{len(looks)} looks are too few for a verdict")
         return True
     minutes = np.array([found.minutes for found in half])
     grew = False
@@ -538,11 +538,11 @@ def verdict(looks: list[Look]) -> bool:
         bad = growth > most
         grew |= bad
         print(
-            f"  {name:<14}{values.min():9.2f} to {values.max():9.2f}, {rate:+9.4f} a minute, "
-            f"{growth:+7.2f} in all, at most {most:.2f}: {'GROWS' if bad else 'flat'}"
+            f"  {name:<14}{values.min():9.2f} to {values.max():9.2f}, {rate:+9.4f} per minute, "
+            f"{growth:+7.2f} in total, limit {most:.2f}: {'GROWS' if bad else 'flat'}"
         )
     came = half[-1].endpoints - half[0].endpoints
-    print(f"  {came} endpoints of others came, of which the middleware keeps up to {came * KEPT_MB:.2f} MB for good")
+    print(f"  {came} remote endpoints discovered, for which the middleware keeps up to {came * KEPT_MB:.2f} MB")
     return grew
 
 
@@ -555,7 +555,7 @@ def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple
     between_s = max(seconds / LOOKS, LOOK_S)
     began = time.monotonic()
     try:
-        first_period = int(drive.told()["position_periods"])
+        first_period = int(drive.next_status()["position_periods"])
         while (passed := time.monotonic() - began) < seconds:
             traffic.step()
             if process.poll() is not None:
@@ -566,7 +566,7 @@ def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple
                 looks.append(look(drive, prober, memory, began))
             except (ChildProcessError, BrokenPipeError) as ended:
                 # A prober process has failed: the soak test evaluates the node.
-                print(f"a prober has ended: {ended}", flush=True)
+                print(f"a prober ended: {ended}", flush=True)
                 if prober.failed >= PROBERS or process.poll() is not None:
                     raise
                 prober.begin_anew()
@@ -574,12 +574,12 @@ def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple
             traffic.forget()
             if len(looks) % TOLD_EVERY == 0:
                 print(looks[-1], flush=True)
-        told = drive.told()
-        lived_s = (int(told["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
-        print(f"\n{lived_s:.0f} s of the axes in {time.monotonic() - began:.0f} s")
-        return looks, told
+        reported = drive.next_status()
+        lived_s = (int(reported["position_periods"]) - first_period) * TSP_NS / NANOSECONDS
+        print(f"\n{lived_s:.0f} s of machine time in {time.monotonic() - began:.0f} s")
+        return looks, reported
     except OSError as failed:  # Includes timeouts and processes that have ended.
-        print(f"broken off after {time.monotonic() - began:.0f} s: {failed}", flush=True)
+        print(f"aborted after {time.monotonic() - began:.0f} s: {failed}", flush=True)
         return looks, {}
     finally:
         memory.close()
@@ -589,18 +589,20 @@ def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple
 def main() -> int:
     """Runs the soak test and its evaluation."""
     parser = options.parser(__doc__)
-    parser.add_argument("--minutes", type=options.positive, default=1, help="of the wall clock (1)")
-    parser.add_argument("--speed", type=options.positive, default=1, help="of the node's clock against the wall's (1)")
-    parser.add_argument("--seed", type=int, default=1, help="of the traffic (1)")
-    parser.add_argument("--churn", type=options.from_zero, default=1, help="times as many who come and go (1)")
+    parser.add_argument("--minutes", type=options.positive, default=1, help="wall time, min (1)")
+    parser.add_argument("--speed", type=options.positive, default=1, help="ratio of the node's clock to wall time (1)")
+    parser.add_argument("--seed", type=int, default=1, help="random seed of the traffic (1)")
+    parser.add_argument(
+        "--churn", type=options.from_zero, default=1, help="multiple of the default number of changing participants (1)"
+    )
     kinds = parser.add_mutually_exclusive_group()
-    kinds.add_argument("--only", metavar="KIND,...", help="of traffic, to find out what grows by it")
-    kinds.add_argument("--without", metavar="KIND,...", help="all traffic but this")
+    kinds.add_argument("--only", metavar="KIND,...", help="only these kinds of traffic")
+    kinds.add_argument("--without", metavar="KIND,...", help="all kinds of traffic except these")
     args = parser.parse_args()
     known = {**WEIGHTS, **COMING_S}
     named = set(filter(None, (args.only or args.without or "").split(",")))
     if not named <= set(known):
-        parser.error(f"no such traffic: {', '.join(sorted(named - set(known)))}; there is {', '.join(known)}")
+        parser.error(f"unknown traffic: {', '.join(sorted(named - set(known)))}; available: {', '.join(known)}")
     chosen = named if args.only else set(known) - named
     real = args.speed == 1
     mode = ["-p", "time:=real"] if real else ["-p", "use_sim_time:=true"]
@@ -611,7 +613,7 @@ def main() -> int:
             fill(drive, Path(folder))
             with Follow(drive) as follow, Prober(process) as prober:
                 traffic = Traffic(drive, follow, args.seed, chosen, args.churn, Path(folder))
-                looks, told = run(drive, prober, traffic, args.minutes * 60)
+                looks, reported = run(drive, prober, traffic, args.minutes * 60)
         if clock is not None:
             clock.close()
         drive.process = None
@@ -619,10 +621,10 @@ def main() -> int:
         if died:
             print(f"the node died; its output ends:\n{process.output()[-3000:]}")
         grew = verdict(looks)
-        print("  asked:", ", ".join(f"{name} {number}" for name, number in sorted(traffic.count.items())))
+        print("traffic:", ", ".join(f"{name} {number}" for name, number in sorted(traffic.count.items())))
         keys = ("position_periods", "missed_periods", "unpublished_periods", "dropped_samples", "max_lateness_ms")
-        print("  told:", ", ".join(f"{key} {told.get(key)}" for key in keys))
-    return int(grew or died or not told)
+        print("diagnostics:", ", ".join(f"{key} {reported.get(key)}" for key in keys))
+    return int(grew or died or not reported)
 
 
 if __name__ == "__main__":

@@ -60,9 +60,9 @@ def read_axis(path: Path, joint: str) -> Axis:
         return float(table[key][column])
 
     if any(value(key) for key in ("weight_n", "tilt_nm", "rotary")):
-        raise ValueError(f"{joint}: a linear axis without weight is wanted")
+        raise ValueError(f"{joint}: expected a linear axis without weight")
     if len({value(f"{delay}_ms") for delay in ("alpha", "beta", "gamma")}) != 1:
-        raise ValueError(f"{joint}: alpha, beta and gamma must be one")
+        raise ValueError(f"{joint}: alpha, beta and gamma must be equal")
     r = value("screw_lead_mm") * 1e-3 / (2 * math.pi)
     kt, ke, resistance = (value(k) for k in ("torque_constant_nm_a", "emf_constant_v_s_rad", "resistance_ohm"))
     inductance, inertia = value("inductance_mh") * 1e-3, value("inertia_kg_m2")

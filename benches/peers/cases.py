@@ -1,6 +1,6 @@
 """Cases of the comparison: setpoints of each, and the default machine's axes in SI units.
 
-Setpoints are written as text that every contender reads: names of the axes, then a row per position period.
+Setpoints are written as text for all contenders: names of the axes, then a row per position cycle.
 """
 
 from __future__ import annotations

@@ -3,12 +3,12 @@
     benches/peers/setup.sh                 # once: the peers, into .build/peers
     python3 benches/peers/run.py [--case NAME]... [--rounds 10] [--cpu] [--json FILE] [--contender PROGRAM]
 
-Every contender is a process that stays alive, has compiled and warmed up, and runs once for each line that it is
-given. First the figures of each are compared with those of the C loop, to a bound that is printed; only who keeps it
-is timed, and without this library the status is 1. Then all run in turns. Only ratios are printed: how much longer a
-contender takes than the C loop took in the same round for the same simulated time, as the median over the rounds.
-With --cpu the time is that of all threads of a contender on a core, as Linux counts it, for machines that have other
-work to do; without, it is the clock's.
+Each contender is a process that has compiled and warmed up, stays alive, and runs once for each input line. First, the
+figures of each are compared with those of the C loop, with a printed bound; only contenders within their bound are
+timed, and the exit status is 1 if this library is not among them. Then the runs alternate. Only ratios are printed:
+duration of a contender over that of the C loop in the same round for the same simulated time, as the median over the
+rounds. With --cpu the time is the CPU time of all threads of a contender, for machines with other load; without it is
+wall-clock time.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ PATIENCE = 300.0
 """Timeout of a contender, s; compilation takes part of it."""
 
 
-class NotToBeHad(Exception):
+class Unavailable(Exception):
     """A contender that cannot run here, with the reason."""
 
 
@@ -83,7 +83,7 @@ class Contender:
                 env={**os.environ, **threads, "PYTHONDONTWRITEBYTECODE": "1", "JAX_PLATFORMS": "cpu"},
             )
         except OSError as reason:
-            raise NotToBeHad(str(reason)) from reason
+            raise Unavailable(str(reason)) from reason
 
     def on_core(self) -> float:
         """Returns the CPU time of its threads so far, s."""
@@ -114,13 +114,13 @@ class Contender:
             status = self.process.wait()
             self.errors.seek(0)
             said = self.errors.read().strip().splitlines()
-            raise NotToBeHad(said[-1] if said else f"ended with status {status}")
+            raise Unavailable(said[-1] if said else f"ended with status {status}")
         try:
             answer = json.loads(line)
             if not float(answer["seconds"]) > 0:
-                raise NotToBeHad(f"it says that a run took {answer['seconds']} s")
+                raise Unavailable(f"invalid duration of a run: {answer['seconds']} s")
         except (KeyError, TypeError, ValueError) as reason:
-            raise NotToBeHad(f"{line.strip()[:60]} is no answer: {reason!r}") from reason
+            raise Unavailable(f"{line.strip()[:60]} is not a response: {reason!r}") from reason
         return answer
 
     def end(self) -> None:
@@ -166,7 +166,7 @@ def build(source: str, folder: Path, *more: str) -> str:
     """Builds a C program with the flags of the C loop plus `more`."""
     gcc = shutil.which("gcc")
     if not gcc:
-        raise NotToBeHad("there is no gcc")
+        raise Unavailable("gcc not found")
     program = folder / Path(source).stem
     program = program.with_name(program.name + str(len(list(folder.iterdir()))))
     done = subprocess.run(
@@ -175,7 +175,7 @@ def build(source: str, folder: Path, *more: str) -> str:
         text=True,
     )
     if done.returncode:
-        raise NotToBeHad(f"gcc: {done.stderr.strip().splitlines()[-1]}")
+        raise Unavailable(f"gcc: {done.stderr.strip().splitlines()[-1]}")
     return str(program)
 
 
@@ -188,7 +188,7 @@ def library(program: str | None) -> str:
     messages = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     found = [m["executable"] for m in messages if m.get("target", {}).get("name") == "contender" and "executable" in m]
     if done.returncode or not found:
-        raise NotToBeHad("cargo did not build it")
+        raise Unavailable("cargo failed to build it")
     return found[-1]
 
 
@@ -196,7 +196,7 @@ def python_peer(module: str, script: str) -> list[str]:
     """Returns the command of a Python peer, if its package is installed."""
     python = VENV / "bin" / "python"
     if not python.exists() or subprocess.run([python, "-c", f"import {module}"], capture_output=True).returncode:
-        raise NotToBeHad(f"there is no {module} in .build/peers: benches/peers/setup.sh")
+        raise Unavailable(f"{module} is not installed: run benches/peers/setup.sh")
     return [str(python), str(HERE / script)]
 
 
@@ -205,7 +205,7 @@ def mujoco(folder: Path) -> str:
     package = next(VENV.glob("lib/python3*/site-packages/mujoco"), None)
     shared = next(package.glob("libmujoco.so*"), None) if package else None
     if not package or not shared:
-        raise NotToBeHad("there is no mujoco in .build/peers: benches/peers/setup.sh")
+        raise Unavailable("mujoco is not installed: run benches/peers/setup.sh")
     return build("with_mujoco.c", folder, f"-I{package / 'include'}", str(shared), f"-Wl,-rpath,{package}")
 
 
@@ -219,7 +219,7 @@ def contenders(case: Case, folder: Path, cpu: bool, program: str | None) -> tupl
     def add(name: str, command, bound: float = SAME, kind: type[Contender] = Contender) -> None:
         try:
             found.append(kind(name, command(), bound))
-        except NotToBeHad as reason:
+        except Unavailable as reason:
             missing[name] = str(reason)
 
     add(REFERENCE, lambda: [build("scalar.c", folder), *table_first])
@@ -263,7 +263,7 @@ def compared(reference: dict, answer: dict) -> float:
         for joint, figures in mine["axes"].items():
             both = figures.keys() & other["axes"][joint].keys() - {"position"}
             if not both:
-                raise ValueError(f"no figure of {joint}")
+                raise ValueError(f"no figures of {joint}")
             for key in both:
                 compare(other["axes"][joint][key], figures[key], abs(figures[key]))
         # A mean may be close to 0: each is relative to the largest of the three.
@@ -285,13 +285,13 @@ def check_all(all_of_them: list[Contender], missing: dict[str, str]) -> list[Con
             try:
                 contender.differs = compared(reference, answer)
             except (KeyError, TypeError, ValueError) as reason:
-                raise NotToBeHad(f"its figures cannot be compared: {reason!r}") from reason
+                raise Unavailable(f"its figures cannot be compared: {reason!r}") from reason
             if not contender.differs <= contender.bound:
-                raise NotToBeHad(f"its figures differ by {contender.differs:.2g}, more than {contender.bound:.2g}")
+                raise Unavailable(f"its figures differ by {contender.differs:.2g}, more than {contender.bound:.2g}")
             again = contender.run(1)["seconds"]
             contender.runs = max(1, math.ceil(ROUND_SECONDS / again))
             kept.append(contender)
-        except NotToBeHad as reason:
+        except Unavailable as reason:
             missing[contender.name] = str(reason)
             contender.end()
     return kept
@@ -353,7 +353,7 @@ def table(measured: dict) -> str:
     lines = [
         f"### {measured['case']}: " + (f"median of {rounds} rounds" if rounds > 1 else "one round"),
         "",
-        f"| contender | {measured['clock']}, C loop = 1 | least … largest of a round | figures differ by at most |",
+        f"| contender | {measured['clock']}, C loop = 1 | range over the rounds | largest difference of figures |",
         "|---|---|---|---|",
     ]
     for row in sorted(measured["results"], key=lambda row: row["time_relative_to_c"]):
@@ -363,7 +363,10 @@ def table(measured: dict) -> str:
             f"| {row['differs_by']:.1g} (bound {row['bound']:.2g}) |"
         )
     if worth := measured["two_cores_are_worth"]:
-        lines += ["", "Two cores are worth " + ", ".join(f"{v:.2f} to {name}" for name, v in worth.items()) + "."]
+        lines += [
+            "",
+            "Speedup by a second core: " + ", ".join(f"{v:.2f} for {name}" for name, v in worth.items()) + ".",
+        ]
     lines += [f"\nNot run: {name}: {reason}" for name, reason in measured["missing"].items()]
     return "\n".join(lines) + "\n"
 
@@ -371,14 +374,14 @@ def table(measured: dict) -> str:
 def main() -> int:
     """Runs the cases of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--case", action="append", choices=list(CASES), help="one case; all of them without")
-    parser.add_argument("--rounds", type=int, default=10, help="rounds, ten at least for a figure that is told")
-    parser.add_argument("--cpu", action="store_true", help="time on a core in the place of the clock's")
-    parser.add_argument("--json", type=Path, help="writes the results to this file too")
-    parser.add_argument("--contender", help="this library's program; without, cargo builds it")
+    parser.add_argument("--case", action="append", choices=list(CASES), help="case to run (default: all)")
+    parser.add_argument("--rounds", type=int, default=10, help="rounds; at least 10 for published figures")
+    parser.add_argument("--cpu", action="store_true", help="use CPU time in place of wall-clock time")
+    parser.add_argument("--json", type=Path, help="also write the results to this file")
+    parser.add_argument("--contender", help="this library's program (default: built by cargo)")
     arguments = parser.parse_args()
     if arguments.rounds < 1:
-        parser.error("--rounds: one at least")
+        parser.error("--rounds: must be at least 1")
     if arguments.json:
         # An output that cannot be written is reported before the measurement.
         try:

@@ -1,9 +1,9 @@
 """The single-axis case in CasADi: `mapaccum` over the position periods, as C code compiled by gcc.
 
-A position period is one SX function (its 48 ticks written out), `mapaccum` carries the state through all of them,
-and CasADi's code generator makes it C, compiled with the flags of the C loop and called through `external`: the
-fastest way that CasADi documents. Branches of the model are `if_else`, of which CasADi works out both sides.
-Figures: the largest synchronized error and current only. Generating and compiling are not in the time.
+A position cycle is one SX function (its 48 ticks unrolled), `mapaccum` carries the state through all of them, and
+CasADi's code generator translates it to C, compiled with the flags of the C loop and called through `external`: the
+fastest documented way. Branches of the model are `if_else`; CasADi evaluates both sides.
+Figures: the largest delay-compensated following error and current only. Generation and compilation are not timed.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The single-axis case in Drake, in Python: PyPI has the library without its headers, so that no C++ can be built.
 
-A LeafSystem whose one periodic event updates the discrete state every 125 µs, as a Drake user writes a sampled
-system. The arithmetic is on plain Python floats, which is faster than numpy for so small a state; the outer loops
-are called at their instants from the same event, since events of one time all see the state before it. Figures:
-the largest synchronized error and current only. Building the diagram is not in the time.
+A LeafSystem whose only periodic event updates the discrete state every 125 µs, the usual form of a sampled system in
+Drake. The arithmetic uses plain Python floats, which is faster than numpy for this small state; the outer loops are
+called at their instants by the same event, since simultaneous events all read the state before the update.
+Figures: the largest delay-compensated following error and current only. Building the diagram is not timed.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The single-axis case in jaxonomy: a LeafSystem with one periodic update every 125 µs, compiled by JAX.
 
-In float64, nothing recorded, the compiled simulator kept from run to run (`jax.jit` of `Simulator.advance_to`, as
-its documentation has it for repeated runs). The outer loops are chosen by their instants inside the update: periodic
-updates of one time all see the state before it. Figures: the largest synchronized error and current only. Tracing
-and compiling are not in the time.
+In float64, without recording, the compiled simulator reused for all runs (`jax.jit` of `Simulator.advance_to`, as
+documented for repeated runs). The outer loops are selected by their instants inside the update: simultaneous periodic
+updates all read the state before the update. Figures: the largest delay-compensated following error and current only.
+Tracing and compilation are not timed.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The single-axis case in numba: one compiled loop, all figures of the C loop.
 
-fastmath is on, as -ffast-math is for the C loop. Compiling is not in the time.
+fastmath is on, like -ffast-math of the C loop. Compilation is not timed.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ SETTLE_S = 0.2
 """Timeout for a reliable sample written at matching: it may wait for the next heartbeat, s."""
 
 
-class Refused(Exception):
+class TrajectoryRejected(Exception):
     """Rejection of a trajectory; `result` holds the reason."""
 
     def __init__(self, result: TrajectoryResult):
@@ -56,7 +56,7 @@ class Refused(Exception):
         self.result = result
 
 
-class ParameterRefused(Exception):
+class ParameterRejected(Exception):
     """Rejection of a parameter value; the text is the reason."""
 
 
@@ -312,7 +312,7 @@ class Drive:
         """Publishes setpoints and returns their acceptance; raises TrajectoryRejected."""
         result = self.decision(self.send(trajectory), timeout)
         if result.status == TrajectoryResult.REJECTED:
-            raise Refused(result)
+            raise TrajectoryRejected(result)
         return result
 
     def run(self, trajectory: JointTrajectory, timeout: float = 60.0, settle: float = 0.0) -> Recording:
@@ -385,7 +385,7 @@ class Drive:
         seen = len(self.diagnostics())
         return self.wait_for(lambda: self.diagnostics()[seen + 1 :], timeout, "diagnostics")[0]
 
-    def told(self) -> dict[str, str]:
+    def next_status(self) -> dict[str, str]:
         """Returns the values of the node's next diagnostics, by key."""
         return status_values(self.next_diagnostics().status[0])
 
@@ -436,14 +436,14 @@ class Drive:
         results = self.call(SetParameters, "set_parameters", request).results
         reasons = [result.reason for result in results if not result.successful]
         if reasons or len(results) != len(values):
-            raise ParameterRefused("; ".join(reasons))
+            raise ParameterRejected("; ".join(reasons))
 
     def set_parameters_atomically(self, values: Mapping[str, Any]) -> None:
         """Sets all parameters at the same position instant or none; raises ParameterRejected."""
         request = SetParametersAtomically.Request(parameters=parameter_messages(values))
         result = self.call(SetParametersAtomically, "set_parameters_atomically", request).result
         if not result.successful:
-            raise ParameterRefused(result.reason)
+            raise ParameterRejected(result.reason)
 
 
 def parameter_messages(values: Mapping[str, Any]) -> list[ParameterMsg]:

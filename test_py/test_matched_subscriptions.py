@@ -16,7 +16,7 @@ LOOKED_S = 2.5
 SAMPLES = 50
 
 
-def test_each_listener_gets_an_unbroken_grid_of_samples_whoever_left_before(real: Drive):
+def test_each_subscriber_gets_an_unbroken_grid_of_samples(real: Drive):
     """The node's count of matched subscriptions must not cause lost samples."""
     for _ in range(2):
         stamps: list[int] = []

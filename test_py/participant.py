@@ -1,13 +1,14 @@
 """Remote DDS participants, each a separate process that can be stopped and killed: this file as a program.
 
-    python test_py/guest.py listen TOPIC DEPTH    reliable; tells the stamps that it got when it is asked
-    python test_py/guest.py send POINTS           one trajectory of so many points on psec
-    python test_py/guest.py sink DEPTH            reliable; drops what joint_states, motor_currents, drive_states say
-    python test_py/guest.py echo SERVICE          answers it, always the same
-    python test_py/guest.py probe SERVICE SERVICE calls the two in turns; tells how long they took when it is asked,
-                                                  or which of them did not answer
+    python test_py/participant.py listen TOPIC DEPTH  reliable; writes the received stamps for each input line
+    python test_py/participant.py send POINTS         one trajectory with this number of points on psec
+    python test_py/participant.py sink DEPTH          reliable; drops joint_states, motor_currents, drive_states
+    python test_py/participant.py echo SERVICE        service with a constant response
+    python test_py/participant.py probe SERVICE SERVICE
+                                                      calls the two alternately; writes the durations for each input
+                                                      line, or the service that did not respond
 
-Each says that it is ready by a line on its standard output, and ends with whoever started it.
+Each writes a line to standard output when it is ready, and ends with its parent process.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-class Silent(TimeoutError):
+class NoResponse(TimeoutError):
     """A service that did not respond to a prober."""
 
     def __init__(self, service: str):
@@ -65,7 +66,7 @@ class Silent(TimeoutError):
         self.service = service
 
 
-class Guest:
+class Participant:
     """Process that runs this file, terminated by its process id."""
 
     def __init__(
@@ -95,7 +96,7 @@ class Guest:
             preexec_fn=die_with_parent,
         )
 
-    def __enter__(self) -> Guest:
+    def __enter__(self) -> Participant:
         """Waits until the process is ready and returns itself."""
         try:
             assert self.says() == READY
@@ -113,10 +114,10 @@ class Guest:
         out = self._process.stdout
         assert out is not None
         if not select.select([out], [], [], PATIENCE_S)[0]:
-            raise TimeoutError("a guest says nothing")
+            raise TimeoutError("no output of a participant")
         line = out.readline()
         if not line:
-            raise ChildProcessError(f"a guest has ended, status {self._process.wait(PATIENCE_S)}")
+            raise ChildProcessError(f"a participant ended with status {self._process.wait(PATIENCE_S)}")
         return line.rstrip("\n")
 
     def stamps(self) -> np.ndarray:
@@ -131,10 +132,10 @@ class Guest:
         assert self._process.stdin is not None
         self._process.stdin.write(f"{calls}\n")
         self._process.stdin.flush()
-        told = json.loads(self.says())
-        if isinstance(told, str):
-            raise Silent(told)
-        return told
+        reported = json.loads(self.says())
+        if isinstance(reported, str):
+            raise NoResponse(reported)
+        return reported
 
     def go_on(self) -> None:
         """Starts the transmission of a sender."""
@@ -273,23 +274,23 @@ def probe(node: Any, services: tuple[str, str]) -> None:
         client.call_async(GetParameters.Request()).add_done_callback(lambda _: answered.set())
         if not answered.wait(ANSWER_S):
             if not spins.is_alive():
-                sys.exit("rclpy's executor has ended")
-            raise Silent(client.srv_name)
+                sys.exit("rclpy's executor ended")
+            raise NoResponse(client.srv_name)
         return (time.perf_counter() - begin) * 1e3
 
     for line in sys.stdin:
         try:
             took = [[took_ms(client) for client in clients] for _ in range(int(line))]
-            told = np.median(took, axis=0).tolist()
-        except Silent as silent:
-            told = silent.service
-        print(json.dumps(told), flush=True)
+            reported = np.median(took, axis=0).tolist()
+        except NoResponse as no_response:
+            reported = no_response.service
+        print(json.dumps(reported), flush=True)
 
 
 def main() -> None:
     """Runs the role of the command line."""
     rclpy.init()
-    node = rclpy.create_node(f"guest_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
+    node = rclpy.create_node(f"participant_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
     match sys.argv[1:]:
         case ["listen", topic, depth]:
             listen(node, topic, int(depth))

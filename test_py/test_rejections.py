@@ -181,7 +181,7 @@ def motion(real: Drive) -> Iterator[Motion]:
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
-def test_refused_with_its_reason(motion: Motion, case: Case):
+def test_rejected_with_its_reason(motion: Motion, case: Case):
     """The result names the error; psec stays the plan of the active motion, bit for bit."""
     drive = motion.drive
     before = drive.now()
@@ -209,7 +209,7 @@ def test_refused_with_its_reason(motion: Motion, case: Case):
     assert assert_psec(drive, motion.start, plan, max(before, motion.start), after) >= 3
 
 
-def test_refused_at_rest_stays_at_rest(start: Callable[..., Drive]):
+def test_axes_at_rest_do_not_move_on_a_rejection(start: Callable[..., Drive]):
     """A rejection without an active motion moves no axis."""
     drive = start()
     before = drive.latest("position")

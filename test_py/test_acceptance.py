@@ -41,7 +41,7 @@ def test_stamp_zero_starts_at_the_next_position_period(home: Drive):
     assert ended.name and len(ended.peak_current) == len(ended.name)
 
 
-def test_every_point_on_the_grid_is_used_as_it_is(home: Drive):
+def test_points_on_the_grid_are_published_unchanged(home: Drive):
     """Irregular points are published bit for bit."""
     noise = np.cumsum(np.random.default_rng(1).uniform(-1e-5, 1e-5, 400))
     noise[0] = 0.0
@@ -49,7 +49,7 @@ def test_every_point_on_the_grid_is_used_as_it_is(home: Drive):
     assert_psec(home, recording.start, {"z": noise})
 
 
-def test_stamp_in_the_future_waits_and_the_present_one_goes_on(home: Drive):
+def test_stamp_in_the_future_waits_while_the_active_motion_continues(home: Drive):
     """The active motion is followed until the start, the new one from the start on."""
     _, start, plan = start_swing(home, duration=1.8)
     end = start + (len(plan["x"]) - 1) * TSP_NS
@@ -118,7 +118,7 @@ def test_between_points_the_fields_decide(home: Drive, fields: dict, quarter: fl
     assert psec[200] == way
 
 
-def test_new_one_while_moving_replaces_the_old_one(home: Drive):
+def test_a_new_trajectory_preempts_the_active_one(home: Drive):
     """The transition starts at the commanded state without a jump; the result of the old one is PREEMPTED."""
     first, start, plan = start_swing(home, duration=6.0)
     home.wait_until(start + 150 * TSP_NS, 5)
@@ -167,7 +167,7 @@ def test_no_points_is_a_controlled_stop(home: Drive, names: list[str]):
     assert 0.01 < psec[-1] < 0.2
 
 
-def test_some_joints_leave_the_others_to_what_they_were_doing(home: Drive):
+def test_joints_that_a_trajectory_omits_continue_their_motion(home: Drive):
     """x continues its swing while z moves."""
     _, start, plan = start_swing(home, duration=2.4)
     time, position = swing(0.6, amplitude=0.01)

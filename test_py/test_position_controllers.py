@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import TSP_NS, Drive, ParameterRefused, joint_trajectory, node_binary
+from drive import TSP_NS, Drive, ParameterRejected, joint_trajectory, node_binary
 from motion import assert_psec, go_home, start_swing, swing
 
 LOOP = "x.position_loop"
@@ -57,7 +57,7 @@ def design() -> dict[str, object]:
     ],
     ids=lambda value: ",".join(value) if isinstance(value, dict) else "",
 )
-def test_a_controller_that_cannot_be_is_refused_and_the_motion_goes_on(
+def test_an_invalid_controller_is_rejected_and_the_motion_continues(
     values: dict[str, object], words: list[str], real: Drive
 ):
     """The reason has the key or the axis and the numbers; the configuration is unchanged."""
@@ -66,14 +66,14 @@ def test_a_controller_that_cannot_be_is_refused_and_the_motion_goes_on(
     real.wait_until(start + 20 * TSP_NS, 10)
     keys = list(of_x({**dict.fromkeys(UNSTABLE), **values}))
     before = real.get_parameters(keys)
-    with pytest.raises(ParameterRefused) as refusal:
+    with pytest.raises(ParameterRejected) as rejection:
         real.set_parameters_atomically(of_x(values))
     for word in words:
-        assert re.search(word, str(refusal.value), re.IGNORECASE), f"no {word} in: {refusal.value}"
+        assert re.search(word, str(rejection.value), re.IGNORECASE), f"no {word} in: {rejection.value}"
     assert real.get_parameters(keys) == before
 
-    refused_at = real.now()
-    end = min(refused_at + 50 * TSP_NS, start + (len(planned["x"]) - 1) * TSP_NS)
+    rejected_at = real.now()
+    end = min(rejected_at + 50 * TSP_NS, start + (len(planned["x"]) - 1) * TSP_NS)
     assert_psec(real, start, planned, last=end)
     states = real.record(start, end).states
     assert set(states["controller", "x"]) == {"cascade"}
@@ -83,7 +83,7 @@ def test_a_controller_that_cannot_be_is_refused_and_the_motion_goes_on(
     assert {result.status for result in real.results(accepted.sequence_number)} <= {R.ACCEPTED, R.COMPLETED}
 
 
-def test_an_unstable_loop_is_refused_by_its_pole_and_runs_when_it_is_allowed(start: Callable[..., Drive]):
+def test_an_unstable_loop_is_rejected_with_its_pole_unless_allowed(start: Callable[..., Drive]):
     """The pole is that of A S + B R; with allow_unstable the axis oscillates."""
     drive = start()
     model = design()["model"]
@@ -91,10 +91,10 @@ def test_an_unstable_loop_is_refused_by_its_pole_and_runs_when_it_is_allowed(sta
     poles = np.roots(np.array(model["a"]) + gain * np.array(model["b_s"]))
     worst = poles[np.abs(poles).argmax()]
     assert abs(worst) > 1
-    with pytest.raises(ParameterRefused) as refusal:
+    with pytest.raises(ParameterRejected) as rejection:
         drive.set_parameters_atomically(of_x(UNSTABLE))
-    named = re.search(r"pole (-?[\d.]+) [+±] ([\d.]+)j has the modulus ([\d.]+)", str(refusal.value))
-    assert named, refusal.value
+    named = re.search(r"pole (-?[\d.]+) [+±] ([\d.]+)j has the modulus ([\d.]+)", str(rejection.value))
+    assert named, rejection.value
     assert [float(number) for number in named.groups()] == pytest.approx(
         [worst.real, abs(worst.imag), abs(worst)], abs=1e-5
     )
@@ -108,14 +108,14 @@ def test_an_unstable_loop_is_refused_by_its_pole_and_runs_when_it_is_allowed(sta
     assert not forced.currents["saturated", "y"].any()
 
     # The flag cannot be reset while the controller requires it, only together with it.
-    with pytest.raises(ParameterRefused, match="unstable"):
+    with pytest.raises(ParameterRejected, match="unstable"):
         drive.set_parameters({f"{LOOP}.allow_unstable": False})
     drive.set_parameters_atomically(of_x({"allow_unstable": False, "controller": "cascade"}))
     drive.wait_for(lambda: drive.latest("controller")["x"] == "cascade", 10, "controller cascade")
     assert drive.get_parameters([f"{LOOP}.allow_unstable"]) == {f"{LOOP}.allow_unstable": False}
 
 
-def test_the_axis_does_not_know_whether_a_controller_is_predictive(start: Callable[..., Drive]):
+def test_a_predictive_controller_equals_its_polynomials(start: Callable[..., Drive]):
     """The polynomials of `virtual_axes design gpc` as arrays of doubles give the same bits as the design."""
     found = design()
     polynomials = {
