@@ -1,12 +1,12 @@
-//! This library as a contender of `benches/peers/run.py`, by the same protocol as the C loop.
+//! This library as a program of `benches/peers/run.py`, with the same protocol as the C loop.
 //!
 //! ```text
 //! cargo bench --bench contender -- SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--cores COUNT]
 //! ```
 //!
-//! SETPOINTS is text: names of the axes that take part, then a row of setpoints (m, rad) for each position period.
-//! Each line `run N` on standard input makes N runs; the answer is a line of JSON with the seconds of a run and the
-//! figures. Without arguments it says so and ends.
+//! SETPOINTS is a text file: names of the axes, then a row of setpoints (m, rad) per position period. Each line `run N`
+//! on standard input makes N runs; the response is a line of JSON with the seconds per run and the figures. Without
+//! arguments it prints its usage.
 
 use std::error::Error;
 use std::fmt::Display;
@@ -29,44 +29,45 @@ use virtual_axes_core::units::seconds;
 const USAGE: &str = "contender SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--cores COUNT]   (see benches/peers/run.py)";
 const MACHINE: &str = include_str!("../config/mikron_ucp710.yaml");
 const JOINTS: &str = r#"joints: ["x", "y", "z", "a", "c"]"#;
-/// Of Kp and Kv over the machines of a sweep, as in scalar.c.
+/// Relative spread of Kp over the machines of a sweep, as in scalar.c.
 const POSITION_SPREAD: f64 = 0.2;
+/// Relative spread of Kv over the machines of a sweep, as in scalar.c.
 const VELOCITY_SPREAD: f64 = 0.1;
 
-/// What is run.
+/// Case of a benchmark.
 struct Case {
     joints: Vec<String>,
-    /// One axis behind the other in each row.
+    /// Setpoints, one row per position period.
     rows: Vec<Vec<f64>>,
     circle: Option<Circle>,
     machines: Vec<Arc<MachineParameters>>,
-    /// One core is this thread's.
+    /// Number of threads; 1 uses the main thread only.
     cores: usize,
 }
 
-/// Radial deviation about (−radius, 0) in a window of position periods.
+/// Circle about (−radius, 0) that is assessed in a window of position periods.
 struct Circle {
     radius: f64,
     window: Range<usize>,
 }
 
-/// Figures of a machine.
+/// Figures of one machine.
 struct Figures {
     axes: Vec<AxisReport>,
     deviation: Option<Deviation>,
 }
 
-/// Mean, least and largest radial deviation, m.
+/// Mean, smallest and largest radial deviation, m.
 struct Deviation {
     mean: f64,
     min: f64,
     max: f64,
 }
 
-/// Machines that are run side by side on a core.
+/// Machines simulated side by side on a core.
 const TOGETHER: usize = 16;
 
-/// Runs some machines side by side with all their figures: the part that is measured.
+/// Runs machines side by side and computes their figures: the measured part.
 fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures> {
     let Some(together) = MachineParameters::concatenate(machines) else { return Vec::new() };
     let axes = case.joints.len();
@@ -82,14 +83,14 @@ fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures
         psec.clear();
         (0..machines.len()).for_each(|_| psec.extend_from_slice(row));
         machine.advance(&psec, &[]);
-        for (place, assessor) in assessors.iter_mut().enumerate() {
-            assessor.observe(machine.axis(place).sample(), &machine.activity(place));
+        for (index, assessor) in assessors.iter_mut().enumerate() {
+            assessor.observe(machine.axis(index).sample(), &machine.activity(index));
         }
         if let Some(circle) = case.circle.as_ref().filter(|circle| circle.window.contains(&k)) {
-            for (place, radial) in circles.iter_mut().enumerate() {
-                machine.positions(place * axes, &mut x);
-                machine.positions(place * axes + 1, &mut y);
-                // As wide as the processor's vectors are, like the library's own loops.
+            for (index, radial) in circles.iter_mut().enumerate() {
+                machine.positions(index * axes, &mut x);
+                machine.positions(index * axes + 1, &mut y);
+                // Uses the widest vectors of the processor, like the library.
                 width.dispatch(
                     #[inline(always)]
                     || radial.push(circle.radius, &x, &y),
@@ -105,10 +106,10 @@ fn run_machines(machines: &[Arc<MachineParameters>], case: &Case) -> Vec<Figures
     assessors.chunks(axes).zip(&circles).map(figures).collect()
 }
 
-/// Ticks whose radial deviations are reckoned side by side.
+/// Ticks whose radial deviations are computed side by side.
 const SIDE_BY_SIDE: usize = 8;
 
-/// Radial deviation about (−radius, 0), tick by tick.
+/// Accumulator of the radial deviation about (−radius, 0) at each tick.
 #[derive(Clone)]
 struct Radial {
     sum: [f64; SIDE_BY_SIDE],
@@ -129,7 +130,7 @@ impl Default for Radial {
 }
 
 impl Radial {
-    /// Takes ticks in, a multiple of [`SIDE_BY_SIDE`].
+    /// Adds ticks, a multiple of [`SIDE_BY_SIDE`].
     #[inline(always)]
     fn push(&mut self, radius: f64, x: &[f64], y: &[f64]) {
         let (x, _) = x.as_chunks::<SIDE_BY_SIDE>();
@@ -154,7 +155,7 @@ impl Radial {
     }
 }
 
-/// Runs all machines of a case, on as many cores as the pool has.
+/// Runs all machines of a case on the cores of the pool.
 fn run_case(case: &Case, pool: Option<&ThreadPool>) -> Vec<Figures> {
     let run = |machines| run_machines(machines, case);
     match pool {
@@ -165,7 +166,7 @@ fn run_case(case: &Case, pool: Option<&ThreadPool>) -> Vec<Figures> {
     }
 }
 
-/// The default machine with these joints only, its gains scaled.
+/// Returns the default machine reduced to `joints`, with scaled gains.
 fn machine(
     joints: &[String],
     position: f64,
@@ -192,7 +193,7 @@ fn machine(
     Ok(Arc::new(MachineParameters::new(&parameters.machine_config()?)?))
 }
 
-/// The text of a machine without the sections of other joints.
+/// Removes the sections of other joints from the text of a machine.
 fn without_sections(text: &str, joints: &[String]) -> String {
     let mut kept = true;
     let lines = text.lines().filter(|line| {
@@ -206,7 +207,7 @@ fn without_sections(text: &str, joints: &[String]) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// The value of an option.
+/// Parses the value of an option.
 fn value<T: FromStr<Err: Display>>(option: &str, word: &str) -> Result<T, String> {
     word.parse().map_err(|error| format!("{option} {word}: {error}"))
 }
@@ -221,12 +222,14 @@ fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
     let rows: Vec<Vec<f64>> =
         lines.map(|line| line.split_whitespace().map(number).collect()).collect::<Result<_, _>>()?;
     if rows.is_empty() || rows.iter().any(|row| row.len() != joints.len()) {
-        return Err(format!("{path}: a value per joint is wanted in each row").into());
+        return Err(
+            format!("{path}: each row must have one value per joint, at least one row is required").into()
+        );
     }
     let (mut circle, mut count, mut cores) = (None, 1, 1);
     let mut words = options.iter();
     while let Some(word) = words.next() {
-        let mut next = || words.next().ok_or_else(|| format!("{word}: what? {USAGE}"));
+        let mut next = || words.next().ok_or_else(|| format!("{word}: value is missing; {USAGE}"));
         match word.as_str() {
             "--circle" if joints.len() >= 2 => {
                 let radius = value(word, next()?)?;
@@ -234,13 +237,13 @@ fn read(arguments: &[String]) -> Result<Case, Box<dyn Error>> {
             }
             "--machines" => count = i32::from(value::<NonZeroU16>(word, next()?)?.get()),
             "--cores" => cores = usize::from(value::<NonZeroU8>(word, next()?)?.get()),
-            _ => return Err(format!("{word}: {USAGE}").into()),
+            _ => return Err(format!("unknown option {word}; {USAGE}").into()),
         }
     }
-    let place =
+    let spread =
         |index: i32| if count > 1 { 2.0 * f64::from(index) / f64::from(count - 1) - 1.0 } else { 0.0 };
     let scaled = |index| {
-        let x = place(index);
+        let x = spread(index);
         machine(&joints, 1.0 + POSITION_SPREAD * x, 1.0 - VELOCITY_SPREAD * x)
     };
     let machines = (0..count).map(scaled).collect::<Result<_, _>>()?;
@@ -277,7 +280,7 @@ fn serve(case: &Case) -> Result<(), Box<dyn Error>> {
     for line in io::stdin().lock().lines() {
         let line = line?;
         let runs = line.strip_prefix("run ").and_then(|runs| runs.trim().parse::<NonZeroU32>().ok());
-        let runs = runs.ok_or("`run N` is wanted, N from 1 on")?.get();
+        let runs = runs.ok_or_else(|| format!("{line}: must be `run N` with N ≥ 1"))?.get();
         let began = Instant::now();
         let mut figures = Vec::new();
         for _ in 0..runs {
@@ -292,10 +295,10 @@ fn serve(case: &Case) -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // `cargo bench` says --bench, `cargo test` says --test.
+    // `cargo bench` passes --bench, `cargo test` passes --test.
     let arguments: Vec<String> =
         std::env::args().skip(1).filter(|word| word != "--bench" && word != "--test").collect();
-    // What else begins so is meant for the other programs of `cargo bench`.
+    // Other options are for the other programs of `cargo bench`.
     if arguments.first().is_none_or(|word| word.starts_with("--")) {
         println!("{USAGE}");
         return Ok(());

@@ -1,10 +1,10 @@
-//! How the cost of a simulation grows: with the length of the setpoints, with axes, machines and cores.
+//! Scaling of the cost of a simulation with the length of the setpoints, axes, machines and cores.
 //!
 //!     cargo bench --no-default-features --bench growth
 //!     cargo bench --no-default-features --bench growth -- axes cores
 //!
-//! The rows of a table are run in turns, so that what the computer does besides falls on all of them; medians over
-//! the rounds, and their ratio to the first row per simulated second of a machine.
+//! The rows of a table are run in turns, so that the background load of the computer affects all of them. A table
+//! shows medians over the rounds and their ratio to the first row per simulated second of a machine.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -20,25 +20,25 @@ use virtual_axes_core::trial::{self, Figures, GridSource, SetpointSource, Source
 use virtual_axes_core::units::seconds;
 use virtual_axes_verification::fixtures::machines::{AXES, parameters, program, setpoints};
 
-/// Rounds of a table, an odd number.
+/// Rounds of a table; odd.
 const ROUNDS: usize = 11;
-/// A row that would take longer than that in all its rounds has as many as fit, at least one.
+/// Time limit of a row over all rounds; later rounds of the row are skipped, except the first.
 const LONGEST: Duration = Duration::from_secs(20);
-/// Machines that are run side by side on a core, as a search does.
+/// Machines simulated side by side on a core, as in a search.
 const TOGETHER: usize = 32;
-/// Machines of which more than one core has its share.
+/// Machines of the table of cores.
 const SWEEP: usize = 256;
 /// Simulated time of the table of axes, s.
 const AXES_TIME: f64 = 120.0;
-/// Instants after which the motion begins anew: a minute.
+/// Period of the motion, position cycles: a minute.
 const CYCLE: usize = 10_000;
-/// Amplitude (m, rad) and turns a cycle of the axes: each begins and ends a cycle at rest.
+/// Amplitude (m, rad) and oscillations per cycle of each axis: a cycle starts and ends at rest.
 const MOTION: [(f64, f64); AXES] = [(0.1, 6.0), (0.08, 7.0), (0.05, 5.0), (0.3, 3.0), (0.6, 4.0)];
 
-/// A row of a table.
+/// Row of a table.
 struct Row<'a> {
     name: String,
-    /// Simulated seconds, of all machines together.
+    /// Simulated time, summed over the machines, s.
     simulated: f64,
     run: Box<dyn FnMut() + 'a>,
 }
@@ -83,7 +83,7 @@ fn table(title: &str, column: &str, mut rows: Vec<Row>) {
     }
 }
 
-/// The motion of `MOTION`, again and again, for some instants; nothing of it is held.
+/// Source that repeats the motion [`MOTION`] for a number of position cycles without storing it.
 struct Cycle {
     joints: [usize; AXES],
     rows: Arc<Vec<[f64; AXES]>>,
@@ -110,7 +110,7 @@ fn cycle() -> Arc<Vec<[f64; AXES]>> {
     Arc::new((0..CYCLE).map(at).collect())
 }
 
-/// Setpoints that are computed as they are needed, figures of tool and axes, no trace.
+/// Measures the length of the setpoints: computed on demand, with figures of tool and axes, without a trace.
 fn length(config: &MachineConfig) {
     let rows = cycle();
     let trial = Trial { machine: config, program: None, allow_nonzero_end_velocity: false, record: false };
@@ -132,21 +132,21 @@ fn length(config: &MachineConfig) {
     }
 }
 
-/// One machine with more and more axes, with their figures.
+/// Measures one machine with increasing numbers of axes, with their figures.
 fn axes(config: &MachineConfig) {
     let cycle = cycle();
     let instants = (AXES_TIME / seconds(config.periods().position)) as usize;
     let row = |count: usize| {
-        let places: Vec<usize> = (0..count).map(|axis| axis % AXES).collect();
-        let made = MachineParameters::from_axes(config, &places).expect("it can be discretized");
-        let mut machine = Machine::new(Arc::new(made));
+        let indices: Vec<usize> = (0..count).map(|axis| axis % AXES).collect();
+        let parameters = MachineParameters::from_axes(config, &indices).expect("can be discretized");
+        let mut machine = Machine::new(Arc::new(parameters));
         let cycle = Arc::clone(&cycle);
         let mut psec = vec![0.0; count];
         Row::new(count, AXES_TIME, move || {
             let mut assessors = vec![AxisAssessor::default(); count];
             machine.reset(&vec![0.0; count]);
             for row in cycle.iter().cycle().take(instants) {
-                psec.iter_mut().zip(&places).for_each(|(psec, &place)| *psec = row[place]);
+                psec.iter_mut().zip(&indices).for_each(|(psec, &index)| *psec = row[index]);
                 machine.advance(&psec, &[]);
                 for (axis, assessor) in assessors.iter_mut().enumerate() {
                     assessor.observe(machine.axis(axis).sample(), &machine.activity(axis));
@@ -158,7 +158,7 @@ fn axes(config: &MachineConfig) {
     table("axes: one machine, figures of the axes", "axes", [1, 2, 4, 5, 8, 16, 32].map(row).into());
 }
 
-/// Machines of different gains.
+/// Creates machines with different gains.
 fn variants(count: usize) -> Vec<MachineConfig> {
     let variant = |i: usize| {
         let gain = 1.0 + 0.5 * i as f64 / count as f64;
@@ -169,7 +169,7 @@ fn variants(count: usize) -> Vec<MachineConfig> {
     (0..count).map(variant).collect()
 }
 
-/// Machines on the ballbar as a search runs them: some side by side, over the cores of the pool.
+/// Simulates machines on the ballbar test as in a search: side by side, on the cores of the pool.
 fn sweep(trial: &Trial<'_>, variants: &[MachineConfig], own: &[usize]) -> Vec<Figures> {
     let run = |some: &[MachineConfig]| {
         let program = trial.program.clone().expect("planned");
@@ -179,7 +179,7 @@ fn sweep(trial: &Trial<'_>, variants: &[MachineConfig], own: &[usize]) -> Vec<Fi
     variants.par_chunks(TOGETHER).with_max_len(1).flat_map(run).collect()
 }
 
-/// More and more machines on one core, and the same machines on more cores.
+/// Measures increasing numbers of machines on one core, and the same machines on several cores.
 fn machines(config: &MachineConfig, counts: &[usize], cores: &[usize]) {
     let program = program("ballbar", config);
     let (duration, own) = (program.duration(), [0, 1]);
@@ -207,15 +207,15 @@ fn machines(config: &MachineConfig, counts: &[usize], cores: &[usize]) {
     }
 }
 
-/// What can be asked for.
+/// Names of the tables.
 const TABLES: [&str; 4] = ["length", "axes", "machines", "cores"];
 
 fn main() {
-    // `cargo bench` says --bench.
+    // `cargo bench` passes --bench.
     let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
-    // Other words are for the other benchmarks of `cargo bench`.
+    // Other names select benchmarks of other programs of `cargo bench`.
     if !wanted.is_empty() && !wanted.iter().any(|word| TABLES.contains(&word.as_str())) {
-        println!("none is named {}: there are {}", wanted.join(", "), TABLES.join(", "));
+        println!("no table is named {}, allowed: {}", wanted.join(", "), TABLES.join(", "));
     }
     let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
     let config = parameters::<&str>(&[]).machine_config().expect("the shipped machine");

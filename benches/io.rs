@@ -1,10 +1,10 @@
-//! Files against the raw bytes: each reader and writer beside a plain read or write of the same file.
+//! Throughput of each reader and writer relative to a raw read or write of the same file.
 //!
 //!     cargo bench --no-default-features --bench io
 //!     cargo bench --no-default-features --bench io -- MCAP
 //!
-//! A round runs every case once, so that what the machine does besides falls on all of them; the first table
-//! gives medians over the rounds as a ratio to the raw bytes. Criterion's own figures follow.
+//! A round runs every case once, so that the background load of the computer affects all of them. The first table shows
+//! medians over the rounds and their ratio to the raw bytes. The figures of Criterion follow.
 
 use std::fs::{self, File};
 use std::hint::black_box;
@@ -18,44 +18,44 @@ use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::units::Nanoseconds;
 use virtual_axes_io::files::{
-    OutputFile, PsecCsv, RecordingOptions, Trajectories, encode, psec_writer, read_psec_yaml, read_recording,
-    trace_writer,
+    McapTrajectories, OutputFile, PsecCsvReader, RecordingOptions, encode_cdr, psec_writer, read_psec_yaml,
+    read_recording, trace_writer,
 };
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 use virtual_axes_io::messages::{DriveStates, MotorCurrents, Sampled};
 
 /// Rounds of the first table.
 const ROUNDS: usize = 11;
-/// Setpoints: at 6 ms an hour.
+/// Number of setpoints: one hour at 6 ms.
 const INSTANTS: i64 = 600_000;
-/// Setpoints in YAML, which is bounded in length: ten minutes.
+/// Number of setpoints in YAML, which has a limited length: ten minutes.
 const YAML_INSTANTS: i64 = 100_000;
-/// Ticks of a trace: at 125 µs ten seconds.
+/// Ticks of a trace: ten seconds at 125 µs.
 const TICKS: i64 = 80_000;
-/// Bytes of a raw read or write.
+/// Block size of a raw read or write, bytes.
 const BLOCK: usize = 1 << 20;
 
-/// One way to read or write a file.
+/// Case: a reader or writer of a file.
 struct Case {
     name: &'static str,
-    /// What the throughput counts.
+    /// Bytes per run.
     bytes: u64,
-    /// The case that it is compared with.
+    /// Name of the reference case.
     against: Option<&'static str>,
     run: Box<dyn FnMut()>,
 }
 
-/// A folder that goes when the benchmark ends.
+/// Temporary folder that is removed at the end.
 struct Folder(PathBuf);
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // Nothing else is kept there.
+        // The folder contains only temporary files.
         let _ = fs::remove_dir_all(&self.0);
     }
 }
 
-/// A position that needs all its digits, within the stroke of axis `axis`.
+/// Returns a position with all digits, within the travel limits of `axis`, m or rad.
 fn position(axis: usize, time: Nanoseconds) -> f64 {
     let turn = (axis + 3) as f64 * 1e-10 * time as f64;
     0.05 * (1.0 - turn.cos())
@@ -120,15 +120,15 @@ fn write_trace(path: &Path, names: &[String], tick: Nanoseconds, rows: &[[AxisSa
     writer.finish().expect("a file");
 }
 
-/// Bytes of the messages of a trace, without MCAP around them.
+/// Returns the number of bytes of the messages of a trace, without the MCAP container.
 fn message_bytes(names: &[String], row: &[AxisSample; 5]) -> u64 {
     let mut bytes = Vec::new();
     let mut sum = 0;
-    encode(&JointState::of(0, row, names), &mut bytes).expect("a message");
+    encode_cdr(&JointState::of(0, row, names), &mut bytes).expect("a message");
     sum += bytes.len();
-    encode(&MotorCurrents::of(0, row, names), &mut bytes).expect("a message");
+    encode_cdr(&MotorCurrents::of(0, row, names), &mut bytes).expect("a message");
     sum += bytes.len();
-    encode(&DriveStates::of(0, row, names), &mut bytes).expect("a message");
+    encode_cdr(&DriveStates::of(0, row, names), &mut bytes).expect("a message");
     (sum + bytes.len()) as u64 * TICKS as u64
 }
 
@@ -175,7 +175,7 @@ fn cases(machine: &'static MachineConfig, folder: &Path) -> Vec<Case> {
             psec_size,
             read,
             Box::new(move || {
-                let mut source = PsecCsv::open(&psec_in, period, &limits).expect("setpoints");
+                let mut source = PsecCsvReader::open(&psec_in, period, &limits).expect("setpoints");
                 let mut row = [0.0; 5];
                 while source.next(&mut row).expect("setpoints") {
                     black_box(&row);
@@ -193,7 +193,7 @@ fn cases(machine: &'static MachineConfig, folder: &Path) -> Vec<Case> {
             points,
             read,
             Box::new(move || {
-                let requests = Trajectories::open(&points_in, None).expect("a recording");
+                let requests = McapTrajectories::open(&points_in, None).expect("a recording");
                 for request in requests {
                     black_box(request.expect("a trajectory"));
                 }
@@ -270,7 +270,7 @@ fn ratios(cases: &mut [Case]) {
         .collect();
     println!(
         "{:32} {:>9} {:>8} {:>20}",
-        "median of 11 interleaved rounds", "MB", "MB/s", "part of raw bytes"
+        "median of 11 interleaved rounds", "MB", "MB/s", "ratio to raw bytes"
     );
     for (case, speed) in cases.iter().zip(&speeds) {
         let raw = cases.iter().position(|other| Some(other.name) == case.against);
@@ -280,7 +280,7 @@ fn ratios(cases: &mut [Case]) {
 }
 
 fn main() {
-    // It ends the program at an option that it does not know: before there is anything to clear away.
+    // Criterion exits at an unknown option: parse before the folder is created.
     let mut criterion = Criterion::default().sample_size(10).configure_from_args();
     let folder = Folder(std::env::temp_dir().join(format!("virtual_axes_io_{}", std::process::id())));
     fs::create_dir_all(&folder.0).expect("a folder for files");
@@ -288,7 +288,7 @@ fn main() {
         Parameters::embedded_default().and_then(|p| p.machine_config()).expect("the shipped machine"),
     ));
     let mut cases = cases(machine, &folder.0);
-    // `cargo bench` says --bench.
+    // `cargo bench` passes --bench.
     let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| name.contains(word.as_str()));
     cases.retain(|case| case.against.is_none() || is_wanted(case.name));

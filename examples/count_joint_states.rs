@@ -1,11 +1,11 @@
-//! Subscribes to `joint_states` from Rust, and counts what comes and what is lost.
+//! Subscribes to `joint_states` from Rust and counts received and lost samples.
 //!
 //! ```text
 //! cargo run --release --example count_joint_states -- [SECONDS [PERIOD_MS [TOPIC]]]
 //! ```
 //!
-//! The node publishes one sample per position period, with the time of its position instant as stamp:
-//! two samples that follow each other are PERIOD_MS (6) apart, or something is missing between them.
+//! The node publishes one sample per position period with the time of its position cycle as stamp, so consecutive
+//! samples are PERIOD_MS (default 6) apart; a larger distance means lost samples.
 
 use std::env;
 use std::error::Error;
@@ -18,9 +18,9 @@ use virtual_axes::ros::environment::Environment;
 use virtual_axes::ros::participant::Participant;
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
-/// How long the first sample is waited for.
+/// Timeout for the first sample.
 const FIRST: Duration = Duration::from_secs(10);
-/// Samples that are kept until they are taken. RustDDS keeps fewer of "all".
+/// History depth; RustDDS limits "keep all" to fewer samples.
 const DEPTH: usize = 100_000;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let period_ms: f64 = arguments.next().as_deref().unwrap_or("6").parse()?;
     let topic = arguments.next().unwrap_or_else(|| "/joint_states".to_owned());
 
-    // ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and the others.
+    // Reads ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and related variables.
     let environment = Environment::from_process()?;
     let participant = Participant::open(&environment)?;
     let counted = tokio::runtime::Builder::new_current_thread().enable_all().build()?.block_on(count(
@@ -43,14 +43,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let period = period_ms * 1e6;
     let lost: f64 = stamps.windows(2).map(|w| ((w[1] - w[0]) as f64 / period).round() - 1.0).sum();
     println!(
-        "{} samples in {seconds:.2} s: {:.1} a second, {lost} lost",
+        "{} samples in {seconds:.2} s: {:.1} per second, {lost} lost",
         stamps.len(),
         stamps.len().saturating_sub(1) as f64 / seconds
     );
     Ok(())
 }
 
-/// The stamps that came, ns, and the time from the first to the last, s.
+/// Received stamps, ns, and the time from the first to the last sample, s.
 struct Counted {
     stamps: Vec<i64>,
     seconds: f64,
@@ -60,14 +60,14 @@ async fn count(participant: &Participant, topic: &str, span: Duration) -> Result
     let context = participant.context()?;
     let options = NodeOptions::new().start_parameter_services(false).enable_rosout(false);
     let mut node = context.new_node(NodeName::new("/", "count_joint_states")?, options)?;
-    // A publisher's profile is reliable, and fits both ends.
+    // The default profile of a publisher is reliable and compatible with the node.
     let qos = QosProfile::publisher_default().history(History::KeepLast { depth: DEPTH });
     let topic =
         node.create_topic(&Name::parse(topic)?, MessageTypeName::new("sensor_msgs", "JointState"), &qos)?;
     let subscription = node.create_subscription::<JointState>(&topic, None)?;
 
     let mut samples = std::pin::pin!(subscription.async_stream());
-    tokio::time::timeout(FIRST, samples.next()).await.map_err(|_| "nothing is published")?;
+    tokio::time::timeout(FIRST, samples.next()).await.map_err(|_| "no sample within 10 s")?;
     let (mut stamps, start) = (Vec::new(), Instant::now());
     let (end, mut last) = (tokio::time::Instant::from_std(start + span), start);
     while let Ok(Some(received)) = tokio::time::timeout_at(end, samples.next()).await {

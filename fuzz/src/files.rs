@@ -1,46 +1,46 @@
-//! Files of setpoints and recordings.
+//! Fuzz targets of setpoint files and recordings.
 
 use std::io::Cursor;
 
 use virtual_axes_core::trajectory::{Trajectory, ValidationContext};
 use virtual_axes_identify::recording::{Conditioning, Finding, RawRecording, condition};
 use virtual_axes_io::files::{
-    Columns, PsecCsv, PsecCsvOut, RecordingOptions, Trajectories, read_psec_yaml, read_recording_csv,
-    read_recording_mcap,
+    Columns, McapTrajectories, PsecCsvReader, PsecCsvWriter, RecordingOptions, read_psec_yaml,
+    read_recording_csv, read_recording_mcap,
 };
 use virtual_axes_io::messages;
 
-use crate::{JOINTS, MACHINE, bounded, bounded_beside, names, refused};
+use crate::{JOINTS, MACHINE, assert_one_line, bounded, bounded_with_extra, names};
 
-/// A record in a compressed chunk is believed to be as long as it says, up to the longest, bytes.
+/// Largest record in a compressed chunk, bytes: its declared length is allocated.
 const COMPRESSED_RECORD: u64 = 256 << 20;
-/// Most instants of a file that are read: a long time in two rows is as long a motion.
-const MOST_INSTANTS: usize = 2000;
-/// Most points of a trajectory that is checked.
-const MOST_POINTS: usize = 1000;
-/// Longest trajectory that is checked, ns: a minute; each instant of it is looked at.
+/// Largest number of position cycles read: two rows can span a long time.
+const MAX_CYCLES: usize = 2000;
+/// Largest number of points of a validated trajectory.
+const MAX_POINTS: usize = 1000;
+/// Longest validated trajectory, ns: validation checks each position cycle.
 const LONGEST: i64 = 60_000_000_000;
 
-/// Reads setpoints to their end; the joints and the rows.
+/// Reads setpoints to their end and returns joints and rows.
 fn rows(data: &[u8]) -> Option<(Vec<String>, Vec<Vec<f64>>)> {
-    let mut psec = match PsecCsv::new(data, "my.csv", MACHINE.periods().position, &JOINTS) {
+    let mut psec = match PsecCsvReader::new(data, "my.csv", MACHINE.periods().position, &JOINTS) {
         Ok(psec) => psec,
         Err(error) => {
-            refused(&error.to_string());
+            assert_one_line(&error.to_string());
             assert!(error.to_string().starts_with("my.csv"), "{error}");
             return None;
         }
     };
-    let joints = psec.joints().iter().map(|&place| names()[place].clone()).collect();
+    let joints = psec.joints().iter().map(|&index| names()[index].clone()).collect();
     let mut row = vec![0.0; psec.joints().len()];
     let mut rows = Vec::new();
-    while rows.len() < MOST_INSTANTS {
+    while rows.len() < MAX_CYCLES {
         match psec.next(&mut row) {
             Ok(true) => rows.push(row.clone()),
             Ok(false) => return Some((joints, rows)),
             Err(error) => {
-                refused(&error.to_string());
-                assert!(matches!(psec.next(&mut row), Ok(false)), "faults are told once");
+                assert_one_line(&error.to_string());
+                assert!(matches!(psec.next(&mut row), Ok(false)), "an error is reported once");
                 return None;
             }
         }
@@ -48,14 +48,14 @@ fn rows(data: &[u8]) -> Option<(Vec<String>, Vec<Vec<f64>>)> {
     None
 }
 
-/// Setpoints as CSV: what is read is written and read back the same.
+/// Reads setpoints in CSV and asserts that they round-trip.
 pub fn psec_csv(data: &[u8]) {
     bounded(data.len(), || {
         let Some((joints, rows_read)) = rows(data) else { return };
         for row in &rows_read {
             assert!(row.iter().all(|value| value.is_finite()));
         }
-        let mut out = PsecCsvOut::new(Vec::new(), &joints).expect("a vector takes all");
+        let mut out = PsecCsvWriter::new(Vec::new(), &joints).expect("a vector takes all");
         for (k, row) in rows_read.iter().enumerate() {
             out.row(k as i64 * MACHINE.periods().position, row).expect("a vector takes all");
         }
@@ -72,15 +72,15 @@ fn check(request: virtual_axes_core::trajectory::TrajectoryRequest) {
     let context = ValidationContext {
         joints: &JOINTS,
         period: MACHINE.periods().position,
-        max_points: MOST_POINTS,
+        max_points: MAX_POINTS,
         allow_nonzero_end_velocity: true,
     };
     if let Err(rejection) = Trajectory::new(request, &context) {
-        refused(&rejection.to_string());
+        assert_one_line(&rejection.to_string());
     }
 }
 
-/// Setpoints as YAML.
+/// Reads trajectories in YAML and asserts that they round-trip through messages.
 pub fn psec_yaml(data: &[u8]) {
     let Ok(text) = str::from_utf8(data) else { return };
     bounded(data.len(), || match read_psec_yaml(text, "my.yaml") {
@@ -92,18 +92,18 @@ pub fn psec_yaml(data: &[u8]) {
             }
         }
         Err(error) => {
-            refused(&error.to_string());
+            assert_one_line(&error.to_string());
             assert!(error.to_string().starts_with("my.yaml"), "{error}");
         }
     });
 }
 
-/// Setpoints as MCAP.
+/// Reads trajectories in MCAP and asserts that they are sorted by log time.
 pub fn psec_mcap(data: &[u8]) {
-    bounded_beside(COMPRESSED_RECORD, data.len(), || {
-        let trajectories = match Trajectories::new(Cursor::new(data), "my.mcap", None) {
+    bounded_with_extra(COMPRESSED_RECORD, data.len(), || {
+        let trajectories = match McapTrajectories::new(Cursor::new(data), "my.mcap", None) {
             Ok(trajectories) => trajectories,
-            Err(error) => return refused(&error.to_string()),
+            Err(error) => return assert_one_line(&error.to_string()),
         };
         let announced = trajectories.remaining();
         let mut seen = 0;
@@ -116,15 +116,15 @@ pub fn psec_mcap(data: &[u8]) {
                     last = time;
                     check(request);
                 }
-                Err(error) => refused(&error.to_string()),
+                Err(error) => assert_one_line(&error.to_string()),
             }
         }
         assert!(seen <= announced);
     });
 }
 
-/// What was read of an axis has as many values as stamps; it is made even, or refused.
-fn conditioned(read: (RawRecording, Vec<Finding>)) {
+/// Asserts that all channels have the length of the time stamps, and conditions the recording.
+fn check_recording(read: (RawRecording, Vec<Finding>)) {
     let (raw, _) = read;
     for channel in [&raw.psec, &raw.position, &raw.velocity, &raw.current] {
         assert!(channel.as_ref().is_none_or(|values| values.len() == raw.time.len()));
@@ -138,11 +138,11 @@ fn conditioned(read: (RawRecording, Vec<Finding>)) {
                 assert!(of.iter().all(|values| values.iter().all(|value| value.is_finite())));
             }
         }
-        Err(fault) => refused(&fault.to_string()),
+        Err(fault) => assert_one_line(&fault.to_string()),
     }
 }
 
-/// A recording as CSV. What stands before a line `---` says which column is what.
+/// Reads a recording in CSV; text before a line `---` assigns the columns.
 pub fn recording_csv(data: &[u8]) {
     let mut options = RecordingOptions::default();
     let mut body = data;
@@ -151,27 +151,27 @@ pub fn recording_csv(data: &[u8]) {
     {
         for line in columns.lines() {
             if let Err(error) = options.columns.set(line, "--columns") {
-                refused(&error.to_string());
+                assert_one_line(&error.to_string());
             }
         }
         if let Err(error) = Columns::from_yaml(columns, "columns.yaml") {
-            refused(&error.to_string());
+            assert_one_line(&error.to_string());
         }
         body = rest.as_bytes();
     }
     bounded(data.len(), || match read_recording_csv(body, "my.csv", &MACHINE.axes()[0], &options) {
-        Ok(read) => conditioned(read),
-        Err(error) => refused(&error.to_string()),
+        Ok(read) => check_recording(read),
+        Err(error) => assert_one_line(&error.to_string()),
     });
 }
 
-/// A recording as MCAP.
+/// Reads a recording in MCAP.
 pub fn recording_mcap(data: &[u8]) {
-    bounded_beside(COMPRESSED_RECORD, data.len(), || {
+    bounded_with_extra(COMPRESSED_RECORD, data.len(), || {
         let options = RecordingOptions::default();
         match read_recording_mcap(Cursor::new(data), "my.mcap", &MACHINE.axes()[0], &options) {
-            Ok(read) => conditioned(read),
-            Err(error) => refused(&error.to_string()),
+            Ok(read) => check_recording(read),
+            Err(error) => assert_one_line(&error.to_string()),
         }
     });
 }

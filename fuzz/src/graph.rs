@@ -1,4 +1,4 @@
-//! Messages and requests as they come from the network: four bytes of header, then CDR.
+//! Fuzz targets of messages and requests from the network: four bytes of header, then CDR.
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -27,16 +27,16 @@ use virtual_axes_io::messages::std_srvs::srv::TriggerRequest;
 use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectory;
 use virtual_axes_io::messages::{self, GetResultRequest, SendGoalRequest, nanoseconds};
 
-use crate::{JOINTS, MACHINE, ORIGIN, PARAMETERS, bounded, machine_at_rest, names, refused, step};
+use crate::{JOINTS, MACHINE, ORIGIN, PARAMETERS, assert_one_line, bounded, machine_at_rest, names, step};
 
-/// Header before CDR.
+/// Length of the encapsulation header, bytes.
 const HEADER: usize = 4;
-/// Position periods that the machine is run for what it took.
+/// Simulated position periods after an accepted message.
 const PERIODS: usize = 12;
-/// Longest time of a trajectory here, s; the node takes any, and checks longer ones as thoroughly.
+/// Longest trajectory of the target, s; the node accepts any duration.
 const LONGEST: i32 = 60;
 
-/// What a reader of the node makes of a sample: the decoder that RustDDS calls, in the order of the header.
+/// Decodes a sample with the decoder of RustDDS, in the byte order of the header, and asserts that it round-trips.
 fn decode<T: DeserializeOwned + Serialize + PartialEq + Debug>(sample: &[u8]) -> Option<T> {
     let (header, body) = sample.split_first_chunk::<HEADER>()?;
     let message = match header[1] {
@@ -45,13 +45,13 @@ fn decode<T: DeserializeOwned + Serialize + PartialEq + Debug>(sample: &[u8]) ->
     };
     let (message, consumed) = message.ok()?;
     assert!(consumed <= body.len());
-    // What was understood can be said again, and means the same.
+    // A decoded message can be encoded and decoded again.
     let mut written = Vec::new();
-    virtual_axes_io::files::encode(&message, &mut written).expect("a message can be written");
+    virtual_axes_io::files::encode_cdr(&message, &mut written).expect("a message can be written");
     let (again, _) = cdr_encoding::from_bytes::<T, LittleEndian>(&written[HEADER..]).expect("it can be read");
-    // Not by comparing values: NaN is not itself.
+    // Bytes are compared because NaN differs from itself.
     let mut twice = Vec::new();
-    virtual_axes_io::files::encode(&again, &mut twice).expect("a message can be written");
+    virtual_axes_io::files::encode_cdr(&again, &mut twice).expect("a message can be written");
     assert_eq!(written, twice);
     Some(message)
 }
@@ -67,34 +67,34 @@ fn validator() -> TrajectoryValidator {
     }
 }
 
-/// Times that are checked instant by instant take as long as they are.
+/// Limits times, because validation checks each position cycle.
 fn shorten_times(message: &mut JointTrajectory) {
     for point in &mut message.points {
         point.time_from_start.sec = point.time_from_start.sec.clamp(-1, LONGEST);
     }
 }
 
-/// `psec`: a trajectory is checked, offered to the axes and begun.
+/// Validates, submits and starts a trajectory of the topic `psec`.
 pub fn cdr_psec(data: &[u8]) {
     bounded(data.len(), || {
         let Some(mut message) = decode::<JointTrajectory>(data) else { return };
         shorten_times(&mut message);
         let trajectory = match validator().validate(&message) {
             Ok(trajectory) => trajectory,
-            Err(rejection) => return refused(&rejection.to_string()),
+            Err(rejection) => return assert_one_line(&rejection.to_string()),
         };
         let request = messages::request(&message, usize::MAX).expect("it has just been read");
         let again = messages::joint_trajectory(&request);
         assert_eq!(messages::request(&again, usize::MAX).as_ref(), Ok(&request));
         let mut simulation = machine_at_rest();
         if let Err(rejection) = simulation.submit(MotionId(1), Arc::new(trajectory)) {
-            refused(&rejection.to_string());
+            assert_one_line(&rejection.to_string());
         }
         step(&mut simulation, PERIODS);
     });
 }
 
-/// `psec_stream` and `load`: setpoints and loads of the same message.
+/// Uses one message as setpoints (`psec_stream`) and as loads (`load`).
 pub fn cdr_joint_state(data: &[u8]) {
     bounded(data.len(), || {
         let Some(message) = decode::<JointState>(data) else { return };
@@ -103,25 +103,25 @@ pub fn cdr_joint_state(data: &[u8]) {
         let mut order = ReorderFilter::default();
         for publisher in [[1; 16], [1; 16], [2; 16]] {
             let setpoints = StreamSetpoints::from_message_in_order(&message, &names, publisher, &mut order);
-            assert!(!setpoints.is_reordered, "the same stamp is not older");
+            assert!(!setpoints.is_reordered, "an equal stamp is in order");
             assert!(setpoints.positions.len() <= names.len());
-            setpoints.rejected.iter().for_each(|rejection| refused(&rejection.to_string()));
-            for &(place, position) in &setpoints.positions {
-                if let Err(rejection) = simulation.submit_setpoint_stamped(place, position, setpoints.sent) {
-                    refused(&rejection.to_string());
+            setpoints.rejected.iter().for_each(|rejection| assert_one_line(&rejection.to_string()));
+            for &(index, position) in &setpoints.positions {
+                if let Err(rejection) = simulation.submit_setpoint_stamped(index, position, setpoints.sent) {
+                    assert_one_line(&rejection.to_string());
                 }
             }
             step(&mut simulation, 2);
         }
         match loads(&message, &names) {
-            Ok(loads) => loads.iter().for_each(|&(place, load)| simulation.set_load(place, load, SECOND_NS)),
-            Err(reason) => refused(&reason),
+            Ok(loads) => loads.iter().for_each(|&(index, load)| simulation.set_load(index, load, SECOND_NS)),
+            Err(reason) => assert_one_line(&reason),
         }
         step(&mut simulation, PERIODS);
     });
 }
 
-/// A request of the action: its goal is checked, offered with its tolerances and begun.
+/// Validates, submits and starts a goal of the action with its tolerances.
 pub fn cdr_goal(data: &[u8]) {
     bounded(data.len(), || {
         let Some(mut message) = decode::<SendGoalRequest>(data) else { return };
@@ -135,16 +135,16 @@ pub fn cdr_goal(data: &[u8]) {
                 if let Err(rejection) =
                     simulation.submit_with_tolerances(MotionId(1), Arc::new(trajectory), tolerances)
                 {
-                    refused(&rejection.to_string());
+                    assert_one_line(&rejection.to_string());
                 }
                 step(&mut simulation, PERIODS);
             }
-            Err(rejection) => refused(&rejection.to_string()),
+            Err(rejection) => assert_one_line(&rejection.to_string()),
         }
     });
 }
 
-/// Requests to the parameter services; the last byte of the header says which.
+/// Processes a request of a parameter service; the last byte of the header selects the service.
 pub fn cdr_parameters(data: &[u8]) {
     let settings = || ParameterStore::new(PARAMETERS.clone(), Arc::default());
     bounded(data.len(), || match data.get(HEADER - 1).copied().unwrap_or_default() % 6 {
@@ -155,20 +155,20 @@ pub fn cdr_parameters(data: &[u8]) {
             };
             let parameters = parameters.unwrap_or_default();
             if let Err(reason) = check_count(parameters.len()) {
-                return refused(&reason);
+                return assert_one_line(&reason);
             }
             let changes = parameters.into_iter().map(parameter_from_wire);
             let changes = match changes.collect::<Result<Vec<_>, _>>() {
                 Ok(changes) => changes,
-                Err(reason) => return refused(&reason),
+                Err(reason) => return assert_one_line(&reason),
             };
             let mut settings = settings();
             let result = settings.check(changes.clone()).map(|(changed, _)| settings.replace(changed));
             if let Err(reason) = &result {
-                refused(reason);
-                assert_eq!(settings.parameters(), &*PARAMETERS, "what is refused changes nothing");
+                assert_one_line(reason);
+                assert_eq!(settings.parameters(), &*PARAMETERS, "a rejected request changes nothing");
             } else {
-                // The last value of a name counts, and an integer serves as a number.
+                // The last value of a name applies, and an integer is a valid number.
                 for (index, (name, value)) in changes.iter().enumerate() {
                     let kind = settings.get(name).expect("it has just been set").kind();
                     let is_last = changes[index + 1..].iter().all(|(later, _)| later != name);
@@ -217,7 +217,7 @@ pub fn cdr_parameters(data: &[u8]) {
     });
 }
 
-/// `/clock`, `~/stop`, `~/reset`, and the action's requests to cancel and for a result.
+/// Processes messages of `/clock` and requests of `~/stop`, `~/reset`, cancel goal and get result.
 pub fn cdr_other(data: &[u8]) {
     bounded(data.len(), || match data.get(HEADER - 1).copied().unwrap_or_default() % 4 {
         0 => _ = decode::<Clock>(data).map(|message| nanoseconds(&message.clock)),
@@ -225,13 +225,13 @@ pub fn cdr_other(data: &[u8]) {
         2 => _ = decode::<GetResultRequest>(data),
         _ => {
             let Some(request) = decode::<CancelGoalRequest>(data) else { return };
-            let asked = &request.goal_info;
+            let goal_info = &request.goal_info;
             let goals = (0..4u8).map(|n| CancelCandidate {
                 id: [n; 16],
                 stamp: ORIGIN + i64::from(n) * SECOND_NS,
                 is_cancelable: n != 2,
             });
-            match select_goals_to_cancel(&asked.goal_id.uuid, nanoseconds(&asked.stamp), goals) {
+            match select_goals_to_cancel(&goal_info.goal_id.uuid, nanoseconds(&goal_info.stamp), goals) {
                 Ok(ids) => assert!(ids.len() <= 3 && !ids.contains(&[2; 16])),
                 Err(code) => assert!(code > 0),
             }

@@ -1,6 +1,5 @@
-//! What each fuzz target does with its bytes. Beside "no panic" it holds that what is refused is refused in
-//! one short line, that what is accepted is finite and can be written and read back the same, and that
-//! memory stays in proportion to the input.
+//! Bodies of the fuzz targets. In addition to "no panic" they assert that an error is one short line, that accepted
+//! values are finite and round-trip through their writers, and that memory is bounded in proportion to the input.
 
 mod files;
 mod graph;
@@ -19,13 +18,13 @@ use virtual_axes_core::simulation::{self, Simulation};
 use virtual_axes_core::trajectory::JointLimits;
 use virtual_axes_core::units::Nanoseconds;
 
-/// Longest refusal, bytes: a few quoted texts and what is allowed.
-const LONGEST_REFUSAL: usize = 2000;
-/// Memory that is used whatever the input is, bytes: machines, designs, buffers of readers.
+/// Largest length of an error message, bytes.
+const MAX_ERROR_LENGTH: usize = 2000;
+/// Allowed memory independent of the input, bytes: machines, controller designs, buffers of readers.
 const FREE_MEMORY: u64 = 48 << 20;
-/// Memory per byte of input: an empty string on the wire is 4 bytes, and a rejection a few hundred.
+/// Allowed memory per byte of input: an empty string is 4 bytes in CDR, a rejection a few hundred.
 const MEMORY_PER_BYTE: u64 = 1000;
-/// Time of the first position instant, ns since the Unix epoch.
+/// Time of the first position cycle, ns since the Unix epoch.
 const ORIGIN: Nanoseconds = 1_700_000_000_000_000_000;
 
 static PARAMETERS: LazyLock<Parameters> = LazyLock::new(|| Parameters::embedded_default().expect("shipped"));
@@ -36,12 +35,12 @@ fn names() -> Vec<String> {
     JOINTS.iter().map(|joint| joint.name.clone()).collect()
 }
 
-/// The default machine at rest.
+/// Creates a simulation of the default machine at rest.
 fn machine_at_rest() -> Simulation {
     Simulation::new(&MACHINE, JOINTS.clone(), ORIGIN).expect("the shipped machine can be simulated")
 }
 
-/// Steps the machine; all that it says is finite.
+/// Steps the simulation and asserts that its signals are finite.
 fn step(simulation: &mut Simulation, periods: usize) {
     for _ in 0..periods {
         simulation.step();
@@ -52,32 +51,35 @@ fn step(simulation: &mut Simulation, periods: usize) {
     }
 }
 
-/// Line and paragraph separators, and what marks or turns the direction of writing (Unicode's Bidi_Control).
-const TURNS: &str = "\u{2028}\u{2029}\u{61c}\u{200e}\u{200f}\u{202a}\u{202b}\u{202c}\u{202d}\u{202e}\
+/// Line and paragraph separators, and the bidirectional control characters (Unicode property Bidi_Control).
+const SEPARATORS: &str = "\u{2028}\u{2029}\u{61c}\u{200e}\u{200f}\u{202a}\u{202b}\u{202c}\u{202d}\u{202e}\
     \u{2066}\u{2067}\u{2068}\u{2069}";
 
-/// A refusal is one short line that says something.
-fn refused(text: &str) {
-    assert!(!text.trim().is_empty(), "a refusal without a word");
+/// Asserts that an error message is one short, non-empty line.
+fn assert_one_line(text: &str) {
+    assert!(!text.trim().is_empty(), "empty error message");
     assert!(
-        text.len() <= LONGEST_REFUSAL,
+        text.len() <= MAX_ERROR_LENGTH,
         "{} bytes: {}…",
         text.len(),
         &text[..text.floor_char_boundary(200)]
     );
-    assert!(!text.contains(|c: char| c.is_control() || TURNS.contains(c)), "more than a line: {text:?}");
+    assert!(
+        !text.contains(|c: char| c.is_control() || SEPARATORS.contains(c)),
+        "more than one line: {text:?}"
+    );
 }
 
-/// Runs `body`, which may take memory in proportion to `input`, a length in bytes.
+/// Runs `body` and asserts that its memory is bounded in proportion to `input`, a length in bytes.
 fn bounded(input: usize, body: impl FnOnce()) {
-    bounded_beside(0, input, body);
+    bounded_with_extra(0, input, body);
 }
 
-/// Likewise, and `beside` bytes whatever the input is.
-fn bounded_beside(beside: u64, input: usize, body: impl FnOnce()) {
-    // What is made once counts for nobody.
+/// Runs `body` and asserts the bound of [`bounded`] plus `extra` bytes independent of the input.
+fn bounded_with_extra(extra: u64, input: usize, body: impl FnOnce()) {
+    // Shared data is created outside of the measurement.
     LazyLock::force(&JOINTS);
     let used = allocation_counter::measure(body).bytes_max;
-    let allowed = beside + FREE_MEMORY + MEMORY_PER_BYTE * input as u64;
+    let allowed = extra + FREE_MEMORY + MEMORY_PER_BYTE * input as u64;
     assert!(used <= allowed, "{used} bytes for an input of {input}");
 }

@@ -1,4 +1,4 @@
-//! What a graph can ask of the axes in any order, in values that are often good ones.
+//! Fuzz target of the simulation: commands in any order, with values that are often valid.
 
 use std::sync::Arc;
 
@@ -8,14 +8,14 @@ use virtual_axes_core::trajectory::{
 };
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
 
-use crate::{JOINTS, MACHINE, ORIGIN, bounded, machine_at_rest, refused, step};
+use crate::{JOINTS, MACHINE, ORIGIN, assert_one_line, bounded, machine_at_rest, step};
 
-/// Most position periods that one input is worth.
-const MOST_PERIODS: usize = 200;
-/// Most points of a trajectory.
-const MOST_POINTS: usize = 12;
+/// Largest number of position periods per input.
+const MAX_PERIODS: usize = 200;
+/// Largest number of points of a trajectory.
+const MAX_POINTS: usize = 12;
 
-/// A value up to `scale`; now and then any that 64 bits can mean.
+/// Draws a value up to `scale`, or rarely any 64-bit float.
 fn value(input: &mut Unstructured<'_>, scale: f64) -> Result<f64> {
     Ok(match input.arbitrary::<u8>()? {
         0..=3 => f64::arbitrary(input)?,
@@ -32,22 +32,22 @@ fn start(input: &mut Unstructured<'_>, now: Nanoseconds) -> Result<Start> {
     })
 }
 
-/// A request of some joints that begins where they are commanded to be.
+/// Draws a request of some joints that starts at their commanded positions.
 fn request(
     input: &mut Unstructured<'_>,
     now: Nanoseconds,
     commanded: &[f64],
 ) -> Result<Option<TrajectoryRequest>> {
     let mask: u8 = input.arbitrary()?;
-    let places: Vec<usize> = (0..JOINTS.len()).filter(|place| mask >> place & 1 == 1).collect();
+    let indices: Vec<usize> = (0..JOINTS.len()).filter(|index| mask >> index & 1 == 1).collect();
     let mut request = TrajectoryRequest::new(
         start(input, now)?,
-        places.iter().map(|&place| JOINTS[place].name.clone()).collect(),
+        indices.iter().map(|&index| JOINTS[index].name.clone()).collect(),
     );
     let order = input.int_in_range(0..=2)?;
-    let mut at: Vec<f64> = places.iter().map(|&place| commanded[place]).collect();
+    let mut at: Vec<f64> = indices.iter().map(|&index| commanded[index]).collect();
     let mut time: Nanoseconds = 0;
-    for index in 0..input.int_in_range(0..=MOST_POINTS)? {
+    for index in 0..input.int_in_range(0..=MAX_POINTS)? {
         let pause = match input.arbitrary::<u8>()? {
             0..=7 => Nanoseconds::from(input.arbitrary::<i32>()?),
             8..=99 => Nanoseconds::from(input.int_in_range(1..=60u8)?) * MACHINE.periods().position,
@@ -55,14 +55,14 @@ fn request(
         };
         if index > 0 || input.ratio(1, 8)? {
             time += pause;
-            for (at, &place) in at.iter_mut().zip(&places) {
-                // Within its reach, more or less.
+            for (at, &index) in at.iter_mut().zip(&indices) {
+                // Usually within the velocity limit.
                 *at +=
-                    value(input, 1.2 * JOINTS[place].limits.velocity * seconds(pause.clamp(0, SECOND_NS)))?;
+                    value(input, 1.2 * JOINTS[index].limits.velocity * seconds(pause.clamp(0, SECOND_NS)))?;
             }
         }
         let row = |scale: f64, input: &mut Unstructured<'_>| -> Result<Vec<f64>> {
-            places.iter().map(|_| value(input, scale)).collect()
+            indices.iter().map(|_| value(input, scale)).collect()
         };
         let velocities = if order > 0 { row(0.4, input)? } else { Vec::new() };
         let accelerations = if order > 1 { row(3.0, input)? } else { Vec::new() };
@@ -73,7 +73,7 @@ fn request(
             effort: &[],
         };
         if let Err(rejection) = request.push(time, row) {
-            refused(&rejection.to_string());
+            assert_one_line(&rejection.to_string());
             return Ok(None);
         }
     }
@@ -83,7 +83,7 @@ fn request(
 fn play(input: &mut Unstructured<'_>) -> Result<()> {
     let period = MACHINE.periods().position;
     let mut simulation = machine_at_rest();
-    let (mut left, mut id, mut offered) = (MOST_PERIODS, 0, 0);
+    let (mut left, mut id, mut active) = (MAX_PERIODS, 0, 0);
     while left > 0 && !input.is_empty() {
         let now = simulation.time_of(simulation.next_instant());
         match input.int_in_range(0..=9u8)? {
@@ -95,7 +95,7 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
                 let context = ValidationContext {
                     joints: &JOINTS,
                     period,
-                    max_points: MOST_POINTS,
+                    max_points: MAX_POINTS,
                     allow_nonzero_end_velocity: input.arbitrary()?,
                 };
                 let accepted = Trajectory::new(request, &context).and_then(|trajectory| {
@@ -104,10 +104,10 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
                 });
                 match accepted {
                     Ok(admission) => {
-                        offered += 1;
+                        active += 1;
                         assert!(admission.start_k <= admission.join_k);
                     }
-                    Err(rejection) => refused(&rejection.to_string()),
+                    Err(rejection) => assert_one_line(&rejection.to_string()),
                 }
             }
             4..=6 => {
@@ -118,19 +118,19 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
                 step(&mut simulation, periods);
                 let passed = seconds((simulation.next_instant() - resets) * period);
                 for ((sample, before), joint) in simulation.samples().iter().zip(before).zip(JOINTS.iter()) {
-                    let reach = joint.speed_bound() * passed * (1.0 + 1e-6);
+                    let largest = joint.speed_bound() * passed * (1.0 + 1e-6);
                     let moved = (sample.psec - before).abs();
-                    // The first setpoint of a stream may be one step away from where the axis stands.
-                    assert!(stream || moved <= reach + 1e-9, "{}: {moved} in {passed} s", joint.name);
+                    // The first setpoint of a stream may be one step away from the position of the axis.
+                    assert!(stream || moved <= largest + 1e-9, "{}: {moved} in {passed} s", joint.name);
                 }
             }
             7 => {
-                let place = input.int_in_range(0..=JOINTS.len())?;
-                let at = simulation.psec_ahead(place, 0).unwrap_or_default();
+                let index = input.int_in_range(0..=JOINTS.len())?;
+                let at = simulation.psec_ahead(index, 0).unwrap_or_default();
                 let position = at + value(input, 2e-3)?;
                 let sent = input.arbitrary::<bool>()?.then_some(now);
-                if let Err(rejection) = simulation.submit_setpoint_stamped(place, position, sent) {
-                    refused(&rejection.to_string());
+                if let Err(rejection) = simulation.submit_setpoint_stamped(index, position, sent) {
+                    assert_one_line(&rejection.to_string());
                 }
             }
             8 => {
@@ -143,20 +143,20 @@ fn play(input: &mut Unstructured<'_>) -> Result<()> {
                 n => _ = simulation.cancel(MotionId(u64::from(n % 16))),
             },
         }
-        offered -= simulation.drain_finished().count();
+        active -= simulation.drain_finished().count();
     }
-    // What was accepted ends once: by its end, by another, or by this.
+    // An accepted motion ends once: completed, preempted, or aborted by this reset.
     simulation.reset();
     step(&mut simulation, 1);
-    offered -= simulation.drain_finished().count();
-    assert_eq!(offered, 0, "motions without an end");
+    active -= simulation.drain_finished().count();
+    assert_eq!(active, 0, "motions without an end");
     Ok(())
 }
 
-/// Trajectories, stops, streams, loads, resets and jumps of the clock, between steps of the machine.
+/// Submits trajectories, stops, streams, loads, resets and clock jumps between steps of the simulation.
 pub fn trajectory(data: &[u8]) {
     bounded(data.len(), || {
-        // An input that is too short ends where it ends.
+        // A short input ends the sequence.
         let _ = play(&mut Unstructured::new(data));
     });
 }

@@ -1,18 +1,18 @@
-//! Texts: machine files, parameters, scenarios, arguments.
+//! Fuzz targets of text inputs: machine files, parameters, scenarios, ROS arguments.
 
 use virtual_axes::ingress::args::Command;
 use virtual_axes_core::config::{Parameters, ValueSource};
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::scenario::Scenario;
 
-use crate::{JOINTS, MACHINE, PARAMETERS, bounded, refused};
+use crate::{JOINTS, MACHINE, PARAMETERS, assert_one_line, bounded};
 
-/// Instants at which the path of a scenario is looked at.
-const LOOKS: u32 = 64;
-/// Most moves that are planned; more of them show nothing new.
-const MOST_MOVES: usize = 40;
+/// Number of samples along a scenario.
+const SAMPLES: u32 = 64;
+/// Largest number of planned moves.
+const MAX_MOVES: usize = 40;
 
-/// What is valid is written and read back the same, bit for bit.
+/// Asserts that parameters round-trip through YAML bit by bit.
 fn assert_reads_back(parameters: &Parameters) {
     let text = parameters.to_yaml("", |_| None);
     let again = Parameters::from_yaml(&text, "again.yaml").expect("what was written can be read");
@@ -20,7 +20,7 @@ fn assert_reads_back(parameters: &Parameters) {
     assert_eq!(values(&again), values(parameters));
 }
 
-/// Machine files.
+/// Reads a machine file.
 pub fn machine_file(data: &[u8]) {
     let Ok(text) = str::from_utf8(data) else { return };
     bounded(data.len(), || match Parameters::from_yaml(text, "my.yaml") {
@@ -28,17 +28,17 @@ pub fn machine_file(data: &[u8]) {
             assert_reads_back(&parameters);
             let config = parameters.machine_config().expect("valid parameters are a machine");
             if let Err(error) = MachineParameters::new(&config) {
-                refused(&error.to_string());
+                assert_one_line(&error.to_string());
             }
         }
         Err(error) => {
-            refused(&error.to_string());
+            assert_one_line(&error.to_string());
             assert!(error.to_string().starts_with("my.yaml"), "{error}");
         }
     });
 }
 
-/// A parameter file over the default machine, or lines as of `-p` and `--set`.
+/// Overlays a parameter file, or lines of the form of `-p` and `--set`, on the default machine.
 pub fn parameter_text(data: &[u8]) {
     let Ok(text) = str::from_utf8(data) else { return };
     bounded(data.len(), || {
@@ -52,26 +52,26 @@ pub fn parameter_text(data: &[u8]) {
                 .map(|line| {
                     let before = parameters.clone();
                     let result = parameters.set_text(line, &source);
-                    assert!(result.is_ok() || parameters == before, "what is refused changes nothing");
+                    assert!(result.is_ok() || parameters == before, "a rejected assignment changes nothing");
                     result.map_err(|error| error.to_string())
                 })
                 .collect()
         };
-        results.iter().filter_map(|result| result.as_ref().err()).for_each(|error| refused(error));
+        results.iter().filter_map(|result| result.as_ref().err()).for_each(|error| assert_one_line(error));
         let config = parameters.machine_config().expect("what is accepted is valid");
         if results.iter().any(Result::is_ok) {
             assert_reads_back(&parameters);
             if let Err(error) = MachineParameters::new(&config) {
-                refused(&error.to_string());
+                assert_one_line(&error.to_string());
             }
         }
     });
 }
 
-/// Scenarios.
+/// Plans a scenario and samples it.
 pub fn scenario(data: &[u8]) {
     let Ok(text) = str::from_utf8(data) else { return };
-    if text.matches("- ").count() > MOST_MOVES {
+    if text.matches("- ").count() > MAX_MOVES {
         return;
     }
     bounded(data.len(), || {
@@ -79,7 +79,7 @@ pub fn scenario(data: &[u8]) {
         let program = match planned {
             Ok(program) => program,
             Err(error) => {
-                refused(&error.to_string());
+                assert_one_line(&error.to_string());
                 assert!(error.to_string().starts_with("my.yaml"), "{error}");
                 return;
             }
@@ -88,10 +88,10 @@ pub fn scenario(data: &[u8]) {
         assert!(duration.is_finite() && duration >= 0.0);
         let mut psec = vec![0.0; JOINTS.len()];
         let mut before = 0.0;
-        for look in 0..=LOOKS {
-            let t = duration * f64::from(look) / f64::from(LOOKS);
+        for sample in 0..=SAMPLES {
+            let t = duration * f64::from(sample) / f64::from(SAMPLES);
             program.psec(t, &mut psec);
-            // Strokes are looked at by whoever moves the machine.
+            // Travel limits are checked later, by validation.
             assert!(psec.iter().all(|position| position.is_finite()), "{psec:?} at {t} s");
             let progress = program.progress(t);
             assert!(progress >= before, "progress steps back at {t} s");
@@ -100,7 +100,7 @@ pub fn scenario(data: &[u8]) {
     });
 }
 
-/// Arguments of the node, one a line.
+/// Parses the arguments of the node, one per line.
 pub fn ros_args(data: &[u8]) {
     let Ok(text) = str::from_utf8(data) else { return };
     bounded(data.len(), || {

@@ -1,4 +1,25 @@
-//! Random trajectories with checks of every tick, and fixtures of tests.
+//! Verification of the library: stress test with random trajectories, and fixtures shared by the tests of all crates.
+//!
+//! - [`stress`] runs random trajectories and checks limits, friction, energy balance and following errors at every tick.
+//! - [`fixtures`] contains test machines, recordings, tuning problems and temporary folders.
+//!
+//! The crate is a development dependency only and is not published.
+//!
+//! # Example
+//! ```
+//! use virtual_axes_core::config::Parameters;
+//! use virtual_axes_core::machine::SimdWidth;
+//! use virtual_axes_verification::stress::{TestMachines, TrajectoryTest};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // Trajectory 12 of seed 7 on the default machine with each kind of controller.
+//! let machines = TestMachines::new(&[Parameters::embedded_default()?])?;
+//! let mut test = TrajectoryTest::new(&machines, 7, SimdWidth::Widest);
+//! let record = test.run(12)?;
+//! assert!(record.violations.is_empty(), "{:?}", record.violations);
+//! # Ok(())
+//! # }
+//! ```
 
 #![forbid(unsafe_code)]
 

@@ -1,5 +1,4 @@
-//! Messages of `control_msgs` as ROS 2 Jazzy has them (5.x), field by field, and those that its action
-//! `FollowJointTrajectory` is made of on the wire.
+//! Messages of `control_msgs` of ROS 2 Jazzy (5.x), and the services and topics of the action `FollowJointTrajectory`.
 
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::{Duration, Time};
 use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
@@ -12,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Name of the package.
 pub const CONTROL_PACKAGE: &str = "control_msgs";
 
-/// Largest errors of a joint: 0 is the server's default, −1 none.
+/// Tolerances of a joint: 0 selects the default of the server, −1 disables the tolerance.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointTolerance {
     /// The joint.
@@ -25,12 +24,12 @@ pub struct JointTolerance {
     pub acceleration: f64,
 }
 
-/// Largest errors of one component of a joint with several degrees of freedom.
+/// Tolerances of one component of a multi-DOF joint.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointComponentTolerance {
     /// The joint.
     pub joint_name: String,
-    /// An axis (1, 2, 3), the translation (4) or the rotation (5).
+    /// Component: X, Y or Z axis (1, 2, 3), translation (4) or rotation (5).
     pub component: u16,
     /// m or rad.
     pub position: f64,
@@ -40,22 +39,23 @@ pub struct JointComponentTolerance {
     pub acceleration: f64,
 }
 
-/// A goal of `FollowJointTrajectory`.
+/// Goal of the action `FollowJointTrajectory`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FollowJointTrajectoryGoal {
-    /// What to follow.
+    /// Trajectory to follow.
     pub trajectory: JointTrajectory,
-    /// Likewise for joints with several degrees of freedom.
+    /// Trajectory of multi-DOF joints.
     pub multi_dof_trajectory: MultiDOFJointTrajectory,
-    /// On the way.
+    /// Tolerances during the motion.
     pub path_tolerance: Vec<JointTolerance>,
-    /// Likewise for joints with several degrees of freedom.
+    /// Tolerances of multi-DOF joints during the motion.
     pub component_path_tolerance: Vec<JointComponentTolerance>,
-    /// At the end.
+    /// Tolerances at the goal.
     pub goal_tolerance: Vec<JointTolerance>,
-    /// Likewise for joints with several degrees of freedom.
+    /// Tolerances of multi-DOF joints at the goal.
     pub component_goal_tolerance: Vec<JointComponentTolerance>,
-    /// How much later than its end the goal may be reached: 0 is the server's default, negative any time.
+    /// Time after the end of the trajectory in which the goal must be reached: 0 selects the default of the server, a
+    /// negative value disables the limit.
     pub goal_time_tolerance: Duration,
 }
 
@@ -63,120 +63,120 @@ pub struct FollowJointTrajectoryGoal {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i32)]
 pub enum ErrorCode {
-    /// Followed to its end.
+    /// The trajectory was completed within its tolerances.
     Successful = 0,
-    /// Cannot be followed, or was not followed to its end.
+    /// The goal was rejected, or the trajectory was not completed.
     InvalidGoal = -1,
-    /// Joints that the machine does not have, or twice.
+    /// A joint is unknown or occurs more than once.
     InvalidJoints = -2,
-    /// Ended before it came.
+    /// The trajectory ended before it arrived.
     OldHeaderTimestamp = -3,
-    /// An error on the way was larger than allowed.
+    /// A path tolerance was violated.
     PathToleranceViolated = -4,
-    /// An error at the end was larger than allowed.
+    /// A goal tolerance was violated.
     GoalToleranceViolated = -5,
 }
 
-/// The result of a goal.
+/// Result of a goal.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FollowJointTrajectoryResult {
     /// An [`ErrorCode`].
     pub error_code: i32,
-    /// For people.
+    /// Human-readable reason.
     pub error_string: String,
 }
 
-/// How a goal fares.
+/// Feedback of an active goal.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FollowJointTrajectoryFeedback {
-    /// Stamp: when it was so.
+    /// Header with the time of the state as stamp.
     pub header: Header,
     /// Joints of the points below.
     pub joint_names: Vec<String>,
-    /// What is asked for.
+    /// Setpoint.
     pub desired: JointTrajectoryPoint,
-    /// What is.
+    /// Simulated state.
     pub actual: JointTrajectoryPoint,
-    /// `desired` less `actual`.
+    /// Difference `desired` − `actual`.
     pub error: JointTrajectoryPoint,
-    /// Joints with several degrees of freedom.
+    /// Names of multi-DOF joints.
     pub multi_dof_joint_names: Vec<String>,
-    /// What is asked of those.
+    /// Setpoint of multi-DOF joints.
     pub multi_dof_desired: MultiDOFJointTrajectoryPoint,
-    /// What is of those.
+    /// State of multi-DOF joints.
     pub multi_dof_actual: MultiDOFJointTrajectoryPoint,
-    /// The difference.
+    /// Difference of multi-DOF joints.
     pub multi_dof_error: MultiDOFJointTrajectoryPoint,
 }
 
-/// What a trajectory controller is doing.
+/// State of a joint trajectory controller.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointTrajectoryControllerState {
-    /// Stamp: when it was so.
+    /// Header with the time of the state as stamp.
     pub header: Header,
     /// Joints of the points below.
     pub joint_names: Vec<String>,
-    /// The setpoint.
+    /// Setpoint.
     pub reference: JointTrajectoryPoint,
-    /// What is measured.
+    /// Measured state.
     pub feedback: JointTrajectoryPoint,
-    /// `reference` less `feedback`.
+    /// Difference `reference` − `feedback`.
     pub error: JointTrajectoryPoint,
-    /// What the controller puts out.
+    /// Output of the controller.
     pub output: JointTrajectoryPoint,
-    /// Joints with several degrees of freedom.
+    /// Names of multi-DOF joints.
     pub multi_dof_joint_names: Vec<String>,
-    /// What is asked of those.
+    /// Setpoint of multi-DOF joints.
     pub multi_dof_reference: MultiDOFJointTrajectoryPoint,
-    /// What is measured of those.
+    /// Measured state of multi-DOF joints.
     pub multi_dof_feedback: MultiDOFJointTrajectoryPoint,
-    /// The difference.
+    /// Difference of multi-DOF joints.
     pub multi_dof_error: MultiDOFJointTrajectoryPoint,
-    /// What the controller puts out for those.
+    /// Output of the controller for multi-DOF joints.
     pub multi_dof_output: MultiDOFJointTrajectoryPoint,
-    /// 1: as fast as the trajectory says.
+    /// Feed override factor: 1 is the programmed speed.
     pub speed_scaling_factor: f64,
 }
 
 /// Request of the service `_action/send_goal`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SendGoalRequest {
-    /// Chosen by the client.
+    /// Goal id chosen by the client.
     pub goal_id: UUID,
-    /// What it asks for.
+    /// Goal.
     pub goal: FollowJointTrajectoryGoal,
 }
 
 /// Response of the service `_action/send_goal`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SendGoalResponse {
-    /// Whether there will be a result.
+    /// True if the goal was accepted.
     pub accepted: bool,
-    /// When it was accepted.
+    /// Time of acceptance.
     pub stamp: Time,
 }
 
 /// Request of the service `_action/get_result`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetResultRequest {
-    /// Whose result.
+    /// Id of the goal.
     pub goal_id: UUID,
 }
 
 /// Response of the service `_action/get_result`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetResultResponse {
-    /// As in `action_msgs/GoalStatus`.
+    /// Status code of `action_msgs/GoalStatus`.
     pub status: i8,
-    /// The result.
+    /// Result.
     pub result: FollowJointTrajectoryResult,
 }
 
 /// Message of the topic `_action/feedback`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FeedbackMessage {
-    /// Whose feedback.
+    /// Id of the goal.
     pub goal_id: UUID,
-    /// The feedback.
+    /// Feedback.
     pub feedback: FollowJointTrajectoryFeedback,
 }

@@ -1,5 +1,4 @@
-//! ROS messages as values, without a network: this package's own, conversions from and to what the
-//! library computes with, and their definitions. Messages are converted here and nowhere else.
+//! ROS messages as plain structs, their conversion from and to the types of the core, and their definitions (schemas).
 
 mod control;
 mod own;

@@ -1,4 +1,4 @@
-//! This package's own messages, field by field as in `msg/`.
+//! Messages of this package with the fields of `msg/`.
 
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Name of this ROS package.
 pub const PACKAGE: &str = "virtual_axes";
 
-/// `msg/MotorCurrents.msg`; units there.
+/// Message `MotorCurrents`; units in `msg/MotorCurrents.msg`.
 #[allow(missing_docs, reason = "documented in msg/MotorCurrents.msg")]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct MotorCurrents {
@@ -21,7 +21,7 @@ pub struct MotorCurrents {
     pub saturated: Vec<bool>,
 }
 
-/// `msg/DriveStates.msg`; units there.
+/// Message `DriveStates`; units in `msg/DriveStates.msg`. `tracking_error` is the following error.
 #[allow(missing_docs, reason = "documented in msg/DriveStates.msg")]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct DriveStates {
@@ -39,7 +39,7 @@ pub struct DriveStates {
     pub controller: Vec<String>,
 }
 
-/// `msg/TrajectoryResult.msg`; units there.
+/// Message `TrajectoryResult`; units in `msg/TrajectoryResult.msg`. `tracking_error` is the following error.
 #[allow(missing_docs, reason = "documented in msg/TrajectoryResult.msg")]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrajectoryResult {
@@ -68,33 +68,33 @@ pub struct TrajectoryResult {
     pub saturation_time: Vec<f64>,
 }
 
-/// `SOURCE_*` of `msg/TrajectoryResult.msg`.
+/// Source of a trajectory: the constants `SOURCE_*` of `msg/TrajectoryResult.msg`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Source {
-    /// The topic `psec`.
+    /// Topic `psec`.
     Topic = 0,
-    /// A goal of `~/follow_joint_trajectory`.
+    /// Action `~/follow_joint_trajectory`.
     Action = 1,
-    /// The topic `psec_stream`.
+    /// Topic `psec_stream`.
     Stream = 2,
 }
 
-/// `ACCEPTED` … `ABORTED` of `msg/TrajectoryResult.msg`.
+/// Status of a trajectory: the constants `ACCEPTED` … `ABORTED` of `msg/TrajectoryResult.msg`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Status {
-    /// It starts at `start`.
+    /// Accepted; starts at `start`.
     Accepted = 0,
-    /// Refused whole.
+    /// Rejected as a whole.
     Rejected = 1,
-    /// Every point has been executed.
+    /// All points were executed.
     Completed = 2,
-    /// A newer one took axes over.
+    /// Preempted by a newer trajectory.
     Preempted = 3,
-    /// Ended by a controlled stop, or called off.
+    /// Ended by a controlled stop or canceled.
     Stopped = 4,
-    /// Ended by a reset, a clock that jumped, or a tolerance that was not kept.
+    /// Ended by a reset, a clock jump or a violated tolerance.
     Aborted = 5,
 }
 

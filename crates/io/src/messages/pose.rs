@@ -1,4 +1,4 @@
-//! The tool as messages: its pose, and the path that its tip takes.
+//! Messages of the tool: pose and path of the tool tip.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use ros2_interfaces_jazzy_serde::geometry_msgs::msg::{Point, Pose, PoseStamped, Quaternion};
@@ -7,7 +7,7 @@ use ros2_interfaces_jazzy_serde::nav_msgs::msg::Path;
 use super::time::header;
 use virtual_axes_core::units::Nanoseconds;
 
-/// A tip (m) and the orientation of the tool frame at a time (ns since the Unix epoch), both in `frame`.
+/// Returns the pose of the tool frame: tip (m) and orientation in `frame`, at a time in ns since the Unix epoch.
 pub fn pose_stamped(
     time: Nanoseconds,
     frame: &str,
@@ -22,7 +22,7 @@ pub fn pose_stamped(
     PoseStamped { header, pose }
 }
 
-/// A path in `frame`, with the stamp of its last pose.
+/// Returns a path in `frame` with the stamp of its last pose.
 pub fn path(frame: &str, poses: Vec<PoseStamped>) -> Path {
     let mut header = poses.last().map(|pose| pose.header.clone()).unwrap_or_default();
     header.frame_id = frame.to_owned();

@@ -1,4 +1,4 @@
-//! Messages that a recording of the node holds.
+//! Messages that a recording (MCAP) of the node contains.
 
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
 use ros2_interfaces_jazzy_serde::geometry_msgs::msg::PoseStamped;
@@ -15,15 +15,15 @@ use super::schema::Schema;
 use super::time::nanoseconds;
 use virtual_axes_core::units::Nanoseconds;
 
-/// A type of message with the definition that a recording carries.
+/// Message type with the definition that a recording contains.
 pub trait Recorded: Serialize {
-    /// The definition.
+    /// Returns the definition.
     fn schema() -> Schema;
-    /// What the message itself says its time is, ns since the Unix epoch; 0 where it does not say.
+    /// Returns the time stamp of the message, ns since the Unix epoch; 0 if it is not set.
     fn time(&self) -> Nanoseconds;
 }
 
-/// For messages with a header.
+/// Implements [`Recorded`] for messages with a header.
 macro_rules! with_header {
     ($($message:ty => $schema:ident),* $(,)?) => {$(
         impl Recorded for $message {

@@ -1,4 +1,4 @@
-//! A trajectory message that becomes a request while it is read.
+//! Deserializes a trajectory message directly into a request.
 
 use std::fmt;
 
@@ -7,16 +7,17 @@ use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
 use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
 
 use super::trajectory::{point_time, start};
-use virtual_axes_core::trajectory::{Rejection, TrajectoryRequest, TrajectoryPoint};
+use virtual_axes_core::trajectory::{Rejection, TrajectoryPoint, TrajectoryRequest};
 
-/// Fields of `trajectory_msgs/JointTrajectory` and of its points, in their order.
+/// Fields of `trajectory_msgs/JointTrajectory`, in their order.
 const MESSAGE_FIELDS: &[&str] = &["header", "joint_names", "points"];
+/// Fields of `trajectory_msgs/JointTrajectoryPoint`, in their order.
 const POINT_FIELDS: &[&str] = &["positions", "velocities", "accelerations", "effort", "time_from_start"];
 
-/// Takes a serialized `trajectory_msgs/JointTrajectory` as a request, or says why no machine could run it.
+/// Deserializes a `trajectory_msgs/JointTrajectory` into a request, or into the rejection of an invalid one.
 ///
-/// It gives what [`request`](super::request) gives for the same message, but makes no list for each point. What
-/// follows the first thing that is refused is not read.
+/// The result equals that of [`request`](super::request), without allocation per point. Reading stops at the first
+/// invalid field.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RequestSeed;
 
@@ -51,7 +52,7 @@ fn required<T, E: Error>(field: Option<T>, name: &'static str) -> Result<T, E> {
     field.ok_or_else(|| E::missing_field(name))
 }
 
-/// The points, which are added to a request.
+/// Visitor that appends the points to a request.
 struct Points(TrajectoryRequest);
 
 impl<'de> DeserializeSeed<'de> for Points {
@@ -89,7 +90,7 @@ impl<'de> Visitor<'de> for Points {
     }
 }
 
-/// Room for the lists of one point, used again for the next; its time is what is read.
+/// Reused buffers of one point; deserializing returns its time.
 #[derive(Default)]
 struct Point {
     positions: Vec<f64>,
@@ -122,7 +123,7 @@ impl<'de> Visitor<'de> for &mut Point {
     }
 }
 
-/// A list that takes the place of another.
+/// Visitor that overwrites a list.
 struct Values<'a>(&'a mut Vec<f64>);
 
 impl<'de> DeserializeSeed<'de> for Values<'_> {
@@ -158,10 +159,10 @@ mod tests {
 
     use super::*;
 
-    /// What the seed makes of a message, and what becomes of the message read whole.
+    /// Returns the results of the seed and of the conversion of the complete message.
     fn both<O: ByteOrder>(message: &JointTrajectory) -> [Result<TrajectoryRequest, Rejection>; 2] {
         let bytes = to_vec::<_, O>(message).expect("a message");
-        let read = RequestSeed.deserialize(&mut CdrDeserializer::<O>::new(&bytes)).expect("it is whole");
+        let read = RequestSeed.deserialize(&mut CdrDeserializer::<O>::new(&bytes)).expect("complete message");
         [read, super::super::request(message, usize::MAX)]
     }
 
@@ -182,14 +183,14 @@ mod tests {
             ],
             ..JointTrajectory::default()
         };
-        // A string and a name of odd lengths: numbers are padded.
+        // Strings of odd lengths, so that numbers are padded.
         message.header.frame_id = "cell 7".into();
         message.header.stamp = Time { sec: 5, nanosec: 6 };
         message
     }
 
     #[test]
-    fn it_gives_what_the_message_read_whole_gives() {
+    fn seed_gives_the_request_of_the_complete_message() {
         let mut without = message();
         without.points.clear();
         for message in [message(), without, JointTrajectory::default()] {
@@ -200,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn it_refuses_what_the_message_read_whole_is_refused_for() {
+    fn seed_gives_the_rejection_of_the_complete_message() {
         type Change = fn(&mut JointTrajectory);
         let changes: [Change; 6] = [
             |message| message.header.stamp.nanosec = 1_000_000_000,
@@ -214,12 +215,12 @@ mod tests {
             let mut message = message();
             change(&mut message);
             let [read, whole] = both::<LittleEndian>(&message);
-            assert_eq!(read.expect_err("refused"), whole.expect_err("refused"));
+            assert_eq!(read.expect_err("rejected"), whole.expect_err("rejected"));
         }
     }
 
     #[test]
-    fn a_message_that_is_cut_off_is_no_request() {
+    fn truncated_message_is_an_error() {
         let bytes = to_vec::<_, LittleEndian>(&message()).expect("a message");
         for length in 0..bytes.len() {
             let mut reader = CdrDeserializer::<LittleEndian>::new(&bytes[..length]);

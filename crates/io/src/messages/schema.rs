@@ -1,9 +1,9 @@
-//! Definitions of messages as recordings carry them (`ros2msg`, as rosbag2 writes it): a message's
-//! text, then the text of each message in it behind a line of `=` and a line with its name.
+//! Message definitions in recordings (encoding `ros2msg` of rosbag2): the text of the message, then the text of each
+//! nested message after a line of `=` and a line with its name.
 
 use super::own::PACKAGE;
 
-/// Between definitions.
+/// Separator of definitions.
 const RULE: &str = "================================================================================";
 
 const HEADER: (&str, &str) = ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
@@ -96,12 +96,12 @@ trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_output
 float64 speed_scaling_factor
 ";
 
-/// A type of message, with its definition.
+/// Name and definition of a message type.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Schema {
-    /// `package/msg/Type`.
+    /// Name of the type, `package/msg/Type`.
     pub name: String,
-    /// The `ros2msg` text.
+    /// Definition with all nested types, encoding `ros2msg`.
     pub text: String,
 }
 
@@ -114,65 +114,65 @@ impl Schema {
         Schema { name: format!("{package}/msg/{kind}"), text }
     }
 
-    /// `sensor_msgs/msg/JointState`.
+    /// Returns the schema of `sensor_msgs/msg/JointState`.
     pub fn joint_state() -> Self {
         Self::new("sensor_msgs", "JointState", JOINT_STATE, &[HEADER, TIME])
     }
 
-    /// `trajectory_msgs/msg/JointTrajectory`.
+    /// Returns the schema of `trajectory_msgs/msg/JointTrajectory`.
     pub fn joint_trajectory() -> Self {
         let nested = [HEADER, TIME, JOINT_TRAJECTORY_POINT, DURATION];
         Self::new("trajectory_msgs", "JointTrajectory", JOINT_TRAJECTORY, &nested)
     }
 
-    /// `virtual_axes/msg/MotorCurrents`.
+    /// Returns the schema of `virtual_axes/msg/MotorCurrents`.
     pub fn motor_currents() -> Self {
         let own = include_str!("../../msg/MotorCurrents.msg");
         Self::new(PACKAGE, "MotorCurrents", own, &[HEADER, TIME])
     }
 
-    /// `virtual_axes/msg/DriveStates`.
+    /// Returns the schema of `virtual_axes/msg/DriveStates`.
     pub fn drive_states() -> Self {
         let own = include_str!("../../msg/DriveStates.msg");
         Self::new(PACKAGE, "DriveStates", own, &[HEADER, TIME])
     }
 
-    /// `virtual_axes/msg/TrajectoryResult`.
+    /// Returns the schema of `virtual_axes/msg/TrajectoryResult`.
     pub fn trajectory_result() -> Self {
         let own = include_str!("../../msg/TrajectoryResult.msg");
         Self::new(PACKAGE, "TrajectoryResult", own, &[HEADER, TIME])
     }
 
-    /// `diagnostic_msgs/msg/DiagnosticArray`.
+    /// Returns the schema of `diagnostic_msgs/msg/DiagnosticArray`.
     pub fn diagnostic_array() -> Self {
         let own = "std_msgs/Header header\nDiagnosticStatus[] status\n";
         Self::new("diagnostic_msgs", "DiagnosticArray", own, &[HEADER, TIME, DIAGNOSTIC_STATUS, KEY_VALUE])
     }
 
-    /// `rosgraph_msgs/msg/Clock`.
+    /// Returns the schema of `rosgraph_msgs/msg/Clock`.
     pub fn clock() -> Self {
         Self::new("rosgraph_msgs", "Clock", "builtin_interfaces/Time clock\n", &[TIME])
     }
 
-    /// `rcl_interfaces/msg/Log`.
+    /// Returns the schema of `rcl_interfaces/msg/Log`.
     pub fn log() -> Self {
         Self::new("rcl_interfaces", "Log", LOG, &[TIME])
     }
 
-    /// `geometry_msgs/msg/PoseStamped`.
+    /// Returns the schema of `geometry_msgs/msg/PoseStamped`.
     pub fn pose_stamped() -> Self {
         let nested = [HEADER, TIME, POSE, POINT, QUATERNION];
         Self::new("geometry_msgs", "PoseStamped", POSE_STAMPED.1, &nested)
     }
 
-    /// `nav_msgs/msg/Path`.
+    /// Returns the schema of `nav_msgs/msg/Path`.
     pub fn path() -> Self {
         let own = "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n";
         let nested = [HEADER, TIME, POSE_STAMPED, POSE, POINT, QUATERNION];
         Self::new("nav_msgs", "Path", own, &nested)
     }
 
-    /// `control_msgs/msg/JointTrajectoryControllerState`.
+    /// Returns the schema of `control_msgs/msg/JointTrajectoryControllerState`.
     pub fn controller_state() -> Self {
         let nested = [
             HEADER,
@@ -193,7 +193,6 @@ impl Schema {
 mod tests {
     use super::*;
 
-    /// Every type that a definition names is a basic one or is defined below it.
     #[test]
     fn every_nested_type_is_defined() {
         for schema in [

@@ -1,4 +1,4 @@
-//! Samples of the axes as messages, with buffers that are used again.
+//! Converts axis samples into messages with reused buffers.
 
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 
@@ -7,15 +7,15 @@ use super::time::header;
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::units::Nanoseconds;
 
-/// A message with one value of each kind per axis.
+/// Message with one value per axis in each field.
 pub trait Sampled {
-    /// The message of `joints`, still without values.
+    /// Creates a message with the names of `joints` and without values.
     fn named(joints: &[String]) -> Self;
-    /// Puts the values of an instant (ns since the Unix epoch) in, one sample per joint; allocates only
-    /// the first time.
+    /// Overwrites the values with those of an instant (ns since the Unix epoch), one sample per joint; allocates only in
+    /// the first call.
     fn fill(&mut self, time: Nanoseconds, samples: &[AxisSample]);
 
-    /// The message of an instant.
+    /// Creates the message of an instant, ns since the Unix epoch.
     fn of(time: Nanoseconds, samples: &[AxisSample], joints: &[String]) -> Self
     where
         Self: Sized,
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_that_is_used_again_is_as_a_new_one() {
+    fn refilled_message_equals_a_new_one() {
         let joints = ["x".to_owned(), "y".to_owned()];
         let sample = |v: f64| AxisSample {
             position: v,

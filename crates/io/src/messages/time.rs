@@ -1,34 +1,34 @@
-//! Nanoseconds and ROS times.
+//! Conversion between integer nanoseconds and ROS times and durations.
 
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::{Duration, Time};
 use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
 
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
-/// A ROS stamp of a time in ns since the Unix epoch; what its 32 bits cannot say is cut off.
+/// Converts a time in ns since the Unix epoch into a ROS stamp; saturates at 32-bit seconds.
 pub fn stamp(time: Nanoseconds) -> Time {
     let (sec, nanosec) = parts(time);
     Time { sec, nanosec }
 }
 
-/// A ROS duration of `time` ns; what its 32 bits cannot say is cut off.
+/// Converts `time` in ns into a ROS duration; saturates at 32-bit seconds.
 pub fn duration(time: Nanoseconds) -> Duration {
     let (sec, nanosec) = parts(time);
     Duration { sec, nanosec }
 }
 
-/// Header of what belongs to an instant, ns since the Unix epoch.
+/// Creates a header with a time in ns since the Unix epoch and an empty frame.
 pub fn header(time: Nanoseconds) -> Header {
     Header { stamp: stamp(time), frame_id: String::new() }
 }
 
-/// Whole seconds, rounded down, and the nanoseconds after them.
+/// Splits a time in ns into whole seconds, rounded down, and the remaining nanoseconds.
 pub fn parts(time: Nanoseconds) -> (i32, u32) {
     let sec = time.div_euclid(SECOND_NS).clamp(i32::MIN.into(), i32::MAX.into());
     (sec as i32, time.rem_euclid(SECOND_NS) as u32)
 }
 
-/// A ROS time in ns since the Unix epoch, as it came: `nanosec` may be more than a second.
+/// Converts a ROS time into ns since the Unix epoch without validation: `nanosec` may exceed one second.
 pub fn nanoseconds(time: &Time) -> Nanoseconds {
     Nanoseconds::from(time.sec) * SECOND_NS + Nanoseconds::from(time.nanosec)
 }

@@ -1,4 +1,4 @@
-//! Trajectory messages: to requests and back.
+//! Conversion between trajectory messages and trajectory requests.
 
 use std::fmt;
 
@@ -7,20 +7,21 @@ use ros2_interfaces_jazzy_serde::std_msgs::msg::Header;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
 
 use super::time::{duration, header};
-use virtual_axes_core::trajectory::{RejectionCode, Rejection, TrajectoryRequest, TrajectoryPoint, Start};
+use virtual_axes_core::trajectory::{Rejection, RejectionCode, Start, TrajectoryPoint, TrajectoryRequest};
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
-/// A trajectory message as a request.
+/// Converts a trajectory message into a request.
 ///
 /// # Errors
-/// [`Rejection`] for what no machine could run: wrong array sizes, values that are not finite,
-/// malformed times, more than `max_points` points.
+/// [`Rejection`] if array sizes do not match, a value is not finite, a time is malformed, or there are more than
+/// `max_points` points.
 pub fn request(message: &JointTrajectory, max_points: usize) -> Result<TrajectoryRequest, Rejection> {
     let start = start(&message.header)?;
     let points = &message.points;
     if points.len() > max_points {
         let text = format!("{} points are more than max_points, {max_points}", points.len());
-        return Err(Rejection::new(RejectionCode::TooManyPoints, text).numbers(points.len() as f64, max_points as f64));
+        return Err(Rejection::new(RejectionCode::TooManyPoints, text)
+            .numbers(points.len() as f64, max_points as f64));
     }
     let mut request = TrajectoryRequest::new(start, message.joint_names.clone());
     request.reserve(points.len());
@@ -38,7 +39,7 @@ pub fn request(message: &JointTrajectory, max_points: usize) -> Result<Trajector
     Ok(request)
 }
 
-/// When a trajectory starts by its header.
+/// Returns the start time of a trajectory from its header.
 pub(super) fn start(header: &Header) -> Result<Start, Rejection> {
     let Time { sec, nanosec } = header.stamp;
     Ok(match nanoseconds(sec, nanosec, format_args!("header.stamp"), None)? {
@@ -47,14 +48,15 @@ pub(super) fn start(header: &Header) -> Result<Start, Rejection> {
     })
 }
 
-/// The time of point `index`, ns from the start.
+/// Returns the time of point `index`, ns from the start.
 pub(super) fn point_time(time: &Duration, index: usize) -> Result<Nanoseconds, Rejection> {
     let Duration { sec, nanosec } = *time;
     nanoseconds(sec, nanosec, format_args!("point {index}, time_from_start"), Some(index))
 }
 
-/// A request as a message, stamp 0 for [`Start::Now`]; the inverse of [`request`] but for efforts,
-/// which a request does not keep, and for times beyond the 32-bit seconds of a message, which are cut off.
+/// Converts a request into a message, with stamp 0 for [`Start::Now`].
+///
+/// This is the inverse of [`request`], except that efforts are not stored and times saturate at 32-bit seconds.
 pub fn joint_trajectory(request: &TrajectoryRequest) -> JointTrajectory {
     let at = match request.start() {
         Start::Now => 0,
@@ -71,7 +73,7 @@ pub fn joint_trajectory(request: &TrajectoryRequest) -> JointTrajectory {
     message
 }
 
-/// A point `time` ns after the start.
+/// Creates a point `time` ns after the start.
 pub fn point(time: Nanoseconds, row: TrajectoryPoint<'_>) -> JointTrajectoryPoint {
     JointTrajectoryPoint {
         positions: row.positions.to_vec(),
@@ -82,10 +84,10 @@ pub fn point(time: Nanoseconds, row: TrajectoryPoint<'_>) -> JointTrajectoryPoin
     }
 }
 
-/// Nanoseconds of a ROS time or duration.
+/// Converts a ROS time or duration into nanoseconds.
 ///
 /// # Errors
-/// [`RejectionCode::InvalidTime`] if `nanosec` is a second or more; `what` and `index` say where it stands.
+/// [`RejectionCode::InvalidTime`] if `nanosec` is one second or more; `what` and `index` name the field and the point.
 fn nanoseconds(
     sec: i32,
     nanosec: u32,
@@ -94,8 +96,8 @@ fn nanoseconds(
 ) -> Result<Nanoseconds, Rejection> {
     if i64::from(nanosec) >= SECOND_NS {
         let text = format!("{what}: nanosec is {nanosec}, must be below {SECOND_NS}");
-        let rejection =
-            Rejection::new(RejectionCode::InvalidTime, text).numbers(f64::from(nanosec), SECOND_NS as f64 - 1.0);
+        let rejection = Rejection::new(RejectionCode::InvalidTime, text)
+            .numbers(f64::from(nanosec), SECOND_NS as f64 - 1.0);
         return Err(match index {
             Some(index) => rejection.index(index),
             None => rejection,
@@ -121,20 +123,23 @@ mod tests {
     }
 
     #[test]
-    fn a_nanosec_field_of_a_second_is_refused_with_its_point() {
-        let rejection = request(&trajectory(1_000_000_000), 10).expect_err("must be refused");
+    fn nanosec_of_one_second_is_rejected_with_its_point() {
+        let rejection = request(&trajectory(1_000_000_000), 10).expect_err("must be rejected");
         assert_eq!((rejection.code, rejection.index), (RejectionCode::InvalidTime, Some(0)));
         assert!(request(&trajectory(999_999_999), 10).is_ok());
     }
 
     #[test]
-    fn more_points_than_allowed_are_refused_before_they_are_copied() {
-        let rejection = request(&trajectory(0), 0).expect_err("must be refused");
-        assert_eq!((rejection.code, rejection.value, rejection.limit), (RejectionCode::TooManyPoints, 1.0, 0.0));
+    fn more_than_max_points_are_rejected_before_they_are_copied() {
+        let rejection = request(&trajectory(0), 0).expect_err("must be rejected");
+        assert_eq!(
+            (rejection.code, rejection.value, rejection.limit),
+            (RejectionCode::TooManyPoints, 1.0, 0.0)
+        );
     }
 
     #[test]
-    fn a_message_becomes_a_request_and_the_same_message_again() {
+    fn message_round_trips_through_a_request() {
         let mut message = trajectory(5);
         message.header.stamp = Time { sec: 7, nanosec: 8 };
         message.points[0].velocities = vec![0.2];

@@ -1,30 +1,30 @@
-//! Why a machine has no URDF.
+//! Error of the conversion of a machine into a URDF.
 
-/// A machine that cannot be said as a URDF.
+/// Error of the conversion of a machine into a URDF.
 #[derive(Debug, thiserror::Error)]
 pub enum UrdfError {
-    /// A joint without a place in the chain.
+    /// A joint has no role in the kinematic chain.
     #[error(
-        "joint {joint} ({kind}) has no place in the chain workpiece-C-A-X/Y/Z-tool; its joints are x, y, z (linear), a \
+        "joint {joint} ({kind}) has no role in the chain workpiece-C-A-X/Y/Z-tool; its joints are x, y, z (linear), a \
          and c (rotary), each at most once"
     )]
     NotInChain {
-        /// Its name.
+        /// Name of the joint.
         joint: String,
-        /// `linear` or `rotary`.
+        /// Kind of the joint, `linear` or `rotary`.
         kind: &'static str,
     },
-    /// A text with a character that XML does not have.
-    #[error("{what} {text:?} has the character {character:?}, which cannot stand in XML")]
+    /// A text contains a character that XML 1.0 does not allow.
+    #[error("{what} {text:?} contains the character {character:?}, which XML does not allow")]
     NotXml {
-        /// What the text is.
+        /// Meaning of the text.
         what: &'static str,
-        /// The text.
+        /// Text.
         text: String,
-        /// The first character that cannot be written.
+        /// First invalid character.
         character: char,
     },
-    /// The XML cannot be put together.
+    /// Writing the XML failed.
     #[error("the URDF cannot be written: {0}")]
     Write(#[from] std::io::Error),
 }

@@ -1,18 +1,18 @@
-//! The machine as a URDF for robot_state_publisher, RViz and MoveIt.
+//! Converts a machine into a URDF for robot_state_publisher, RViz and MoveIt.
 //!
-//! The joints that move are those of `joint_states`, by the same names; their limits are the machine
-//! file's. Signs are those of ISO 841: a positive joint moves the *tool* relative to the workpiece, so
-//! the tables turn about −X (A) and −Z (C) of the machine frame.
+//! The movable joints have the names of `joint_states` and the limits of the machine file. Signs follow ISO 841: a
+//! positive joint moves the *tool* relative to the workpiece, so the tables turn about −X (A) and −Z (C) of the
+//! machine frame.
 //!
 //! ```text
 //! machine ─ a ─ cradle ─ c ─ table ─ workpiece
 //!         └ x ─ x_slide ─ y ─ y_slide ─ z ─ z_slide ─ tool
 //! ```
 //!
-//! `workpiece` and `tool` are fixed to their parents. `tool` is the tip, its Z axis points to the
-//! spindle: the transform from `workpiece` to `tool` is [`Kinematics::forward`](virtual_axes_core::kinematics::Kinematics::forward).
-//! A role that no joint has is a fixed joint. Shapes are simple ones, for the eye only; there are no
-//! masses and no meshes.
+//! `workpiece` and `tool` are fixed to their parents. `tool` is the tool tip, its Z axis points to the spindle: the
+//! transform from `workpiece` to `tool` is
+//! [`Kinematics::forward`](virtual_axes_core::kinematics::Kinematics::forward). A missing axis is a fixed joint. Shapes
+//! are simple and for visualization only; the URDF contains no masses and no meshes.
 
 mod error;
 mod model;
@@ -23,17 +23,17 @@ pub use error::UrdfError;
 
 use virtual_axes_core::config::MachineConfig;
 
-/// Frame that everything else hangs on: the machine frame of the kinematics.
+/// Root frame: the machine frame of the kinematics.
 pub const MACHINE_FRAME: &str = "machine";
 /// Frame of the workpiece, fixed to the table of C.
 pub const WORKPIECE_FRAME: &str = "workpiece";
-/// Frame of the tool tip, Z along the tool axis towards the spindle.
+/// Frame of the tool tip, Z along the tool axis toward the spindle.
 pub const TOOL_FRAME: &str = "tool";
 
-/// The URDF of a machine, `joint_prefix` before the names of its joints as in the node.
+/// Returns the URDF of a machine, with `joint_prefix` before the names of its joints as in the node.
 ///
 /// # Errors
-/// [`UrdfError`] if a joint has no place in the chain, or the prefix cannot stand in XML.
+/// [`UrdfError`] if a joint has no role in the chain, or a name contains a character that XML does not allow.
 pub fn urdf(machine: &MachineConfig, joint_prefix: &str) -> Result<String, UrdfError> {
     xml::written(&model::Model::new(machine, joint_prefix)?)
 }

@@ -1,16 +1,16 @@
-//! Links and joints of a machine, still without XML.
+//! Links and joints of the URDF of a machine.
 
 use super::shapes::{Shapes, Visual};
 use super::{MACHINE_FRAME, TOOL_FRAME, UrdfError, WORKPIECE_FRAME};
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig};
-use virtual_axes_core::kinematics::{Kinematics, AxisRole};
+use virtual_axes_core::kinematics::{AxisRole, Kinematics};
 
-/// What stands for an end of the stroke that a machine file leaves open, m: the widest that one can say.
-const OPEN_STROKE: f64 = 1e3;
-/// Likewise of a rotary axis that is open at one end only, rad: 1e6°.
-const OPEN_TURNS: f64 = 1e6 * virtual_axes_core::units::DEGREE;
+/// Travel limit of a linear axis without limit in the machine file, m: the largest allowed value.
+const OPEN_TRAVEL: f64 = 1e3;
+/// Travel limit of a rotary axis with one open end, rad: 1e6°.
+const OPEN_ROTATION: f64 = 1e6 * virtual_axes_core::units::DEGREE;
 
-/// A machine as URDF has it.
+/// URDF model of a machine.
 pub(super) struct Model {
     /// Name of the machine.
     pub name: String,
@@ -18,40 +18,40 @@ pub(super) struct Model {
     pub joints: Vec<Joint>,
 }
 
-/// A body.
+/// Link of the URDF.
 pub(super) struct Link {
     pub name: &'static str,
     pub visuals: Vec<Visual>,
 }
 
-/// What holds a child to its parent.
+/// Joint of the URDF.
 pub(super) struct Joint {
     pub name: String,
     pub parent: &'static str,
     pub child: &'static str,
-    /// Of the child in the parent with the joint at 0, m; nothing is turned there.
+    /// Origin of the child in the parent at joint position 0, without rotation, m.
     pub origin: [f64; 3],
     pub motion: Motion,
 }
 
-/// How a joint moves.
+/// Type of motion of a joint.
 pub(super) enum Motion {
     Fixed,
     Moves {
-        /// `prismatic`, `revolute` or `continuous`.
+        /// Joint type: `prismatic`, `revolute` or `continuous`.
         kind: &'static str,
-        /// Unit vector of the parent along or about which a positive joint moves the child.
+        /// Unit vector in the parent frame along or about which a positive joint moves the child.
         axis: [f64; 3],
         limit: Limit,
     },
 }
 
-/// Limits of a joint: m, m/s, N; or rad, rad/s, N·m.
+/// Limits of a joint in m, m/s, N or in rad, rad/s, N·m.
 pub(super) struct Limit {
-    /// Ends of the stroke; none for a continuous joint.
-    pub stroke: Option<[f64; 2]>,
+    /// Travel limits; `None` for a continuous joint.
+    pub travel: Option<[f64; 2]>,
     pub velocity: f64,
-    /// The most that the motor exerts at the axis: Kt·imax/r.
+    /// Largest force or torque of the motor at the axis, Kt·imax/r.
     pub effort: f64,
 }
 
@@ -61,11 +61,11 @@ impl Limit {
         let (min, max) = (limits.travel_min, limits.travel_max);
         let endless = axis.kind() == AxisKind::Rotary && min.is_infinite() && max.is_infinite();
         let open = match axis.kind() {
-            AxisKind::Linear => OPEN_STROKE,
-            AxisKind::Rotary => OPEN_TURNS,
+            AxisKind::Linear => OPEN_TRAVEL,
+            AxisKind::Rotary => OPEN_ROTATION,
         };
         Limit {
-            stroke: (!endless).then(|| [min.max(-open), max.min(open)]),
+            travel: (!endless).then(|| [min.max(-open), max.min(open)]),
             velocity: limits.velocity,
             effort: axis.max_effort(),
         }
@@ -105,7 +105,7 @@ impl Model {
     }
 }
 
-/// The joints of a machine by what they do.
+/// Kinematic chain: the joints of a machine by their roles.
 struct Chain<'a> {
     axes: &'a [AxisConfig],
     kinematics: Kinematics,
@@ -115,9 +115,10 @@ struct Chain<'a> {
 impl<'a> Chain<'a> {
     fn new(machine: &'a MachineConfig, prefix: &'a str) -> Result<Self, UrdfError> {
         let kinematics = Kinematics::new(machine);
-        let places = AxisRole::ALL.map(|role| kinematics.role(role));
-        let stranger = machine.axes().iter().enumerate().find(|(place, _)| !places.contains(&Some(*place)));
-        if let Some((_, axis)) = stranger {
+        let indices = AxisRole::ALL.map(|role| kinematics.role(role));
+        let unassigned =
+            machine.axes().iter().enumerate().find(|(index, _)| !indices.contains(&Some(*index)));
+        if let Some((_, axis)) = unassigned {
             let kind = match axis.kind() {
                 AxisKind::Linear => "linear",
                 AxisKind::Rotary => "rotary",
@@ -128,10 +129,10 @@ impl<'a> Chain<'a> {
     }
 
     fn axis(&self, role: AxisRole) -> Option<&'a AxisConfig> {
-        self.kinematics.role(role).and_then(|place| self.axes.get(place))
+        self.kinematics.role(role).and_then(|index| self.axes.get(index))
     }
 
-    /// The joint that has the role; fixed where none has.
+    /// Returns the joint with the role, or a fixed joint if the machine has none.
     fn joint(&self, role: AxisRole, between: [&'static str; 2], origin: [f64; 3], axis: [f64; 3]) -> Joint {
         let Some(config) = self.axis(role) else {
             return fixed(&format!("{role}_held"), between, origin);
@@ -139,7 +140,7 @@ impl<'a> Chain<'a> {
         let limit = Limit::of(config);
         let kind = match config.kind() {
             AxisKind::Linear => "prismatic",
-            AxisKind::Rotary if limit.stroke.is_none() => "continuous",
+            AxisKind::Rotary if limit.travel.is_none() => "continuous",
             AxisKind::Rotary => "revolute",
         };
         let [parent, child] = between;

@@ -1,15 +1,15 @@
-//! What the links look like: boxes and cylinders, for the eye only. Nothing is computed from them.
+//! Shapes of the links for visualization: boxes and cylinders.
 
 use virtual_axes_core::config::{KinematicsConfig, LimitsConfig};
 use virtual_axes_core::kinematics::AxisRole;
 
-/// Half a stroke that is assumed for the picture where the machine file says none, m.
-const HALF_STROKE: f64 = 0.3;
-/// Largest half stroke that is drawn, m: an axis without end must not fill the picture.
-const LARGEST_HALF_STROKE: f64 = 5.0;
+/// Drawn half travel of an axis without travel limits, m.
+const DEFAULT_HALF_TRAVEL: f64 = 0.3;
+/// Largest drawn half travel, m.
+const MAX_HALF_TRAVEL: f64 = 5.0;
 /// Thickness of plates and of the table, m.
 const PLATE: f64 = 0.04;
-/// Between parts that move past each other, m.
+/// Clearance between moving parts, m.
 const GAP: f64 = 0.02;
 /// Cross-section of the slides, m.
 const SLIDE: f64 = 0.16;
@@ -21,12 +21,12 @@ const SPINDLE_RADIUS: f64 = 0.05;
 const SPINDLE_LENGTH: f64 = 0.2;
 /// Radius of the tool, m.
 const TOOL_RADIUS: f64 = 0.006;
-/// What edges and places of shapes are rounded to, 1/m: 0.1 mm.
+/// Reciprocal of the rounding of dimensions, 1/m: 0.1 mm.
 const ROUNDING: f64 = 1e4;
 /// Radius of the bearings of A, m.
 const BEARING_RADIUS: f64 = 0.07;
 
-/// Name and color (red, green, blue, opacity) of what a part is painted with.
+/// Name and color (red, green, blue, opacity) of a material.
 pub(super) type Material = (&'static str, [f64; 4]);
 
 pub(super) const CASTING: Material = ("casting", [0.45, 0.48, 0.50, 1.0]);
@@ -36,24 +36,24 @@ pub(super) const TABLE: Material = ("table", [0.55, 0.60, 0.64, 1.0]);
 pub(super) const SPINDLE: Material = ("spindle", [0.25, 0.25, 0.28, 1.0]);
 pub(super) const TOOL: Material = ("tool", [0.85, 0.65, 0.20, 1.0]);
 
-/// Every material, each once.
+/// All materials.
 pub(super) const MATERIALS: [Material; 6] = [CASTING, SLIDES, CRADLE, TABLE, SPINDLE, TOOL];
 
-/// A shape that fills a space.
+/// Geometry of a shape.
 pub(super) enum Geometry {
-    /// Edges along X, Y and Z, m.
+    /// Box with its edges along X, Y and Z, m.
     Box([f64; 3]),
-    /// Along Z unless it is turned, m.
+    /// Cylinder along Z, m.
     Cylinder { radius: f64, length: f64 },
 }
 
-/// A shape in the frame of its link.
+/// Shape in the frame of its link.
 pub(super) struct Visual {
     pub geometry: Geometry,
-    /// Its middle, m.
+    /// Center, m.
     pub origin: [f64; 3],
     /// Roll, pitch and yaw, rad.
-    pub turned: [f64; 3],
+    pub rotation: [f64; 3],
     pub material: &'static str,
 }
 
@@ -61,35 +61,38 @@ fn rounded(value: f64) -> f64 {
     (value * ROUNDING).round() / ROUNDING
 }
 
-/// The box between two corners.
+/// Creates the box between two corners.
 fn block(from: [f64; 3], to: [f64; 3], (material, _): Material) -> Visual {
     let edges = std::array::from_fn(|i| rounded((to[i] - from[i]).abs()));
     let middle = std::array::from_fn(|i| rounded(0.5 * (from[i] + to[i])));
-    Visual { geometry: Geometry::Box(edges), origin: middle, turned: [0.0; 3], material }
+    Visual { geometry: Geometry::Box(edges), origin: middle, rotation: [0.0; 3], material }
 }
 
-/// The cylinder about Z from one height to another.
+/// Creates the cylinder about Z between two heights.
 fn cylinder(radius: f64, from: f64, to: f64, (material, _): Material) -> Visual {
     let geometry = Geometry::Cylinder { radius, length: rounded((to - from).abs()) };
-    Visual { geometry, origin: [0.0, 0.0, rounded(0.5 * (from + to))], turned: [0.0; 3], material }
+    Visual { geometry, origin: [0.0, 0.0, rounded(0.5 * (from + to))], rotation: [0.0; 3], material }
 }
 
-/// The shapes of one machine.
+/// Dimensions of the shapes of one machine.
 pub(super) struct Shapes {
-    /// Half strokes of X, Y and Z, m.
+    /// Half travel of X, Y and Z, m.
     half: [f64; 3],
     tool_length: f64,
     pivot_a: [f64; 2],
     pivot_c: [f64; 2],
-    /// Height of the table's top in the machine frame at home, m: below the lowest tool tip.
+    /// Height of the table surface in the machine frame at home, m: below the lowest tool tip.
     top: f64,
 }
 
 impl Shapes {
-    pub fn new<'a>(geometry: &KinematicsConfig, limits: impl Fn(AxisRole) -> Option<&'a LimitsConfig>) -> Self {
+    pub fn new<'a>(
+        geometry: &KinematicsConfig,
+        limits: impl Fn(AxisRole) -> Option<&'a LimitsConfig>,
+    ) -> Self {
         let half = AxisRole::LINEAR.map(|role| {
-            let reach = limits(role).map(|limits| limits.travel_max.max(-limits.travel_min));
-            reach.filter(|reach| reach.is_finite()).unwrap_or(HALF_STROKE).min(LARGEST_HALF_STROKE)
+            let travel = limits(role).map(|limits| limits.travel_max.max(-limits.travel_min));
+            travel.filter(|travel| travel.is_finite()).unwrap_or(DEFAULT_HALF_TRAVEL).min(MAX_HALF_TRAVEL)
         });
         let lowest = (-half[2] - geometry.tool_length).min(geometry.workpiece[2]);
         Shapes {
@@ -101,28 +104,28 @@ impl Shapes {
         }
     }
 
-    /// Half the room between the side plates of the cradle, m.
+    /// Returns half the clear width between the side plates of the cradle, m.
     fn half_cradle(&self) -> f64 {
         TABLE_RADIUS + self.pivot_c[0].abs() + GAP
     }
 
-    /// Lower face of the cradle at home, m.
+    /// Returns the height of the lower face of the cradle at home, m.
     fn cradle_bottom(&self) -> f64 {
         self.top - 2.0 * PLATE - GAP
     }
 
-    /// Height of the rails of X, above all that turns, m.
+    /// Returns the height of the rails of X, above all rotating parts, m.
     fn rails(&self) -> f64 {
         self.half[2] + SPINDLE_LENGTH + 2.0 * SLIDE
     }
 
-    /// Where the column stands behind the tables, m.
+    /// Returns the Y position of the column behind the tables, m.
     fn column(&self) -> f64 {
         let swing = (self.cradle_bottom() - self.pivot_a[1]).hypot(TABLE_RADIUS + self.pivot_c[1].abs());
         self.pivot_a[0] + swing + GAP
     }
 
-    /// Bed, posts that carry A, column with the rails of X.
+    /// Returns the bed, the posts of A and the column with the rails of X.
     pub fn machine(&self) -> Vec<Visual> {
         let inner = self.half_cradle() + PLATE + GAP;
         let (width, back) = (inner + SLIDE, self.column() + SLIDE);
@@ -142,7 +145,7 @@ impl Shapes {
         ]
     }
 
-    /// Two side plates on bearings and a bottom plate, in the frame of A.
+    /// Returns the cradle in the frame of A: two side plates with bearings and a bottom plate.
     pub fn cradle(&self) -> Vec<Visual> {
         let (inner, [y, z]) = (self.half_cradle(), self.pivot_a);
         let middle = self.pivot_c[1] - y;
@@ -154,7 +157,7 @@ impl Shapes {
         let bearing = |side: f64| Visual {
             geometry: Geometry::Cylinder { radius: BEARING_RADIUS, length: PLATE + GAP },
             origin: [rounded(side * (inner + PLATE)), 0.0, 0.0],
-            turned: [0.0, std::f64::consts::FRAC_PI_2, 0.0],
+            rotation: [0.0, std::f64::consts::FRAC_PI_2, 0.0],
             material: CRADLE.0,
         };
         let half = TABLE_RADIUS / 2.0;
@@ -167,7 +170,7 @@ impl Shapes {
         ]
     }
 
-    /// The table of C with a groove that shows how far it has turned, in the frame of C.
+    /// Returns the table in the frame of C, with a groove that shows its angle.
     pub fn table(&self) -> Vec<Visual> {
         let groove = GAP / 4.0;
         vec![
@@ -176,20 +179,20 @@ impl Shapes {
         ]
     }
 
-    /// The carriage on the rails of X, as long as the travel limits of Y.
+    /// Returns the carriage on the rails of X, as long as the travel of Y.
     pub fn x_slide(&self) -> Vec<Visual> {
         let rails = self.rails();
         let from = [-SLIDE, -self.half[1] - SLIDE, rails - SLIDE];
         vec![block(from, [SLIDE, self.column() + SLIDE, rails], SLIDES)]
     }
 
-    /// The head that Y moves.
+    /// Returns the head on the rails of Y.
     pub fn y_slide(&self) -> Vec<Visual> {
         let bottom = self.rails() - 2.0 * SLIDE;
         vec![block([-SLIDE, -SLIDE, bottom], [SLIDE, SLIDE, bottom + SLIDE], SLIDES)]
     }
 
-    /// Quill and spindle; the point that X, Y and Z move is the spindle's nose.
+    /// Returns quill and spindle; the origin of the frame is the spindle nose.
     pub fn z_slide(&self) -> Vec<Visual> {
         let quill = SLIDE / 2.0;
         let (from, to) = (SPINDLE_LENGTH, SPINDLE_LENGTH + 2.0 * self.half[2] + SLIDE);
@@ -199,7 +202,7 @@ impl Shapes {
         ]
     }
 
-    /// From the tip to the spindle's nose; nothing where the tool has no length.
+    /// Returns the tool from the tip to the spindle nose; empty if the tool length is 0.
     pub fn tool(&self) -> Vec<Visual> {
         if self.tool_length == 0.0 {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! The model as XML.
+//! Writes the URDF model as XML.
 
 use std::io;
 
@@ -11,11 +11,11 @@ use super::shapes::{Geometry, MATERIALS, Visual};
 
 type Xml<'a> = Writer<&'a mut Vec<u8>>;
 
-/// What the file says about itself.
+/// Comment at the top of the file.
 const REMARK: &str = " Written by `virtual_axes urdf` from the machine file: m, rad, s, N, N m. Signs are those of ISO \
                       841: a positive joint moves the tool relative to the workpiece, so the tables turn the other way. ";
 
-/// The whole document.
+/// Returns the document as text.
 pub(super) fn written(model: &Model) -> Result<String, UrdfError> {
     check("machine's name", &model.name)?;
     for joint in &model.joints {
@@ -27,7 +27,7 @@ pub(super) fn written(model: &Model) -> Result<String, UrdfError> {
     String::from_utf8(text).map_err(|error| UrdfError::Write(io::Error::other(error)))
 }
 
-/// Refuses what no escape can bring into XML 1.0.
+/// Rejects a text with a character that XML 1.0 cannot represent.
 fn check(what: &'static str, text: &str) -> Result<(), UrdfError> {
     match text.chars().find(|c| c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')) {
         Some(character) => Err(UrdfError::NotXml { what, text: text.to_owned(), character }),
@@ -64,7 +64,7 @@ fn link(xml: &mut Xml, link: &Link) -> io::Result<()> {
 
 fn visual(xml: &mut Xml, visual: &Visual) -> io::Result<()> {
     xml.create_element("visual").write_inner_content(|xml| {
-        origin(xml, visual.origin, visual.turned)?;
+        origin(xml, visual.origin, visual.rotation)?;
         xml.create_element("geometry").write_inner_content(|xml| {
             match visual.geometry {
                 Geometry::Box(edges) => xml
@@ -108,7 +108,7 @@ fn joint(xml: &mut Xml, joint: &Joint) -> io::Result<()> {
 
 fn limit(xml: &mut Xml, limit: &Limit) -> io::Result<()> {
     let mut element = xml.create_element("limit");
-    if let Some([lower, upper]) = limit.stroke {
+    if let Some([lower, upper]) = limit.travel {
         element = element
             .with_attribute(("lower", number(lower).as_str()))
             .with_attribute(("upper", number(upper).as_str()));
@@ -128,7 +128,7 @@ fn origin(xml: &mut Xml, xyz: [f64; 3], rpy: [f64; 3]) -> io::Result<()> {
     Ok(())
 }
 
-/// The shortest text that reads back as the same number; without a minus before zero.
+/// Returns the shortest decimal text that parses to the same number, without a sign before zero.
 fn number(value: f64) -> String {
     (value + 0.0).to_string()
 }

@@ -1,4 +1,4 @@
-//! Runs random trajectories and checks every tick of them: limits, energy, errors against theory.
+//! Runs random trajectories and checks every tick of them: limits, energy, errors against model.
 
 use std::error::Error;
 use std::fmt::Write;
@@ -10,36 +10,38 @@ use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use virtual_axes_core::config::Parameters;
-use virtual_axes_core::machine::Width;
-use virtual_axes_verification::stress::{self, Bench, Fleet, Options, Plan, Summary};
+use virtual_axes_core::machine::SimdWidth;
+use virtual_axes_verification::stress::{
+    self, StressOptions, StressSummary, TestMachines, TestPlan, TrajectoryTest,
+};
 
-/// Trajectories, and the number of the first, at most: nobody waits for more.
-const MOST: u64 = 1 << 62;
+/// Largest number of trajectories and largest number of the first one.
+const MAX_COUNT: u64 = 1 << 62;
 
-/// Runs random trajectories and checks every tick of them: limits, energy, errors against theory.
+/// Runs random trajectories and checks every tick of them: limits, energy, errors against model.
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {
-    /// What everything random follows from.
+    /// Seed of all random numbers.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
-    /// How many trajectories.
-    #[arg(long, default_value_t = 10_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=MOST))]
+    /// Number of trajectories.
+    #[arg(long, default_value_t = 10_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=MAX_COUNT))]
     count: u64,
-    /// Number of the first one.
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(..=MOST))]
+    /// Number of the first trajectory.
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(..=MAX_COUNT))]
     first: u64,
-    /// Threads; all cores if left out. The result does not depend on it.
+    /// Number of threads; default: all cores. The result does not depend on it.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// How wide vectors of the processor are used. The result does not depend on it.
+    /// SIMD width. The result does not depend on it.
     #[arg(long, value_enum, default_value_t = WidthName::Widest)]
     width: WidthName,
-    /// A shipped machine or a machine file, with each kind of controller; all shipped ones if left out. Can be given
+    /// Shipped machine or machine file, tested with each kind of controller; default: all shipped machines. Can be given
     /// several times.
     #[arg(long)]
     machine: Vec<String>,
-    /// Run this trajectory alone, and print what it is.
+    /// Run only this trajectory and print its plan and figures.
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, conflicts_with_all = ["count", "first", "threads", "json"])]
     only: Option<u64>,
     /// Print the figures as one JSON object.
@@ -47,23 +49,23 @@ struct Arguments {
     json: bool,
 }
 
-/// Widths of vectors.
+/// SIMD width on the command line.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum WidthName {
-    /// As wide as this processor has them.
+    /// Widest vectors of this processor.
     Widest,
-    /// As wide as this processor has them, but four numbers at most.
+    /// Widest vectors of this processor, at most four numbers.
     Four,
-    /// As every processor of its kind has them; slow.
+    /// Vectors of the baseline instruction set; slow.
     Baseline,
 }
 
-impl From<WidthName> for Width {
+impl From<WidthName> for SimdWidth {
     fn from(name: WidthName) -> Self {
         match name {
-            WidthName::Widest => Width::Widest,
-            WidthName::Four => Width::Four,
-            WidthName::Baseline => Width::Baseline,
+            WidthName::Widest => SimdWidth::Widest,
+            WidthName::Four => SimdWidth::Four,
+            WidthName::Baseline => SimdWidth::Baseline,
         }
     }
 }
@@ -81,20 +83,20 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs the trajectories. The error lists the faults found.
+/// Runs the trajectories and returns the summary. The error lists the violations.
 fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    let fleet = if arguments.machine.is_empty() {
-        Fleet::shipped()?
+    let machines = if arguments.machine.is_empty() {
+        TestMachines::shipped()?
     } else {
         let machines: Result<Vec<_>, _> =
             arguments.machine.iter().map(|machine| Parameters::load(machine)).collect();
-        Fleet::new(&machines?)?
+        TestMachines::new(&machines?)?
     };
     if let Some(number) = arguments.only {
-        return only(&fleet, arguments, number);
+        return only(&machines, arguments, number);
     }
     let cores = || thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let options = Options {
+    let options = StressOptions {
         seed: arguments.seed,
         first: arguments.first,
         count: arguments.count,
@@ -103,61 +105,61 @@ fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     };
     let progress = ProgressBar::new(options.count);
     progress.set_style(ProgressStyle::with_template("{wide_bar} {pos} of {len} trajectories, {eta} left")?);
-    let summary = stress::run(&fleet, &options, |run| {
+    let summary = stress::run(&machines, &options, |run| {
         progress.set_position(run);
         Ok(())
     });
     progress.finish_and_clear();
     let summary = summary?;
-    if !summary.faults.is_empty() {
-        let mut text = format!("{} trajectories with faults, seed {}", summary.faulty, options.seed);
-        for fault in &summary.faults {
-            write!(text, "\n{fault}")?;
+    if !summary.violations.is_empty() {
+        let mut text = format!("{} trajectories with violations, seed {}", summary.violating, options.seed);
+        for violation in &summary.violations {
+            write!(text, "\n{violation}")?;
         }
         return Err(text.into());
     }
     Ok(if arguments.json {
-        format!("{:#}\n", object(&fleet, &options, &summary))
+        format!("{:#}\n", object(&machines, &options, &summary))
     } else {
-        text(&fleet, &options, &summary)
+        text(&machines, &options, &summary)
     })
 }
 
-/// What one trajectory is and came to.
-fn only(fleet: &Fleet, arguments: &Arguments, number: u64) -> Result<String, Box<dyn Error>> {
-    let plan = Plan::new(fleet, arguments.seed, number)?;
-    let variant = &fleet.variants()[plan.variant];
-    let record = Bench::new(fleet, arguments.seed, arguments.width.into()).run(number)?;
+/// Runs one trajectory and returns its plan and figures as text.
+fn only(machines: &TestMachines, arguments: &Arguments, number: u64) -> Result<String, Box<dyn Error>> {
+    let plan = TestPlan::new(machines, arguments.seed, number)?;
+    let variant = &machines.variants()[plan.variant];
+    let record = TrajectoryTest::new(machines, arguments.seed, arguments.width.into()).run(number)?;
     let mut text = format!("{}, {}\n{plan:#?}\n{:#?}\n", variant.machine, variant.controllers, record.axes);
-    for fault in &record.faults {
-        writeln!(text, "{fault}")?;
+    for violation in &record.violations {
+        writeln!(text, "{violation}")?;
     }
-    if record.faults.is_empty() { Ok(text) } else { Err(text.trim_end().into()) }
+    if record.violations.is_empty() { Ok(text) } else { Err(text.trim_end().into()) }
 }
 
-fn text(fleet: &Fleet, options: &Options, summary: &Summary) -> String {
+fn text(machines: &TestMachines, options: &StressOptions, summary: &StressSummary) -> String {
     let mut text = String::new();
     for (kind, count) in &summary.kinds {
         text.push_str(&format!("{}: {count}\n", kind.name()));
     }
-    for (variant, count) in fleet.variants().iter().zip(&summary.variants) {
+    for (variant, count) in machines.variants().iter().zip(&summary.variants) {
         text.push_str(&format!("{}, {}: {count}\n", variant.machine, variant.controllers));
     }
-    let Summary { run, time, ticks, loaded, limited, axes, bounded, .. } = summary;
+    let StressSummary { run, time, ticks, loaded, limited, axes, bounded, .. } = summary;
     let rows = [
         ("seed", options.seed.to_string()),
         ("trajectories", run.to_string()),
-        ("simulated time", format!("{time:.1} s, {ticks} ticks of axes")),
+        ("simulated time", format!("{time:.1} s, {ticks} axis ticks")),
         ("with a load", loaded.to_string()),
         ("reached a limit", limited.to_string()),
-        ("axes whose error has a bound", format!("{bounded} of {axes}")),
-        ("largest error, of its bound", worst(summary.error)),
-        ("largest difference from the linear loop, of what rounding is allowed", worst(summary.mismatch)),
-        ("largest imbalance of energy in a tick, of what rounding is allowed", worst(summary.imbalance)),
-        ("energy supplied, less copper", format!("{:.1} J", summary.supplied)),
-        ("taken by friction", format!("{:.1} J", summary.dissipated)),
-        ("given back by friction in ticks of a standstill", format!("{:.6} J", summary.returned)),
-        ("faults", summary.faulty.to_string()),
+        ("axes with an error bound", format!("{bounded} of {axes}")),
+        ("largest error / bound", worst(summary.error)),
+        ("largest difference from the linear loop / allowed rounding error", worst(summary.mismatch)),
+        ("largest energy imbalance of a tick / allowed rounding error", worst(summary.imbalance)),
+        ("energy supplied, without copper losses", format!("{:.1} J", summary.supplied)),
+        ("dissipated by friction", format!("{:.1} J", summary.dissipated)),
+        ("returned by friction at standstill", format!("{:.6} J", summary.returned)),
+        ("trajectories with violations", summary.violating.to_string()),
         ("digest", summary.digest()),
     ];
     for (name, value) in rows {
@@ -170,9 +172,9 @@ fn worst((value, number): (f64, u64)) -> String {
     format!("{value:.3e} (trajectory {number})")
 }
 
-fn object(fleet: &Fleet, options: &Options, summary: &Summary) -> Value {
+fn object(machines: &TestMachines, options: &StressOptions, summary: &StressSummary) -> Value {
     let worst = |(value, number): (f64, u64)| json!({ "value": value, "trajectory": number });
-    let variants = fleet.variants().iter().zip(&summary.variants).map(|(variant, count)| {
+    let variants = machines.variants().iter().zip(&summary.variants).map(|(variant, count)| {
         json!({ "machine": variant.machine, "controllers": variant.controllers, "trajectories": count })
     });
     let kinds = summary.kinds.iter().map(|(kind, count)| (kind.name().to_owned(), json!(count)));
@@ -195,7 +197,7 @@ fn object(fleet: &Fleet, options: &Options, summary: &Summary) -> Value {
         "supplied_j": summary.supplied,
         "dissipated_j": summary.dissipated,
         "returned_j": summary.returned,
-        "faulty": summary.faulty,
+        "faulty": summary.violating,
         "digest": summary.digest(),
     })
 }

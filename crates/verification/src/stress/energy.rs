@@ -1,20 +1,20 @@
-//! The energy of a drive, and what changes it over a tick.
+//! Energy balance of a drive over one tick.
 //!
-//! L di/dt = u − R i − Ke ω and J dω/dt = Kt i + τ, with τ = −C_friction − C_gravity + r F. The first times
-//! (Kt/Ke) i and the second times ω, added, lose the conversion Kt i ω:
+//! L di/dt = u − R i − Ke ω and J dω/dt = Kt i + τ, with τ = −C_friction − C_gravity + r F. In the sum of the first
+//! times (Kt/Ke) i and the second times ω, the conversion term Kt i ω cancels:
 //!
 //! ```text
 //! d/dt [ ½ (Kt/Ke) L i² + ½ J ω² ]  =  (Kt/Ke) (u i − R i²)  +  τ ω
 //! ```
 //!
-//! So Kt/Ke is the number of phases that work: 3 where both are per phase and rms. The right side is a quadratic
-//! form of z = (i, ω, u, τ), of which u and τ are held over a tick: ż = M z. Its integral over a tick is zᵀ W z with
+//! Kt/Ke is the number of phases: 3 if both constants are per phase and rms. The right side is a quadratic form of
+//! z = (i, ω, u, τ) with ż = M z, since u and τ are constant over a tick. Its integral over a tick is zᵀ W z with
 //!
 //! ```text
 //! W = ∫ e^{Mᵀs} Q e^{Ms} ds = F₃ᵀ G,      exp( [−Mᵀ Q; 0 M] T ) = [F₁ G; 0 F₃]      (Van Loan 1978)
 //! ```
 //!
-//! and so it is exact: no step of the library's is in it.
+//! and is exact; it uses no step of the library.
 
 use nalgebra::SMatrix;
 
@@ -22,9 +22,9 @@ use super::exponential::exponential;
 use virtual_axes_core::config::AxisConfig;
 use virtual_axes_core::drive::Plant;
 
-/// What a drive is at the start of a tick, and what is held over it.
+/// Current and speed at the start of a tick, voltage and torque held over it.
 #[derive(Debug, Clone, Copy)]
-pub struct Held {
+pub struct HeldInputs {
     /// i, A.
     pub current: f64,
     /// ω, rad/s (m/s).
@@ -35,24 +35,24 @@ pub struct Held {
     pub torque: f64,
 }
 
-impl Held {
+impl HeldInputs {
     fn numbers(&self) -> [f64; 4] {
         [self.current, self.speed, self.voltage, self.torque]
     }
 }
 
-/// What a tick puts into a drive.
+/// Energy supplied to a drive and angle moved over one tick.
 #[derive(Debug, Clone, Copy)]
-pub struct Work {
+pub struct TickWork {
     /// ∫ (Kt/Ke)(u i − R i²) + τ ω dt, J.
     pub done: f64,
-    /// The sum of its terms by their sizes, J: what rounding is relative to.
+    /// Sum of the magnitudes of its terms, J: reference of the rounding error.
     pub size: f64,
     /// ∫ ω dt, rad (m).
     pub turned: f64,
 }
 
-/// Energy of one drive.
+/// Energy model of one drive.
 #[derive(Debug, Clone)]
 pub struct DriveEnergy {
     kinetic: f64,
@@ -69,14 +69,14 @@ pub struct DriveEnergy {
     tick: f64,
 }
 
-/// Roundings between the torques of a tick and its speed: products, sums, and the division that makes the torque that
+/// Rounding steps between the torques of a tick and its speed: products, sums, and the division of the torque that
 /// stops the axis.
 const ROUNDINGS: f64 = 8.0;
 
 impl DriveEnergy {
-    /// The drive of `axis`, as it is with what it deviates by, over ticks of `tick` s.
+    /// Creates the energy model of the drive of `axis`, with its deviations, for ticks of `tick` s.
     pub fn new(axis: &AxisConfig, tick: f64) -> Self {
-        let motor = Plant::motor(axis);
+        let motor = Plant::deviating_motor(axis);
         let phases = motor.torque_constant / motor.emf_constant;
         let mut moving = SMatrix::<f64, 4, 4>::zeros();
         moving[(0, 0)] = -motor.resistance / motor.inductance;
@@ -112,15 +112,15 @@ impl DriveEnergy {
         }
     }
 
-    /// ½ (Kt/Ke) L i² + ½ J ω², J.
+    /// Returns the stored energy ½ (Kt/Ke) L i² + ½ J ω², J.
     pub fn stored(&self, current: f64, speed: f64) -> f64 {
         self.magnetic * current * current + self.kinetic * speed * speed
     }
 
-    /// What a tick puts in.
-    pub fn work(&self, held: &Held) -> Work {
+    /// Returns the energy supplied over a tick.
+    pub fn work(&self, held: &HeldInputs) -> TickWork {
         let z = held.numbers();
-        let mut work = Work { done: 0.0, size: 0.0, turned: 0.0 };
+        let mut work = TickWork { done: 0.0, size: 0.0, turned: 0.0 };
         for i in 0..4 {
             work.turned += self.turned[i] * z[i];
             for j in i..4 {
@@ -132,30 +132,30 @@ impl DriveEnergy {
         work
     }
 
-    /// By how much the torque τ of a tick is rounded, N·m (N), where it is made of torques of these sizes in sum: at a
-    /// standstill they cancel, with each other and with that of the motor, and each is rounded.
-    pub fn torque_rounding(&self, held: &Held, torques: f64) -> f64 {
+    /// Returns the rounding error of the torque τ of a tick, N·m (N); `torques` is the sum of the magnitudes of its parts.
+    /// At a standstill they cancel, with each other and with the motor torque, and each is rounded.
+    pub fn torque_rounding(&self, held: &HeldInputs, torques: f64) -> f64 {
         let current = held.current.abs() + self.tick * held.voltage.abs() / self.inductance;
         ROUNDINGS * f64::EPSILON * (self.torque_constant * current + torques)
     }
 
-    /// What a difference of τ makes of the work of a tick at most, J.
-    pub fn work_of(&self, difference: f64, held: &Held) -> f64 {
+    /// Returns the largest change of the work of a tick caused by a `difference` of τ, J.
+    pub fn work_of(&self, difference: f64, held: &HeldInputs) -> f64 {
         let crossed: f64 = self.work[3].iter().zip(held.numbers()).map(|(w, z)| (w * z).abs()).sum();
         difference * (2.0 * crossed + self.work[3][3].abs() * difference)
     }
 
-    /// What a difference of τ makes of the speed at the end of a tick, rad/s (m/s).
+    /// Returns the change of the speed at the end of a tick caused by a `difference` of τ, rad/s (m/s).
     pub fn speed_of(&self, difference: f64) -> f64 {
         difference * self.tick / (2.0 * self.kinetic)
     }
 
-    /// By how much the way over a tick may differ from that of a speed that goes evenly from its first to its last
-    /// value, rad (m).
+    /// Returns the largest difference between the angle moved in a tick and the trapezoidal rule, rad (m).
     ///
-    /// The trapezoidal rule is off by T³/12 max|ω̈|, and ω̈ = Kt/J di/dt while τ is held; the voltage that drives the
-    /// current is at most twice its sum by sizes at the start, a tick being short against the motor's time constants.
-    pub fn uneven(&self, held: &Held) -> f64 {
+    /// The error of the trapezoidal rule is T³/12 max|ω̈|, and ω̈ = Kt/J di/dt while τ is held. The voltage that changes the
+    /// current is at most twice the sum of the magnitudes of its terms at the start, because a tick is short relative to
+    /// the time constants of the motor.
+    pub fn uneven(&self, held: &HeldInputs) -> f64 {
         let voltage =
             held.voltage.abs() + self.resistance * held.current.abs() + self.emf_constant * held.speed.abs();
         self.unevenness * voltage
@@ -173,9 +173,9 @@ mod tests {
         let machine = Parameters::embedded_default().and_then(|p| p.machine_config()).expect("valid");
         let (tick, parts) = (125e-6, 1000);
         for axis in machine.axes() {
-            let m = Plant::motor(axis);
+            let m = Plant::deviating_motor(axis);
             let phases = m.torque_constant / m.emf_constant;
-            let held = Held { current: 12.0, speed: -30.0, voltage: 150.0, torque: -4.0 };
+            let held = HeldInputs { current: 12.0, speed: -30.0, voltage: 150.0, torque: -4.0 };
             let derivative = |i: f64, w: f64| {
                 let di = (held.voltage - m.resistance * i - m.emf_constant * w) / m.inductance;
                 (di, (m.torque_constant * i + held.torque) / m.inertia)

@@ -1,4 +1,4 @@
-//! The exponential of a matrix, apart from that of the drive.
+//! Matrix exponential by scaling and squaring, independent of the one in the drive model.
 
 use nalgebra::SMatrix;
 
@@ -7,7 +7,7 @@ const SMALL: f64 = 0.5;
 /// Terms of the series: 0.5¹⁸ / 18! is far below the rounding.
 const TERMS: u32 = 18;
 
-/// e^A by its Taylor series on A/2ˢ, squared s times.
+/// Returns e^A: the Taylor series of A/2ˢ, squared s times.
 pub fn exponential<const N: usize>(a: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
     let mut halved = *a;
     let mut squarings = 0;
@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_turn_is_a_turn() {
+    fn exponential_of_a_skew_matrix_is_a_rotation() {
         for angle in [1e-3_f64, 0.7, 3.0, 20.0] {
             let found = exponential(&Matrix2::new(0.0, -angle, angle, 0.0));
             let turned = Matrix2::new(angle.cos(), -angle.sin(), angle.sin(), angle.cos());

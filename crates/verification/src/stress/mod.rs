@@ -1,31 +1,31 @@
-//! Random trajectories through the library, each of which is checked tick by tick.
+//! Stress test: random trajectories through the library, each checked at every tick.
 //!
-//! What a trajectory is follows from a seed and its number alone ([`Plan`]); a [`Bench`] runs it through the checks and the
-//! simulation that everybody uses and looks at every tick. It checks that all signals are finite, that limits hold and are reported,
-//! that friction brakes and energy does not come from nowhere, and that the error is what the
-//! impulse responses of the linear loop allow wherever no limit acts: by matrices of its own, not by the library's step.
-//! [`run`] does that many times, over all cores, and makes one digest of all that came out.
+//! A trajectory depends on a seed and its number only ([`TestPlan`]). A [`TrajectoryTest`] runs it through the validation and the
+//! simulation of the library and checks every tick: all signals are finite, limits hold and are reported, friction
+//! brakes, energy is conserved, and, where no limit acts, the delay-compensated following error is within the bound
+//! of the impulse responses of the linear loop. These references are computed by matrices of this module, not by the
+//! library's step. [`run`] runs many trajectories on several threads and returns one digest of their results.
 
-mod bench;
+mod check;
 mod curve;
-mod drive;
+mod drive_checker;
 mod energy;
 mod exponential;
-mod fault;
-mod fleet;
-mod linear;
+mod invariants;
+mod linear_axis;
 mod plan;
 mod random;
 mod response;
 mod runs;
 mod shape;
 mod summary;
-mod watch;
+mod test_machines;
+mod trajectory_test;
 
-pub use bench::{Bench, Record};
-pub use fault::{Check, Fault};
-pub use fleet::{Fleet, FleetError, Variant};
-pub use plan::{Ask, Kind, Load, Plan};
-pub use runs::{Options, StressError, run};
-pub use summary::Summary;
-pub use watch::AxisFigures;
+pub use check::{Check, Violation};
+pub use invariants::AxisObservation;
+pub use plan::{LoadStep, TestCommand, TestPlan, TrajectoryKind};
+pub use runs::{StressError, StressOptions, run};
+pub use summary::StressSummary;
+pub use test_machines::{MachineVariant, TestMachines, TestMachinesError};
+pub use trajectory_test::{TestRecord, TrajectoryTest};

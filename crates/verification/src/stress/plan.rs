@@ -1,236 +1,252 @@
-//! A trajectory at random: which machine, from where, what it is asked for and what loads it meets.
+//! RandomSource trajectory: machine variant, start, commands and loads.
 
-use super::curve::{self, Point};
-use super::fleet::Fleet;
-use super::random::Random;
-use super::shape::{Reach, extent};
-use virtual_axes_core::trajectory::{Rejection, Request, Row, Start};
+use super::curve::{self, CurvePoint};
+use super::random::RandomSource;
+use super::shape::{MotionLimits, extent};
+use super::test_machines::TestMachines;
+use virtual_axes_core::trajectory::{Rejection, Start, TrajectoryPoint, TrajectoryRequest};
 use virtual_axes_core::units::Nanoseconds;
 
-/// Kinds of trajectories.
+/// TrajectoryKind of a random trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
-    /// From rest to rest within velocity, acceleration and jerk, a setpoint in each position period.
+pub enum TrajectoryKind {
+    /// Rest-to-rest motion within velocity, acceleration and jerk limits, one setpoint per position period.
     Move,
-    /// Several points with velocities: cubic polynomials.
+    /// Points with velocities, interpolated by cubic polynomials.
     Cubic,
-    /// Several points with velocities and accelerations: quintic polynomials.
+    /// Points with velocities and accelerations, interpolated by quintic polynomials.
     Quintic,
-    /// A random walk within velocity and acceleration.
+    /// RandomSource walk within velocity and acceleration limits.
     Walk,
-    /// Streamed setpoints whose velocity goes in steps.
+    /// Streamed setpoints with stepwise constant velocity.
     Stream,
-    /// A random walk that is stopped on its way.
+    /// RandomSource walk with a controlled stop.
     Stop,
-    /// At rest under loads.
+    /// Standstill under loads.
     Hold,
 }
 
-impl Kind {
-    /// All of them.
-    pub const ALL: [Kind; 7] =
-        [Kind::Move, Kind::Cubic, Kind::Quintic, Kind::Walk, Kind::Stream, Kind::Stop, Kind::Hold];
+impl TrajectoryKind {
+    /// All kinds.
+    pub const ALL: [TrajectoryKind; 7] = [
+        TrajectoryKind::Move,
+        TrajectoryKind::Cubic,
+        TrajectoryKind::Quintic,
+        TrajectoryKind::Walk,
+        TrajectoryKind::Stream,
+        TrajectoryKind::Stop,
+        TrajectoryKind::Hold,
+    ];
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Move => "move",
-            Kind::Cubic => "cubic",
-            Kind::Quintic => "quintic",
-            Kind::Walk => "walk",
-            Kind::Stream => "stream",
-            Kind::Stop => "stop",
-            Kind::Hold => "hold",
+            TrajectoryKind::Move => "move",
+            TrajectoryKind::Cubic => "cubic",
+            TrajectoryKind::Quintic => "quintic",
+            TrajectoryKind::Walk => "walk",
+            TrajectoryKind::Stream => "stream",
+            TrajectoryKind::Stop => "stop",
+            TrajectoryKind::Hold => "hold",
         }
     }
 }
 
-/// How often each kind comes, in the order of [`Kind::ALL`].
+/// Probability of each kind, in the order of [`TrajectoryKind::ALL`].
 const SHARES: [f64; 7] = [0.25, 0.15, 0.15, 0.2, 0.12, 0.08, 0.05];
-/// Ticks that the lengths of trajectories are drawn in.
+/// Unit of the length of trajectories, ticks.
 const UNIT_TICKS: usize = 768;
-/// Fewest position periods of motion.
-const FEWEST: usize = 6;
-/// How often acceleration and jerk are beyond what the machine file allows, which only the motor minds.
-const SHARP: f64 = 0.1;
-/// How far beyond.
-const SHARPER: f64 = 8.0;
-/// How often an axis moves.
-const MOVES: f64 = 0.5;
-/// How often there are loads on something that moves.
-const LOADED: f64 = 0.35;
-/// How often a load may be larger than the motor.
-const OVERLOADED: f64 = 0.05;
+/// Smallest number of position periods of motion.
+const MIN_PERIODS: usize = 6;
+/// Probability that acceleration and jerk exceed the limits of the machine file, so that the motor saturates.
+const EXCESS_PROBABILITY: f64 = 0.1;
+/// Largest factor of this excess.
+const MAX_EXCESS: f64 = 8.0;
+/// Probability that an axis moves.
+const MOVE_PROBABILITY: f64 = 0.5;
+/// Probability of loads during motion.
+const LOAD_PROBABILITY: f64 = 0.35;
+/// Probability that a load may exceed the motor torque.
+const OVERLOAD_PROBABILITY: f64 = 0.05;
 
-/// A load that acts for a while.
+/// LoadStep on an axis for a number of position periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Load {
-    /// Position period from which on it acts.
+pub struct LoadStep {
+    /// First position period.
     pub at: usize,
-    /// Place of the axis.
+    /// Index of the axis.
     pub axis: usize,
-    /// N or N·m.
+    /// LoadStep, N or N·m.
     pub value: f64,
-    /// For how many position periods.
+    /// Duration, position periods.
     pub periods: usize,
 }
 
-/// What a trajectory asks for.
+/// Commands of a random trajectory.
 #[derive(Debug, Clone)]
-pub enum Ask {
-    /// A trajectory.
-    Follow(Request),
-    /// One that is stopped before this position period.
-    Stop(Request, usize),
-    /// Of each axis that moves its place and a position for each position period, m or rad; the last one holds.
+pub enum TestCommand {
+    /// Trajectory that is followed to its end.
+    Follow(TrajectoryRequest),
+    /// Trajectory with a controlled stop before this position period.
+    Stop(TrajectoryRequest, usize),
+    /// Streamed setpoints: axis index and one position per position period, m or rad; the last one is held.
     Stream(Vec<(usize, Vec<f64>)>),
-    /// Nothing.
+    /// No command.
     Rest,
 }
 
-/// A trajectory at random.
+/// RandomSource trajectory with its machine, start and loads.
 #[derive(Debug, Clone)]
-pub struct Plan {
-    /// Its number.
+pub struct TestPlan {
+    /// Number of the trajectory.
     pub number: u64,
-    /// Place of its machine in the fleet.
+    /// Index of the machine variant.
     pub variant: usize,
-    /// Its kind.
-    pub kind: Kind,
-    /// Where the axes are at rest at first, m or rad.
+    /// TrajectoryKind of the trajectory.
+    pub kind: TrajectoryKind,
+    /// Initial positions of the axes at rest, m or rad.
     pub start: Vec<f64>,
-    /// What is asked for.
-    pub ask: Ask,
-    /// Loads, the earliest first.
-    pub loads: Vec<Load>,
-    /// Position periods that are run.
+    /// Commands.
+    pub command: TestCommand,
+    /// Loads, sorted by their first position period.
+    pub loads: Vec<LoadStep>,
+    /// Simulated position periods.
     pub periods: usize,
 }
 
-impl Plan {
-    /// Trajectory `number` of those of `seed`.
+impl TestPlan {
+    /// Creates trajectory `number` of `seed`.
     ///
     /// # Errors
-    /// [`Rejection`] if the library does not take its points.
-    pub fn new(fleet: &Fleet, seed: u64, number: u64) -> Result<Self, Rejection> {
-        let mut random = Random::new(seed, number);
-        let place = random.below(fleet.variants().len());
-        let variant = &fleet.variants()[place];
+    /// [`Rejection`] if the library rejects its points.
+    pub fn new(machines: &TestMachines, seed: u64, number: u64) -> Result<Self, Rejection> {
+        let mut random = RandomSource::new(seed, number);
+        let index = random.below(machines.variants().len());
+        let variant = &machines.variants()[index];
         let kind = drawn(&mut random);
         let unit = UNIT_TICKS / variant.ticks();
-        let moving = FEWEST + random.below(unit * 5 / 4);
-        let horizon = variant.axes.iter().map(|axis| axis.ahead).max().unwrap_or(0);
-        let settling = 3 + random.below(unit / 2) + if kind == Kind::Stream { horizon } else { 0 };
-        // What a move is rounded up to, and what its setpoints are delayed by.
+        let moving = MIN_PERIODS + random.below(unit * 5 / 4);
+        let horizon = variant.axes.iter().map(|axis| axis.preview).max().unwrap_or(0);
+        let settling = 3 + random.below(unit / 2) + if kind == TrajectoryKind::Stream { horizon } else { 0 };
+        // Rounding of the duration and delay of the setpoints.
         let periods = (moving + settling + 4).min(variant.longest());
-        let sharper = if random.chance(SHARP) { random.between(1.0, SHARPER) } else { 1.0 };
+        let sharper = if random.chance(EXCESS_PROBABILITY) { random.between(1.0, MAX_EXCESS) } else { 1.0 };
         let count = variant.joints.len();
-        let mut moves: Vec<bool> = (0..count).map(|_| random.chance(MOVES)).collect();
+        let mut moves: Vec<bool> = (0..count).map(|_| random.chance(MOVE_PROBABILITY)).collect();
         let one = random.below(count);
         moves[one] = true;
-        let reach = |axis: usize| Reach::new(&variant.joints[axis].limits, variant.period(), sharper);
-        let mut start: Vec<f64> = (0..count).map(|axis| reach(axis).start(&mut random, 0.0, 0.0)).collect();
+        let limits = |axis: usize| MotionLimits::new(&variant.joints[axis].limits, variant.period(), sharper);
+        let mut start: Vec<f64> = (0..count).map(|axis| limits(axis).start(&mut random, 0.0, 0.0)).collect();
         let axes: Vec<usize> = (0..count).filter(|&axis| moves[axis]).collect();
         let names = axes.iter().map(|&axis| variant.joints[axis].name.clone()).collect();
-        let request = Request::new(Start::Now, names);
-        let rows = |random: &mut Random, start: &mut [f64], of: &dyn Fn(&Reach, &mut Random) -> Vec<f64>| {
+        let request = TrajectoryRequest::new(Start::Now, names);
+        let rows = |random: &mut RandomSource,
+                    start: &mut [f64],
+                    of: &dyn Fn(&MotionLimits, &mut RandomSource) -> Vec<f64>| {
             let column = |&axis: &usize| {
-                let reach = reach(axis);
-                let way = of(&reach, random);
+                let limits = limits(axis);
+                let way = of(&limits, random);
                 let (low, high) = extent(&way);
-                start[axis] = reach.start(random, low, high);
+                start[axis] = limits.start(random, low, high);
                 way.into_iter().map(|value| start[axis] + value).collect::<Vec<f64>>()
             };
             axes.iter().map(column).collect::<Vec<_>>()
         };
         let period = variant.period();
-        let ask = match kind {
-            Kind::Move => {
+        let command = match kind {
+            TrajectoryKind::Move => {
                 let columns =
-                    rows(&mut random, &mut start, &|reach, random| reach.rest_to_rest(random, moving));
-                Ask::Follow(gridded(request, &columns, period)?)
+                    rows(&mut random, &mut start, &|limits, random| limits.rest_to_rest(random, moving));
+                TestCommand::Follow(gridded(request, &columns, period)?)
             }
-            Kind::Walk => {
-                let columns = rows(&mut random, &mut start, &|reach, random| reach.walk(random, moving));
-                Ask::Follow(gridded(request, &columns, period)?)
+            TrajectoryKind::Walk => {
+                let columns = rows(&mut random, &mut start, &|limits, random| limits.walk(random, moving));
+                TestCommand::Follow(gridded(request, &columns, period)?)
             }
-            Kind::Stop => {
-                let columns = rows(&mut random, &mut start, &|reach, random| reach.walk(random, moving));
-                Ask::Stop(gridded(request, &columns, period)?, 1 + random.below(moving))
+            TrajectoryKind::Stop => {
+                let columns = rows(&mut random, &mut start, &|limits, random| limits.walk(random, moving));
+                TestCommand::Stop(gridded(request, &columns, period)?, 1 + random.below(moving))
             }
-            Kind::Stream => {
-                let columns = rows(&mut random, &mut start, &|reach, random| reach.steps(random, moving));
-                Ask::Stream(axes.iter().copied().zip(columns).collect())
+            TrajectoryKind::Stream => {
+                let columns = rows(&mut random, &mut start, &|limits, random| limits.steps(random, moving));
+                TestCommand::Stream(axes.iter().copied().zip(columns).collect())
             }
-            Kind::Cubic | Kind::Quintic => {
-                let degree = if kind == Kind::Cubic { 3 } else { 5 };
+            TrajectoryKind::Cubic | TrajectoryKind::Quintic => {
+                let degree = if kind == TrajectoryKind::Cubic { 3 } else { 5 };
                 let times = times(&mut random, moving as Nanoseconds * period);
                 let mut columns = Vec::new();
                 for &axis in &axes {
-                    let reach = reach(axis);
-                    let points = curve::points(&mut random, &reach, &times, degree);
+                    let limits = limits(axis);
+                    let points = curve::points(&mut random, &limits, &times, degree);
                     let (low, high) = curve::hull(&points, &times, degree);
-                    start[axis] = reach.start(&mut random, low, high);
+                    start[axis] = limits.start(&mut random, low, high);
                     columns.push((start[axis], points));
                 }
-                Ask::Follow(pointed(request, &times, &columns, degree)?)
+                TestCommand::Follow(pointed(request, &times, &columns, degree)?)
             }
-            Kind::Hold => Ask::Rest,
+            TrajectoryKind::Hold => TestCommand::Rest,
         };
-        let loads = if kind == Kind::Hold || random.chance(LOADED) {
-            let efforts: Vec<f64> = variant.config.axes().iter().map(|axis| axis.largest_effort()).collect();
+        let loads = if kind == TrajectoryKind::Hold || random.chance(LOAD_PROBABILITY) {
+            let efforts: Vec<f64> = variant.config.axes().iter().map(|axis| axis.max_effort()).collect();
             loads(&mut random, &efforts, periods)
         } else {
             Vec::new()
         };
-        Ok(Plan { number, variant: place, kind, start, ask, loads, periods })
+        Ok(TestPlan { number, variant: index, kind, start, command, loads, periods })
     }
 }
 
-fn drawn(random: &mut Random) -> Kind {
+fn drawn(random: &mut RandomSource) -> TrajectoryKind {
     let mut left = random.unit();
-    for (kind, share) in Kind::ALL.into_iter().zip(SHARES) {
+    for (kind, share) in TrajectoryKind::ALL.into_iter().zip(SHARES) {
         if left < share {
             return kind;
         }
         left -= share;
     }
-    Kind::Move
+    TrajectoryKind::Move
 }
 
-/// Times of two to six points within `duration`, ns, on no grid.
-fn times(random: &mut Random, duration: Nanoseconds) -> Vec<Nanoseconds> {
+/// Draws the times of two to six points within `duration`, ns, independent of the position cycle.
+fn times(random: &mut RandomSource, duration: Nanoseconds) -> Vec<Nanoseconds> {
     let segments = 1 + random.below(5);
     let share = duration / segments as Nanoseconds;
     let mut times = vec![0];
     for segment in 0..segments as Nanoseconds {
-        // Each at least half as long as the others.
+        // Each segment is at least half as long as the others.
         let within = share / 2 + (share / 2) as Nanoseconds * random.below(1000) as Nanoseconds / 1000;
         times.push(segment * share + within.max(1));
     }
     times
 }
 
-/// A setpoint of each column in each position period.
-fn gridded(mut request: Request, columns: &[Vec<f64>], period: Nanoseconds) -> Result<Request, Rejection> {
+/// Adds one point per position period with a position of each column.
+fn gridded(
+    mut request: TrajectoryRequest,
+    columns: &[Vec<f64>],
+    period: Nanoseconds,
+) -> Result<TrajectoryRequest, Rejection> {
     let points = columns.iter().map(Vec::len).max().unwrap_or(0);
     let mut positions = vec![0.0; columns.len()];
     for k in 0..points {
         for (position, column) in positions.iter_mut().zip(columns) {
             *position = column[k.min(column.len() - 1)];
         }
-        request.push(k as Nanoseconds * period, Row { positions: &positions, ..Row::default() })?;
+        request.push(
+            k as Nanoseconds * period,
+            TrajectoryPoint { positions: &positions, ..TrajectoryPoint::default() },
+        )?;
     }
     Ok(request)
 }
 
-/// Points at `times`; each column begins at its start.
+/// Adds points at `times`; each column is relative to its start.
 fn pointed(
-    mut request: Request,
+    mut request: TrajectoryRequest,
     times: &[Nanoseconds],
-    columns: &[(f64, Vec<Point>)],
+    columns: &[(f64, Vec<CurvePoint>)],
     degree: usize,
-) -> Result<Request, Rejection> {
+) -> Result<TrajectoryRequest, Rejection> {
     for (k, &time) in times.iter().enumerate() {
         let field = |which: usize| columns.iter().map(move |(_, points)| points[k][which]);
         let positions: Vec<f64> = columns.iter().zip(field(0)).map(|((start, _), way)| start + way).collect();
@@ -238,7 +254,7 @@ fn pointed(
         let accelerations: Vec<f64> = if degree == 5 { field(2).collect() } else { Vec::new() };
         request.push(
             time,
-            Row {
+            TrajectoryPoint {
                 positions: &positions,
                 velocities: &velocities,
                 accelerations: &accelerations,
@@ -249,14 +265,14 @@ fn pointed(
     Ok(request)
 }
 
-/// One to three steps of load on any axes, most of them small against `efforts`.
-fn loads(random: &mut Random, efforts: &[f64], periods: usize) -> Vec<Load> {
-    let largest = if random.chance(OVERLOADED) { 1.5 } else { 0.5 };
-    let mut loads: Vec<Load> = (0..1 + random.below(3))
+/// Draws one to three load steps on random axes, most of them small relative to `efforts`.
+fn loads(random: &mut RandomSource, efforts: &[f64], periods: usize) -> Vec<LoadStep> {
+    let largest = if random.chance(OVERLOAD_PROBABILITY) { 1.5 } else { 0.5 };
+    let mut loads: Vec<LoadStep> = (0..1 + random.below(3))
         .map(|_| {
             let axis = random.below(efforts.len());
             let part = random.unit();
-            Load {
+            LoadStep {
                 at: random.below(periods),
                 axis,
                 value: random.sign() * largest * part * part * efforts[axis],

@@ -1,27 +1,27 @@
-//! Random numbers that depend on a seed and a trajectory's number, and on nothing else.
+//! Reproducible random numbers from a seed and a trajectory number.
 
 use blake3::{Hasher, OutputReader};
 
-/// Bytes that are taken from the generator at a time.
+/// Bytes read from the generator at a time.
 const BLOCK: usize = 64;
-/// 2⁻⁵³, the distance of random numbers in [0, 1).
+/// Resolution of random numbers in [0, 1): 2⁻⁵³.
 const RESOLUTION: f64 = 1.0 / (1_u64 << 53) as f64;
 
-/// Numbers of one trajectory: the output of BLAKE3 over seed and number.
+/// RandomSource numbers of one trajectory: the output of BLAKE3 over seed and number.
 ///
-/// Only additions, multiplications and divisions follow, which have the same bits on every processor.
-pub struct Random {
+/// Numbers are derived by additions, multiplications and divisions only, so they are bit-identical on every processor.
+pub struct RandomSource {
     source: OutputReader,
     block: [u8; BLOCK],
     used: usize,
 }
 
-impl Random {
-    /// The numbers of trajectory `number` under `seed`.
+impl RandomSource {
+    /// Creates the generator of trajectory `number` with `seed`.
     pub fn new(seed: u64, number: u64) -> Self {
         let mut hasher = Hasher::new();
         hasher.update(&seed.to_le_bytes()).update(&number.to_le_bytes());
-        Random { source: hasher.finalize_xof(), block: [0; BLOCK], used: BLOCK }
+        RandomSource { source: hasher.finalize_xof(), block: [0; BLOCK], used: BLOCK }
     }
 
     fn word(&mut self) -> u64 {
@@ -35,27 +35,27 @@ impl Random {
         u64::from_le_bytes(word)
     }
 
-    /// In [0, 1).
+    /// Returns a number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.word() >> 11) as f64 * RESOLUTION
     }
 
-    /// In [`low`, `high`).
+    /// Returns a number in [`low`, `high`).
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// 0 … `count` − 1; 0 if there is none.
+    /// Returns an integer in 0 … `count` − 1; 0 if `count` is 0.
     pub fn below(&mut self, count: usize) -> usize {
         ((u128::from(self.word()) * count as u128) >> 64) as usize
     }
 
-    /// Whether what has `probability` happens.
+    /// Returns true with the given probability.
     pub fn chance(&mut self, probability: f64) -> bool {
         self.unit() < probability
     }
 
-    /// −1 or 1.
+    /// Returns −1 or 1.
     pub fn sign(&mut self) -> f64 {
         if self.chance(0.5) { -1.0 } else { 1.0 }
     }
@@ -66,9 +66,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_even_and_depend_on_seed_and_number_alone() {
+    fn numbers_are_uniform_and_depend_on_seed_and_number_only() {
         let numbers = |seed, number| {
-            let mut random = Random::new(seed, number);
+            let mut random = RandomSource::new(seed, number);
             (0..10_000).map(|_| random.unit()).collect::<Vec<_>>()
         };
         let found = numbers(1, 2);
@@ -77,7 +77,7 @@ mod tests {
         let mean = found.iter().sum::<f64>() / found.len() as f64;
         // Five standard deviations of a mean of 10 000.
         assert!((mean - 0.5).abs() < 5.0 / (12.0_f64 * 10_000.0).sqrt(), "{mean}");
-        let mut random = Random::new(1, 2);
+        let mut random = RandomSource::new(1, 2);
         let mut seen = [0; 7];
         (0..7_000).for_each(|_| seen[random.below(7)] += 1);
         assert!(seen.iter().all(|count| (850..1150).contains(count)), "{seen:?}");

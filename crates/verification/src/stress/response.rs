@@ -1,32 +1,32 @@
-//! What bounds the error of an axis: the impulse responses of its linear loop, and their absolute sums.
+//! Bounds of the following error from the impulse responses of the linear loop.
 //!
-//! As long as no limit acts, an axis is linear in its setpoints and in the torques that it meets. With e the
-//! synchronized tracking error at position instants, Δ the difference of setpoints and d the torque on the motor,
+//! While no limit acts, an axis is linear in its setpoints and in the torques on its motor. With e the
+//! delay-compensated following error at position cycles, Δ the difference of setpoints and d the torque on the motor,
 //!
 //! ```text
 //! e(k) = Σⱼ h(j, k) Δ(j) + Σₙ g(k·N − n) d(n) + Σₘ q(k·M − m) c(m)
 //! ```
 //!
-//! where n counts ticks, N to a position period, and m instants of the velocity loop, M to a period, at which a
-//! friction compensation adds c. h depends on k − j alone but for the first j, whose motion the controller cannot see
-//! before the beginning. So |e| ≤ ‖h‖₁ max|Δ| + ‖g‖₁ max|d| + ‖q‖₁ max|c|, and likewise with the second and third
-//! differences of the setpoints and the once and twice summed h.
+//! where n counts ticks, N per position period, and m velocity cycles, M per position period, at which friction
+//! compensation adds c. h depends on k − j only, except for the first j, which lie within the preview at the start.
+//! Therefore |e| ≤ ‖h‖₁ max|Δ| + ‖g‖₁ max|d| + ‖q‖₁ max|c|. The same bound holds with the second and third differences
+//! of the setpoints and the once and twice summed h.
 
-use super::linear::{LinearAxis, STATES, State};
+use super::linear_axis::{LinearAxis, LoopState, STATES};
 
-/// Differences of the setpoints that there is a bound by.
+/// Orders of setpoint differences with a bound: first, second, third.
 pub const ORDERS: usize = 3;
 
-/// Responses of one axis over a number of position periods.
+/// Impulse responses of one axis over a number of position periods.
 #[derive(Debug, Clone)]
-pub struct Response {
-    /// h(j, ·) of the first setpoints; the last one of these holds for all that follow, shifted.
+pub struct ImpulseResponses {
+    /// h(j, ·) of the first setpoints; the last one, shifted, applies to all later setpoints.
     setpoint: Vec<Vec<f64>>,
-    /// g, the largest lag first: ticks since the torque.
+    /// g by ticks since the torque, largest lag first.
     torque: Vec<f64>,
-    /// q, the largest lag first: instants of the velocity loop.
+    /// q by velocity cycles since the feedforward, largest lag first.
     feedforward: Vec<f64>,
-    /// Absolute sums of h, once and twice summed h, by the instant.
+    /// Absolute sums of h, once and twice summed h, by position cycle.
     setpoint_norms: Vec<[f64; ORDERS]>,
     torque_norms: Vec<f64>,
     feedforward_norms: Vec<f64>,
@@ -34,31 +34,31 @@ pub struct Response {
     instants: usize,
 }
 
-/// What an axis was given, to be weighed with its responses.
+/// ResponseInputs of one axis for the superposition of its impulse responses.
 #[derive(Debug, Clone, Copy)]
-pub struct Inputs<'a> {
-    /// Δ by the position instant, m or rad; the first is from rest.
+pub struct ResponseInputs<'a> {
+    /// Δ by position cycle, m or rad; the first is relative to rest.
     pub steps: &'a [f64],
-    /// d by the tick, N·m.
+    /// d by tick, N·m.
     pub torque: &'a [f64],
-    /// c by the instant of the velocity loop, N·m; none if it is nothing.
+    /// c by velocity cycle, N·m; empty if 0.
     pub feedforward: &'a [f64],
 }
 
-impl Response {
-    /// Those of `axis` over `periods` position periods.
+impl ImpulseResponses {
+    /// Computes the responses of `axis` over `periods` position periods.
     pub fn new(axis: &LinearAxis, periods: usize) -> Self {
         let unit = |j: usize| move |k: i64| if k >= j as i64 { 1.0 } else { 0.0 };
-        let setpoint = (0..=axis.ahead()).map(|j| axis.errors(periods, unit(j))).collect();
+        let setpoint = (0..=axis.preview()).map(|j| axis.errors(periods, unit(j))).collect();
         let free: Vec<Vec<f64>> = (0..STATES)
-            .map(|place| {
+            .map(|index| {
                 let mut state = [0.0; STATES];
-                state[place] = 1.0;
+                state[index] = 1.0;
                 axis.free(state, periods)
             })
             .collect();
-        // What an impulse leaves behind at the end of its period goes on by itself.
-        let lags = |impulses: usize, after: &dyn Fn(usize) -> State| {
+        // After the period of the impulse, its state decays as a free response.
+        let lags = |impulses: usize, after: &dyn Fn(usize) -> LoopState| {
             let mut lags = vec![0.0; periods * impulses];
             for at in 0..impulses {
                 let state = after(at);
@@ -72,7 +72,7 @@ impl Response {
         let (ticks, instants) = (axis.ticks, axis.ticks / axis.velocity_ticks);
         let torque = lags(ticks, &|at| axis.after_torque(at));
         let feedforward = lags(instants, &|at| axis.after_feedforward(at));
-        let mut response = Response {
+        let mut response = ImpulseResponses {
             setpoint,
             torque_norms: norms(&torque, periods, ticks),
             feedforward_norms: norms(&feedforward, periods, instants),
@@ -91,19 +91,19 @@ impl Response {
         response
     }
 
-    /// Position periods that they reach.
+    /// Returns the number of position periods.
     pub fn periods(&self) -> usize {
         self.setpoint_norms.len()
     }
 
-    /// h(j, k).
+    /// Returns h(j, k).
     fn of_setpoint(&self, j: usize, k: usize) -> f64 {
         let last = self.setpoint.len() - 1;
         let (column, shift) = (j.min(last), j.saturating_sub(last));
         if k < shift { 0.0 } else { self.setpoint[column][k - shift] }
     }
 
-    /// Σⱼ |h(j, k)|, and of the sums of h from j on.
+    /// Returns Σⱼ |h(j, k)| for h and for its sums from j on.
     fn absolute_sums(&self, k: usize) -> [f64; ORDERS] {
         let mut sums = [0.0; ORDERS];
         let (mut once, mut twice) = (0.0, 0.0);
@@ -118,8 +118,8 @@ impl Response {
         sums
     }
 
-    /// What bounds |e| up to instant `k`, from the largest `differences` of the setpoints (first, second, third),
-    /// the largest torque and the largest feedforward.
+    /// Returns the bound of |e| up to position cycle `k` from the largest `differences` of the setpoints (first, second,
+    /// third), the largest torque and the largest feedforward.
     pub fn bound(&self, k: usize, differences: [f64; ORDERS], torque: f64, feedforward: f64) -> f64 {
         let by_setpoint = self.setpoint_norms[k].iter().zip(differences).map(|(norm, most)| norm * most);
         by_setpoint.fold(f64::INFINITY, f64::min)
@@ -127,8 +127,8 @@ impl Response {
             + self.feedforward_norms[k] * feedforward
     }
 
-    /// e(k).
-    pub fn error(&self, k: usize, inputs: &Inputs<'_>) -> f64 {
+    /// Returns e(k) by superposition.
+    pub fn error(&self, k: usize, inputs: &ResponseInputs<'_>) -> f64 {
         let seen = inputs.steps.len().min(k + self.setpoint.len());
         let by_setpoint: f64 =
             inputs.steps[..seen].iter().enumerate().map(|(j, step)| step * self.of_setpoint(j, k)).sum();
@@ -138,7 +138,7 @@ impl Response {
     }
 }
 
-/// Absolute sums of the lags up to each position instant.
+/// Returns the absolute sums of the lags up to each position cycle.
 fn norms(lags: &[f64], periods: usize, ticks: usize) -> Vec<f64> {
     let mut sum = 0.0;
     let sums: Vec<f64> = lags
@@ -152,19 +152,19 @@ fn norms(lags: &[f64], periods: usize, ticks: usize) -> Vec<f64> {
     (0..periods).map(|k| if k == 0 { 0.0 } else { sums[k * ticks - 1] }).collect()
 }
 
-/// The last `count` weights with the first `count` values; no values are nothing.
+/// Returns the inner product of the last `count` weights and the first `count` values; 0 without values.
 fn latest(weights: &[f64], values: &[f64], count: usize) -> f64 {
-    /// Sums that go on side by side.
-    const LANES: usize = 8;
+    /// Parallel partial sums.
+    const PARTIAL_SUMS: usize = 8;
     if values.is_empty() {
         return 0.0;
     }
     let (weights, values) = (&weights[weights.len() - count..], &values[..count]);
-    let mut sums = [0.0; LANES];
-    let (whole, whole_values) = (weights.chunks_exact(LANES), values.chunks_exact(LANES));
+    let mut sums = [0.0; PARTIAL_SUMS];
+    let (whole, whole_values) = (weights.chunks_exact(PARTIAL_SUMS), values.chunks_exact(PARTIAL_SUMS));
     let rest: f64 = whole.remainder().iter().zip(whole_values.remainder()).map(|(w, v)| w * v).sum();
     for (w, v) in whole.zip(whole_values) {
-        for lane in 0..LANES {
+        for lane in 0..PARTIAL_SUMS {
             sums[lane] += w[lane] * v[lane];
         }
     }

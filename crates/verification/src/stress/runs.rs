@@ -1,4 +1,4 @@
-//! Many trajectories over several threads, with one result whatever their number.
+//! Runs many trajectories on several threads; the result does not depend on the number of threads.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -7,51 +7,51 @@ use std::sync::mpsc::{self, SyncSender};
 use std::thread;
 use std::time::Duration;
 
-use super::bench::{Bench, Record};
-use super::fleet::{Fleet, FleetError};
-use super::summary::Summary;
-use virtual_axes_core::machine::Width;
+use super::summary::StressSummary;
+use super::test_machines::{TestMachines, TestMachinesError};
+use super::trajectory_test::{TestRecord, TrajectoryTest};
+use virtual_axes_core::machine::SimdWidth;
 
-/// Trajectories that a thread takes at a time.
-const TOGETHER: u64 = 64;
-/// Such parts that may wait to be taken, for each thread.
-const WAITING: usize = 4;
-/// How many parts a thread may be ahead of one that is held up: what is ahead is kept.
-const AHEAD: u64 = 256;
-/// Time between two looks at whether it has come up.
-const LOOK: Duration = Duration::from_millis(1);
+/// Trajectories of a batch.
+const BATCH: u64 = 64;
+/// Capacity of the result channel per thread, batches.
+const QUEUED: usize = 4;
+/// Largest lead of a thread over the oldest incomplete batch: results in between are buffered.
+const MAX_LEAD: u64 = 256;
+/// Polling interval while a thread waits for the oldest batch.
+const POLL: Duration = Duration::from_millis(1);
 
-/// What is to be run.
+/// StressOptions of a stress test.
 #[derive(Debug, Clone, Copy)]
-pub struct Options {
-    /// What everything random follows from.
+pub struct StressOptions {
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Number of the first trajectory.
     pub first: u64,
-    /// How many.
+    /// Number of trajectories.
     pub count: u64,
-    /// Threads; at least one runs.
+    /// Number of threads; at least one is started.
     pub threads: usize,
-    /// How wide vectors are used.
-    pub width: Width,
+    /// SIMD width.
+    pub width: SimdWidth,
 }
 
-/// Why a run did not come to its end.
+/// Error that ends a stress test.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StressError {
     /// A machine cannot be simulated.
     #[error(transparent)]
-    Fleet(#[from] FleetError),
-    /// The system gives no thread.
+    TestMachines(#[from] TestMachinesError),
+    /// A thread cannot be started.
     #[error("cannot start a thread: {0}")]
     Thread(io::Error),
-    /// Who looks on ended it.
+    /// The progress callback returned an error.
     #[error(transparent)]
     Watch(#[from] io::Error),
 }
 
-/// Sets a flag when its thread panics: who waits for that thread stops waiting.
+/// Sets a flag when its thread panics, so that other threads stop waiting for it.
 struct Panics<'a>(&'a AtomicBool);
 
 impl Drop for Panics<'_> {
@@ -62,36 +62,36 @@ impl Drop for Panics<'_> {
     }
 }
 
-/// Runs trajectories on the machines of `fleet`; `watch` is told now and then how many have been run.
+/// Runs random trajectories on `machines` and passes the number of completed ones to `watch`.
 ///
 /// # Errors
-/// [`StressError`].
+/// [`StressError`] if a machine cannot be simulated, a thread cannot be started, or `watch` returns an error.
 pub fn run(
-    fleet: &Fleet,
-    options: &Options,
+    machines: &TestMachines,
+    options: &StressOptions,
     mut watch: impl FnMut(u64) -> io::Result<()>,
-) -> Result<Summary, StressError> {
-    let parts = options.count.div_ceil(TOGETHER);
+) -> Result<StressSummary, StressError> {
+    let parts = options.count.div_ceil(BATCH);
     let (next, done, stopped) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
     let threads = options.threads.max(1);
-    let (sender, receiver) = mpsc::sync_channel(WAITING * threads);
-    let mut summary = Summary::new(fleet);
+    let (sender, receiver) = mpsc::sync_channel(QUEUED * threads);
+    let mut summary = StressSummary::new(machines);
     let work = |sender: SyncSender<_>| {
         let _panics = Panics(&stopped);
-        let mut bench = Bench::new(fleet, options.seed, options.width);
+        let mut test = TrajectoryTest::new(machines, options.seed, options.width);
         while !stopped.load(Ordering::Relaxed) {
             let part = next.fetch_add(1, Ordering::Relaxed);
             if part >= parts {
                 return;
             }
-            // Who has the part that is waited for never waits here.
-            while part >= done.load(Ordering::Relaxed) + AHEAD && !stopped.load(Ordering::Relaxed) {
-                thread::sleep(LOOK);
+            // The thread with the oldest batch never waits here.
+            while part >= done.load(Ordering::Relaxed) + MAX_LEAD && !stopped.load(Ordering::Relaxed) {
+                thread::sleep(POLL);
             }
-            let numbers = part * TOGETHER..((part + 1) * TOGETHER).min(options.count);
-            let records = numbers.map(|number| bench.run(options.first.wrapping_add(number)));
-            let records: Result<Vec<Record>, FleetError> = records.collect();
-            // Nobody takes them when the run has been ended.
+            let numbers = part * BATCH..((part + 1) * BATCH).min(options.count);
+            let records = numbers.map(|number| test.run(options.first.wrapping_add(number)));
+            let records: Result<Vec<TestRecord>, TestMachinesError> = records.collect();
+            // The receiver is closed after an error.
             if sender.send((part, records)).is_err() {
                 return;
             }
@@ -108,15 +108,15 @@ pub fn run(
             drop(sender);
             let mut early = BTreeMap::new();
             let mut due = 0;
-            // Goes before the threads are waited for: those that wait to hand theirs over go on.
+            // The receiver is dropped before the threads are joined, so that blocked senders return.
             for (part, records) in receiver {
                 early.insert(part, records?);
                 while let Some(records) = early.remove(&due) {
-                    records.iter().for_each(|record| summary.add(fleet, record));
+                    records.iter().for_each(|record| summary.add(machines, record));
                     due += 1;
                 }
                 done.store(due, Ordering::Relaxed);
-                watch((due * TOGETHER).min(options.count))?;
+                watch((due * BATCH).min(options.count))?;
             }
             Ok(())
         };

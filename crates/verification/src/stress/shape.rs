@@ -1,66 +1,66 @@
-//! Setpoints of one axis at random, within its limits by construction.
+//! RandomSource setpoints of one axis, within its limits by construction.
 
-use super::random::Random;
+use super::random::RandomSource;
 use virtual_axes_core::config::LimitsConfig;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// What of a limit is used at most: rounding stays inside.
+/// Largest used fraction of the velocity limit: leaves a margin for rounding.
 const WITHIN: f64 = 0.999;
-/// Where a joint without stroke may go, m or rad.
+/// Travel limit of a joint without travel limits, m or rad.
 const UNLIMITED: f64 = 10.0;
-/// Part of a stroke that a trajectory takes at most.
-const PART_OF_STROKE: f64 = 0.9;
+/// Largest fraction of the travel range used by a trajectory.
+const TRAVEL_FRACTION: f64 = 0.9;
 
-/// What an axis may be asked for.
+/// Motion limits of an axis for random setpoints.
 #[derive(Debug, Clone, Copy)]
-pub struct Reach {
+pub struct MotionLimits {
     /// Tsp, s.
     pub period: f64,
-    /// m/s or rad/s.
+    /// Velocity limit, m/s or rad/s.
     pub velocity: f64,
-    /// m/s² or rad/s².
+    /// Acceleration limit, m/s² or rad/s².
     pub acceleration: f64,
-    /// m/s³ or rad/s³.
+    /// Jerk limit, m/s³ or rad/s³.
     pub jerk: f64,
     low: f64,
     high: f64,
 }
 
-impl Reach {
-    /// Within `limits`; acceleration and jerk may be `sharper` than these, which only the motor minds.
+impl MotionLimits {
+    /// Creates motion limits from `limits`, with acceleration and jerk scaled by `sharper`, so that the motor may saturate.
     pub fn new(limits: &LimitsConfig, period: Nanoseconds, sharper: f64) -> Self {
-        Reach {
+        MotionLimits {
             period: seconds(period),
             velocity: WITHIN * limits.velocity,
             acceleration: sharper * limits.acceleration,
             jerk: sharper * limits.jerk,
-            low: limits.stroke_min.max(-UNLIMITED),
-            high: limits.stroke_max.min(UNLIMITED),
+            low: limits.travel_min.max(-UNLIMITED),
+            high: limits.travel_max.min(UNLIMITED),
         }
     }
 
     fn span(&self) -> f64 {
-        PART_OF_STROKE * (self.high - self.low)
+        TRAVEL_FRACTION * (self.high - self.low)
     }
 
-    /// A start from which displacements between `low` and `high` stay inside the stroke.
-    pub fn start(&self, random: &mut Random, low: f64, high: f64) -> f64 {
+    /// Draws a start from which displacements between `low` and `high` stay within the travel limits.
+    pub fn start(&self, random: &mut RandomSource, low: f64, high: f64) -> f64 {
         random.between(self.low - low.min(0.0), self.high - high.max(0.0))
     }
 
-    /// Displacements of a move from rest to rest within `periods` position periods, at these.
+    /// Draws the displacements of a rest-to-rest motion over `periods` position periods, one per period.
     ///
-    /// Its velocity is the convolution of three boxes of n₁, n₂ and n₃ periods: it is D/(n₁T) at most, its difference
-    /// D/(n₁n₂T²), the difference of that D/(n₁n₂n₃T³), or twice that where no box is as wide as the others together
+    /// The velocity is the convolution of three rectangular pulses of n₁, n₂ and n₃ periods: velocity ≤ D/(n₁T),
+    /// acceleration ≤ D/(n₁n₂T²), jerk ≤ D/(n₁n₂n₃T³), or twice that if no pulse is as wide as the other two together
     /// (Biagiotti and Melchiorri 2012).
-    pub fn rest_to_rest(&self, random: &mut Random, periods: usize) -> Vec<f64> {
+    pub fn rest_to_rest(&self, random: &mut RandomSource, periods: usize) -> Vec<f64> {
         let spare = periods.saturating_sub(3).max(1);
         let second = random.below(spare / 2 + 1) + 1;
         let third = random.below((spare - second.min(spare)) / 2 + 1) + 1;
         let first = (periods + 2).saturating_sub(second + third).max(1);
         let t = self.period;
         let counts = [first, second, third].map(|n| n as f64);
-        // Two of the edges that lower the acceleration act at once unless the widest box is as wide as the others together.
+        // Two falling edges of the acceleration coincide unless the widest pulse is as wide as the others together.
         let widest = first.max(second).max(third);
         let at_once = if 2 * widest < first + second + third { 2.0 } else { 1.0 };
         let most = [
@@ -82,15 +82,15 @@ impl Reach {
         summed(steps)
     }
 
-    /// Displacements of a random walk of `periods` position periods that ends at rest.
-    pub fn walk(&self, random: &mut Random, periods: usize) -> Vec<f64> {
+    /// Draws the displacements of a random walk over `periods` position periods that ends at rest.
+    pub fn walk(&self, random: &mut RandomSource, periods: usize) -> Vec<f64> {
         let (t, change) = (self.period, self.acceleration * self.period);
         let (mut velocity, mut acceleration) = (0.0, 0.0);
         let steps = (1..=periods).map(|k| {
             if random.chance(0.3) {
                 acceleration = random.between(-change, change);
             }
-            // What can still be braked.
+            // Largest velocity from which the axis can still stop in time.
             let most = f64::min(self.velocity, change * (periods - k) as f64);
             velocity = f64::clamp(velocity + acceleration, -most, most);
             velocity * t
@@ -98,8 +98,8 @@ impl Reach {
         self.fitting(summed(steps.collect()))
     }
 
-    /// Displacements of a stream whose velocity goes in steps.
-    pub fn steps(&self, random: &mut Random, periods: usize) -> Vec<f64> {
+    /// Draws the displacements of a stream with stepwise constant velocity.
+    pub fn steps(&self, random: &mut RandomSource, periods: usize) -> Vec<f64> {
         let mut velocity = 0.0;
         let steps = (1..=periods).map(|k| {
             if k == 1 || random.chance(0.15) {
@@ -110,7 +110,7 @@ impl Reach {
         self.fitting(summed(steps.collect()))
     }
 
-    /// The same, smaller where they take too much of the stroke.
+    /// Scales displacements down to the usable travel range.
     fn fitting(&self, mut displacements: Vec<f64>) -> Vec<f64> {
         let (low, high) = extent(&displacements);
         let scale = (self.span() / (high - low)).min(1.0);
@@ -118,18 +118,19 @@ impl Reach {
         displacements
     }
 
-    /// What of a curve with such largest velocity, acceleration and extent is within all limits.
+    /// Returns the largest scale factor that keeps a curve with this largest velocity, acceleration and extent within all
+    /// limits.
     pub fn scale(&self, velocity: f64, acceleration: f64, span: f64) -> f64 {
         (self.velocity / velocity).min(self.acceleration / acceleration).min(self.span() / span)
     }
 }
 
-/// Lowest and highest, and 0.
+/// Returns the smallest and the largest displacement, including 0.
 pub fn extent(displacements: &[f64]) -> (f64, f64) {
     displacements.iter().fold((0.0, 0.0), |(low, high): (f64, f64), &value| (low.min(value), high.max(value)))
 }
 
-/// Their sums, from 0 on.
+/// Returns the cumulative sums, starting with 0.
 fn summed(steps: Vec<f64>) -> Vec<f64> {
     let mut sum = 0.0;
     std::iter::once(0.0)
@@ -145,7 +146,7 @@ mod tests {
     use super::*;
 
     const LIMITS: LimitsConfig =
-        LimitsConfig { velocity: 0.5, acceleration: 2.5, jerk: 50.0, stroke_min: -0.355, stroke_max: 0.355 };
+        LimitsConfig { velocity: 0.5, acceleration: 2.5, jerk: 50.0, travel_min: -0.355, travel_max: 0.355 };
 
     fn differences(values: &[f64], period: f64) -> Vec<f64> {
         values.windows(2).map(|w| (w[1] - w[0]) / period).collect()
@@ -153,18 +154,18 @@ mod tests {
 
     #[test]
     fn moves_and_walks_keep_the_limits() {
-        let reach = Reach::new(&LIMITS, 6_000_000, 1.0);
+        let limits = MotionLimits::new(&LIMITS, 6_000_000, 1.0);
         let close = 1.0 + 1e-9;
         for number in 0..2000 {
-            let mut random = Random::new(3, number);
+            let mut random = RandomSource::new(3, number);
             let periods = 4 + random.below(40);
             let padded = |values: Vec<f64>| {
                 let last = values[values.len() - 1];
                 [&[0.0; 3][..], &values[..], &[last; 3][..]].concat()
             };
-            let moved = padded(reach.rest_to_rest(&mut random, periods));
+            let moved = padded(limits.rest_to_rest(&mut random, periods));
             assert!(moved.len() <= periods + 8, "{} of {periods}", moved.len());
-            let walked = padded(reach.walk(&mut random, periods));
+            let walked = padded(limits.walk(&mut random, periods));
             for (values, jerk) in [(moved, 50.0), (walked, f64::INFINITY)] {
                 let v = differences(&values, 0.006);
                 let a = differences(&v, 0.006);

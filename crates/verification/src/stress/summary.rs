@@ -1,69 +1,69 @@
-//! What many trajectories come to.
+//! StressSummary of the results of many trajectories.
 
 use std::collections::BTreeMap;
 
 use blake3::Hasher;
 
-use super::bench::Record;
-use super::fault::Fault;
-use super::fleet::Fleet;
-use super::plan::Kind;
+use super::check::Violation;
+use super::plan::TrajectoryKind;
+use super::test_machines::TestMachines;
+use super::trajectory_test::TestRecord;
 use virtual_axes_core::units::seconds;
 
-/// Bounds of errors below it, m or rad, are those of axes that rest: what errors are there is rounding.
-const SEEN: f64 = 1e-9;
+/// Smallest error bound of a moving axis, m or rad: at rest the errors are rounding errors.
+const MIN_BOUND: f64 = 1e-9;
 
-/// Faults that are kept, of all that are found.
-const KEPT: usize = 20;
+/// Largest number of recorded violations.
+const MAX_VIOLATIONS: usize = 20;
 
-/// What trajectories came to, in the order of their numbers.
+/// StressSummary of trajectories, accumulated in the order of their numbers.
 #[derive(Debug, Clone)]
-pub struct Summary {
-    /// How many ran.
+pub struct StressSummary {
+    /// Number of trajectories.
     pub run: u64,
-    /// How many of each kind ran.
-    pub kinds: BTreeMap<Kind, u64>,
-    /// How many ran on each variant of the fleet.
+    /// Number of trajectories of each kind.
+    pub kinds: BTreeMap<TrajectoryKind, u64>,
+    /// Number of trajectories on each machine variant.
     pub variants: Vec<u64>,
-    /// How many met a load.
+    /// Number of trajectories with a load.
     pub loaded: u64,
-    /// How many reached a limit.
+    /// Number of trajectories that reached a limit.
     pub limited: u64,
     /// Simulated time, s.
     pub time: f64,
-    /// Ticks of axes that were looked at.
+    /// Checked ticks, summed over the axes.
     pub ticks: u64,
-    /// Axes, one by one.
+    /// Checked axes, summed over the trajectories.
     pub axes: u64,
-    /// Of these, those whose error has a bound.
+    /// Checked axes with a bound of the following error.
     pub bounded: u64,
-    /// Largest error relative to its bound, and the trajectory.
+    /// Largest error relative to its bound, and the number of its trajectory.
     pub error: (f64, u64),
-    /// Largest difference between an error and that of the linear loop, relative to what rounding is allowed, and
-    /// the trajectory.
+    /// Largest difference between an error and the linear loop, relative to the allowed rounding error, and the number of
+    /// its trajectory.
     pub mismatch: (f64, u64),
-    /// Largest imbalance of energy in a tick, relative to what rounding is allowed, and the trajectory.
+    /// Largest energy imbalance of a tick relative to the allowed rounding error, and the number of its trajectory.
     pub imbalance: (f64, u64),
-    /// Energy that came in, J.
+    /// Supplied energy, J.
     pub supplied: f64,
-    /// Energy that friction took, J.
+    /// Energy dissipated by friction, J.
     pub dissipated: f64,
-    /// Energy that friction gave back over ticks of a standstill, J.
+    /// Energy returned by friction over ticks with a standstill, J.
     pub returned: f64,
-    /// Trajectories with faults.
-    pub faulty: u64,
-    /// The first faults.
-    pub faults: Vec<Fault>,
+    /// Number of trajectories with violations.
+    pub violating: u64,
+    /// First violations.
+    pub violations: Vec<Violation>,
     hasher: Hasher,
 }
 
-impl Summary {
-    /// Of nothing yet.
-    pub(super) fn new(fleet: &Fleet) -> Self {
-        Summary {
+impl StressSummary {
+    /// Creates an empty summary.
+    pub(super) fn new(machines: &TestMachines) -> Self {
+        StressSummary {
             run: 0,
             kinds: BTreeMap::new(),
-            variants: vec![0; fleet.variants().len()],
+            variants: vec![0; machines.variants().len()],
             loaded: 0,
             limited: 0,
             time: 0.0,
@@ -76,26 +76,26 @@ impl Summary {
             supplied: 0.0,
             dissipated: 0.0,
             returned: 0.0,
-            faulty: 0,
-            faults: Vec::new(),
+            violating: 0,
+            violations: Vec::new(),
             hasher: Hasher::new(),
         }
     }
 
-    /// Adds the trajectory that comes next.
-    pub(super) fn add(&mut self, fleet: &Fleet, record: &Record) {
+    /// Adds the next trajectory.
+    pub(super) fn add(&mut self, machines: &TestMachines, record: &TestRecord) {
         self.hasher.update(&record.digest);
         self.run += 1;
-        if !record.faults.is_empty() {
-            self.faulty += 1;
-            let room = KEPT - self.faults.len();
-            self.faults.extend(record.faults.iter().take(room).cloned());
+        if !record.violations.is_empty() {
+            self.violating += 1;
+            let free = MAX_VIOLATIONS - self.violations.len();
+            self.violations.extend(record.violations.iter().take(free).cloned());
         }
-        // One that was refused has no more than that to tell.
-        let Some((place, kind)) = record.ran else { return };
-        let variant = &fleet.variants()[place];
+        // A rejected trajectory has no other results.
+        let Some((index, kind)) = record.ran else { return };
+        let variant = &machines.variants()[index];
         *self.kinds.entry(kind).or_default() += 1;
-        self.variants[place] += 1;
+        self.variants[index] += 1;
         self.loaded += u64::from(record.loaded);
         self.limited += u64::from(record.axes.iter().any(|axis| axis.limited_ticks > 0));
         self.time += record.periods as f64 * seconds(variant.period());
@@ -109,7 +109,7 @@ impl Summary {
             self.axes += 1;
             if let Some(bound) = axis.bound {
                 self.bounded += 1;
-                larger(&mut self.error, if bound > SEEN { axis.error / bound } else { 0.0 });
+                larger(&mut self.error, if bound > MIN_BOUND { axis.error / bound } else { 0.0 });
             }
             larger(&mut self.mismatch, axis.mismatch);
             larger(&mut self.imbalance, axis.imbalance);
@@ -119,7 +119,7 @@ impl Summary {
         }
     }
 
-    /// BLAKE3 over the digests of the trajectories, in the order of their numbers.
+    /// Returns the BLAKE3 hash of the digests of the trajectories, in the order of their numbers, as hexadecimal text.
     pub fn digest(&self) -> String {
         self.hasher.finalize().to_hex().to_string()
     }

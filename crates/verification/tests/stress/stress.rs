@@ -1,78 +1,81 @@
-//! Random trajectories: every check holds, each check of a tick can fail, and the digest depends on the seed alone.
+//! RandomSource trajectories: every check passes, each check detects an injected violation, and the digest depends on the
+//! seed only.
 
 use std::process::{Command, Output};
 use std::sync::LazyLock;
 
 use virtual_axes_core::machine::{AxisSample, SimdWidth};
-use virtual_axes_verification::stress::{Bench, Check, Fleet, Kind, Options, Summary, run};
+use virtual_axes_verification::stress::{
+    Check, StressOptions, StressSummary, TestMachines, TrajectoryKind, TrajectoryTest, run,
+};
 
-/// Trajectories of a test.
+/// Number of trajectories per test.
 const COUNT: u64 = if cfg!(debug_assertions) { 400 } else { 4000 };
 
-static FLEET: LazyLock<Fleet> =
-    LazyLock::new(|| Fleet::shipped().expect("the shipped machines take all controllers"));
+static MACHINES: LazyLock<TestMachines> =
+    LazyLock::new(|| TestMachines::shipped().expect("the shipped machines take all controllers"));
 
-fn options(count: u64) -> Options {
-    Options { seed: 7, first: 0, count, threads: 2, width: SimdWidth::Widest }
+fn options(count: u64) -> StressOptions {
+    StressOptions { seed: 7, first: 0, count, threads: 2, width: SimdWidth::Widest }
 }
 
-fn stressed(options: Options) -> Summary {
-    run(&FLEET, &options, |_| Ok(())).expect("nobody ends it")
+fn stressed(options: StressOptions) -> StressSummary {
+    run(&MACHINES, &options, |_| Ok(())).expect("the stress test runs to its end")
 }
 
 #[test]
 fn random_trajectories_pass_every_check() {
     let summary = stressed(options(COUNT));
-    assert!(summary.faults.is_empty(), "{:#?}", summary.faults);
+    assert!(summary.violations.is_empty(), "{:#?}", summary.violations);
     assert_eq!(summary.run, COUNT);
-    // Of everything there is something.
-    assert_eq!(summary.kinds.len(), Kind::ALL.len());
+    // Each kind and each machine variant occurs.
+    assert_eq!(summary.kinds.len(), TrajectoryKind::ALL.len());
     assert!(summary.variants.iter().all(|count| *count > 0), "{:?}", summary.variants);
     assert!(summary.limited > COUNT / 100 && summary.limited < COUNT, "{}", summary.limited);
     assert!(summary.bounded * 5 > summary.axes * 4, "{} of {}", summary.bounded, summary.axes);
-    // The bound is not far from what happens.
+    // The bound is tight.
     assert!(summary.error.0 > 0.3 && summary.error.0 <= 1.0 + 1e-6, "{:?}", summary.error);
     assert!(summary.dissipated > 1e3 * summary.returned, "{} J, {} J", summary.dissipated, summary.returned);
 }
 
 #[test]
-fn the_digest_follows_from_the_seed_alone() {
+fn digest_depends_on_the_seed_only() {
     let count = COUNT / 4;
-    let digest = |options: Options| stressed(options).digest();
+    let digest = |options: StressOptions| stressed(options).digest();
     let one = digest(options(count));
     assert_eq!(one, digest(options(count)));
-    assert_eq!(one, digest(Options { threads: 1, ..options(count) }));
-    assert_eq!(one, digest(Options { threads: 5, ..options(count) }));
-    assert!(one != digest(Options { seed: 8, ..options(count) }));
+    assert_eq!(one, digest(StressOptions { threads: 1, ..options(count) }));
+    assert_eq!(one, digest(StressOptions { threads: 5, ..options(count) }));
+    assert!(one != digest(StressOptions { seed: 8, ..options(count) }));
     let few = digest(options(count / 4));
     for width in [SimdWidth::Four, SimdWidth::Baseline] {
-        assert_eq!(few, digest(Options { width, ..options(count / 4) }), "{width:?}");
+        assert_eq!(few, digest(StressOptions { width, ..options(count / 4) }), "{width:?}");
     }
 }
 
 #[test]
-fn a_trajectory_is_the_same_alone() {
-    let mut bench = Bench::new(&FLEET, 7, SimdWidth::Widest);
-    let all: Vec<_> = (0..100).map(|number| bench.run(number).expect("runs")).collect();
+fn single_trajectory_is_bit_identical_to_the_one_of_a_series() {
+    let mut test = TrajectoryTest::new(&MACHINES, 7, SimdWidth::Widest);
+    let all: Vec<_> = (0..100).map(|number| test.run(number).expect("runs")).collect();
     for number in (0..100).rev().step_by(7) {
-        let alone = Bench::new(&FLEET, 7, SimdWidth::Widest).run(number).expect("runs");
+        let alone = TrajectoryTest::new(&MACHINES, 7, SimdWidth::Widest).run(number).expect("runs");
         assert_eq!(alone, all[number as usize]);
     }
 }
 
-/// That `check` finds what `alter` does to the samples of one of many trajectories, none of which has a fault.
+/// Asserts that `check` detects what `alter` does to the samples of one of many valid trajectories.
 #[track_caller]
 fn assert_found(check: Check, mut alter: impl FnMut(usize, usize, &mut AxisSample)) {
-    let mut bench = Bench::new(&FLEET, 7, SimdWidth::Widest);
+    let mut test = TrajectoryTest::new(&MACHINES, 7, SimdWidth::Widest);
     let mut found = |number: u64| {
-        let record = bench.run_altered(number, &mut alter).expect("runs");
-        record.faults.iter().any(|fault| fault.check == check)
+        let record = test.run_altered(number, &mut alter).expect("runs");
+        record.violations.iter().any(|violation| violation.check == check)
     };
     assert!((0..200).any(&mut found), "{check:?} is not found");
 }
 
 #[test]
-fn a_number_that_is_none_is_found() {
+fn non_finite_signal_is_detected() {
     assert_found(Check::Finite, |axis, tick, s| {
         if (axis, tick) == (1, 200) {
             s.voltage = f64::NAN
@@ -86,7 +89,7 @@ fn a_number_that_is_none_is_found() {
 }
 
 #[test]
-fn a_limit_that_does_not_hold_or_is_not_told_is_found() {
+fn exceeded_or_unreported_limit_is_detected() {
     assert_found(Check::Limits, |_, tick, s| {
         if tick == 99 {
             s.current_setpoint = 1e3
@@ -111,14 +114,14 @@ fn a_limit_that_does_not_hold_or_is_not_told_is_found() {
 }
 
 #[test]
-fn friction_that_drives_is_found() {
+fn driving_friction_is_detected() {
     assert_found(Check::FrictionSign, |_, _, s| s.friction_current = -s.friction_current);
     assert_found(Check::FrictionWork, |_, _, s| s.friction_current = -s.friction_current);
     assert_found(Check::FrictionLaw, |_, _, s| s.friction_current *= 1.0 + 1e-9);
 }
 
 #[test]
-fn energy_from_nowhere_is_found() {
+fn energy_imbalance_is_detected() {
     // A part in 10¹⁰ of the speed at one tick.
     assert_found(Check::Energy, |_, tick, s| {
         if tick == 500 {
@@ -134,7 +137,7 @@ fn energy_from_nowhere_is_found() {
 }
 
 #[test]
-fn an_error_that_theory_does_not_know_is_found() {
+fn following_error_off_the_linear_model_is_detected() {
     // A nanometer.
     assert_found(Check::Superposition, |_, _, s| s.delayed_psec += 1e-9);
     assert_found(Check::Bound, |_, _, s| s.delayed_psec += 0.1);
@@ -145,7 +148,7 @@ fn command(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn the_command_runs_many_and_shows_one() {
+fn command_runs_many_trajectories_and_prints_one() {
     let output = command(&["--count", "200", "--seed", "7", "--json"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");

@@ -1,4 +1,4 @@
-//! Kinematics, drive, control, design, machine: what is computed at ticks and at position instants.
+//! Benchmarks of kinematics, drive, control, design and machine.
 
 use std::cell::LazyCell;
 use std::f64::consts::TAU;
@@ -21,14 +21,15 @@ use virtual_axes_core::units::{POSITION_GAIN, seconds};
 
 use crate::{bench, shipped, swing};
 
-/// Ticks, instants or poses of one iteration.
+/// Ticks, cycles or poses per iteration.
 const MANY: usize = 1000;
-/// Position periods of one iteration of a machine.
+/// Position periods per iteration of a machine.
 const PERIODS: usize = 100;
-/// The preset of the paper.
+/// Controller tuning of the paper.
 const TUNING: GpcTuning = GpcTuning { n1: 1, n2: 15, nu: 1, weight: ControlWeight::Relative(0.01) };
 
-/// Of the X axis of the shipped machine: friction, Kt (N·m/A), r (m/rad), loops, largest current (A).
+/// Friction of the X axis of the shipped machine; the constants below are its Kt (N·m/A), r (m/rad), loops and largest
+/// current (A).
 const FRICTION: FrictionConfig = FrictionConfig { a: 1.576, b: 0.01965, c: -0.5332, d: -0.2801, i0: 1.043 };
 const TORQUE_CONSTANT: f64 = 2.64;
 const RATIO: f64 = 0.020 / TAU;
@@ -49,7 +50,7 @@ fn kinematics(criterion: &mut Criterion) {
     let kinematics = Kinematics::new(&shipped());
     let axes = 5;
     let joints: Vec<f64> = (0..MANY).flat_map(|k| (0..axes).map(move |axis| swing(axis, k))).collect();
-    // One axis behind the other.
+    // Column-major: all values of an axis, then of the next.
     let columns: Vec<f64> = (0..axes).flat_map(|axis| (0..MANY).map(move |k| swing(axis, k))).collect();
     let poses: Vec<_> = joints.chunks(axes).map(|joints| kinematics.forward(joints)).collect();
     let mut group = criterion.benchmark_group("kinematics, poses");
@@ -160,10 +161,10 @@ fn machine(criterion: &mut Criterion) {
     for (width, name) in [(SimdWidth::Widest, "widest vectors"), (SimdWidth::Baseline, "baseline vectors")] {
         let counts: &[usize] = if width == SimdWidth::Widest { &[1, 4, 5, 8, 32] } else { &[1, 5, 8] };
         for &axes in counts {
-            let places: Vec<usize> = (0..axes).map(|axis| axis % config.axes().len()).collect();
+            let indices: Vec<usize> = (0..axes).map(|axis| axis % config.axes().len()).collect();
             let machine = LazyCell::new(|| {
                 let parameters =
-                    MachineParameters::from_axes(&config, &places).expect("it can be discretized");
+                    MachineParameters::from_axes(&config, &indices).expect("it can be discretized");
                 let mut machine = Machine::new(Arc::new(parameters));
                 machine.set_simd_width(width);
                 machine
@@ -172,7 +173,7 @@ fn machine(criterion: &mut Criterion) {
                 (0..PERIODS).map(|k| (0..axes).map(|axis| swing(axis, k)).collect()).collect();
             let mut machine = machine;
             bench(&mut group, &format!("{axes} axes, {name}"), axes * ticks * PERIODS, || {
-                // Each iteration begins where the axes are at rest.
+                // Each iteration starts at rest.
                 machine.reset(&psec[0]);
                 psec.iter().for_each(|psec| machine.advance(psec, &[]));
                 machine.position(0, 0)
@@ -181,7 +182,7 @@ fn machine(criterion: &mut Criterion) {
     }
     let mut five = Machine::new(Arc::new(MachineParameters::new(&config).expect("it can be discretized")));
     let psec: Vec<Vec<f64>> = (0..PERIODS).map(|k| (0..5).map(|axis| swing(axis, k)).collect()).collect();
-    bench(&mut group, "5 axes, every tick shown", 5 * ticks * PERIODS, || {
+    bench(&mut group, "5 axes, every tick observed", 5 * ticks * PERIODS, || {
         five.reset(&psec[0]);
         psec.iter().for_each(|psec| five.advance_with(psec, &[], |machine| _ = black_box(machine.axes())));
     });

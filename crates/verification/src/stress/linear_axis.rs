@@ -1,5 +1,5 @@
-//! The loops of an axis without friction and limits, simulated once more: an implementation apart from the library's
-//! step, straight from the equations (Prévost fig. 3, eqs. 1 and 6 to 9).
+//! Linear reference simulation of an axis without friction and limits, independent of the library's step
+//! (Prévost fig. 3, eqs. 1 and 6 to 9).
 
 use nalgebra::SMatrix;
 
@@ -7,18 +7,18 @@ use super::exponential::exponential;
 use virtual_axes_core::config::{AxisConfig, Periods, PositionControllerConfig};
 use virtual_axes_core::control::Rst;
 use virtual_axes_core::drive::Plant;
-use virtual_axes_core::machine::{AxisError, designed, prediction_model};
+use virtual_axes_core::machine::{AxisError, design_controller, prediction_model};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// i, ω, θ and the integrals of the velocity and the current loop.
+/// Number of states: i, ω, θ and the integrals of the velocity and the current controller.
 pub const STATES: usize = 5;
-/// Their values.
-pub type State = [f64; STATES];
+/// LoopState of the three loops.
+pub type LoopState = [f64; STATES];
 
-/// One axis as a linear system, sampled at three rates.
+/// Linear model of one axis, sampled at three rates.
 #[derive(Debug, Clone)]
 pub struct LinearAxis {
-    /// What i, ω, θ, u and τ make of i, ω and θ over a tick.
+    /// Transition matrix of a tick: (i, ω, θ, u, τ) → (i, ω, θ).
     step: [[f64; 5]; 3],
     ratio: f64,
     velocity_gain: f64,
@@ -32,19 +32,19 @@ pub struct LinearAxis {
     alpha: i64,
     beta: i64,
     gamma: i64,
-    /// Ticks of a position period.
+    /// Ticks per position period.
     pub ticks: usize,
-    /// Ticks of a velocity period.
+    /// Ticks per velocity period.
     pub velocity_ticks: usize,
 }
 
 impl LinearAxis {
-    /// The axis, with the position controller that is designed for it.
+    /// Creates the model of `axis` with its position controller.
     ///
     /// # Errors
-    /// [`AxisError`] if it has none.
+    /// [`AxisError`] if the controller cannot be designed.
     pub fn new(axis: &AxisConfig, periods: &Periods) -> Result<Self, AxisError> {
-        let (motor, nominal) = (Plant::motor(axis), &axis.motor);
+        let (motor, nominal) = (Plant::deviating_motor(axis), &axis.motor);
         let tick = seconds(periods.current);
         let mut moving = SMatrix::<f64, 5, 5>::zeros();
         moving[(0, 0)] = -motor.resistance / motor.inductance;
@@ -54,7 +54,7 @@ impl LinearAxis {
         moving[(1, 4)] = 1.0 / motor.inertia;
         moving[(2, 1)] = 1.0;
         let step = exponential(&(moving * tick));
-        let law = designed(axis, &prediction_model(axis, periods)?)?;
+        let law = design_controller(axis, &prediction_model(axis, periods)?)?;
         let is_cascade = axis.position_loop.controller == PositionControllerConfig::Cascade;
         let weight = |weight: f64| if is_cascade { weight } else { 0.0 };
         let (period, r) = (seconds(periods.position), axis.transmission_ratio);
@@ -70,7 +70,7 @@ impl LinearAxis {
             current_integral_gain: current.gain * tick / current.integral_time,
             law,
             velocity_feedforward: weight(axis.feedforward.velocity) / period / r,
-            // Where friction is compensated both come together, as `feedforward` of `errors`.
+            // With friction compensation both feedforward torques are an input of the response.
             torque_feedforward: if axis.feedforward.friction == 0.0 {
                 weight(axis.feedforward.torque) / (period * period) / r
             } else {
@@ -84,48 +84,48 @@ impl LinearAxis {
         })
     }
 
-    /// Setpoints ahead of the present one that the controller reads.
-    pub fn ahead(&self) -> usize {
+    /// Returns the preview: setpoints ahead of the present one that the controller reads.
+    pub fn preview(&self) -> usize {
         let delay = -(-self.alpha).div_euclid(self.ticks as i64);
         (self.law.preview() - delay).max(0) as usize
     }
 
-    /// Whether the controller has integral action, and with it a guard that is not linear.
-    pub fn is_guarded(&self) -> bool {
+    /// Returns true if the controller has integral action, and so a nonlinear fallback controller.
+    pub fn has_fallback(&self) -> bool {
         self.law.has_integral_action()
     }
 
-    /// The synchronized tracking error at the first `periods` position instants, m or rad, from rest at 0 under
-    /// setpoints `psec(k)`, m or rad.
+    /// Returns the delay-compensated following error at the first `periods` position cycles, m or rad, from rest at 0
+    /// with setpoints `psec(k)`, m or rad.
     pub fn errors(&self, periods: usize, psec: impl Fn(i64) -> f64) -> Vec<f64> {
         self.run([0.0; STATES], periods, psec, |_| 0.0, |_| 0.0).0
     }
 
-    /// Likewise without setpoints, from a state that came of nothing that the position controller has seen.
-    pub fn free(&self, state: State, periods: usize) -> Vec<f64> {
+    /// Returns the free response: the error from `state` with setpoints 0 and an empty controller history, m or rad.
+    pub fn free(&self, state: LoopState, periods: usize) -> Vec<f64> {
         self.run(state, periods, |_| 0.0, |_| 0.0, |_| 0.0).0
     }
 
-    /// The state after a position period with 1 N·m at the motor over tick `at`.
-    pub fn after_torque(&self, at: usize) -> State {
+    /// Returns the state after a position period with 1 N·m at the motor during tick `at`.
+    pub fn after_torque(&self, at: usize) -> LoopState {
         self.run([0.0; STATES], 1, |_| 0.0, |n| if n == at { 1.0 } else { 0.0 }, |_| 0.0).1
     }
 
-    /// The state after a position period with 1 N·m of torque feedforward at instant `at` of the velocity loop.
-    pub fn after_feedforward(&self, at: usize) -> State {
+    /// Returns the state after a position period with 1 N·m of torque feedforward at velocity cycle `at`.
+    pub fn after_feedforward(&self, at: usize) -> LoopState {
         self.run([0.0; STATES], 1, |_| 0.0, |_| 0.0, |m| if m == at { 1.0 } else { 0.0 }).1
     }
 
-    /// Errors, and the state in the end. `torque(n)` acts on the motor over tick n besides its current, N·m,
-    /// `feedforward(m)` on top of the axis's own at instant m of the velocity loop, N·m.
+    /// Returns the errors and the final state. `torque(n)` is an additional motor torque during tick n, N·m;
+    /// `feedforward(m)` is an additional torque feedforward at velocity cycle m, N·m.
     fn run(
         &self,
-        state: State,
+        state: LoopState,
         periods: usize,
         psec: impl Fn(i64) -> f64,
         torque: impl Fn(usize) -> f64,
         feedforward: impl Fn(usize) -> f64,
-    ) -> (Vec<f64>, State) {
+    ) -> (Vec<f64>, LoopState) {
         let ticks = self.ticks as i64;
         let [current, speed, angle, mut integral, mut voltage_integral] = state;
         let mut motor = [current, speed, angle];
@@ -136,9 +136,10 @@ impl LinearAxis {
             errors.push(psec(delayed) - self.ratio * motor[2]);
             angles.rotate_right(1);
             angles[0] = motor[2];
-            let ahead = (delayed + self.law.t_first()..).map(|j| psec(j) / self.ratio);
-            let asked: f64 = self.law.t().iter().zip(ahead).map(|(weight, value)| weight * value).sum();
-            let command = asked - weighted(self.law.r(), &angles) - weighted(&self.law.s()[1..], &commands);
+            let preview = (delayed + self.law.t_first()..).map(|j| psec(j) / self.ratio);
+            let setpoint: f64 = self.law.t().iter().zip(preview).map(|(weight, value)| weight * value).sum();
+            let command =
+                setpoint - weighted(self.law.r(), &angles) - weighted(&self.law.s()[1..], &commands);
             commands.rotate_right(1);
             commands[0] = command;
             let mut current_setpoint = 0.0;
@@ -152,8 +153,8 @@ impl LinearAxis {
                     let error = command + speed - motor[1];
                     integral += self.velocity_integral_gain * error;
                     let more = feedforward(now as usize / self.velocity_ticks);
-                    let wanted = self.velocity_gain * error + integral + own + more;
-                    current_setpoint = wanted * self.inverse_torque_constant;
+                    let torque_setpoint = self.velocity_gain * error + integral + own + more;
+                    current_setpoint = torque_setpoint * self.inverse_torque_constant;
                 }
                 let error = current_setpoint - motor[0];
                 voltage_integral += self.current_integral_gain * error;

@@ -1,49 +1,49 @@
-//! An axis under observation over a whole trajectory.
+//! Checks the invariants of one axis over a whole trajectory.
 
-use super::drive::{Broken, DriveWatch};
-use super::fault::Check;
-use super::fleet::{MOST_TICKS, Theory};
-use super::response::{Inputs, ORDERS};
+use super::check::Check;
+use super::drive_checker::{DriveChecker, FailedCheck};
+use super::response::{ORDERS, ResponseInputs};
+use super::test_machines::{MAX_TICKS, ReferenceModel};
 use virtual_axes_core::config::{AxisConfig, LimitsConfig, Periods};
-use virtual_axes_core::machine::{Activity, AxisSample, REST_AFTER};
+use virtual_axes_core::machine::{Activity, AxisSample, FALLBACK_DELAY};
 use virtual_axes_core::trajectory::limits::SPEED_TOLERANCE;
 use virtual_axes_core::units::seconds;
 
-/// Rounding of an error, relative to its bound, and to the position: that of thousands of ticks.
+/// Allowed rounding error of thousands of ticks, relative to the error bound and to the largest position.
 const ROUNDING: (f64, f64) = (1e-9, 1e-12);
 
-/// What an axis came to.
+/// Observed figures of one axis over a trajectory.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct AxisFigures {
+pub struct AxisObservation {
     /// Ticks at a limit.
     pub limited_ticks: u64,
     /// Largest |i|, A.
     pub peak_current: f64,
-    /// Largest synchronized tracking error at a position instant, m or rad.
+    /// Largest delay-compensated following error at a position cycle, m or rad.
     pub error: f64,
-    /// Its bound, m or rad; none where the loop was not linear: a limit acted, or the guard.
+    /// Bound of the error, m or rad; `None` if a limit or the fallback controller acted, so that the loop was not linear.
     pub bound: Option<f64>,
-    /// How far the error is from what the impulse responses make, relative to what rounding is allowed.
+    /// Difference of the error from the superposition of the impulse responses, relative to the allowed rounding error.
     pub mismatch: f64,
-    /// Energy that came in, J.
+    /// Supplied energy, J.
     pub supplied: f64,
-    /// Energy that friction took, J.
+    /// Energy dissipated by friction, J.
     pub dissipated: f64,
-    /// Energy that friction gave back over ticks of a standstill, J.
+    /// Energy returned by friction over ticks with a standstill, J.
     pub returned: f64,
-    /// Largest imbalance of energy in a tick, relative to what rounding is allowed.
+    /// Largest energy imbalance of a tick relative to the allowed rounding error.
     pub imbalance: f64,
-    /// Where it ended: m or rad, m/s or rad/s, A, V, A.
+    /// Final position (m or rad), velocity (m/s or rad/s), current (A), voltage (V) and current setpoint (A).
     pub end: [f64; 5],
 }
 
-/// One axis.
+/// Checker of the invariants of one axis.
 #[derive(Debug, Clone)]
-pub struct AxisWatch {
-    pub drive: DriveWatch,
+pub struct InvariantChecker {
+    pub drive: DriveChecker,
     limits: LimitsConfig,
     period: f64,
-    /// [`REST_AFTER`], position periods: the loop is linear until then.
+    /// [`FALLBACK_DELAY`] in position periods, during which the loop is linear.
     rest_after: usize,
     velocity_ticks: usize,
     gravity: f64,
@@ -56,35 +56,35 @@ pub struct AxisWatch {
     ticks: usize,
     limited_ticks: u64,
     peak_current: f64,
-    of_period: (u64, f64),
+    period_figures: (u64, f64),
     last: AxisSample,
 }
 
-impl AxisWatch {
-    /// An axis of which `theory` is known.
-    pub fn new(axis: &AxisConfig, periods: &Periods, theory: &Theory) -> Self {
-        AxisWatch {
-            drive: DriveWatch::new(axis, seconds(periods.current), &theory.energy),
+impl InvariantChecker {
+    /// Creates a checker for `axis` with its reference model.
+    pub fn new(axis: &AxisConfig, periods: &Periods, model: &ReferenceModel) -> Self {
+        InvariantChecker {
+            drive: DriveChecker::new(axis, seconds(periods.current), &model.energy),
             limits: axis.limits,
             period: seconds(periods.position),
-            rest_after: (REST_AFTER / periods.position) as usize,
+            rest_after: (FALLBACK_DELAY / periods.position) as usize,
             velocity_ticks: periods.ticks_per_velocity() as usize,
             gravity: 0.0,
             psec: 0.0,
             farthest: 0.0,
             steps: Vec::new(),
             errors: Vec::new(),
-            torque: Vec::with_capacity(MOST_TICKS),
+            torque: Vec::with_capacity(MAX_TICKS),
             feedforward: Vec::new(),
             ticks: 0,
             limited_ticks: 0,
             peak_current: 0.0,
-            of_period: (0, 0.0),
+            period_figures: (0, 0.0),
             last: AxisSample::default(),
         }
     }
 
-    /// Another trajectory begins, at `position`, m or rad.
+    /// Resets the checker for the next trajectory, which starts at `position`, m or rad.
     pub fn begin(&mut self, position: f64) {
         self.drive.begin();
         for list in [&mut self.steps, &mut self.errors, &mut self.torque, &mut self.feedforward] {
@@ -92,18 +92,23 @@ impl AxisWatch {
         }
         (self.psec, self.farthest, self.gravity) = (position, position.abs(), 0.0);
         (self.ticks, self.limited_ticks, self.peak_current) = (0, 0, 0.0);
-        self.of_period = (0, 0.0);
+        self.period_figures = (0, 0.0);
         self.last = AxisSample { position, ..AxisSample::default() };
     }
 
-    /// Ticks that were seen.
+    /// Returns the number of checked ticks.
     pub fn ticks(&self) -> usize {
         self.ticks
     }
 
-    /// A tick; `instant` tells the first of a position period, `second` the one behind it.
-    pub fn see(&mut self, s: &AxisSample, [instant, second]: [bool; 2], broken: &mut impl FnMut(Broken)) {
-        let [friction, against] = self.drive.see(s, second, broken);
+    /// Checks one tick. `instant` is true at the first tick of a position period, `second` at the second.
+    pub fn check_tick(
+        &mut self,
+        s: &AxisSample,
+        [instant, second]: [bool; 2],
+        report: &mut impl FnMut(FailedCheck),
+    ) {
+        let [friction, against] = self.drive.check_tick(s, second, report);
         if self.ticks == 0 {
             self.gravity = against;
         } else {
@@ -114,54 +119,55 @@ impl AxisWatch {
             let most = self.limits.velocity * self.period * (1.0 + 2.0 * SPEED_TOLERANCE)
                 + 2.0 * f64::EPSILON * s.psec.abs();
             if step.abs() > most {
-                broken((Check::SetpointSpeed, step, most));
+                report((Check::SetpointSpeed, step, most));
             }
             self.psec = s.psec;
             self.steps.push(step);
-            self.errors.push(s.synchronized_tracking_error());
-            self.of_period = (0, 0.0);
+            self.errors.push(s.delay_compensated_following_error());
+            self.period_figures = (0, 0.0);
         }
         if self.ticks.is_multiple_of(self.velocity_ticks) {
             self.feedforward.push(s.torque_feedforward);
         }
-        self.of_period.0 += u64::from(self.drive.is_at_limit(s));
-        self.of_period.1 = self.of_period.1.max(s.current.abs());
+        self.period_figures.0 += u64::from(self.drive.is_at_limit(s));
+        self.period_figures.1 = self.period_figures.1.max(s.current.abs());
         self.farthest = self.farthest.max(s.position.abs());
         self.ticks += 1;
         self.last = *s;
     }
 
-    /// The end of a position period, of which the machine says this.
-    pub fn end_period(&mut self, activity: &Activity, broken: &mut impl FnMut(Broken)) {
-        let (limited, peak) = self.of_period;
+    /// Compares the figures of the ended position period with the machine's `activity`.
+    pub fn end_period(&mut self, activity: &Activity, report: &mut impl FnMut(FailedCheck)) {
+        let (limited, peak) = self.period_figures;
         if activity.saturated_ticks != limited {
-            broken((Check::Counted, activity.saturated_ticks as f64, limited as f64));
+            report((Check::Counted, activity.saturated_ticks as f64, limited as f64));
         }
         if activity.peak_current != peak {
-            broken((Check::Counted, activity.peak_current, peak));
+            report((Check::Counted, activity.peak_current, peak));
         }
         self.limited_ticks += limited;
         self.peak_current = self.peak_current.max(peak);
     }
 
-    /// Ticks at a limit in the position period that ended last.
+    /// Returns the ticks at a limit in the last position period.
     pub fn limited_in_period(&self) -> u64 {
-        self.of_period.0
+        self.period_figures.0
     }
 
-    /// The end of the trajectory. `foreseen`: the setpoints came as they could be foreseen; `loaded`: the axis met a
-    /// load.
+    /// Checks the following error at the end of the trajectory and returns the figures of the axis.
+    ///
+    /// `is_preview_exact` is true if the preview of the setpoints was correct, `loaded` if a load acted on the axis.
     pub fn finish(
         &self,
-        theory: &Theory,
-        foreseen: bool,
+        model: &ReferenceModel,
+        is_preview_exact: bool,
         loaded: bool,
-        broken: &mut impl FnMut(Broken),
-    ) -> AxisFigures {
-        let instants = self.linear_instants(theory, foreseen, loaded);
+        report: &mut impl FnMut(FailedCheck),
+    ) -> AxisObservation {
+        let instants = self.linear_instants(model, is_preview_exact, loaded);
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
         let s = &self.last;
-        let mut figures = AxisFigures {
+        let mut figures = AxisObservation {
             limited_ticks: self.limited_ticks,
             peak_current: self.peak_current,
             error: largest(&self.errors),
@@ -174,7 +180,7 @@ impl AxisWatch {
             end: [s.position, s.velocity, s.current, s.voltage, s.current_setpoint],
         };
         let Some(last) = instants.checked_sub(1) else { return figures };
-        let feedforward: &[f64] = if theory.compensated { &self.feedforward } else { &[] };
+        let feedforward: &[f64] = if model.is_compensated { &self.feedforward } else { &[] };
         let mut differences = [0.0; ORDERS];
         let mut before = [0.0; ORDERS];
         for &step in &self.steps {
@@ -184,34 +190,37 @@ impl AxisWatch {
                 value -= std::mem::replace(before, value);
             }
         }
-        let bound = theory.response.bound(last, differences, largest(&self.torque), largest(feedforward));
+        let bound = model.response.bound(last, differences, largest(&self.torque), largest(feedforward));
         let rounding = ROUNDING.0 * bound + ROUNDING.1 * self.farthest;
         let errors = &self.errors[..instants];
         figures.error = largest(errors);
         figures.bound = Some(bound);
         if figures.error.is_nan() || figures.error > bound + rounding {
-            broken((Check::Bound, figures.error, bound));
+            report((Check::Bound, figures.error, bound));
         }
-        let inputs = Inputs { steps: &self.steps, torque: &self.torque, feedforward };
+        let inputs = ResponseInputs { steps: &self.steps, torque: &self.torque, feedforward };
         let worst =
             (0..instants).max_by(|&i, &j| errors[i].abs().total_cmp(&errors[j].abs())).unwrap_or(last);
         for k in [worst, last] {
-            let off = (theory.response.error(k, &inputs) - errors[k]).abs();
+            let off = (model.response.error(k, &inputs) - errors[k]).abs();
             if off.is_nan() || off > rounding {
-                broken((Check::Superposition, off, rounding));
+                report((Check::Superposition, off, rounding));
             }
             figures.mismatch = figures.mismatch.max(off / rounding);
         }
         figures
     }
 
-    /// How many of the first position instants are those of the linear loop.
-    fn linear_instants(&self, theory: &Theory, foreseen: bool, loaded: bool) -> usize {
-        let known = self.errors.len().min(theory.response.periods());
-        if self.limited_ticks > 0 || (!foreseen && theory.ahead > 0) || (theory.guarded && loaded) {
+    /// Returns the number of leading position cycles in which the loop is linear.
+    fn linear_instants(&self, model: &ReferenceModel, is_preview_exact: bool, loaded: bool) -> usize {
+        let known = self.errors.len().min(model.response.periods());
+        if self.limited_ticks > 0
+            || (!is_preview_exact && model.preview > 0)
+            || (model.has_fallback && loaded)
+        {
             return 0;
         }
-        if !theory.guarded {
+        if !model.has_fallback {
             return known;
         }
         let mut moved = None;

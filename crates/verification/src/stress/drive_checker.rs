@@ -1,24 +1,24 @@
-//! The checks of a drive tick by tick: numbers, limits, friction, energy.
+//! Checks of a drive at every tick: finite signals, limits, friction, energy balance.
 
-use super::energy::{DriveEnergy, Held};
-use super::fault::Check;
+use super::check::Check;
+use super::energy::{DriveEnergy, HeldInputs};
 use virtual_axes_core::config::{AxisConfig, AxisKind, FrictionConfig};
 use virtual_axes_core::drive::Plant;
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::units::{METER_PER_MINUTE, RPM};
 
-/// Rounding of a balance, relative to the sum of its terms by their sizes: some hundred operations, and entries of
-/// matrix exponentials.
+/// Rounding error of a balance relative to the sum of the magnitudes of its terms: some hundred operations, and the
+/// entries of matrix exponentials.
 const ROUNDING: f64 = 1e-13;
-/// How far the library's exponential may be from that of the standard library, relative, and A.
-const LAW: (f64, f64) = (1e-11, 1e-11);
+/// Allowed difference of the friction law from the standard library's exponential: relative, and absolute in A.
+const LAW_TOLERANCE: (f64, f64) = (1e-11, 1e-11);
 
-/// What a check found, and what it allows.
-pub type Broken = (Check, f64, f64);
+/// Violated check, value found and value allowed.
+pub type FailedCheck = (Check, f64, f64);
 
-/// One drive, under observation.
+/// Checker of one drive.
 #[derive(Debug, Clone)]
-pub struct DriveWatch {
+pub struct DriveChecker {
     energy: DriveEnergy,
     friction: FrictionConfig,
     /// Speed of the axis in the unit of the friction law per ω.
@@ -32,34 +32,34 @@ pub struct DriveWatch {
     max_voltage: f64,
     max_speed: f64,
     before: Option<AxisSample>,
-    /// Energy that friction took, J.
+    /// Energy dissipated by friction, J.
     pub dissipated: f64,
-    /// Energy that friction gave back over ticks of a standstill, J.
+    /// Energy returned by friction over ticks with a standstill, J.
     pub returned: f64,
-    /// Energy that came in: by voltage less copper, by gravity and load, J.
+    /// Energy supplied by voltage minus copper losses, by gravity and by load, J.
     pub supplied: f64,
-    /// Largest imbalance of a tick, relative to what rounding is allowed.
+    /// Largest energy imbalance of a tick relative to the allowed rounding error.
     pub imbalance: f64,
 }
 
-/// ∓1 … ±1, and 0 of 0 as of NaN.
+/// Returns the sign of the product: −1, 0 or 1; 0 if a factor is 0.
 fn product_sign(a: f64, b: f64) -> f64 {
     if a == 0.0 || b == 0.0 { 0.0 } else { a.signum() * b.signum() }
 }
 
-impl DriveWatch {
-    /// The drive of `axis` over ticks of `tick` s, with its `energy`.
+impl DriveChecker {
+    /// Creates a checker for the drive of `axis` with ticks of `tick` s and its `energy`.
     pub fn new(axis: &AxisConfig, tick: f64, energy: &DriveEnergy) -> Self {
         let unit = match axis.kind {
             AxisKind::Linear => METER_PER_MINUTE,
             AxisKind::Rotary => RPM,
         };
-        DriveWatch {
+        DriveChecker {
             energy: energy.clone(),
             friction: axis.friction,
             law_speed: axis.transmission_ratio / unit,
             law_torque: axis.motor.torque_constant * axis.deviation.friction,
-            torque_constant: Plant::motor(axis).torque_constant,
+            torque_constant: Plant::deviating_motor(axis).torque_constant,
             ratio: axis.transmission_ratio,
             tick,
             max_current: axis.motor.max_current,
@@ -73,24 +73,29 @@ impl DriveWatch {
         }
     }
 
-    /// Another trajectory begins.
+    /// Resets the checker for the next trajectory.
     pub fn begin(&mut self) {
         self.before = None;
         (self.dissipated, self.returned, self.supplied, self.imbalance) = (0.0, 0.0, 0.0, 0.0);
     }
 
-    /// Whether a setpoint is at its limit.
+    /// Returns true if a setpoint is at its limit.
     pub fn is_at_limit(&self, s: &AxisSample) -> bool {
         s.velocity_setpoint.abs() == self.max_speed
             || s.current_setpoint.abs() == self.max_current
             || s.voltage.abs() == self.max_voltage
     }
 
-    /// Looks at a tick, and tells what is wrong. Whether the friction law is looked at over the tick before is for
-    /// the caller to say, since it costs two exponentials.
+    /// Checks one tick and passes violations to `report`. `law` also checks the friction law over the previous tick, which
+    /// costs two exponentials.
     ///
-    /// What acted over the tick before comes back, N·m: friction, and gravity less load.
-    pub fn see(&mut self, s: &AxisSample, law: bool, broken: &mut impl FnMut(Broken)) -> [f64; 2] {
+    /// Returns the torques of the previous tick, N·m: friction, and gravity minus load.
+    pub fn check_tick(
+        &mut self,
+        s: &AxisSample,
+        law: bool,
+        report: &mut impl FnMut(FailedCheck),
+    ) -> [f64; 2] {
         let sum = s.position
             + s.velocity
             + s.current
@@ -106,7 +111,7 @@ impl DriveWatch {
             + s.psec
             + s.delayed_psec;
         if !sum.is_finite() {
-            broken((Check::Finite, sum, f64::MAX));
+            report((Check::Finite, sum, f64::MAX));
         }
         for (value, limit) in [
             (s.velocity_setpoint, self.max_speed),
@@ -114,39 +119,43 @@ impl DriveWatch {
             (s.voltage, self.max_voltage),
         ] {
             if value.abs() > limit {
-                broken((Check::Limits, value, limit));
+                report((Check::Limits, value, limit));
             }
         }
         let at_limit = self.is_at_limit(s);
         if s.saturated != at_limit {
-            broken((Check::Reported, f64::from(u8::from(s.saturated)), f64::from(u8::from(at_limit))));
+            report((Check::Reported, f64::from(u8::from(s.saturated)), f64::from(u8::from(at_limit))));
         }
         let friction = s.friction_current * self.torque_constant;
         let against = (s.gravity_current + s.load_current) * self.torque_constant;
         if let Some(before) = self.before.replace(*s) {
-            self.tick(&before, s, [friction, against], law, broken);
+            self.tick(&before, s, [friction, against], law, report);
         }
         [friction, against]
     }
 
-    /// The tick between two samples, over which `friction` and `against` (gravity less load) acted.
+    /// Checks the tick between two samples with `friction` and `against` (gravity minus load), N·m.
     fn tick(
         &mut self,
         before: &AxisSample,
         s: &AxisSample,
         [friction, against]: [f64; 2],
         law: bool,
-        broken: &mut impl FnMut(Broken),
+        report: &mut impl FnMut(FailedCheck),
     ) {
         let (speed, end) = (before.velocity / self.ratio, s.velocity / self.ratio);
         if product_sign(friction, end) < 0.0 {
-            broken((Check::FrictionSign, friction, 0.0));
+            report((Check::FrictionSign, friction, 0.0));
         }
         if law {
-            self.friction_law(speed, end, friction, broken);
+            self.friction_law(speed, end, friction, report);
         }
-        let held =
-            Held { current: before.current, speed, voltage: before.voltage, torque: -friction - against };
+        let held = HeldInputs {
+            current: before.current,
+            speed,
+            voltage: before.voltage,
+            torque: -friction - against,
+        };
         let work = self.energy.work(&held);
         let (was, is) = (self.energy.stored(before.current, speed), self.energy.stored(s.current, end));
         let torques = [s.friction_current, s.gravity_current, s.load_current].map(f64::abs);
@@ -155,7 +164,7 @@ impl DriveWatch {
         let allowed = ROUNDING * (was + is + work.size) + blurred;
         let imbalance = (is - was - work.done).abs();
         if imbalance.is_nan() || imbalance > allowed {
-            broken((Check::Energy, imbalance, allowed));
+            report((Check::Energy, imbalance, allowed));
         }
         self.imbalance = self.imbalance.max(if allowed > 0.0 { imbalance / allowed } else { 0.0 });
         let (even, uneven) = (0.5 * self.tick * speed.abs(), self.energy.uneven(&held));
@@ -163,7 +172,7 @@ impl DriveWatch {
         let standing = if product_sign(speed, end) > 0.0 { 0.0 } else { even };
         let lent = friction.abs() * (standing + uneven + self.tick * blur);
         if taken < -lent {
-            broken((Check::FrictionWork, -taken, lent));
+            report((Check::FrictionWork, -taken, lent));
         }
         self.dissipated += taken.max(0.0);
         self.returned -= taken.min(0.0);
@@ -174,20 +183,21 @@ impl DriveWatch {
             + 4.0 * f64::EPSILON * (s.position.abs() + before.position.abs());
         let off = (way - self.ratio * work.turned).abs();
         if off.is_nan() || off > rounding {
-            broken((Check::Position, off, rounding));
+            report((Check::Position, off, rounding));
         }
     }
 
-    /// Friction is i_f(V) at the start of the tick as long as the axis moves at its end, and no more otherwise.
-    fn friction_law(&self, speed: f64, end: f64, friction: f64, broken: &mut impl FnMut(Broken)) {
+    /// Checks that friction equals i_f(V) at the start of the tick if the axis moves at its end, and is at most that
+    /// otherwise.
+    fn friction_law(&self, speed: f64, end: f64, friction: f64, report: &mut impl FnMut(FailedCheck)) {
         let FrictionConfig { a, b, c, d, i0 } = self.friction;
         let v = speed.abs() * self.law_speed;
         let current = if speed == 0.0 { i0 } else { a * (b * v).exp() + c * (d * v).exp() };
         let bound = current.max(0.0) * self.law_torque;
-        let close = LAW.0 * bound + LAW.1 * self.law_torque;
+        let close = LAW_TOLERANCE.0 * bound + LAW_TOLERANCE.1 * self.law_torque;
         let (over, under) = (friction.abs() - bound, bound - friction.abs());
         if over > close || (end != 0.0 && under > close) {
-            broken((Check::FrictionLaw, friction.abs(), bound));
+            report((Check::FrictionLaw, friction.abs(), bound));
         }
     }
 }

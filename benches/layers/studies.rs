@@ -1,4 +1,4 @@
-//! Trial, tune, identify: whole runs.
+//! Benchmarks of complete runs of trial, tune and identify.
 
 use std::cell::LazyCell;
 use std::hint::black_box;
@@ -23,13 +23,14 @@ use virtual_axes_verification::fixtures::recordings::{
     Disturbance, initial_parameters, record_campaign, true_parameters,
 };
 
-/// Machines that are run side by side, as a search does.
-const TOGETHER: usize = 32;
-/// Designs that are screened, and how many of them one iteration judges.
+/// Machines simulated side by side, as in a search.
+const SIDE_BY_SIDE_MACHINES: usize = 32;
+/// Number of designs of the grid.
 const DESIGNS: usize = 5000;
+/// Number of designs of the grid that one iteration evaluates.
 const SCREENED: usize = 64;
-/// Samples of what takes long.
-const FEW: usize = 10;
+/// Samples of long benchmarks.
+const FEW_SAMPLES: usize = 10;
 
 pub fn all(criterion: &mut Criterion) {
     trial(criterion);
@@ -45,7 +46,7 @@ fn trial(criterion: &mut Criterion) {
     let config = shipped();
     let ticks = |seconds_of_all: f64| (seconds_of_all / seconds(config.periods().current)) as usize;
     let mut group = criterion.benchmark_group("trial, ticks of a machine");
-    group.sample_size(FEW);
+    group.sample_size(FEW_SAMPLES);
     for name in ["ballbar", "corner-90", "five-axis"] {
         let of = |record| trial_of(name, &config, record);
         let (bare, recorded) = (of(false), of(true));
@@ -54,7 +55,7 @@ fn trial(criterion: &mut Criterion) {
         let count = ticks(run(&bare).figures.duration);
         bench(&mut group, &format!("{name}, figures"), count, || run(&bare));
         bench(&mut group, &format!("{name}, figures and recording"), count, || run(&recorded));
-        bench(&mut group, &format!("{name}, every tick shown"), count, || {
+        bench(&mut group, &format!("{name}, every tick observed"), count, || {
             trial::trace(&bare, points(&bare), |tick| {
                 black_box(tick.machine.axes());
                 Ok(())
@@ -63,9 +64,9 @@ fn trial(criterion: &mut Criterion) {
         if name != "ballbar" {
             continue;
         }
-        let variants = vec![config.clone(); TOGETHER];
+        let variants = vec![config.clone(); SIDE_BY_SIDE_MACHINES];
         let own: Vec<usize> = (0..config.axes().len()).collect();
-        bench(&mut group, &format!("{name}, 32 machines together"), count * TOGETHER, || {
+        bench(&mut group, &format!("{name}, 32 machines together"), count * SIDE_BY_SIDE_MACHINES, || {
             trial::run_variants(&bare, points(&bare), &variants, &own, || Ok(()))
         });
     }
@@ -76,22 +77,22 @@ fn tune(criterion: &mut Criterion) {
     let config = shipped();
     let parameters = Parameters::embedded_default().expect("the shipped machine");
     let program = program("ballbar", &config);
-    let course =
+    let workload =
         Workload::read("ballbar", Some(Arc::clone(&program)), setpoints("ballbar", program, &config), || {
             Ok(())
         })
         .expect("setpoints");
     let cost = Cost::default();
-    let bench_of =
-        LazyCell::new(|| TuningProblem::new(&parameters, &course, &cost, &NoProgress).expect("a bench"));
+    let problem =
+        LazyCell::new(|| TuningProblem::new(&parameters, &workload, &cost, &NoProgress).expect("a bench"));
     let designs: Vec<Tuning> = fine_design_grid(DESIGNS).into_iter().step_by(DESIGNS / SCREENED).collect();
     let mut group = criterion.benchmark_group("tune, designs");
     bench(&mut group, "margins of the worst axis", designs.len(), || {
-        designs.iter().filter(|design| bench_of.margins(design).is_some()).count()
+        designs.iter().filter(|design| problem.margins(design).is_some()).count()
     });
-    group.sample_size(FEW);
+    group.sample_size(FEW_SAMPLES);
     bench(&mut group, "screened on the ballbar, the best refined, all cores", designs.len(), || {
-        tune_gpc_from(&bench_of, &MarginLimits::STABLE, designs.clone()).expect("a tuning")
+        tune_gpc_from(&problem, &MarginLimits::STABLE, designs.clone()).expect("a tuning")
     });
     group.finish();
 }
@@ -116,12 +117,12 @@ fn identify_one(criterion: &mut Criterion) {
         condition(raw, axis, &machine.periods(), &Conditioning::default()).expect("a recording").0
     };
     let signals: LazyCell<Vec<Signals>, _> = LazyCell::new(|| raw.iter().map(conditioned).collect());
-    // A campaign is planned for the machine that is to be identified.
+    // The campaign is planned for the machine to identify.
     let config = shipped();
     let planned = Campaign::plan(&config, 0, &FeedforwardMode::ALL, &CampaignOptions::default());
     let samples = planned.expect("planned").psec().len();
     let mut group = criterion.benchmark_group("identify, position periods recorded");
-    group.sample_size(FEW);
+    group.sample_size(FEW_SAMPLES);
     bench(&mut group, "a campaign planned", samples, || {
         Campaign::plan(&config, 0, &FeedforwardMode::ALL, &CampaignOptions::default())
     });

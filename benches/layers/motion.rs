@@ -1,4 +1,4 @@
-//! Trajectory, path, assess, simulation: what is asked of the axes, and how well they do it.
+//! Benchmarks of trajectory, path, assess and simulation.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -19,16 +19,17 @@ use virtual_axes_core::units::seconds;
 use crate::{bench, shipped};
 use virtual_axes_verification::fixtures::machines::program;
 
-/// Points of a long trajectory: a minute at 6 ms.
+/// Points of a long trajectory: one minute at 6 ms.
 const POINTS: usize = 10_000;
-/// Instants in which a timeline samples it.
+/// Position cycles sampled by a timeline.
 const SAMPLED: usize = 1000;
-/// How far ahead of the setpoint a foot is sought, as a trial does, m or rad.
+/// Search range of the closest path point beyond the setpoint, as in a trial, m or rad.
 const AHEAD: f64 = 5e-3;
-/// Linear axes of the shipped machine, the first ones, and by how much they are off the path, m.
+/// Number of linear axes of the shipped machine, which come first.
 const LINEAR: usize = 3;
+/// Deviation of the linear axes from the path, m.
 const OFF: f64 = 1e-6;
-/// Scenarios with lines, with a circle, with curves in space, and of five axes.
+/// Scenarios with lines, a circle, spatial curves and five axes.
 const SCENARIOS: [&str; 4] = ["corner-90", "ballbar", "bspline-3d", "five-axis"];
 
 pub fn all(criterion: &mut Criterion) {
@@ -38,12 +39,12 @@ pub fn all(criterion: &mut Criterion) {
     simulation(criterion);
 }
 
-/// Setpoints of five axes that move slowly and stand still at both ends; with their velocities if so asked.
+/// Returns a slow rest-to-rest motion of five axes, optionally with velocities.
 fn request(config: &MachineConfig, every: i64, with_velocities: bool) -> TrajectoryRequest {
     let names = config.axes().iter().map(|axis| axis.name().to_owned()).collect();
     let mut request = TrajectoryRequest::new(Start::Now, names);
     let period = config.periods().position * every;
-    // Rest to rest as 10 u³ − 15 u⁴ + 6 u⁵.
+    // Rest-to-rest profile 10 u³ − 15 u⁴ + 6 u⁵.
     let size = 0.05;
     let duration = seconds(period * (POINTS as i64 - 1));
     for k in 0..POINTS {
@@ -67,7 +68,7 @@ fn checked(request: TrajectoryRequest, limits: &[JointLimits], period: i64) -> T
 fn trajectory(criterion: &mut Criterion) {
     let config = shipped();
     let (limits, period) = (joint_limits(&config, ""), config.periods().position);
-    // On the grid of position instants, and with polynomials of the third degree between the points.
+    // On the grid of position cycles, and with cubic interpolation between the points.
     let kinds = [("on the grid", request(&config, 1, false)), ("cubic", request(&config, 3, true))];
     let mut group = criterion.benchmark_group("trajectory, points");
     group.throughput(Throughput::Elements(POINTS as u64));
@@ -98,7 +99,7 @@ fn trajectory(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Position periods of a program.
+/// Returns the number of position periods of a program.
 fn periods_of(program: &Program, config: &MachineConfig) -> usize {
     (program.duration() / seconds(config.periods().position)).ceil() as usize
 }
@@ -123,7 +124,7 @@ fn path(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Poses of a program, period by period, a little beside it.
+/// Returns the poses of a program with a small deviation, one batch per position period.
 fn poses(program: &Program, config: &MachineConfig) -> Vec<Poses> {
     let kinematics = Kinematics::new(config);
     let (ticks, axes) = (config.periods().ticks_per_position() as usize, config.axes().len());
@@ -135,7 +136,7 @@ fn poses(program: &Program, config: &MachineConfig) -> Vec<Poses> {
         for instant in 0..ticks {
             program.psec((period * ticks + instant) as f64 * tick, &mut joints);
             for (axis, value) in joints.iter().enumerate() {
-                // Tables that stand still do so to the bit.
+                // Tables at rest do not move by a single bit.
                 let off = if axis < LINEAR { OFF * (instant as f64).sin() } else { 0.0 };
                 columns[axis * ticks + instant] = value + off;
             }

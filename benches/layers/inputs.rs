@@ -1,4 +1,4 @@
-//! Config, scenario, messages, report, urdf: what comes in and goes out.
+//! Benchmarks of inputs and outputs: config, scenario, messages, report, urdf.
 
 use std::cell::LazyCell;
 use std::hint::black_box;
@@ -12,7 +12,7 @@ use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters};
 use virtual_axes_core::scenario::Scenario;
 use virtual_axes_core::trajectory::{Start, TrajectoryPoint, TrajectoryRequest};
 use virtual_axes_core::trial::{self, Trial};
-use virtual_axes_io::files::encode;
+use virtual_axes_io::files::encode_cdr;
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectory;
 use virtual_axes_io::messages::{self, DriveStates, MotorCurrents, Sampled};
@@ -22,7 +22,7 @@ use virtual_axes_report::{Report, ReportRun};
 use crate::{Group, bench, shipped, swing};
 use virtual_axes_verification::fixtures::machines::{program, setpoints};
 
-/// The four bytes before a message's own.
+/// Length of the encapsulation header before CDR, bytes.
 const CDR_HEADER: usize = 4;
 /// Points of a large trajectory.
 const POINTS: usize = 10_000;
@@ -33,7 +33,7 @@ pub fn all(criterion: &mut Criterion) {
     report(criterion);
     let machine = shipped();
     let mut group = criterion.benchmark_group("urdf, machines");
-    bench(&mut group, "described", 1, || urdf(black_box(&machine), ""));
+    bench(&mut group, "URDF of a machine", 1, || urdf(black_box(&machine), ""));
     group.finish();
 }
 
@@ -46,15 +46,15 @@ fn config(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The bytes of a message, and the message of these.
+/// Benchmarks encoding and decoding of a message.
 macro_rules! both_ways {
     ($group:expr, $name:literal, $type:ty, $message:expr) => {{
         let message: $type = $message;
         let mut bytes = Vec::new();
-        encode(&message, &mut bytes).expect("a message");
+        encode_cdr(&message, &mut bytes).expect("a message");
         $group.throughput(Throughput::Bytes(bytes.len() as u64));
-        let mut room = Vec::new();
-        bytes_of($group, concat!($name, " encoded"), || encode(black_box(&message), &mut room));
+        let mut buffer = Vec::new();
+        bytes_of($group, concat!($name, " encoded"), || encode_cdr(black_box(&message), &mut buffer));
         bytes_of($group, concat!($name, " decoded"), || {
             cdr_encoding::from_bytes::<$type, LittleEndian>(black_box(&bytes[CDR_HEADER..]))
         });
@@ -83,7 +83,7 @@ fn messages_as_bytes(criterion: &mut Criterion) {
     both_ways!(group, "motor currents of five axes", MotorCurrents, MotorCurrents::of(1, &samples, &names));
     both_ways!(group, "drive states of five axes", DriveStates, DriveStates::of(1, &samples, &names));
     both_ways!(group, "trajectory of 10 000 points", JointTrajectory, long.clone());
-    bytes_of(group, "trajectory of 10 000 points taken as a request", || {
+    bytes_of(group, "trajectory of 10 000 points converted to a request", || {
         messages::request(black_box(&long), usize::MAX)
     });
 }

@@ -1,54 +1,54 @@
-//! The machines that trajectories are run on: each with every kind of controller.
+//! Machines of the stress test: each machine with every kind of controller.
 
 use std::sync::Arc;
 
 use super::energy::DriveEnergy;
-use super::linear::LinearAxis;
-use super::response::Response;
+use super::linear_axis::LinearAxis;
+use super::response::ImpulseResponses;
 use virtual_axes_core::config::{
-    Assignment, AxisConfig, ConfigError, MachineConfig, Parameters, Source, Value,
+    Assignment, AxisConfig, ConfigError, MachineConfig, Parameters, Value, ValueSource,
 };
 use virtual_axes_core::machine::MachineError;
-use virtual_axes_core::simulation::{SimulationError, joints};
+use virtual_axes_core::simulation::{SimulationError, joint_limits};
 use virtual_axes_core::trajectory::JointLimits;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// Most ticks of a trajectory.
-pub const MOST_TICKS: usize = 3072;
+/// Largest number of ticks of a trajectory.
+pub const MAX_TICKS: usize = 3072;
 
-/// Why there are no machines to run on.
+/// Error in the setup of the test machines.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum FleetError {
-    /// There is none.
-    #[error("there must be a machine to run on")]
+pub enum TestMachinesError {
+    /// The list of machines is empty.
+    #[error("no machines are given, at least one is required")]
     Empty,
-    /// A machine does not take a controller.
+    /// A machine rejects the parameters of a controller.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// An axis has no such controller.
+    /// The controller of an axis cannot be designed.
     #[error(transparent)]
     Machine(#[from] MachineError),
     /// A machine cannot be simulated.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// A machine whose position period has too many ticks.
+    /// The position period of a machine has too many ticks.
     #[error(
-        "{machine}: a position period has {ticks} ticks of the current loop; at most {most} are allowed here",
-        most = MOST_TICKS / FEWEST_PERIODS
+        "{machine}: a position period has {ticks} current cycles, at most {most} are allowed in the stress test",
+        most = MAX_TICKS / MIN_PERIODS
     )]
     Ticks {
         /// Name of the machine.
         machine: String,
-        /// What it has.
+        /// Ticks of its position period.
         ticks: usize,
     },
 }
 
-/// Fewest position periods that must fit into the longest trajectory.
-const FEWEST_PERIODS: usize = 32;
+/// Smallest number of position periods of the longest trajectory.
+const MIN_PERIODS: usize = 32;
 
-/// What an axis is under.
+/// Controller settings of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Law {
     Cascade,
@@ -61,12 +61,12 @@ enum Law {
 }
 
 impl Law {
-    /// What is set for joint `axis`.
+    /// Returns the parameter assignments for joint `axis`.
     fn assignments(self, machine: &Parameters, axis: &AxisConfig) -> Vec<Assignment> {
         let set = |key: &str, value| Assignment {
             key: format!("{}.{key}", axis.name),
             value,
-            source: Source::named("stress"),
+            source: ValueSource::named("stress"),
         };
         let controller = |name: &str| set("position_loop.controller", Value::Text(name.to_owned()));
         let of_screw = format!("{}.feedforward.torque_kg_m2", axis.name);
@@ -83,7 +83,7 @@ impl Law {
             }
             Law::Gpc => vec![controller("gpc")],
             Law::Rst => {
-                // The axis's own proportional gain, spread over two instants each of position and setpoint.
+                // The proportional gain of the axis, spread over two cycles each of position and setpoint.
                 let gain = axis.position_loop.gain;
                 let list = |values: &[f64]| Value::DoubleList(values.to_vec());
                 vec![
@@ -98,7 +98,7 @@ impl Law {
     }
 }
 
-/// The variants of a machine: a name, and what its axes are under, in turns.
+/// Variants of a machine: name, and controller settings that are assigned to its axes in turn.
 const VARIANTS: [(&str, &[Law]); 8] = [
     ("cascade", &[Law::Cascade]),
     ("cascade without feedforward", &[Law::NoFeedforward]),
@@ -110,117 +110,117 @@ const VARIANTS: [(&str, &[Law]); 8] = [
     ("mixed", &[Law::Gpc, Law::FrictionCompensation, Law::Rst, Law::Cascade, Law::NoFeedforward]),
 ];
 
-/// An axis with what is known of it beforehand.
+/// Reference model of an axis, computed before the simulation.
 #[derive(Debug)]
-pub struct Theory {
-    /// Its energy.
+pub struct ReferenceModel {
+    /// Energy model.
     pub energy: DriveEnergy,
-    /// Its responses.
-    pub response: Response,
-    /// Setpoints ahead of the present one that its controller reads.
-    pub ahead: usize,
-    /// Whether its controller has a guard.
-    pub guarded: bool,
-    /// Whether friction is compensated.
-    pub compensated: bool,
+    /// Impulse responses.
+    pub response: ImpulseResponses,
+    /// Preview: setpoints ahead of the present one that the controller reads.
+    pub preview: usize,
+    /// True if the position controller has a fallback controller.
+    pub has_fallback: bool,
+    /// True if friction compensation is active.
+    pub is_compensated: bool,
 }
 
-/// A machine with controllers.
+/// Machine with one set of controllers.
 #[derive(Debug)]
-pub struct Variant {
+pub struct MachineVariant {
     /// Name of the machine.
     pub machine: String,
-    /// Which controllers.
+    /// Name of the set of controllers.
     pub controllers: &'static str,
-    /// Its configuration.
+    /// Configuration.
     pub config: MachineConfig,
-    /// Its joints.
+    /// Joint limits.
     pub joints: Vec<JointLimits>,
-    /// Its axes.
-    pub(super) axes: Vec<Theory>,
+    /// Reference models of the axes.
+    pub(super) axes: Vec<ReferenceModel>,
 }
 
-impl Variant {
-    fn new(base: &Parameters, name: &'static str, laws: &[Law]) -> Result<Self, FleetError> {
+impl MachineVariant {
+    fn new(base: &Parameters, name: &'static str, laws: &[Law]) -> Result<Self, TestMachinesError> {
         let machine = base.machine_config()?;
         let of_axis = |(axis, law): (&AxisConfig, &Law)| law.assignments(base, axis);
         let mut parameters = base.clone();
         parameters.set_all(machine.axes().iter().zip(laws.iter().cycle()).flat_map(of_axis).collect())?;
         let config = parameters.machine_config()?;
         let periods = config.periods();
-        let longest = MOST_TICKS / periods.ticks_per_position() as usize;
-        let theory = |axis: &AxisConfig| {
+        let longest = MAX_TICKS / periods.ticks_per_position() as usize;
+        let model = |axis: &AxisConfig| {
             let linear = LinearAxis::new(axis, &periods)
                 .map_err(|source| MachineError::Axis { axis: axis.name.clone(), source })?;
-            Ok(Theory {
+            Ok(ReferenceModel {
                 energy: DriveEnergy::new(axis, seconds(periods.current)),
-                response: Response::new(&linear, longest),
-                ahead: linear.ahead(),
-                guarded: linear.is_guarded(),
-                compensated: axis.feedforward.friction != 0.0,
+                response: ImpulseResponses::new(&linear, longest),
+                preview: linear.preview(),
+                has_fallback: linear.has_fallback(),
+                is_compensated: axis.feedforward.friction != 0.0,
             })
         };
-        let axes = config.axes().iter().map(theory).collect::<Result<_, MachineError>>()?;
-        let joints = joints(&config, "");
-        Ok(Variant { machine: config.name().to_owned(), controllers: name, config, joints, axes })
+        let axes = config.axes().iter().map(model).collect::<Result<_, MachineError>>()?;
+        let joints = joint_limits(&config, "");
+        Ok(MachineVariant { machine: config.name().to_owned(), controllers: name, config, joints, axes })
     }
 
-    /// Tsp, ns.
+    /// Returns Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
         self.config.periods().position
     }
 
-    /// Ticks of a position period.
+    /// Returns the ticks of a position period.
     pub fn ticks(&self) -> usize {
         self.config.periods().ticks_per_position() as usize
     }
 
-    /// Most position periods of a trajectory.
+    /// Returns the largest number of position periods of a trajectory.
     pub fn longest(&self) -> usize {
-        MOST_TICKS / self.ticks()
+        MAX_TICKS / self.ticks()
     }
 }
 
-/// Machines with all of their controllers; shared by all threads.
+/// Machines with all sets of controllers, shared by all threads.
 #[derive(Debug, Clone)]
-pub struct Fleet {
-    variants: Arc<[Variant]>,
+pub struct TestMachines {
+    variants: Arc<[MachineVariant]>,
 }
 
-impl Fleet {
-    /// The fleet of `machines`.
+impl TestMachines {
+    /// Creates all variants of `machines`.
     ///
     /// # Errors
-    /// [`FleetError`].
-    pub fn new(machines: &[Parameters]) -> Result<Self, FleetError> {
+    /// [`TestMachinesError`] if the list is empty, or if a machine rejects a controller or has too many ticks.
+    pub fn new(machines: &[Parameters]) -> Result<Self, TestMachinesError> {
         let mut variants = Vec::new();
         for machine in machines {
             let config = machine.machine_config()?;
             let ticks = config.periods().ticks_per_position() as usize;
-            if ticks * FEWEST_PERIODS > MOST_TICKS {
-                return Err(FleetError::Ticks { machine: config.name().to_owned(), ticks });
+            if ticks * MIN_PERIODS > MAX_TICKS {
+                return Err(TestMachinesError::Ticks { machine: config.name().to_owned(), ticks });
             }
             for (name, laws) in VARIANTS {
-                variants.push(Variant::new(machine, name, laws)?);
+                variants.push(MachineVariant::new(machine, name, laws)?);
             }
         }
         if variants.is_empty() {
-            return Err(FleetError::Empty);
+            return Err(TestMachinesError::Empty);
         }
-        Ok(Fleet { variants: variants.into() })
+        Ok(TestMachines { variants: variants.into() })
     }
 
-    /// The machines that come with the program.
+    /// Creates all variants of the shipped machines.
     ///
     /// # Errors
-    /// None, as the tests show.
-    pub fn shipped() -> Result<Self, FleetError> {
+    /// [`TestMachinesError`] if a shipped machine rejects a controller, which the tests exclude.
+    pub fn shipped() -> Result<Self, TestMachinesError> {
         let machines: Result<Vec<_>, _> = Parameters::builtin_names().map(Parameters::builtin).collect();
         Self::new(&machines?)
     }
 
-    /// Its machines.
-    pub fn variants(&self) -> &[Variant] {
+    /// Returns the machine variants.
+    pub fn variants(&self) -> &[MachineVariant] {
         &self.variants
     }
 }

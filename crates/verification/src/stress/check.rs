@@ -1,0 +1,89 @@
+//! Invariants that every trajectory must satisfy, and their violations.
+
+use std::fmt;
+
+use virtual_axes_core::trajectory::RejectionCode;
+
+/// Invariant of a simulated trajectory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Check {
+    /// Every signal is a finite number.
+    Finite,
+    /// Ω*, i* and u are within their limits.
+    Limits,
+    /// A tick is reported as saturated if and only if a setpoint is at its limit.
+    Reported,
+    /// The figures of a position period agree with its ticks.
+    Counted,
+    /// The speed of the position setpoint is within the limit of the axis.
+    SetpointSpeed,
+    /// Friction has the sign of the speed at the end of the tick: it does not reverse the axis.
+    FrictionSign,
+    /// Friction follows its law, or is less where it stops the axis.
+    FrictionLaw,
+    /// Friction dissipates energy, except for the return of a torque held over a tick with a standstill.
+    FrictionWork,
+    /// The position is the integral of the speed.
+    Position,
+    /// The change of the stored energy equals the supplied energy.
+    Energy,
+    /// The delay-compensated following error is within the bound of the impulse responses.
+    Bound,
+    /// The delay-compensated following error equals the superposition of the impulse responses.
+    Superposition,
+    /// Each accepted trajectory ends exactly once.
+    Ended,
+    /// A trajectory within all limits is accepted; contains the code of the rejection.
+    Accepted(RejectionCode),
+}
+
+impl Check {
+    /// Returns the description of the violation.
+    pub fn description(self) -> &'static str {
+        match self {
+            Check::Finite => "a signal is not finite",
+            Check::Limits => "a setpoint exceeds its limit",
+            Check::Reported => "the saturation flag does not match the setpoints",
+            Check::Counted => "the figures of a position period do not match its ticks",
+            Check::SetpointSpeed => "the position setpoint exceeds the velocity limit of the axis",
+            Check::FrictionSign => "friction acts in the direction of motion",
+            Check::FrictionLaw => "friction differs from the friction law",
+            Check::FrictionWork => "friction supplies energy",
+            Check::Position => "the position is not the integral of the speed",
+            Check::Energy => "the energy balance is violated",
+            Check::Bound => "the following error exceeds its bound",
+            Check::Superposition => "the following error differs from the linear loop",
+            Check::Ended => "a trajectory did not end exactly once",
+            Check::Accepted(_) => "a trajectory within all limits is rejected",
+        }
+    }
+}
+
+/// Violation of an invariant by a trajectory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Violation {
+    /// Violated invariant.
+    pub check: Check,
+    /// Number of the trajectory.
+    pub number: u64,
+    /// Name of the axis; empty if it concerns the whole trajectory.
+    pub axis: String,
+    /// Tick since the start of the trajectory.
+    pub tick: usize,
+    /// Value found, SI units.
+    pub value: f64,
+    /// Value allowed, SI units.
+    pub allowed: f64,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Violation { check, number, axis, tick, value, allowed } = self;
+        write!(
+            f,
+            "trajectory {number}, {axis}, tick {tick}: {}: {value:e}, allowed {allowed:e}",
+            check.description()
+        )?;
+        if let Check::Accepted(code) = check { write!(f, ", {}", code.name()) } else { Ok(()) }
+    }
+}
