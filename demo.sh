@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
-# Runs the ballbar on the virtual axes over ROS 2, prints the errors, writes .build/ballbar.png, and the
-# same trial offline as a page with plots, .build/ballbar.html.
+# Runs the ballbar on the virtual axes over ROS 2, prints the deviations, writes .build/ballbar.png, and runs
+# the same trial offline with a report page, .build/ballbar.html.
 #
 #     ./demo.sh [--fast] [--out FILE.png]
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 options=("$@")
 
-# Refuses what is no name of a picture, before anything is built.
+# Rejects an invalid file name before the build.
 picture() {
   case ${1,,} in
     -* | .png | .pdf | .svg) ;;
     *.png | *.pdf | *.svg) return ;;
   esac
-  echo "demo: --out: '$1': the name of the picture must end in .png, .pdf or .svg" >&2
+  echo "demo: --out: the file extension of '$1' must be .png, .pdf or .svg" >&2
   exit 2
 }
 
@@ -21,15 +21,15 @@ while [ $# -gt 0 ]; do
   case $1 in
     --fast) ;;
     --out=*) picture "${1#--out=}" ;;
-    --out) [ $# -gt 1 ] || { echo "demo: --out wants a file" >&2 && exit 2; } && shift && picture "$1" ;;
+    --out) [ $# -gt 1 ] || { echo "demo: --out requires a file" >&2 && exit 2; } && shift && picture "$1" ;;
     -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
-    *) echo "demo: no option $1: --fast, --out FILE.png or --help" >&2 && exit 2 ;;
+    *) echo "demo: unknown option $1; allowed: --fast, --out FILE.png, --help" >&2 && exit 2 ;;
   esac
   shift
 done
 command -v cargo >/dev/null || { echo "demo: needs cargo, Rust's build tool (https://rustup.rs)" >&2; exit 1; }
 
-# The set-up mostly waits for the network and for single processes; cargo builds beside it.
+# The setup mostly waits for the network and single processes; cargo builds in parallel.
 mkdir -p "$root/.build/logs"
 "$root/tools/setup.sh" >"$root/.build/logs/demo-setup.log" 2>&1 </dev/null &
 setup=$!
@@ -40,7 +40,7 @@ trap - EXIT
 # shellcheck source=/dev/null
 source "$root/.build/env.sh"
 
-# Nothing leaves this machine; demo.py takes a domain of its own.
+# All traffic stays on the loopback interface; demo.py uses its own domain.
 export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 unset ROS_STATIC_PEERS ROS_LOCALHOST_ONLY
 

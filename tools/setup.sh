@@ -1,20 +1,20 @@
 #!/usr/bin/env bash
-# Makes what the Python side needs, inside the checkout: .venv (rclpy and the message generators),
-# .build/install (the messages of this package, and of control_msgs as far as the node speaks them)
-# and .build/env.sh, which a shell sources to use both.
+# Creates the Python environment inside the checkout: .venv (rclpy and the message generators),
+# .build/install (the messages of this package, and the interfaces of control_msgs that the node uses)
+# and .build/env.sh, which activates both in a shell.
 #
 #     tools/setup.sh [--browser] && source .build/env.sh
 #
-# With --browser also Chromium, in which the tests open a report, where apt-get can install it.
-# Run again, it does only what a change of its inputs asks for: each stage ends by writing a stamp
-# with the hash of its inputs, so a stage that was broken off is done anew from nothing.
+# With --browser, apt-get also installs Chromium for the tests of the report, where that is possible.
+# Another run repeats only stages with changed inputs: each stage ends by writing a stamp with the
+# hash of its inputs, so an aborted stage starts again from the beginning.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 root=$PWD
 venv=$root/.venv
 build=$root/.build
 logs=$build/logs
-# The interfaces of control_msgs that the tests speak; PyPI does not have that package.
+# The interfaces of control_msgs that the tests use; the package is not on PyPI.
 overlay=test_py/overlay/control_msgs
 
 fail() {
@@ -27,11 +27,11 @@ for argument in "$@"; do
   case $argument in
     --browser) browser=true ;;
     -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
-    *) fail "no option $argument: --browser or --help" ;;
+    *) fail "unknown option $argument; allowed: --browser, --help" ;;
   esac
 done
 
-# Runs a step with its output in a log; shows the log's end when the step fails.
+# Runs a step with its output in a log; prints the end of the log if the step fails.
 step() {
   local title=$1 log=$logs/$2.log began=$SECONDS
   shift 2
@@ -44,23 +44,23 @@ step() {
   set -e
   if [ "$status" -ne 0 ]; then
     tail -n 30 "$log" >&2
-    fail "$title failed; all of its output: $log"
+    fail "$title failed; complete output: $log"
   fi
   echo "setup: $title: $((SECONDS - began)) s" >&2
 }
 
-# Installs Debian packages where that is possible without asking anybody.
+# Installs Debian packages where that is possible without interaction.
 try_apt() {
   [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null || return 1
   step "apt-get install $*" apt bash -c 'apt-get update -q && DEBIAN_FRONTEND=noninteractive apt-get install -y -q "$@"' _ "$@"
 }
 
-# The wheels are built for Python 3.11 and 3.12; a shim without a version behind it does not run.
+# The wheels are built for Python 3.11 and 3.12; a pyenv shim without an installed version fails.
 find_python() {
   local candidate
   for candidate in ${PYTHON:-} python3.12 python3.11 python3; do
     if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null; then
-      # Not a virtual environment's: that may be .venv itself, about to be made anew.
+      # Not the interpreter of a virtual environment, which may be the .venv that is created again.
       "$candidate" -c 'import sys; print(sys._base_executable)'
       return 0
     fi
@@ -82,13 +82,13 @@ check_tools() {
     fail "needs the headers of $python (Debian: apt-get install python3-dev)"
 }
 
-# Debian's; where it cannot be had, the test that needs it says so.
+# Installs Debian's Chromium; without it, the tests of the report fail or are skipped.
 install_browser() {
   command -v chromium chromium-browser google-chrome google-chrome-stable >/dev/null || try_apt chromium ||
     echo "setup: no Chromium (Debian: apt-get install chromium): the test of the report will fail" >&2
 }
 
-# The wheels' CMake files name directories of the machine that they were built on.
+# The CMake files of the wheels contain directories of their build machine.
 fix_cmake_paths() {
   local include numpy
   include=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"))')
@@ -115,7 +115,7 @@ make_messages() {
   rm -rf "$build/install" "$build/messages"
   mkdir -p "$source"
   cp -r package.xml CMakeLists.txt msg "$source"
-  # Beside it, since colcon looks into no package for others.
+  # Beside it: colcon does not search for packages inside packages.
   cp -r "$overlay" "$build/messages"
   PATH=$venv/bin:$PATH VIRTUAL_ENV=$venv AMENT_PREFIX_PATH=$venv CMAKE_PREFIX_PATH=$venv PYTHONPATH='' \
     COLCON_HOME=$build/colcon "$venv/bin/colcon" --log-base "$logs/colcon" build --merge-install \
@@ -134,7 +134,7 @@ END
 from control_msgs.action import FollowJointTrajectory')
 }
 
-# The checkout's own path is an input: a virtual environment does not survive being moved.
+# The path of the checkout is an input: a virtual environment cannot be moved.
 hash_of() {
   { printf '%s\0' "$root" "$@"; cat "$@"; } | sha256sum | cut -d' ' -f1
 }

@@ -1,7 +1,7 @@
-/* One feed drive and its cascade: parameters, state, and what happens in a tick.
+/* One feed drive and its cascade: parameters, state, and the operations of a tick.
  *
- * A plain scalar statement of the equations of docs/performance.md: no SIMD intrinsics, no approximation of
- * exp or sin. Everything is inlined into the one loop of scalar.c; what does not change is computed once.
+ * A plain scalar form of the equations of docs/performance.md: no SIMD intrinsics, no approximation of
+ * exp or sin. All functions are inlined into the loop of scalar.c; constants are computed once.
  * SI units; motor quantities in rad and N·m.
  */
 #ifndef DRIVE_H
@@ -12,7 +12,7 @@
 enum { TICKS_PER_POSITION = 48, TICKS_PER_VELOCITY = 2 };
 static const double POSITION_PERIOD = 6e-3, VELOCITY_PERIOD = 250e-6, CURRENT_PERIOD = 125e-6;
 
-/* A row of the discretized motor: the weights of i, omega, u and the torque that is held. */
+/* A row of the discretized motor: the weights of i, omega, u and the held torque. */
 struct row {
   double current, speed, voltage, torque;
 };
@@ -22,12 +22,12 @@ struct pi {
   double gain, integral_gain, inverse_scale, limit;
 };
 
-/* A delay of the staircase of setpoints: it moves on at tick `step` of a period, from `periods` back to one less. */
+/* Delay of the zero-order-held setpoints: at tick `step` of a cycle it changes from `periods` cycles to one less. */
 struct delay {
   int periods, step;
 };
 
-/* What never changes while an axis runs. */
+/* Constants of an axis. */
 struct axis {
   struct row current, speed, angle; /* exact zero-order hold over a tick */
   double inverse_speed_per_torque;
@@ -42,12 +42,12 @@ struct axis {
   struct delay alpha, beta, gamma;
 };
 
-/* Everything that changes. */
+/* State of an axis. */
 struct state {
   double i, omega, theta;
   double velocity_integral, current_integral;
   double velocity_setpoint, current_setpoint, voltage;
-  double feedforward_velocity[2], feedforward_torque[2]; /* before and behind the step of their delay */
+  double feedforward_velocity[2], feedforward_torque[2]; /* before and after the switch of their delay */
   int speed_limited, current_limited, voltage_limited;
 };
 
@@ -62,14 +62,14 @@ static inline double clamp(double value, double limit) {
   return value > limit ? limit : value < -limit ? -limit : value;
 }
 
-/* The integral is used at the instant that makes it, and kept where the output is limited and the error would
- * wind it further up. */
+/* The integral is updated before its use, and held where the output is limited and the error would increase it
+ * further (anti-windup). */
 static inline double pi_update(const struct pi *p, double *integral, int *limited, double error, double feedforward) {
   const double sum = *integral + p->integral_gain * error;
-  const double wanted = (p->gain * error + sum + feedforward) * p->inverse_scale;
-  const double output = clamp(wanted, p->limit);
-  *limited = wanted != output;
-  if (!(*limited && error * (wanted - output) > 0.0)) *integral = sum;
+  const double unlimited = (p->gain * error + sum + feedforward) * p->inverse_scale;
+  const double output = clamp(unlimited, p->limit);
+  *limited = unlimited != output;
+  if (!(*limited && error * (unlimited - output) > 0.0)) *integral = sum;
   return output;
 }
 
@@ -84,12 +84,12 @@ static inline struct state at_rest(const struct axis *p, double position) {
   return s;
 }
 
-/* Position instant. `psec` points at the setpoint of the period that begins; those before it are there. */
+/* Position instant. `psec` points to the setpoint of the new cycle; the previous ones precede it in memory. */
 static inline void control_position(const struct axis *p, struct state *s, const double *psec) {
   const double delayed = psec[-(p->alpha.periods)];
-  const double wanted = p->position_gain * (delayed * p->inverse_ratio - s->theta);
-  s->velocity_setpoint = clamp(wanted, p->max_speed);
-  s->speed_limited = wanted != s->velocity_setpoint;
+  const double unlimited = p->position_gain * (delayed * p->inverse_ratio - s->theta);
+  s->velocity_setpoint = clamp(unlimited, p->max_speed);
+  s->speed_limited = unlimited != s->velocity_setpoint;
   for (int after = 0; after < 2; after++) {
     const double *v = psec - p->beta.periods + after, *t = psec - p->gamma.periods + after;
     s->feedforward_velocity[after] = p->velocity_feedforward * (v[0] - v[-1]);
@@ -97,7 +97,7 @@ static inline void control_position(const struct axis *p, struct state *s, const
   }
 }
 
-/* Instant of the velocity loop, at `tick` of the position period. */
+/* Instant of the velocity loop, at `tick` of the position cycle. */
 static inline void control_velocity(const struct axis *p, struct state *s, int tick) {
   const double velocity = s->feedforward_velocity[tick >= p->beta.step];
   const double torque = s->feedforward_torque[tick >= p->gamma.step];
@@ -110,7 +110,7 @@ static inline void control_current(const struct axis *p, struct state *s) {
   s->voltage = pi_update(&p->current_pi, &s->current_integral, &s->voltage_limited, error, 0.0);
 }
 
-/* The largest friction torque at a motor speed. */
+/* Maximum friction torque at a motor speed. */
 static inline double friction_bound(const struct axis *p, double omega) {
   if (omega == 0.0) return p->friction_i0;
   const double v = fabs(omega) * p->velocity_per_speed;
@@ -122,7 +122,7 @@ static inline double row_times(const struct row *r, const struct state *s, doubl
   return r->current * s->i + r->speed * s->omega + r->voltage * s->voltage + r->torque * torque;
 }
 
-/* Moves the plant by a tick. Friction is the torque that ends the tick at standstill, limited to its bound. */
+/* Advances the plant by a tick. Friction is the torque that ends the tick at standstill, limited to its maximum. */
 static inline void move(const struct axis *p, struct state *s) {
   const double external = -gravity(p, position_of(p, s));
   const double bound = friction_bound(p, s->omega);

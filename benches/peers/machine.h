@@ -1,4 +1,4 @@
-/* The machine's table and the setpoints, read from text; the motor, discretized; the line protocol. */
+/* Parser of the machine table and the setpoints; the discretized motor; the line protocol. */
 #ifndef MACHINE_H
 #define MACHINE_H
 
@@ -16,11 +16,11 @@ _Noreturn static void fail(const char *what, const char *which) {
   exit(1);
 }
 
-/* The number that a word is. */
+/* Returns the number of a word. */
 static double number(const char *word) {
   char *end;
   const double value = strtod(word, &end);
-  if (end == word || *end) fail("no number", word);
+  if (end == word || *end) fail("invalid number", word);
   return value;
 }
 
@@ -30,7 +30,7 @@ static FILE *open_text(const char *path) {
   return file;
 }
 
-/* The table of a machine: a row per quantity, a column per axis. */
+/* Table of a machine: a row per quantity, a column per axis. */
 struct table {
   int axes, rows;
   char joints[MAX_AXES][16];
@@ -54,7 +54,7 @@ static void read_table(const char *path, struct table *t) {
       else t->values[t->rows][column] = number(word);
     }
     if (joints) t->axes = column;
-    else if (column != t->axes) fail("a value per joint is wanted of", t->keys[t->rows]);
+    else if (column != t->axes) fail("expected one value per joint for", t->keys[t->rows]);
     else t->rows++;
   }
   fclose(file);
@@ -63,16 +63,16 @@ static void read_table(const char *path, struct table *t) {
 static double value(const struct table *t, const char *key, int column) {
   for (int row = 0; row < t->rows; row++)
     if (!strcmp(t->keys[row], key)) return t->values[row][column];
-  fail("the table lacks", key);
+  fail("missing in the table:", key);
 }
 
-/* exp of a 5 by 5 matrix: Taylor series of the matrix halved until it is small, then squared back. */
+/* exp of a 5 by 5 matrix: Taylor series with scaling and squaring. */
 static void matrix_exponential(double a[5][5], double e[5][5]) {
   enum { HALVINGS = 10, TERMS = 16 };
   double term[5][5] = {0}, next[5][5];
   memset(e, 0, 25 * sizeof e[0][0]);
   for (int r = 0; r < 5; r++) term[r][r] = 1.0;
-  /* exp(a) - 1 is carried, so that squaring does not lose the small entries beside the ones. */
+  /* Computes exp(a) - 1, so that squaring keeps the precision of small entries beside the ones. */
   for (int k = 1; k <= TERMS; k++) {
     for (int r = 0; r < 5; r++)
       for (int c = 0; c < 5; c++) {
@@ -97,8 +97,8 @@ static void matrix_exponential(double a[5][5], double e[5][5]) {
 static struct delay delay_of(double seconds) {
   const int ticks = (int)lround(seconds / CURRENT_PERIOD);
   const struct delay d = {ticks / TICKS_PER_POSITION, ticks % TICKS_PER_POSITION};
-  if (d.periods + 3 > LOOKBACK) fail("a delay is longer than", "the setpoints that are kept");
-  /* Before its step the staircase is one period further back; without a step it never is. */
+  if (d.periods + 3 > LOOKBACK) fail("a delay is longer than", "the setpoint history");
+  /* Before the switch the zero-order hold is one cycle further back; without a switch it is not. */
   return d.step ? (struct delay){d.periods + 1, d.step} : (struct delay){d.periods, TICKS_PER_POSITION};
 }
 
@@ -150,7 +150,7 @@ static struct axis axis_of(const struct table *t, int c, double position_scale, 
   };
 }
 
-/* Setpoints of some axes: a row per position period. Each axis has its own column, with its first value repeated
+/* Setpoints of some axes: a row per position cycle. Each axis has its own column, with its first value repeated
  * before its start. */
 struct setpoints {
   int axes, count;
@@ -164,11 +164,11 @@ static void read_setpoints(const char *path, const struct table *t, struct setpo
   int room = 0;
   FILE *file = open_text(path);
   memset(s, 0, sizeof *s);
-  if (!fgets(line, sizeof line, file)) fail("no first line in", path);
+  if (!fgets(line, sizeof line, file)) fail("missing first line in", path);
   for (char *word = strtok(line, " \t\n"); word && s->axes < MAX_AXES; word = strtok(NULL, " \t\n")) {
     int column = 0;
     while (column < t->axes && strcmp(t->joints[column], word)) column++;
-    if (column == t->axes) fail("no such joint", word);
+    if (column == t->axes) fail("unknown joint", word);
     snprintf(s->joints[s->axes], sizeof s->joints[0], "%s", word);
     s->columns[s->axes++] = column;
   }
@@ -177,16 +177,16 @@ static void read_setpoints(const char *path, const struct table *t, struct setpo
       room = room ? 2 * room : 1024;
       for (int a = 0; a < s->axes; a++) {
         s->psec[a] = realloc(s->psec[a] ? s->psec[a] - LOOKBACK : NULL, (room + LOOKBACK) * sizeof(double));
-        if (!s->psec[a]) fail("no memory for", path);
+        if (!s->psec[a]) fail("out of memory for", path);
         s->psec[a] += LOOKBACK;
       }
     }
     char *word = strtok(line, " \t\n");
     for (int a = 0; a < s->axes; a++, word = strtok(NULL, " \t\n")) {
-      if (!word) fail("a value per joint is wanted in each row of", path);
+      if (!word) fail("expected one value per joint in each row of", path);
       s->psec[a][s->count] = number(word);
     }
-    if (word) fail("a value per joint is wanted in each row of", path);
+    if (word) fail("expected one value per joint in each row of", path);
     s->count++;
   }
   fclose(file);

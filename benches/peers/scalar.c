@@ -1,29 +1,29 @@
-/* The model of docs/performance.md as a scalar C loop, with its figures: what all others are compared with.
+/* The model of docs/performance.md as a scalar C loop, with its figures: the reference of the comparison.
  *
  *     gcc -O3 -march=native -ffast-math -o scalar scalar.c -lm
  *     scalar TABLE SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--positions]
  *
- * TABLE is a file such as mikron_ucp710.txt. SETPOINTS is text: names of the axes that take part, then a row of
- * setpoints (m, rad) for each position period. --circle adds the radial deviation of the first two axes from a
- * circle about (-RADIUS, 0), at every tick of the position periods FIRST up to LAST. --machines runs COUNT machines
- * with different gains one after the other. --positions prints the positions at position instants and ends.
+ * TABLE is a file such as mikron_ucp710.txt. SETPOINTS is text: names of the axes, then a row of
+ * setpoints (m, rad) for each position cycle. --circle adds the radial deviation of the first two axes from a
+ * circle about (-RADIUS, 0), at every tick of the position cycles FIRST up to LAST. --machines runs COUNT machines
+ * with different gains one after the other. --positions prints the positions at position instants and exits.
  *
- * Each line "run N" on standard input makes N runs; the answer is a line of JSON with seconds per run and figures.
+ * Each line "run N" on standard input makes N runs; the response is a line of JSON with seconds per run and figures.
  *
- * With -ffast-math gcc may contract, reorder and vectorize what it can. Several axes stand side by side in the loop
- * over ticks, so that the processor overlaps their chains of dependent operations: for five axes that is a fifth
- * faster than one axis after the other.
+ * -ffast-math permits contraction, reordering and vectorization. The loop over ticks processes several axes, so that
+ * the processor overlaps their chains of dependent operations: for five axes this is a fifth faster than one axis
+ * after the other.
  */
 #include "machine.h"
 
-/* Figures of an axis, gathered while it runs. */
+/* Accumulated figures of an axis. */
 struct figures {
-  double max_tracking, max_synchronized, square_tracking, square_synchronized;
+  double max_tracking, max_delay_compensated, square_tracking, square_delay_compensated;
   double peak_current, square_activity, last_current_setpoint;
   long saturated_ticks;
 };
 
-/* Radial deviation from a circle, in a window of position periods. */
+/* Radial deviation from a circle, in a window of position cycles. */
 struct circle {
   double radius;
   int first, last;
@@ -42,11 +42,11 @@ struct machine {
 static inline void assess_instant(struct figures *f, const struct axis *p, const struct state *s, const double *psec,
                                   int k) {
   const double position = position_of(p, s);
-  const double tracking = psec[0] - position, synchronized = psec[-p->alpha.periods] - position;
+  const double tracking = psec[0] - position, delay_compensated = psec[-p->alpha.periods] - position;
   f->max_tracking = fmax(f->max_tracking, fabs(tracking));
-  f->max_synchronized = fmax(f->max_synchronized, fabs(synchronized));
+  f->max_delay_compensated = fmax(f->max_delay_compensated, fabs(delay_compensated));
   f->square_tracking += tracking * tracking;
-  f->square_synchronized += synchronized * synchronized;
+  f->square_delay_compensated += delay_compensated * delay_compensated;
   const double change = s->current_setpoint - f->last_current_setpoint;
   if (k > 0) f->square_activity += change * change;
   f->last_current_setpoint = s->current_setpoint;
@@ -65,7 +65,7 @@ static inline void assess_circle(struct circle *c, double x, double y) {
   c->count++;
 }
 
-/* Tick `t` of position period `k` of an axis: the loops that are due, the figures, the plant. */
+/* Tick `t` of position cycle `k` of an axis: the loops that are due, the figures, the plant. */
 static inline void step(const struct axis *p, struct state *s, struct figures *f, const double *psec, int k, int t) {
   if (t == 0) control_position(p, s, psec);
   if (t % TICKS_PER_VELOCITY == 0) control_velocity(p, s, t);
@@ -75,7 +75,7 @@ static inline void step(const struct axis *p, struct state *s, struct figures *f
   move(p, s);
 }
 
-/* A position period of a machine with one axis: its state may stay in registers. */
+/* Position cycle of a machine with one axis: its state can stay in registers. */
 static void period_of_one(const struct axis *p, struct state *state, struct figures *figures, const double *psec, int k) {
   struct state s = *state;
   struct figures f = *figures;
@@ -119,8 +119,8 @@ static void print_figures(const struct machine *m, const struct setpoints *sp) {
     printf("%s\"%s\": {\"max_following_error\": %.17g, \"rms_following_error\": %.17g, "
            "\"max_delay_compensated_following_error\": %.17g, \"rms_delay_compensated_following_error\": %.17g, "
            "\"peak_current\": %.17g, \"saturation_time\": %.17g, \"control_activity\": %.17g, \"position\": %.17g}",
-           a ? ", " : "", sp->joints[a], f->max_tracking, sqrt(f->square_tracking / n), f->max_synchronized,
-           sqrt(f->square_synchronized / n), f->peak_current, f->saturated_ticks * CURRENT_PERIOD,
+           a ? ", " : "", sp->joints[a], f->max_tracking, sqrt(f->square_tracking / n), f->max_delay_compensated,
+           sqrt(f->square_delay_compensated / n), f->peak_current, f->saturated_ticks * CURRENT_PERIOD,
            sqrt(f->square_activity / changes), position_of(&m->axis[a], &m->state[a]));
   }
   printf("}");
@@ -129,11 +129,11 @@ static void print_figures(const struct machine *m, const struct setpoints *sp) {
            m->circle.min, m->circle.max);
 }
 
-/* From -1 to 1 over the machines of a sweep; 0 for the only one. */
+/* Returns -1 to 1 over the machines of a sweep; 0 for a single one. */
 static double place(int index, int count) { return count > 1 ? 2.0 * index / (count - 1) - 1.0 : 0.0; }
 
 int main(int argc, char **argv) {
-  /* Of Kp and Kv over the machines of a sweep. */
+  /* Relative range of Kp and Kv over the machines of a sweep. */
   const double position_spread = 0.2, velocity_spread = 0.1;
   if (argc < 3) fail("usage", "scalar TABLE SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--positions]");
   struct table table;
@@ -153,12 +153,12 @@ int main(int argc, char **argv) {
     } else if (!strcmp(argv[arg], "--positions")) {
       positions = 1;
     } else {
-      fail("no such argument, or too little behind it", argv[arg]);
+      fail("unknown argument, or missing values of", argv[arg]);
     }
   }
-  if (count < 1) fail("machines", "at least one is wanted");
+  if (count < 1) fail("machines", "must be at least 1");
   struct machine *machines = calloc(count, sizeof *machines);
-  if (!machines) fail("no memory for", "the machines");
+  if (!machines) fail("out of memory for", "the machines");
   for (int m = 0; m < count; m++) {
     const double x = place(m, count);
     machines[m].axes = setpoints.axes;

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Installs what the simulation is compared with into .build/peers, from PyPI. Run again, it does nothing unless
-# requirements.txt or constraints.txt changed. A package that cannot be had is named, and run.py says so again.
+# Installs the peers of the comparison from PyPI into .build/peers. Another run does nothing unless
+# requirements.txt or constraints.txt changed. An unavailable package is reported here and by run.py.
 #
 #     benches/peers/setup.sh
 set -euo pipefail
 case ${1:-} in
   "") ;;
   -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
-  *) echo "setup: no option $1" >&2 && exit 2 ;;
+  *) echo "setup: unknown option $1; allowed: --help" >&2 && exit 2 ;;
 esac
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 peers=benches/peers
@@ -31,11 +31,11 @@ rm -rf "$venv"
 "$python" -m venv "$venv"
 pip=("$venv/bin/python" -m pip install --disable-pip-version-check --prefer-binary --quiet)
 if ! "${pip[@]}" -r "$peers/requirements.txt"; then
-  echo "setup: not all at once; one after the other" >&2
+  echo "setup: joint installation failed; installing the packages one by one" >&2
   grep -E '^[a-z]' "$peers/requirements.txt" | while read -r package; do
-    "${pip[@]}" -c "$peers/constraints.txt" "$package" || echo "setup: cannot be had: $package" >&2
+    "${pip[@]}" -c "$peers/constraints.txt" "$package" || echo "setup: not available: $package" >&2
   done
-  # Tried again at the next call.
+  # The next call tries again.
   exit 0
 fi
 echo "$wanted" >"$stamp"

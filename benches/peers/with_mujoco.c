@@ -4,13 +4,13 @@
  *     with_mujoco TABLE SETPOINTS STEPS
  *
  * A hinge with a `dcmotor` actuator (voltage in, current as its activation), stepped by mj_step, STEPS times in each
- * 125 us, with everything switched off that it does not need. MuJoCo's motor has one constant K = sqrt(Kt Ke); with s = sqrt(Kt/Ke)
- * its current is s i and its voltage s u, the rest is the same.
+ * 125 us, with all unused features disabled. MuJoCo's motor has one constant K = sqrt(Kt Ke); with s = sqrt(Kt/Ke)
+ * its current is s i and its voltage s u; all other quantities are equal.
  *
- * What MuJoCo has not: the cascade with its rates, limits and delays, which are those of drive.h, called before each
- * step; the friction law, which is applied as an external torque, with the torque that would stop the axis in MuJoCo's
- * own step as its limit (its constraint solver would be slower). What it does otherwise: it integrates by
- * semi-implicit Euler, where the model has the exact step, so that it needs more STEPS for the same error. Figures: the largest synchronized error and current only.
+ * Not part of MuJoCo: the cascade with its rates, limits and delays (drive.h), called before each step; the friction
+ * law, applied as an external torque and limited to the torque that stops the axis within MuJoCo's step (its constraint
+ * solver would be slower). Difference: MuJoCo integrates by semi-implicit Euler, the model has the exact step, so that
+ * MuJoCo needs more STEPS for the same error. Figures: the largest delay-compensated following error and current only.
  */
 #include <mujoco/mujoco.h>
 
@@ -24,7 +24,7 @@ int main(int argc, char **argv) {
   struct setpoints setpoints;
   read_table(argv[1], &table);
   read_setpoints(argv[2], &table, &setpoints);
-  if (setpoints.axes != 1) fail("one axis is wanted in", argv[2]);
+  if (setpoints.axes != 1) fail("expected one axis in", argv[2]);
   const int column = setpoints.columns[0];
   const struct axis p = axis_of(&table, column, 1.0, 1.0);
   const double inertia = value(&table, "inertia_kg_m2", column), kt = p.torque_constant;
@@ -46,18 +46,18 @@ int main(int argc, char **argv) {
   mjModel *model = spec ? mj_compile(spec, NULL) : NULL;
   if (!model) fail("MuJoCo", error);
   mjData *data = mj_makeData(model);
-  if (model->na != 1 || model->nu != 1 || model->nv != 1) fail("MuJoCo", "not the states that were expected");
+  if (model->na != 1 || model->nu != 1 || model->nv != 1) fail("MuJoCo", "unexpected number of states");
 
   char line[MAX_LINE];
   int runs;
   while (fgets(line, sizeof line, stdin) && sscanf(line, "run %d", &runs) == 1 && runs > 0) {
-    double synchronized = 0.0, peak = 0.0;
+    double delay_compensated = 0.0, peak = 0.0;
     const double began = now();
     for (int r = 0; r < runs; r++) {
       mj_resetData(model, data);
       struct state s = at_rest(&p, setpoints.psec[0][0]);
       data->qpos[0] = s.theta;
-      synchronized = peak = 0.0;
+      delay_compensated = peak = 0.0;
       for (int k = 0; k < setpoints.count; k++) {
         const double *psec = setpoints.psec[0] + k;
         for (int t = 0; t < TICKS_PER_POSITION; t++) {
@@ -66,7 +66,7 @@ int main(int argc, char **argv) {
           s.theta = data->qpos[0];
           if (t == 0) {
             control_position(&p, &s, psec);
-            synchronized = fmax(synchronized, fabs(psec[-p.alpha.periods] - position_of(&p, &s)));
+            delay_compensated = fmax(delay_compensated, fabs(psec[-p.alpha.periods] - position_of(&p, &s)));
           }
           if (t % TICKS_PER_VELOCITY == 0) control_velocity(&p, &s, t);
           control_current(&p, &s);
@@ -83,7 +83,7 @@ int main(int argc, char **argv) {
     }
     printf("{\"seconds\": %.9g, \"machines\": [{\"axes\": {\"%s\": {\"max_delay_compensated_following_error\": %.17g, "
            "\"peak_current\": %.17g, \"position\": %.17g}}}]}\n",
-           (now() - began) / runs, setpoints.joints[0], synchronized, peak, data->qpos[0] * p.ratio);
+           (now() - began) / runs, setpoints.joints[0], delay_compensated, peak, data->qpos[0] * p.ratio);
     fflush(stdout);
   }
   mj_deleteData(data);
