@@ -99,7 +99,7 @@ fn report(criterion: &mut Criterion) {
             record: true,
         };
         let outcome = trial::run(&trial, setpoints("ballbar", program, &config), |_| Ok(()));
-        let recording = outcome.expect("a run").recording.expect("it was asked for");
+        let recording = outcome.expect("a run").recording.expect("recording is enabled");
         vec![recording; 2]
     });
     let page = |runs: usize| {
@@ -111,7 +111,7 @@ fn report(criterion: &mut Criterion) {
         };
         let runs = recordings.iter().enumerate().map(run).take(runs).collect();
         let mut page = Vec::new();
-        Report { title: "ballbar", description: "", runs }.write(&mut page).expect("memory takes it");
+        Report { title: "ballbar", description: "", runs }.write(&mut page).expect("written to memory");
         page
     };
     let mut group = criterion.benchmark_group("report, position periods shown");

@@ -55,11 +55,11 @@ pub fn psec_csv(data: &[u8]) {
         for row in &rows_read {
             assert!(row.iter().all(|value| value.is_finite()));
         }
-        let mut out = PsecCsvWriter::new(Vec::new(), &joints).expect("a vector takes all");
+        let mut out = PsecCsvWriter::new(Vec::new(), &joints).expect("written to a vector");
         for (k, row) in rows_read.iter().enumerate() {
-            out.row(k as i64 * MACHINE.periods().position, row).expect("a vector takes all");
+            out.row(k as i64 * MACHINE.periods().position, row).expect("written to a vector");
         }
-        let written = out.finish().expect("a vector takes all");
+        let written = out.finish().expect("written to a vector");
         let again = rows(&written).expect("what was written can be read");
         assert_eq!(again, (joints, rows_read));
     });

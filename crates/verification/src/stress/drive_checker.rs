@@ -168,22 +168,22 @@ impl DriveChecker {
         }
         self.imbalance = self.imbalance.max(if allowed > 0.0 { imbalance / allowed } else { 0.0 });
         let (even, uneven) = (0.5 * self.tick * speed.abs(), self.energy.uneven(&held));
-        let taken = friction * work.turned;
+        let dissipated = friction * work.turned;
         let standing = if product_sign(speed, end) > 0.0 { 0.0 } else { even };
-        let lent = friction.abs() * (standing + uneven + self.tick * blur);
-        if taken < -lent {
-            report((Check::FrictionWork, -taken, lent));
+        let allowed_return = friction.abs() * (standing + uneven + self.tick * blur);
+        if dissipated < -allowed_return {
+            report((Check::FrictionWork, -dissipated, allowed_return));
         }
-        self.dissipated += taken.max(0.0);
-        self.returned -= taken.min(0.0);
-        self.supplied += work.done + taken;
-        let way = s.position - before.position;
+        self.dissipated += dissipated.max(0.0);
+        self.returned -= dissipated.min(0.0);
+        self.supplied += work.done + dissipated;
+        let moved = s.position - before.position;
         let rounding = ROUNDING * self.ratio * (even + 0.5 * self.tick * end.abs() + uneven)
             + self.ratio * self.tick * blur
             + 4.0 * f64::EPSILON * (s.position.abs() + before.position.abs());
-        let off = (way - self.ratio * work.turned).abs();
-        if off.is_nan() || off > rounding {
-            report((Check::Position, off, rounding));
+        let difference = (moved - self.ratio * work.turned).abs();
+        if difference.is_nan() || difference > rounding {
+            report((Check::Position, difference, rounding));
         }
     }
 

@@ -123,19 +123,20 @@ impl TestPlan {
         let mut random = RandomSource::new(seed, number);
         let index = random.below(machines.variants().len());
         let variant = &machines.variants()[index];
-        let kind = drawn(&mut random);
+        let kind = draw_kind(&mut random);
         let unit = UNIT_TICKS / variant.ticks();
         let moving = MIN_PERIODS + random.below(unit * 5 / 4);
-        let horizon = variant.axes.iter().map(|axis| axis.preview).max().unwrap_or(0);
-        let settling = 3 + random.below(unit / 2) + if kind == TrajectoryKind::Stream { horizon } else { 0 };
+        let longest_preview = variant.axes.iter().map(|axis| axis.preview).max().unwrap_or(0);
+        let settling =
+            3 + random.below(unit / 2) + if kind == TrajectoryKind::Stream { longest_preview } else { 0 };
         // Rounding of the duration and delay of the setpoints.
         let periods = (moving + settling + 4).min(variant.longest());
-        let sharper = if random.chance(EXCESS_PROBABILITY) { random.between(1.0, MAX_EXCESS) } else { 1.0 };
+        let excess = if random.chance(EXCESS_PROBABILITY) { random.between(1.0, MAX_EXCESS) } else { 1.0 };
         let count = variant.joints.len();
         let mut moves: Vec<bool> = (0..count).map(|_| random.chance(MOVE_PROBABILITY)).collect();
         let one = random.below(count);
         moves[one] = true;
-        let limits = |axis: usize| MotionLimits::new(&variant.joints[axis].limits, variant.period(), sharper);
+        let limits = |axis: usize| MotionLimits::new(&variant.joints[axis].limits, variant.period(), excess);
         let mut start: Vec<f64> = (0..count).map(|axis| limits(axis).start(&mut random, 0.0, 0.0)).collect();
         let axes: Vec<usize> = (0..count).filter(|&axis| moves[axis]).collect();
         let names = axes.iter().map(|&axis| variant.joints[axis].name.clone()).collect();
@@ -145,10 +146,10 @@ impl TestPlan {
                     of: &dyn Fn(&MotionLimits, &mut RandomSource) -> Vec<f64>| {
             let column = |&axis: &usize| {
                 let limits = limits(axis);
-                let way = of(&limits, random);
-                let (low, high) = extent(&way);
+                let displacements = of(&limits, random);
+                let (low, high) = extent(&displacements);
                 start[axis] = limits.start(random, low, high);
-                way.into_iter().map(|value| start[axis] + value).collect::<Vec<f64>>()
+                displacements.into_iter().map(|value| start[axis] + value).collect::<Vec<f64>>()
             };
             axes.iter().map(column).collect::<Vec<_>>()
         };
@@ -196,7 +197,7 @@ impl TestPlan {
     }
 }
 
-fn drawn(random: &mut RandomSource) -> TrajectoryKind {
+fn draw_kind(random: &mut RandomSource) -> TrajectoryKind {
     let mut left = random.unit();
     for (kind, share) in TrajectoryKind::ALL.into_iter().zip(SHARES) {
         if left < share {
@@ -249,7 +250,8 @@ fn pointed(
 ) -> Result<TrajectoryRequest, Rejection> {
     for (k, &time) in times.iter().enumerate() {
         let field = |which: usize| columns.iter().map(move |(_, points)| points[k][which]);
-        let positions: Vec<f64> = columns.iter().zip(field(0)).map(|((start, _), way)| start + way).collect();
+        let positions: Vec<f64> =
+            columns.iter().zip(field(0)).map(|((start, _), displacements)| start + displacements).collect();
         let velocities: Vec<f64> = field(1).collect();
         let accelerations: Vec<f64> = if degree == 5 { field(2).collect() } else { Vec::new() };
         request.push(

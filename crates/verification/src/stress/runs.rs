@@ -71,7 +71,7 @@ pub fn run(
     options: &StressOptions,
     mut watch: impl FnMut(u64) -> io::Result<()>,
 ) -> Result<StressSummary, StressError> {
-    let parts = options.count.div_ceil(BATCH);
+    let batches = options.count.div_ceil(BATCH);
     let (next, done, stopped) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
     let threads = options.threads.max(1);
     let (sender, receiver) = mpsc::sync_channel(QUEUED * threads);
@@ -80,26 +80,26 @@ pub fn run(
         let _panics = Panics(&stopped);
         let mut test = TrajectoryTest::new(machines, options.seed, options.width);
         while !stopped.load(Ordering::Relaxed) {
-            let part = next.fetch_add(1, Ordering::Relaxed);
-            if part >= parts {
+            let batch = next.fetch_add(1, Ordering::Relaxed);
+            if batch >= batches {
                 return;
             }
             // The thread with the oldest batch never waits here.
-            while part >= done.load(Ordering::Relaxed) + MAX_LEAD && !stopped.load(Ordering::Relaxed) {
+            while batch >= done.load(Ordering::Relaxed) + MAX_LEAD && !stopped.load(Ordering::Relaxed) {
                 thread::sleep(POLL);
             }
-            let numbers = part * BATCH..((part + 1) * BATCH).min(options.count);
+            let numbers = batch * BATCH..((batch + 1) * BATCH).min(options.count);
             let records = numbers.map(|number| test.run(options.first.wrapping_add(number)));
             let records: Result<Vec<TestRecord>, TestMachinesError> = records.collect();
             // The receiver is closed after an error.
-            if sender.send((part, records)).is_err() {
+            if sender.send((batch, records)).is_err() {
                 return;
             }
         }
     };
     thread::scope(|scope| {
         let _panics = Panics(&stopped);
-        let take = || -> Result<(), StressError> {
+        let collect = || -> Result<(), StressError> {
             for _ in 0..threads {
                 let (sender, work) = (sender.clone(), &work);
                 let started = thread::Builder::new().spawn_scoped(scope, move || work(sender));
@@ -109,8 +109,8 @@ pub fn run(
             let mut early = BTreeMap::new();
             let mut due = 0;
             // The receiver is dropped before the threads are joined, so that blocked senders return.
-            for (part, records) in receiver {
-                early.insert(part, records?);
+            for (batch, records) in receiver {
+                early.insert(batch, records?);
                 while let Some(records) = early.remove(&due) {
                     records.iter().for_each(|record| summary.add(machines, record));
                     due += 1;
@@ -120,9 +120,9 @@ pub fn run(
             }
             Ok(())
         };
-        let taken = take();
+        let result = collect();
         stopped.store(true, Ordering::Relaxed);
-        taken
+        result
     })?;
     Ok(summary)
 }

@@ -27,13 +27,13 @@ pub struct MotionLimits {
 }
 
 impl MotionLimits {
-    /// Creates motion limits from `limits`, with acceleration and jerk scaled by `sharper`, so that the motor may saturate.
-    pub fn new(limits: &LimitsConfig, period: Nanoseconds, sharper: f64) -> Self {
+    /// Creates motion limits from `limits`, with acceleration and jerk scaled by `excess`, so that the motor may saturate.
+    pub fn new(limits: &LimitsConfig, period: Nanoseconds, excess: f64) -> Self {
         MotionLimits {
             period: seconds(period),
             velocity: WITHIN * limits.velocity,
-            acceleration: sharper * limits.acceleration,
-            jerk: sharper * limits.jerk,
+            acceleration: excess * limits.acceleration,
+            jerk: excess * limits.jerk,
             low: limits.travel_min.max(-UNLIMITED),
             high: limits.travel_max.min(UNLIMITED),
         }
