@@ -79,7 +79,7 @@ def report(path: Ballbar, runs: dict[str, Recording]) -> str:
         for row in rows
     ]
     lines.insert(1, "  ".join("-" * width for width in widths))
-    return "\n".join(["Radial deviation and tracking errors in µm:", "", *lines])
+    return "\n".join(["Radial deviation and following errors in µm:", "", *lines])
 
 
 def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
