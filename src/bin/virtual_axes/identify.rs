@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{DEFAULT_MACHINE, MachineConfig, ParameterKind, Parameters, Periods};
 use virtual_axes_core::units::MILLISECOND_NS;
+use virtual_axes_identify::identify::summary::IdentificationSummary;
 use virtual_axes_identify::identify::{
-    Breakaway, IdentificationInput, IdentificationOptions, IdentifiedValue, RefinementScope,
+    Agreement, Breakaway, IdentificationInput, IdentificationOptions, IdentifiedValue, RefinementScope,
 };
 use virtual_axes_identify::recording::{Finding, Severity};
 use virtual_axes_io::files::OutputFile;
@@ -19,7 +20,7 @@ use crate::identify_result::{AxisValidation, IdentificationResult};
 use crate::input::must_not_replace;
 use crate::progress::Spinner;
 use crate::recordings::{self, ConditionedRecording, RecordingArguments};
-use crate::{axis, identify_json, identify_text, machine_file, report, variant};
+use crate::{axis, identify_text, machine_file, report, variant};
 
 /// Group of parameters that the refinement adjusts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -101,16 +102,16 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     let (found, identified) = identify(arguments, &parameters, &config, index, &spinner)?;
     spinner.set_activity("writing")?;
     if let Some(out) = &arguments.out {
-        machine_file::write(out, &machine_text(arguments, &found, &identified))?;
+        machine_file::write(out, &machine_text(arguments, &found.summary, &identified))?;
     }
     if let Some(page) = &arguments.report {
         write_report(page, &found, config.periods())?;
     }
     drop(spinner);
     if arguments.json {
-        return Ok(format!("{:#}\n", identify_json::object(&found)));
+        return Ok(serde_json::to_string_pretty(&found.summary)? + "\n");
     }
-    Ok(identify_text::text(&found))
+    Ok(identify_text::text(&found.summary))
 }
 
 /// Rejects invalid output files before the identification starts.
@@ -147,12 +148,11 @@ fn write_report(path: &Path, found: &IdentificationResult, periods: Periods) -> 
     }
     let validations: Vec<ValidationRecording<'_>> = found.validations.iter().map(check).collect();
     let page = IdentificationPage {
-        machine: &found.machine,
+        summary: &found.summary,
         periods,
         inputs: &inputs,
         findings: &findings,
         identification: &found.identification,
-        values: &found.values,
         validations: &validations,
     };
     let mut file = OutputFile::create(path)?;
@@ -217,11 +217,12 @@ fn identify(
             virtual_axes_identify::identify::validate(&recorded.input(), &updated.axes()[index], &periods)?;
         Ok(AxisValidation { recorded, agreement })
     });
-    let validations = validations.collect::<Result<_, Box<dyn Error>>>()?;
-    let (machine, axis) = (config.name().to_owned(), axis.clone());
-    let found =
-        IdentificationResult { machine, axis, recordings, identification, values, validations, findings };
-    Ok((found, identified))
+    let validations: Vec<AxisValidation> = validations.collect::<Result<_, Box<dyn Error>>>()?;
+    let validated: Vec<(IdentificationInput<'_>, &Agreement)> =
+        validations.iter().map(|v| (v.recorded.input(), &v.agreement)).collect();
+    let summary =
+        IdentificationSummary::new(config.name(), &inputs, &identification, values, &validated, findings);
+    Ok((IdentificationResult { recordings, identification, validations, summary }, identified))
 }
 
 /// Returns true if the recordings determine a value: false for a delay whose interval is its whole range.
@@ -247,23 +248,21 @@ fn no_result_message(axis: &str, findings: &[Finding]) -> String {
 /// Returns the machine file.
 fn machine_text(
     arguments: &IdentifyArguments,
-    found: &IdentificationResult,
+    found: &IdentificationSummary,
     identified: &Parameters,
 ) -> String {
-    let list = |recorded: &mut dyn Iterator<Item = &ConditionedRecording>| -> String {
-        recorded.map(|r| r.signals.name.as_str()).collect::<Vec<_>>().join(", ")
-    };
+    let recordings: Vec<&str> = found.recordings.iter().map(|r| r.name.as_str()).collect();
     let mut head = format!(
         "{}, from the machine {} by `virtual_axes identify`; see there for the sources of the other values.\n\
          {} was identified from {}; ± is the standard error.",
         found.machine,
         arguments.machine,
-        found.axis.name(),
-        list(&mut found.recordings.iter()),
+        found.axis,
+        recordings.join(", "),
     );
-    if !found.validations.is_empty() {
-        let others = list(&mut found.validations.iter().map(|v| &v.recorded));
-        head.push_str(&format!("\nValidated on {others}."));
+    if !found.validation.is_empty() {
+        let others: Vec<&str> = found.validation.iter().map(|v| v.recording.name.as_str()).collect();
+        head.push_str(&format!("\nValidated on {}.", others.join(", ")));
     }
     for finding in found.findings.iter().filter(|finding| finding.severity > Severity::Note) {
         head.push_str(&format!("\n{}", identify_text::finding(finding)));

@@ -1,8 +1,7 @@
 //! Result of `virtual_axes identify`.
 
-use virtual_axes_core::config::AxisConfig;
-use virtual_axes_identify::identify::{Agreement, Identification, IdentifiedValue};
-use virtual_axes_identify::recording::Finding;
+use virtual_axes_identify::identify::summary::IdentificationSummary;
+use virtual_axes_identify::identify::{Agreement, Identification};
 
 use crate::recordings::ConditionedRecording;
 
@@ -18,18 +17,12 @@ pub struct AxisValidation {
 /// Result of the command.
 #[derive(Debug)]
 pub struct IdentificationResult {
-    /// Machine name.
-    pub machine: String,
-    /// Initial axis.
-    pub axis: AxisConfig,
     /// Recordings that were used for the identification.
     pub recordings: Vec<ConditionedRecording>,
     /// Result of the identification.
     pub identification: Identification,
-    /// Identified parameters of the machine file.
-    pub values: Vec<IdentifiedValue>,
     /// Validation results.
     pub validations: Vec<AxisValidation>,
-    /// Findings of reading, identification and validation, sorted by decreasing severity.
-    pub findings: Vec<Finding>,
+    /// Figures of the output.
+    pub summary: IdentificationSummary,
 }

@@ -10,7 +10,6 @@ mod check;
 mod design;
 mod design_output;
 mod identify;
-mod identify_json;
 mod identify_result;
 mod identify_text;
 mod input;

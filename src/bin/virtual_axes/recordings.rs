@@ -73,18 +73,6 @@ impl ConditionedRecording {
     pub fn input(&self) -> IdentificationInput<'_> {
         IdentificationInput { signals: &self.signals, feedforward: self.feedforward }
     }
-
-    /// Returns the duration from the first to the last sample, s.
-    pub fn duration(&self) -> f64 {
-        let Signals { spans, period, .. } = &self.signals;
-        let end = spans.last().map(|s| s.start + s.position.len().saturating_sub(1) as f64 * period);
-        spans.first().zip(end).map_or(0.0, |(first, end)| end - first.start)
-    }
-
-    /// Returns the number of samples.
-    pub fn samples(&self) -> usize {
-        self.signals.spans.iter().map(|span| span.position.len()).sum()
-    }
 }
 
 /// Reads and conditions the recording `path` of `axis`; `feedforward` is the value of `option`.

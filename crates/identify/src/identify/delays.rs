@@ -6,6 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::closed_loop::{Experiment, position_residuals};
 use super::feedforward_mode::FeedforwardMode;
@@ -25,7 +26,8 @@ const BLOCK: i64 = 8;
 const CORRELATION: usize = 200;
 
 /// Delay parameter of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum DelayParameter {
     /// α, before the position comparator; identified without feedforward.
     Alpha,

@@ -1,9 +1,11 @@
 //! Feedforward mode of a recording.
 
+use serde::Serialize;
 use virtual_axes_core::config::{Assignment, AxisConfig, Parameters, Value, ValueSource};
 
 /// Feedforward that was active during a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum FeedforwardMode {
     /// No feedforward.
     Off,

@@ -1,6 +1,7 @@
 //! Identification of the friction law from constant velocities (Prévost section 3.3, eq. 3, fig. 5).
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 use super::fit::{BoundedParameter, Effort, NonlinearFit, fit_linear, minimize, r_squared};
 use super::gravity::SteadyCurrent;
@@ -30,7 +31,8 @@ pub const LEAST_DETERMINATION: f64 = 0.95;
 const ASYMMETRIC: f64 = 0.05;
 
 /// Form of the friction law.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum FrictionLaw {
     /// `a e^{bV} + c e^{dV}` (Prévost eq. 3).
     DoubleExponential,

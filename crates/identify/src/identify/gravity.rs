@@ -5,6 +5,8 @@
 //! contains a friction part within ±i0 whose sign follows the approach direction; it cancels with approaches
 //! from both sides.
 
+use serde::Serialize;
+
 use super::fit::fit_linear;
 use super::segments::{MotionSegment, SegmentKind};
 use crate::recording::Signals;
@@ -14,7 +16,7 @@ use virtual_axes_core::statistics::mean;
 /// Averaging time of samples before a fit, s.
 const BATCH: f64 = 0.1;
 /// Relative difference below which two speeds are the same.
-const SAME_SPEED: f64 = 0.03;
+pub(super) const SAME_SPEED: f64 = 0.03;
 /// Number of standard errors of a significant gravity.
 const SIGNIFICANT: f64 = 4.0;
 /// Gravity relative to friction below which it is neglected.
@@ -47,13 +49,16 @@ pub struct Standstill {
 }
 
 /// Gravity as motor current, A: `constant + sine · sin q + cosine · cos q`.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct GravityCurrent {
     /// Part independent of the position, A.
+    #[serde(rename = "constant_a")]
     pub constant: f64,
     /// Factor of the sine of the position, A (rotary axes).
+    #[serde(rename = "sine_a")]
     pub sine: f64,
     /// Factor of the cosine of the position, A (rotary axes).
+    #[serde(rename = "cosine_a")]
     pub cosine: f64,
 }
 
@@ -65,7 +70,8 @@ impl GravityCurrent {
 }
 
 /// Source of an identified gravity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum GravitySource {
     /// Constant velocities in both directions.
     Motion,

@@ -6,6 +6,7 @@
 //! what to record instead.
 
 pub mod campaign;
+pub mod summary;
 
 mod closed_loop;
 mod delays;

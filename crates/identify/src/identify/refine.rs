@@ -3,6 +3,7 @@
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Serialize, Serializer};
 
 use super::closed_loop::{Experiment, SimulatedExperiment, simulate_all};
 use super::fit::{BoundedParameter, Effort, NonlinearFit, minimize};
@@ -67,6 +68,12 @@ impl fmt::Display for RefinedParameter {
             RefinedParameter::VelocityFeedforward => "feedforward.velocity",
             RefinedParameter::TorqueFeedforward => "feedforward.torque",
         })
+    }
+}
+
+impl Serialize for RefinedParameter {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 
@@ -191,7 +198,7 @@ pub(super) fn with_parameters(
 }
 
 /// Refined parameter with standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RefinedValue {
     /// Parameter.
     pub parameter: RefinedParameter,
@@ -202,6 +209,7 @@ pub struct RefinedValue {
     /// Standard error, SI.
     pub error: f64,
     /// True if the value is at one of its bounds.
+    #[serde(rename = "at_bound")]
     pub is_at_bound: bool,
 }
 

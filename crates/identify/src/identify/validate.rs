@@ -1,6 +1,8 @@
 //! Validation of a model against a recording: closed-loop simulation with PSEC, inverse dynamics with
 //! current.
 
+use serde::Serialize;
+
 use super::closed_loop::{Experiment, SimulatedExperiment, find_experiments, simulate_all};
 use super::feedforward_mode::FeedforwardMode;
 use super::fit::r_squared;
@@ -13,7 +15,7 @@ use virtual_axes_core::drive::Gravity;
 use virtual_axes_core::machine::MachineError;
 
 /// Largest and RMS residual.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ResidualStatistics {
     /// Largest magnitude.
     pub max: f64,

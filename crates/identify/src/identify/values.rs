@@ -1,5 +1,7 @@
 //! Identified values as parameters of a machine file.
 
+use serde::Serialize;
+
 use super::delays::DelayParameter;
 use super::friction::{FrictionLaw, LawFit, speed_unit_name};
 use super::gravity::{GravityCurrent, GravitySource};
@@ -14,17 +16,18 @@ const GUARD_DIGITS: i32 = 2;
 const MOST_DIGITS: i32 = 9;
 
 /// Identified parameter of the machine file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct IdentifiedValue {
     /// Full key, such as `x.motor.inertia_kg_m2`.
     pub key: String,
     /// Value in the unit of the machine file.
     pub value: f64,
-    /// Value before the identification.
-    pub before: f64,
     /// Unit; can be empty.
     pub unit: &'static str,
+    /// Value before the identification.
+    pub before: f64,
     /// Standard error in the unit of the machine file.
+    #[serde(rename = "standard_error")]
     pub error: Option<f64>,
     /// Interval of equivalent delays: above the first and up to the second value.
     pub interval: Option<[f64; 2]>,
@@ -90,7 +93,7 @@ impl Identification {
                 _ => f64::NAN,
             };
             let value = if interval.is_some() { value } else { rounded(value, error) };
-            out.push(IdentifiedValue { key, value, before, unit: definition.unit, error, interval, source });
+            out.push(IdentifiedValue { key, value, unit: definition.unit, before, error, interval, source });
         };
         self.push_plant(&mut put);
         self.push_control(&mut put);
@@ -236,7 +239,7 @@ impl Identification {
         }
     }
 
-    fn refined(&self, parameter: RefinedParameter) -> Option<&RefinedValue> {
+    pub(super) fn refined(&self, parameter: RefinedParameter) -> Option<&RefinedValue> {
         self.refinement.as_ref()?.parameters.iter().find(|refined| refined.parameter == parameter)
     }
 

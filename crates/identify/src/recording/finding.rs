@@ -2,8 +2,11 @@
 
 use std::fmt;
 
+use serde::Serialize;
+
 /// Severity of a finding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// Information without effect on the result.
     Note,
@@ -14,13 +17,14 @@ pub enum Severity {
 }
 
 /// Message about a recording or result, with the remedy.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
     /// Severity.
     pub severity: Severity,
     /// Stable identifier such as `gap` or `few-speeds`.
     pub code: &'static str,
     /// Message with its numbers and the name of the recording.
+    #[serde(rename = "text")]
     pub what: String,
     /// Remedy: what to record or to change; empty if nothing is to be done.
     pub remedy: String,

@@ -10,6 +10,7 @@ use super::format::{columns, format_r_squared, optional, with_unit};
 use super::recordings::{bands, over_time, single_recording};
 use super::{IdentificationPage, Step, ValidationRecording};
 use virtual_axes_core::units::{MILLIMETER, seconds};
+use virtual_axes_identify::identify::summary::RecordingSummary;
 use virtual_axes_identify::identify::{
     Agreement, Experiment, ExperimentComparison, IdentificationInput, ResidualStatistics, SegmentKind,
     SimulatedExperiment,
@@ -42,8 +43,12 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
 }
 
 /// Creates the section of a validation recording.
-pub(super) fn validation_section(page: &IdentificationPage, check: &ValidationRecording) -> Section {
-    let mut section = single_recording(&check.input, check.findings, check.agreement);
+pub(super) fn validation_section(
+    page: &IdentificationPage,
+    check: &ValidationRecording,
+    recording: &RecordingSummary,
+) -> Section {
+    let mut section = single_recording(recording, check.findings);
     section.heading = format!("Validation on {}", check.input.signals.name);
     section.paragraphs.push("This recording was not used for the identification.".to_owned());
     fill(page, &mut section, &[(&check.input, check.agreement)]);

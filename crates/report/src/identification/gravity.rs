@@ -9,7 +9,8 @@ use super::format::{columns, digits};
 use super::{IdentificationPage, Step};
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::DEGREE;
-use virtual_axes_identify::identify::{GravityCurrent, GravityFit, GravitySource, Standstill};
+use virtual_axes_identify::identify::summary::{Estimate, GravitySummary};
+use virtual_axes_identify::identify::{GravityCurrent, GravitySource, Standstill};
 
 /// Number of points of the line of the gravity model.
 const LINE_POINTS: usize = 181;
@@ -17,7 +18,7 @@ const LINE_POINTS: usize = 181;
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let found = page.identification;
     let mut section = page.step("Gravity", Step::Gravity);
-    let Some(gravity) = &found.gravity else {
+    let Some(gravity) = &page.summary.gravity else {
         section.paragraphs.push(
             "Gravity was not identified: the recordings have no current at standstill, and none at constant \
              velocities in both directions. The value of the machine file is kept."
@@ -46,24 +47,18 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
 }
 
 /// Returns a sentence with the gravity in the units of the machine file.
-fn sentence(page: &IdentificationPage, gravity: &GravityFit) -> String {
-    let pair = |value: f64, error: f64| format!("{} ± {}", digits(value, 4), digits(error, 2));
+fn sentence(page: &IdentificationPage, gravity: &GravitySummary) -> String {
+    let pair = |found: Estimate| format!("{} ± {}", digits(found.value, 4), digits(found.error, 2));
     if gravity.model == GravityCurrent::default() {
         return "It is not significant; the model has no gravity.".to_owned();
     }
-    let mut parts = Vec::new();
-    if let Some((weight, error)) = gravity.weight {
-        parts.push(format!("W = {} N", pair(weight, error)));
-    }
-    if let Some((tilt, error)) = gravity.tilt {
-        parts.push(format!("k = {} N·m", pair(tilt, error)));
-    }
-    if let Some((phase, error)) = gravity.phase {
-        parts.push(format!("φ = {}°", pair(phase / DEGREE, error / DEGREE)));
-    }
+    let weight = gravity.weight_n.map(|weight| format!("W = {} N", pair(weight)));
+    let tilt = gravity.tilt_nm.map(|tilt| format!("k = {} N·m", pair(tilt)));
+    let phase = gravity.tilt_phase_deg.map(|phase| format!("φ = {}°", pair(phase)));
+    let parts: Vec<String> = [weight, tilt, phase].into_iter().flatten().collect();
     let found = page.axis().gravity;
-    let refined = gravity.weight.is_some_and(|w| w.0 != found.weight)
-        || gravity.tilt.is_some_and(|k| k.0 != found.tilt);
+    let refined = gravity.weight_n.is_some_and(|w| w.value != found.weight)
+        || gravity.tilt_nm.is_some_and(|k| k.value != found.tilt);
     let more = if !refined {
         String::new()
     } else if page.kind() == AxisKind::Linear {
@@ -78,7 +73,7 @@ fn sentence(page: &IdentificationPage, gravity: &GravityFit) -> String {
     format!("This gives {}{more}.", parts.join(", "))
 }
 
-fn chart(page: &IdentificationPage, gravity: &GravityFit, rests: &[Standstill]) -> Chart {
+fn chart(page: &IdentificationPage, gravity: &GravitySummary, rests: &[Standstill]) -> Chart {
     let approached = |label: &str, group: usize, sign: f64| {
         let of_it = rests.iter().filter(|rest| rest.approach == sign);
         ChartSeries::new(label, SeriesStyle::Points(group), of_it.map(|r| [r.position, r.current]).collect())
@@ -100,8 +95,12 @@ fn chart(page: &IdentificationPage, gravity: &GravityFit, rests: &[Standstill]) 
         let law =
             |law: &GravityCurrent| (0..LINE_POINTS).map(|i| [position(i), law.at(position(i))]).collect();
         series.push(ChartSeries::new("gravity of the model", SeriesStyle::Simulated, law(&gravity.model)));
-        if let Some((at_rest, _)) = &gravity.at_rest {
-            series.push(ChartSeries::new("from standstills only", SeriesStyle::Line(2), law(at_rest)));
+        if let Some(at_rest) = &gravity.at_rest {
+            series.push(ChartSeries::new(
+                "from standstills only",
+                SeriesStyle::Line(2),
+                law(&at_rest.current),
+            ));
         }
     }
     Chart {
@@ -114,7 +113,7 @@ fn chart(page: &IdentificationPage, gravity: &GravityFit, rests: &[Standstill]) 
     }
 }
 
-fn table(kind: AxisKind, gravity: &GravityFit) -> Table {
+fn table(kind: AxisKind, gravity: &GravitySummary) -> Table {
     let part = |name: &str, of: fn(&GravityCurrent) -> f64| {
         let pair = |pair: Option<(&GravityCurrent, &GravityCurrent)>| {
             pair.map_or_else(
@@ -124,7 +123,7 @@ fn table(kind: AxisKind, gravity: &GravityFit) -> Table {
         };
         let own = Some((&gravity.current, &gravity.error));
         let (motion, rest) = match gravity.source {
-            GravitySource::Motion => (own, gravity.at_rest.as_ref().map(|(value, error)| (value, error))),
+            GravitySource::Motion => (own, gravity.at_rest.as_ref().map(|rest| (&rest.current, &rest.error))),
             GravitySource::Rest => (None, own),
         };
         let mut row = vec![name.to_owned()];

@@ -14,9 +14,8 @@ mod summary;
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, Periods};
 use virtual_axes_core::units::seconds;
-use virtual_axes_identify::identify::{
-    Agreement, FeedforwardMode, Identification, IdentificationInput, IdentifiedValue,
-};
+use virtual_axes_identify::identify::summary::IdentificationSummary;
+use virtual_axes_identify::identify::{Agreement, Identification, IdentificationInput};
 use virtual_axes_identify::recording::Finding;
 
 use super::document::{Document, Section};
@@ -26,8 +25,8 @@ use notices::Step;
 /// Contents of the page of an identification.
 #[derive(Debug, Clone, Copy)]
 pub struct IdentificationPage<'a> {
-    /// Name of the initial machine.
-    pub machine: &'a str,
+    /// Summary of the identification.
+    pub summary: &'a IdentificationSummary,
     /// Sampling periods of the position, velocity and current loops.
     pub periods: Periods,
     /// Recordings, as passed to [`identify`](virtual_axes_identify::identify::identify).
@@ -36,9 +35,7 @@ pub struct IdentificationPage<'a> {
     pub findings: &'a [Vec<Finding>],
     /// Result of the identification.
     pub identification: &'a Identification,
-    /// Identified parameters, from [`Identification::values`].
-    pub values: &'a [IdentifiedValue],
-    /// Recordings for validation, which were not used for the identification.
+    /// Recordings for validation, which were not used for the identification, in the order of the summary.
     pub validations: &'a [ValidationRecording<'a>],
 }
 
@@ -67,7 +64,11 @@ impl IdentificationPage<'_> {
             refinement::section(self),
             agreement::section(self),
         ];
-        sections.extend(self.validations.iter().map(|check| agreement::validation_section(self, check)));
+        let validations = self.validations.iter().zip(&self.summary.validation);
+        sections.extend(
+            validations
+                .map(|(check, summary)| agreement::validation_section(self, check, &summary.recording)),
+        );
         Document {
             title: format!("Identification of the {} axis", self.axis().name()),
             description: "The steps of Prévost section 3, and a refinement in simulated closed loop."
@@ -86,7 +87,7 @@ impl IdentificationPage<'_> {
         let ms = |period| format!("{} ms", exact(seconds(period) * 1e3));
         let Periods { position, velocity, current } = self.periods;
         let mut facts = vec![
-            ("machine".to_owned(), self.machine.to_owned()),
+            ("machine".to_owned(), self.summary.machine.clone()),
             ("axis".to_owned(), format!("{} ({kind})", self.axis().name())),
             (
                 "sampling periods of position, velocity and current loop".to_owned(),
@@ -120,16 +121,4 @@ impl IdentificationPage<'_> {
     fn has_linear_motor(&self) -> bool {
         self.kind() == AxisKind::Linear && self.axis().transmission_ratio == 1.0
     }
-}
-
-/// Returns the distinct feedforward modes of the parts of a recording, separated by commas.
-fn modes(agreement: &Agreement, input: &IdentificationInput) -> String {
-    let mut modes: Vec<FeedforwardMode> = agreement.experiments.iter().map(|e| e.mode).collect();
-    modes.sort();
-    modes.dedup();
-    if modes.is_empty() {
-        modes.extend(input.feedforward);
-    }
-    let names: Vec<&str> = modes.iter().map(|mode| mode.name()).collect();
-    if names.is_empty() { "–".to_owned() } else { names.join(", ") }
 }

@@ -6,17 +6,14 @@ use super::super::document::Section;
 use super::super::table::Table;
 use super::super::unit::DisplayUnit;
 use super::format::{columns, digits, exact};
-use super::{IdentificationPage, modes, notices};
-use virtual_axes_identify::identify::{Agreement, IdentificationInput, MotionSegment, SegmentKind};
+use super::{IdentificationPage, notices};
+use virtual_axes_identify::identify::summary::RecordingSummary;
+use virtual_axes_identify::identify::{Agreement, MotionSegment, SegmentKind};
 use virtual_axes_identify::recording::{Finding, SignalSpan, Signals};
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let pairs: Vec<(&IdentificationInput, Option<&Agreement>)> = page
-        .inputs
-        .iter()
-        .enumerate()
-        .map(|(number, input)| (input, page.identification.agreements.get(number)))
-        .collect();
+    let agreements = page.identification.agreements.iter().map(Some).chain(std::iter::repeat(None));
+    let charts = page.inputs.iter().zip(agreements).map(|(input, a)| chart(page, input.signals, a));
     let findings = page.findings.iter().take(page.inputs.len()).flatten();
     let text = "Velocity and acceleration are derivatives of the position after a zero-phase low-pass \
                 filter; its cut-off frequency is at −3 dB. Shaded intervals are the segments of the motion \
@@ -24,26 +21,22 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     Section {
         paragraphs: vec![text.to_owned()],
         notices: findings.map(notices::notice).collect(),
-        tables: vec![table(&pairs)],
-        charts: pairs.iter().map(|(input, agreement)| chart(page, input.signals, *agreement)).collect(),
+        tables: vec![table(&page.summary.recordings)],
+        charts: charts.collect(),
         ..Section::new("Recordings")
     }
 }
 
 /// Creates a section with the notices and the table of one recording.
-pub(super) fn single_recording(
-    input: &IdentificationInput,
-    findings: &[Finding],
-    agreement: &Agreement,
-) -> Section {
+pub(super) fn single_recording(recording: &RecordingSummary, findings: &[Finding]) -> Section {
     Section {
         notices: findings.iter().map(notices::notice).collect(),
-        tables: vec![table(&[(input, Some(agreement))])],
+        tables: vec![table(std::slice::from_ref(recording))],
         ..Section::default()
     }
 }
 
-fn table(pairs: &[(&IdentificationInput, Option<&Agreement>)]) -> Table {
+fn table(recordings: &[RecordingSummary]) -> Table {
     let heads = [
         ("recording", ""),
         ("samples", ""),
@@ -59,30 +52,22 @@ fn table(pairs: &[(&IdentificationInput, Option<&Agreement>)]) -> Table {
     Table {
         caption: "Recordings".to_owned(),
         columns: columns(heads),
-        rows: pairs.iter().map(|(input, agreement)| row(input, *agreement)).collect(),
+        rows: recordings.iter().map(row).collect(),
     }
 }
 
-fn row(input: &IdentificationInput, agreement: Option<&Agreement>) -> Vec<String> {
-    let signals = input.signals;
-    let samples: usize = signals.spans.iter().map(|span| span.position.len()).sum();
-    let duration = |kind: SegmentKind| {
-        let segments = agreement.map_or(&[][..], |a| &a.segments).iter().filter(|s| s.kind == kind);
-        let count: usize = segments.map(|s| s.samples.len()).sum();
-        format!("{:.1}", count as f64 * signals.period)
-    };
-    vec![
-        signals.name.clone(),
-        samples.to_string(),
-        exact(signals.period * 1e3),
-        digits(signals.cutoff, 3),
-        digits(signals.current_lag * 1e3, 3),
-        signals.spans.len().to_string(),
-        agreement.map_or_else(|| "–".to_owned(), |agreement| modes(agreement, input)),
-        duration(SegmentKind::Static),
-        duration(SegmentKind::ConstantVelocity),
-        duration(SegmentKind::Accelerating),
-    ]
+fn row(recording: &RecordingSummary) -> Vec<String> {
+    let mut row = vec![
+        recording.name.clone(),
+        recording.samples.to_string(),
+        exact(recording.period_ms),
+        digits(recording.cutoff_hz, 3),
+        digits(recording.current_lag_ms, 3),
+        recording.spans.to_string(),
+        recording.feedforward_names(),
+    ];
+    row.extend(recording.segments_s.map(|duration| format!("{duration:.1}")));
+    row
 }
 
 /// Creates the plot of velocity and current over time.

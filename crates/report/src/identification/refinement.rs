@@ -3,14 +3,14 @@
 use super::super::document::Section;
 use super::super::table::{Table, TableColumn};
 use super::super::text::{listed, number};
-use super::super::unit::DisplayUnit;
-use super::format::{columns, digits, percent, with_unit};
+use super::format::{columns, digits, percent};
 use super::{IdentificationPage, Step};
-use virtual_axes_identify::identify::{RefinedParameter, RefinedValue, Refinement};
+use virtual_axes_identify::identify::summary::RefinementSummary;
+use virtual_axes_identify::identify::{RefinedParameter, RefinedValue};
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let mut section = page.step("Refinement in closed loop", Step::Refinement);
-    let Some(refinement) = &page.identification.refinement else {
+    let Some(refinement) = &page.summary.refinement else {
         section.paragraphs.push(
             "The refinement was not run; the values are those of the preceding steps, or of the machine \
              file."
@@ -20,9 +20,9 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     };
     section.paragraphs.push(text(page, refinement));
     let pairs: Vec<String> = refinement
-        .correlated_pairs()
-        .into_iter()
-        .map(|(a, b, rho)| format!("{a} with {b} ({})", number(rho, 3)))
+        .correlated_pairs
+        .iter()
+        .map(|(a, b, rho)| format!("{a} with {b} ({})", number(*rho, 3)))
         .collect();
     section.paragraphs.push(if pairs.is_empty() {
         "No two parameters are strongly correlated.".to_owned()
@@ -53,21 +53,20 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     section
 }
 
-fn text(page: &IdentificationPage, refinement: &Refinement) -> String {
-    let unit = page.error_unit();
-    let of = |value: f64| with_unit(value, &unit, 3);
-    let (before, after) = refinement.position;
-    let current = refinement.current.map_or_else(String::new, |(before, after)| {
-        let of = |value: f64| with_unit(value, &DisplayUnit::AMPERE, 3);
-        format!(", the RMS of the current deviation from {} to {}", of(before), of(after))
+fn text(page: &IdentificationPage, refinement: &RefinementSummary) -> String {
+    let unit = page.error_unit().symbol;
+    let of = |value: f64, unit: &str| format!("{}\u{a0}{unit}", digits(value, 3));
+    let current = refinement.current_rms_a.map_or_else(String::new, |current| {
+        let [before, after] = [current.before, current.after].map(|value| of(value, "A"));
+        format!(", the RMS of the current deviation from {before} to {after}")
     });
     format!(
         "All parameters below are adjusted jointly to minimize the deviation of the simulated axis from the \
          recorded positions{}, weighted by the residuals. The RMS of the position deviation changes from {} \
          to {}{current}.",
-        if refinement.current.is_some() { " and currents" } else { "" },
-        of(before),
-        of(after)
+        if refinement.current_rms_a.is_some() { " and currents" } else { "" },
+        of(refinement.position_rms.before, unit),
+        of(refinement.position_rms.after, unit)
     )
 }
 
@@ -98,7 +97,7 @@ fn row(page: &IdentificationPage, refined: &RefinedValue) -> Vec<String> {
 }
 
 /// Creates the lower triangle of the correlation matrix.
-fn correlations(refinement: &Refinement) -> Table {
+fn correlations(refinement: &RefinementSummary) -> Table {
     let names: Vec<String> = refinement.parameters.iter().map(|p| p.parameter.to_string()).collect();
     let mut heads = vec![TableColumn::new("", "")];
     let across = names.len().saturating_sub(1);

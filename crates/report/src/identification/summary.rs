@@ -18,8 +18,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         .collect();
     // Missing results come first.
     general.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
-    let count = capital(&counted(page.values.len(), "parameter"));
-    let text = if page.values.is_empty() {
+    let count = capital(&counted(page.summary.values.len(), "parameter"));
+    let text = if page.summary.values.is_empty() {
         "No parameter was identified from the recordings.".to_owned()
     } else {
         format!(
@@ -31,7 +31,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     let table = Table {
         caption: "Identified values".to_owned(),
         columns: columns(heads),
-        rows: page.values.iter().map(row).collect(),
+        rows: page.summary.values.iter().map(row).collect(),
     };
     Section {
         paragraphs: vec![text],

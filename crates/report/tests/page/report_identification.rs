@@ -4,6 +4,7 @@ use std::sync::LazyLock;
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig, Parameters};
 use virtual_axes_identify::identify::campaign::CampaignOptions as Course;
+use virtual_axes_identify::identify::summary::IdentificationSummary;
 use virtual_axes_identify::identify::{
     Agreement, FeedforwardMode, Identification, IdentificationInput, IdentificationOptions, IdentifiedValue,
     RefinementScope, identify, validate,
@@ -88,13 +89,22 @@ impl TestCase {
         values: &[IdentifiedValue],
         validations: &[ValidationRecording<'_>],
     ) -> Document {
+        let inputs = self.inputs();
+        let validated: Vec<_> = validations.iter().map(|check| (check.input, check.agreement)).collect();
+        let summary = IdentificationSummary::new(
+            self.machine.name(),
+            &inputs,
+            identification,
+            values.to_vec(),
+            &validated,
+            identification.findings.clone(),
+        );
         let page = IdentificationPage {
-            machine: self.machine.name(),
+            summary: &summary,
             periods: self.machine.periods(),
-            inputs: &self.inputs(),
+            inputs: &inputs,
             findings: &self.findings,
             identification,
-            values,
             validations,
         };
         page.document()
