@@ -45,7 +45,7 @@ def start(context: LaunchContext) -> list[object]:
     clock = {"use_sim_time": argument["time"] != "real"}
     source = str(SHARE / "launch" / "virtual_axes.launch.py")
     actions: list[object] = []
-    for place, side in enumerate(SIDES):
+    for index, side in enumerate(SIDES):
         of_side = {
             "machine": argument[f"{side}_machine"],
             "controller": argument[f"{side}_controller"],
@@ -59,9 +59,9 @@ def start(context: LaunchContext) -> list[object]:
         }
         # In a group: the arguments of one must not reach the other.
         include = IncludeLaunchDescription(PythonLaunchDescriptionSource(source), launch_arguments=of_side.items())
-        actions.append(TimerAction(period=APART_S * place, actions=[GroupAction([include])]))
+        actions.append(TimerAction(period=APART_S * index, actions=[GroupAction([include])]))
         if argument["robot_state_publisher"] == "true":
-            x = float(argument["distance"]) * place
+            x = float(argument["distance"]) * index
             actions.append(
                 Node(
                     package="tf2_ros",

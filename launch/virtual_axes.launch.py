@@ -28,7 +28,7 @@ ARGUMENTS = [
         "controller",
         "as_machine",
         ["as_machine", "cascade", "gpc", "rst"],
-        "Position controller of every joint; as_machine: what the machine file says",
+        "Position controller of every joint; as_machine: as in the machine file",
     ),
     ("namespace", "", None, "Namespace of the nodes"),
     ("name", PACKAGE, None, "Name of the node"),

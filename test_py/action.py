@@ -67,7 +67,7 @@ class Sent:
     def feedback(self) -> list[FollowJointTrajectory.Feedback]:
         """Returns the feedback so far."""
         id = self.id
-        return [said.feedback for said in list(self._follow.feedback) if bytes(said.goal_id.uuid) == id]
+        return [message.feedback for message in list(self._follow.feedback) if bytes(message.goal_id.uuid) == id]
 
     @property
     def handle(self) -> Any:

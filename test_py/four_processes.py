@@ -173,7 +173,7 @@ class Figures:
         return found
 
     def load_per_velocity(self) -> tuple[float, float, float]:
-        """Returns load current over velocity (A s/m, least squares), its correlation, and the lag in periods.
+        """Returns load current over velocity (A s/m, least squares), its correlation, and the lag in cycles.
 
         A load acts some periods after the velocity that it answers.
         """
@@ -197,8 +197,8 @@ class Figures:
         for joint in range(len(JOINTS)):
             known = np.sort(self.velocity[:, joint] * load_per_velocity)
             load = self.load[self.load[:, joint] != 0, joint]
-            place = np.clip(np.searchsorted(known, load), 1, len(known) - 1)
-            away = np.minimum(np.abs(known[place] - load), np.abs(known[place - 1] - load))
+            index = np.clip(np.searchsorted(known, load), 1, len(known) - 1)
+            away = np.minimum(np.abs(known[index] - load), np.abs(known[index - 1] - load))
             answers.append(away <= 1e-9 * np.abs(known).max())
         return float(np.concatenate(answers).mean())
 

@@ -76,10 +76,10 @@ def test_a_goal_is_followed_with_feedback_to_success(follow: Follow) -> None:
         assert np.allclose(desired - actual, error, rtol=0, atol=1e-15)
         velocity = np.array([message.actual.velocities[column] for message in feedback])
         assert np.array_equal(velocity, states["velocity", joint][rows])
-        asked = np.array([message.desired.velocities[column] for message in feedback])
+        velocities = np.array([message.desired.velocities[column] for message in feedback])
         # Quintic from rest to rest over T: 15/8 of the mean speed in the middle.
         peak = 15 / 8 * (0.02 if joint == "y" else 0.05) / 2.0
-        assert asked.max() == pytest.approx(peak, rel=2e-3)
+        assert velocities.max() == pytest.approx(peak, rel=2e-3)
 
 
 def test_every_field_crosses_the_wire(follow: Follow) -> None:
@@ -115,7 +115,7 @@ def test_a_goal_without_points_is_a_controlled_stop(follow: Follow) -> None:
     assert "stop" in ended.result.error_string
 
 
-# ---- goals that are rejected
+# ---- rejected goals
 
 
 def tolerance(name: str, **values: float) -> list[JointTolerance]:

@@ -83,7 +83,7 @@ def test_a_goal_tolerance_is_waited_for_as_long_as_the_goal_allows(without_feedf
         assert in_time.status() == GoalStatus.STATUS_SUCCEEDED, (end_time, in_time.result().error_string)
 
 
-# ---- canceling and displacing
+# ---- cancellation and preemption
 
 
 def test_canceling_stops_the_axes_within_their_limits(follow: Follow) -> None:

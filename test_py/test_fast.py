@@ -149,7 +149,7 @@ def test_of_machines_that_start_together_one_leads(shared: tuple[ExitStack, Doma
     for process in processes:
         wait_for_topics(process)
     both = [stack.enter_context(Drive(process=process)) for process in processes]
-    both[0].wait_for(lambda: sum(map(leads, both)) == 1, 5, "one machine that gives the clock")
+    both[0].wait_for(lambda: sum(map(leads, both)) == 1, 5, "one machine that publishes the clock")
     ticks = Ticks(both[0])
     count = len(ticks.shown)
     time.sleep(0.3)
@@ -181,7 +181,7 @@ def test_an_external_clock_is_followed(start: Callable[..., Drive]):
     assert_unbroken(drive, begin, drive.now() - NANOSECONDS // 20)
 
 
-def stands(drive: Drive, timeout: float = 60.0) -> int:
+def stalled_at(drive: Drive, timeout: float = 60.0) -> int:
     """Returns the number of position cycles at which a slow subscriber has stopped the clock for seconds."""
     seen = len(drive.diagnostics())
 
@@ -191,7 +191,7 @@ def stands(drive: Drive, timeout: float = 60.0) -> int:
         is_held = all(status.message == "waiting for a slow subscriber" for status in said)
         return counted if len(counted) == 2 and is_held and counted[0] == counted[1] else []
 
-    return int(drive.wait_for(counts, timeout, "clock that stands")[0])
+    return int(drive.wait_for(counts, timeout, "stalled clock")[0])
 
 
 def test_a_slow_subscriber_loses_no_sample(start: Callable[..., Drive]):
@@ -216,11 +216,11 @@ def test_a_slow_subscriber_loses_no_sample(start: Callable[..., Drive]):
         end = drive.now() + instants * TSP_NS
         sent = drive.send(joint_trajectory(["x"], *swing(0.3, amplitude=0.01), stamp=end))
         drive.decision(sent)
-        stood_at = stands(drive)
+        stalled = stalled_at(drive)
         assert drive.now() < end and len(drive.results(sent)) == 1, "it is under way"
         assert drive.get_parameters(["time"]) == {"time": "fast"}
         drive.set_parameters({"y.velocity_loop.gain": 4.4})
-        assert stands(drive) == stood_at
+        assert stalled_at(drive) == stalled
         end += NANOSECONDS // 2
         deadline = time.monotonic() + 60
         while stamps[-1] < end and time.monotonic() < deadline:

@@ -84,7 +84,7 @@ def test_invalid_times_are_ignored_and_logged_once(clock: SimClock):
     for _ in range(100):
         clock._publisher.publish(Clock(clock=Time(sec=-1, nanosec=0)))
         clock._publisher.publish(Clock(clock=Time(sec=1, nanosec=4_000_000_000)))
-    drive.wait_for(lambda: "invalid time" in drive.process.output()[said:], 10, "word of what is no time")
+    drive.wait_for(lambda: "invalid time" in drive.process.output()[said:], 10, "log of an invalid time")
     time.sleep(0.2)
     assert drive.now() == stood_at
     assert drive.process.output()[said:].count("invalid time") == 1

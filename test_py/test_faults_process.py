@@ -72,7 +72,7 @@ def test_a_paused_node_continues_without_a_burst(real: Drive):
     def counted(values: dict[str, str]) -> bool:
         return all(int(values[key]) - int(before[key]) >= missed for key in ("missed_periods", "unpublished_periods"))
 
-    real.wait_for(lambda: counted(diagnostics(real)[-1]), 10, "count of the missed periods")
+    real.wait_for(lambda: counted(diagnostics(real)[-1]), 10, "count of the missed cycles")
     messages = [array.status[0].message for array in real.diagnostics()]
     assert any("the node stalled" in message for message in messages)
     assert "the node stalled for" in real.process.output()

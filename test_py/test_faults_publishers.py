@@ -277,7 +277,7 @@ def test_messages_of_two_contending_streams_are_not_mixed(node: Drive):
     commanded = list(zip(states["psec", "x"].tolist(), states["psec", "y"].tolist()))
     assert set(commanded) <= set(sent)
     assert commanded[-1] == sent[-1]
-    places = [sent.index(pair) for pair in commanded]
-    assert places == sorted(places), "an older message came after a newer one"
-    assert {x > 0 for x, _ in commanded if x} == {True, False}, "only one of them was heard"
+    indices = [sent.index(pair) for pair in commanded]
+    assert indices == sorted(indices), "an older message came after a newer one"
+    assert {x > 0 for x, _ in commanded if x} == {True, False}, "only one of them was followed"
     assert len(set(commanded)) > 30

@@ -16,7 +16,7 @@ def test_four_processes_on_an_unbroken_grid(tmp_path: Path):
     assert figures.faults() == []
     assert all(len(stamps) > 3.0 / 0.006 for stamps in figures.stamps.values())
     slope, correlation, lag = figures.load_per_velocity()
-    print(f"\nload over velocity {slope:.2f} A s/m, correlation {correlation:.4f}, {lag:g} periods later")
+    print(f"\nload over velocity {slope:.2f} A s/m, correlation {correlation:.4f}, lag {lag:g} cycles")
     # `load` of motor_currents is positive where it opposes motion in the positive direction.
     assert slope > 0
     # The first loads respond to velocities from before the recording.

@@ -114,9 +114,9 @@ def test_a_recorded_trace_is_the_csv_trace_field_by_field(traces: tuple[Path, Pa
     assert len(times) > 101
     for topic, messages in found.items():
         assert [stamp for stamp, _ in messages] == times.tolist(), topic
-    for place, joint in enumerate(JOINTS):
+    for index, joint in enumerate(JOINTS):
         for column, (topic, field) in COLUMNS.items():
-            values = np.array([getattr(message, field)[place] for _, message in found[topic]])
+            values = np.array([getattr(message, field)[index] for _, message in found[topic]])
             assert values.tobytes() == table[f"{joint}.{column}"].tobytes(), f"{joint}.{column}"
     assert np.ptp(table["x.position"]) > 0.0039 and np.ptp(table["c.position"]) > 0.29
 
@@ -129,9 +129,9 @@ def test_a_recorded_trace_is_the_csv_trace_field_by_field(traces: tuple[Path, Pa
         assert len(state.effort) == len(current.gravity) == len(current.load) == len(current.saturated) == len(JOINTS)
         assert not any(current.saturated) and not any(current.load)
     # Effort is the motor's force: Kt i / r, one ratio per axis.
-    for place in (0, 4):
-        efforts = np.array([state.effort[place] for _, state in found["/joint_states"]])
-        currents = np.array([current.current[place] for _, current in found["/virtual_axes/motor_currents"]])
+    for index in (0, 4):
+        efforts = np.array([state.effort[index] for _, state in found["/joint_states"]])
+        currents = np.array([current.current[index] for _, current in found["/virtual_axes/motor_currents"]])
         moving = np.abs(currents) > 0.1
         assert moving.sum() > 50
         ratio = efforts[moving] / currents[moving]

@@ -23,8 +23,8 @@ ROWS = {
 """Specified radial deviation of the model at every tick: mean to ±0.2 µm, extremes to ±1 µm."""
 MEAN_UM, EXTREME_UM = 0.2, 1.0
 BETWEEN_SAMPLES_UM = 1.0
-"""The top of a spike lies up to 3 ms beside a published position: wherever the grid of 6 ms lies against
-it, less than this is missed (the same circle sampled every 125 µs, at all 48 places of the grid)."""
+"""Maximum amount by which the samples underestimate a spike, µm: its top is up to 3 ms from a published position
+(from the same circle sampled every 125 µs, at all 48 phases of the grid of 6 ms)."""
 
 
 def of_axes(values: dict[str, object], axes: tuple[str, ...] = AXES) -> dict[str, object]:

@@ -127,7 +127,7 @@ class Session:
 
     path: Path
     sent: dict[str, list[bytes]]
-    heard: dict[str, list[bytes]]
+    received_messages: dict[str, list[bytes]]
     offered: dict[str, tuple[str, ReliabilityPolicy, DurabilityPolicy]]
     """Type and profile of each topic in the graph."""
     status: DiagnosticStatus
@@ -141,8 +141,10 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
     path = tmp_path_factory.mktemp("record") / "session.mcap"
     with Node(["-p", f"record:={path}", "-p", "qos.drive_states.depth:=7"]) as process:
         drive = Drive(process=process)
-        heard: dict[str, list[bytes]] = {topic: [] for topic in KINDS if topic not in ("/psec", CURRENTS, DRIVES)}
-        for topic, store in heard.items():
+        received_messages: dict[str, list[bytes]] = {
+            topic: [] for topic in KINDS if topic not in ("/psec", CURRENTS, DRIVES)
+        }
+        for topic, store in received_messages.items():
             profile = RESULT_QOS if topic in (RESULTS, "/rosout") else DEEP_QOS
             drive.node.create_subscription(KINDS[topic], topic, drive._keep(store), profile, raw=True)
         sent: dict[str, list[bytes]] = {"/psec": [], "/psec_stream": [], "/load": []}
@@ -155,7 +157,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
             drive.load({"y": float(k)})
             sent["/load"].append(serialize_message(JointState(name=["y"], effort=[float(k)])))
             time.sleep(0.01)
-        drive.wait_for(lambda: all(heard.values()), 10, "every topic")
+        drive.wait_for(lambda: all(received_messages.values()), 10, "every topic")
         status = drive.wait_for(lambda: recording_status(drive), 10, "diagnostics of the recording")
         offered = {}
         name, namespace = drive.target.rsplit("/", 1)[1], drive.target.rsplit("/", 1)[0] or "/"
@@ -174,9 +176,9 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
         exit_status = process.stop(signal.SIGTERM)
         drive.wait_for(lambda: not drive.sees(), 5, "dispose")
         for topic, key in ((STATES, "joints"), (CURRENTS, "currents"), (DRIVES, "states")):
-            heard[topic] = list(drive._samples[key])
+            received_messages[topic] = list(drive._samples[key])
         drive.close()
-        yield Session(path, sent, heard, offered, status, exit_status, process.output())
+        yield Session(path, sent, received_messages, offered, status, exit_status, process.output())
 
 
 def test_every_topic_is_recorded_with_its_type_and_profile(session: Session):
@@ -199,15 +201,15 @@ def test_every_topic_is_recorded_with_its_type_and_profile(session: Session):
 def test_published_messages_are_recorded_bit_for_bit(session: Session):
     """A subscriber's samples are in the recording, in order, without gaps."""
     messages, _, _ = read(session.path)
-    assert set(session.heard) | set(session.sent) == set(messages)
-    for topic, heard in session.heard.items():
-        heard = [text(topic, data) for data in heard]
+    assert set(session.received_messages) | set(session.sent) == set(messages)
+    for topic, received in session.received_messages.items():
+        received = [text(topic, data) for data in received]
         recorded = [text(topic, entry.data) for entry in messages[topic]]
         # A transient local publisher may send old samples first.
-        first = recorded.index(heard[0])
-        assert recorded[first : first + len(heard)] == heard, topic
-        assert len(heard) > 0
-    assert len(session.heard[DRIVES]) > 100
+        first = recorded.index(received[0])
+        assert recorded[first : first + len(received)] == received, topic
+        assert len(received) > 0
+    assert len(session.received_messages[DRIVES]) > 100
 
 
 def test_received_messages_are_recorded_bit_for_bit(session: Session):
@@ -223,7 +225,7 @@ def test_received_messages_are_recorded_bit_for_bit(session: Session):
             remaining = iter(sent)
             assert found and all(message in remaining for message in found), topic
         assert all(entry.publish == entry.log for entry in received), "they had no stamps"
-    began, ended = (messages[DRIVES][place].log for place in (0, -1))
+    began, ended = (messages[DRIVES][index].log for index in (0, -1))
     assert all(began <= entry.log <= ended for topic in session.sent for entry in messages[topic])
 
 

@@ -80,9 +80,7 @@ CASES = {
         value=3,
         limit=2,
     ),
-    "time stands still": Case(
-        R.TIMES_NOT_INCREASING, lambda d: line("z", (1, 0), (2, 0), (2, 0)), index=2, value=2, limit=2
-    ),
+    "equal times": Case(R.TIMES_NOT_INCREASING, lambda d: line("z", (1, 0), (2, 0), (2, 0)), index=2, value=2, limit=2),
     "time runs back": Case(
         R.TIMES_NOT_INCREASING, lambda d: line("z", (1, 0), (3, 0), (2.5, 0)), index=2, value=2.5, limit=3
     ),

@@ -43,7 +43,7 @@ def state_of(drive: Drive, wanted: str, timeout: float = 8.0) -> dict[str, str]:
                 return values
         return None
 
-    return drive.wait_for(found, timeout, f"diagnostics that say {wanted}")
+    return drive.wait_for(found, timeout, f"diagnostics with the state {wanted}")
 
 
 def begin_anew(clock: SimClock, first: int) -> None:

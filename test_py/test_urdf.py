@@ -101,8 +101,8 @@ def test_the_tool_in_the_workpiece_equals_the_kinematics(machine: str):
     random = np.random.default_rng(710)
     names = ["x", "y", "z", "a", "c"]
     trials = random.uniform([-0.3, -0.2, -0.2, -math.pi, -20.0], [0.3, 0.2, 0.2, math.pi, 20.0], (60, 5))
-    asked = [f"--joints={','.join(f'{n}={v!r}' for n, v in zip(names, row))}" for row in trials.tolist()]
-    poses = json.loads(command("pose", "--machine", machine, "--json", *settings, *asked))
+    positions = [f"--joints={','.join(f'{n}={v!r}' for n, v in zip(names, row))}" for row in trials.tolist()]
+    poses = json.loads(command("pose", "--machine", machine, "--json", *settings, *positions))
     largest = 0.0
     for row, pose in zip(trials.tolist(), poses, strict=True):
         joints = dict(zip(names, row))
@@ -125,8 +125,8 @@ def test_a_positive_joint_moves_the_tool_relative_to_the_workpiece():
     def tool(**joints: float) -> np.ndarray:
         return np.linalg.inv(frame(robot, "workpiece", joints)) @ frame(robot, "tool", joints)
 
-    for place, name in enumerate("xyz"):
-        assert tool(**{name: 0.1})[:3, 3] - tool()[:3, 3] == pytest.approx(0.1 * np.eye(3)[place], abs=1e-15)
+    for index, name in enumerate("xyz"):
+        assert tool(**{name: 0.1})[:3, 3] - tool()[:3, 3] == pytest.approx(0.1 * np.eye(3)[index], abs=1e-15)
     # A right-handed rotation of the tool about X turns its axis from Z towards -Y; about Z, X towards Y.
     assert tool(a=math.pi / 2)[:3, 2] == pytest.approx([0.0, -1.0, 0.0], abs=1e-15)
     assert tool(c=math.pi / 2)[:3, 0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-15)

@@ -15,10 +15,10 @@ the recording. Sections of a recording:
     json        figures of the other commands that have `--json`
     keys        key paths of each `--json` output with the kinds of their values
     help        `--help` of the programs and of all subcommands
-    texts       `parameters`, `check`, `urdf`, and what is shipped, without comments
+    texts       `parameters`, `check`, `urdf`, and built-in files, without comments
     refusals    exit status and output of bad invocations
     node        with `--node`: topics, QoS, services, actions, message types and parameters of the node, as seen from
-                rclpy, for several command lines; exit status and output of command lines that the node refuses
+                rclpy, for several command lines; exit status and output of command lines that the node rejects
 
 `--compare` prints each difference on one line; the exit status is 1 if there is any. Numbers are compared exactly.
 Texts are compared line by line, with runs of spaces and dashes shortened, since they align tables. Each line
@@ -502,7 +502,7 @@ def process_module() -> ModuleType:
 
 
 def record_node(programs: Programs) -> dict[str, Any]:
-    """Records the node as seen from rclpy, and the command lines that it refuses."""
+    """Records the node as seen from rclpy, and the command lines that it rejects."""
     for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
         os.environ.pop(variable, None)
     # Before rclpy makes its first context: nothing leaves this machine.

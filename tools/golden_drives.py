@@ -213,10 +213,10 @@ def loops():
     names = list(LOOPS)
     middle = [value for value, _ in LOOPS.values()]
     cases = [(middle, periods) for periods in PERIODS]
-    for place in range(len(names)):
+    for index in range(len(names)):
         for factor in (1e-4, 0.1, 10, 1e4):
             for periods in PERIODS[:2]:
-                cases.append(([v * factor if k == place else v for k, v in enumerate(middle)], periods))
+                cases.append(([v * factor if k == index else v for k, v in enumerate(middle)], periods))
     for _ in range(80):
         factors = [10 ** source.uniform(-2, 2) for _ in names]
         cases.append(([v * f for v, f in zip(middle, factors)], source.choice(PERIODS)))

@@ -136,9 +136,9 @@ def main() -> None:
     kinds = ("NONE", "SIGN", "ENCRYPT")
     words.add_argument("--rtps", choices=kinds, default="SIGN", help="protection of whole messages")
     words.add_argument("enclaves", nargs="+", metavar="/ENCLAVE[:-TOPIC]...")
-    asked = words.parse_args()
-    keystore = Keystore(asked.folder, asked.domain, asked.rtps)
-    for enclave in asked.enclaves:
+    arguments = words.parse_args()
+    keystore = Keystore(arguments.folder, arguments.domain, arguments.rtps)
+    for enclave in arguments.enclaves:
         name, *denied = enclave.split(":-")
         print(keystore.enclave(name, denied))
 

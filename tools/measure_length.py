@@ -97,9 +97,9 @@ def run(command: list[str], outputs: list[Path]) -> Run:
 
 def measure(arguments: argparse.Namespace, folder: Path) -> None:
     pages = [("--report", folder / "page.html")] * arguments.report
-    wanted = pages + [("--trace", folder / "trace.csv")] * arguments.trace
-    outputs = [output for _, output in wanted]
-    options = [word for option, output in wanted for word in (option, str(output))]
+    options_and_files = pages + [("--trace", folder / "trace.csv")] * arguments.trace
+    outputs = [output for _, output in options_and_files]
+    options = [word for option, output in options_and_files for word in (option, str(output))]
     runs: dict[int, list[Run]] = {seconds: [] for seconds in arguments.seconds}
     read: dict[int, int] = {}
     for _ in range(arguments.rounds):

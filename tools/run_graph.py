@@ -44,9 +44,7 @@ def main() -> int:
         print(f"  {fault}")
     slope, correlation, lag = figures.load_per_velocity()
     nominal = DAMPING * RATIO / TORQUE_CONSTANT
-    print(
-        f"  load over velocity: {slope:.3f} A s/m ({nominal:.3f}), correlation {correlation:.5f}, lag {lag:g} periods"
-    )
+    print(f"  load over velocity: {slope:.3f} A s/m ({nominal:.3f}), correlation {correlation:.5f}, lag {lag:g} cycles")
     print(f"  loads equal to a published velocity times this factor: {figures.answered(nominal) * 100:.2f} %")
     for key in ("position_periods", "missed_periods", "dropped_samples", "mean_lateness_ms", "max_lateness_ms"):
         print(f"  {key}: {figures.diagnostics[key]}")

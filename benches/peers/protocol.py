@@ -16,7 +16,7 @@ Figures = dict[str, float]
 """Figures of the single axis, by the names of the C loop."""
 
 
-class Asked(NamedTuple):
+class RunInput(NamedTuple):
     """Input of a run of a single axis."""
 
     joint: str
@@ -29,18 +29,18 @@ class Asked(NamedTuple):
     """Index of the first setpoint in `values`."""
 
 
-def asked() -> Asked:
+def read_input() -> RunInput:
     """Returns the input named on the command line: the machine table and the setpoints."""
     table, setpoints = map(Path, sys.argv[1:3])
     (joint,), (psec,) = read_setpoints(setpoints)
     axis = read_axis(table, joint)
-    return Asked(joint, axis, psec, *padded(psec, axis))
+    return RunInput(joint, axis, psec, *padded(psec, axis))
 
 
-def figures(max_synchronized: float, peak_current: float, **more: float) -> Figures:
+def figures(max_delay_compensated: float, peak_current: float, **more: float) -> Figures:
     """Returns the figures common to all contenders, and additional ones."""
     return {
-        "max_delay_compensated_following_error": float(max_synchronized),
+        "max_delay_compensated_following_error": float(max_delay_compensated),
         "peak_current": float(peak_current),
         **{name: float(value) for name, value in more.items()},
     }

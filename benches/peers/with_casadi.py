@@ -1,4 +1,4 @@
-"""The single-axis case in CasADi: `mapaccum` over the position periods, as C code compiled by gcc.
+"""The single-axis case in CasADi: `mapaccum` over the position cycles, as C code compiled by gcc.
 
 A position cycle is one SX function (its 48 ticks unrolled), `mapaccum` carries the state through all of them, and
 CasADi's code generator translates it to C, compiled with the flags of the C loop and called through `external`: the
@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from axis import TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
-from protocol import Figures, asked, figures, serve
+from protocol import Figures, figures, read_input, serve
 
 FLAGS = ("-O3", "-march=native", "-ffast-math", "-fPIC", "-shared")
 
@@ -30,19 +30,19 @@ def clamp(value: ca.SX, limit: ca.SX | float) -> ca.SX:
 def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
     """Returns output and integral of a PI controller."""
     new = integral + integral_gain * error
-    wanted = (gain * error + new + feedforward) * scale
-    output = clamp(wanted, limit)
-    return output, ca.if_else(error * (wanted - output) > 0, integral, new)
+    unlimited = (gain * error + new + feedforward) * scale
+    output = clamp(unlimited, limit)
+    return output, ca.if_else(error * (unlimited - output) > 0, integral, new)
 
 
 def position_period(p: Axis) -> ca.Function:
     """Returns the map from state and setpoints (delayed, then those of both feedforwards) to the next state."""
     state = ca.SX.sym("state", 7)
     psec = ca.SX.sym("psec", 4)
-    i, omega, theta, velocity_integral, current_integral, synchronized, peak = ca.vertsplit(state)
+    i, omega, theta, velocity_integral, current_integral, delay_compensated, peak = ca.vertsplit(state)
     # Newest first: one after the delayed setpoint, the delayed setpoint, and two before it.
     after, delayed, before, oldest = ca.vertsplit(psec)
-    synchronized = ca.fmax(synchronized, ca.fabs(delayed - theta * p.ratio))
+    delay_compensated = ca.fmax(delay_compensated, ca.fabs(delayed - theta * p.ratio))
     velocity_setpoint = clamp(p.position_gain * (delayed / p.ratio - theta), p.max_speed)
     differences = ((delayed - before, before - oldest), (after - delayed, delayed - before))
     current_setpoint = ca.SX(0)
@@ -70,7 +70,7 @@ def position_period(p: Axis) -> ca.Function:
         theta = theta + row(p.angle, -friction)
         i = row(p.current, -friction)
         omega = ca.if_else(friction == stopping, 0, row(p.speed, -friction))
-    end = ca.vertcat(i, omega, theta, velocity_integral, current_integral, synchronized, peak)
+    end = ca.vertcat(i, omega, theta, velocity_integral, current_integral, delay_compensated, peak)
     return ca.Function("period", [state, psec], [end])
 
 
@@ -89,7 +89,7 @@ def compiled(function: ca.Function) -> ca.Function:
 
 def main() -> None:
     """Runs the requests on standard input."""
-    joint, axis, psec, values, start = asked()
+    joint, axis, psec, values, start = read_input()
     array = np.array(values)
     count = len(values) - start
     at = np.arange(start, len(values)) - axis.delay_periods
@@ -101,8 +101,8 @@ def main() -> None:
     buffer, call = function.buffer()
     arguments = [np.array(initial).ravel(order="F"), np.array(shifted).ravel(order="F")]
     result = np.zeros(function.nnz_out(0))
-    for place, argument in enumerate(arguments):
-        buffer.set_arg(place, memoryview(argument))
+    for index, argument in enumerate(arguments):
+        buffer.set_arg(index, memoryview(argument))
     buffer.set_res(0, memoryview(result))
 
     def run() -> Figures:

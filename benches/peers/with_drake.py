@@ -14,7 +14,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
 from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
-from protocol import Figures, asked, figures, serve
+from protocol import Figures, figures, read_input, serve
 
 
 class Drive(LeafSystem):
@@ -33,30 +33,32 @@ class Drive(LeafSystem):
         p, psec = self.axis, self.psec
         (
             i, omega, theta, velocity_integral, current_integral,
-            velocity_setpoint, current_setpoint, n, synchronized, peak, place,
+            velocity_setpoint, current_setpoint, n, delay_compensated, peak, index,
         ) = context.get_discrete_state(self.state).value().tolist()  # fmt: skip
         t = int(n)
-        at = self.start + int(place) - p.delay_periods
+        at = self.start + int(index) - p.delay_periods
         if t == 0:
             error = psec[at] - theta * p.ratio
-            synchronized = max(synchronized, abs(error))
-            wanted = p.position_gain * (psec[at] / p.ratio - theta)
-            velocity_setpoint = min(max(wanted, -p.max_speed), p.max_speed)
+            delay_compensated = max(delay_compensated, abs(error))
+            unlimited = p.position_gain * (psec[at] / p.ratio - theta)
+            velocity_setpoint = min(max(unlimited, -p.max_speed), p.max_speed)
         if t % TICKS_PER_VELOCITY == 0:
             if t >= p.delay_step:
                 at += 1
             first, second = psec[at] - psec[at - 1], psec[at - 1] - psec[at - 2]
             error = velocity_setpoint + p.velocity_feedforward * first - omega
             integral = velocity_integral + p.velocity_integral_gain * error
-            wanted = (p.velocity_gain * error + integral + p.torque_feedforward * (first - second)) / p.torque_constant
-            current_setpoint = min(max(wanted, -p.max_current), p.max_current)
-            if error * (wanted - current_setpoint) <= 0.0:
+            unlimited = (
+                p.velocity_gain * error + integral + p.torque_feedforward * (first - second)
+            ) / p.torque_constant
+            current_setpoint = min(max(unlimited, -p.max_current), p.max_current)
+            if error * (unlimited - current_setpoint) <= 0.0:
                 velocity_integral = integral
         error = current_setpoint - i
         integral = current_integral + p.current_integral_gain * error
-        wanted = p.current_gain * error + integral
-        voltage = min(max(wanted, -p.max_voltage), p.max_voltage)
-        if error * (wanted - voltage) <= 0.0:
+        unlimited = p.current_gain * error + integral
+        voltage = min(max(unlimited, -p.max_voltage), p.max_voltage)
+        if error * (unlimited - voltage) <= 0.0:
             current_integral = integral
         peak = max(peak, abs(i))
         if omega == 0.0:
@@ -75,11 +77,11 @@ class Drive(LeafSystem):
         omega = 0.0 if friction == stopping else free - r[3] * friction
         t += 1
         if t == TICKS_PER_POSITION:
-            t, place = 0, place + 1
+            t, index = 0, index + 1
         values.set_value(
             (
                 i, omega, theta, velocity_integral, current_integral,
-                velocity_setpoint, current_setpoint, t, synchronized, peak, place,
+                velocity_setpoint, current_setpoint, t, delay_compensated, peak, index,
             )
         )  # fmt: skip
         return EventStatus.Succeeded()
@@ -87,7 +89,7 @@ class Drive(LeafSystem):
 
 def main() -> None:
     """Runs the requests on standard input."""
-    joint, axis, psec, values, start = asked()
+    joint, axis, psec, values, start = read_input()
     simulator = Simulator(Drive(axis, values, start))
     context = simulator.get_mutable_context()
     initial = [0.0, 0.0, psec[0] / axis.ratio] + [0.0] * (Drive.STATE - 3)

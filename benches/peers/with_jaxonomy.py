@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import jax
 
-from protocol import Figures, asked, figures, serve
+from protocol import Figures, figures, read_input, serve
 
 jax.config.update("jax_enable_x64", True)
 
@@ -24,9 +24,9 @@ from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis  #
 def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
     """Returns output and integral of a PI controller."""
     new = integral + integral_gain * error
-    wanted = (gain * error + new + feedforward) * scale
-    output = jnp.clip(wanted, -limit, limit)
-    return output, jnp.where(error * (wanted - output) > 0.0, integral, new)
+    unlimited = (gain * error + new + feedforward) * scale
+    output = jnp.clip(unlimited, -limit, limit)
+    return output, jnp.where(error * (unlimited - output) > 0.0, integral, new)
 
 
 class Drive(jaxonomy.LeafSystem):
@@ -46,16 +46,16 @@ class Drive(jaxonomy.LeafSystem):
         p, psec = self.axis, self.psec
         (
             i, omega, theta, velocity_integral, current_integral,
-            velocity_setpoint, current_setpoint, n, synchronized, peak,
+            velocity_setpoint, current_setpoint, n, delay_compensated, peak,
         ) = state.discrete_state  # fmt: skip
         tick = n.astype(jnp.int64)
         t, k = tick % TICKS_PER_POSITION, tick // TICKS_PER_POSITION
         at = self.start_at + k - p.delay_periods
         is_position = t == 0
         error = psec[at] - theta * p.ratio
-        synchronized = jnp.where(is_position, jnp.maximum(synchronized, jnp.abs(error)), synchronized)
-        wanted = jnp.clip(p.position_gain * (psec[at] / p.ratio - theta), -p.max_speed, p.max_speed)
-        velocity_setpoint = jnp.where(is_position, wanted, velocity_setpoint)
+        delay_compensated = jnp.where(is_position, jnp.maximum(delay_compensated, jnp.abs(error)), delay_compensated)
+        unlimited = jnp.clip(p.position_gain * (psec[at] / p.ratio - theta), -p.max_speed, p.max_speed)
+        velocity_setpoint = jnp.where(is_position, unlimited, velocity_setpoint)
 
         at = at + (t >= p.delay_step)
         first, second = psec[at] - psec[at - 1], psec[at - 1] - psec[at - 2]
@@ -86,14 +86,15 @@ class Drive(jaxonomy.LeafSystem):
                 row(p.current, -friction),
                 jnp.where(friction == stopping, 0.0, row(p.speed, -friction)),
                 theta + row(p.angle, -friction),
-                velocity_integral, current_integral, velocity_setpoint, current_setpoint, n + 1, synchronized, peak,
+                velocity_integral, current_integral, velocity_setpoint, current_setpoint, n + 1,
+                delay_compensated, peak,
             ]
         )  # fmt: skip
 
 
 def main() -> None:
     """Runs the requests on standard input."""
-    joint, axis, psec, values, start = asked()
+    joint, axis, psec, values, start = read_input()
     system = Drive(axis, values, start)
     ticks = len(psec) * TICKS_PER_POSITION
     # The update at the end of the last cycle must not run.

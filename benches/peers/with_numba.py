@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from axis import CURRENT_PERIOD, TICKS_PER_POSITION, TICKS_PER_VELOCITY, Axis
-from protocol import Figures, asked, figures, serve
+from protocol import Figures, figures, read_input, serve
 
 
 @njit(fastmath=True)
@@ -24,10 +24,10 @@ def clamp(value: float, limit: float) -> float:
 def pi(gain, integral_gain, scale, limit, integral, error, feedforward):
     """Returns output, integral and saturation of a PI controller."""
     new = integral + integral_gain * error
-    wanted = (gain * error + new + feedforward) * scale
-    output = clamp(wanted, limit)
-    limited = wanted != output
-    return output, integral if limited and error * (wanted - output) > 0.0 else new, limited
+    unlimited = (gain * error + new + feedforward) * scale
+    output = clamp(unlimited, limit)
+    limited = unlimited != output
+    return output, integral if limited and error * (unlimited - output) > 0.0 else new, limited
 
 
 @njit(fastmath=True)
@@ -42,21 +42,21 @@ def simulate(p: Axis, psec: np.ndarray, start: int):
     i = omega = velocity_integral = current_integral = 0.0
     theta = psec[0] / p.ratio
     current_setpoint = 0.0
-    max_tracking = max_synchronized = square_tracking = square_synchronized = 0.0
+    max_tracking = max_delay_compensated = square_tracking = square_delay_compensated = 0.0
     peak = square_activity = last = 0.0
     saturated = 0
     current_limited = False
     inverse_kt, inverse_speed_per_torque = 1.0 / p.torque_constant, 1.0 / p.speed[3]
     for k in range(start, len(psec)):
         delayed = psec[k - p.delay_periods]
-        wanted = p.position_gain * (delayed / p.ratio - theta)
-        velocity_setpoint = clamp(wanted, p.max_speed)
-        speed_limited = wanted != velocity_setpoint
-        tracking, synchronized = psec[k] - theta * p.ratio, delayed - theta * p.ratio
+        unlimited = p.position_gain * (delayed / p.ratio - theta)
+        velocity_setpoint = clamp(unlimited, p.max_speed)
+        speed_limited = unlimited != velocity_setpoint
+        tracking, delay_compensated = psec[k] - theta * p.ratio, delayed - theta * p.ratio
         max_tracking = max(max_tracking, abs(tracking))
-        max_synchronized = max(max_synchronized, abs(synchronized))
+        max_delay_compensated = max(max_delay_compensated, abs(delay_compensated))
         square_tracking += tracking * tracking
-        square_synchronized += synchronized * synchronized
+        square_delay_compensated += delay_compensated * delay_compensated
         for t in range(TICKS_PER_POSITION):
             if t % TICKS_PER_VELOCITY == 0:
                 at = k - p.delay_periods + (1 if t >= p.delay_step else 0)
@@ -91,25 +91,25 @@ def simulate(p: Axis, psec: np.ndarray, start: int):
             i = i_next
     n = len(psec) - start
     return (
-        max_tracking, math.sqrt(square_tracking / n), max_synchronized, math.sqrt(square_synchronized / n),
+        max_tracking, math.sqrt(square_tracking / n), max_delay_compensated, math.sqrt(square_delay_compensated / n),
         peak, saturated * CURRENT_PERIOD, math.sqrt(square_activity / (n - 1)), theta * p.ratio,
     )  # fmt: skip
 
 
 def main() -> None:
     """Runs the requests on standard input."""
-    joint, axis, _, values, start = asked()
+    joint, axis, _, values, start = read_input()
     array = np.array(values)
 
     def run() -> Figures:
         found = simulate(axis, array, start)
-        tracking, rms_tracking, synchronized, rms_synchronized, peak, saturation, activity, position = found
+        tracking, rms_tracking, delay_compensated, rms_delay_compensated, peak, saturation, activity, position = found
         return figures(
-            synchronized,
+            delay_compensated,
             peak,
             max_following_error=tracking,
             rms_following_error=rms_tracking,
-            rms_delay_compensated_following_error=rms_synchronized,
+            rms_delay_compensated_following_error=rms_delay_compensated,
             saturation_time=saturation,
             control_activity=activity,
             position=position,

@@ -63,7 +63,7 @@ class ParameterRejected(Exception):
 class Drive:
     """ROS 2 node that sends setpoints to the virtual axes and keeps their messages.
 
-    It spins in a thread of its own; every wait is bounded and raises TimeoutError.
+    It spins in its own thread; every wait has a timeout and raises TimeoutError.
     """
 
     _count = itertools.count()
@@ -78,14 +78,14 @@ class Drive:
         remaps: Sequence[str] = (),
         listen: bool = True,
     ):
-        """Join the graph and, unless `connect` is false, wait until the axes are there.
+        """Joins the graph and, unless `connect` is false, waits for the axes.
 
-        Unless `listen` is false it keeps what they say at each position instant.
+        Unless `listen` is false it keeps their samples of each position instant.
 
-        `remaps` are the names that the axes' node was given others for, as in "joint_states:=/states".
+        `remaps` are the remapping rules of the axes' node, as in "joint_states:=/states".
 
-        `node` is the full name of the axes' node; `process` the process if it was started from
-        here, which gives name and domain, and whose early end ends the wait.
+        `node` is the full name of the axes' node; `process` is its process if it was started here, which sets
+        name and domain, and whose early end aborts the wait.
         """
         self.process = process
         self.target = node or (process.name if process else DEFAULT_NODE)
@@ -364,7 +364,7 @@ class Drive:
     def stream(self, names: Sequence[str], positions: Sequence[float], stamp: int = 0) -> None:
         """Publishes one setpoint of a stream (m, rad); NaN or a missing position does not command the joint.
 
-        `stamp` is when it was sent, ns of a clock of the sender's own; 0 does not say.
+        `stamp` is the time of sending, ns of the sender's own clock; 0 means unknown.
         """
         message = JointState(name=list(names), position=[float(value) for value in positions])
         message.header.stamp = to_time(stamp)
