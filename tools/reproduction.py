@@ -25,12 +25,12 @@ PAGE = ROOT / "docs" / "reproduction.md"
 HEAD = """# The paper, figure by figure
 
 Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling for the simulation of tool path tracking in
-multi-axis High Speed Machining*. Its figures compare measurements with a simulation; what it prints of
-them stands in the second column. The third is what this package's model is specified to have, the last
-what `virtual_axes` makes of it, by the command above each table. Add `--report page.html` to a command
-to see the plots, `--trace signals.csv` for the signals.
+multi-axis High Speed Machining*. The paper compares measurements with a simulation. Columns of the tables:
+the value printed in the paper, the value specified for this package's model, and the value computed by
+`virtual_axes` with the command above the table. Add `--report page.html` to a command for plots,
+`--trace signals.csv` for the signals.
 
-`tools/reproduction.py` writes this page; the tests look that it is what comes out.
+`tools/reproduction.py` generates this page; a test compares it with the output of the commands.
 """
 
 
@@ -141,7 +141,7 @@ def page() -> str:
     parts = [HEAD]
     validated = "measured and simulated agree to {}"
     [single] = run("x-constant")
-    rows = axis_rows(single, "x", ("218.9", "14.40"), validated.format("4 µm, while it accelerates to 6 µm"))
+    rows = axis_rows(single, "x", ("218.9", "14.40"), validated.format("4 µm, during acceleration to 6 µm"))
     parts.append(
         section(
             "Figure 6: one axis at constant velocity",
@@ -153,7 +153,8 @@ def page() -> str:
     others = (("y", ("230.5", "12.40")), ("z", ("102.7", "11.50")), ("a", ("35.0", "2.37")), ("c", ("35.4", "1.76")))
     for axis, specified in others:
         [single] = run(f"{axis}-constant")
-        text = f"The same trial on {axis.upper()}{', 90° at 10 rpm' if axis in 'ac' else ''}; no figure of its own."
+        turn = ", 90° at 10 rpm" if axis in "ac" else ""
+        text = f"The same trial on {axis.upper()}{turn}; the paper has no figure of it."
         parts.append(
             section(f"Section 4.1: {axis.upper()}", text, f"{axis}-constant", axis_rows(single, axis, specified))
         )
@@ -162,7 +163,7 @@ def page() -> str:
     parts.append(
         section(
             "Figure 7: two velocities on C",
-            "0 to 130° at 18 rpm, then to 210° at 6 rpm, which is reached at 130°.",
+            "0 to 130° at 18 rpm, then to 210° at 6 rpm, reached at 130°.",
             "c-two-speeds",
             rows,
         )
@@ -170,7 +171,7 @@ def page() -> str:
     [single] = run("x-there-and-back")
     parts.append(
         section(
-            "Section 4.1, case 3: there and back",
+            "Section 4.1, case 3: reciprocating motion",
             "X over 200 mm and back at 10 m/min.",
             "x-there-and-back",
             axis_rows(single, "x", ("—", "—")),
@@ -211,8 +212,8 @@ def page() -> str:
     parts.append(
         section(
             "Figure 10, right: the ballbar under predictive control",
-            "The rows name N1, N2, Nu and λ_rel; the paper does not print its tuning. The extremes are the spikes "
-            "where friction reverses, at the quadrants.",
+            "The rows contain N1, N2, Nu and λ_rel; the paper does not print its tuning. The extremes are reversal "
+            "spikes at the friction reversals in the quadrants.",
             predictive("ballbar"),
             rows,
         )
@@ -220,11 +221,11 @@ def page() -> str:
     command = f"ballbar --controller gpc --compare {','.join(in_x_and_y(feedforward__friction=1))}"
     preset, compensated = run(command)
     rows = circle_rows(preset, "almost 0 (right)", ("−0.4 ± 0.2", "−8.5 ± 1", "13.2 ± 1"), PRESET)
-    rows += circle_rows(compensated, "—", ("—", "−1.4", "0.4"), "the same with friction compensated")
+    rows += circle_rows(compensated, "—", ("—", "−1.4", "0.4"), "same tuning with friction compensation")
     parts.append(
         section(
-            "Figure 10, right: the tuning of the machine file, and friction compensated",
-            "The friction current of the setpoint's velocity is fed forward, 11.75 ms behind the setpoint.",
+            "Figure 10, right: tuning of the machine file, and friction compensation",
+            "The friction current at the setpoint velocity is fed forward, 11.75 ms after the setpoint.",
             command,
             rows,
         )
@@ -255,7 +256,7 @@ def page() -> str:
         parts.append(
             section(
                 f"Figure 11: corner of {turn}° under predictive control",
-                f"The same corner as above, where the cascade leaves {cascade} µm, with the tunings of figure 10.",
+                f"The same corner as above, where the cascade has {cascade} µm, with the tunings of figure 10.",
                 command,
                 rows,
             )
@@ -267,8 +268,8 @@ def page() -> str:
         [single] = run(name)
         parts.append(
             section(
-                f"Section 6, the stated aim: {name}",
-                f"{text}: the final geometric error due to the drives, in the workpiece frame.",
+                f"Section 6, objective of the paper: {name}",
+                f"{text}: the geometric error caused by the drives, in the workpiece frame.",
                 name,
                 following_error_rows(single) + contour_rows(single),
             )
