@@ -23,16 +23,16 @@ from launch_ros.actions import Node
 SHARE = Path(__file__).resolve().parent.parent
 CONTROLLERS = ["as_machine", "cascade", "gpc", "rst"]
 ARGUMENTS = [
-    ("left_machine", "mikron_ucp710", None, "Machine on the left: a file, or the name of a shipped one"),
+    ("left_machine", "mikron_ucp710", None, "Machine on the left: a file, or the name of a built-in machine"),
     ("right_machine", "mikron_ucp710", None, "Machine on the right"),
     ("left_controller", "as_machine", CONTROLLERS, "Position controller of every joint on the left"),
     ("right_controller", "as_machine", CONTROLLERS, "Position controller of every joint on the right"),
-    ("distance", "2.5", None, "From the left machine frame to the right one along X, m"),
+    ("distance", "2.5", None, "Distance of the right machine frame from the left one along X, m"),
     ("time", "real", ["real", "fast", "sim"], "As in virtual_axes.launch.py"),
     ("robot_state_publisher", "true", ["true", "false"], "Publish models and transforms"),
     ("rviz", "false", ["true", "false"], "Show both in RViz"),
     ("record", "", None, "Folder for the recordings left.mcap and right.mcap; empty: none"),
-    ("log_level", "info", None, "Level of the nodes' logs"),
+    ("log_level", "info", None, "Log level of the nodes"),
 ]
 SIDES = ["left", "right"]
 APART_S = 2.0

@@ -23,7 +23,7 @@ PUBLISH_FREQUENCY = 50.0
 """Publish rate of robot_state_publisher, Hz; its default of 20 is not smooth."""
 
 ARGUMENTS = [
-    ("machine", DEFAULT_MACHINE, None, "Machine file (ROS 2 parameters), or the name of a shipped machine"),
+    ("machine", DEFAULT_MACHINE, None, "Machine file (ROS 2 parameters), or the name of a built-in machine"),
     (
         "controller",
         "as_machine",
@@ -32,18 +32,18 @@ ARGUMENTS = [
     ),
     ("namespace", "", None, "Namespace of the nodes"),
     ("name", PACKAGE, None, "Name of the node"),
-    ("joint_prefix", "", None, "Text before the joint names"),
-    ("frame_prefix", "", None, "Text before the names of the frames, as in cell/"),
+    ("joint_prefix", "", None, "Prefix of the joint names"),
+    ("frame_prefix", "", None, "Prefix of the frame names, as in cell/"),
     (
         "time",
         "real",
         ["real", "fast", "sim"],
-        "Real time; as fast as possible with a /clock of its own; or after the /clock of others",
+        "Real time; as fast as possible with its own /clock; or following an external /clock",
     ),
     ("robot_state_publisher", "true", ["true", "false"], "Publish the model of the machine and its transforms"),
     ("rviz", "false", ["true", "false"], "Show the machine in RViz"),
     ("record", "", None, "MCAP file that the node records its topics to; empty: none"),
-    ("log_level", "info", None, "Level of the node's log"),
+    ("log_level", "info", None, "Log level of the node"),
 ]
 
 

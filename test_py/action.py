@@ -72,7 +72,7 @@ class Sent:
     @property
     def handle(self) -> Any:
         """Returns the client's goal handle, after the node has responded."""
-        self._drive.wait_for(self._accepting.done, 20.0, "answer to a goal")
+        self._drive.wait_for(self._accepting.done, 20.0, "response to a goal")
         return self._accepting.result()
 
     @property
@@ -108,7 +108,7 @@ class Sent:
         """Requests cancellation."""
         handle = self.handle
         future = self._drive.in_executor(handle.cancel_goal_async)
-        self._drive.wait_for(future.done, 20.0, "answer to a cancel request")
+        self._drive.wait_for(future.done, 20.0, "response to a cancel request")
         return future.result()
 
 
@@ -134,7 +134,7 @@ class Follow:
             GoalStatusArray, f"{self.name}/_action/status", self.statuses.append, STATUS_QOS
         )
         drive.wait_for(self.client.server_is_ready, timeout, f"action {self.name}")
-        drive.wait_for(self._canceling.service_is_ready, timeout, f"canceling of {self.name}")
+        drive.wait_for(self._canceling.service_is_ready, timeout, f"cancellation of {self.name}")
         time.sleep(SETTLE_S)
 
     def __enter__(self) -> Follow:
@@ -160,7 +160,7 @@ class Follow:
         """Cancels goals by the rules of action_msgs/CancelGoal."""
         info = GoalInfo(goal_id=UUID(uuid=list(uuid)), stamp=stamp or Time())
         future = self._canceling.call_async(CancelGoal.Request(goal_info=info))
-        self.drive.wait_for(future.done, 20.0, "answer to a cancel request")
+        self.drive.wait_for(future.done, 20.0, "response to a cancel request")
         return future.result()
 
     def status_of(self, uuid: bytes) -> int | None:

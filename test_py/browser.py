@@ -67,7 +67,7 @@ class Browser:
         deadline = time.monotonic() + TIMEOUT
         while time.monotonic() < deadline:
             if self._process.poll() is not None:
-                raise RuntimeError(f"the browser ended with {self._process.returncode}: {self._log.name}")
+                raise RuntimeError(f"the browser ended with status {self._process.returncode}: {self._log.name}")
             lines = file.read_text().split() if file.exists() else []
             if len(lines) == 2:
                 port, path = lines

@@ -119,7 +119,7 @@ def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
         )
     figure.legend(*plot.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=10, frameon=False)
     figure.suptitle(
-        "Ballbar in X–Y at 15 m/min: radial deviation in µm over the polar angle, each on its own scale", fontsize=12
+        "Ballbar in X–Y at 15 m/min: radial deviation in µm over the polar angle, individual scales", fontsize=12
     )
     figure.savefig(file, dpi=150)
     plt.close(figure)
@@ -138,7 +138,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path(__file__).resolve().parent.parent / ".build" / "ballbar.png")
     arguments = parser.parse_args()
     if arguments.out.suffix.lower() not in (".png", ".pdf", ".svg"):
-        parser.error(f"--out: '{arguments.out}': the name of the picture must end in .png, .pdf or .svg")
+        parser.error(f"--out: '{arguments.out}': the file extension must be .png, .pdf or .svg")
     try:
         arguments.out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

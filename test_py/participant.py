@@ -62,7 +62,7 @@ class NoResponse(TimeoutError):
 
     def __init__(self, service: str):
         """Keeps the name of the service."""
-        super().__init__(f"{service} did not answer within {ANSWER_S} s")
+        super().__init__(f"{service} did not respond within {ANSWER_S} s")
         self.service = service
 
 

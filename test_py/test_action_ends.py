@@ -104,8 +104,8 @@ def test_canceling_stops_the_axes_within_their_limits(follow: Follow) -> None:
     limits = follow.drive.get_parameters(["x.limits.acceleration_m_s2", "x.limits.jerk_m_s3"])
     acceleration = np.diff(psec, 2) / TSP**2
     jerk = np.diff(psec, 3) / TSP**3
-    assert np.ptp(psec[-rest:]) < 1e-12, "at rest when it is over"
-    assert np.abs(np.diff(psec)).max() > 0.0, "it moved before"
+    assert np.ptp(psec[-rest:]) < 1e-12, "at rest at the end"
+    assert np.abs(np.diff(psec)).max() > 0.0, "in motion before the stop"
     assert np.abs(acceleration).max() <= limits["x.limits.acceleration_m_s2"] * (1 + 1e-6)
     assert np.abs(jerk).max() <= limits["x.limits.jerk_m_s3"] * (1 + 1e-6)
 

@@ -132,7 +132,7 @@ def test_the_second_machine_follows_the_first_and_then_publishes(shared: tuple[E
         assert time.monotonic() - began > 0.4
         before = second.now()
     count = len(ticks.shown)
-    second.wait_for(lambda: leads(second), 10, "second machine that takes over")
+    second.wait_for(lambda: leads(second), 10, "second machine that publishes the clock")
     second.run(joint_trajectory(["y"], [0.0, 1.0], [[0.1], [0.0]]))
     ticks.since(count)
     shown = np.array(ticks.shown)
@@ -163,7 +163,7 @@ def test_an_external_clock_is_followed(start: Callable[..., Drive]):
     ticks = Ticks(drive)
     begin = -(-(drive.now() + 2 * NANOSECONDS) // TSP_NS) * TSP_NS
     other = SimClock(drive, begin)
-    drive.wait_for(lambda: "another node publishes it" in drive.process.output(), 10, "notice of the other clock")
+    drive.wait_for(lambda: "another node publishes it" in drive.process.output(), 10, "log of the other clock")
     other.reach(begin)
     count = len(ticks.shown)
     times, position = swing(0.6)
@@ -177,7 +177,7 @@ def test_an_external_clock_is_followed(start: Callable[..., Drive]):
     said = len(ticks.shown) - count
     assert said <= 21 < len(own), "the machine no longer publishes"
     other.close()
-    drive.wait_for(lambda: drive.now() > other.now + NANOSECONDS // 10, 10, "clock of its own")
+    drive.wait_for(lambda: drive.now() > other.now + NANOSECONDS // 10, 10, "own clock")
     assert_unbroken(drive, begin, drive.now() - NANOSECONDS // 20)
 
 
@@ -217,7 +217,7 @@ def test_a_slow_subscriber_loses_no_sample(start: Callable[..., Drive]):
         sent = drive.send(joint_trajectory(["x"], *swing(0.3, amplitude=0.01), stamp=end))
         drive.decision(sent)
         stalled = stalled_at(drive)
-        assert drive.now() < end and len(drive.results(sent)) == 1, "it is under way"
+        assert drive.now() < end and len(drive.results(sent)) == 1, "the motion is active"
         assert drive.get_parameters(["time"]) == {"time": "fast"}
         drive.set_parameters({"y.velocity_loop.gain": 4.4})
         assert stalled_at(drive) == stalled

@@ -122,7 +122,7 @@ def test_existing_participants_work_with_a_node_that_was_killed_and_started_agai
         # Service clients.
         gain = "x.velocity_loop.gain"
         found = recovers(lambda: drive.get_parameters([gain]))
-        assert found == {gain: 5.0}, "a new node has its own"
+        assert found == {gain: 5.0}, "default value of the new node"
         recovers(lambda: drive.set_parameters({gain: 4.8}))
         recovers(drive.reset)
         # Action client.

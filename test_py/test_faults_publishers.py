@@ -73,7 +73,7 @@ def test_a_publisher_killed_within_a_message_does_not_affect_others(node: Drive,
     before = node.run(motion)
     memory, attempts = resident_mb(pid_of(node)), 1
     while not kill_while_sending(node, tmp_path):
-        assert attempts < ATTEMPTS, "each message was whole before its sender died"
+        assert attempts < ATTEMPTS, "each message was complete before its sender was killed"
         attempts += 1
     go_home(node)
     after = node.run(motion)
@@ -142,12 +142,12 @@ def move_through(drive: Drive, act: Callable[[], None]) -> str:
 
 
 FLOODS = {
-    "trajectories that are taken": ("_psec", joint_trajectory(["x"], [0.0, 0.06], [[0.0]] * 2)),
-    "trajectories that are rejected": ("_psec", joint_trajectory(["q"], [0.0], [[0.0]])),
-    "setpoints that are taken": ("_stream", JointState(name=["x"], position=[1e-4])),
-    "setpoints that are rejected": ("_stream", JointState(name=["x"], position=[0.4])),
+    "accepted trajectories": ("_psec", joint_trajectory(["x"], [0.0, 0.06], [[0.0]] * 2)),
+    "rejected trajectories": ("_psec", joint_trajectory(["q"], [0.0], [[0.0]])),
+    "accepted setpoints": ("_stream", JointState(name=["x"], position=[1e-4])),
+    "rejected setpoints": ("_stream", JointState(name=["x"], position=[0.4])),
     "loads": ("_load", JointState(name=["x"], effort=[1.0])),
-    "loads that are rejected": ("_load", JointState(name=["q"], effort=[1.0])),
+    "rejected loads": ("_load", JointState(name=["q"], effort=[1.0])),
 }
 
 
@@ -163,19 +163,19 @@ def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
         seconds = flood(getattr(node, publisher), message, number)
         if publisher == "_psec":
             node._sent += number
-        print(f"\n{what}: {number / seconds:.0f} a second, ", end="")
+        print(f"\n{what}: {number / seconds:.0f} per second, ", end="")
 
     log = move_through(node, act)
     grown = resident_mb(pid_of(node)) - memory
     print(f"{grown:.1f} MB more, {log.count(chr(10))} lines")
     assert grown < GROWTH_MB
     if publisher == "_psec":
-        assert "lines of this kind" in log, "nothing was left out"
+        assert "lines of this kind" in log, "no log line was suppressed"
         forget_results(node)
-    if what == "setpoints that are rejected":
+    if what == "rejected setpoints":
         assert int(node.next_status()["stream_setpoints_rejected"]) > rejected
         assert log.count("streamed setpoint rejected") <= 10
-    if what == "loads that are rejected":
+    if what == "rejected loads":
         assert 1 <= log.count("load message ignored") <= 10
     node.set_parameters({"x.velocity_loop.gain": 5.0})
     time_s, position = swing(0.6, amplitude=0.01)
@@ -197,7 +197,7 @@ def test_a_flood_of_service_calls(node: Drive):
     request = SetParameters.Request(parameters=parameter_messages({"x.velocity_loop.gain": 5.0}))
     calls = [setter.call_async(request) for _ in range(FLOOD // 10)]
     calls += [stopper.call_async(Trigger.Request()) for _ in range(FLOOD // 10)]
-    print(f"\n{len(calls) / (time.monotonic() - begin):.0f} a second")
+    print(f"\n{len(calls) / (time.monotonic() - begin):.0f} per second")
     node.wait_for(lambda: sum(call.done() for call in calls) > len(calls) // 10, 60, "answers")
     for client in (setter, stopper):
         node.in_executor(lambda client=client: node.node.destroy_client(client))
@@ -278,6 +278,6 @@ def test_messages_of_two_contending_streams_are_not_mixed(node: Drive):
     assert set(commanded) <= set(sent)
     assert commanded[-1] == sent[-1]
     indices = [sent.index(pair) for pair in commanded]
-    assert indices == sorted(indices), "an older message came after a newer one"
+    assert indices == sorted(indices), "an older message followed a newer one"
     assert {x > 0 for x, _ in commanded if x} == {True, False}, "only one of them was followed"
     assert len(set(commanded)) > 30

@@ -98,7 +98,7 @@ def write_mcap(file: Path, recording: Recording, seed: int) -> None:
     """Writes published messages with encoder quantization and current noise."""
     noise = random.Random(seed)
     states, currents = recording.states, recording.currents
-    assert states.stamp.tolist() == currents.stamp.tolist(), "both topics are whole"
+    assert states.stamp.tolist() == currents.stamp.tolist(), "both topics are complete"
     position = np.column_stack([np.round(states["position", axis] / STEP[axis]) * STEP[axis] for axis in AXES])
     measured = np.column_stack([currents["current", axis] for axis in AXES])
     measured = measured + NOISE * np.abs(measured).max(axis=0) * np.array(
@@ -179,7 +179,7 @@ def test_parameters_of_an_axis_are_identified_from_its_recording(axis: str, reco
     assert value["feedforward.torque_kg_m2"] == pytest.approx(TORQUE_FEEDFORWARD[axis], rel=0.005)
     for delay in ("alpha", "gamma"):
         if delay == "gamma" and TORQUE_FEEDFORWARD[axis] == 0:
-            assert "delays.gamma_ms" not in values, "nothing shows it"
+            assert "delays.gamma_ms" not in values, "it is not identifiable"
             continue
         low, high = values[f"delays.{delay}_ms"]["interval"]
         assert low < DELAY_MS <= high

@@ -64,7 +64,7 @@ def test_a_hundred_requests_at_a_time(real: Drive):
         real.wait_for(client.service_is_ready, 5, "service")
         time.sleep(SETTLE_S)
         futures = [client.call_async(DescribeParameters.Request(names=names)) for _ in range(100)]
-        real.wait_for(lambda: all(future.done() for future in futures), 10, "a hundred answers")
+        real.wait_for(lambda: all(future.done() for future in futures), 10, "a hundred responses")
     finally:
         real.in_executor(lambda: real.node.destroy_client(client))
     assert all(len(future.result().descriptors) == len(names) for future in futures)

@@ -55,7 +55,7 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
         write_many(0.05)
         reliable: list[int] = []
         subscription = listen(DEEP_QOS, reliable)
-        drive.wait_for(lambda: (now := writers()) != first and len(now) == 1, 90, "another publisher alone")
+        drive.wait_for(lambda: (now := writers()) != first and len(now) == 1, 90, "only the new publisher")
         drive.wait_for(lambda: len(reliable) > 1000, 30, "samples")
         assert set(np.diff(reliable[JOINING:])) == {TSP_NS}
         second = writers()
@@ -68,7 +68,7 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
             listen(BEST_EFFORT, stamps)
         drive.wait_for(lambda: all(late), 20, "samples of the late readers")
         grown = own_mb(process.pid) - before
-        print(f"{LATE} readers that come late: {grown:.1f} MB")
+        print(f"{LATE} late-joining readers: {grown:.1f} MB")
         assert grown < LATE * MAY_GROW_MB
 
         # Readers that have received the dispose of the first writer discover the next writer.

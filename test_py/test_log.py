@@ -58,7 +58,7 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
     process = drive.process
     began = time.time()
     drive.node.create_publisher(Clock, "/clock", 10)
-    drive.wait_for(lambda: "another node publishes it" in process.output(), 5, "notice of another clock")
+    drive.wait_for(lambda: "another node publishes it" in process.output(), 5, "log of another clock")
     reject_one(drive)
     names = (drive.list_parameters() * 4)[:1000]
     with pytest.raises(TimeoutError):

@@ -132,7 +132,7 @@ def test_switching_to_predictive_and_back_on_a_circle_is_bumpless(real: Drive):
             switch(real, controller)
         end = real.now()
         assert [result.status for result in real.results(accepted.sequence_number)] == [R.ACCEPTED], (
-            "the circle was over too soon, or was not let finish"
+            "the circle ended too early, or was preempted"
         )
     finally:
         real.set_parameters_atomically(of_axes({"controller": "cascade"}))

@@ -224,7 +224,7 @@ def test_received_messages_are_recorded_bit_for_bit(session: Session):
         else:  # Best effort, or reliable with a depth of one.
             remaining = iter(sent)
             assert found and all(message in remaining for message in found), topic
-        assert all(entry.publish == entry.log for entry in received), "they had no stamps"
+        assert all(entry.publish == entry.log for entry in received), "the messages had no stamps"
     began, ended = (messages[DRIVES][index].log for index in (0, -1))
     assert all(began <= entry.log <= ended for topic in session.sent for entry in messages[topic])
 
@@ -315,7 +315,7 @@ def test_a_recording_ends_at_its_maximum_size_and_the_axes_continue(start: Calla
 def test_a_failed_write_ends_the_recording_but_not_the_node(tmp_path: Path):
     """A file size limit of 200 KiB acts like a full disk: the data written before stay readable.
 
-    It is said once, and the next recording is whole.
+    One log line reports it, and the next recording is complete.
     """
     path, binary = tmp_path / "full.mcap", tmp_path / "limited.sh"
     binary.write_text(f'#!/bin/bash\ntrap "" XFSZ\nulimit -f 200\nexec {node_binary()} "$@"\n')

@@ -81,7 +81,7 @@ CASES = {
         limit=2,
     ),
     "equal times": Case(R.TIMES_NOT_INCREASING, lambda d: line("z", (1, 0), (2, 0), (2, 0)), index=2, value=2, limit=2),
-    "time runs back": Case(
+    "decreasing times": Case(
         R.TIMES_NOT_INCREASING, lambda d: line("z", (1, 0), (3, 0), (2.5, 0)), index=2, value=2.5, limit=3
     ),
     "negative first time": Case(R.NEGATIVE_TIME, lambda d: line("z", (-0.5, 0), (1, 0)), index=0, value=-0.5, limit=0),
@@ -113,7 +113,7 @@ CASES = {
         limit=TRAVEL_MIN_A,
     ),
     "jump to the first point": Case(R.JUMP, lambda d: line("z", (0, 0.1), (1, 0.1)), joint="z", index=0, value=0.1),
-    "jump when joining in": Case(
+    "jump at a start in the past": Case(
         R.JUMP,
         lambda d: line("z", (0, 0), (10, 0.2), stamp=d.now() - 5 * NANOSECONDS),
         joint="z",
@@ -125,7 +125,7 @@ CASES = {
     "too fast to the first point": Case(
         R.SPEED, lambda d: line("z", (0.1, 0.2), (1, 0.2)), joint="z", index=0, value=2.0, limit=0.5
     ),
-    "too fast a velocity": Case(
+    "velocity above the limit": Case(
         R.SPEED,
         lambda d: joint_trajectory(["z"], [1, 2, 3], [[0], [0.1], [0.2]], [[0], [0.6], [0]]),
         joint="z",

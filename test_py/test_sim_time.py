@@ -82,7 +82,7 @@ def test_before_the_first_message_the_axes_wait(start: Callable[..., Drive]):
         clock.set(BEGIN)
         return bool(drive.results(soon))
 
-    drive.wait_for(decided, 5, "decision on a trajectory that waited for the clock")
+    drive.wait_for(decided, 5, "result of a trajectory that waited for the clock")
     first = -(-BEGIN // TSP_NS) * TSP_NS
     assert to_ns(drive.decision(soon).start) == first
     assert to_ns(drive.decision(later).start) == -(-begin // TSP_NS) * TSP_NS

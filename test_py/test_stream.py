@@ -83,7 +83,7 @@ def results_of_preemption(drive: Drive, take: Callable[[], object]) -> list[R]:
         begin = drive.now()
         try:
             take()
-            return drive.wait_for(lambda begin=begin: stream_results(drive, begin), 2, "word of the stream's end")
+            return drive.wait_for(lambda begin=begin: stream_results(drive, begin), 2, "result of the stream")
         except TimeoutError:
             # A stall of the machine has paused the stream.
             continue
@@ -226,7 +226,7 @@ def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):
         statuses = [array.status[0] for array in real.diagnostics()[seen:]]
         return any(status_values(s)["stream_held_off"] == "true" and s.level == DiagnosticStatus.WARN for s in statuses)
 
-    real.wait_for(ignored, 5, "diagnostics of a stream that is held off")
+    real.wait_for(ignored, 5, "diagnostics of an inhibited stream")
     assert real.latest("psec")["x"] == 0.001
     time.sleep(0.2)
     follow(real, ["x"], np.array([[0.003]]))
@@ -280,7 +280,7 @@ def test_diagnostics_contain_stream_state_and_delay(real: Drive):
             for a in real.diagnostics()[seen:]
         )
 
-    real.wait_for(streaming, 5, "diagnostics of a stream that drives")
+    real.wait_for(streaming, 5, "diagnostics of an active stream")
     node_status(real, lambda v: v["stream_drives"] == "false")
     # A trajectory is not a stream.
     go_home(real)

@@ -97,7 +97,7 @@ def attempt(drive: Drive, *args: object) -> Run:
         assert np.abs(np.diff(run.psec["x"])).max() <= VMAX * TSP * (1 + 1e-9)
         if run.counts["stream_gaps"] == 0:
             return run
-    pytest.skip(f"this machine broke the stream off in each of {ATTEMPTS} attempts: {run.counts}")
+    pytest.skip(f"a stall of this machine interrupted the stream in each of {ATTEMPTS} attempts: {run.counts}")
 
 
 @pytest.mark.parametrize(("rate", "threshold"), [(100.0, -1.0), (250.0, 1e-5)])

@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("megabytes", type=options.positive, nargs="?", default=256, help="announced length in MB (256)")
     length = round(parser.parse_args().megabytes * 1_000_000)
     if not FRAGMENT < length <= LONGEST:
-        parser.error(f"a message of {length} octets: it must be longer than a fragment, {FRAGMENT}, up to {LONGEST}")
+        parser.error(f"a message of {length} octets: must be longer than a fragment, {FRAGMENT}, up to {LONGEST}")
     with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:
         drive.node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
         time.sleep(1.0)

@@ -208,7 +208,7 @@ def share(process: Node, client: Client | None, seconds: float) -> str:
     used, took = cpu_seconds(process.pid) - before, time.monotonic() - start
     slept = wakeups(process.pid) - slept
     check(process, client.stamps[first:] if client else None, took)
-    return f"{used / took:6.2%}{slept * TSP_NS / 1e9 / took:6.1f} wake-ups a period"
+    return f"{used / took:6.2%}{slept * TSP_NS / 1e9 / took:6.1f} wake-ups per cycle"
 
 
 def memory(process: Node, client: Client, minutes: float) -> None:

@@ -115,7 +115,7 @@ def count_in_rust(process: Node, seconds: float, period_ns: int) -> Count:
     env = os.environ | {"ROS_DOMAIN_ID": str(process.domain_id)}
     command = [str(COUNTER), str(seconds), str(period_ns / 1e6)]
     done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=seconds + 20, check=False)
-    found = re.search(r"(\d+) samples in ([\d.]+) s: [\d.]+ a second, (-?\d+) lost", done.stdout)
+    found = re.search(r"(\d+) samples in ([\d.]+) s: [\d.]+ per second, (-?\d+) lost", done.stdout)
     if done.returncode or found is None:
         raise SystemExit(f"{COUNTER.name}: {done.stdout}{done.stderr}")
     return Count(int(found[1]), float(found[2]), int(found[3]))
@@ -151,7 +151,7 @@ def real_time(seconds: float) -> None:
                 best[name] = max(best.get(name, 0), multiple)
             print(
                 f"{multiple:>10g}{period_ms:>12g}{name:>12}{found.rate:>10.0f}{found.lost:>8}{used:>17.1%}",
-                "" if is_whole else "  not whole",
+                "" if is_whole else "  incomplete",
                 flush=True,
             )
     for name, multiple in best.items():

@@ -19,12 +19,12 @@ def parser(doc: str | None) -> argparse.ArgumentParser:
 
 def positive(text: str) -> float:
     """Returns a finite number above 0."""
-    return _number(text, "no finite number above 0", lambda value: value > 0)
+    return _number(text, "not a finite number above 0", lambda value: value > 0)
 
 
 def from_zero(text: str) -> float:
     """Returns a finite number that is not negative."""
-    return _number(text, "no finite number from 0 on", lambda value: value >= 0)
+    return _number(text, "not a finite number from 0 on", lambda value: value >= 0)
 
 
 def whole(text: str) -> int:

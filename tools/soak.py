@@ -503,7 +503,7 @@ def look(drive: Drive, prober: Prober, memory: Memory, began: float) -> Look:
 def table(looks: list[Look]) -> str:
     """Returns some looks as a Markdown table."""
     rows = [
-        "| of the time | memory, MB | at least | at most | files | threads | service, ms | echo, ms | ratio | load |",
+        "| time | memory, MB | at least | at most | files | threads | service, ms | echo, ms | ratio | load |",
         "|" + "---|" * 10,
     ]
     for mark in MARKS:
@@ -559,7 +559,7 @@ def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple
         while (passed := time.monotonic() - began) < seconds:
             traffic.step()
             if process.poll() is not None:
-                raise ChildProcessError("the node has ended")
+                raise ChildProcessError("the node ended")
             if passed < len(looks) * between_s:
                 continue
             try:

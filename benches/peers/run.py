@@ -114,7 +114,7 @@ class Contender:
             status = self.process.wait()
             self.errors.seek(0)
             said = self.errors.read().strip().splitlines()
-            raise Unavailable(said[-1] if said else f"ended with status {status}")
+            raise Unavailable(said[-1] if said else f"exit status {status}")
         try:
             answer = json.loads(line)
             if not float(answer["seconds"]) > 0:
@@ -326,7 +326,7 @@ def measure(case: Case, rounds: int, cpu: bool, program: str | None) -> dict:
                     "bound": contender.bound,
                 }
             )
-    clock = "time on a core" if cpu else "time"
+    clock = "CPU time" if cpu else "time"
     return {
         "case": case.name,
         "clock": clock,

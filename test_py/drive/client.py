@@ -205,7 +205,7 @@ class Drive:
         during a wait.
         """
         task = self._executor.create_task(call)
-        self.wait_for(task.done, TURN_S, "turn of the executor")
+        self.wait_for(task.done, TURN_S, "execution by the executor")
         return task.result()
 
     def wait_for(self, condition: Callable[[], Any], timeout: float, what: str) -> Any:
@@ -236,7 +236,7 @@ class Drive:
                 and all(self._samples.values())
             )
 
-        self.wait_for(matched, timeout, f"contact with {self.target}")
+        self.wait_for(matched, timeout, f"match with {self.target}")
         time.sleep(SETTLE_S)
 
     def sees(self, name: str | None = None) -> bool:
@@ -346,7 +346,7 @@ class Drive:
 
     def _must_listen(self) -> None:
         if not self._samples:
-            raise ValueError("with listen=False a drive keeps no samples")
+            raise ValueError("a Drive with listen=False keeps no samples")
 
     def forget(self) -> None:
         """Drops all samples but the newest of each topic."""
@@ -399,7 +399,7 @@ class Drive:
             self.wait_for(client.service_is_ready, timeout, f"service {service}")
             time.sleep(SETTLE_S)
         future = client.call_async(request)
-        self.wait_for(future.done, timeout, f"answer of service {service}")
+        self.wait_for(future.done, timeout, f"response of service {service}")
         return future.result()
 
     def reset(self, timeout: float = 10.0) -> str:
