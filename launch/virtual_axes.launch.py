@@ -49,11 +49,11 @@ ARGUMENTS = [
 
 def machine_file(machine: str) -> Path:
     """Returns the parameter file of a machine: a path, or the name of a built-in one."""
-    shipped = SHARE / "config" / f"{machine}.yaml"
-    for path in (Path(machine).expanduser(), shipped):
+    built_in = SHARE / "config" / f"{machine}.yaml"
+    for path in (Path(machine).expanduser(), built_in):
         if path.is_file():
             return path.resolve()
-    names = ", ".join(sorted(path.stem for path in shipped.parent.glob("*.yaml")))
+    names = ", ".join(sorted(path.stem for path in built_in.parent.glob("*.yaml")))
     raise RuntimeError(f"machine:={machine}: file not found; built-in machines: {names}")
 
 

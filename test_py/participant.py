@@ -99,7 +99,7 @@ class Participant:
     def __enter__(self) -> Participant:
         """Waits until the process is ready and returns itself."""
         try:
-            assert self.says() == READY
+            assert self.read_line() == READY
         except BaseException:
             self.kill()
             raise
@@ -109,7 +109,7 @@ class Participant:
         """Kills the process."""
         self.kill()
 
-    def says(self) -> str:
+    def read_line(self) -> str:
         """Returns the next line of its output."""
         out = self._process.stdout
         assert out is not None
@@ -125,14 +125,14 @@ class Participant:
         assert self._process.stdin is not None
         self._process.stdin.write("\n")
         self._process.stdin.flush()
-        return np.array(json.loads(self.says()), dtype=np.int64)
+        return np.array(json.loads(self.read_line()), dtype=np.int64)
 
     def latencies_ms(self, calls: int) -> list[float]:
         """Returns the latencies of a prober's services, medians of this number of calls of each."""
         assert self._process.stdin is not None
         self._process.stdin.write(f"{calls}\n")
         self._process.stdin.flush()
-        reported = json.loads(self.says())
+        reported = json.loads(self.read_line())
         if isinstance(reported, str):
             raise NoResponse(reported)
         return reported

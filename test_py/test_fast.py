@@ -99,8 +99,8 @@ def shared() -> Iterator[tuple[ExitStack, DomainId]]:
 
 def leads(drive: Drive) -> bool:
     """Returns true if a machine publishes the clock, by its log."""
-    said = [line for line in drive.process.output().splitlines() if "/clock:" in line]
-    return bool(said) and said[-1].endswith("publishing it")
+    lines = [line for line in drive.process.output().splitlines() if "/clock:" in line]
+    return bool(lines) and lines[-1].endswith("publishing it")
 
 
 def assert_unbroken(drive: Drive, begin: int, end: int) -> None:
@@ -174,8 +174,8 @@ def test_an_external_clock_is_followed(start: Callable[..., Drive]):
     other.advance(1.0, 0.05)
     assert drive.end(sent, 5).status == TrajectoryResult.COMPLETED
     own = set(range(begin, other.now + 1, TSP_NS)) - set(ticks.shown[:count])
-    said = len(ticks.shown) - count
-    assert said <= 21 < len(own), "the machine no longer publishes"
+    published = len(ticks.shown) - count
+    assert published <= 21 < len(own), "the machine no longer publishes"
     other.close()
     drive.wait_for(lambda: drive.now() > other.now + NANOSECONDS // 10, 10, "own clock")
     assert_unbroken(drive, begin, drive.now() - NANOSECONDS // 20)
@@ -186,9 +186,9 @@ def stalled_at(drive: Drive, timeout: float = 60.0) -> int:
     seen = len(drive.diagnostics())
 
     def counts() -> list[str]:
-        said = [array.status[0] for array in drive.diagnostics()[seen:]][-2:]
-        counted = [status_values(status)["position_periods"] for status in said]
-        is_held = all(status.message == "waiting for a slow subscriber" for status in said)
+        statuses = [array.status[0] for array in drive.diagnostics()[seen:]][-2:]
+        counted = [status_values(status)["position_periods"] for status in statuses]
+        is_held = all(status.message == "waiting for a slow subscriber" for status in statuses)
         return counted if len(counted) == 2 and is_held and counted[0] == counted[1] else []
 
     return int(drive.wait_for(counts, timeout, "stalled clock")[0])

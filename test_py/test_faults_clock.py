@@ -55,7 +55,7 @@ def test_two_contending_clocks_are_counted_as_jumps_with_a_limited_log(clock: Si
     time_s, position = swing(6.0)
     moving = drive.accept(joint_trajectory(["y"], time_s, position))
     clock.advance(0.3, 0.006)
-    before, said = jumps(drive), len(drive.process.output())
+    before, logged_before = jumps(drive), len(drive.process.output())
     other = SimClock(drive, clock.now + APART, ReliabilityPolicy.RELIABLE)
     drive.wait_for(lambda: other._publisher.get_subscription_count() > 0, 10, "match of another clock")
     begin = time.monotonic()
@@ -65,7 +65,7 @@ def test_two_contending_clocks_are_counted_as_jumps_with_a_limited_log(clock: Si
         time.sleep(0.001)
     assert drive.end(moving.sequence_number, 10).status == R.ABORTED
     counted = jumps(drive) - before
-    lines = drive.process.output()[said:].count("the clock jumped")
+    lines = drive.process.output()[logged_before:].count("the clock jumped")
     seconds = time.monotonic() - begin
     # The clock is best effort: a message that is not taken in time is overwritten.
     assert 2 <= counted <= 2 * MESSAGES
@@ -80,14 +80,14 @@ def test_invalid_times_are_ignored_and_logged_once(clock: SimClock):
     drive = clock.drive
     clock.advance(0.06, 0.006)
     stood_at = drive.now()
-    said = len(drive.process.output())
+    logged_before = len(drive.process.output())
     for _ in range(100):
         clock._publisher.publish(Clock(clock=Time(sec=-1, nanosec=0)))
         clock._publisher.publish(Clock(clock=Time(sec=1, nanosec=4_000_000_000)))
-    drive.wait_for(lambda: "invalid time" in drive.process.output()[said:], 10, "log of an invalid time")
+    drive.wait_for(lambda: "invalid time" in drive.process.output()[logged_before:], 10, "log of an invalid time")
     time.sleep(0.2)
     assert drive.now() == stood_at
-    assert drive.process.output()[said:].count("invalid time") == 1
+    assert drive.process.output()[logged_before:].count("invalid time") == 1
     back, last = clock.now, (2**31 - 1) * NANOSECONDS // TSP_NS * TSP_NS
     for _ in range(3):
         clock.reach(last)

@@ -124,7 +124,7 @@ def forget_results(drive: Drive) -> None:
 def move_through(drive: Drive, act: Callable[[], None]) -> str:
     """Runs a swing of Z during `act`, checks psec and the log length, and returns the log."""
     go_home(drive)
-    said = len(drive.process.output())
+    logged_before = len(drive.process.output())
     begin = time.monotonic()
     accepted, start, plan = start_swing(drive, ["z"], duration=1.8, amplitude=0.02)
     act()
@@ -132,7 +132,7 @@ def move_through(drive: Drive, act: Callable[[], None]) -> str:
     assert drive.end(accepted.sequence_number, 30).status == R.COMPLETED
     # Diagnostics and the last log lines are complete now.
     drive.next_status()
-    log, seconds = drive.process.output()[said:], time.monotonic() - begin
+    log, seconds = drive.process.output()[logged_before:], time.monotonic() - begin
     kinds: dict[str, int] = {}
     for line in log.splitlines():
         kind = re.sub(r"\d+", "", line.split("]: ", 1)[-1].removeprefix("more than"))

@@ -45,8 +45,8 @@ def test_by_default_the_node_and_its_model_start():
     [node], [publisher] = found["virtual_axes_node"], found["robot_state_publisher"]
     assert node.values == {"time": "real", "joint_prefix": "", "workpiece_frame": "workpiece"}
     assert node.files[0] == str(ROOT / "config" / "mikron_ucp710.yaml")
-    shipped = (ROOT / "urdf" / "mikron_ucp710.urdf").read_text()
-    assert publisher.values["robot_description"] == shipped
+    built_in = (ROOT / "urdf" / "mikron_ucp710.urdf").read_text()
+    assert publisher.values["robot_description"] == built_in
     assert publisher.values["use_sim_time"] is False
 
 

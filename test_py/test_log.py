@@ -67,8 +67,8 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
     found = rosout(drive)
     drive.wait_for(lambda: len(found) >= 3, 5, "messages on /rosout")
     words = ("publishes it", "no_such_joint", "no response of")
-    said = {(message.level, word) for message in found for word in words if word in message.msg}
-    assert said == {(20, "publishes it"), (30, "no_such_joint"), (40, "no response of")}
+    logged = {(message.level, word) for message in found for word in words if word in message.msg}
+    assert logged == {(20, "publishes it"), (30, "no_such_joint"), (40, "no response of")}
     assert (Log.INFO, Log.WARN, Log.ERROR) == (20, 30, 40)
     # The terminal has the same texts.
     shown = {match["text"]: (match["level"], match["logger"]) for match in lines(process)}
@@ -143,11 +143,11 @@ def killed_participant(domain_id: int, profile: Path, failures: list[Any]) -> No
     with subprocess.Popen([sys.executable, "-c", GUEST], env=env, stdout=subprocess.PIPE, text=True) as participant:
         bounded = threading.Timer(20, participant.kill)
         bounded.start()
-        said = participant.stdout.readline() if participant.stdout else ""
+        ready = participant.stdout.readline() if participant.stdout else ""
         bounded.cancel()
         participant.kill()
-    if said != "matched\n":
-        failures.append(said)
+    if ready != "matched\n":
+        failures.append(ready)
 
 
 def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
@@ -175,8 +175,8 @@ def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
     drive.process = None
     assert process.stop() == 0
     # Only INFO messages of the node's own logger: requests of the participants and the end.
-    said = lines(process)
-    assert {(match["level"], match["logger"]) for match in said} == {("INFO", "virtual_axes")}, [m[0] for m in said]
+    logged = lines(process)
+    assert {(match["level"], match["logger"]) for match in logged} == {("INFO", "virtual_axes")}, [m[0] for m in said]
     assert {(message.level, message.name) for message in found} == {(20, "virtual_axes")}, [m.msg for m in found]
 
 
@@ -210,7 +210,7 @@ def test_a_full_stderr_pipe_does_not_stop_the_node():
             assert drive.end(accepted.sequence_number, 20).status == 2
             text = ""
 
-            def said() -> bool:
+            def is_logged() -> bool:
                 nonlocal text
                 try:
                     text += os.read(read, PIPE_BYTES).decode()
@@ -218,7 +218,7 @@ def test_a_full_stderr_pipe_does_not_stop_the_node():
                     pass
                 return "no_such_joint" in text and "the node stalled" in text
 
-            drive.wait_for(said, 10, "log")
+            drive.wait_for(is_logged, 10, "log")
             assert process.stop() == 0
 
 

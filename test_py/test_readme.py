@@ -232,13 +232,13 @@ def test_parameter_names(seen: tuple[Run, Drive], machine: Machine):
 
 def test_parameter_descriptions(seen: tuple[Run, Drive], machine: Machine):
     """Text, unit, type, range, choices, and whether the parameter is read-only."""
-    for said in seen[1].describe(list(machine.rows)):
-        row = machine.rows[said.name]
-        assert said.description == row.description + (f" Unit: {row.unit}." if row.unit else ""), said.name
-        assert said.read_only != row.live, said.name
-        assert said.additional_constraints == row.constraint, said.name
-        ranges = [(r.from_value, r.to_value) for r in (*said.floating_point_range, *said.integer_range)]
-        assert ranges == ([row.bounds] if row.bounds else []), said.name
+    for descriptor in seen[1].describe(list(machine.rows)):
+        row = machine.rows[descriptor.name]
+        assert descriptor.description == row.description + (f" Unit: {row.unit}." if row.unit else ""), descriptor.name
+        assert descriptor.read_only != row.live, descriptor.name
+        assert descriptor.additional_constraints == row.constraint, descriptor.name
+        ranges = [(r.from_value, r.to_value) for r in (*descriptor.floating_point_range, *descriptor.integer_range)]
+        assert ranges == ([row.bounds] if row.bounds else []), descriptor.name
         kinds = {
             "text": [ParameterType.PARAMETER_STRING],
             "list of texts": [ParameterType.PARAMETER_STRING_ARRAY],
@@ -246,11 +246,11 @@ def test_parameter_descriptions(seen: tuple[Run, Drive], machine: Machine):
         }
         numbers = [ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER]
         if row.bounds:
-            assert said.type in numbers, said.name
+            assert descriptor.type in numbers, descriptor.name
         elif "numbers" in row.range:
-            assert said.type == ParameterType.PARAMETER_DOUBLE_ARRAY, said.name
+            assert descriptor.type == ParameterType.PARAMETER_DOUBLE_ARRAY, descriptor.name
         else:
-            assert said.type in kinds.get(row.range, kinds["text"]), said.name
+            assert descriptor.type in kinds.get(row.range, kinds["text"]), descriptor.name
 
 
 def test_parameter_values(seen: tuple[Run, Drive], machine: Machine):

@@ -80,8 +80,8 @@ def is_allowed(expression: str, allowed: set[str]) -> bool:
 
 def clarified(rules: dict[str, Any], package: dict[str, Any]) -> str:
     """Returns the license of a package from its manifest or from the clarifications in deny.toml."""
-    said = {rule["crate"]: rule["expression"] for rule in rules.get("clarify", [])}
-    return package["license"] or said.get(package["name"], "not stated")
+    clarified_licenses = {rule["crate"]: rule["expression"] for rule in rules.get("clarify", [])}
+    return package["license"] or clarified_licenses.get(package["name"], "not stated")
 
 
 def crates(rules: dict[str, Any]) -> list[tuple[str, str, str, str, str | None]]:
@@ -137,8 +137,8 @@ def main() -> int:
     words = options.parser(__doc__)
     words.add_argument("--write", action="store_true")
     words.add_argument("--advisories", action="store_true")
-    asked = words.parse_args()
-    if asked.advisories:
+    arguments = words.parse_args()
+    if arguments.advisories:
         return advisories()
     rules = tomllib.loads((ROOT / "deny.toml").read_text())["licenses"]
     allowed = set(rules["allow"])
@@ -159,7 +159,7 @@ def main() -> int:
     text = TABLE.read_text()
     before, rest = text.split(BEGIN)
     present, after = rest.split(END)
-    if asked.write:
+    if arguments.write:
         TABLE.write_text(before + BEGIN + table + END + after)
     elif present != table:
         faults.append("table")

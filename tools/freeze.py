@@ -68,7 +68,7 @@ LONGEST = 160
 FINE = ("five-axis", "125us")
 """Scenario that is traced more densely, too, and the trace period."""
 POLYNOMIALS = "design pi --gain 0.5 --integral-time-ms 400"
-"""Controllers for `rst`, whose polynomials the shipped machines lack."""
+"""Controllers for `rst`, whose polynomials the built-in machines do not have."""
 
 FILES = {
     "nan.csv": "time,x\n0,0\n0.006,NaN\n",
@@ -440,7 +440,7 @@ def subcommands(text: list[str]) -> list[str]:
 
 
 def record_texts(programs: Programs, machines: list[str], scenarios: list[str]) -> dict[str, Any]:
-    """Records the output of commands that print text, and what is shipped without its comments."""
+    """Records the output of commands that print text, and the built-in files without comments."""
     commands = ["parameters", "parameters --markdown"]
     commands += [f"urdf --machine {machine}" for machine in machines]
     commands += [f"check {name}" for name in machines + scenarios]

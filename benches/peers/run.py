@@ -113,8 +113,8 @@ class Contender:
         if not line:
             status = self.process.wait()
             self.errors.seek(0)
-            said = self.errors.read().strip().splitlines()
-            raise Unavailable(said[-1] if said else f"exit status {status}")
+            lines = self.errors.read().strip().splitlines()
+            raise Unavailable(lines[-1] if lines else f"exit status {status}")
         try:
             answer = json.loads(line)
             if not float(answer["seconds"]) > 0:
