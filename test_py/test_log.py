@@ -176,7 +176,7 @@ def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
     assert process.stop() == 0
     # Only INFO messages of the node's own logger: requests of the participants and the end.
     logged = lines(process)
-    assert {(match["level"], match["logger"]) for match in logged} == {("INFO", "virtual_axes")}, [m[0] for m in said]
+    assert {(match["level"], match["logger"]) for match in logged} == {("INFO", "virtual_axes")}, [m[0] for m in logged]
     assert {(message.level, message.name) for message in found} == {(20, "virtual_axes")}, [m.msg for m in found]
 
 
