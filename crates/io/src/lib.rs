@@ -27,7 +27,7 @@
 //! assert_eq!(positions, [0.0, 0.001, 0.002]);
 //!
 //! let description = urdf(&machine, "")?;
-//! assert!(description.contains("<robot name=\"mikron_ucp710\">"));
+//! assert!(description.contains(r#"<joint name="x" type="prismatic">"#));
 //! # Ok(())
 //! # }
 //! ```
