@@ -115,7 +115,7 @@ def test_a_machine_without_kinematics_is_rejected_unless_the_model_is_off(tmp_pa
     assert changed.count("b:") > text.count("b:")
     machine = tmp_path / "b.yaml"
     machine.write_text(changed)
-    with pytest.raises(RuntimeError, match=r"joint b \(rotary\) has no place.*robot_state_publisher:=false"):
+    with pytest.raises(RuntimeError, match=r"joint b \(rotary\) has no role.*robot_state_publisher:=false"):
         nodes(ONE, machine=str(machine))
     assert len(nodes(ONE, machine=str(machine), robot_state_publisher="false")) == 1
 
