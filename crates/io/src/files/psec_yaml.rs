@@ -137,7 +137,7 @@ impl<T: TryFrom<i128> + Bounded> Visitor<'_> for WholeVisitor<T> {
     type Value = Whole<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "a whole number from {} to {}", T::BOUNDS.0, T::BOUNDS.1)
+        write!(f, "an integer from {} to {}", T::BOUNDS.0, T::BOUNDS.1)
     }
 
     fn visit_i64<E: de::Error>(self, value: i64) -> Result<Whole<T>, E> {

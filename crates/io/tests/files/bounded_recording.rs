@@ -101,12 +101,12 @@ proptest! {
             let longest = file.len() as u64 + stored(MESSAGE + length) + OVERHEAD + head;
             prop_assert!(longest > bound, "{} of {bound}, {length} rejected", file.len());
         }
-        let summary = Summary::read(&file).expect("whole").expect("a summary");
+        let summary = Summary::read(&file).expect("complete").expect("a summary");
         prop_assert_eq!(summary.stats.expect("statistics").message_count, written.len() as u64);
         prop_assert_eq!(summary.channels.len(), 3);
         let found: Vec<_> = MessageStream::new(&file)
-            .expect("whole")
-            .map(|message| message.expect("whole"))
+            .expect("complete")
+            .map(|message| message.expect("complete"))
             .map(|message| (message.channel.topic.clone(), message.log_time, message.data.into_owned()))
             .collect();
         prop_assert_eq!(found, written);
@@ -197,9 +197,9 @@ fn complete_chunks_are_readable_after_a_full_disk() {
         })
         .expect("it does not fit");
     assert_eq!(error.kind(), io::ErrorKind::StorageFull);
-    let whole = recording.complete_bytes() as usize;
+    let complete = recording.complete_bytes() as usize;
     assert!(recording.finish().is_err());
-    let file = disk.bytes.lock().expect("one thread")[..whole].to_vec();
+    let file = disk.bytes.lock().expect("one thread")[..complete].to_vec();
     // Two chunks of ten messages fit, three do not.
     assert_eq!((flushed, read(&file).0), (20, 20));
 }

@@ -425,8 +425,8 @@ fn a_trace_contains_the_records_that_rosbag2_and_viewers_require() {
             .expect("in memory");
     }
     let bytes = trace.finish().expect("in memory");
-    let summary = mcap::Summary::read(&bytes).expect("whole").expect("there is one");
-    let stats = summary.stats.as_ref().expect("rosbag2 takes counts from it");
+    let summary = mcap::Summary::read(&bytes).expect("complete").expect("a summary");
+    let stats = summary.stats.as_ref().expect("statistics for rosbag2");
     assert_eq!((stats.message_count, stats.message_start_time, stats.message_end_time), (9, 0, 250_000));
     // rosbag2 reads in log time order with the message indexes.
     assert!(summary.chunk_indexes.iter().all(|index| !index.message_index_offsets.is_empty()));

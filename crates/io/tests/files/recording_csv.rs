@@ -44,7 +44,7 @@ fn read(bytes: impl AsRef<[u8]>, texts: &[&str]) -> Outcome {
 #[track_caller]
 fn good(text: &str, texts: &[&str]) -> RawRecording {
     let (recording, findings) = read(text, texts).expect("good");
-    assert_eq!(findings, [], "nothing to say");
+    assert_eq!(findings, [], "no findings");
     recording
 }
 

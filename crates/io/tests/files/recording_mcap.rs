@@ -411,8 +411,8 @@ fn truncated_files_are_rejected() {
 #[test]
 fn an_unfinished_recording_is_read_up_to_its_last_complete_chunk() {
     let bytes = sample_recording();
-    let (whole, _) = read_with(&bytes, &RecordingOptions::default()).expect("good");
-    let summary = mcap::Summary::read(&bytes).expect("whole").expect("has a summary");
+    let (complete, _) = read_with(&bytes, &RecordingOptions::default()).expect("good");
+    let summary = mcap::Summary::read(&bytes).expect("complete").expect("has a summary");
     // End of a chunk and its indexes.
     let ends: Vec<usize> = summary
         .chunk_indexes
@@ -425,11 +425,11 @@ fn an_unfinished_recording_is_read_up_to_its_last_complete_chunk() {
         let (found, findings) = read_with(&bytes[..*end], &RecordingOptions::default()).expect("goes on");
         assert_eq!(findings[0].code, "unfinished", "{findings:?}");
         rows.push(found.time.len());
-        assert_eq!(found.time, whole.time[..found.time.len()]);
-        assert_eq!(found.position.as_deref(), whole.position.as_deref().map(|p| &p[..found.time.len()]));
+        assert_eq!(found.time, complete.time[..found.time.len()]);
+        assert_eq!(found.position.as_deref(), complete.position.as_deref().map(|p| &p[..found.time.len()]));
     }
     assert!(
-        rows.is_sorted() && rows.first() < rows.last() && rows.last() == Some(&whole.time.len()),
+        rows.is_sorted() && rows.first() < rows.last() && rows.last() == Some(&complete.time.len()),
         "{rows:?}"
     );
 }

@@ -16,13 +16,13 @@ use virtual_axes_core::yaml;
 /// An entry is a text `CHANNEL=COLUMN[UNIT]`:
 ///
 /// ```
-/// use virtual_axes::files::Columns;
+/// use virtual_axes_io::files::Columns;
 ///
 /// let mut columns = Columns::default();
 /// for text in ["time=t[ms]", "position=Pos1 [mm]", "current=#4[-1 A]", "velocity=[m/min]", "delimiter=;"] {
 ///     columns.set(text, "--column")?;
 /// }
-/// # Ok::<(), virtual_axes::files::ColumnsError>(())
+/// # Ok::<(), virtual_axes_io::files::ColumnsError>(())
 /// ```
 ///
 /// COLUMN is a header, or `#` and a number from 1; default is the channel name. UNIT is a symbol with an optional

@@ -29,15 +29,12 @@ pub(super) fn read(
             if columns.skip_lines > 0 { "no line after the skipped lines" } else { "the file is empty" };
         return Err(AxisRecordingError::Empty { at: name.to_owned(), what });
     };
-    let layout = match context.layout(line, &text, &factors) {
-        Ok(layout) => layout,
-        Err(mut error) => {
-            if let AxisRecordingError::NoColumn { hint, .. } = &mut error {
-                *hint = context.hint(line, &text, &mut lines, &factors).into();
-            }
-            return Err(error);
+    let layout = context.layout(line, &text, &factors).map_err(|mut error| {
+        if let AxisRecordingError::NoColumn { hint, .. } = &mut error {
+            *hint = context.hint(line, &text, &mut lines, &factors).into();
         }
-    };
+        error
+    })?;
     let mut channels: [Vec<f64>; Channel::ALL.len()] = Default::default();
     let mut rows = 0;
     let mut is_ended = true;
@@ -70,11 +67,10 @@ pub(super) fn read(
     }
     let mut findings = Vec::new();
     if !is_ended {
-        findings.push(Finding::warning(
-            "unended",
-            format!("{name}:{last}: the last line has no line break: if the file is truncated, its last value is incomplete"),
-            "end the last line with a line break, or delete it",
-        ));
+        let what = format!(
+            "{name}:{last}: the last line has no line break: if the file is truncated, its last value is incomplete"
+        );
+        findings.push(Finding::warning("unended", what, "end the last line with a line break, or delete it"));
     }
     context.report_default_columns(&layout, &mut findings);
     Ok((build_recording(name, channels, &layout, rows, &mut findings)?, findings))

@@ -249,7 +249,7 @@ impl Context<'_> {
         if self.columns.mappings.is_empty() || layout.default_channels.is_empty() {
             return;
         }
-        let taken: Vec<String> = layout
+        let columns: Vec<String> = layout
             .default_channels
             .iter()
             .filter_map(|&index| {
@@ -260,7 +260,7 @@ impl Context<'_> {
             })
             .collect();
         let what =
-            format!("{}: channels without a mapping use default columns: {}", self.name, taken.join(", "));
+            format!("{}: channels without a mapping use default columns: {}", self.name, columns.join(", "));
         findings.push(Finding::note("usual-columns", what));
     }
 }

@@ -6,7 +6,7 @@ use std::io::{Read, Seek};
 use mcap::McapError;
 
 use super::error::AxisRecordingError;
-use super::join::{TargetStamps, TimeSource, values_at_stamps};
+use super::join::{TargetStamps, TimeSource};
 use super::series::{MessageKind, Row, Series};
 use crate::files::mcap_reader::{Completeness, check_chunks, parse_error, read_messages, type_of};
 use crate::files::shorten_names;
@@ -171,7 +171,7 @@ fn join_series(
     findings: &mut Vec<Finding>,
 ) -> Found<RawRecording> {
     // Stamps that were never set are 0: log times are used.
-    let clock =
+    let source =
         if series.iter().any(|series| !series.is_stamped()) { TimeSource::Log } else { TimeSource::Stamp };
     let mut others = series.split_off(1);
     let Some(base) = series.pop() else { return Ok(RawRecording::default()) };
@@ -179,44 +179,20 @@ fn join_series(
     let (found, mut rows) = base.into_rows(name, joint, None)?;
     // Stable sort: messages of equal log time stay in file order.
     rows.sort_by_key(|row| row.log_time);
-    let stamps: Vec<Nanoseconds> = rows.iter().map(|row| clock.of(row)).collect();
-    let first = stamps.first().copied().unwrap_or_default();
-    let channel = |index: usize| non_empty(rows.iter().map(|row| row.values[index]).collect());
-    let mut recording = RawRecording {
-        name: name.to_owned(),
-        time: stamps.iter().map(|stamp| seconds(stamp.saturating_sub(first))).collect(),
-        position: channel(MessageKind::POSITION),
-        velocity: channel(MessageKind::VELOCITY),
-        ..RawRecording::default()
-    };
-    if kind == MessageKind::DriveStates {
-        recording.psec = channel(MessageKind::PSEC);
-        recording.velocity_feedforward = channel(MessageKind::VELOCITY_FEEDFORWARD);
-        recording.torque_feedforward = channel(MessageKind::TORQUE_FEEDFORWARD);
-    }
-    if recording.position.is_none() {
-        let (channel, rows) = (super::Channel::Position, rows.len());
-        return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel, rows });
-    }
-    if clock == TimeSource::Log {
+    let stamps: Vec<Nanoseconds> = rows.iter().map(|row| source.time_of(row)).collect();
+    let mut recording = base_recording(name, kind, &rows, &stamps)?;
+    if source == TimeSource::Log {
         let what = format!("{name}: the messages have no stamps: log times are used, with their jitter");
         findings.push(Finding::warning("no-stamps", what, "record messages with header.stamp"));
     }
-    let times = TargetStamps::new(stamps);
+    let stamps = TargetStamps::new(stamps, source);
     let current = others.iter().position(|series| series.kind == MessageKind::MotorCurrents);
     if let Some(index) = current {
         let series = others.swap_remove(index);
-        let topic = series.topic.clone();
+        let topic = format!("{name}: {}", series.topic);
         match series.into_rows(name, joint, Some(&found)) {
             Ok((_, rows)) => {
-                let values = values_at_stamps(
-                    &rows,
-                    MessageKind::CURRENT,
-                    clock,
-                    &times,
-                    &format!("{name}: {topic}"),
-                    findings,
-                );
+                let values = stamps.nearest_values(&rows, MessageKind::CURRENT, &topic, findings);
                 recording.current = non_empty(values);
             }
             Err(error) => {
@@ -226,18 +202,50 @@ fn join_series(
         return Ok(recording);
     }
     let effort = if kind == MessageKind::JointState {
-        non_empty(rows.iter().map(|row| row.values[MessageKind::EFFORT]).collect())
+        channel(&rows, MessageKind::EFFORT)
     } else {
         others.pop().and_then(|series| {
             let topic = format!("{name}: {}", series.topic);
             let (_, rows) = series.into_rows(name, joint, Some(&found)).ok()?;
-            non_empty(values_at_stamps(&rows, MessageKind::EFFORT, clock, &times, &topic, findings))
+            non_empty(stamps.nearest_values(&rows, MessageKind::EFFORT, &topic, findings))
         })
     };
     if let Some(effort) = effort {
         recording.current = current_from_effort(effort, axis, name, findings);
     }
     Ok(recording)
+}
+
+/// Builds a recording from the messages with the positions; time starts at the first stamp.
+fn base_recording(
+    name: &str,
+    kind: MessageKind,
+    rows: &[Row],
+    stamps: &[Nanoseconds],
+) -> Found<RawRecording> {
+    let first = stamps.first().copied().unwrap_or_default();
+    let mut recording = RawRecording {
+        name: name.to_owned(),
+        time: stamps.iter().map(|stamp| seconds(stamp.saturating_sub(first))).collect(),
+        position: channel(rows, MessageKind::POSITION),
+        velocity: channel(rows, MessageKind::VELOCITY),
+        ..RawRecording::default()
+    };
+    if kind == MessageKind::DriveStates {
+        recording.psec = channel(rows, MessageKind::PSEC);
+        recording.velocity_feedforward = channel(rows, MessageKind::VELOCITY_FEEDFORWARD);
+        recording.torque_feedforward = channel(rows, MessageKind::TORQUE_FEEDFORWARD);
+    }
+    if recording.position.is_none() {
+        let (channel, rows) = (super::Channel::Position, rows.len());
+        return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel, rows });
+    }
+    Ok(recording)
+}
+
+/// Returns the values at `index` of the rows, if there are any.
+fn channel(rows: &[Row], index: usize) -> Option<Vec<f64>> {
+    non_empty(rows.iter().map(|row| row.values[index]).collect())
 }
 
 /// Computes the motor current from the effort (`effort` = Kt·i/r), unless the effort was never set.
@@ -270,14 +278,4 @@ fn current_from_effort(
 /// Returns a channel, if it has values.
 fn non_empty(values: Vec<f64>) -> Option<Vec<f64>> {
     values.iter().any(|value| !value.is_nan()).then_some(values)
-}
-
-impl TimeSource {
-    /// Returns the time of a row, ns.
-    pub(super) fn of(self, row: &Row) -> Nanoseconds {
-        match self {
-            TimeSource::Stamp => row.stamp,
-            TimeSource::Log => row.log_time,
-        }
-    }
 }
