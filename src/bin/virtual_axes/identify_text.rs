@@ -1,11 +1,12 @@
 //! Text output of `virtual_axes identify`.
 
+use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::identify::summary::{
     DelaySummary, FrictionSummary, GravitySummary, IdentificationSummary, InertiaSummary, LawSummary,
-    PartSummary, RefinementSummary, RegressionSummary, ResidualSummary,
+    PartSummary, RefinementSummary, ResidualSummary,
 };
 use virtual_axes_identify::identify::{
-    FrictionLaw, GravityCurrent, GravitySource, IdentifiedValue, ResidualStatistics,
+    FeedforwardRegression, FrictionLaw, GravityCurrent, GravitySource, IdentifiedValue, ResidualStatistics,
 };
 use virtual_axes_identify::recording::{Finding, Severity};
 use virtual_axes_report::{Table, TableColumn};
@@ -245,8 +246,8 @@ fn inertia(inertia: &InertiaSummary) -> String {
     text
 }
 
-fn regression(name: &str, found: &RegressionSummary) -> String {
-    let [low, high] = found.delay_ms.map(|delay| digits(delay, 3));
+fn regression(name: &str, found: &FeedforwardRegression) -> String {
+    let [low, high] = [found.delay.0, found.delay.1].map(|delay| digits(delay / MILLISECOND, 3));
     format!(
         "{name}: {} ± {}, R² {:.6}, {low} … {high} ms delay after the setpoints",
         digits(found.value, 5),

@@ -1,9 +1,12 @@
 //! Identification of the feedforward weights by regression on the derivatives of PSEC (Prévost section 3.5,
 //! eqs. 6–8).
 
+use serde::{Serialize, Serializer};
+
 use super::fit::{fit_linear, r_squared};
 use super::setpoints::SetpointGrid;
 use crate::recording::{Finding, SignalSpan, Signals};
+use virtual_axes_core::units::MILLISECOND;
 
 /// Longest delay of the feedforward, s.
 const LONGEST_DELAY: f64 = 0.1;
@@ -13,7 +16,7 @@ const LEAST_DETERMINATION: f64 = 0.99;
 const SHOWN: f64 = 0.02;
 
 /// Regression of a feedforward weight.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FeedforwardRegression {
     /// VFFW (dimensionless), or TFFW (kg·m² at the motor, kg for a linear motor).
     pub value: f64,
@@ -22,19 +25,26 @@ pub struct FeedforwardRegression {
     /// Coefficient of determination R².
     pub r_squared: f64,
     /// Delay of the recorded setpoint behind the derivative, s: above the first and up to the second value.
+    #[serde(rename = "delay_ms", serialize_with = "serialize_milliseconds")]
     pub delay: (f64, f64),
     /// Pairs of the derivative of PSEC at the motor (rad/s, rad/s²) and the recorded setpoint.
+    #[serde(skip)]
     pub points: Vec<(f64, f64)>,
 }
 
+fn serialize_milliseconds<S: Serializer>(delay: &(f64, f64), serializer: S) -> Result<S::Ok, S::Error> {
+    (delay.0 / MILLISECOND, delay.1 / MILLISECOND).serialize(serializer)
+}
+
 /// Regressions of VFFW and TFFW.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct FeedforwardFit {
     /// Regression of VFFW.
     pub velocity: Option<FeedforwardRegression>,
     /// Regression of TFFW.
     pub torque: Option<FeedforwardRegression>,
     /// True if a recording with torque feedforward shows that TFFW is 0.
+    #[serde(skip)]
     pub is_torque_zero: bool,
 }
 
