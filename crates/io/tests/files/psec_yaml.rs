@@ -168,7 +168,7 @@ fn the_kind_of_a_file_is_detected_by_its_content() {
         assert_eq!(input.kind(), kind);
         let yaml = ![FileKind::PsecCsv, FileKind::Mcap].contains(&kind);
         assert_eq!(input.text().map(str::as_bytes), yaml.then_some(bytes));
-        let mut whole = Vec::new();
+        let mut complete = Vec::new();
         std::io::Read::read_to_end(&mut input.into_reader(), &mut complete).expect("readable");
         assert_eq!(complete, bytes, "the reader returns the complete content");
     }
