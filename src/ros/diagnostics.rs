@@ -1,27 +1,27 @@
-//! `/diagnostics` once a second (REP-107), readable with stock types.
+//! Diagnostics of the node and its axes (`/diagnostics`, REP-107).
 
 use std::fmt::Display;
 
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 
 use super::convert::header;
-use super::pace::{AxisHealth, ClockSource, Health};
+use super::health::{AxisHealth, ClockSource, Health};
 use super::process_memory::private_memory_mb;
 use super::remote_endpoints::DiscoveredEndpoints;
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds};
 
-/// What stays the same from message to message.
+/// Constant contents of the diagnostics, and the source of the discovery count.
 #[derive(Debug, Clone)]
 pub struct Diagnostics {
     /// Fully qualified name of the node.
     pub node: String,
     /// Name of the machine.
     pub machine: String,
-    /// Joints, with prefix.
+    /// Names of the joints, with prefix.
     pub joints: Vec<String>,
-    /// `real`, `fast` or `sim`.
+    /// Time mode: `real`, `fast` or `sim`.
     pub time_mode: &'static str,
-    /// Counts the endpoints elsewhere.
+    /// Counter of the discovered remote endpoints.
     pub discovered: DiscoveredEndpoints,
 }
 
@@ -30,9 +30,9 @@ fn value(key: &str, value: impl Display) -> KeyValue {
 }
 
 impl Diagnostics {
-    /// The message at `time` (ns): what has happened between `before` and `now`.
+    /// Creates the message at `time`, ns, with the events between the states `before` and `now`.
     ///
-    /// `outputs_dropped` counts messages that a slow subscriber made the node drop since the start.
+    /// `outputs_dropped` is the number of messages dropped for slow subscribers since the start, before and now.
     pub fn message(
         &self,
         time: Nanoseconds,
@@ -48,18 +48,18 @@ impl Diagnostics {
         DiagnosticArray { header: header(time), status }
     }
 
-    /// Joints that stood outside their travel limits between `before` and `now`.
+    /// Returns the joints that were outside their travel limits between `before` and `now`.
     pub fn outside_travel_limits(&self, before: &Health, now: &Health) -> Vec<&str> {
-        let left = |&(_, before, now): &(&str, AxisHealth, AxisHealth)| now.outside > before.outside;
-        self.axes(before, now).filter(left).map(|(joint, ..)| joint).collect()
+        let is_outside = |&(_, before, now): &(&str, AxisHealth, AxisHealth)| now.outside > before.outside;
+        self.axes(before, now).filter(is_outside).map(|(joint, ..)| joint).collect()
     }
 
     fn axes(&self, before: &Health, now: &Health) -> impl Iterator<Item = (&str, AxisHealth, AxisHealth)> {
-        let of = |health: &Health, place| health.axes.get(place).copied().unwrap_or_default();
+        let of = |health: &Health, index| health.axes.get(index).copied().unwrap_or_default();
         self.joints
             .iter()
             .enumerate()
-            .map(move |(place, joint)| (joint.as_str(), of(before, place), of(now, place)))
+            .map(move |(index, joint)| (joint.as_str(), of(before, index), of(now, index)))
     }
 
     fn status(&self, name: String, problems: &[&str], fine: &str, values: Vec<KeyValue>) -> DiagnosticStatus {
@@ -71,52 +71,12 @@ impl Diagnostics {
     fn node_status(&self, before: &Health, now: &Health, (old, new): (u64, u64)) -> DiagnosticStatus {
         let periods = now.periods - before.periods;
         let missed = now.missed - before.missed;
-        let dropped = (now.dropped - before.dropped) + (new - old);
         let mean =
             if periods == 0 { 0.0 } else { (now.total_lateness - before.total_lateness) / periods as f64 };
-        let mut problems = Vec::new();
-        if missed > 0 {
-            problems.push("position periods were released late");
-        }
-        if now.unpublished > before.unpublished {
-            problems.push("the node stood still: position instants were computed and not published");
-        }
-        if dropped > 0 {
-            problems.push("samples were dropped: a subscriber is slow");
-        }
-        if now.stream.refused > before.stream.refused {
-            problems.push("setpoints of the stream were refused");
-        }
-        if now.stream.counts.gaps > before.stream.counts.gaps {
-            problems.push("the stream broke off in motion");
-        }
-        if now.stream.counts.limited > before.stream.counts.limited {
-            problems.push("the stream asked for more than the axes' largest speed");
-        }
-        if now.stream.held_off {
-            problems.push("a stream is ignored after a stop until it pauses");
-        }
-        if now.clock.jumps > before.clock.jumps {
-            problems.push("the clock jumped");
-        }
-        let stands = periods == 0 && now.clock.source != ClockSource::Wall;
-        let fine = if stands && now.clock.source == ClockSource::None {
-            "waiting for /clock"
-        } else if stands && (now.clock.held_back || now.clock.source == ClockSource::Own) {
-            "waiting for a slow subscriber"
-        } else if stands {
-            "paused"
-        } else if now.moving {
-            "running"
-        } else if now.stream.drives {
-            "streaming"
-        } else if now.busy {
-            "settling"
-        } else {
-            "holding"
-        };
+        let problems = node_problems(before, now, new - old);
+        let state = node_state(periods, now);
         let values = vec![
-            value("state", fine),
+            value("state", state),
             value("time", self.time_mode),
             value("clock", now.clock.source.name()),
             value("clock_jumps", now.clock.jumps),
@@ -128,16 +88,16 @@ impl Diagnostics {
             value("dropped_samples", now.dropped + new),
             value("mean_lateness_ms", format!("{:.3}", mean * 1e3)),
             value("max_lateness_ms", format!("{:.3}", now.max_lateness * 1e3)),
-            value("stream_drives", now.stream.drives),
+            value("stream_drives", now.stream.is_active),
             value("stream_delay_ms", now.stream.delay as f64 / MILLISECOND_NS as f64),
-            value("stream_setpoints_refused", now.stream.refused),
+            value("stream_setpoints_rejected", now.stream.rejected),
             value("stream_setpoints_ignored", now.stream.ignored),
-            value("stream_messages_out_of_order", now.stream.overtaken),
+            value("stream_messages_out_of_order", now.stream.reordered),
             value("stream_gaps", now.stream.counts.gaps),
             value("stream_speed_limited_periods", now.stream.counts.limited),
-            value("stream_held_off", now.stream.held_off),
+            value("stream_held_off", now.stream.is_inhibited),
         ];
-        self.status(format!("{}: axes", self.node), &problems, fine, values)
+        self.status(format!("{}: axes", self.node), &problems, state, values)
     }
 
     fn axis(&self, joint: &str, before: AxisHealth, now: AxisHealth) -> DiagnosticStatus {
@@ -146,7 +106,7 @@ impl Diagnostics {
             problems.push("speed, current or voltage setpoint at its limit");
         }
         if now.extrapolated > before.extrapolated {
-            problems.push("friction law used beyond its fitted range of 20 m/min or rev/min");
+            problems.push("friction law extrapolated beyond its fitted range of 20 m/min or rev/min");
         }
         if now.outside > before.outside {
             problems.push("outside its travel limits");
@@ -160,12 +120,51 @@ impl Diagnostics {
     }
 }
 
+/// Returns the problems of the node between the states `before` and `now`, with `dropped` messages.
+fn node_problems(before: &Health, now: &Health, dropped: u64) -> Vec<&'static str> {
+    let (old, new) = (&before.stream, &now.stream);
+    let conditions = [
+        (now.missed > before.missed, "position cycles were released late"),
+        (
+            now.unpublished > before.unpublished,
+            "the node stalled: position instants were computed but not published",
+        ),
+        (now.dropped - before.dropped + dropped > 0, "samples were dropped: a subscriber is slow"),
+        (new.rejected > old.rejected, "streamed setpoints were rejected"),
+        (new.counts.gaps > old.counts.gaps, "gap in the stream during motion"),
+        (new.counts.limited > old.counts.limited, "streamed setpoints exceeded the axes' maximum velocity"),
+        (new.is_inhibited, "a stream is ignored after a stop until it pauses"),
+        (now.clock.jumps > before.clock.jumps, "the clock jumped"),
+    ];
+    conditions.into_iter().filter_map(|(is_present, text)| is_present.then_some(text)).collect()
+}
+
+/// Returns the state of the node if `periods` position cycles were released since the previous message.
+fn node_state(periods: u64, now: &Health) -> &'static str {
+    let is_paused = periods == 0 && now.clock.source != ClockSource::Wall;
+    if is_paused && now.clock.source == ClockSource::None {
+        "waiting for /clock"
+    } else if is_paused && (now.clock.is_blocked || now.clock.source == ClockSource::Own) {
+        "waiting for a slow subscriber"
+    } else if is_paused {
+        "paused"
+    } else if now.is_moving {
+        "running"
+    } else if now.stream.is_active {
+        "streaming"
+    } else if now.is_busy {
+        "settling"
+    } else {
+        "holding"
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_warning_names_what_happened_in_the_last_second_only() {
+    fn a_warning_reports_events_of_the_last_second_only() {
         let diagnostics = Diagnostics {
             node: "/virtual_axes".into(),
             machine: "m".into(),

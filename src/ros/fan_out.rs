@@ -1,4 +1,4 @@
-//! From the simulation to the topics: each position instant, the clock, and the diagnostics.
+//! Publication of each frame on the topics, and of the diagnostics.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -9,12 +9,13 @@ use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use tokio::sync::{mpsc, watch};
 use tracing::warn;
 
-use super::action::Feedback;
+use super::action::FeedbackOutput;
+use super::axes_interface::SampleFrame;
 use super::clock::ClockOutput;
 use super::convert;
 use super::diagnostics::Diagnostics;
+use super::health::Health;
 use super::outputs::Output;
-use super::pace::{Frame, Health};
 use super::recorder::RecordingStatus;
 use super::setpoints::{SetpointVelocities, controller_state};
 use super::tool::ToolOutput;
@@ -23,42 +24,42 @@ use virtual_axes_io::messages::{DriveStates, JointTrajectoryControllerState, Mot
 /// Period of `/diagnostics` (REP-107).
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
 
-/// The outputs of every position instant.
+/// Outputs of the frames.
 pub struct FanOut {
-    /// `joint_states`.
+    /// Output `joint_states`.
     pub joint_states: Output<JointState>,
-    /// `~/motor_currents`.
+    /// Output `~/motor_currents`.
     pub motor_currents: Output<MotorCurrents>,
-    /// `~/drive_states`.
+    /// Output `~/drive_states`.
     pub drive_states: Output<DriveStates>,
-    /// `~/controller_state`.
+    /// Output `~/controller_state`.
     pub controller_state: Output<JointTrajectoryControllerState>,
-    /// Of the action.
-    pub feedback: Feedback,
-    /// Pose and paths of the tool, if the machine moves one.
+    /// Feedback of the action.
+    pub feedback: FeedbackOutput,
+    /// Pose and paths of the tool, if the machine has joints that move it.
     pub tool: Option<ToolOutput>,
-    /// `/clock`, in `fast`.
+    /// Output `/clock`, in `fast`.
     pub clock: Option<ClockOutput>,
-    /// Joints, with prefix.
+    /// Names of the joints, with prefix.
     pub joints: Vec<String>,
-    /// Position instants from one publication to the next.
+    /// Number of position cycles between publications.
     pub every: i64,
 }
 
 impl FanOut {
-    /// Publishes frames until the simulation ends.
-    pub async fn run(self, mut frames: mpsc::Receiver<Arc<Frame>>) {
+    /// Publishes the frames until their sender is dropped.
+    pub async fn run(self, mut frames: mpsc::Receiver<Arc<SampleFrame>>) {
         let mut setpoints = SetpointVelocities::default();
         while let Some(frame) = frames.recv().await {
             let velocities = setpoints.update(&frame);
             if let Some(clock) = &self.clock {
                 clock.send(frame.time).await;
             }
-            let publish = frame.instant % self.every == 0;
+            let is_due = frame.instant % self.every == 0;
             if let Some(tool) = &self.tool {
-                tool.take(&frame, publish).await;
+                tool.update(&frame, is_due).await;
             }
-            if publish {
+            if is_due {
                 if self.joint_states.has_subscriptions() {
                     self.joint_states.send(convert::joint_state(&frame, &self.joints)).await;
                 }
@@ -72,12 +73,13 @@ impl FanOut {
                     self.controller_state.send(controller_state(&frame, velocities, &self.joints)).await;
                 }
             }
-            self.feedback.frame(&frame, velocities).await;
+            self.feedback.publish(&frame, velocities).await;
         }
     }
 }
 
-/// Publishes what has happened since the last message, once a second.
+/// Publishes the diagnostics once per second, with the events since the previous message, and logs axes that leave
+/// their travel limits.
 pub async fn publish_diagnostics(
     text: Diagnostics,
     output: Output<DiagnosticArray>,

@@ -18,20 +18,9 @@ use tokio::time::timeout;
 
 use super::endpoints::Publisher;
 use super::matched_subscriptions::{MatchedSubscriptionTracker, MatchedSubscriptions};
+use super::overflow::OverflowPolicy;
 use super::recorder::Tap;
 use super::writer_rotation::{RotatedTopics, Writer, WriterRotation};
-
-/// Policy for a queue that is full because its subscribers are slow.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OverflowPolicy {
-    /// The message is dropped and counted; used where the axes follow the wall clock.
-    Drop,
-    /// The sender waits; used where the axes run as fast as subscribers can receive.
-    Block,
-    /// The sender waits for at most [`BLOCK_TIMEOUT`]. After a timeout messages are dropped and counted until the
-    /// queue has space again, so that a stalled subscriber is waited for only once.
-    BlockWithTimeout,
-}
 
 /// Length of a queue that drops: 1.5 s of messages at the default rate.
 const DROPPING_QUEUE: usize = 256;

@@ -1,59 +1,59 @@
-//! The node's parameters: what is set goes to the simulation as a command.
+//! Parameters of the node: validation of changes and their transfer to the simulation.
 
 use std::sync::Arc;
 
 use tokio::sync::mpsc;
 
-use super::pace::Command;
+use super::axes_interface::Command;
 pub use crate::ingress::parameters::LiveNodeParameters;
 use crate::ingress::parameters::{ParameterDescriptor, ParameterHost, ParameterStore, ParameterValue};
 use virtual_axes_core::config::Parameters;
 
-/// Checks what is set against the schema, and hands it to the simulation as a command.
-pub struct Host {
-    settings: ParameterStore,
+/// Parameter host that validates changes against the schema and sends them to the simulation.
+pub struct NodeParameterHost {
+    store: ParameterStore,
     commands: mpsc::Sender<Command>,
-    /// Room among the commands for the next change.
-    room: Option<mpsc::OwnedPermit<Command>>,
+    /// Permit for the command of the next change.
+    permit: Option<mpsc::OwnedPermit<Command>>,
 }
 
-impl Host {
-    /// A host of `parameters` whose changes go to `commands` and `live`.
+impl NodeParameterHost {
+    /// Creates a host of `parameters` that sends changes to `commands` and stores them in `live`.
     pub fn new(
         parameters: Parameters,
         commands: mpsc::Sender<Command>,
         live: Arc<LiveNodeParameters>,
     ) -> Self {
-        Host { settings: ParameterStore::new(parameters, live), commands, room: None }
+        NodeParameterHost { store: ParameterStore::new(parameters, live), commands, permit: None }
     }
 }
 
-impl ParameterHost for Host {
+impl ParameterHost for NodeParameterHost {
     fn names(&self) -> Vec<String> {
-        self.settings.names()
+        self.store.names()
     }
 
     fn get(&self, name: &str) -> Option<ParameterValue> {
-        self.settings.get(name)
+        self.store.get(name)
     }
 
     fn describe(&self, name: &str) -> Option<ParameterDescriptor> {
-        self.settings.describe(name)
+        self.store.describe(name)
     }
 
     async fn ready(&mut self) {
-        if self.room.is_none() {
-            // None only when the node shuts down.
-            self.room = self.commands.clone().reserve_owned().await.ok();
+        if self.permit.is_none() {
+            // The channel is closed only at shutdown.
+            self.permit = self.commands.clone().reserve_owned().await.ok();
         }
     }
 
     fn set(&mut self, changes: Vec<(String, ParameterValue)>) -> Result<(), String> {
-        // A predictive controller takes a while to design; other tasks go on meanwhile.
-        let (changed, machine) = tokio::task::block_in_place(|| self.settings.check(changes))?;
-        let room = self.room.take().ok_or("the node is shutting down")?;
-        room.send(Command::Adopt(Arc::new(machine)));
-        self.settings.replace(changed);
+        // The design of a predictive controller takes long; other tasks continue meanwhile.
+        let (changed, machine) = tokio::task::block_in_place(|| self.store.check(changes))?;
+        let permit = self.permit.take().ok_or("the node is shutting down")?;
+        permit.send(Command::UpdateParameters(Arc::new(machine)));
+        self.store.replace(changed);
         Ok(())
     }
 }

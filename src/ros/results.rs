@@ -1,4 +1,4 @@
-//! `~/trajectory_result`: what became of each trajectory, so that its publisher finds its own.
+//! Results of trajectories (`~/trajectory_result`), each with the identity of its trajectory.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -9,39 +9,39 @@ use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use tokio::sync::{Mutex, mpsc};
 use tracing::{info, warn};
 
-use super::action::{GoalEvent, GoalId, goal_name};
+use super::axes_interface::{Accepted, SimulationReport};
 use super::convert::{header, stamp};
+use super::goal_event::{GoalEvent, GoalId, goal_name};
 use super::outputs::Output;
-use super::pace::{Accepted, Report};
 use crate::ingress::AdmissionControl;
 use virtual_axes_core::assess::AxisReport;
 use virtual_axes_core::simulation::{AbortReason, MotionEnd, MotionOutcome, Quantity, ToleranceViolation};
 use virtual_axes_core::trajectory::{JointLimits, JointSet, MotionId, Rejection, StreamEnd, Trajectory};
-use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_core::units::{Nanoseconds, Rounded, seconds};
 use virtual_axes_io::messages::{Source, Status, TrajectoryResult};
 
-/// Where a trajectory came from.
+/// Origin of a trajectory.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Origin {
-    /// The topic `psec`.
+    /// Message on the topic `psec`.
     Topic {
-        /// `header.stamp` as it came.
+        /// `header.stamp` of the message, unchanged.
         stamp: Time,
-        /// The middleware's, per publisher.
+        /// DDS sequence number of the publisher's message.
         sequence_number: u64,
-        /// The middleware's id of the publisher.
+        /// Global identifier (GID) of the publisher.
         publisher_gid: [u8; 16],
     },
-    /// A goal of the action.
+    /// Goal of the action.
     Action {
-        /// `header.stamp` of its trajectory as it came.
+        /// `header.stamp` of its trajectory, unchanged.
         stamp: Time,
-        /// Its name.
+        /// Identifier of the goal.
         goal_id: GoalId,
     },
 }
 
-/// As texts name it.
+/// Formats the origin for messages.
 impl fmt::Display for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -52,8 +52,8 @@ impl fmt::Display for Origin {
 }
 
 impl Origin {
-    /// Origin of a message on `psec`.
-    pub fn of(stamp: &Time, info: &MessageInfo) -> Self {
+    /// Creates the origin of a message on `psec`.
+    pub fn from_message(stamp: &Time, info: &MessageInfo) -> Self {
         Origin::Topic {
             stamp: stamp.clone(),
             sequence_number: u64::try_from(info.sequence_number()).unwrap_or(0),
@@ -79,80 +79,83 @@ impl Origin {
     }
 }
 
-/// A trajectory that has been handed to the simulation.
-struct Known {
+/// Trajectory that has been submitted to the simulation and has not ended.
+struct ActiveTrajectory {
     origin: Origin,
     start: Time,
-    /// Held here so that the thread of the simulation does not have to free it.
+    /// Reference that keeps the axes' thread from freeing the trajectory.
     _trajectory: Arc<Trajectory>,
 }
 
-/// Publishes results, and remembers the trajectories that have none yet.
-pub struct Results {
+/// Publisher of results, with the origins of the trajectories that have not ended.
+pub struct TrajectoryResults {
     output: Output<TrajectoryResult>,
     joints: Vec<JointLimits>,
-    /// What becomes of goals; at most two events for each.
-    goals: mpsc::UnboundedSender<GoalEvent>,
-    known: Mutex<HashMap<MotionId, Known>>,
+    /// Sender of goal events, at most two for each goal.
+    goal_events: mpsc::UnboundedSender<GoalEvent>,
+    active: Mutex<HashMap<MotionId, ActiveTrajectory>>,
     admission: AdmissionControl,
 }
 
-impl Results {
-    /// Results of a machine with `joints`; those of action goals go to `goals` too. One trajectory has at most
-    /// `max_points` points.
+impl TrajectoryResults {
+    /// Creates the results of a machine with `joints`, which also sends the events of action goals to `goal_events`.
+    /// A trajectory has at most `max_points` points.
     pub fn new(
         output: Output<TrajectoryResult>,
         joints: Vec<JointLimits>,
-        goals: mpsc::UnboundedSender<GoalEvent>,
+        goal_events: mpsc::UnboundedSender<GoalEvent>,
         max_points: usize,
     ) -> Self {
-        Results {
+        TrajectoryResults {
             output,
             joints,
-            goals,
-            known: Mutex::new(HashMap::new()),
+            goal_events,
+            active: Mutex::new(HashMap::new()),
             admission: AdmissionControl::new(max_points),
         }
     }
 
-    /// Takes a trajectory in, whatever source it has, while there is room for it.
+    /// Admits a trajectory of any origin; see [`AdmissionControl::admit`].
     ///
     /// # Errors
-    /// As [`AdmissionControl::admit`].
-    pub fn hold(&self, trajectory: Trajectory) -> Result<Arc<Trajectory>, Rejection> {
+    /// [`RejectionCode::QueueFull`](virtual_axes_core::trajectory::RejectionCode::QueueFull) if too many trajectories
+    /// or points are active or waiting.
+    pub fn admit(&self, trajectory: Trajectory) -> Result<Arc<Trajectory>, Rejection> {
         self.admission.admit(trajectory)
     }
 
-    /// Remembers where a trajectory came from, before the simulation is asked.
-    pub async fn remember(&self, id: MotionId, origin: Origin, trajectory: Arc<Trajectory>) {
-        let known = Known { origin, start: Time::default(), _trajectory: trajectory };
-        self.known.lock().await.insert(id, known);
+    /// Stores the origin of a trajectory; called before its submission.
+    pub async fn register(&self, id: MotionId, origin: Origin, trajectory: Arc<Trajectory>) {
+        let active = ActiveTrajectory { origin, start: Time::default(), _trajectory: trajectory };
+        self.active.lock().await.insert(id, active);
     }
 
-    /// Publishes what the simulation reports.
-    pub async fn report(&self, report: Report) {
+    /// Publishes the result of a report and sends its goal event.
+    pub async fn publish(&self, report: SimulationReport) {
         match report {
-            Report::Decided(id, time, Ok(accepted)) => self.accepted(id, time, accepted).await,
-            Report::Decided(id, time, Err(rejection)) => {
-                let known = self.known.lock().await.remove(&id);
-                if let Some(known) = known {
-                    self.rejected(&known.origin, time, &rejection).await;
-                    if let Origin::Action { goal_id, .. } = known.origin {
-                        self.tell(GoalEvent::Refused(goal_id, rejection));
+            SimulationReport::Decision(id, time, Ok(accepted)) => {
+                self.publish_acceptance(id, time, accepted).await
+            }
+            SimulationReport::Decision(id, time, Err(rejection)) => {
+                let trajectory = self.active.lock().await.remove(&id);
+                if let Some(trajectory) = trajectory {
+                    self.publish_rejection(&trajectory.origin, time, &rejection).await;
+                    if let Origin::Action { goal_id, .. } = trajectory.origin {
+                        self.send_goal_event(GoalEvent::Rejected(goal_id, rejection));
                     }
                 }
             }
-            Report::Ended(end) => self.ended(end).await,
-            Report::StreamEnded(time, end, joints, on_its_way) => {
-                self.stream_ended(time, end, joints).await;
-                drop(on_its_way);
+            SimulationReport::MotionEnded(end) => self.publish_end(end).await,
+            SimulationReport::StreamEnded(time, end, joints, unread) => {
+                self.publish_stream_end(time, end, joints).await;
+                drop(unread);
             }
         }
     }
 
-    /// Publishes a refusal at `time` (ns).
-    pub async fn rejected(&self, origin: &Origin, time: Nanoseconds, rejection: &Rejection) {
-        warn!("{origin} refused: {rejection}");
+    /// Publishes a rejection at `time`, ns.
+    pub async fn publish_rejection(&self, origin: &Origin, time: Nanoseconds, rejection: &Rejection) {
+        warn!("{origin} rejected: {rejection}");
         let index = rejection.index.and_then(|index| i32::try_from(index).ok());
         self.output
             .send(TrajectoryResult {
@@ -167,39 +170,41 @@ impl Results {
             .await;
     }
 
-    /// Passes an event on; nobody hears it when the node shuts down.
-    fn tell(&self, event: GoalEvent) {
-        let _ = self.goals.send(event);
+    /// Sends a goal event; at shutdown it has no receiver.
+    fn send_goal_event(&self, event: GoalEvent) {
+        let _ = self.goal_events.send(event);
     }
 
-    /// Which tolerance was not kept: `path` or `goal`.
-    fn violation(&self, tolerance: &str, violation: &ToleranceViolation) -> String {
+    /// Returns the text of a violated `path` or `goal` tolerance.
+    fn violation_text(&self, tolerance: &str, violation: &ToleranceViolation) -> String {
         let ToleranceViolation { axis_index, quantity, error, limit } = *violation;
         let (name, unit) = self.joints.get(axis_index).map_or(("", ""), |j| (j.name.as_str(), j.unit()));
-        let (what, per) = match quantity {
+        let (quantity, per) = match quantity {
             Quantity::Position => ("position", ""),
             Quantity::Velocity => ("velocity", "/s"),
             Quantity::Acceleration => ("acceleration", "/s²"),
         };
         format!(
-            "joint {name}: {what} error {error} {unit}{per} exceeds the {tolerance} tolerance {limit} {unit}{per}"
+            "joint {name}: {quantity} error {} {unit}{per} exceeds the {tolerance} tolerance {} {unit}{per}",
+            Rounded(error),
+            Rounded(limit)
         )
     }
 
-    async fn accepted(&self, id: MotionId, time: Nanoseconds, accepted: Accepted) {
+    async fn publish_acceptance(&self, id: MotionId, time: Nanoseconds, accepted: Accepted) {
         let start = stamp(accepted.start);
         let origin = {
-            let mut known = self.known.lock().await;
-            let Some(known) = known.get_mut(&id) else { return };
-            known.start = start.clone();
-            known.origin.clone()
+            let mut active = self.active.lock().await;
+            let Some(trajectory) = active.get_mut(&id) else { return };
+            trajectory.start = start.clone();
+            trajectory.origin.clone()
         };
         if let Origin::Action { goal_id, .. } = origin {
-            self.tell(GoalEvent::Started(goal_id));
+            self.send_goal_event(GoalEvent::Started(goal_id));
         }
         let text = if accepted.is_late {
-            let late = seconds(time - accepted.start);
-            let text = format!("joined {late} s after its start");
+            let late = Rounded(seconds(time - accepted.start));
+            let text = format!("received {late} s after its start time; it is followed from now on");
             warn!("{origin}: {text}");
             text
         } else {
@@ -209,10 +214,10 @@ impl Results {
         self.output.send(TrajectoryResult { start, text, ..origin.result(time, Status::Accepted) }).await;
     }
 
-    /// Publishes what took joints away from a stream.
-    async fn stream_ended(&self, time: Nanoseconds, end: StreamEnd, joints: JointSet) {
+    /// Publishes the end of a stream on some joints.
+    async fn publish_stream_end(&self, time: Nanoseconds, end: StreamEnd, joints: JointSet) {
         let (status, text) = match end {
-            StreamEnd::Preempted(by) => (Status::Preempted, taken_over(&*self.known.lock().await, by)),
+            StreamEnd::Preempted(by) => (Status::Preempted, preemption_text(&*self.active.lock().await, by)),
             StreamEnd::Stopped(_) => {
                 let text = "controlled stop; the stream is ignored until it pauses";
                 (Status::Stopped, text.to_owned())
@@ -221,7 +226,7 @@ impl Results {
             StreamEnd::ClockJump => (Status::Aborted, "the clock jumped".to_owned()),
         };
         let name: Vec<_> =
-            joints.iter().filter_map(|place| Some(self.joints.get(place)?.name.clone())).collect();
+            joints.iter().filter_map(|index| Some(self.joints.get(index)?.name.clone())).collect();
         info!("stream of {}: {status:?}, {text}", name.join(", "));
         self.output
             .send(TrajectoryResult {
@@ -235,37 +240,43 @@ impl Results {
             .await;
     }
 
-    async fn ended(&self, end: MotionEnd) {
-        let mut known_list = self.known.lock().await;
-        let Some(known) = known_list.remove(&end.id) else { return };
+    async fn publish_end(&self, end: MotionEnd) {
+        let mut active = self.active.lock().await;
+        let Some(trajectory) = active.remove(&end.id) else { return };
         let (status, text) = match end.outcome {
             MotionOutcome::Completed => (Status::Completed, String::new()),
-            MotionOutcome::Preempted { by } => (Status::Preempted, taken_over(&known_list, by)),
+            MotionOutcome::Preempted { by } => (Status::Preempted, preemption_text(&active, by)),
             MotionOutcome::Stopped => (Status::Stopped, "controlled stop".to_owned()),
             MotionOutcome::Canceled => (Status::Stopped, "canceled".to_owned()),
-            MotionOutcome::PathTolerance(violation) => (Status::Aborted, self.violation("path", &violation)),
-            MotionOutcome::GoalTolerance(violation) => (Status::Aborted, self.violation("goal", &violation)),
+            MotionOutcome::PathTolerance(violation) => {
+                (Status::Aborted, self.violation_text("path", &violation))
+            }
+            MotionOutcome::GoalTolerance(violation) => {
+                (Status::Aborted, self.violation_text("goal", &violation))
+            }
             MotionOutcome::Aborted(AbortReason::Reset) => (Status::Aborted, "reset".to_owned()),
             MotionOutcome::Aborted(AbortReason::ClockJump { from, to }) => {
                 let (from, to) = (seconds(from), seconds(to));
                 (Status::Aborted, format!("the clock jumped from {from:.3} s to {to:.3} s"))
             }
         };
-        drop(known_list);
-        let told = format!("{}: {status:?}{}{text}", known.origin, if text.is_empty() { "" } else { ", " });
+        drop(active);
+        let separator = if text.is_empty() { "" } else { ", " };
+        let line = format!("{}: {status:?}{separator}{text}", trajectory.origin);
         if status == Status::Aborted {
-            warn!("{told}")
+            warn!("{line}")
         } else {
-            info!("{told}")
+            info!("{line}")
         }
-        if let Origin::Action { goal_id, .. } = known.origin {
-            self.tell(GoalEvent::Ended(goal_id, end.outcome, text.clone()));
+        if let Origin::Action { goal_id, .. } = trajectory.origin {
+            self.send_goal_event(GoalEvent::Ended(goal_id, end.outcome, text.clone()));
         }
         let column = |value: fn(&AxisReport) -> f64| end.report.axes.iter().map(value).collect();
-        let name = end.axis_indices.iter().filter_map(|&p| Some(self.joints.get(p)?.name.clone())).collect();
+        let name =
+            end.axis_indices.iter().filter_map(|&index| Some(self.joints.get(index)?.name.clone())).collect();
         self.output
             .send(TrajectoryResult {
-                start: known.start,
+                start: trajectory.start,
                 text,
                 name,
                 max_tracking_error: column(|a| a.max_following_error),
@@ -276,14 +287,14 @@ impl Results {
                 rms_contour_error: end.report.rms_contour_error.unwrap_or(f64::NAN),
                 peak_current: column(|a| a.peak_current),
                 saturation_time: column(|a| a.saturation_time),
-                ..known.origin.result(end.time, status)
+                ..trajectory.origin.result(end.time, status)
             })
             .await;
     }
 }
 
-/// What is told to a displaced one.
-fn taken_over(known: &HashMap<MotionId, Known>, by: MotionId) -> String {
-    let by = known.get(&by).map_or_else(|| "another trajectory".to_owned(), |k| k.origin.to_string());
-    format!("axes were taken over by {by}")
+/// Returns the text for a motion or stream that is preempted by the motion `by`.
+fn preemption_text(active: &HashMap<MotionId, ActiveTrajectory>, by: MotionId) -> String {
+    let by = active.get(&by).map_or_else(|| "another trajectory".to_owned(), |t| t.origin.to_string());
+    format!("preempted by {by}")
 }

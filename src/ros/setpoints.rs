@@ -1,25 +1,25 @@
-//! Setpoints as they reach the position controllers, with their velocities: what `~/controller_state`
-//! and the action's feedback compare the axes with.
+//! Delay-compensated setpoints with their velocities, and their comparison with the axes in `~/controller_state` and
+//! the feedback of the action.
 
-use super::pace::Frame;
+use super::axes_interface::SampleFrame;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectoryPoint;
 use virtual_axes_io::messages::{JointTrajectoryControllerState, header};
 
-/// The velocities of the synchronized setpoints, by difference from frame to frame:
-/// `(PSEC_floor(k − α/Tsp) − the one before) / Tsp`.
+/// Velocities of the setpoints delayed by α, as the difference quotient of successive frames:
+/// `(PSEC(floor(k − α/Tsp)) − PSEC(floor(k − 1 − α/Tsp))) / Tsp`.
 #[derive(Debug, Default)]
 pub struct SetpointVelocities {
-    /// Time and resets of the frame before.
+    /// Time, ns, and number of resets of the previous frame.
     before: Option<(Nanoseconds, u64)>,
     positions: Vec<f64>,
     velocities: Vec<f64>,
 }
 
 impl SetpointVelocities {
-    /// Takes the next frame in; m/s or rad/s per axis, 0 in the first, after a reset and where the
-    /// clock went backwards.
-    pub fn update(&mut self, frame: &Frame) -> &[f64] {
+    /// Returns the setpoint velocities of all axes at the next frame, m/s or rad/s; 0 at the first frame, after a
+    /// reset, and if the clock went backwards.
+    pub fn update(&mut self, frame: &SampleFrame) -> &[f64] {
         let before = self.before.filter(|&(_, resets)| resets == frame.resets);
         let elapsed = before.map(|(time, _)| seconds(frame.time - time)).filter(|&time| time > 0.0);
         self.velocities.clear();
@@ -36,22 +36,23 @@ impl SetpointVelocities {
     }
 }
 
-/// What is asked of some axes and what they do: positions and velocities.
-pub struct Comparison {
-    /// The synchronized setpoints.
+/// Comparison of the delayed setpoints of some axes with their positions and velocities.
+pub struct JointComparison {
+    /// Setpoints delayed by α.
     pub desired: JointTrajectoryPoint,
-    /// The axes.
+    /// Simulated positions and velocities.
     pub actual: JointTrajectoryPoint,
-    /// `desired` less `actual`.
+    /// Difference `desired` − `actual`: the delay-compensated following error.
     pub error: JointTrajectoryPoint,
 }
 
-impl Comparison {
-    /// Of the axes at `places`, in this order; `velocities` are those of the setpoints.
-    pub fn of(frame: &Frame, velocities: &[f64], places: impl Iterator<Item = usize>) -> Self {
+impl JointComparison {
+    /// Creates the comparison of the axes with the given indices, in their order; `velocities` are the setpoint
+    /// velocities of all axes.
+    pub fn new(frame: &SampleFrame, velocities: &[f64], indices: impl Iterator<Item = usize>) -> Self {
         let [mut desired, mut actual, mut error] = [(); 3].map(|()| JointTrajectoryPoint::default());
-        for place in places {
-            let (Some(sample), Some(&velocity)) = (frame.samples.get(place), velocities.get(place)) else {
+        for index in indices {
+            let (Some(sample), Some(&velocity)) = (frame.samples.get(index), velocities.get(index)) else {
                 continue;
             };
             desired.positions.push(sample.delayed_psec);
@@ -61,18 +62,18 @@ impl Comparison {
             error.positions.push(sample.delay_compensated_following_error());
             error.velocities.push(velocity - sample.velocity);
         }
-        Comparison { desired, actual, error }
+        JointComparison { desired, actual, error }
     }
 }
 
-/// `~/controller_state` of a frame; `output` holds what the drives put out: the efforts at the axes, N
-/// or N·m.
+/// Creates the message `~/controller_state` of a frame; its `output` contains the efforts of the drives at the axes,
+/// N or N·m.
 pub fn controller_state(
-    frame: &Frame,
+    frame: &SampleFrame,
     velocities: &[f64],
     joints: &[String],
 ) -> JointTrajectoryControllerState {
-    let Comparison { desired, actual, error } = Comparison::of(frame, velocities, 0..joints.len());
+    let JointComparison { desired, actual, error } = JointComparison::new(frame, velocities, 0..joints.len());
     let effort = frame.samples.iter().map(|sample| sample.effort).collect();
     JointTrajectoryControllerState {
         header: header(frame.time),
@@ -92,15 +93,15 @@ mod tests {
     use virtual_axes_core::machine::AxisSample;
     use virtual_axes_core::units::MILLISECOND_NS;
 
-    fn frame(instant: i64, setpoint: f64) -> Frame {
+    fn frame(instant: i64, setpoint: f64) -> SampleFrame {
         let sample =
             AxisSample { delayed_psec: setpoint, position: 0.25, velocity: 1.0, ..Default::default() };
         let samples = vec![AxisSample::default(), sample];
-        Frame { instant, time: instant * MILLISECOND_NS, samples, resets: 0, motions: Vec::new() }
+        SampleFrame { instant, time: instant * MILLISECOND_NS, samples, resets: 0, motions: Vec::new() }
     }
 
     #[test]
-    fn the_velocity_of_a_set_point_is_its_difference_also_over_a_frame_that_is_missing() {
+    fn setpoint_velocity_is_the_difference_also_over_missing_frames() {
         let mut velocities = SetpointVelocities::default();
         assert_eq!(velocities.update(&frame(5, 0.5)), [0.0, 0.0]);
         assert_eq!(velocities.update(&frame(6, 0.5625)), [0.0, 62.5]);
@@ -108,18 +109,18 @@ mod tests {
     }
 
     #[test]
-    fn a_reset_and_a_clock_that_goes_backwards_are_no_motion() {
+    fn a_reset_or_a_backward_clock_jump_gives_zero_velocity() {
         let mut velocities = SetpointVelocities::default();
         velocities.update(&frame(5, 0.5));
-        assert_eq!(velocities.update(&Frame { resets: 1, ..frame(6, 0.0) }), [0.0, 0.0]);
-        assert_eq!(velocities.update(&Frame { resets: 1, ..frame(4, 0.25) }), [0.0, 0.0]);
-        assert_eq!(velocities.update(&Frame { resets: 1, ..frame(5, 0.25) }), [0.0, 0.0]);
-        assert_eq!(velocities.update(&Frame { resets: 1, ..frame(6, 0.5) }), [0.0, 250.0]);
+        assert_eq!(velocities.update(&SampleFrame { resets: 1, ..frame(6, 0.0) }), [0.0, 0.0]);
+        assert_eq!(velocities.update(&SampleFrame { resets: 1, ..frame(4, 0.25) }), [0.0, 0.0]);
+        assert_eq!(velocities.update(&SampleFrame { resets: 1, ..frame(5, 0.25) }), [0.0, 0.0]);
+        assert_eq!(velocities.update(&SampleFrame { resets: 1, ..frame(6, 0.5) }), [0.0, 250.0]);
     }
 
     #[test]
-    fn a_comparison_keeps_the_order_that_is_asked_for() {
-        let found = Comparison::of(&frame(0, 0.5), &[0.0, 3.0], [1, 0].into_iter());
+    fn a_comparison_keeps_the_requested_order() {
+        let found = JointComparison::new(&frame(0, 0.5), &[0.0, 3.0], [1, 0].into_iter());
         assert_eq!((found.desired.positions, found.desired.velocities), (vec![0.5, 0.0], vec![3.0, 0.0]));
         assert_eq!((found.actual.positions, found.actual.velocities), (vec![0.25, 0.0], vec![1.0, 0.0]));
         assert_eq!((found.error.positions, found.error.velocities), (vec![0.25, 0.0], vec![2.0, 0.0]));

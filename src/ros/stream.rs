@@ -1,4 +1,4 @@
-//! `psec_stream`: setpoints one at a time, and what becomes of them.
+//! Intake of streamed setpoints (`psec_stream`): submission to the simulation, counters and log messages.
 
 use tracing::warn;
 
@@ -8,85 +8,88 @@ use virtual_axes_core::simulation::Simulation;
 use virtual_axes_core::trajectory::{Rejection, RejectionCode, StreamCounts};
 use virtual_axes_core::units::Nanoseconds;
 
-/// What the diagnostics say about the stream.
+/// State and counters of the setpoint stream, for the diagnostics.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct StreamHealth {
-    /// Whether a stream drives, moving or not.
-    pub drives: bool,
-    /// Whether setpoints come that are ignored after a stop.
-    pub held_off: bool,
-    /// Its delay, ns.
+    /// True if a stream is active, in motion or not.
+    pub is_active: bool,
+    /// True if streamed setpoints arrive and are ignored after a stop.
+    pub is_inhibited: bool,
+    /// Delay of streamed setpoints, ns.
     pub delay: Nanoseconds,
-    /// Setpoints refused since the start.
-    pub refused: u64,
-    /// Setpoints since the start that came while a trajectory or a stop had the joint, or after a stop.
+    /// Number of rejected setpoints since the start.
+    pub rejected: u64,
+    /// Number of setpoints since the start that arrived while a trajectory or a stop commanded the joint, or after a
+    /// stop.
     pub ignored: u64,
-    /// Messages since the start that a younger one had overtaken.
-    pub overtaken: u64,
-    /// What the axes counted since the start.
+    /// Number of messages since the start that arrived after a later message of their publisher.
+    pub reordered: u64,
+    /// Counters of the simulation.
     pub counts: StreamCounts,
 }
 
-/// Hands setpoints to the simulation, counts those that are not taken, and tells of them now and then.
+/// Submits streamed setpoints to the simulation, counts rejected, ignored and reordered ones, and logs at a limited
+/// rate.
 #[derive(Debug, Default)]
-pub struct StreamLog {
-    refused: u64,
+pub struct StreamIntake {
+    rejected: u64,
     ignored: u64,
-    overtaken: u64,
+    reordered: u64,
     gaps: u64,
-    told: Throttle<Told>,
+    throttle: Throttle<StreamWarning>,
 }
 
-/// What the log tells about.
+/// Kind of a log message.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Told {
-    Refused(RejectionCode),
+enum StreamWarning {
+    Rejection(RejectionCode),
     Gap,
 }
 
-impl StreamLog {
-    /// Gives `setpoints` to the axes for the next position instant.
-    pub fn take(&mut self, simulation: &mut Simulation, setpoints: &StreamSetpoints) {
+impl StreamIntake {
+    /// Submits `setpoints` for the next position instant.
+    pub fn submit(&mut self, simulation: &mut Simulation, setpoints: &StreamSetpoints) {
         let now = simulation.time_of(simulation.next_instant());
-        self.overtaken += u64::from(setpoints.is_reordered);
-        self.refused += setpoints.unlisted_rejections;
+        self.reordered += u64::from(setpoints.is_reordered);
+        self.rejected += setpoints.unlisted_rejections;
         for rejection in &setpoints.rejected {
-            self.refuse(rejection, now);
+            self.count_rejection(rejection, now);
         }
-        for &(place, position) in &setpoints.positions {
-            match simulation.submit_setpoint_stamped(place, position, setpoints.sent) {
+        for &(index, position) in &setpoints.positions {
+            match simulation.submit_setpoint_stamped(index, position, setpoints.sent) {
                 Ok(true) => {}
                 Ok(false) => self.ignored += 1,
-                Err(rejection) => self.refuse(&rejection, now),
+                Err(rejection) => self.count_rejection(&rejection, now),
             }
         }
     }
 
-    fn refuse(&mut self, rejection: &Rejection, now: Nanoseconds) {
-        self.refused += 1;
-        if self.told.is_due(Told::Refused(rejection.code), now) {
-            warn!("setpoint of the stream refused: {rejection}");
+    fn count_rejection(&mut self, rejection: &Rejection, now: Nanoseconds) {
+        self.rejected += 1;
+        if self.throttle.is_due(StreamWarning::Rejection(rejection.code), now) {
+            warn!("streamed setpoint rejected: {rejection}");
         }
     }
 
-    /// Tells when the stream broke off, after each position instant.
-    pub fn watch(&mut self, simulation: &Simulation) {
+    /// Logs a gap of the stream; called after each position instant.
+    pub fn check_gaps(&mut self, simulation: &Simulation) {
         let gaps = simulation.stream_counts().gaps;
-        if gaps > self.gaps && self.told.is_due(Told::Gap, simulation.time_of(simulation.next_instant())) {
-            warn!("the stream broke off in motion; the axes hold its last setpoints");
+        let now = simulation.time_of(simulation.next_instant());
+        if gaps > self.gaps && self.throttle.is_due(StreamWarning::Gap, now) {
+            warn!("gap in the stream during motion; the axes hold the last setpoints");
         }
         self.gaps = gaps;
     }
 
-    /// What the diagnostics say.
+    /// Returns state and counters for the diagnostics.
     pub fn health(&self, simulation: &Simulation) -> StreamHealth {
         StreamHealth {
-            drives: simulation.is_streaming(),
-            held_off: simulation.is_stream_inhibited(),
+            is_active: simulation.is_streaming(),
+            is_inhibited: simulation.is_stream_inhibited(),
             delay: simulation.stream_delay(),
-            refused: self.refused,
+            rejected: self.rejected,
             ignored: self.ignored,
-            overtaken: self.overtaken,
+            reordered: self.reordered,
             counts: simulation.stream_counts(),
         }
     }

@@ -1,5 +1,4 @@
-//! The tool in the workpiece frame: its pose with each frame of samples, and the paths that its tip has
-//! taken and should have taken.
+//! Tool in the workpiece frame: its pose at each frame of samples, and the actual and setpoint paths of its tip.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,23 +10,24 @@ use ros2_interfaces_jazzy_serde::geometry_msgs::msg::PoseStamped;
 use ros2_interfaces_jazzy_serde::nav_msgs::msg::Path;
 use tokio::time::{Instant, MissedTickBehavior};
 
+use super::axes_interface::SampleFrame;
 use super::endpoints::{EndpointError, Endpoints, Publisher};
-use super::outputs::{Output, OutputFactory, OverflowPolicy};
-use super::pace::Frame;
+use super::outputs::{Output, OutputFactory};
+use super::overflow::OverflowPolicy;
 use virtual_axes_core::config::ToolConfig;
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::units::Nanoseconds;
 use virtual_axes_io::messages;
 
-/// From one pose of a path to the next at least, m: below what can be seen of a machine on a screen.
-const SPACING: f64 = 1e-4;
-/// Or the tool has turned by this, rad: 0.1 mm at 100 mm of tool.
-const TURN: f64 = 1e-3;
-/// A path that does not change is repeated as often as this, for readers that came later.
-const REPEAT: Duration = Duration::from_secs(2);
+/// Smallest distance between poses of a path, m: below the resolution of a machine on a screen.
+const MIN_SPACING: f64 = 1e-4;
+/// Smallest rotation between poses of a path, rad: 0.1 mm at a tool length of 100 mm.
+const MIN_ROTATION: f64 = 1e-3;
+/// Period at which an unchanged path is repeated for late joiners.
+const REPEAT_PERIOD: Duration = Duration::from_secs(2);
 
-/// The topics of the tool.
+/// Topics of the tool.
 pub struct ToolTopics {
     pose: Publisher<PoseStamped>,
     path: Publisher<Path>,
@@ -38,10 +38,10 @@ pub struct ToolTopics {
 }
 
 impl ToolTopics {
-    /// Creates them, for a machine with joints that move the tool relative to the workpiece.
+    /// Creates the topics; returns `None` if no joint moves the tool relative to the workpiece.
     ///
     /// # Errors
-    /// [`EndpointError`] naming the topic that the middleware refuses.
+    /// [`EndpointError`] naming the topic that cannot be created.
     pub fn create(
         endpoints: &mut Endpoints<'_>,
         kinematics: Kinematics,
@@ -58,136 +58,139 @@ impl ToolTopics {
         Ok(Some(ToolTopics { pose, path, setpoint, kinematics, names }))
     }
 
-    /// Starts what publishes on them.
+    /// Starts the outputs, and the task that publishes the paths.
     pub fn start(
         self,
-        publishing: &mut OutputFactory,
+        outputs: &mut OutputFactory,
         config: ToolConfig,
         overflow: OverflowPolicy,
     ) -> ToolOutput {
-        let trace = Arc::new(Mutex::new(Trace::new(config.path_length)));
+        let history = Arc::new(Mutex::new(PathHistory::new(config.path_length)));
         if let Some(rate) = config.path_rate {
-            // A task of their own waits for slow readers of the paths; the axes do not.
-            let outputs =
-                [self.path, self.setpoint].map(|path| publishing.start(path, OverflowPolicy::Block));
-            let paths = Paths { trace: Arc::clone(&trace), frame: config.frame.clone(), outputs };
-            publishing.tasks.spawn(paths.run(Duration::from_secs_f64(1.0 / rate)));
+            // A separate task waits for slow readers of the paths; the axes do not wait.
+            let paths = [self.path, self.setpoint].map(|path| outputs.start(path, OverflowPolicy::Block));
+            let publisher =
+                PathPublisher { history: Arc::clone(&history), frame: config.frame.clone(), outputs: paths };
+            outputs.tasks.spawn(publisher.run(Duration::from_secs_f64(1.0 / rate)));
         }
-        let pose = publishing.start(self.pose, overflow);
-        ToolOutput { pose, kinematics: self.kinematics, frame: config.frame, trace }
+        let pose = outputs.start(self.pose, overflow);
+        ToolOutput { pose, kinematics: self.kinematics, frame: config.frame, history }
     }
 }
 
-/// What is published of the tool.
+/// Output of the tool's pose, and recording of its paths.
 pub struct ToolOutput {
     pose: Output<PoseStamped>,
     kinematics: Kinematics,
     frame: String,
-    trace: Arc<Mutex<Trace>>,
+    history: Arc<Mutex<PathHistory>>,
 }
 
 impl ToolOutput {
-    /// Takes the samples of an instant, and publishes the pose if it is to be.
-    pub async fn take(&self, frame: &Frame, publish: bool) {
-        let actual = self.place(frame, |sample| sample.position);
-        let setpoint = self.place(frame, |sample| sample.delayed_psec);
-        lock(&self.trace).take(frame.resets, Moment { time: frame.time, actual, setpoint });
-        if publish && self.pose.has_subscriptions() {
+    /// Adds the samples of an instant to the paths, and publishes the pose if `is_due`.
+    pub async fn update(&self, frame: &SampleFrame, is_due: bool) {
+        let actual = self.pose(frame, |sample| sample.position);
+        let setpoint = self.pose(frame, |sample| sample.delayed_psec);
+        lock(&self.history).add(frame.resets, ToolPosePair { time: frame.time, actual, setpoint });
+        if is_due && self.pose.has_subscriptions() {
             self.pose.send(actual.message(frame.time, &self.frame)).await;
         }
     }
 
-    fn place(&self, frame: &Frame, position: impl Fn(&AxisSample) -> f64) -> Place {
+    fn pose(&self, frame: &SampleFrame, position: impl Fn(&AxisSample) -> f64) -> OrientedToolPose {
         let joints: Vec<f64> = frame.samples.iter().map(position).collect();
-        Place { pose: self.kinematics.forward(&joints), orientation: self.kinematics.orientation(&joints) }
+        OrientedToolPose {
+            pose: self.kinematics.forward(&joints),
+            orientation: self.kinematics.orientation(&joints),
+        }
     }
 }
 
-/// The tool at an instant.
+/// Pose of the tool with its orientation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Place {
+struct OrientedToolPose {
     pose: ToolPose,
     orientation: UnitQuaternion<f64>,
 }
 
-impl Place {
+impl OrientedToolPose {
     fn message(&self, time: Nanoseconds, frame: &str) -> PoseStamped {
         messages::pose_stamped(time, frame, &self.pose.tip, &self.orientation)
     }
 
     fn is_far_from(&self, other: &Self) -> bool {
-        (self.pose.tip - other.pose.tip).norm() >= SPACING
-            || (self.pose.axis - other.pose.axis).norm() >= TURN
+        (self.pose.tip - other.pose.tip).norm() >= MIN_SPACING
+            || (self.pose.axis - other.pose.axis).norm() >= MIN_ROTATION
     }
 }
 
-/// Where the tool is, and where the position controllers were asked to bring it.
+/// Actual and setpoint pose of the tool at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Moment {
+struct ToolPosePair {
     time: Nanoseconds,
-    actual: Place,
-    setpoint: Place,
+    actual: OrientedToolPose,
+    setpoint: OrientedToolPose,
 }
 
-/// The newest part of both paths; a pose of one has its counterpart of the same instant in the other.
+/// Newest part of the actual and the setpoint path, with poses of the same instants.
 #[derive(Debug)]
-struct Trace {
-    kept: VecDeque<Moment>,
-    /// Where the tool is now, kept or not.
-    newest: Option<Moment>,
+struct PathHistory {
+    kept: VecDeque<ToolPosePair>,
+    /// Newest poses, which may be too close to the last kept ones to be kept.
+    newest: Option<ToolPosePair>,
     length: usize,
     resets: u64,
-    /// Whether a pose has been kept, or all forgotten, since the paths were last read.
-    changed: bool,
+    /// True if a pose has been added or the paths cleared since they were last read.
+    is_changed: bool,
 }
 
-impl Trace {
+impl PathHistory {
     fn new(length: usize) -> Self {
-        Trace { kept: VecDeque::new(), newest: None, length, resets: 0, changed: false }
+        PathHistory { kept: VecDeque::new(), newest: None, length, resets: 0, is_changed: false }
     }
 
-    /// Goes on; after a reset, or where time goes backwards, from nothing.
-    fn take(&mut self, resets: u64, moment: Moment) {
-        if resets != self.resets || self.newest.is_some_and(|newest| newest.time >= moment.time) {
+    /// Adds the poses of an instant. Clears the paths after a reset or if time goes backwards.
+    fn add(&mut self, resets: u64, poses: ToolPosePair) {
+        if resets != self.resets || self.newest.is_some_and(|newest| newest.time >= poses.time) {
             self.kept.clear();
         }
         self.resets = resets;
-        self.newest = Some(moment);
-        let far = self.kept.back().is_none_or(|last| {
-            moment.actual.is_far_from(&last.actual) || moment.setpoint.is_far_from(&last.setpoint)
+        self.newest = Some(poses);
+        let is_far = self.kept.back().is_none_or(|last| {
+            poses.actual.is_far_from(&last.actual) || poses.setpoint.is_far_from(&last.setpoint)
         });
-        if far {
-            // The newest stands behind those that are kept.
+        if is_far {
+            // The newest poses are appended to the kept ones.
             if self.kept.len() + 1 >= self.length {
                 self.kept.pop_front();
             }
-            self.kept.push_back(moment);
-            self.changed = true;
+            self.kept.push_back(poses);
+            self.is_changed = true;
         }
     }
 
-    /// Actual and setpoint, oldest first.
-    fn read(&mut self) -> Vec<Moment> {
-        self.changed = false;
+    /// Returns the poses of both paths, oldest first.
+    fn read(&mut self) -> Vec<ToolPosePair> {
+        self.is_changed = false;
         let newest = self.newest.filter(|newest| self.kept.back() != Some(newest));
         self.kept.iter().copied().chain(newest).collect()
     }
 }
 
-/// Nothing panics while it holds the lock; what is inside is whole in any case.
-fn lock(trace: &Mutex<Trace>) -> MutexGuard<'_, Trace> {
-    trace.lock().unwrap_or_else(PoisonError::into_inner)
+/// Locks the paths. No code panics while it holds the lock, so a poisoned lock is valid.
+fn lock(history: &Mutex<PathHistory>) -> MutexGuard<'_, PathHistory> {
+    history.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What publishes both paths.
-struct Paths {
-    trace: Arc<Mutex<Trace>>,
+/// Publisher of both paths.
+struct PathPublisher {
+    history: Arc<Mutex<PathHistory>>,
     frame: String,
-    /// Of the actual path and of the setpoints'.
+    /// Outputs of the actual and the setpoint path.
     outputs: [Output<Path>; 2],
 }
 
-impl Paths {
+impl PathPublisher {
     async fn run(self, period: Duration) {
         let mut timer = tokio::time::interval(period);
         timer.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -197,18 +200,19 @@ impl Paths {
             if !self.outputs.iter().any(Output::has_subscriptions) {
                 continue;
             }
-            let is_due = last.is_none_or(|last| now - last >= REPEAT);
-            let moments = {
-                let mut trace = lock(&self.trace);
-                if trace.newest.is_none() || !(trace.changed || is_due) {
+            let is_due = last.is_none_or(|last| now - last >= REPEAT_PERIOD);
+            let pairs = {
+                let mut history = lock(&self.history);
+                if history.newest.is_none() || !(history.is_changed || is_due) {
                     continue;
                 }
-                trace.read()
+                history.read()
             };
             last = Some(now);
-            let places: [fn(&Moment) -> Place; 2] = [|moment| moment.actual, |moment| moment.setpoint];
-            for (output, place) in self.outputs.iter().zip(places) {
-                let poses = moments.iter().map(|moment| place(moment).message(moment.time, &self.frame));
+            let selectors: [fn(&ToolPosePair) -> OrientedToolPose; 2] =
+                [|poses| poses.actual, |poses| poses.setpoint];
+            for (output, select) in self.outputs.iter().zip(selectors) {
+                let poses = pairs.iter().map(|poses| select(poses).message(poses.time, &self.frame));
                 output.send(messages::path(&self.frame, poses.collect())).await;
             }
         }
@@ -220,45 +224,45 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    fn at(time: Nanoseconds, x: f64) -> Moment {
+    fn at(time: Nanoseconds, x: f64) -> ToolPosePair {
         let pose = ToolPose { tip: Vector3::new(x, 0.0, 0.0), axis: Vector3::z() };
-        let place = Place { pose, orientation: UnitQuaternion::identity() };
-        Moment { time, actual: place, setpoint: place }
+        let pose = OrientedToolPose { pose, orientation: UnitQuaternion::identity() };
+        ToolPosePair { time, actual: pose, setpoint: pose }
     }
 
-    fn times(trace: &mut Trace) -> Vec<Nanoseconds> {
-        trace.read().iter().map(|moment| moment.time).collect()
+    fn times(history: &mut PathHistory) -> Vec<Nanoseconds> {
+        history.read().iter().map(|poses| poses.time).collect()
     }
 
     #[test]
-    fn a_tool_that_stands_adds_nothing_but_where_it_is() {
-        let mut trace = Trace::new(10);
+    fn a_stationary_tool_adds_no_pose_but_its_newest() {
+        let mut history = PathHistory::new(10);
         for time in 0..100 {
-            trace.take(0, at(time, 0.1 * SPACING * (time % 2) as f64));
+            history.add(0, at(time, 0.1 * MIN_SPACING * (time % 2) as f64));
         }
-        assert_eq!(times(&mut trace), [0, 99]);
-        trace.take(0, at(100, 0.0));
-        assert!(!trace.changed, "an unchanged path is not worth publishing");
+        assert_eq!(times(&mut history), [0, 99]);
+        history.add(0, at(100, 0.0));
+        assert!(!history.is_changed, "an unchanged path is not published");
     }
 
     #[test]
-    fn the_oldest_poses_give_way() {
-        let mut trace = Trace::new(4);
+    fn the_oldest_poses_are_dropped() {
+        let mut history = PathHistory::new(4);
         for time in 0..50 {
-            trace.take(0, at(time, time as f64 * 2.0 * SPACING));
-            assert!(trace.read().len() <= 4);
+            history.add(0, at(time, time as f64 * 2.0 * MIN_SPACING));
+            assert!(history.read().len() <= 4);
         }
-        assert_eq!(times(&mut trace), [47, 48, 49]);
+        assert_eq!(times(&mut history), [47, 48, 49]);
     }
 
     #[test]
-    fn a_reset_and_a_clock_that_jumps_back_begin_anew() {
-        let mut trace = Trace::new(10);
-        (0..5).for_each(|time| trace.take(0, at(time, time as f64)));
-        trace.take(1, at(5, 0.0));
-        assert_eq!(times(&mut trace), [5]);
-        trace.take(1, at(6, 1.0));
-        trace.take(1, at(2, 1.0));
-        assert_eq!(times(&mut trace), [2]);
+    fn a_reset_or_a_backward_clock_jump_clears_the_paths() {
+        let mut history = PathHistory::new(10);
+        (0..5).for_each(|time| history.add(0, at(time, time as f64)));
+        history.add(1, at(5, 0.0));
+        assert_eq!(times(&mut history), [5]);
+        history.add(1, at(6, 1.0));
+        history.add(1, at(2, 1.0));
+        assert_eq!(times(&mut history), [2]);
     }
 }

@@ -21,12 +21,28 @@ const CLOCK_QOS: QosConfig = QosConfig { is_reliable: false, is_transient_local:
 
 /// Publishers and subscriptions of the node.
 pub struct Topics {
+    /// Subscriptions.
+    pub subscriptions: TopicSubscriptions,
+    /// Publishers.
+    pub publishers: TopicPublishers,
+    /// Resolved names.
+    pub names: GraphNames,
+}
+
+/// Subscriptions of the node.
+pub struct TopicSubscriptions {
     /// Subscription `psec`.
     pub psec: Subscription<JointTrajectory>,
     /// Subscription `psec_stream`.
     pub psec_stream: Subscription<JointState>,
     /// Subscription `load`.
     pub load: Subscription<JointState>,
+    /// Subscription `/clock` and its resolved name, in `fast` and with `use_sim_time`.
+    pub clock: Option<(Subscription<Clock>, String)>,
+}
+
+/// Publishers of the node.
+pub struct TopicPublishers {
     /// Publisher `joint_states`.
     pub joint_states: Publisher<JointState>,
     /// Publisher `~/motor_currents`.
@@ -41,10 +57,6 @@ pub struct Topics {
     pub diagnostics: Publisher<DiagnosticArray>,
     /// Publisher `/clock`, in `fast` only.
     pub clock: Option<Publisher<Clock>>,
-    /// Subscription `/clock` and its resolved name, in `fast` and with `use_sim_time`.
-    pub clock_input: Option<(Subscription<Clock>, String)>,
-    /// Resolved names.
-    pub names: GraphNames,
 }
 
 /// Resolved names for the summary at start.
@@ -113,10 +125,8 @@ impl Topics {
             services: ["~/reset", "~/stop"].iter().filter_map(|s| args.resolve_service(s).ok()).collect(),
             actions: Vec::new(),
         };
-        Ok(Topics {
-            psec,
-            psec_stream,
-            load,
+        let subscriptions = TopicSubscriptions { psec, psec_stream, load, clock: clock_input };
+        let publishers = TopicPublishers {
             joint_states,
             motor_currents,
             drive_states,
@@ -124,9 +134,8 @@ impl Topics {
             results,
             diagnostics,
             clock: clock.map(|(publisher, _)| publisher),
-            clock_input,
-            names,
-        })
+        };
+        Ok(Topics { subscriptions, publishers, names })
     }
 }
 

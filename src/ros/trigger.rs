@@ -1,4 +1,4 @@
-//! The services `~/stop` and `~/reset`.
+//! Services `~/stop` and `~/reset`.
 
 use futures::StreamExt;
 use futures::future::BoxFuture;
@@ -10,21 +10,21 @@ use super::args::RosArgs;
 use super::response_limiter::ResponseLimiter;
 use super::service::{Service, ServiceError};
 
-/// Takes the axes home.
+/// Label of the service that resets the axes to rest at home.
 pub const RESET: &str = "reset";
-/// Stops the axes within their limits.
+/// Label of the service that stops the axes within their limits.
 pub const STOP: &str = "stop";
-/// Requests that may wait.
+/// Number of requests that may wait.
 const DEPTH: usize = 10;
 
-/// A `std_srvs/Trigger` service.
-pub struct Trigger(Service<TriggerRequest, TriggerResponse>);
+/// Service of type `std_srvs/Trigger`.
+pub struct TriggerService(Service<TriggerRequest, TriggerResponse>);
 
-impl Trigger {
-    /// The service `~/label`.
+impl TriggerService {
+    /// Creates the service `~/label`.
     ///
     /// # Errors
-    /// [`ServiceError`] when the middleware refuses it.
+    /// [`ServiceError`] if the service cannot be created.
     pub fn new(
         node: &mut Node,
         context: &Context,
@@ -32,16 +32,16 @@ impl Trigger {
         label: &'static str,
     ) -> Result<Self, ServiceError> {
         let type_name = ServiceTypeName::new("std_srvs", "Trigger");
-        Service::new(node, context, args, label, &type_name, DEPTH).map(Trigger)
+        Service::new(node, context, args, label, &type_name, DEPTH).map(TriggerService)
     }
 
-    /// Serves until the node shuts down: `act` does what is asked and says what it did.
+    /// Serves until the node shuts down; `act` executes a request and returns the message of its response.
     pub async fn serve<F>(self, act: impl Fn() -> F + Send)
     where
         F: Future<Output = Result<String, String>> + Send,
     {
         let mut requests = self.0.requests();
-        // Responses are sent side by side: a client that is gone holds up no other's stop.
+        // Responses are sent concurrently: a client that has disconnected does not delay the stop of another.
         let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
         let limiter = ResponseLimiter::default();
         loop {

@@ -1,48 +1,49 @@
-//! How goals fare, at a rate of the node's clock.
+//! Feedback of the active goals, at a rate in the time of the node's clock.
 
 use std::sync::Arc;
 
 use tokio::sync::watch;
 
 use super::{GoalId, uuid};
+use crate::ros::axes_interface::SampleFrame;
 use crate::ros::outputs::Output;
-use crate::ros::pace::Frame;
-use crate::ros::setpoints::Comparison;
+use crate::ros::setpoints::JointComparison;
 use virtual_axes_core::trajectory::MotionId;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::messages::{FeedbackMessage, FollowJointTrajectoryFeedback, duration, header};
 
-/// A goal that the axes follow or will follow.
+/// Goal whose motion is active or waiting.
 #[derive(Debug, Clone)]
-pub struct Running {
-    /// Which one.
+pub struct RunningGoal {
+    /// Identifier of the goal.
     pub id: GoalId,
-    /// Its motion.
+    /// Identifier of its motion.
     pub motion: MotionId,
-    /// Its joints, in its order, as places in the machine.
-    pub places: Vec<usize>,
+    /// Indices of its joints in the machine, in the order of the goal.
+    pub indices: Vec<usize>,
 }
 
-/// Position instants from one feedback to the next at `rate` Hz; `period` is Tsp, ns.
+/// Returns the number of position cycles between feedback messages at `rate`, Hz, at least 1; `period` is Tsp, ns.
 pub fn feedback_period(rate: f64, period: Nanoseconds) -> i64 {
     ((1.0 / (rate * seconds(period))).round() as i64).max(1)
 }
 
-/// Publishes the feedback of the goals that run.
-pub struct Feedback {
-    /// Those goals, and some that are over.
-    pub goals: watch::Receiver<Arc<[Running]>>,
-    /// `_action/feedback`.
+/// Output of the feedback of the active goals.
+pub struct FeedbackOutput {
+    /// Active goals, and some that have ended.
+    pub goals: watch::Receiver<Arc<[RunningGoal]>>,
+    /// Output `_action/feedback`.
     pub output: Output<FeedbackMessage>,
-    /// Joints of the machine, with prefix.
+    /// Names of the joints of the machine, with prefix.
     pub joints: Vec<String>,
-    /// Position instants from one message of a goal to the next.
+    /// Number of position cycles between messages.
     pub every: i64,
 }
 
-impl Feedback {
-    /// Publishes what is due at a frame; `velocities` are those of the setpoints, one per axis.
-    pub async fn frame(&self, frame: &Frame, velocities: &[f64]) {
+impl FeedbackOutput {
+    /// Publishes the feedback that is due at a frame; `velocities` are the setpoint velocities of all axes, m/s or
+    /// rad/s.
+    pub async fn publish(&self, frame: &SampleFrame, velocities: &[f64]) {
         if frame.instant % self.every != 0 {
             return;
         }
@@ -56,13 +57,13 @@ impl Feedback {
 }
 
 fn message(
-    goal: &Running,
+    goal: &RunningGoal,
     start: Nanoseconds,
-    frame: &Frame,
+    frame: &SampleFrame,
     velocities: &[f64],
     joints: &[String],
 ) -> FeedbackMessage {
-    let mut compared = Comparison::of(frame, velocities, goal.places.iter().copied());
+    let mut compared = JointComparison::new(frame, velocities, goal.indices.iter().copied());
     let elapsed = duration(frame.time - start);
     for point in [&mut compared.desired, &mut compared.actual, &mut compared.error] {
         point.time_from_start = elapsed.clone();
@@ -71,7 +72,7 @@ fn message(
         goal_id: uuid(goal.id),
         feedback: FollowJointTrajectoryFeedback {
             header: header(frame.time),
-            joint_names: goal.places.iter().filter_map(|&place| joints.get(place).cloned()).collect(),
+            joint_names: goal.indices.iter().filter_map(|&index| joints.get(index).cloned()).collect(),
             desired: compared.desired,
             actual: compared.actual,
             error: compared.error,
@@ -86,7 +87,7 @@ mod tests {
     use virtual_axes_core::units::MILLISECOND_NS;
 
     #[test]
-    fn feedback_comes_at_the_nearest_whole_number_of_periods_and_at_most_once_in_one() {
+    fn feedback_period_is_rounded_and_at_least_one_cycle() {
         let tsp = 6 * MILLISECOND_NS;
         assert_eq!(feedback_period(20.0, tsp), 8);
         assert_eq!(feedback_period(1e6, tsp), 1);

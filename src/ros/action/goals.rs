@@ -1,4 +1,4 @@
-//! The goals that are known: under way, or ended a while ago.
+//! Table of the goals: active ones, and ended ones whose results are kept.
 
 use std::time::{Duration, Instant};
 
@@ -12,30 +12,30 @@ use virtual_axes_io::messages::action_msgs::msg::{GoalInfo, GoalStatus, GoalStat
 use virtual_axes_io::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
 use virtual_axes_io::messages::{FollowJointTrajectoryResult, GetResultResponse, stamp};
 
-/// Most goals under way at once; each holds its trajectory.
-pub(super) const MOST_LIVE: usize = 1024;
-/// Most results that are kept; each status message names all of them.
-const MOST_ENDED: usize = 256;
-/// How long a result is kept.
-const RESULTS_KEPT: Duration = Duration::from_secs(15 * 60);
-/// Most requests that wait for the results of all goals: each gets its response when the goals end, maybe at once.
-const MOST_WAITING: usize = 4096;
+/// Largest number of active goals; each owns its trajectory.
+pub(super) const MAX_ACTIVE_GOALS: usize = 1024;
+/// Largest number of kept results; each status message contains all of them.
+const MAX_KEPT_RESULTS: usize = 256;
+/// Time for which a result is kept (`result_timeout` of rcl_action).
+const RESULT_TIMEOUT: Duration = Duration::from_secs(15 * 60);
+/// Largest number of waiting result requests of all goals. All may be answered at once, when the goals end together.
+const MAX_RESULT_REQUESTS: usize = 4096;
 
-/// Where a goal stands, as action_msgs/GoalStatus numbers it.
+/// State of a goal, with the numbers of action_msgs/GoalStatus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i8)]
-pub(super) enum State {
-    /// Nobody has decided yet.
+pub(super) enum GoalState {
+    /// Accepted by the server; the simulation has not decided yet.
     Accepted = GoalStatus::STATUS_ACCEPTED,
-    /// The axes have it.
+    /// Accepted by the simulation.
     Executing = GoalStatus::STATUS_EXECUTING,
-    /// It is being stopped because its client asked for it.
+    /// Stopping at the request of a client.
     Canceling = GoalStatus::STATUS_CANCELING,
-    /// Followed to its end.
+    /// Completed within its tolerances.
     Succeeded = GoalStatus::STATUS_SUCCEEDED,
-    /// Stopped because its client asked for it.
+    /// Stopped at the request of a client.
     Canceled = GoalStatus::STATUS_CANCELED,
-    /// Ended otherwise.
+    /// Ended for another reason.
     Aborted = GoalStatus::STATUS_ABORTED,
 }
 
@@ -43,10 +43,10 @@ pub(super) enum State {
 struct Goal {
     id: GoalId,
     stamp: Nanoseconds,
-    state: State,
+    state: GoalState,
     motion: Option<MotionId>,
     waiting: Vec<RmwRequestId>,
-    /// The result, and when it came.
+    /// Result and its time.
     ended: Option<(FollowJointTrajectoryResult, Instant)>,
 }
 
@@ -56,34 +56,34 @@ impl Goal {
     }
 }
 
-/// What a request for a result gets.
+/// Reply to a result request.
 #[derive(Debug, PartialEq)]
-pub(super) enum Answer {
-    /// This, at once.
-    Now(GetResultResponse),
-    /// The result, when there is one.
-    Later,
+pub(super) enum ResultReply {
+    /// Response to be sent at once.
+    Ready(GetResultResponse),
+    /// Deferred until the goal ends.
+    Pending,
 }
 
-/// Goals in the order in which they were accepted.
+/// Table of goals in the order of acceptance.
 #[derive(Debug, Default)]
-pub(super) struct Goals {
+pub(super) struct GoalTable {
     list: Vec<Goal>,
 }
 
-impl Goals {
-    /// Whether the id is in use.
-    pub fn knows(&self, id: &GoalId) -> bool {
+impl GoalTable {
+    /// Returns true if the id is in use.
+    pub fn contains(&self, id: &GoalId) -> bool {
         self.list.iter().any(|goal| goal.id == *id)
     }
 
-    /// Goals that have not ended.
-    pub fn live(&self) -> usize {
+    /// Returns the number of active goals.
+    pub fn active_count(&self) -> usize {
         self.list.iter().filter(|goal| goal.ended.is_none()).count()
     }
 
-    /// Ids of the goals that have not ended.
-    pub fn live_ids(&self) -> Vec<GoalId> {
+    /// Returns the ids of the active goals.
+    pub fn active_ids(&self) -> Vec<GoalId> {
         self.list.iter().filter(|goal| goal.ended.is_none()).map(|goal| goal.id).collect()
     }
 
@@ -91,33 +91,34 @@ impl Goals {
         self.list.iter_mut().find(|goal| goal.id == *id)
     }
 
-    /// Takes a goal in at `stamp` (ns of the node's clock).
+    /// Adds a goal accepted at `stamp`, ns of the node's clock.
     pub fn accept(&mut self, id: GoalId, stamp: Nanoseconds) {
-        let goal = Goal { id, stamp, state: State::Accepted, motion: None, waiting: Vec::new(), ended: None };
+        let goal =
+            Goal { id, stamp, state: GoalState::Accepted, motion: None, waiting: Vec::new(), ended: None };
         self.list.push(goal);
     }
 
-    /// Notes by what name the simulation knows a goal.
-    pub fn offered(&mut self, id: &GoalId, motion: MotionId) {
+    /// Sets the motion of a goal.
+    pub fn set_motion(&mut self, id: &GoalId, motion: MotionId) {
         if let Some(goal) = self.find(id) {
             goal.motion = Some(motion);
         }
     }
 
-    /// The axes have it.
-    pub fn started(&mut self, id: &GoalId) {
+    /// Changes an accepted goal to executing.
+    pub fn start(&mut self, id: &GoalId) {
         if let Some(goal) = self.find(id)
-            && goal.state == State::Accepted
+            && goal.state == GoalState::Accepted
         {
-            goal.state = State::Executing;
+            goal.state = GoalState::Executing;
         }
     }
 
-    /// A goal has ended: who waits for its result, and the response. The first end counts.
+    /// Ends a goal. Returns the waiting result requests and their response. Further ends of the goal have no effect.
     pub fn end(
         &mut self,
         id: &GoalId,
-        state: State,
+        state: GoalState,
         result: FollowJointTrajectoryResult,
         now: Instant,
     ) -> (Vec<RmwRequestId>, GetResultResponse) {
@@ -130,41 +131,41 @@ impl Goals {
             }
             _ => Vec::new(),
         };
-        self.forget(now);
+        self.remove_old_results(now);
         (waiting, response)
     }
 
-    /// Somebody asks for a result.
-    pub fn result(&mut self, id: &GoalId, request: RmwRequestId) -> Answer {
+    /// Returns the reply to a result request; a deferred request is added to the goal.
+    pub fn request_result(&mut self, id: &GoalId, request: RmwRequestId) -> ResultReply {
         let waiting = self.list.iter().map(|goal| goal.waiting.len()).sum::<usize>();
         match self.find(id) {
             Some(Goal { state, ended: Some((result, _)), .. }) => {
-                Answer::Now(GetResultResponse { status: *state as i8, result: result.clone() })
+                ResultReply::Ready(GetResultResponse { status: *state as i8, result: result.clone() })
             }
-            Some(goal) if waiting < MOST_WAITING => {
+            Some(goal) if waiting < MAX_RESULT_REQUESTS => {
                 goal.waiting.push(request);
-                Answer::Later
+                ResultReply::Pending
             }
-            // Status unknown.
-            _ => Answer::Now(GetResultResponse::default()),
+            // The default status is UNKNOWN.
+            _ => ResultReply::Ready(GetResultResponse::default()),
         }
     }
 
-    /// Somebody wants goals canceled: the response, and the motions to call off.
+    /// Changes the selected goals to canceling. Returns the response and the motions to be canceled.
     pub fn cancel(&mut self, request: &CancelGoalRequest) -> (CancelGoalResponse, Vec<MotionId>) {
-        let asked = &request.goal_info;
-        let time = i64::from(asked.stamp.sec) * SECOND_NS + i64::from(asked.stamp.nanosec);
+        let selected = &request.goal_info;
+        let time = i64::from(selected.stamp.sec) * SECOND_NS + i64::from(selected.stamp.nanosec);
         let candidates = self.list.iter().map(|goal| CancelCandidate {
             id: goal.id,
             stamp: goal.stamp,
-            is_cancelable: matches!(goal.state, State::Accepted | State::Executing),
+            is_cancelable: matches!(goal.state, GoalState::Accepted | GoalState::Executing),
         });
         let mut response = CancelGoalResponse::default();
         let mut motions = Vec::new();
-        match select_goals_to_cancel(&asked.goal_id.uuid, time, candidates) {
+        match select_goals_to_cancel(&selected.goal_id.uuid, time, candidates) {
             Ok(ids) => {
                 for goal in self.list.iter_mut().filter(|goal| ids.contains(&goal.id)) {
-                    goal.state = State::Canceling;
+                    goal.state = GoalState::Canceling;
                     response.goals_canceling.push(goal.info());
                     motions.extend(goal.motion);
                 }
@@ -174,19 +175,19 @@ impl Goals {
         (response, motions)
     }
 
-    /// What the status topic says.
-    pub fn statuses(&self) -> GoalStatusArray {
+    /// Returns the message of the status topic.
+    pub fn status_message(&self) -> GoalStatusArray {
         let status = |goal: &Goal| GoalStatus { goal_info: goal.info(), status: goal.state as i8 };
         GoalStatusArray { status_list: self.list.iter().map(status).collect() }
     }
 
-    /// Forgets results that are old or too many, the oldest first.
-    fn forget(&mut self, now: Instant) {
+    /// Removes expired results, and the oldest ones if there are too many.
+    fn remove_old_results(&mut self, now: Instant) {
         let ended = self.list.iter().filter(|goal| goal.ended.is_some()).count();
-        let mut too_many = ended.saturating_sub(MOST_ENDED);
+        let mut surplus = ended.saturating_sub(MAX_KEPT_RESULTS);
         self.list.retain(|goal| match &goal.ended {
-            Some((_, since)) if too_many > 0 || now.duration_since(*since) > RESULTS_KEPT => {
-                too_many = too_many.saturating_sub(1);
+            Some((_, since)) if surplus > 0 || now.duration_since(*since) > RESULT_TIMEOUT => {
+                surplus = surplus.saturating_sub(1);
                 false
             }
             _ => true,
@@ -204,77 +205,77 @@ mod tests {
         id
     }
 
-    fn response(goals: &mut Goals, number: u16) -> Answer {
-        goals.result(&id(number), RmwRequestId::default())
+    fn response(goals: &mut GoalTable, number: u16) -> ResultReply {
+        goals.request_result(&id(number), RmwRequestId::default())
     }
 
     #[test]
-    fn a_result_is_there_for_those_who_ask_before_and_after_the_end() {
-        let mut goals = Goals::default();
+    fn result_requests_before_and_after_the_end_are_answered() {
+        let mut goals = GoalTable::default();
         goals.accept(id(1), 5);
-        assert_eq!(response(&mut goals, 1), Answer::Later);
-        assert_eq!(response(&mut goals, 1), Answer::Later);
+        assert_eq!(response(&mut goals, 1), ResultReply::Pending);
+        assert_eq!(response(&mut goals, 1), ResultReply::Pending);
         let result = FollowJointTrajectoryResult { error_code: -5, error_string: "far".into() };
-        let (waiting, answer) = goals.end(&id(1), State::Aborted, result, Instant::now());
+        let (waiting, answer) = goals.end(&id(1), GoalState::Aborted, result, Instant::now());
         assert_eq!((waiting.len(), answer.status, answer.result.error_code), (2, 6, -5));
-        assert_eq!(response(&mut goals, 1), Answer::Now(answer));
-        assert_eq!(response(&mut goals, 2), Answer::Now(GetResultResponse::default()));
+        assert_eq!(response(&mut goals, 1), ResultReply::Ready(answer));
+        assert_eq!(response(&mut goals, 2), ResultReply::Ready(GetResultResponse::default()));
     }
 
-    /// A thousand goals had room for 256 requests each, which are all answered when a reset ends them.
+    /// A reset ends all goals, and all their result requests are answered at once.
     #[test]
-    fn requests_for_results_are_bounded_over_all_goals() {
-        let mut goals = Goals::default();
+    fn result_requests_are_bounded_over_all_goals() {
+        let mut goals = GoalTable::default();
         for number in 1..=2 {
             goals.accept(id(number), 5);
         }
-        for _ in 0..MOST_WAITING / 2 {
-            assert_eq!(response(&mut goals, 1), Answer::Later);
-            assert_eq!(response(&mut goals, 2), Answer::Later);
+        for _ in 0..MAX_RESULT_REQUESTS / 2 {
+            assert_eq!(response(&mut goals, 1), ResultReply::Pending);
+            assert_eq!(response(&mut goals, 2), ResultReply::Pending);
         }
         for number in 1..=2 {
-            assert_eq!(response(&mut goals, number), Answer::Now(GetResultResponse::default()));
+            assert_eq!(response(&mut goals, number), ResultReply::Ready(GetResultResponse::default()));
         }
-        goals.end(&id(1), State::Succeeded, FollowJointTrajectoryResult::default(), Instant::now());
-        assert_eq!(response(&mut goals, 2), Answer::Later);
+        goals.end(&id(1), GoalState::Succeeded, FollowJointTrajectoryResult::default(), Instant::now());
+        assert_eq!(response(&mut goals, 2), ResultReply::Pending);
     }
 
     #[test]
     fn the_first_end_of_a_goal_counts() {
-        let mut goals = Goals::default();
+        let mut goals = GoalTable::default();
         goals.accept(id(1), 5);
         let now = Instant::now();
-        goals.end(&id(1), State::Succeeded, FollowJointTrajectoryResult::default(), now);
-        goals.end(&id(1), State::Aborted, FollowJointTrajectoryResult::default(), now);
-        assert_eq!(goals.statuses().status_list[0].status, State::Succeeded as i8);
+        goals.end(&id(1), GoalState::Succeeded, FollowJointTrajectoryResult::default(), now);
+        goals.end(&id(1), GoalState::Aborted, FollowJointTrajectoryResult::default(), now);
+        assert_eq!(goals.status_message().status_list[0].status, GoalState::Succeeded as i8);
     }
 
     #[test]
-    fn old_results_and_those_beyond_the_most_are_forgotten_but_no_goal_under_way() {
-        let mut goals = Goals::default();
+    fn old_and_surplus_results_are_dropped_but_no_active_goal() {
+        let mut goals = GoalTable::default();
         goals.accept(id(0), 0);
         let begin = Instant::now();
-        let most = MOST_ENDED as u16;
+        let most = MAX_KEPT_RESULTS as u16;
         for number in 1..=most + 2 {
             goals.accept(id(number), 0);
-            goals.end(&id(number), State::Succeeded, FollowJointTrajectoryResult::default(), begin);
+            goals.end(&id(number), GoalState::Succeeded, FollowJointTrajectoryResult::default(), begin);
         }
-        assert_eq!(goals.list.len(), MOST_ENDED + 1);
-        assert!(goals.knows(&id(0)) && !goals.knows(&id(2)) && goals.knows(&id(3)));
-        let later = begin + RESULTS_KEPT + Duration::from_secs(1);
+        assert_eq!(goals.list.len(), MAX_KEPT_RESULTS + 1);
+        assert!(goals.contains(&id(0)) && !goals.contains(&id(2)) && goals.contains(&id(3)));
+        let later = begin + RESULT_TIMEOUT + Duration::from_secs(1);
         goals.accept(id(9999), 0);
-        goals.end(&id(9999), State::Succeeded, FollowJointTrajectoryResult::default(), later);
-        assert_eq!(goals.live_ids(), [id(0)]);
+        goals.end(&id(9999), GoalState::Succeeded, FollowJointTrajectoryResult::default(), later);
+        assert_eq!(goals.active_ids(), [id(0)]);
         assert_eq!(goals.list.len(), 2);
     }
 
     #[test]
-    fn canceling_tells_the_motions_once() {
-        let mut goals = Goals::default();
+    fn motions_are_canceled_only_once() {
+        let mut goals = GoalTable::default();
         for number in [1, 2] {
             goals.accept(id(number), SECOND_NS);
-            goals.offered(&id(number), MotionId(number.into()));
-            goals.started(&id(number));
+            goals.set_motion(&id(number), MotionId(number.into()));
+            goals.start(&id(number));
         }
         let (response, motions) = goals.cancel(&CancelGoalRequest::default());
         assert_eq!((response.return_code, motions), (0, vec![MotionId(1), MotionId(2)]));

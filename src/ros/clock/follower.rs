@@ -1,77 +1,77 @@
-//! A clock that is followed: which position instants it makes due, and when it has jumped.
+//! Follower of `/clock`: the newest time, the position instants that are due, and clock jumps.
 
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
-/// A clock that goes further than this from one message to the next has jumped; less is a stretch of
-/// time to be simulated. The coarsest clocks in use tick once a second, and a recording played a
-/// hundred times faster with 40 messages a second goes 2.5 s at a time; a machine computes this much
-/// in about a second.
-pub const LONGEST_STRETCH: Nanoseconds = 10 * SECOND_NS;
+/// Largest forward step of the clock that is simulated; a larger one is a jump, ns.
+///
+/// The coarsest clocks in use tick once per second. A bag played at 100 times its rate with 40 messages per second
+/// steps by 2.5 s. A machine simulates 10 s in about one second.
+pub const MAX_CLOCK_STEP: Nanoseconds = 10 * SECOND_NS;
 
-/// Where the clock last began anew.
+/// Jump of the clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Jump {
-    /// How often it has, its first message included.
+pub struct ClockJump {
+    /// Number of jumps so far, including the first message.
     pub count: u64,
-    /// What it was before, ns; none the first time.
+    /// Time before the jump, ns; `None` for the first message.
     pub from: Option<Nanoseconds>,
-    /// What it was then, ns.
+    /// Time after the jump, ns.
     pub to: Nanoseconds,
 }
 
-/// The clock as its messages tell it.
+/// Time of a followed clock.
 #[derive(Debug)]
-pub struct Follower {
+pub struct ClockFollower {
     period: Nanoseconds,
     newest: Option<Nanoseconds>,
-    jump: Jump,
+    jump: ClockJump,
 }
 
-impl Follower {
-    /// One that has no time yet, for position instants `period` ns apart.
+impl ClockFollower {
+    /// Creates a follower without a time; `period` is Tsp, ns.
     pub fn new(period: Nanoseconds) -> Self {
-        Follower { period, newest: None, jump: Jump::default() }
+        ClockFollower { period, newest: None, jump: ClockJump::default() }
     }
 
-    /// The newest time, ns; none before the first message.
+    /// Returns the newest time, ns; `None` before the first message.
     pub fn newest(&self) -> Option<Nanoseconds> {
         self.newest
     }
 
-    /// Where it last began anew.
-    pub fn jump(&self) -> Jump {
+    /// Returns the last jump.
+    pub fn jump(&self) -> ClockJump {
         self.jump
     }
 
-    /// Follows on from a clock of the node's own that stands at `time` ns.
-    pub fn follow_on_from(&mut self, time: Nanoseconds) {
+    /// Continues from the node's own clock at `time`, ns.
+    pub fn continue_from(&mut self, time: Nanoseconds) {
         self.newest = Some(self.newest.map_or(time, |newest| newest.max(time)));
     }
 
-    /// Takes a message. `stretches` says that its sender never jumps ahead, however far it goes.
+    /// Processes a message. With `never_jumps_ahead` a forward step of any size is simulated.
     ///
-    /// A clock set back by less than a position period is waited for: nothing that has been released
-    /// needs to be taken back.
-    pub fn take(&mut self, time: Nanoseconds, stretches: bool) {
+    /// The follower waits for a clock that is set back by less than a position period, because no released instant
+    /// has to be repeated.
+    pub fn receive(&mut self, time: Nanoseconds, never_jumps_ahead: bool) {
         let Some(newest) = self.newest else {
-            self.begin_anew(time);
+            self.restart(time);
             return;
         };
         let ahead = time.saturating_sub(newest);
-        if ahead <= -self.period || (ahead > LONGEST_STRETCH && !stretches) {
-            self.begin_anew(time);
+        if ahead <= -self.period || (ahead > MAX_CLOCK_STEP && !never_jumps_ahead) {
+            self.restart(time);
         } else {
             self.newest = Some(newest.max(time));
         }
     }
 
-    fn begin_anew(&mut self, time: Nanoseconds) {
-        self.jump = Jump { count: self.jump.count + 1, from: self.newest, to: time };
+    fn restart(&mut self, time: Nanoseconds) {
+        self.jump = ClockJump { count: self.jump.count + 1, from: self.newest, to: time };
         self.newest = Some(time);
     }
 }
 
-/// The first position instant of a grid of `period` ns through 0 that is not before `time`, ns.
+/// Returns the first position instant that is not before `time`, ns: a multiple of `period`, ns.
 pub fn first_instant(time: Nanoseconds, period: Nanoseconds) -> Nanoseconds {
     -(-time).div_euclid(period) * period
 }
@@ -84,21 +84,20 @@ mod tests {
 
     const PERIOD: Nanoseconds = 6_000_000;
 
-    /// Takes the messages, and collects the instants that are released after each; a jump begins a
-    /// list of its own.
+    /// Returns the instants released by the messages, with a new list after each jump.
     fn releases(messages: &[Nanoseconds]) -> Vec<Vec<Nanoseconds>> {
-        let mut follower = Follower::new(PERIOD);
+        let mut follower = ClockFollower::new(PERIOD);
         let mut released: Vec<Vec<Nanoseconds>> = Vec::new();
         let mut next = 0;
         for &message in messages {
             let before = follower.jump().count;
-            follower.take(message, false);
+            follower.receive(message, false);
             if follower.jump().count != before {
                 next = first_instant(follower.jump().to, PERIOD);
                 released.push(Vec::new());
             }
-            while next <= follower.newest().expect("a message has come") {
-                released.last_mut().expect("the first message begins a list").push(next);
+            while next <= follower.newest().expect("at least one message") {
+                released.last_mut().expect("list of the first message").push(next);
                 next += PERIOD;
             }
         }
@@ -106,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_coarse_clock_releases_many_instants_at_once_a_fine_one_now_and_then() {
+    fn a_coarse_clock_releases_several_instants_per_message() {
         let coarse = releases(&[0, 100_000_000, 200_000_000]);
         assert_eq!(coarse, [(0..=33).map(|k| k * PERIOD).collect::<Vec<_>>()]);
         let fine: Vec<_> = (0..=18).map(|n| n * 1_000_000).collect();
@@ -121,34 +120,34 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_goes_back_or_far_ahead_begins_anew() {
+    fn a_clock_that_is_set_back_or_far_ahead_has_jumped() {
         let jump = |from, to| {
-            let mut follower = Follower::new(PERIOD);
-            follower.take(from, false);
-            follower.take(to, false);
+            let mut follower = ClockFollower::new(PERIOD);
+            follower.receive(from, false);
+            follower.receive(to, false);
             (follower.jump().count == 2).then(|| follower.jump())
         };
         let at = 100 * SECOND_NS;
-        let begun = |to| Some(Jump { count: 2, from: Some(at), to });
-        assert_eq!(jump(at, 0), begun(0));
-        assert_eq!(jump(at, at - PERIOD), begun(at - PERIOD));
+        let jumped = |to| Some(ClockJump { count: 2, from: Some(at), to });
+        assert_eq!(jump(at, 0), jumped(0));
+        assert_eq!(jump(at, at - PERIOD), jumped(at - PERIOD));
         assert_eq!(jump(at, at - PERIOD + 1), None);
         assert_eq!(jump(at, at), None);
-        assert_eq!(jump(at, at + LONGEST_STRETCH), None);
-        assert_eq!(jump(at, at + LONGEST_STRETCH + 1), begun(at + LONGEST_STRETCH + 1));
+        assert_eq!(jump(at, at + MAX_CLOCK_STEP), None);
+        assert_eq!(jump(at, at + MAX_CLOCK_STEP + 1), jumped(at + MAX_CLOCK_STEP + 1));
     }
 
     #[test]
-    fn a_machine_never_jumps_ahead() {
-        let mut follower = Follower::new(PERIOD);
-        follower.take(0, true);
-        follower.take(1000 * SECOND_NS, true);
+    fn the_clock_of_a_machine_never_jumps_ahead() {
+        let mut follower = ClockFollower::new(PERIOD);
+        follower.receive(0, true);
+        follower.receive(1000 * SECOND_NS, true);
         assert_eq!((follower.jump().count, follower.newest()), (1, Some(1000 * SECOND_NS)));
     }
 
     proptest! {
         #[test]
-        fn between_jumps_the_grid_is_unbroken_and_never_ahead_of_the_clock(
+        fn between_jumps_the_time_grid_has_no_gap_and_is_not_ahead_of_the_clock(
             messages in prop::collection::vec(
                 prop_oneof![
                     4 => 0..200_000_000_i64,
@@ -175,8 +174,8 @@ mod tests {
             let lists = releases(&clock);
             let last = lists.last().and_then(|list| list.last());
             let newest = {
-                let mut follower = Follower::new(PERIOD);
-                clock.iter().for_each(|&time| follower.take(time, false));
+                let mut follower = ClockFollower::new(PERIOD);
+                clock.iter().for_each(|&time| follower.receive(time, false));
                 follower.newest().expect("at least one")
             };
             prop_assert!(last.is_none_or(|last| last + PERIOD > newest));

@@ -1,13 +1,13 @@
-//! `/clock`: followed where somebody else gives it, given in `fast` where nobody else does.
+//! `/clock`: subscribed with `use_sim_time`, published or subscribed in `fast`.
 //!
-//! In `use_sim_time` whoever publishes it is followed. In `fast` the machines of a domain agree on
-//! one that gives it ([`election`]); the others follow, and are silent.
+//! With `use_sim_time` the node follows any publisher. In `fast` the nodes of a domain elect one that publishes
+//! ([`election`]); the others follow it and do not publish.
 
 mod election;
 mod follower;
 
 pub use election::Role;
-pub use follower::{Jump, first_instant};
+pub use follower::{ClockJump, first_instant};
 
 use std::collections::HashSet;
 use std::time::Duration;
@@ -20,96 +20,97 @@ use rustdds::{DomainParticipant, RTPSEntity};
 use tokio::sync::watch;
 use tracing::{info, warn};
 
+use super::convert::stamp;
 use super::endpoints::Subscription;
+use super::health::Health;
 use super::outputs::Output;
-use super::pace::Health;
-use election::{Election, Prefix, Rival};
-use follower::Follower;
+use election::{Election, GuidPrefix, RemoteClock};
+use follower::ClockFollower;
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
-/// How often it is looked who publishes the clock.
-const LOOK_PERIOD: Duration = Duration::from_millis(50);
-/// Looks before a machine takes it that nobody else does: others are known 10 to 160 ms after the
-/// start, and give a clock every position period.
-const LOOKS: u32 = 6;
-/// Once it has listened, it looks only every so many times: a graph can be large.
-const LOOK_EVERY: u32 = 4;
-/// A topic that every machine of this package publishes, and nobody else.
+/// Polling period of the publishers of the clock.
+const POLL_PERIOD: Duration = Duration::from_millis(50);
+/// Number of polls before a node may publish the clock. Other nodes are discovered 10 to 160 ms after the start and
+/// publish every position cycle.
+const LISTENING_POLLS: u32 = 6;
+/// Number of timer ticks per poll after the listening phase; in a large graph a poll takes long.
+const POLL_EVERY: u32 = 4;
+/// Type of a topic that every node of this package publishes, and no other node.
 const MACHINE_TYPE: &str = "virtual_axes::msg::dds_::DriveStates_";
 
-/// What is known about the clock.
+/// State of the clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClockState {
-    /// What this node does about it.
+    /// Role of this node.
     pub role: Role,
-    /// The newest time that was heard, ns.
+    /// Newest received time, ns.
     pub newest: Option<Nanoseconds>,
-    /// Where it last began anew.
-    pub jump: Jump,
+    /// Last jump.
+    pub jump: ClockJump,
 }
 
 impl ClockState {
-    /// Nothing yet; `fast` listens first.
-    pub fn new(fast: bool) -> Self {
-        let role = if fast { Role::Listening } else { Role::Following(None) };
-        ClockState { role, newest: None, jump: Jump::default() }
+    /// Creates the state without a time. The role is listening in `fast`, else following.
+    pub fn new(is_fast: bool) -> Self {
+        let role = if is_fast { Role::Listening } else { Role::Following(None) };
+        ClockState { role, newest: None, jump: ClockJump::default() }
     }
 
-    /// Whether there is a time.
+    /// Returns true if the time is known.
     pub fn is_known(&self) -> bool {
         self.role == Role::Leading || self.newest.is_some()
     }
 
-    /// Whether this node tells the others that it is `time` (ns): they have not heard so before.
-    fn is_told(&self, time: Nanoseconds) -> bool {
+    /// Returns true if this node publishes `time`, ns: it leads, and the time has not been published before.
+    fn publishes(&self, time: Nanoseconds) -> bool {
         self.role == Role::Leading && self.newest.is_none_or(|newest| time > newest)
     }
 }
 
-/// `/clock` of this node's own, in `fast`.
+/// Output `/clock` of this node, in `fast`.
 pub struct ClockOutput {
-    /// Where it goes.
+    /// Output of the topic.
     pub output: Output<Clock>,
-    /// Whether it goes there.
+    /// State of the clock.
     pub state: watch::Receiver<ClockState>,
 }
 
 impl ClockOutput {
-    /// Publishes `time` (ns), unless somebody else gives the clock.
+    /// Publishes `time`, ns, unless another node publishes the clock.
     pub async fn send(&self, time: Nanoseconds) {
-        let is_told = self.state.borrow().is_told(time);
-        if is_told {
-            self.output.send(Clock { clock: super::convert::stamp(time) }).await;
+        let is_published = self.state.borrow().publishes(time);
+        if is_published {
+            self.output.send(Clock { clock: stamp(time) }).await;
         }
     }
 }
 
-/// Listens to the clock and to who publishes it.
+/// Input of the clock: subscription and discovery of its publishers.
 pub struct ClockInput {
-    /// `/clock`.
+    /// Subscription `/clock`.
     pub subscription: Subscription<Clock>,
-    /// Its resolved name.
+    /// Resolved name of the topic.
     pub name: String,
-    /// What knows who publishes it.
+    /// Participant, which discovers the publishers.
     pub participant: DomainParticipant,
-    /// Tsp, ns.
+    /// Position period Tsp, ns.
     pub period: Nanoseconds,
-    /// What the node's own clock shows.
+    /// State of the axes' thread, with the time of the last position instant.
     pub health: watch::Receiver<Health>,
-    /// Who wants to know.
+    /// Sender of the state of the clock.
     pub state: watch::Sender<ClockState>,
 }
 
 impl ClockInput {
-    /// Listens until the node shuts down; in `fast` it takes part in the election.
-    pub async fn run(self, fast: bool) {
+    /// Follows the clock until the node shuts down; takes part in the election if `is_fast`.
+    pub async fn run(self, is_fast: bool) {
         let own = prefix_of(&self.participant.guid().to_bytes());
-        let election = fast.then(|| Election::new(own));
-        let follower = Follower::new(self.period);
+        let election = is_fast.then(|| Election::new(own));
+        let follower = ClockFollower::new(self.period);
         let ClockInput { subscription, name, participant, health, state, .. } = self;
-        let graph = Graph { participant, topic: format!("rt{name}"), own };
+        let graph = ClockGraph { participant, topic: format!("rt{name}"), own };
         let machines = HashSet::new();
-        let mut watcher = Watcher {
+        let mut watcher = ClockWatcher {
             name,
             own,
             election,
@@ -118,46 +119,46 @@ impl ClockInput {
             health,
             state,
             graph,
-            is_fresh: false,
-            told_invalid: false,
+            has_polled_for_message: false,
+            has_warned: false,
         };
-        let mut looks = 0_u32;
-        let mut timer = tokio::time::interval(LOOK_PERIOD);
+        let mut ticks = 0_u32;
+        let mut timer = tokio::time::interval(POLL_PERIOD);
         let mut messages = std::pin::pin!(subscription.async_stream());
         loop {
             tokio::select! {
                 _ = timer.tick() => {
-                    looks = looks.saturating_add(1);
-                    let listened = looks > LOOKS;
-                    if !listened || looks.is_multiple_of(LOOK_EVERY) {
-                        watcher.is_fresh = false;
-                        watcher.look(listened);
+                    ticks = ticks.saturating_add(1);
+                    let has_listened = ticks > LISTENING_POLLS;
+                    if !has_listened || ticks.is_multiple_of(POLL_EVERY) {
+                        watcher.has_polled_for_message = false;
+                        watcher.poll(has_listened);
                     }
                 }
                 Some(received) = messages.next() => match received {
-                    Ok((message, info)) => watcher.take(&message.clock, &info),
-                    Err(error) => warn!("a message on {} could not be read: {error:?}", watcher.name),
+                    Ok((message, info)) => watcher.receive(&message.clock, &info),
+                    Err(error) => warn!("{}: invalid message: {error:?}", watcher.name),
                 },
             }
         }
     }
 }
 
-fn prefix_of(guid: &[u8; 16]) -> Prefix {
+fn prefix_of(guid: &[u8; 16]) -> GuidPrefix {
     std::array::from_fn(|i| guid[i])
 }
 
-/// Who publishes what.
-struct Graph {
+/// Discovered publishers of the clock.
+struct ClockGraph {
     participant: DomainParticipant,
     topic: String,
-    own: Prefix,
+    own: GuidPrefix,
 }
 
-impl Graph {
-    /// Others who publish the clock.
-    fn rivals(&self) -> Vec<Rival> {
-        let writers: Vec<(String, String, Prefix)> = self
+impl ClockGraph {
+    /// Returns the other participants that have a publisher of the clock.
+    fn remote_clocks(&self) -> Vec<RemoteClock> {
+        let writers: Vec<(String, String, GuidPrefix)> = self
             .participant
             .discovered_writers()
             .into_iter()
@@ -168,52 +169,55 @@ impl Graph {
             })
             .collect();
         let is_machine =
-            |prefix: Prefix| writers.iter().any(|(_, kind, by)| kind == MACHINE_TYPE && *by == prefix);
+            |prefix: GuidPrefix| writers.iter().any(|(_, kind, by)| kind == MACHINE_TYPE && *by == prefix);
         writers
             .iter()
             .filter(|(topic, _, by)| *topic == self.topic && *by != self.own)
-            .map(|&(_, _, prefix)| Rival { prefix, machine: is_machine(prefix) })
+            .map(|&(_, _, prefix)| RemoteClock { prefix, is_machine: is_machine(prefix) })
             .collect()
     }
 }
 
-struct Watcher {
+struct ClockWatcher {
     name: String,
-    own: Prefix,
-    /// In `fast`.
+    own: GuidPrefix,
+    /// Election, in `fast`.
     election: Option<Election>,
-    /// Machines of this package that publish the clock.
-    machines: HashSet<Prefix>,
-    follower: Follower,
+    /// Nodes of this package that have a publisher of the clock.
+    machines: HashSet<GuidPrefix>,
+    follower: ClockFollower,
     health: watch::Receiver<Health>,
     state: watch::Sender<ClockState>,
-    graph: Graph,
-    /// Whether somebody unknown has been looked up since the last look.
-    is_fresh: bool,
-    told_invalid: bool,
+    graph: ClockGraph,
+    /// True if a message of an unknown publisher has caused a poll since the last regular one.
+    has_polled_for_message: bool,
+    has_warned: bool,
 }
 
-impl Watcher {
-    /// Looks who publishes the clock.
-    fn look(&mut self, listened: bool) {
-        let rivals = self.graph.rivals();
-        self.machines = rivals.iter().filter(|r| r.machine).map(|r| r.prefix).collect();
+impl ClockWatcher {
+    /// Updates the publishers of the clock and the election.
+    fn poll(&mut self, has_listened: bool) {
+        let remote = self.graph.remote_clocks();
+        self.machines = remote.iter().filter(|r| r.is_machine).map(|r| r.prefix).collect();
         if let Some(election) = &mut self.election {
             let before = election.role();
-            election.see(rivals, listened);
+            election.update(remote, has_listened);
             let role = election.role();
-            self.tell(before, role);
+            self.report(before, role);
         }
     }
 
-    fn take(&mut self, time: &Time, info: &MessageInfo) {
+    fn receive(&mut self, time: &Time, info: &MessageInfo) {
         let from = prefix_of(&info.publisher_gid().to_bytes16());
         if from == self.own {
             return;
         }
         if i64::from(time.nanosec) >= SECOND_NS || time.sec < 0 {
-            if !std::mem::replace(&mut self.told_invalid, true) {
-                warn!("{}: sec {}, nanosec {} is no time; left out", self.name, time.sec, time.nanosec);
+            if !std::mem::replace(&mut self.has_warned, true) {
+                warn!(
+                    "{}: invalid time: sec {}, nanosec {}; ignored, use sec >= 0 and nanosec < 1000000000",
+                    self.name, time.sec, time.nanosec
+                );
             }
             return;
         }
@@ -221,18 +225,18 @@ impl Watcher {
         let Some(election) = &mut self.election else {
             let role = Role::Following(Some(from));
             self.follow(time, from);
-            self.tell(role, role);
+            self.report(role, role);
             return;
         };
         let before = election.role();
-        let mut follows = election.hear(from);
-        if !follows && before != Role::Leading && !self.is_fresh {
-            // Its first message can be here before the look that finds it.
-            self.is_fresh = true;
-            election.see(self.graph.rivals(), false);
-            follows = election.hear(from);
+        let mut is_followed = election.receive(from);
+        if !is_followed && before != Role::Leading && !self.has_polled_for_message {
+            // The first message of a publisher can arrive before the poll that finds the publisher.
+            self.has_polled_for_message = true;
+            election.update(self.graph.remote_clocks(), false);
+            is_followed = election.receive(from);
         }
-        if !follows {
+        if !is_followed {
             return;
         }
         let role = election.role();
@@ -242,24 +246,24 @@ impl Watcher {
                 (health.time, health.periods)
             };
             if periods > 0 {
-                self.follower.follow_on_from(time);
+                self.follower.continue_from(time);
             }
         }
         self.follow(time, from);
-        self.tell(before, role);
+        self.report(before, role);
     }
 
-    fn follow(&mut self, time: Nanoseconds, from: Prefix) {
-        self.follower.take(time, self.machines.contains(&from));
+    fn follow(&mut self, time: Nanoseconds, from: GuidPrefix) {
+        self.follower.receive(time, self.machines.contains(&from));
     }
 
-    /// Tells the simulation, and the log when it is news.
-    fn tell(&self, before: Role, role: Role) {
+    /// Sends the state to the axes' thread and logs a change of role.
+    fn report(&self, before: Role, role: Role) {
         let state = ClockState { role, newest: self.follower.newest(), jump: self.follower.jump() };
-        self.state.send_if_modified(|told| std::mem::replace(told, state) != state);
+        self.state.send_if_modified(|sent| std::mem::replace(sent, state) != state);
         let follows = |role| matches!(role, Role::Following(_));
         if follows(role) && !follows(before) {
-            info!("{}: somebody else publishes it; holding back and following it", self.name);
+            info!("{}: another node publishes it; following it", self.name);
         } else if role == Role::Leading && before != Role::Leading {
             info!("{}: publishing it", self.name);
         }

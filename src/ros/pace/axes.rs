@@ -1,4 +1,4 @@
-//! The simulation, its commands and its reports, whatever it keeps step with.
+//! Simulation with its commands, frames and reports, independent of the clock that paces it.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -6,41 +6,42 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tracing::{info, warn};
 
-use super::super::arc_pool::ArcPool;
-use super::super::stream::StreamLog;
-use super::{Accepted, AxisHealth, COMMAND_QUEUE, ClockHealth, Command, Frame, Health, Report};
+use crate::ros::arc_pool::ArcPool;
+use crate::ros::axes_interface::{Accepted, COMMAND_QUEUE, Command, SampleFrame, SimulationReport};
+use crate::ros::health::{AxisHealth, ClockHealth, Health};
+use crate::ros::stream::StreamIntake;
 use virtual_axes_core::simulation::Simulation;
 use virtual_axes_core::trajectory::{MotionId, Rejection, RejectionCode};
 use virtual_axes_core::units::Nanoseconds;
 
-/// Most reports on streams that are on their way; what becomes of streams meanwhile is told by the last.
-const MOST_STREAM_ENDS: usize = 64;
+/// Largest number of unread reports on stream ends. Later ends are merged into the next report.
+const MAX_STREAM_ENDS: usize = 64;
 
-/// The simulation with what it answers.
+/// Simulation with its reports.
 pub(super) struct Axes {
     simulation: Simulation,
-    reports: mpsc::UnboundedSender<Report>,
+    reports: mpsc::UnboundedSender<SimulationReport>,
     health: watch::Sender<Health>,
-    stream: StreamLog,
-    /// How often the axes have been reset.
+    stream: StreamIntake,
+    /// Number of resets.
     resets: u64,
-    /// The accepted motions that have not ended, with the times of their starts, ns.
+    /// Accepted motions that have not ended, with their start times, ns.
     motions: Vec<(MotionId, Nanoseconds)>,
-    frames: ArcPool<Frame>,
-    /// The stops that nobody asked a result of, while they last.
+    frames: ArcPool<SampleFrame>,
+    /// Active stops, whose ends are not reported.
     stops: Vec<MotionId>,
-    /// Shared by the reports on streams that are on their way.
+    /// Counter of the unread reports on stream ends.
     stream_ends: Arc<()>,
 }
 
 impl Axes {
     pub(super) fn new(
         simulation: Simulation,
-        reports: mpsc::UnboundedSender<Report>,
+        reports: mpsc::UnboundedSender<SimulationReport>,
         health: watch::Sender<Health>,
     ) -> Self {
         health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
-        let (stream, frames) = (StreamLog::default(), ArcPool::default());
+        let (stream, frames) = (StreamIntake::default(), ArcPool::default());
         let (motions, stops, stream_ends) = (Vec::new(), Vec::new(), Arc::new(()));
         Axes { simulation, reports, health, stream, resets: 0, motions, frames, stops, stream_ends }
     }
@@ -49,17 +50,17 @@ impl Axes {
         &self.simulation
     }
 
-    /// Time of the position instant that is computed next, ns.
+    /// Returns the time of the next position instant, ns.
     pub(super) fn next_time(&self) -> Nanoseconds {
         self.simulation.time_of(self.simulation.next_instant())
     }
 
     /// Computes the next position instant.
-    pub(super) fn step(&mut self) -> Arc<Frame> {
+    pub(super) fn step(&mut self) -> Arc<SampleFrame> {
         let Axes { simulation, stream, resets, motions, frames, .. } = self;
         let instant = simulation.next_instant();
         simulation.step();
-        stream.watch(simulation);
+        stream.check_gaps(simulation);
         frames.acquire(|frame| {
             frame.instant = instant;
             frame.time = simulation.time_of(instant);
@@ -70,45 +71,45 @@ impl Axes {
         })
     }
 
-    /// Tells what has become of the instant that was computed last.
-    pub(super) fn released(&mut self, lateness: Duration, missed: bool, dropped: bool) {
+    /// Reports ended motions and counts the last computed instant as released.
+    pub(super) fn finish_cycle(&mut self, lateness: Duration, is_missed: bool, is_dropped: bool) {
         self.report_ends();
         let Axes { simulation, stream, .. } = self;
         self.health.send_modify(|h| {
-            h.update(simulation, lateness, missed, dropped);
+            h.update(simulation, lateness, is_missed, is_dropped);
             h.stream = stream.health(simulation);
         });
     }
 
-    /// Likewise of an instant that came too late to be published.
-    pub(super) fn kept(&mut self, lateness: Duration) {
-        self.released(lateness, true, false);
+    /// Reports ended motions and counts the last computed instant as missed and unpublished.
+    pub(super) fn finish_unpublished_cycle(&mut self, lateness: Duration) {
+        self.finish_cycle(lateness, true, false);
         self.health.send_modify(|h| h.unpublished += 1);
     }
 
-    /// Tells of motions and streams that have ended, whether or not time goes on.
+    /// Reports motions and streams that have ended since the last call.
     pub(super) fn report_ends(&mut self) {
-        if Arc::strong_count(&self.stream_ends) <= MOST_STREAM_ENDS
+        if Arc::strong_count(&self.stream_ends) <= MAX_STREAM_ENDS
             && let Some((end, joints)) = self.simulation.take_stream_end()
         {
             let now = self.simulation.time_of(self.simulation.next_instant() - 1);
-            let on_its_way = Arc::clone(&self.stream_ends);
-            let _ = self.reports.send(Report::StreamEnded(now, end, joints, on_its_way));
+            let unread = Arc::clone(&self.stream_ends);
+            let _ = self.reports.send(SimulationReport::StreamEnded(now, end, joints, unread));
         }
         for end in self.simulation.drain_finished() {
             self.motions.retain(|(id, _)| *id != end.id);
-            let asked_for = self.stops.len();
+            let count = self.stops.len();
             self.stops.retain(|id| *id != end.id);
-            if self.stops.len() < asked_for {
+            if self.stops.len() < count {
                 continue;
             }
-            // The receiver lives as long as the node; when it is gone, so is whoever wants to know.
-            let _ = self.reports.send(Report::Ended(end));
+            // The receiver is dropped only at shutdown.
+            let _ = self.reports.send(SimulationReport::MotionEnded(end));
         }
     }
 
-    /// Changes what the diagnostics say about the clock.
-    pub(super) fn tell_clock(&self, change: impl FnOnce(&mut ClockHealth)) {
+    /// Changes the clock's part of the diagnostics.
+    pub(super) fn update_clock_health(&self, change: impl FnOnce(&mut ClockHealth)) {
         self.health.send_if_modified(|h| {
             let before = h.clock;
             change(&mut h.clock);
@@ -116,27 +117,29 @@ impl Axes {
         });
     }
 
-    /// Goes on at `time` (ns), a position instant.
+    /// Continues at the position instant with the time `time`, ns.
     pub(super) fn jump_to(&mut self, time: Nanoseconds) {
         self.simulation.jump_to(time);
         self.report_ends();
     }
 
-    /// Refuses a trajectory because too many wait for the clock.
-    pub(super) fn refuse_full(&self, id: MotionId) {
-        let text = format!("{COMMAND_QUEUE} trajectories wait for the first /clock");
+    /// Rejects a trajectory because too many wait for the first `/clock` message.
+    pub(super) fn reject_queue_full(&self, id: MotionId) {
+        let text = format!(
+            "{COMMAND_QUEUE} trajectories already wait for the first /clock message; publish /clock or retry later"
+        );
         let limit = COMMAND_QUEUE as f64;
         let rejection = Rejection::new(RejectionCode::QueueFull, text).numbers(limit + 1.0, limit);
-        let _ = self.reports.send(Report::Decided(id, 0, Err(rejection)));
+        let _ = self.reports.send(SimulationReport::Decision(id, 0, Err(rejection)));
     }
 
-    /// Takes a command; the next step is the first to show it.
+    /// Applies a command; it takes effect in the next step.
     pub(super) fn apply(&mut self, command: Command) {
         let Axes { simulation, reports, stream, resets, motions, stops, .. } = self;
-        // Between two instants, the time is that of the first.
+        // Between two instants, the current time is the time of the first.
         let now = simulation.time_of(simulation.next_instant() - 1);
         match command {
-            Command::Offer { id, trajectory, tolerances } => {
+            Command::Submit { id, trajectory, tolerances } => {
                 let admission = match tolerances {
                     Some(tolerances) => simulation.submit_with_tolerances(id, trajectory, *tolerances),
                     None => simulation.submit(id, trajectory),
@@ -148,11 +151,11 @@ impl Axes {
                 if let Ok(accepted) = &decision {
                     motions.push((id, accepted.start));
                 }
-                let _ = reports.send(Report::Decided(id, now, decision));
+                let _ = reports.send(SimulationReport::Decision(id, now, decision));
             }
             Command::Stop(id, trajectory) => match simulation.submit(id, trajectory) {
                 Ok(_) => stops.push(id),
-                Err(rejection) => warn!("the axes cannot be stopped: {rejection}"),
+                Err(rejection) => warn!("controlled stop rejected: {rejection}"),
             },
             Command::Cancel(id, done) => {
                 let _ = done.send(simulation.cancel(id));
@@ -162,10 +165,10 @@ impl Axes {
                     simulation.set_load(axis, load, hold);
                 }
             }
-            Command::Stream(setpoints) => stream.take(simulation, &setpoints),
-            Command::Adopt(parameters) => {
+            Command::Stream(setpoints) => stream.submit(simulation, &setpoints),
+            Command::UpdateParameters(parameters) => {
                 if let Err(error) = simulation.update_parameters(parameters) {
-                    warn!("changed parameters could not be taken over: {error}");
+                    warn!("changed parameters not applied: {error}");
                 }
             }
             Command::Reset(done) => {
@@ -174,7 +177,7 @@ impl Axes {
                 *resets += 1;
                 let _ = done.send(());
             }
-            // Whoever calls ends then.
+            // The caller ends the thread.
             Command::Shutdown => {}
         }
     }

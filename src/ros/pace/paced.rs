@@ -1,8 +1,8 @@
-//! In step with a ROS clock: this node's own in `fast`, or that of somebody else.
+//! Pacing by a ROS clock: published by this node in `fast`, or by another node.
 //!
-//! Commands are taken whether or not time goes on, so that services answer and nothing is lost while
-//! a clock stands or a subscriber is slow; they show at the next position instant. Before there is a
-//! time at all, trajectories are kept until it comes.
+//! Commands are received whether or not time advances, so that services respond and no command is lost while the
+//! clock is paused or a subscriber is slow; they take effect at the next position instant. Trajectories received
+//! before the first time are kept until it arrives.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,90 +11,93 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tracing::warn;
 
-use super::super::clock::{ClockState, Jump, Role, first_instant};
 use super::axes::Axes;
-use super::wall::Pulse;
-use super::{COMMAND_QUEUE, ClockSource, Command, Frame};
+use super::wall::IdleTimer;
+use crate::ros::axes_interface::{COMMAND_QUEUE, Command, SampleFrame};
+use crate::ros::clock::{ClockJump, ClockState, Role, first_instant};
+use crate::ros::health::ClockSource;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// Whether the next position instant may be computed.
+/// Condition for the computation of the next position instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Leave {
-    /// At once.
-    Now,
-    /// When the idle clock ticks.
-    AtTick,
-    /// When the clock that is followed comes to it.
-    Later,
+enum StepCondition {
+    /// No condition: the instant may be computed at once.
+    Immediate,
+    /// Next tick of the idle timer.
+    IdleTick,
+    /// Arrival of the followed clock at the instant.
+    ClockTime,
 }
 
-fn leave(state: &ClockState, next: Nanoseconds, busy: bool) -> Leave {
+fn step_condition(state: &ClockState, next: Nanoseconds, is_busy: bool) -> StepCondition {
     let is_due = state.newest.is_some_and(|newest| newest >= next);
     match state.role {
-        _ if is_due => Leave::Now,
-        Role::Leading if busy => Leave::Now,
-        Role::Leading => Leave::AtTick,
-        Role::Listening | Role::Following(_) => Leave::Later,
+        _ if is_due => StepCondition::Immediate,
+        Role::Leading if is_busy => StepCondition::Immediate,
+        Role::Leading => StepCondition::IdleTick,
+        Role::Listening | Role::Following(_) => StepCondition::ClockTime,
     }
 }
 
-/// Runs until told to shut down; a full queue of frames is waited for.
+/// Runs until [`Command::Shutdown`]; waits while the queue of frames is full.
 pub(super) async fn run(
     axes: Axes,
     mut commands: mpsc::Receiver<Command>,
-    frames: &mpsc::Sender<Arc<Frame>>,
+    frames: &mpsc::Sender<Arc<SampleFrame>>,
     mut clock: watch::Receiver<ClockState>,
 ) {
     let period = axes.simulation().period();
     let tick = Duration::from_nanos(period.unsigned_abs());
-    let mut axes = Paced { axes, held: VecDeque::new(), known: false, jumps: 0, stepped: false };
-    let mut pulse = Pulse::default();
+    let mut axes =
+        PacedAxes { axes, waiting: VecDeque::new(), is_time_known: false, jumps: 0, has_stepped: false };
+    let mut idle_timer = IdleTimer::default();
     let mut ticks_at = None;
     loop {
         loop {
             match commands.try_recv() {
                 Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => return,
-                Ok(command) => axes.take(command),
+                Ok(command) => axes.receive(command),
                 Err(mpsc::error::TryRecvError::Empty) => break,
             }
         }
         let state = *clock.borrow_and_update();
         axes.follow(&state);
-        let leave = leave(&state, axes.axes.next_time(), axes.axes.simulation().is_busy());
-        if leave != Leave::AtTick {
-            pulse.stop();
+        let condition = step_condition(&state, axes.axes.next_time(), axes.axes.simulation().is_busy());
+        if condition != StepCondition::IdleTick {
+            idle_timer.stop();
             ticks_at = None;
         } else if ticks_at.is_none() {
-            ticks_at = Some(pulse.next(tick));
+            ticks_at = Some(idle_timer.next_tick(tick));
         }
+        let may_step = condition == StepCondition::Immediate;
         let mut permit = None;
-        if leave == Leave::Now {
+        if may_step {
             permit = frames.try_reserve().ok();
         }
         if permit.is_none() {
-            axes.axes.tell_clock(|clock| clock.held_back = leave == Leave::Now);
+            axes.axes.update_clock_health(|clock| clock.is_blocked = may_step);
             tokio::select! {
                 biased;
                 command = commands.recv() => match command {
                     Some(Command::Shutdown) | None => return,
-                    Some(command) => axes.take(command),
+                    Some(command) => axes.receive(command),
                 },
                 changed = clock.changed() => if changed.is_err() { return },
                 () = until(ticks_at), if ticks_at.is_some() => {
                     ticks_at = None;
-                    // Idle, it waits for nobody: a frame that is not taken by the next tick is waited for then.
+                    // An idle machine does not wait for space in the queue; it tries again at the next tick.
                     permit = frames.try_reserve().ok();
                 }
-                free = frames.reserve(), if leave == Leave::Now => match free {
-                    Ok(free) => permit = Some(free),
+                reserved = frames.reserve(), if may_step => match reserved {
+                    Ok(reserved) => permit = Some(reserved),
                     Err(_) => return,
                 },
             }
         }
         if let Some(permit) = permit {
             permit.send(axes.axes.step());
-            axes.stepped = true;
-            axes.axes.released(Duration::ZERO, false, false);
+            axes.has_stepped = true;
+            axes.axes.finish_cycle(Duration::ZERO, false, false);
         }
     }
 }
@@ -106,95 +109,98 @@ async fn until(time: Option<tokio::time::Instant>) {
     }
 }
 
-/// The axes, and what waits for the first time.
-struct Paced {
+/// Axes with the commands that wait for the first time.
+struct PacedAxes {
     axes: Axes,
-    /// Trajectories and stops that came before there was a time, oldest first.
-    held: VecDeque<Command>,
-    /// Whether there is a time.
-    known: bool,
-    /// Jumps of the clock that have been followed.
+    /// Trajectories and stops received before the first time, oldest first.
+    waiting: VecDeque<Command>,
+    /// True after the first time has been received.
+    is_time_known: bool,
+    /// Number of clock jumps that have been applied.
     jumps: u64,
-    /// Whether an instant has been released.
-    stepped: bool,
+    /// True after the first position instant.
+    has_stepped: bool,
 }
 
-impl Paced {
-    fn take(&mut self, command: Command) {
-        if self.known {
+impl PacedAxes {
+    fn receive(&mut self, command: Command) {
+        if self.is_time_known {
             self.axes.apply(command);
             self.axes.report_ends();
             return;
         }
         match command {
-            Command::Offer { id, .. } if self.held.len() >= COMMAND_QUEUE => self.axes.refuse_full(id),
-            Command::Offer { .. } => self.held.push_back(command),
-            // They act at once or not at all.
+            Command::Submit { id, .. } if self.waiting.len() >= COMMAND_QUEUE => {
+                self.axes.reject_queue_full(id);
+            }
+            Command::Submit { .. } => self.waiting.push_back(command),
+            // Loads and streamed setpoints are valid only at their reception.
             Command::Load { .. } | Command::Stream(_) => {}
             Command::Cancel(id, _) => {
-                // What it ends has to have been taken; the others wait on.
-                let is_it = |held: &Command| matches!(held, Command::Offer { id: other, .. } if *other == id);
-                if let Some(offer) =
-                    self.held.iter().position(is_it).and_then(|place| self.held.remove(place))
+                // A motion must be submitted before it can be canceled; other commands continue to wait.
+                let is_canceled =
+                    |waiting: &Command| matches!(waiting, Command::Submit { id: other, .. } if *other == id);
+                if let Some(submission) =
+                    self.waiting.iter().position(is_canceled).and_then(|index| self.waiting.remove(index))
                 {
-                    self.axes.apply(offer);
+                    self.axes.apply(submission);
                 }
                 self.axes.apply(command);
                 self.axes.report_ends();
             }
-            // What came before it is stopped at its start; of several in a row one is enough.
-            Command::Stop(..) if matches!(self.held.back(), Some(Command::Stop(..))) => {}
-            Command::Stop(..) => self.held.push_back(command),
-            // All that waits ends with it.
+            // A stop affects the trajectories before it; consecutive stops are equivalent to one.
+            Command::Stop(..) if matches!(self.waiting.back(), Some(Command::Stop(..))) => {}
+            Command::Stop(..) => self.waiting.push_back(command),
+            // A reset ends all waiting commands.
             Command::Reset(_) => {
-                self.release();
+                self.apply_waiting();
                 self.axes.apply(command);
                 self.axes.report_ends();
             }
-            Command::Adopt(_) | Command::Shutdown => self.axes.apply(command),
+            Command::UpdateParameters(_) | Command::Shutdown => self.axes.apply(command),
         }
     }
 
-    fn release(&mut self) {
-        for command in self.held.drain(..) {
+    fn apply_waiting(&mut self) {
+        for command in self.waiting.drain(..) {
             self.axes.apply(command);
         }
     }
 
-    /// Keeps to the clock's own idea of time.
+    /// Applies a new state of the clock: jumps, first time and diagnostics.
     fn follow(&mut self, state: &ClockState) {
         if state.jump.count != self.jumps {
             self.jumps = state.jump.count;
             self.jump(&state.jump);
         }
-        if state.is_known() && !self.known {
-            self.known = true;
-            self.release();
+        if state.is_known() && !self.is_time_known {
+            self.is_time_known = true;
+            self.apply_waiting();
             self.axes.report_ends();
         }
         let source = match state.role {
             Role::Leading => ClockSource::Own,
             Role::Listening | Role::Following(_) if state.newest.is_none() => ClockSource::None,
-            Role::Listening | Role::Following(_) => ClockSource::Others,
+            Role::Listening | Role::Following(_) => ClockSource::Followed,
         };
         let behind = state.newest.map_or(0, |newest| (newest - self.axes.next_time()).max(0));
-        self.axes.tell_clock(|clock| {
+        self.axes.update_clock_health(|clock| {
             clock.source = source;
             clock.behind = behind;
         });
     }
 
-    fn jump(&mut self, jump: &Jump) {
+    fn jump(&mut self, jump: &ClockJump) {
         let period = self.axes.simulation().period();
         let first = first_instant(jump.to, period);
-        if self.stepped {
+        if self.has_stepped {
             let from = jump.from.unwrap_or(self.axes.next_time() - period);
             warn!(
-                "the clock jumped from {:.3} s to {:.3} s; motions end, the axes come to rest",
+                "the clock jumped from {:.3} s to {:.3} s; all motions are aborted and the axes stop",
                 seconds(from),
                 seconds(jump.to)
             );
-            self.axes.tell_clock(|clock| clock.jumps += 1);
+            self.axes.update_clock_health(|clock| clock.jumps += 1);
         }
         self.axes.jump_to(first);
     }

@@ -1,4 +1,4 @@
-//! In step with the wall clock.
+//! Real-time pacing by the wall clock.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -9,46 +9,48 @@ use futures::future::BoxFuture;
 use tokio::sync::mpsc;
 use tracing::warn;
 
+use super::CooperativeTasks;
 use super::axes::Axes;
 use super::wall::{PaceClock, since_epoch};
-use super::{ClockSource, Command, CooperativeTasks, Frame};
+use crate::ros::axes_interface::{Command, SampleFrame};
+use crate::ros::health::ClockSource;
 
-/// Instants that come later than this are computed and not published: a burst of them would push out of
-/// subscribers' queues what they have not read, and tell nothing of now.
-pub(super) const LONGEST_BURST: Duration = Duration::from_secs(1);
+/// Largest lateness of a published instant. Later instants are computed and not published: a burst of old frames would
+/// displace unread frames in the queues of the subscribers.
+pub(super) const MAX_PUBLISHED_LATENESS: Duration = Duration::from_secs(1);
 
-/// Runs until told to shut down; a frame that nobody takes in time is dropped and counted.
+/// Runs until [`Command::Shutdown`]. A frame is dropped and counted if the queue of frames is full.
 pub(super) fn run(
     mut axes: Axes,
     mut commands: mpsc::Receiver<Command>,
-    frames: &mpsc::Sender<Arc<Frame>>,
+    frames: &mpsc::Sender<Arc<SampleFrame>>,
     mut tasks: CooperativeTasks,
 ) {
     let clock = PaceClock::new(axes.simulation(), since_epoch);
-    axes.tell_clock(|clock| clock.source = ClockSource::Wall);
+    axes.update_clock_health(|clock| clock.source = ClockSource::Wall);
     loop {
         let mut lateness = clock.wait_for(axes.simulation().next_instant());
-        if lateness > LONGEST_BURST {
-            stood_still(&mut axes, lateness, clock.newest_due(), |k| clock.lateness_of(k));
+        if lateness > MAX_PUBLISHED_LATENESS {
+            catch_up(&mut axes, lateness, clock.newest_due(), |k| clock.lateness_of(k));
             lateness = clock.wait_for(axes.simulation().next_instant());
         }
-        poll_once(&mut tasks.input);
-        if period(&mut axes, &mut commands, frames, lateness, lateness > clock.period).is_break() {
+        poll_once(&mut tasks.inputs);
+        if run_cycle(&mut axes, &mut commands, frames, lateness, lateness > clock.period).is_break() {
             return;
         }
-        poll_once(&mut tasks.output);
+        poll_once(&mut tasks.outputs);
     }
 }
 
-/// It is asked again in the next period, whether or not it has been woken.
+/// Polls a task without a waker; it is polled again in the next cycle in any case.
 fn poll_once(future: &mut BoxFuture<'static, ()>) {
     let _ = future.as_mut().poll(&mut Context::from_waker(Waker::noop()));
 }
 
-/// Computes the instants before `newest`, of which the first is due since `lateness`, and keeps them to itself.
+/// Computes the instants before `newest` without publishing them; the first has been due for `lateness`.
 ///
-/// Commands wait for the instant of now. What the axes do in between is what they would have done in time.
-pub(super) fn stood_still(
+/// Commands take effect at the instant `newest`. The state of the axes is the same as without the delay.
+pub(super) fn catch_up(
     axes: &mut Axes,
     lateness: Duration,
     newest: i64,
@@ -57,24 +59,24 @@ pub(super) fn stood_still(
     let first = axes.simulation().next_instant();
     for instant in first..newest {
         drop(axes.step());
-        axes.kept(lateness_of(instant));
+        axes.finish_unpublished_cycle(lateness_of(instant));
     }
     warn!(
-        "the node stood still for {:.3} s: {} position periods were missed; they are computed, and not published",
+        "the node stalled for {:.3} s: {} position cycles were missed; they are computed but not published",
         lateness.as_secs_f64(),
         (newest - first).max(0)
     );
 }
 
-/// One position period that has become due `lateness` ago; breaks when told to shut down.
+/// Runs one position cycle that has been due for `lateness`; breaks on [`Command::Shutdown`].
 ///
-/// It allocates and frees nothing but when a trajectory or another seldom command comes or a motion ends.
-pub(super) fn period(
+/// Allocates and frees memory only for trajectories and other rare commands, and when a motion ends.
+pub(super) fn run_cycle(
     axes: &mut Axes,
     commands: &mut mpsc::Receiver<Command>,
-    frames: &mpsc::Sender<Arc<Frame>>,
+    frames: &mpsc::Sender<Arc<SampleFrame>>,
     lateness: Duration,
-    missed: bool,
+    is_missed: bool,
 ) -> ControlFlow<()> {
     loop {
         match commands.try_recv() {
@@ -85,7 +87,7 @@ pub(super) fn period(
             Err(mpsc::error::TryRecvError::Empty) => break,
         }
     }
-    let taken = frames.try_send(axes.step()).is_ok();
-    axes.released(lateness, missed, !taken);
+    let is_sent = frames.try_send(axes.step()).is_ok();
+    axes.finish_cycle(lateness, is_missed, !is_sent);
     ControlFlow::Continue(())
 }

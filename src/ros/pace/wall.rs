@@ -1,4 +1,4 @@
-//! The wall clock.
+//! Wall clock as a sequence of position instants, and the timer of an idle machine in `fast`.
 
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -7,11 +7,12 @@ use virtual_axes_core::config::TimeMode;
 use virtual_axes_core::simulation::Simulation;
 use virtual_axes_core::units::Nanoseconds;
 
-/// Ticks of an idle clock that are made up for when the machine is busy; beyond that, they are lost.
+/// Largest number of late ticks of the idle timer that are made up for; earlier ones are skipped.
 const CATCH_UP: u32 = 10;
 
-/// When position instant 0 is, ns since the Unix epoch: the next one of the grid of `period` ns
-/// through the epoch. A clock that is followed says so itself when it comes.
+/// Returns the time of position instant 0, ns since the Unix epoch: the next multiple of `period` (ns).
+///
+/// With `use_sim_time` the origin is preliminary; the first `/clock` message sets the time.
 pub fn origin(mode: TimeMode, period: Nanoseconds) -> Nanoseconds {
     match mode {
         TimeMode::Real | TimeMode::Fast => grid_origin(period),
@@ -24,25 +25,26 @@ fn grid_origin(period: Nanoseconds) -> Nanoseconds {
     (now.div_euclid(period) + 1) * period
 }
 
-/// What the wall clock says, since the Unix epoch.
+/// Returns the wall-clock time since the Unix epoch.
 pub(super) fn since_epoch() -> Duration {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
 }
 
-/// The wall clock as position instants, as it ran when this began: it is read once, so that setting it
-/// later neither stops nor hurries the axes.
+/// Schedule of the position instants on the monotonic clock.
+///
+/// The wall clock is read once at construction, so that setting it later neither stops nor accelerates the axes.
 pub(super) struct PaceClock {
-    /// When instant 0 is due.
+    /// Due time of instant 0.
     start: Instant,
     pub(super) period: Duration,
 }
 
 impl PaceClock {
-    /// That of the instants of `simulation`, whose origin is the next instant by `wall`, or a past one.
+    /// Creates the schedule of `simulation`, whose origin is at most one period after the wall-clock time `wall`.
     pub(super) fn new(simulation: &Simulation, wall: impl FnOnce() -> Duration) -> Self {
         let origin = Duration::from_nanos(u64::try_from(simulation.time_of(0)).unwrap_or(0));
         let period = Duration::from_nanos(u64::try_from(simulation.period()).unwrap_or(1));
-        // More than a period ahead it is only by a wall clock that has been set back since.
+        // The origin is more than a period ahead only if the wall clock has been set back since.
         let start = Instant::now() + origin.saturating_sub(wall()).min(period);
         PaceClock { start, period }
     }
@@ -52,7 +54,7 @@ impl PaceClock {
         self.start + Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
     }
 
-    /// Sleeps until instant `k` is due, and says how late it has become.
+    /// Sleeps until instant `k` is due and returns its lateness.
     pub(super) fn wait_for(&self, k: i64) -> Duration {
         let due = self.due(k);
         let now = Instant::now();
@@ -62,27 +64,27 @@ impl PaceClock {
         self.lateness_of(k)
     }
 
-    /// How late instant `k` is now.
+    /// Returns the lateness of instant `k`, 0 if it is not yet due.
     pub(super) fn lateness_of(&self, k: i64) -> Duration {
         Instant::now().saturating_duration_since(self.due(k))
     }
 
-    /// The last instant that is due.
+    /// Returns the last instant that is due.
     pub(super) fn newest_due(&self) -> i64 {
         let passed = Instant::now().saturating_duration_since(self.start).as_nanos();
         i64::try_from(passed / self.period.as_nanos().max(1)).unwrap_or(i64::MAX)
     }
 }
 
-/// An idle clock of our own: it ticks at real pace, and need not be exact.
+/// Timer of the position cycles of an idle machine in `fast`, at wall-clock rate.
 #[derive(Debug, Default)]
-pub(super) struct Pulse {
+pub(super) struct IdleTimer {
     due: Option<tokio::time::Instant>,
 }
 
-impl Pulse {
-    /// When it ticks next, `period` after the tick before, or after now when it has just begun.
-    pub(super) fn next(&mut self, period: Duration) -> tokio::time::Instant {
+impl IdleTimer {
+    /// Returns the time of the next tick: `period` after the previous tick, or from now after a stop.
+    pub(super) fn next_tick(&mut self, period: Duration) -> tokio::time::Instant {
         let now = tokio::time::Instant::now();
         let earliest = now.checked_sub(period * CATCH_UP).unwrap_or(now);
         let due = self.due.map_or(now, |due| due.max(earliest)) + period;
@@ -90,7 +92,7 @@ impl Pulse {
         due
     }
 
-    /// Begins anew with the next tick.
+    /// Stops the timer; the next tick starts it again.
     pub(super) fn stop(&mut self) {
         self.due = None;
     }

@@ -1,9 +1,8 @@
-//! The six parameter services of a node, and `/parameter_events`.
+//! Parameter services of a node (`~/get_parameters` and five others) and `/parameter_events`.
 //!
-//! The crate's own services describe no parameter, and come with its spinner, which subscribes to
-//! `/clock` with a wrong type. So the node is created with
-//! `NodeOptions::new().start_parameter_services(false)`, its spinner stays unused, and the services
-//! are these.
+//! The parameter services of ros2-client describe no parameter and need its spinner, which subscribes to `/clock`
+//! with a wrong type. The node is therefore created with `NodeOptions::new().start_parameter_services(false)` and
+//! without the spinner.
 
 use std::future::Future;
 
@@ -33,8 +32,9 @@ use super::response_limiter::{ResponseLimiter, ResponsePermit};
 use super::service::{RESPONSE_DEPTH, Service, ServiceError, profile};
 use crate::ingress::parameters::{self as wire, ParameterHost, list_parameters};
 
-/// rmw's profile for parameter services keeps this many, so that a client may send that many requests at once.
+/// Depth of rmw's profile for parameter services: number of requests that a client may send at once.
 const QUEUE_DEPTH: usize = 1000;
+
 enum Request {
     Get(RmwRequestId, GetParametersRequest),
     Types(RmwRequestId, GetParameterTypesRequest),
@@ -44,7 +44,7 @@ enum Request {
     Describe(RmwRequestId, DescribeParametersRequest),
 }
 
-/// The services of one node, ready to [`Self::serve`].
+/// Parameter services of a node.
 pub struct ParameterServices {
     get: Service<GetParametersRequest, GetParametersResponse>,
     types: Service<GetParameterTypesRequest, GetParameterTypesResponse>,
@@ -57,26 +57,25 @@ pub struct ParameterServices {
 }
 
 impl ParameterServices {
-    /// Creates the services under the node's name, and the publisher of `/parameter_events`.
-    /// `context` is the one that `node` lives in.
+    /// Creates the services of `node`, which belongs to `context`, and the publisher of `/parameter_events`.
     ///
     /// # Errors
-    /// The first one that the middleware refuses.
+    /// [`ServiceError`] naming the first that cannot be created.
     pub fn new(node: &mut Node, context: &Context, args: &RosArgs) -> Result<Self, ServiceError> {
-        let mut door = Door { node, context, args };
+        let mut factory = ParameterServiceFactory { node, context, args };
         Ok(Self {
-            get: door.service("get_parameters", "GetParameters")?,
-            types: door.service("get_parameter_types", "GetParameterTypes")?,
-            set: door.service("set_parameters", "SetParameters")?,
-            set_atomically: door.service("set_parameters_atomically", "SetParametersAtomically")?,
-            list: door.service("list_parameters", "ListParameters")?,
-            describe: door.service("describe_parameters", "DescribeParameters")?,
-            events: door.events()?,
+            get: factory.service("get_parameters", "GetParameters")?,
+            types: factory.service("get_parameter_types", "GetParameterTypes")?,
+            set: factory.service("set_parameters", "SetParameters")?,
+            set_atomically: factory.service("set_parameters_atomically", "SetParametersAtomically")?,
+            list: factory.service("list_parameters", "ListParameters")?,
+            describe: factory.service("describe_parameters", "DescribeParameters")?,
+            events: factory.events()?,
             node_name: args.node().to_string(),
         })
     }
 
-    /// Answers requests from `host` until `stop` is done. `now` stamps the events.
+    /// Answers requests with the parameters of `host` until `stop` completes; `now` returns the time stamp of an event.
     pub async fn serve<H: ParameterHost>(
         self,
         mut host: H,
@@ -91,7 +90,7 @@ impl ParameterServices {
             self.list.requests_as(Request::List),
             self.describe.requests_as(Request::Describe),
         ]);
-        // Responses are sent side by side: one client that is slow to be discovered holds up no other.
+        // Responses are sent concurrently, so that a client that is discovered late does not delay others.
         let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
         let limiter = ResponseLimiter::default();
         tokio::pin!(stop);
@@ -102,7 +101,7 @@ impl ParameterServices {
                 Some(()) = responses.next(), if !responses.is_empty() => {}
                 Some((permit, request)) = limiter.next(&mut requests) => match request {
                     Ok(request) => {
-                        let response = self.answer(&mut host, &now, request, permit).await;
+                        let response = self.handle_request(&mut host, &now, request, permit).await;
                         responses.push(response);
                     }
                     Err(reason) => tracing::warn!("{reason}"),
@@ -112,8 +111,8 @@ impl ParameterServices {
         }
     }
 
-    /// Does what `request` asks; the future that comes back sends the response.
-    async fn answer<'a, H: ParameterHost>(
+    /// Executes a request and returns the future that sends the response.
+    async fn handle_request<'a, H: ParameterHost>(
         &'a self,
         host: &mut H,
         now: &(impl Fn() -> Time + Send),
@@ -122,12 +121,12 @@ impl ParameterServices {
     ) -> BoxFuture<'a, ()> {
         match request {
             Request::Get(id, request) => {
-                let values = within_bounds(&request.names).iter().map(|name| host.get(name));
+                let values = limit_count(&request.names).iter().map(|name| host.get(name));
                 let values = values.map(wire::value_to_wire).collect();
                 self.get.respond(id, GetParametersResponse { values }, permit)
             }
             Request::Types(id, request) => {
-                let kinds = within_bounds(&request.names)
+                let kinds = limit_count(&request.names)
                     .iter()
                     .map(|name| wire::type_number(host.get(name).map(|value| value.kind())));
                 let types = kinds.collect();
@@ -151,11 +150,11 @@ impl ParameterServices {
                 self.set_atomically.respond(id, SetParametersAtomicallyResponse { result }, permit)
             }
             Request::List(id, request) => {
-                let result = listed(&host.names(), &request.prefixes, request.depth);
+                let result = list_limited(&host.names(), &request.prefixes, request.depth);
                 self.list.respond(id, ListParametersResponse { result }, permit)
             }
             Request::Describe(id, request) => {
-                let descriptors = within_bounds(&request.names).iter().map(|name| {
+                let descriptors = limit_count(&request.names).iter().map(|name| {
                     let descriptor = host.describe(name);
                     wire::descriptor_to_wire(name.clone(), descriptor)
                 });
@@ -180,7 +179,7 @@ impl ParameterServices {
         let names: Vec<String> = changes.iter().map(|(name, _)| name.clone()).collect();
         host.ready().await;
         host.set(changes)?;
-        // What the host made of a value is what counts: it may have turned 4 into 4.0.
+        // The event contains the stored values: the host may have converted 4 to 4.0.
         let changed_parameters = names
             .into_iter()
             .map(|name| msg::Parameter { value: wire::value_to_wire(host.get(&name)), name });
@@ -191,32 +190,32 @@ impl ParameterServices {
             ..Default::default()
         };
         if let Err(error) = self.events.async_publish(event).await {
-            tracing::warn!("a parameter event could not be published: {error:?}");
+            tracing::warn!("parameter event not published: {error:?}");
         }
         Ok(())
     }
 }
 
-/// The names of a request, or none of more than a request may have: what is asked for each of them is held together.
-fn within_bounds(names: &[String]) -> &[String] {
+/// Returns the names of a request, or none if there are too many: the response to all of them is built in memory.
+fn limit_count(names: &[String]) -> &[String] {
     match wire::check_count(names.len()) {
         Ok(()) => names,
         Err(reason) => {
-            tracing::warn!("a request for parameters is answered with none: {reason}");
+            tracing::warn!("parameter request answered with an empty response: {reason}");
             &[]
         }
     }
 }
 
-/// Likewise the names under `prefixes`: no prefixes would ask for all names.
-fn listed(names: &[String], prefixes: &[String], depth: u64) -> msg::ListParametersResult {
-    if within_bounds(prefixes).len() < prefixes.len() {
+/// Returns the parameters under `prefixes`, or none if there are too many prefixes; an empty list would select all.
+fn list_limited(names: &[String], prefixes: &[String], depth: u64) -> msg::ListParametersResult {
+    if limit_count(prefixes).len() < prefixes.len() {
         return msg::ListParametersResult::default();
     }
     list_parameters(names, prefixes, depth)
 }
 
-/// The services under the node's name.
+/// Labels of the services.
 pub(super) const LABELS: [&str; 6] = [
     "get_parameters",
     "get_parameter_types",
@@ -226,14 +225,14 @@ pub(super) const LABELS: [&str; 6] = [
     "list_parameters",
 ];
 
-/// Creates the services under the node's name, reliable and with rmw's depth.
-struct Door<'a> {
+/// Factory of the services, reliable and with rmw's depth.
+struct ParameterServiceFactory<'a> {
     node: &'a mut Node,
     context: &'a Context,
     args: &'a RosArgs,
 }
 
-impl Door<'_> {
+impl ParameterServiceFactory<'_> {
     fn service<Q: Message + Clone + 'static, A: Message + 'static>(
         &mut self,
         label: &'static str,
@@ -260,14 +259,14 @@ impl Door<'_> {
 mod tests {
     use super::*;
 
-    /// A description is some ten times as long as a name that is asked for, and a request has room for millions.
+    /// A descriptor is about ten times as long as a name, and a request can contain millions of names.
     #[test]
-    fn names_without_end_in_a_request_are_not_looked_up() {
+    fn requests_with_too_many_names_are_not_answered() {
         let names = vec!["x.velocity_loop.gain".to_owned(); 1001];
-        assert_eq!(within_bounds(&names[..1000]).len(), 1000);
-        assert!(within_bounds(&names).is_empty());
+        assert_eq!(limit_count(&names[..1000]).len(), 1000);
+        assert!(limit_count(&names).is_empty());
         let known = ["x.velocity_loop.gain".to_owned()];
-        assert_eq!(listed(&known, &names[..1000], 0).names, known);
-        assert!(listed(&known, &names, 0).names.is_empty());
+        assert_eq!(list_limited(&known, &names[..1000], 0).names, known);
+        assert!(list_limited(&known, &names, 0).names.is_empty());
     }
 }

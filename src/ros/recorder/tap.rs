@@ -9,8 +9,8 @@ use tokio::sync::watch;
 
 use super::thread::RecordingEntry;
 use super::{QUEUE_BYTES, Shared};
-use crate::ros::outputs::OverflowPolicy;
-use crate::ros::pace::Health;
+use crate::ros::health::Health;
+use crate::ros::overflow::OverflowPolicy;
 use virtual_axes_core::config::TimeMode;
 use virtual_axes_core::units::Nanoseconds;
 use virtual_axes_io::files::encode_cdr;

@@ -1,0 +1,82 @@
+//! Commands to the thread that owns the simulation, and its frames and reports.
+
+use std::sync::Arc;
+
+use tokio::sync::oneshot;
+
+use crate::ingress::StreamSetpoints;
+use virtual_axes_core::machine::{AxisSample, MachineParameters};
+use virtual_axes_core::simulation::{MotionEnd, Tolerances};
+use virtual_axes_core::trajectory::{JointSet, MotionId, Rejection, StreamEnd, Trajectory};
+use virtual_axes_core::units::Nanoseconds;
+
+/// Capacity of the command queue. A sender waits while the queue is full.
+pub const COMMAND_QUEUE: usize = 64;
+
+/// Command to the simulation; takes effect at the next position instant.
+#[derive(Debug)]
+pub enum Command {
+    /// Submits a trajectory.
+    Submit {
+        /// Identifier of its motion.
+        id: MotionId,
+        /// Trajectory that passed all checks that do not depend on the state of the axes.
+        trajectory: Arc<Trajectory>,
+        /// Path and goal tolerances.
+        tolerances: Option<Box<Tolerances>>,
+    },
+    /// Stops every joint; the motion is not reported.
+    Stop(MotionId, Arc<Trajectory>),
+    /// Cancels a motion, and returns true if it was active or waiting.
+    Cancel(MotionId, oneshot::Sender<bool>),
+    /// Applies external loads for a limited time.
+    Load {
+        /// Index of the axis, and load, N or N·m.
+        loads: Arc<Vec<(usize, f64)>>,
+        /// Duration, ns.
+        hold: Nanoseconds,
+    },
+    /// Submits the setpoints of a stream.
+    Stream(Arc<StreamSetpoints>),
+    /// Applies changed machine parameters.
+    UpdateParameters(Arc<MachineParameters>),
+    /// Resets the machine to rest at home.
+    Reset(oneshot::Sender<()>),
+    /// Ends the thread.
+    Shutdown,
+}
+
+/// Acceptance of a trajectory.
+#[derive(Debug, Clone, Copy)]
+pub struct Accepted {
+    /// Start time of the trajectory, ns.
+    pub start: Nanoseconds,
+    /// True if the start time had passed when the trajectory was received.
+    pub is_late: bool,
+}
+
+/// SimulationReport of the simulation.
+#[derive(Debug)]
+pub enum SimulationReport {
+    /// Acceptance or rejection of a trajectory, with its time, ns.
+    Decision(MotionId, Nanoseconds, Result<Accepted, Rejection>),
+    /// End of a motion.
+    MotionEnded(MotionEnd),
+    /// End of a stream on some joints, with its time, ns. The last field counts the unread reports of this kind.
+    StreamEnded(Nanoseconds, StreamEnd, JointSet, Arc<()>),
+}
+
+/// Samples of all axes at one position instant.
+#[derive(Debug, Clone, Default)]
+pub struct SampleFrame {
+    /// Number of the position instant.
+    pub instant: i64,
+    /// Time of the position instant, ns.
+    pub time: Nanoseconds,
+    /// Sample of each axis.
+    pub samples: Vec<AxisSample>,
+    /// Number of resets before the instant.
+    pub resets: u64,
+    /// Accepted motions that had not ended before the instant, with their start times, ns.
+    pub motions: Vec<(MotionId, Nanoseconds)>,
+}

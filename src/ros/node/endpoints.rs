@@ -1,0 +1,74 @@
+//! Creation of the ROS node with its topics, services and action.
+
+use ros2_client::{Context, Node, NodeName, NodeOptions};
+use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
+use rustdds::DomainParticipant;
+
+use super::NodeError;
+use super::setup::NodeSetup;
+use crate::ros::action::{ActionServer, ActionTopics};
+use crate::ros::args::RosArgs;
+use crate::ros::endpoints::{Endpoints, Publisher};
+use crate::ros::parameter_services::ParameterServices;
+use crate::ros::recorder::TopicRecorder;
+use crate::ros::rosout;
+use crate::ros::tool::ToolTopics;
+use crate::ros::topics::Topics;
+use crate::ros::trigger::{RESET, STOP, TriggerService};
+use virtual_axes_core::config::Parameters;
+use virtual_axes_core::kinematics::Kinematics;
+
+/// ROS node with its topics, services and action.
+pub(super) struct NodeEndpoints {
+    pub(super) node: Node,
+    pub(super) rosout: Option<Publisher<Log>>,
+    pub(super) topics: Topics,
+    pub(super) tool: Option<ToolTopics>,
+    pub(super) action: ActionServer,
+    pub(super) action_topics: ActionTopics,
+    pub(super) services: NodeServices,
+}
+
+/// Services of the node.
+pub(super) struct NodeServices {
+    pub(super) reset: TriggerService,
+    pub(super) stop: TriggerService,
+    pub(super) parameters: ParameterServices,
+}
+
+impl NodeEndpoints {
+    /// Creates the node and its endpoints in `context`.
+    ///
+    /// # Errors
+    /// [`NodeError`] naming the node, topic or service that cannot be created.
+    pub(super) fn create(
+        context: &Context,
+        participant: &DomainParticipant,
+        args: &RosArgs,
+        parameters: &Parameters,
+        setup: &NodeSetup,
+        recorder: &mut TopicRecorder,
+    ) -> Result<Self, NodeError> {
+        let mut node = create_node(context, args)?;
+        let rosout = rosout::publisher(&mut node, participant, args, recorder)?;
+        let mut endpoints = Endpoints::new(&mut node, participant, args, parameters, recorder);
+        let mut topics = Topics::create(&mut endpoints, args, setup.mode)?;
+        let tool = ToolTopics::create(&mut endpoints, Kinematics::new(&setup.config))?;
+        topics.names.add_published(tool.as_ref().map_or(&[], |tool| &tool.names));
+        let (action, action_topics) = ActionServer::new(&mut node, context, args)?;
+        topics.names.actions.push(action_topics.name.clone());
+        let reset = TriggerService::new(&mut node, context, args, RESET)?;
+        let stop = TriggerService::new(&mut node, context, args, STOP)?;
+        let parameters = ParameterServices::new(&mut node, context, args)?;
+        let services = NodeServices { reset, stop, parameters };
+        Ok(NodeEndpoints { node, rosout, topics, tool, action, action_topics, services })
+    }
+}
+
+fn create_node(context: &Context, args: &RosArgs) -> Result<Node, NodeError> {
+    let failed = |reason: String| NodeError::Node { name: args.node().to_string(), reason };
+    let name =
+        NodeName::new(args.node().namespace(), args.node().name()).map_err(|e| failed(format!("{e:?}")))?;
+    let options = NodeOptions::new().start_parameter_services(false).enable_rosout(false);
+    context.new_node(name, options).map_err(|e| failed(e.to_string()))
+}

@@ -1,0 +1,213 @@
+//! Tasks of the node: reception of messages, goals and requests, and publication of reports.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use futures::future::{BoxFuture, join, pending};
+use futures::stream::FuturesUnordered;
+use futures::{FutureExt, StreamExt};
+use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
+use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
+use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
+use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
+use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
+use rustdds::DomainParticipant;
+use tokio::runtime::Handle;
+use tokio::sync::{mpsc, watch};
+use tokio::task::JoinSet;
+
+use super::endpoints::NodeServices;
+use super::outputs::ActionOutputs;
+use super::requests::{reset_axes, stop_axes, stop_of_all_joints};
+use super::setup::NodeSetup;
+use crate::ros::action::{ActionChannels, ActionServer, GoalValidator, ServerContext, ShutdownHandle};
+use crate::ros::args::RosArgs;
+use crate::ros::axes_interface::{Command, SimulationReport};
+use crate::ros::clock::{ClockInput, ClockState};
+use crate::ros::diagnostics::Diagnostics;
+use crate::ros::endpoints::{Publisher, Subscription};
+use crate::ros::fan_out::publish_diagnostics;
+use crate::ros::health::Health;
+use crate::ros::inputs::{PsecInput, TrajectoryValidator, next_motion_id, receive_loads, receive_stream};
+use crate::ros::log::LogRecord;
+use crate::ros::matched_subscriptions::MatchedSubscriptionTracker;
+use crate::ros::outputs::Output;
+use crate::ros::pace::{CooperativeTasks, Pace};
+use crate::ros::parameter_host::{LiveNodeParameters, NodeParameterHost};
+use crate::ros::recorder::RecordingStatus;
+use crate::ros::remote_endpoints::DiscoveredEndpoints;
+use crate::ros::results::TrajectoryResults;
+use crate::ros::writer_rotation::{RotatedTopics, RotationContext};
+use crate::ros::{convert, duplicate_node_name, matched_subscriptions, rosout};
+use virtual_axes_core::config::{Parameters, TimeMode};
+
+/// Tasks of the node, with their shared state.
+pub(super) struct NodeTasks<'a> {
+    pub(super) args: &'a RosArgs,
+    pub(super) setup: &'a NodeSetup,
+    pub(super) participant: DomainParticipant,
+    pub(super) commands: mpsc::Sender<Command>,
+    pub(super) health: watch::Receiver<Health>,
+    pub(super) results: Arc<TrajectoryResults>,
+    /// Counter of motion ids.
+    pub(super) ids: Arc<AtomicU64>,
+    pub(super) live: Arc<LiveNodeParameters>,
+    pub(super) tasks: JoinSet<()>,
+}
+
+impl NodeTasks<'_> {
+    /// Starts the output `/rosout`, if it is enabled, and the check for duplicate node names.
+    pub(super) fn spawn_log_output(
+        &mut self,
+        rosout: Option<Publisher<Log>>,
+        log: mpsc::Receiver<LogRecord>,
+    ) {
+        if let Some(publisher) = rosout {
+            self.tasks.spawn(rosout::publish(publisher, log));
+        }
+        self.tasks.spawn(duplicate_node_name::watch(self.participant.clone(), self.args.node().clone()));
+    }
+
+    /// Starts the tracking of matched subscriptions and the rotation of writers. Returns the count of discovered
+    /// endpoints.
+    pub(super) fn spawn_discovery(
+        &mut self,
+        tracker: MatchedSubscriptionTracker,
+        rotated: RotatedTopics,
+        rotation: RotationContext,
+    ) -> DiscoveredEndpoints {
+        let discovered = DiscoveredEndpoints::default();
+        self.tasks.spawn(matched_subscriptions::run(self.participant.clone(), tracker, discovered.clone()));
+        self.tasks.spawn(rotated.run(rotation));
+        discovered
+    }
+
+    /// Starts the input `/clock`, if there is one; the state of the clock is sent to `state`.
+    pub(super) fn spawn_clock_input(
+        &mut self,
+        input: Option<(Subscription<Clock>, String)>,
+        state: watch::Sender<ClockState>,
+    ) {
+        let Some((subscription, name)) = input else { return };
+        let (participant, health) = (self.participant.clone(), self.health.clone());
+        let period = self.setup.period;
+        let input = ClockInput { subscription, name, participant, period, health, state };
+        self.tasks.spawn(input.run(self.setup.mode == TimeMode::Fast));
+    }
+
+    /// Starts the action server and the input `psec`.
+    pub(super) fn spawn_trajectory_inputs(
+        &mut self,
+        action: ActionServer,
+        outputs: ActionOutputs,
+        psec: Subscription<JointTrajectory>,
+    ) -> ShutdownHandle {
+        let validator = Arc::new(TrajectoryValidator {
+            joints: self.setup.joint_limits.clone(),
+            period: self.setup.period,
+            max_points: self.setup.node_config.max_points,
+            live: Arc::clone(&self.live),
+        });
+        let (handle, shutdown) = ShutdownHandle::new();
+        let context = ServerContext {
+            validator: GoalValidator { trajectories: Arc::clone(&validator) },
+            commands: self.commands.clone(),
+            results: Arc::clone(&self.results),
+            health: self.health.clone(),
+            ids: Arc::clone(&self.ids),
+        };
+        let ActionOutputs { status, running, events } = outputs;
+        self.tasks.spawn(action.serve(ActionChannels { context, events, running, status, shutdown }));
+        let psec_input = PsecInput {
+            validator,
+            commands: self.commands.clone(),
+            results: Arc::clone(&self.results),
+            health: self.health.clone(),
+            ids: Arc::clone(&self.ids),
+        };
+        self.tasks.spawn(psec_input.run(psec));
+        handle
+    }
+
+    /// Starts the parameter services, `~/stop` and `~/reset`.
+    pub(super) fn spawn_services(&mut self, services: NodeServices, parameters: Parameters) {
+        let health = self.health.clone();
+        let now = move || convert::stamp(health.borrow().time);
+        let host = NodeParameterHost::new(parameters, self.commands.clone(), Arc::clone(&self.live));
+        self.tasks.spawn(services.parameters.serve(host, now, pending()));
+        let NodeSetup { joint_limits, period, node_config, .. } = self.setup;
+        let stop = stop_of_all_joints(joint_limits, *period, node_config.max_points);
+        let (commands, ids) = (self.commands.clone(), Arc::clone(&self.ids));
+        let act = move || stop_axes(commands.clone(), next_motion_id(&ids), stop.clone());
+        self.tasks.spawn(services.stop.serve(act));
+        let commands = self.commands.clone();
+        self.tasks.spawn(services.reset.serve(move || reset_axes(commands.clone())));
+    }
+
+    /// Starts the publication of the diagnostics.
+    pub(super) fn spawn_diagnostics(
+        &mut self,
+        output: Output<DiagnosticArray>,
+        discovered: DiscoveredEndpoints,
+        dropped: Arc<AtomicU64>,
+        recording: Option<RecordingStatus>,
+    ) {
+        let diagnostics = Diagnostics {
+            node: self.args.node().to_string(),
+            machine: self.setup.config.name().to_owned(),
+            joints: self.setup.joints.clone(),
+            time_mode: match self.setup.mode {
+                TimeMode::Real => "real",
+                TimeMode::Fast => "fast",
+                TimeMode::SimTime => "sim",
+            },
+            discovered,
+        };
+        let health = self.health.clone();
+        self.tasks.spawn(publish_diagnostics(diagnostics, output, health, dropped, recording));
+    }
+
+    /// Starts the publication of the simulation's reports.
+    pub(super) fn spawn_reports(&mut self, mut reports: mpsc::UnboundedReceiver<SimulationReport>) {
+        let results = Arc::clone(&self.results);
+        self.tasks.spawn(async move {
+            while let Some(report) = reports.recv().await {
+                results.publish(report).await;
+            }
+        });
+    }
+
+    /// Returns the reception of streamed setpoints and loads, which does not end.
+    pub(super) fn stream_and_load_inputs(
+        &self,
+        psec_stream: Subscription<JointState>,
+        load: Subscription<JointState>,
+    ) -> BoxFuture<'static, ()> {
+        let NodeSetup { joints, node_config, .. } = self.setup;
+        let stream = receive_stream(psec_stream, joints.clone(), self.commands.clone());
+        let loads = receive_loads(load, joints.clone(), node_config.load_timeout, self.commands.clone());
+        join(stream, loads).then(|_| pending()).boxed()
+    }
+
+    /// Returns the pacing of the axes' thread. In real time the thread polls `inputs` and `outputs` itself, otherwise
+    /// another thread does.
+    pub(super) fn pace(
+        &mut self,
+        inputs: BoxFuture<'static, ()>,
+        outputs: BoxFuture<'static, ()>,
+        clock: watch::Receiver<ClockState>,
+    ) -> Pace {
+        match self.setup.mode {
+            TimeMode::Real => Pace::Real(CooperativeTasks { inputs, outputs }),
+            TimeMode::Fast | TimeMode::SimTime => {
+                // A separate thread, because the publication may wait for subscribers. It ends with the frames.
+                let futures = FuturesUnordered::from_iter([outputs, inputs]);
+                let runtime = Handle::current();
+                self.tasks.spawn_blocking(move || {
+                    let _ = runtime.block_on(futures.into_future());
+                });
+                Pace::Clock { state: clock, runtime: Handle::current() }
+            }
+        }
+    }
+}
