@@ -4,7 +4,7 @@
 //! cargo bench --bench contender -- SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--cores COUNT]
 //! ```
 //!
-//! SETPOINTS is a text file: names of the axes, then a row of setpoints (m, rad) per position period. Each line `run N`
+//! SETPOINTS is a text file: names of the axes, then a row of setpoints (m, rad) per position cycle. Each line `run N`
 //! on standard input makes N runs; the response is a line of JSON with the seconds per run and the figures. Without
 //! arguments it prints its usage.
 
@@ -37,7 +37,7 @@ const VELOCITY_SPREAD: f64 = 0.1;
 /// Case of a benchmark.
 struct Case {
     joints: Vec<String>,
-    /// Setpoints, one row per position period.
+    /// Setpoints, one row per position cycle.
     rows: Vec<Vec<f64>>,
     circle: Option<Circle>,
     machines: Vec<Arc<MachineParameters>>,
@@ -45,7 +45,7 @@ struct Case {
     cores: usize,
 }
 
-/// Circle about (−radius, 0) that is assessed in a window of position periods.
+/// Circle about (−radius, 0) that is assessed in a window of position cycles.
 struct Circle {
     radius: f64,
     window: Range<usize>,

@@ -4,7 +4,7 @@
 //! cargo run --release --example count_joint_states -- [SECONDS [PERIOD_MS [TOPIC]]]
 //! ```
 //!
-//! The node publishes one sample per position period with the time of its position cycle as stamp, so consecutive
+//! The node publishes one sample per position cycle with the time of its position cycle as stamp, so consecutive
 //! samples are PERIOD_MS (default 6) apart; a larger distance means lost samples.
 
 use std::env;

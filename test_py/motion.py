@@ -24,7 +24,7 @@ def swing(duration: float, amplitude: float = 0.05, rest: float = 0.0) -> tuple[
 
 
 def on_grid(drive: Drive, instant: int) -> int:
-    """Returns the first position instant at or after `instant`, ns."""
+    """Returns the first position cycle at or after `instant`, ns."""
     return grid_after(drive.now(), instant)
 
 
@@ -59,7 +59,7 @@ def assert_psec(
 
 
 def grid_after(start: int, instant: int) -> int:
-    """Returns the first position instant at or after `instant` on the grid through `start`, ns."""
+    """Returns the first position cycle at or after `instant` on the grid through `start`, ns."""
     return start + -(-(instant - start) // TSP_NS) * TSP_NS
 
 

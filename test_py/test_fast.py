@@ -25,7 +25,7 @@ LONG = 30.0
 
 
 def test_fast_outruns_the_wall_clock_on_an_unbroken_grid(start: Callable[..., Drive]):
-    """Half a minute of motion; the clock and the samples contain each position instant once."""
+    """Half a minute of motion; the clock and the samples contain each position cycle once."""
     drive = start("-p", "time:=fast")
     ticks: list[int] = []
     drive.node.create_subscription(Clock, "/clock", lambda message: ticks.append(to_ns(message.clock)), DEEP)
@@ -104,7 +104,7 @@ def leads(drive: Drive) -> bool:
 
 
 def assert_unbroken(drive: Drive, begin: int, end: int) -> None:
-    """Asserts that all position instants between two times exist, ns."""
+    """Asserts that all position cycles between two times exist, ns."""
     drive.wait_until(end // TSP_NS * TSP_NS, 30)
     stamps = drive.record(begin, end).joints.stamp
     assert np.array_equal(stamps, np.arange(-(-begin // TSP_NS) * TSP_NS, end + 1, TSP_NS))

@@ -230,7 +230,7 @@ def test_received_messages_are_recorded_bit_for_bit(session: Session):
 
 
 def test_publish_times_are_the_stamps(session: Session):
-    """Publish times are stamps, not after the log times; the grid of position instants is unbroken."""
+    """Publish times are stamps, not after the log times; the grid of position cycles is unbroken."""
     messages, _, _ = read(session.path)
     for topic in (STATES, CURRENTS, DRIVES):
         times = stamps(messages[topic])

@@ -47,7 +47,7 @@ def state_of(drive: Drive, wanted: str, timeout: float = 8.0) -> dict[str, str]:
 
 
 def begin_anew(clock: SimClock, first: int) -> None:
-    """Jumps to a position instant and drops all earlier samples."""
+    """Jumps to a position cycle and drops all earlier samples."""
     clock.set(first)
     samples = clock.drive._samples.values()
     clock.drive.wait_for(lambda: all(stamp_of(s[-1]) == first for s in samples), 5, f"samples of {first}")
@@ -109,7 +109,7 @@ def test_canceling_a_goal_before_the_first_message_keeps_other_goals(start: Call
 
 @pytest.mark.parametrize("step", [0.1, 0.001, 0.0137, 2.0], ids=lambda step: f"{1e3 * step:g} ms")
 def test_the_grid_is_unbroken_at_any_clock_step(clock: SimClock, step: float):
-    """Every position instant up to the clock is published at any clock step, and none after it."""
+    """Every position cycle up to the clock is published at any clock step, and none after it."""
     begin = clock.now
     clock.advance(max(0.3, 2 * step), step)
     stamps = stamps_since(clock.drive, begin, clock.now + NANOSECONDS)

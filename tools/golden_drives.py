@@ -175,7 +175,7 @@ def power(matrix, n):
 
 
 def impulse(values, tick_ns, ticks, instants):
-    """Returns θ at the position instants after an impulse of Ω* of one cycle: loops as powers of matrices."""
+    """Returns θ at the position cycles after an impulse of Ω* of one cycle: loops as powers of matrices."""
     j, kt, ke, r, ind, kv, tv, ki, ti = (mpf(v) * mpf(repr(f)) for v, (_, f) in zip(values, LOOPS.values()))
     tick = mpf(tick_ns) / 10**9
     # i, ω, θ, integral of the velocity loop, of the current loop, held u, i*, Ω*.

@@ -11,7 +11,7 @@ of the first message
 - of joint_states in which the axis has moved: also the pure delay of the simulated drive.
 
 Figures are ratios to the position cycle. A sample is published after its cycle has been computed. The first latency
-consists of the wait for the next position instant (uniform between 0 and 1 cycle), the computation of that cycle, and
+consists of the wait for the next position cycle (uniform between 0 and 1 cycle), the computation of that cycle, and
 the transport in both directions.
 """
 

@@ -8,7 +8,7 @@
 
 A row per length: CPU time and wall-clock time in s, ratio to real time, time per simulated second relative to the first
 length, maximum resident memory, and the sizes of the input and the outputs. `--report` and `--trace` also write a page
-and a trace (at position instants). With several `--rounds`, which alternate between the lengths, the figures are
+and a trace (at position cycles). With several `--rounds`, which alternate between the lengths, the figures are
 medians.
 """
 

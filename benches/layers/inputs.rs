@@ -114,7 +114,7 @@ fn report(criterion: &mut Criterion) {
         Report { title: "ballbar", description: "", runs }.write(&mut page).expect("written to memory");
         page
     };
-    let mut group = criterion.benchmark_group("report, position periods shown");
+    let mut group = criterion.benchmark_group("report, position cycles shown");
     let periods = recordings.first().map_or(0, |recording| recording.time.len());
     bench(&mut group, "page of a ballbar", periods, || page(1));
     bench(&mut group, "page that compares two", 2 * periods, || page(2));

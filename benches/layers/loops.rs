@@ -23,7 +23,7 @@ use crate::{bench, shipped, swing};
 
 /// Ticks, cycles or poses per iteration.
 const MANY: usize = 1000;
-/// Position periods per iteration of a machine.
+/// Position cycles per iteration of a machine.
 const PERIODS: usize = 100;
 /// Controller tuning of the paper.
 const TUNING: GpcTuning = GpcTuning { n1: 1, n2: 15, nu: 1, weight: ControlWeight::Relative(0.01) };

@@ -99,7 +99,7 @@ fn trajectory(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Returns the number of position periods of a program.
+/// Returns the number of position cycles of a program.
 fn periods_of(program: &Program, config: &MachineConfig) -> usize {
     (program.duration() / seconds(config.periods().position)).ceil() as usize
 }
@@ -107,7 +107,7 @@ fn periods_of(program: &Program, config: &MachineConfig) -> usize {
 fn path(criterion: &mut Criterion) {
     let config = shipped();
     let period = seconds(config.periods().position);
-    let mut group = criterion.benchmark_group("path, position periods");
+    let mut group = criterion.benchmark_group("path, position cycles");
     for name in SCENARIOS {
         let scenario = Scenario::builtin(name).expect("it is shipped");
         let program = program(name, &config);
@@ -124,7 +124,7 @@ fn path(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Returns the poses of a program with a small deviation, one batch per position period.
+/// Returns the poses of a program with a small deviation, one batch per position cycle.
 fn poses(program: &Program, config: &MachineConfig) -> Vec<Poses> {
     let kinematics = Kinematics::new(config);
     let (ticks, axes) = (config.periods().ticks_per_position() as usize, config.axes().len());
@@ -183,7 +183,7 @@ fn assess(criterion: &mut Criterion) {
     machine.advance(&[1e-3; 5], &[]);
     let (sample, activity) = (*machine.axis(0).sample(), machine.activity(0));
     let mut assessor = AxisAssessor::default();
-    let mut group = criterion.benchmark_group("assess, position periods of an axis");
+    let mut group = criterion.benchmark_group("assess, position cycles of an axis");
     bench(&mut group, "following errors and currents", 1000, || {
         (0..1000).for_each(|_| assessor.observe(black_box(&sample), &activity));
         assessor.report(tick)
@@ -195,7 +195,7 @@ fn simulation(criterion: &mut Criterion) {
     let config = shipped();
     let (limits, period) = (joint_limits(&config, ""), config.periods().position);
     let trajectory = Arc::new(checked(request(&config, 1, false), &limits, period));
-    let mut group = criterion.benchmark_group("simulation, position periods");
+    let mut group = criterion.benchmark_group("simulation, position cycles");
     group.throughput(Throughput::Elements(POINTS as u64));
     for (name, assessing) in [("five axes", false), ("five axes, with the figures of a motion", true)] {
         let begun = || {

@@ -121,7 +121,7 @@ fn identify_one(criterion: &mut Criterion) {
     let config = shipped();
     let planned = Campaign::plan(&config, 0, &FeedforwardMode::ALL, &CampaignOptions::default());
     let samples = planned.expect("planned").psec().len();
-    let mut group = criterion.benchmark_group("identify, position periods recorded");
+    let mut group = criterion.benchmark_group("identify, position cycles recorded");
     group.sample_size(FEW_SAMPLES);
     bench(&mut group, "a campaign planned", samples, || {
         Campaign::plan(&config, 0, &FeedforwardMode::ALL, &CampaignOptions::default())

@@ -84,7 +84,7 @@ static inline struct state at_rest(const struct axis *p, double position) {
   return s;
 }
 
-/* Position instant. `psec` points to the setpoint of the new cycle; the previous ones precede it in memory. */
+/* Position cycle. `psec` points to the setpoint of the new cycle; the previous ones precede it in memory. */
 static inline void control_position(const struct axis *p, struct state *s, const double *psec) {
   const double delayed = psec[-(p->alpha.periods)];
   const double unlimited = p->position_gain * (delayed * p->inverse_ratio - s->theta);

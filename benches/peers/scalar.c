@@ -6,7 +6,7 @@
  * TABLE is a file such as mikron_ucp710.txt. SETPOINTS is text: names of the axes, then a row of
  * setpoints (m, rad) for each position cycle. --circle adds the radial deviation of the first two axes from a
  * circle about (-RADIUS, 0), at every tick of the position cycles FIRST up to LAST. --machines runs COUNT machines
- * with different gains one after the other. --positions prints the positions at position instants and exits.
+ * with different gains one after the other. --positions prints the positions at position cycles and exits.
  *
  * Each line "run N" on standard input makes N runs; the response is a line of JSON with seconds per run and figures.
  *

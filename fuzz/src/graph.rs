@@ -31,7 +31,7 @@ use crate::{JOINTS, MACHINE, ORIGIN, PARAMETERS, assert_one_line, bounded, machi
 
 /// Length of the encapsulation header, bytes.
 const HEADER: usize = 4;
-/// Simulated position periods after an accepted message.
+/// Simulated position cycles after an accepted message.
 const PERIODS: usize = 12;
 /// Longest trajectory of the target, s; the node accepts any duration.
 const LONGEST: i32 = 60;

@@ -10,7 +10,7 @@ use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
 
 use crate::{JOINTS, MACHINE, ORIGIN, assert_one_line, bounded, machine_at_rest, step};
 
-/// Largest number of position periods per input.
+/// Largest number of position cycles per input.
 const MAX_PERIODS: usize = 200;
 /// Largest number of points of a trajectory.
 const MAX_POINTS: usize = 12;

@@ -13,7 +13,7 @@ use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectory;
 pub struct TrajectoryValidator {
     /// Limits of the joints, in the order of the machine.
     pub joints: Vec<JointLimits>,
-    /// Position period Tsp, ns.
+    /// Position cycle Tsp, ns.
     pub period: Nanoseconds,
     /// Largest number of points of one trajectory.
     pub max_points: usize,

@@ -13,7 +13,7 @@ use virtual_axes_core::units::Nanoseconds;
 /// Capacity of the command queue. A sender waits while the queue is full.
 pub const COMMAND_QUEUE: usize = 64;
 
-/// Command to the simulation; takes effect at the next position instant.
+/// Command to the simulation; takes effect at the next position cycle.
 #[derive(Debug)]
 pub enum Command {
     /// Submits a trajectory.
@@ -66,12 +66,12 @@ pub enum SimulationReport {
     StreamEnded(Nanoseconds, StreamEnd, JointSet, Arc<()>),
 }
 
-/// Samples of all axes at one position instant.
+/// Samples of all axes at one position cycle.
 #[derive(Debug, Clone, Default)]
 pub struct SampleFrame {
-    /// Number of the position instant.
+    /// Number of the position cycle.
     pub instant: i64,
-    /// Time of the position instant, ns.
+    /// Time of the position cycle, ns.
     pub time: Nanoseconds,
     /// Sample of each axis.
     pub samples: Vec<AxisSample>,

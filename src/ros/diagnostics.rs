@@ -127,7 +127,7 @@ fn node_problems(before: &Health, now: &Health, dropped: u64) -> Vec<&'static st
         (now.missed > before.missed, "position cycles were released late"),
         (
             now.unpublished > before.unpublished,
-            "the node stalled: position instants were computed but not published",
+            "the node stalled: position cycles were computed but not published",
         ),
         (now.dropped - before.dropped + dropped > 0, "samples were dropped: a subscriber is slow"),
         (new.rejected > old.rejected, "streamed setpoints were rejected"),

@@ -9,7 +9,7 @@ use virtual_axes_core::units::Nanoseconds;
 /// Counters and state of the axes' thread since the start.
 #[derive(Debug, Clone, Default)]
 pub struct Health {
-    /// Time of the last position instant, ns.
+    /// Time of the last position cycle, ns.
     pub time: Nanoseconds,
     /// True while a trajectory or a stop moves the setpoints.
     pub is_moving: bool,
@@ -40,9 +40,9 @@ pub struct Health {
 pub struct AxisHealth {
     /// Number of position cycles in which a controller output was saturated.
     pub saturated: u64,
-    /// Number of position instants at which the friction law was extrapolated.
+    /// Number of position cycles at which the friction law was extrapolated.
     pub extrapolated: u64,
-    /// Number of position instants at which the axis was outside its travel limits.
+    /// Number of position cycles at which the axis was outside its travel limits.
     pub outside: u64,
 }
 
@@ -51,7 +51,7 @@ pub struct AxisHealth {
 pub struct ClockHealth {
     /// Source of the clock.
     pub source: ClockSource,
-    /// Delay of the position instants relative to the clock, ns.
+    /// Delay of the position cycles relative to the clock, ns.
     pub behind: Nanoseconds,
     /// True if the thread waited for a slow subscriber at its last wait.
     pub is_blocked: bool,
@@ -86,7 +86,7 @@ impl ClockSource {
 }
 
 impl Health {
-    /// Counts a position instant that has been released `lateness` after it was due.
+    /// Counts a position cycle that has been released `lateness` after it was due.
     pub fn update(&mut self, simulation: &Simulation, lateness: Duration, is_missed: bool, is_dropped: bool) {
         let lateness = lateness.as_secs_f64();
         self.time = simulation.time_of(simulation.next_instant() - 1);

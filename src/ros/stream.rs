@@ -47,7 +47,7 @@ enum StreamWarning {
 }
 
 impl StreamIntake {
-    /// Submits `setpoints` for the next position instant.
+    /// Submits `setpoints` for the next position cycle.
     pub fn submit(&mut self, simulation: &mut Simulation, setpoints: &StreamSetpoints) {
         let now = simulation.time_of(simulation.next_instant());
         self.reordered += u64::from(setpoints.is_reordered);
@@ -71,7 +71,7 @@ impl StreamIntake {
         }
     }
 
-    /// Logs a gap of the stream; called after each position instant.
+    /// Logs a gap of the stream; called after each position cycle.
     pub fn check_gaps(&mut self, simulation: &Simulation) {
         let gaps = simulation.stream_counts().gaps;
         let now = simulation.time_of(simulation.next_instant());

@@ -80,7 +80,7 @@ class Drive:
     ):
         """Joins the graph and, unless `connect` is false, waits for the axes.
 
-        Unless `listen` is false it keeps their samples of each position instant.
+        Unless `listen` is false it keeps their samples of each position cycle.
 
         `remaps` are the remapping rules of the axes' node, as in "joint_states:=/states".
 
@@ -247,7 +247,7 @@ class Drive:
     # ---- time
 
     def now(self) -> int:
-        """Returns the newest position instant that the axes have published, ns of the node's clock."""
+        """Returns the newest position cycle that the axes have published, ns of the node's clock."""
         self._must_listen()
         with self._changed:
             return stamp_of(self._samples["states"][-1])
@@ -439,7 +439,7 @@ class Drive:
             raise ParameterRejected("; ".join(reasons))
 
     def set_parameters_atomically(self, values: Mapping[str, Any]) -> None:
-        """Sets all parameters at the same position instant or none; raises ParameterRejected."""
+        """Sets all parameters at the same position cycle or none; raises ParameterRejected."""
         request = SetParametersAtomically.Request(parameters=parameter_messages(values))
         result = self.call(SetParametersAtomically, "set_parameters_atomically", request).result
         if not result.successful:

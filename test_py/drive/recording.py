@@ -78,7 +78,7 @@ class Recording:
         return (self.time >= span[0]) & (self.time <= span[1])
 
     def tracking_error(self, joint: str) -> np.ndarray:
-        """Returns the following error PSEC - SP at all position instants; contains the pure delay."""
+        """Returns the following error PSEC - SP at all position cycles; contains the pure delay."""
         return self.states["psec", joint] - self.states["position", joint]
 
     def synchronized_tracking_error(self, joint: str, alpha_periods: float = 1.5) -> np.ndarray:

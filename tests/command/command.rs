@@ -101,7 +101,7 @@ fn setpoints_are_simulated_and_traced() {
     assert_eq!(folder.names(), ["psec.csv", "trace.csv"]);
     let text = std::fs::read_to_string(&trace).expect("readable");
     assert!(text.starts_with("time,x.psec,x.position,x.velocity,x.current,"), "{text:.80}");
-    assert!(text.lines().nth(101).expect("a row per position period").starts_with("0.6,0.01,"));
+    assert!(text.lines().nth(101).expect("a row per position cycle").starts_with("0.6,0.01,"));
 }
 
 #[test]

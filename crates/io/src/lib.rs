@@ -16,7 +16,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let machine = Parameters::embedded_default()?.machine_config()?;
 //!
-//! // Position setpoints of the X axis, m, one row per position period of 6 ms.
+//! // Position setpoints of the X axis, m, one row per position cycle of 6 ms.
 //! let text = "time,x\n0,0\n0.006,0.001\n0.012,0.002\n";
 //! let joints = joint_limits(&machine, "");
 //! let mut psec = PsecCsvReader::new(text.as_bytes(), "example.csv", machine.periods().position, &joints)?;

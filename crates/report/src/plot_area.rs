@@ -38,7 +38,7 @@ impl PlotArea {
     }
 
     /// Converts a pair of values to pixels.
-    pub(super) fn to_pixels(&self, [x, y]: [f64; 2]) -> PixelPoint {
+    pub(super) fn to_pixels(self, [x, y]: [f64; 2]) -> PixelPoint {
         [self.x()(x), self.y()(y)]
     }
 

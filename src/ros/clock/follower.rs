@@ -1,4 +1,4 @@
-//! Follower of `/clock`: the newest time, the position instants that are due, and clock jumps.
+//! Follower of `/clock`: the newest time, the position cycles that are due, and clock jumps.
 
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 
@@ -50,7 +50,7 @@ impl ClockFollower {
 
     /// Processes a message. With `never_jumps_ahead` a forward step of any size is simulated.
     ///
-    /// The follower waits for a clock that is set back by less than a position period, because no released instant
+    /// The follower waits for a clock that is set back by less than a position cycle, because no released instant
     /// has to be repeated.
     pub fn receive(&mut self, time: Nanoseconds, never_jumps_ahead: bool) {
         let Some(newest) = self.newest else {
@@ -71,7 +71,7 @@ impl ClockFollower {
     }
 }
 
-/// Returns the first position instant that is not before `time`, ns: a multiple of `period`, ns.
+/// Returns the first position cycle that is not before `time`, ns: a multiple of `period`, ns.
 pub fn first_instant(time: Nanoseconds, period: Nanoseconds) -> Nanoseconds {
     -(-time).div_euclid(period) * period
 }

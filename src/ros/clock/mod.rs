@@ -93,9 +93,9 @@ pub struct ClockInput {
     pub name: String,
     /// Participant, which discovers the publishers.
     pub participant: DomainParticipant,
-    /// Position period Tsp, ns.
+    /// Position cycle Tsp, ns.
     pub period: Nanoseconds,
-    /// State of the axes' thread, with the time of the last position instant.
+    /// State of the axes' thread, with the time of the last position cycle.
     pub health: watch::Receiver<Health>,
     /// Sender of the state of the clock.
     pub state: watch::Sender<ClockState>,

@@ -14,9 +14,9 @@ pub(super) struct NodeSetup {
     pub(super) joint_limits: Vec<JointLimits>,
     /// Names of the joints, with prefix.
     pub(super) joints: Vec<String>,
-    /// Position period Tsp, ns.
+    /// Position cycle Tsp, ns.
     pub(super) period: Nanoseconds,
-    /// Overflow policy of the outputs of every position instant.
+    /// Overflow policy of the outputs of every position cycle.
     pub(super) overflow: OverflowPolicy,
     /// Overflow policy of results and goal status.
     pub(super) result_overflow: OverflowPolicy,

@@ -50,12 +50,12 @@ impl Axes {
         &self.simulation
     }
 
-    /// Returns the time of the next position instant, ns.
+    /// Returns the time of the next position cycle, ns.
     pub(super) fn next_time(&self) -> Nanoseconds {
         self.simulation.time_of(self.simulation.next_instant())
     }
 
-    /// Computes the next position instant.
+    /// Computes the next position cycle.
     pub(super) fn step(&mut self) -> Arc<SampleFrame> {
         let Axes { simulation, stream, resets, motions, frames, .. } = self;
         let instant = simulation.next_instant();
@@ -117,7 +117,7 @@ impl Axes {
         });
     }
 
-    /// Continues at the position instant with the time `time`, ns.
+    /// Continues at the position cycle with the time `time`, ns.
     pub(super) fn jump_to(&mut self, time: Nanoseconds) {
         self.simulation.jump_to(time);
         self.report_ends();

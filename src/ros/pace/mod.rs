@@ -1,6 +1,6 @@
 //! Thread that owns the simulation and paces its position cycles; the only module that reads the wall clock for them.
 //!
-//! In real time ([`real`]) position instant k is computed and released when the wall clock reaches it. A late instant
+//! In real time ([`real`]) position cycle k is computed and released when the wall clock reaches it. A late instant
 //! is computed at once and counted; none is skipped. With a ROS clock ([`paced`]), published by this node in `fast` or
 //! by another node, the simulation steps on the same time grid; the clock only determines the time of each step.
 

@@ -1,7 +1,7 @@
 //! Pacing by a ROS clock: published by this node in `fast`, or by another node.
 //!
 //! Commands are received whether or not time advances, so that services respond and no command is lost while the
-//! clock is paused or a subscriber is slow; they take effect at the next position instant. Trajectories received
+//! clock is paused or a subscriber is slow; they take effect at the next position cycle. Trajectories received
 //! before the first time are kept until it arrives.
 
 use std::collections::VecDeque;
@@ -18,7 +18,7 @@ use crate::ros::clock::{ClockJump, ClockState, Role, first_instant};
 use crate::ros::health::ClockSource;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// Condition for the computation of the next position instant.
+/// Condition for the computation of the next position cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum StepCondition {
     /// No condition: the instant may be computed at once.
@@ -118,7 +118,7 @@ struct PacedAxes {
     is_time_known: bool,
     /// Number of clock jumps that have been applied.
     jumps: u64,
-    /// True after the first position instant.
+    /// True after the first position cycle.
     has_stepped: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Wall clock as a sequence of position instants, and the timer of an idle machine in `fast`.
+//! Wall clock as a sequence of position cycles, and the timer of an idle machine in `fast`.
 
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -10,7 +10,7 @@ use virtual_axes_core::units::Nanoseconds;
 /// Largest number of late ticks of the idle timer that are made up for; earlier ones are skipped.
 const CATCH_UP: u32 = 10;
 
-/// Returns the time of position instant 0, ns since the Unix epoch: the next multiple of `period` (ns).
+/// Returns the time of position cycle 0, ns since the Unix epoch: the next multiple of `period` (ns).
 ///
 /// With `use_sim_time` the origin is preliminary; the first `/clock` message sets the time.
 pub fn origin(mode: TimeMode, period: Nanoseconds) -> Nanoseconds {
@@ -30,7 +30,7 @@ pub(super) fn since_epoch() -> Duration {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
 }
 
-/// Schedule of the position instants on the monotonic clock.
+/// Schedule of the position cycles on the monotonic clock.
 ///
 /// The wall clock is read once at construction, so that setting it later neither stops nor accelerates the axes.
 pub(super) struct PaceClock {

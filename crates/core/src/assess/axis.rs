@@ -6,19 +6,19 @@ use crate::statistics::rms_of_sum;
 /// Figures of one axis over a motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AxisReport {
-    /// Largest following error |PSEC − SP| at position instants, m or rad; contains the pure delay.
+    /// Largest following error |PSEC − SP| at position cycles, m or rad; contains the pure delay.
     pub max_following_error: f64,
-    /// RMS of the following error PSEC − SP at position instants, m or rad.
+    /// RMS of the following error PSEC − SP at position cycles, m or rad.
     pub rms_following_error: f64,
-    /// Largest delay-compensated following error |PSEC delayed by α − SP| at position instants, m or rad.
+    /// Largest delay-compensated following error |PSEC delayed by α − SP| at position cycles, m or rad.
     pub max_delay_compensated_following_error: f64,
-    /// RMS of the delay-compensated following error at position instants, m or rad.
+    /// RMS of the delay-compensated following error at position cycles, m or rad.
     pub rms_delay_compensated_following_error: f64,
     /// Largest |i| at any tick, A.
     pub peak_current: f64,
     /// Time with speed, current or voltage setpoint at its limit, s.
     pub saturation_time: f64,
-    /// Control activity: RMS of the change of the current setpoint between consecutive position instants,
+    /// Control activity: RMS of the change of the current setpoint between consecutive position cycles,
     /// A.
     pub control_activity: f64,
 }
@@ -30,14 +30,14 @@ pub struct AxisAssessor {
     sum_following_squared: f64,
     sum_compensated_squared: f64,
     sum_activity_squared: f64,
-    /// Current setpoint at the last position instant, A.
+    /// Current setpoint at the last position cycle, A.
     current_setpoint: f64,
     instants: u64,
     saturated_ticks: u64,
 }
 
 impl AxisAssessor {
-    /// Adds a position cycle: the sample at its position instant and the activity of its ticks.
+    /// Adds a position cycle: the sample at its position cycle and the activity of its ticks.
     pub fn observe(&mut self, instant: &AxisSample, activity: &Activity) {
         let report = &mut self.maxima;
         report.peak_current = report.peak_current.max(activity.peak_current);

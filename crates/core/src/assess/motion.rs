@@ -59,7 +59,7 @@ impl MotionAssessor {
         }
     }
 
-    /// Adds future setpoints to the path before a position instant.
+    /// Adds future setpoints to the path before a position cycle.
     ///
     /// `psec` returns the setpoint of an axis, by its machine index, the given number of cycles after that
     /// instant. The preview is needed where an axis overshoots a corner: it is closest to a later part of

@@ -2,7 +2,7 @@
 
 use crate::config::AxisKind;
 
-/// Signals of one run at position instants; all lists of a run have the length of [`Self::time`].
+/// Signals of one run at position cycles; all lists of a run have the length of [`Self::time`].
 ///
 /// Quantities whose figures are evaluated at every tick are recorded at their largest value in the position
 /// cycle, so that a plot shows the figure.

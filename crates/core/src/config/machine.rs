@@ -169,7 +169,7 @@ pub struct GpcConfig {
     pub n1: usize,
     /// Last period N2 of the prediction horizon.
     pub n2: usize,
-    /// Length Nu of the control horizon, position periods.
+    /// Length Nu of the control horizon, position cycles.
     pub nu: usize,
     /// Relative control weight λ / trace(GᵀG); unused if `lambda` is set.
     pub lambda_rel: f64,

@@ -22,7 +22,7 @@ const MAX_CURRENT: f64 = 1e4;
 /// Range of the exponents of the friction law, min/m or min/rev. The decrease after breakaway can be steep; a rise
 /// steeper than e^V does not occur in bearings.
 const FRICTION_EXPONENT: (f64, f64) = (-100.0, 1.0);
-/// Maximum horizon of predictive control and maximum preview of T, position periods.
+/// Maximum horizon of predictive control and maximum preview of T, position cycles.
 pub const MAX_HORIZON: i64 = 200;
 /// Range of the plant deviation factors.
 const DEVIATION: (f64, f64) = (0.1, 10.0);
@@ -234,10 +234,10 @@ const MACHINE: &[ParameterDefinition] = &[
         .on(Rotary)
         .describe("Kp, position-loop gain; 1 (1000 °/min)/° is 16.667 s⁻¹ (Prévost Appendix 2)."),
     horizon("position_loop.gpc.n1", 1)
-        .describe("N1, first position period of the prediction horizon, at most n2 (Prévost table 1)."),
-    horizon("position_loop.gpc.n2", 14).describe("N2, last position period of the prediction horizon (Prévost table 1)."),
+        .describe("N1, first position cycle of the prediction horizon, at most n2 (Prévost table 1)."),
+    horizon("position_loop.gpc.n2", 14).describe("N2, last position cycle of the prediction horizon (Prévost table 1)."),
     horizon("position_loop.gpc.nu", 12)
-        .describe("Nu, position periods of the control horizon, at most n2 (Prévost table 1)."),
+        .describe("Nu, position cycles of the control horizon, at most n2 (Prévost table 1)."),
     ParameterDefinition::number("position_loop.gpc.lambda_rel", "", 0.0, MAX_GAIN)
         .of_axis()
         .default(Number(0.005))
@@ -263,7 +263,7 @@ const MACHINE: &[ParameterDefinition] = &[
         .of_axis()
         .default(Integer(0))
         .live()
-        .describe("Power of q of the first term of T: 1 is one position period of preview."),
+        .describe("Power of q of the first term of T: 1 is one position cycle of preview."),
     gain("velocity_loop.gain", "N·m/(rad/s)")
         .driven_by(RotaryMotor)
         .describe("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),

@@ -47,7 +47,9 @@ impl Pi {
 }
 
 impl<N: SimdReal> Pi<N> {
-    /// Steps the controller by one cycle with an error; returns the limited output, without `scale`.
+    /// Steps the controller by one cycle with an error; returns the limited output.
+    ///
+    /// Valid only for `scale` = 1, as in the current loop: the integral is not scaled.
     #[inline(always)]
     pub fn update(&self, s: &mut PiState<N>, error: N) -> N {
         self.output(s, error, s.integral)

@@ -198,7 +198,7 @@ pub struct Feedforward {
 }
 
 impl Feedforward {
-    /// Creates a feedforward for position period `period` (s) and transmission ratio r.
+    /// Creates a feedforward for position cycle `period` (s) and transmission ratio r.
     pub fn new(config: &FeedforwardConfig, period: f64, transmission_ratio: f64) -> Self {
         Feedforward {
             velocity: config.velocity / period / transmission_ratio,

@@ -47,7 +47,7 @@ impl PredictionModel {
         &self.b
     }
 
-    /// Returns the position period Tsp, s.
+    /// Returns the position cycle Tsp, s.
     pub fn period(&self) -> f64 {
         self.period
     }

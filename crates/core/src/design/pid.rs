@@ -12,7 +12,7 @@ const MAX_INTEGRAL_TIME: f64 = 100.0;
 const MAX_DERIVATIVE_TIME: f64 = 1.0;
 /// Largest weight of the velocity feedforward; 1 feeds the setpoint's velocity forward.
 const MAX_FEEDFORWARD: f64 = 2.0;
-/// Longest position period, s.
+/// Longest position cycle, s.
 const MAX_PERIOD: f64 = 1.0;
 /// 1 − q⁻¹.
 const DIFFERENCE: [f64; 2] = [1.0, -1.0];

@@ -4,6 +4,8 @@
 //! [`AxisBlock::run`] is the only code that runs the recurrence of an axis: one generic function over [`SimdReal`],
 //! compiled once per SIMD width. Its documentation lists the equations.
 
+use std::hint::black_box;
+
 use pulp::Simd;
 
 use crate::control::{Pi, PiState};
@@ -110,6 +112,16 @@ soa_struct! {
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
 pub(super) struct Aligned<T>(pub T);
+
+/// Aligns the stack frame of the calling function to 64 bytes; returns the address of a local aligned that way.
+///
+/// The compiler aligns a stack frame as its most aligned local requires. SIMD vectors that are spilled to an aligned
+/// frame do not cross cache lines (docs/performance.md, block sizes). [`black_box`] keeps the local from being
+/// optimized away. The function is always inlined: a call would align only its own frame.
+#[inline(always)]
+fn align_stack_frame() -> usize {
+    std::ptr::from_mut(black_box(&mut Aligned(0_u8))).addr()
+}
 
 /// Lengths of the control cycles in ticks; a tick is one current cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -258,6 +270,7 @@ impl<const L: usize> AxisBlock<L> {
         ticks: CycleTicks,
         record_all: bool,
     ) {
+        align_stack_frame();
         let loops: InnerLoops<N> = self.loops.0.load(simd, index);
         let inputs: InnerLoopInputs<N> = self.inputs.0.load(simd, index);
         let mut friction_expansion: FrictionExpansion<N> = self.friction_expansion.0.load(simd, index);
@@ -361,6 +374,19 @@ impl<N: SimdReal> InnerLoops<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Aligns the frame behind `depth` calls with a local of one byte each.
+    fn aligned_behind(depth: usize) -> usize {
+        let local = black_box(depth as u8);
+        if local == 0 { align_stack_frame() } else { aligned_behind(depth - 1) }
+    }
+
+    #[test]
+    fn stack_frames_are_aligned_to_a_cache_line() {
+        for depth in 0..100 {
+            assert_eq!(aligned_behind(depth) % 64, 0, "depth {depth}");
+        }
+    }
 
     #[test]
     fn zero_order_hold_switches_at_its_velocity_cycle() {

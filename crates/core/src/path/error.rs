@@ -156,8 +156,8 @@ pub enum PlanError {
         /// Value found.
         value: f64,
     },
-    /// Position period that is not positive.
-    #[error("the position period must be larger than 0; found {found} ns")]
+    /// Position cycle that is not positive.
+    #[error("the position cycle must be larger than 0; found {found} ns")]
     InvalidPeriod {
         /// Value found, ns.
         found: i64,

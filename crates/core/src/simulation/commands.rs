@@ -1,4 +1,4 @@
-//! Commands to a running simulation between two position instants: trajectories, cancellation, streamed
+//! Commands to a running simulation between two position cycles: trajectories, cancellation, streamed
 //! setpoints, loads, parameters, reset.
 
 use std::sync::Arc;
@@ -67,7 +67,7 @@ impl Simulation {
         true
     }
 
-    /// Continues at `time` (ns) with the next position instant, after a jump of the followed clock.
+    /// Continues at `time` (ns) with the next position cycle, after a jump of the followed clock.
     ///
     /// All motions are aborted, every axis comes to rest by a controlled stop, loads and the stream are
     /// cleared. The motion of the axes does not depend on the absolute time.
@@ -79,7 +79,7 @@ impl Simulation {
         self.grid.origin = time.saturating_sub(self.next.saturating_mul(self.grid.period));
     }
 
-    /// Submits one streamed setpoint of a joint, m or rad, for the next position instant.
+    /// Submits one streamed setpoint of a joint, m or rad, for the next position cycle.
     ///
     /// Returns true if it is accepted; it is commanded [`stream_delay`](Self::stream_delay) later. Returns
     /// false while a trajectory or a stop commands the joint, and after a stop until the stream has
@@ -136,13 +136,13 @@ impl Simulation {
     }
 
     /// Sets the external force or torque on an axis, N or N·m, positive in positive direction, from the
-    /// next position instant on for `hold` ns; limited to ±[`MAX_LOAD`](super::MAX_LOAD), zero for NaN.
+    /// next position cycle on for `hold` ns; limited to ±[`MAX_LOAD`](super::MAX_LOAD), zero for NaN.
     pub fn set_load(&mut self, axis: usize, load: f64, hold: Nanoseconds) {
         let until = self.next + hold.max(0).div_euclid(self.grid.period).max(1);
         self.loads.set(axis, load, until);
     }
 
-    /// Replaces gains, weights or delays at the next position instant.
+    /// Replaces gains, weights or delays at the next position cycle.
     ///
     /// # Errors
     /// [`MachineError::AnotherMachine`] if joints or periods differ. Nothing changes then.

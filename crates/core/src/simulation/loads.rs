@@ -9,7 +9,7 @@ pub const MAX_LOAD: f64 = 1e6;
 struct AxisLoad {
     /// Load, N or N·m.
     value: f64,
-    /// First position instant without the load.
+    /// First position cycle without the load.
     until: i64,
 }
 
@@ -43,7 +43,7 @@ impl AxisLoads {
         self.axes.iter().any(|l| l.value != 0.0)
     }
 
-    /// Applies the loads of position instant `k` to the machine.
+    /// Applies the loads of position cycle `k` to the machine.
     pub(super) fn apply(&mut self, machine: &mut Machine, k: i64) {
         for (axis, load) in self.axes.iter_mut().enumerate() {
             if k >= load.until {

@@ -39,14 +39,14 @@ pub enum SimulationError {
     /// An axis cannot be discretized.
     #[error(transparent)]
     Machine(#[from] MachineError),
-    /// Number of joints or position period out of range.
+    /// Number of joints or position cycle out of range.
     #[error(transparent)]
     Timeline(#[from] TimelineError),
 }
 
 /// Simulated machine with its accepted trajectories.
 ///
-/// Position instant k is at `origin + k·Tsp`; the first one is k = 0. Until the first trajectory starts, a
+/// Position cycle k is at `origin + k·Tsp`; the first one is k = 0. Until the first trajectory starts, a
 /// stream first moves a joint or the first load acts, the machine is exactly at rest at its start position.
 /// Therefore the result of a trajectory does not depend on the waiting time before it.
 #[derive(Debug)]
@@ -56,7 +56,7 @@ pub struct Simulation {
     /// Preview of setpoints for the controllers, m or rad, the same number for each axis.
     preview: Vec<f64>,
     grid: PositionGrid,
-    /// Next position instant.
+    /// Next position cycle.
     next: i64,
     /// The machine has moved since it was last reset.
     has_moved: bool,
@@ -72,7 +72,7 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Creates the simulation of the machine `config` at rest at home, with its first position instant at
+    /// Creates the simulation of the machine `config` at rest at home, with its first position cycle at
     /// `origin` (ns), for trajectories validated against `joints` (see [`joint_limits`]).
     ///
     /// # Errors
@@ -119,17 +119,17 @@ impl Simulation {
         self.machine.set_simd_width(width);
     }
 
-    /// Returns the time of position instant k, ns.
+    /// Returns the time of position cycle k, ns.
     pub fn time_of(&self, k: i64) -> Nanoseconds {
         self.grid.time_of(k)
     }
 
-    /// Returns the position instant that the next [`step`](Self::step) computes.
+    /// Returns the position cycle that the next [`step`](Self::step) computes.
     pub fn next_instant(&self) -> i64 {
         self.next
     }
 
-    /// Returns the position period Tsp, ns.
+    /// Returns the position cycle Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
         self.grid.period
     }
@@ -239,7 +239,7 @@ impl Simulation {
         }
     }
 
-    /// Copies the samples of the position instant and updates saturation and figures.
+    /// Copies the samples of the position cycle and updates saturation and figures.
     fn record_cycle(&mut self) {
         let axes = self.machine.axes().iter().enumerate();
         for (((index, axis), sample), saturated) in axes.zip(&mut self.samples).zip(&mut self.saturated) {
@@ -257,7 +257,7 @@ impl Simulation {
         }
     }
 
-    /// Returns the samples of all axes at the last position instant.
+    /// Returns the samples of all axes at the last position cycle.
     pub fn samples(&self) -> &[AxisSample] {
         &self.samples
     }

@@ -37,9 +37,9 @@ pub enum AbortReason {
     Reset,
     /// Jump of the followed clock.
     ClockJump {
-        /// Time of the position instant before the jump, ns.
+        /// Time of the position cycle before the jump, ns.
         from: Nanoseconds,
-        /// Time of the position instant after the jump, ns.
+        /// Time of the position cycle after the jump, ns.
         to: Nanoseconds,
     },
 }
@@ -49,7 +49,7 @@ pub enum AbortReason {
 pub struct MotionEnd {
     /// Identifier of the motion.
     pub id: MotionId,
-    /// Time of the position instant of the end, ns.
+    /// Time of the position cycle of the end, ns.
     pub time: Nanoseconds,
     /// Outcome.
     pub outcome: MotionOutcome,
@@ -59,7 +59,7 @@ pub struct MotionEnd {
     pub report: MotionReport,
 }
 
-/// Times of the position instants.
+/// Times of the position cycles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PositionGrid {
     /// Time of instant 0, ns.

@@ -1,7 +1,7 @@
 //! Path tolerance and goal tolerance of a motion, as defined by the action
 //! `control_msgs/FollowJointTrajectory`.
 //!
-//! With e the delay-compensated following error of an axis at position instant k, the errors are
+//! With e the delay-compensated following error of an axis at position cycle k, the errors are
 //!
 //! ```text
 //! position e[k]    velocity (e[k] − e[k−1])/Tsp    acceleration (e[k] − 2 e[k−1] + e[k−2])/Tsp²
@@ -60,7 +60,7 @@ pub struct ToleranceViolation {
     pub limit: f64,
 }
 
-/// Delay-compensated following errors of one axis at the last three position instants, newest first.
+/// Delay-compensated following errors of one axis at the last three position cycles, newest first.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct ErrorHistory([f64; 3]);
 

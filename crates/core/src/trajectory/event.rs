@@ -1,4 +1,4 @@
-//! Events of motions at position instants: started, completed, preempted, stopped.
+//! Events of motions at position cycles: started, completed, preempted, stopped.
 
 /// Identifier of a motion, i.e. of an accepted trajectory; chosen by the caller and returned in events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -33,7 +33,7 @@ impl JointSet {
     }
 }
 
-/// Event of a motion at a position instant.
+/// Event of a motion at a position cycle.
 ///
 /// Each accepted trajectory gets [`TimelineEvent::Started`] at most once and exactly one of the other
 /// events. The latter is its last event, even if some of its joints continue to move.

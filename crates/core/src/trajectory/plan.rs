@@ -1,4 +1,4 @@
-//! Plan of one joint from an instant on: a pure function of the position instant.
+//! Plan of one joint from an instant on: a pure function of the position cycle.
 
 use super::joint_trajectory::Trajectory;
 use super::spline::{KinematicState, Segment};

@@ -7,14 +7,14 @@ use std::collections::VecDeque;
 
 /// FIFO buffer of streamed setpoints that are not commanded yet, the next one first.
 ///
-/// Its length is the stream delay in position cycles. The setpoint that enters at each position instant
+/// Its length is the stream delay in position cycles. The setpoint that enters at each position cycle
 /// approaches the newest accepted setpoint by at most `reach` = Vmax·Tsp.
 #[derive(Debug, Default)]
 pub(super) struct PreviewBuffer {
     buffer: VecDeque<f64>,
     /// Last entry before the newest setpoint was accepted, m or rad.
     from: f64,
-    /// Position instants since the newest setpoint was accepted.
+    /// Position cycles since the newest setpoint was accepted.
     since: i64,
 }
 
@@ -34,7 +34,7 @@ impl PreviewBuffer {
         (self.from, self.since) = (self.last_entry(commanded), 0);
     }
 
-    /// Advances by one position instant towards `newest`, m or rad.
+    /// Advances by one position cycle towards `newest`, m or rad.
     ///
     /// Returns the state to command and true if `newest` has entered the buffer. `commanded` is the
     /// position setpoint of the previous instant.

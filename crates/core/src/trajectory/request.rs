@@ -7,9 +7,9 @@ use crate::units::{Nanoseconds, Rounded, seconds};
 /// Start of a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// Start at the next position instant (stamp 0).
+    /// Start at the next position cycle (stamp 0).
     Now,
-    /// Start at an absolute time, ns, rounded up to a position instant.
+    /// Start at an absolute time, ns, rounded up to a position cycle.
     At(Nanoseconds),
 }
 

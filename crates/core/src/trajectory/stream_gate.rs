@@ -56,7 +56,7 @@ pub(super) struct JointStatus<'a> {
     pub reach: f64,
     /// Tsp, ns.
     pub period: Nanoseconds,
-    /// Next position instant.
+    /// Next position cycle.
     pub k: i64,
     /// Last entry of the preview buffer, m or rad.
     pub last_entry: f64,

@@ -17,10 +17,10 @@ use std::sync::Arc;
 /// bounds the error to 10⁻³ of its largest speed: see [`Trajectory::new`].
 const APPROACH_SAMPLES: i64 = 256;
 
-/// Position instants of an accepted trajectory.
+/// Position cycles of an accepted trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Admission {
-    /// Position instant of the start: the first one at or after its stamp.
+    /// Position cycle of the start: the first one at or after its stamp.
     pub start_k: i64,
     /// First commanded instant: `start_k`, or the next instant for a start in the past.
     pub join_k: i64,

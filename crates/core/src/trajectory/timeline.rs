@@ -1,4 +1,4 @@
-//! Real-time part of trajectory execution: one position setpoint per joint and position instant.
+//! Real-time part of trajectory execution: one position setpoint per joint and position cycle.
 
 use super::event::{JointSet, MotionId, TimelineEvent};
 use super::limits::JointLimits;
@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 /// Largest number of trajectories that wait for one joint.
 pub const MAX_WAITING: usize = 1024;
 
-/// Position setpoints of all joints, one position instant after another.
+/// Position setpoints of all joints, one position cycle after another.
 ///
 /// Each joint has a queue of plans, ordered by the instant from which they command the joint. A plan
 /// gives the state of its joint at any instant. Therefore future setpoints can be previewed, and a new
@@ -30,7 +30,7 @@ pub struct Timeline {
     pub(super) joints: Vec<JointLimits>,
     /// Tsp, ns.
     pub(super) period: Nanoseconds,
-    /// Next position instant.
+    /// Next position cycle.
     pub(super) next_k: i64,
     pub(super) queues: Vec<JointQueue>,
     pub(super) motions: MotionTable,
@@ -65,8 +65,8 @@ pub enum TimelineError {
         /// Number of joints.
         joints: usize,
     },
-    /// Position period Tsp of 0 or less.
-    #[error("position period is {0} ns; it must be greater than 0")]
+    /// Position cycle Tsp of 0 or less.
+    #[error("position cycle is {0} ns; it must be greater than 0")]
     Period(Nanoseconds),
 }
 
@@ -108,7 +108,7 @@ impl Timeline {
         })
     }
 
-    /// Commands the next position instant and returns its index k; see [`Timeline::psec`] and
+    /// Commands the next position cycle and returns its index k; see [`Timeline::psec`] and
     /// [`Timeline::events`].
     // An iterator could not lend the setpoints.
     #[allow(clippy::should_implement_trait)]
@@ -172,7 +172,7 @@ impl Timeline {
         &self.joints
     }
 
-    /// Returns the position period Tsp, ns.
+    /// Returns the position cycle Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
         self.period
     }

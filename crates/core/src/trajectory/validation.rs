@@ -17,7 +17,7 @@ const MIN_SHARE: usize = 64;
 pub struct ValidationContext<'a> {
     /// Limits of the joints, in the order of the machine.
     pub joints: &'a [JointLimits],
-    /// Position period Tsp, ns; greater than 0.
+    /// Position cycle Tsp, ns; greater than 0.
     pub period: Nanoseconds,
     /// Largest number of points of one trajectory.
     pub max_points: usize,
@@ -33,7 +33,7 @@ impl Trajectory {
     /// setpoints is checked by [`Timeline::submit`](super::Timeline::submit).
     ///
     /// The grid is local: setpoints are evaluated at multiples of Tsp from the start, because a start
-    /// between two position instants is moved to the later one. Every instant is checked,
+    /// between two position cycles is moved to the later one. Every instant is checked,
     /// `|PSEC_k − PSEC_{k−1}| / Tsp ≤ Vmax`, unless a segment has more instants than its share of a fixed
     /// budget (4 million instants per joint and trajectory, i.e. hours of motion). A longer segment is
     /// checked at as many equidistant instants as its share, at least 64, by velocity and position of its

@@ -37,7 +37,7 @@ pub struct AxisFigures {
     pub moves: bool,
     /// Errors, current, saturation.
     pub report: AxisReport,
-    /// Time outside its travel limits at position instants, over the whole run, s.
+    /// Time outside its travel limits at position cycles, over the whole run, s.
     pub outside_travel_limits_time: f64,
     /// True if the friction law was used beyond the velocities that it was fitted for.
     pub friction_extrapolated: bool,

@@ -65,7 +65,7 @@ pub(super) struct Observer<'a> {
     axes: Vec<AxisAssessor>,
     moves: Vec<bool>,
     extrapolated: Vec<bool>,
-    /// Number of position instants outside the travel limits, per axis.
+    /// Number of position cycles outside the travel limits, per axis.
     outside_travel: Vec<u64>,
     start: Vec<f64>,
     /// Buffer for future setpoints.
@@ -242,7 +242,7 @@ impl<'a> Observer<'a> {
         axes.zip(&self.moves).any(|(axis, &moves)| moves && axis.kind() == AxisKind::Rotary)
     }
 
-    /// Adds future setpoints to the polyline before a position instant, if it is the reference.
+    /// Adds future setpoints to the polyline before a position cycle, if it is the reference.
     pub(super) fn push_preview(&mut self, simulation: &Simulation) {
         let Some(Tracker::Setpoints(tracker)) = &mut self.tracker else { return };
         let horizon = contour_preview_cycles(simulation.period());

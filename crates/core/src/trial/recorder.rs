@@ -90,9 +90,9 @@ fn axis_values(s: &AxisSample, current: f64) -> [f64; AXIS_SIGNALS] {
 /// Tool data of a position cycle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ToolSample {
-    /// Nearest point of the path to the tip at the position instant, m.
+    /// Nearest point of the path to the tip at the position cycle, m.
     pub reference: [f64; 3],
-    /// Tip at the position instant, m.
+    /// Tip at the position cycle, m.
     pub position: [f64; 3],
     /// Largest contour error at any tick, m.
     pub contour_error: f64,
@@ -100,7 +100,7 @@ pub(super) struct ToolSample {
     pub orientation_error: f64,
 }
 
-/// Accumulator of a [`SignalRecording`]: one row per position instant until the capacity is reached.
+/// Accumulator of a [`SignalRecording`]: one row per position cycle until the capacity is reached.
 #[derive(Debug, Clone)]
 pub(super) struct SignalRecorder {
     time: Vec<f64>,

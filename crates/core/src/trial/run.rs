@@ -10,7 +10,7 @@ use super::observer::{MeasurementScope, Observer};
 use super::setpoints::SetpointSource;
 use super::submitter::TrajectorySubmitter;
 
-/// Runs `setpoints` until the axes have settled and calls `callback` at every position instant.
+/// Runs `setpoints` until the axes have settled and calls `callback` at every position cycle.
 ///
 /// The machine starts at rest at the first setpoint. If the first point of a trajectory is later than 0, the machine
 /// approaches it from the home position.

@@ -7,7 +7,7 @@ use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{ControlWeight, GpcTuning, PredictionModel, gpc};
 use virtual_axes_core::machine::prediction_model;
 
-/// Position period of the default machine, s.
+/// Position cycle of the default machine, s.
 pub const TSP: f64 = 0.006;
 
 pub fn model(a: &[f64], b: &[f64]) -> PredictionModel {

@@ -470,7 +470,7 @@ fn signals(s: &Simulation) -> [u64; 4] {
     [x.psec, x.position, x.current, x.velocity_setpoint].map(f64::to_bits)
 }
 
-/// Creates a trajectory of X with points at position instants.
+/// Creates a trajectory of X with points at position cycles.
 fn trajectory_of_x(config: &MachineConfig, positions: &[f64]) -> Arc<Trajectory> {
     let mut request = TrajectoryRequest::new(Start::Now, vec!["x".into()]);
     for (k, position) in positions.iter().enumerate() {

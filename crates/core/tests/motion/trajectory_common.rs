@@ -8,9 +8,9 @@ use virtual_axes_core::trajectory::{
     TrajectoryRequest,
 };
 
-/// Position period Tsp, ns.
+/// Position cycle Tsp, ns.
 pub const TSP: i64 = 6_000_000;
-/// Position period Tsp, s.
+/// Position cycle Tsp, s.
 pub const TSP_S: f64 = 6e-3;
 /// Absolute time of instant 0, ns: wall-clock time, not a multiple of Tsp.
 pub const ORIGIN: i64 = 1_700_000_000_123_456_789;

@@ -31,7 +31,7 @@ fn names(joints: usize) -> Vec<String> {
 }
 
 fn build(random: &RandomRequest) -> Option<TrajectoryRequest> {
-    // Starts are relative to instant 0, between position instants.
+    // Starts are relative to instant 0, between position cycles.
     let start = random.start.map_or(Start::Now, |ns| Start::At(ORIGIN + ns));
     let mut request = TrajectoryRequest::new(start, names(random.joints));
     let mut time = 0;

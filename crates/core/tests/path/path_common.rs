@@ -5,7 +5,7 @@ use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::path::{Block, Frame, Move, PlanError, Program};
 use virtual_axes_core::trajectory::JointLimits;
 
-/// Position period of the default machine, ns.
+/// Position cycle of the default machine, ns.
 pub const PERIOD: i64 = 6_000_000;
 pub const TSP: f64 = 0.006;
 /// Kinds of the axes x, y, z, a, c.

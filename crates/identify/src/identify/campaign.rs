@@ -124,7 +124,7 @@ impl Campaign {
         [time(run.rows.start), time(run.rows.end.saturating_sub(1))]
     }
 
-    /// Returns the position period Tsp, ns.
+    /// Returns the position cycle Tsp, ns.
     pub fn period(&self) -> Nanoseconds {
         self.period
     }

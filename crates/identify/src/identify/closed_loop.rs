@@ -67,7 +67,7 @@ impl Experiment {
         self.psec.windows(2).any(|pair| pair[0] != pair[1])
     }
 
-    /// Returns PSEC at sample `i` with zero-order hold, m or rad; `tsp` is the position period, s.
+    /// Returns PSEC at sample `i` with zero-order hold, m or rad; `tsp` is the position cycle, s.
     pub fn psec_at(&self, i: usize, tsp: f64) -> f64 {
         let instant = ((self.first + i as f64 * self.period) / tsp + 1e-9).floor().max(0.0) as usize;
         self.psec.get(instant.min(self.psec.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)

@@ -51,7 +51,7 @@ pub struct FeedforwardFit {
 /// Fits VFFW and TFFW as ratios of the recorded VFFWS and TFFWS to the derivatives of PSEC (Prévost eqs. 6,
 /// 7).
 ///
-/// `tsp` is the position period, s; `ratio` is r, m or rad of the axis per rad of the motor.
+/// `tsp` is the position cycle, s; `ratio` is r, m or rad of the axis per rad of the motor.
 pub fn fit_feedforward(
     recordings: &[&Signals],
     tsp: f64,

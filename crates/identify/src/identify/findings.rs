@@ -21,7 +21,7 @@ const DISAGREEING: f64 = 0.05;
 /// Largest position residual of a valid model, twice that of the paper, m and rad.
 const DEVIATING: f64 = 20e-6;
 const DEVIATING_ANGLE: f64 = 20e-3 * DEGREE;
-/// Sampling period, relative to the position period, above which the current between setpoints is not
+/// Sampling period, relative to the position cycle, above which the current between setpoints is not
 /// resolved.
 const COARSE: f64 = 0.34;
 /// Largest relative difference between eq. 5 and the refined inertia without a finding.

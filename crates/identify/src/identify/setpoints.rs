@@ -17,7 +17,7 @@ pub(super) struct SetpointGrid {
 }
 
 impl SetpointGrid {
-    /// Extracts the position cycles of a span sampled with `period`; `tsp` is the position period (both s).
+    /// Extracts the position cycles of a span sampled with `period`; `tsp` is the position cycle (both s).
     ///
     /// A recording finer than the grid shows zero-order-held setpoints whose steps are the position cycles.
     /// Returns none if `period` is not an integer fraction of `tsp`.

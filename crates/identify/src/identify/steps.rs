@@ -181,7 +181,7 @@ impl<'a> IdentificationSteps<'a> {
             self.found.findings.push(Finding::missing(
                 "no-setpoints",
                 explain_missing_experiments(self.inputs, self.periods),
-                "record the position setpoints (PSEC), starting at rest, with the position period or an integer \
+                "record the position setpoints (PSEC), starting at rest, with the position cycle or an integer \
                  fraction of it",
             ));
             return;
@@ -374,7 +374,7 @@ fn explain_missing_experiments(inputs: &[IdentificationInput<'_>], periods: &Per
     let why = match with_psec.iter().find(|signals| stride(signals.period, tsp).is_none()) {
         _ if with_psec.is_empty() => "no recording contains PSEC".to_owned(),
         Some(signals) => format!(
-            "{} is sampled every {:.3} ms, not an integer fraction of the position period of {:.3} ms",
+            "{} is sampled every {:.3} ms, not an integer fraction of the position cycle of {:.3} ms",
             signals.name,
             1e3 * signals.period,
             1e3 * tsp

@@ -16,7 +16,7 @@ use virtual_axes_core::units::{Rounded, seconds};
 const SHORTEST_SPAN: usize = 16;
 /// Shortest permitted length of the longest span, in standard deviations of the filter.
 const SPAN_DEVIATIONS: f64 = 20.0;
-/// Longest sampling period that can show a lag of the current, relative to the position period.
+/// Longest sampling period that can show a lag of the current, relative to the position cycle.
 const COARSEST: f64 = 0.5;
 /// Relative rounding tolerance of a given cut-off frequency.
 const ROUNDING: f64 = 1e-9;
@@ -166,12 +166,12 @@ fn select_current_lag(
         }
         return Ok(found);
     }
-    // A current sampled at about the position period shows the ripple of the setpoints, which looks like a
+    // A current sampled at about the position cycle shows the ripple of the setpoints, which looks like a
     // lag.
     if period > COARSEST * seconds(periods.position) {
         return Ok(0.0);
     }
-    // A narrower filter prevents matching the ripple at the position period with the neighboring period.
+    // A narrower filter prevents matching the ripple at the position cycle with the neighboring period.
     let filter = GaussianFilter::new(current_lag::max_cutoff(periods).min(cutoff), period);
     let long = parts.iter().filter(|part| part.section.len() > 2 * filter.radius());
     let smooth: Vec<FilteredSection> =

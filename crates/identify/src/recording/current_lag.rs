@@ -12,7 +12,7 @@ use virtual_axes_core::units::seconds;
 /// Range of the scanned lags, s: seen with buses and filters of oscilloscopes, with reserve.
 pub(super) const LOWEST_LAG: f64 = -0.010;
 pub(super) const HIGHEST_LAG: f64 = 0.020;
-/// Cut-off frequency of the filter for the scan, times the position period. The zero-order hold of the
+/// Cut-off frequency of the filter for the scan, times the position cycle. The zero-order hold of the
 /// setpoint causes a ripple at that period whose maxima look like lags one period apart; 0.5 % of it pass.
 const CUTOFF_PERIOD: f64 = 0.25;
 /// Step of the scan, s; a parabola through three steps locates the maximum to a hundredth of a step.

@@ -30,9 +30,7 @@ pub(super) fn check_period(name: &str, period: f64, periods: &Periods) -> Result
         "the time is likely in us; give time=COLUMN[us]"
     } else if fits(1e-9) {
         "the time is likely in ns; give time=COLUMN[ns]"
-    } else if fits(1e3) {
-        "the time is likely in s; give time=COLUMN[s]"
-    } else if fits(1e6) || fits(1e9) {
+    } else if fits(1e3) || fits(1e6) || fits(1e9) {
         "the time is likely in s; give time=COLUMN[s]"
     } else {
         ""

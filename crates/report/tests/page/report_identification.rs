@@ -320,7 +320,7 @@ fn plots_show_deviations_and_a_fast_move_of_a_long_recording() {
     }
     let rows = &table(compared, "Simulated minus measured").rows;
     assert_eq!(rows.len(), 3);
-    // Without feedforward X lags by V/Kp, 25 s⁻¹, and by α, whose 9 ms are two position periods.
+    // Without feedforward X lags by V/Kp, 25 s⁻¹, and by α, whose 9 ms are two position cycles.
     let window = chart(compared, "off, feedforward off: a fast move");
     let errors = series(window, "Following error", "measured");
     let lag = errors.points.iter().map(|point| point[1].abs()).fold(0.0, f64::max);

@@ -13,7 +13,7 @@ pub enum Check {
     Limits,
     /// A tick is reported as saturated if and only if a setpoint is at its limit.
     Reported,
-    /// The figures of a position period agree with its ticks.
+    /// The figures of a position cycle agree with its ticks.
     Counted,
     /// The speed of the position setpoint is within the limit of the axis.
     SetpointSpeed,
@@ -44,7 +44,7 @@ impl Check {
             Check::Finite => "a signal is not finite",
             Check::Limits => "a setpoint exceeds its limit",
             Check::Reported => "the saturation flag does not match the setpoints",
-            Check::Counted => "the figures of a position period do not match its ticks",
+            Check::Counted => "the figures of a position cycle do not match its ticks",
             Check::SetpointSpeed => "the position setpoint exceeds the velocity limit of the axis",
             Check::FrictionSign => "friction acts in the direction of motion",
             Check::FrictionLaw => "friction differs from the friction law",

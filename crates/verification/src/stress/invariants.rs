@@ -43,7 +43,7 @@ pub struct InvariantChecker {
     pub drive: DriveChecker,
     limits: LimitsConfig,
     period: f64,
-    /// [`FALLBACK_DELAY`] in position periods, during which the loop is linear.
+    /// [`FALLBACK_DELAY`] in position cycles, during which the loop is linear.
     rest_after: usize,
     velocity_ticks: usize,
     gravity: f64,
@@ -101,7 +101,7 @@ impl InvariantChecker {
         self.ticks
     }
 
-    /// Checks one tick. `instant` is true at the first tick of a position period, `second` at the second.
+    /// Checks one tick. `instant` is true at the first tick of a position cycle, `second` at the second.
     pub fn check_tick(
         &mut self,
         s: &AxisSample,
@@ -136,7 +136,7 @@ impl InvariantChecker {
         self.last = *s;
     }
 
-    /// Compares the figures of the ended position period with the machine's `activity`.
+    /// Compares the figures of the ended position cycle with the machine's `activity`.
     pub fn end_period(&mut self, activity: &Activity, report: &mut impl FnMut(FailedCheck)) {
         let (limited, peak) = self.period_figures;
         if activity.saturated_ticks != limited {
@@ -149,7 +149,7 @@ impl InvariantChecker {
         self.peak_current = self.peak_current.max(peak);
     }
 
-    /// Returns the ticks at a limit in the last position period.
+    /// Returns the ticks at a limit in the last position cycle.
     pub fn limited_in_period(&self) -> u64 {
         self.period_figures.0
     }

@@ -32,7 +32,7 @@ pub struct LinearAxis {
     alpha: i64,
     beta: i64,
     gamma: i64,
-    /// Ticks per position period.
+    /// Ticks per position cycle.
     pub ticks: usize,
     /// Ticks per velocity period.
     pub velocity_ticks: usize,
@@ -106,12 +106,12 @@ impl LinearAxis {
         self.run(state, periods, |_| 0.0, |_| 0.0, |_| 0.0).0
     }
 
-    /// Returns the state after a position period with 1 N·m at the motor during tick `at`.
+    /// Returns the state after a position cycle with 1 N·m at the motor during tick `at`.
     pub fn after_torque(&self, at: usize) -> LoopState {
         self.run([0.0; STATES], 1, |_| 0.0, |n| if n == at { 1.0 } else { 0.0 }, |_| 0.0).1
     }
 
-    /// Returns the state after a position period with 1 N·m of torque feedforward at velocity cycle `at`.
+    /// Returns the state after a position cycle with 1 N·m of torque feedforward at velocity cycle `at`.
     pub fn after_feedforward(&self, at: usize) -> LoopState {
         self.run([0.0; STATES], 1, |_| 0.0, |_| 0.0, |m| if m == at { 1.0 } else { 0.0 }).1
     }

@@ -10,7 +10,7 @@ use virtual_axes_core::units::Nanoseconds;
 /// TrajectoryKind of a random trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TrajectoryKind {
-    /// Rest-to-rest motion within velocity, acceleration and jerk limits, one setpoint per position period.
+    /// Rest-to-rest motion within velocity, acceleration and jerk limits, one setpoint per position cycle.
     Move,
     /// Points with velocities, interpolated by cubic polynomials.
     Cubic,
@@ -56,7 +56,7 @@ impl TrajectoryKind {
 const SHARES: [f64; 7] = [0.25, 0.15, 0.15, 0.2, 0.12, 0.08, 0.05];
 /// Unit of the length of trajectories, ticks.
 const UNIT_TICKS: usize = 768;
-/// Smallest number of position periods of motion.
+/// Smallest number of position cycles of motion.
 const MIN_PERIODS: usize = 6;
 /// Probability that acceleration and jerk exceed the limits of the machine file, so that the motor saturates.
 const EXCESS_PROBABILITY: f64 = 0.1;
@@ -69,16 +69,16 @@ const LOAD_PROBABILITY: f64 = 0.35;
 /// Probability that a load may exceed the motor torque.
 const OVERLOAD_PROBABILITY: f64 = 0.05;
 
-/// LoadStep on an axis for a number of position periods.
+/// LoadStep on an axis for a number of position cycles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadStep {
-    /// First position period.
+    /// First position cycle.
     pub at: usize,
     /// Index of the axis.
     pub axis: usize,
     /// LoadStep, N or N·m.
     pub value: f64,
-    /// Duration, position periods.
+    /// Duration, position cycles.
     pub periods: usize,
 }
 
@@ -87,9 +87,9 @@ pub struct LoadStep {
 pub enum TestCommand {
     /// Trajectory that is followed to its end.
     Follow(TrajectoryRequest),
-    /// Trajectory with a controlled stop before this position period.
+    /// Trajectory with a controlled stop before this position cycle.
     Stop(TrajectoryRequest, usize),
-    /// Streamed setpoints: axis index and one position per position period, m or rad; the last one is held.
+    /// Streamed setpoints: axis index and one position per position cycle, m or rad; the last one is held.
     Stream(Vec<(usize, Vec<f64>)>),
     /// No command.
     Rest,
@@ -108,9 +108,9 @@ pub struct TestPlan {
     pub start: Vec<f64>,
     /// Commands.
     pub command: TestCommand,
-    /// Loads, sorted by their first position period.
+    /// Loads, sorted by their first position cycle.
     pub loads: Vec<LoadStep>,
-    /// Simulated position periods.
+    /// Simulated position cycles.
     pub periods: usize,
 }
 
@@ -221,7 +221,7 @@ fn times(random: &mut RandomSource, duration: Nanoseconds) -> Vec<Nanoseconds> {
     times
 }
 
-/// Adds one point per position period with a position of each column.
+/// Adds one point per position cycle with a position of each column.
 fn gridded(
     mut request: TrajectoryRequest,
     columns: &[Vec<f64>],

@@ -7,7 +7,7 @@
 //! e(k) = Σⱼ h(j, k) Δ(j) + Σₙ g(k·N − n) d(n) + Σₘ q(k·M − m) c(m)
 //! ```
 //!
-//! where n counts ticks, N per position period, and m velocity cycles, M per position period, at which friction
+//! where n counts ticks, N per position cycle, and m velocity cycles, M per position cycle, at which friction
 //! compensation adds c. h depends on k − j only, except for the first j, which lie within the preview at the start.
 //! Therefore |e| ≤ ‖h‖₁ max|Δ| + ‖g‖₁ max|d| + ‖q‖₁ max|c|. The same bound holds with the second and third differences
 //! of the setpoints and the once and twice summed h.
@@ -17,7 +17,7 @@ use super::linear_axis::{LinearAxis, LoopState, STATES};
 /// Orders of setpoint differences with a bound: first, second, third.
 pub const ORDERS: usize = 3;
 
-/// Impulse responses of one axis over a number of position periods.
+/// Impulse responses of one axis over a number of position cycles.
 #[derive(Debug, Clone)]
 pub struct ImpulseResponses {
     /// h(j, ·) of the first setpoints; the last one, shifted, applies to all later setpoints.
@@ -46,7 +46,7 @@ pub struct ResponseInputs<'a> {
 }
 
 impl ImpulseResponses {
-    /// Computes the responses of `axis` over `periods` position periods.
+    /// Computes the responses of `axis` over `periods` position cycles.
     pub fn new(axis: &LinearAxis, periods: usize) -> Self {
         let unit = |j: usize| move |k: i64| if k >= j as i64 { 1.0 } else { 0.0 };
         let setpoint = (0..=axis.preview()).map(|j| axis.errors(periods, unit(j))).collect();
@@ -91,7 +91,7 @@ impl ImpulseResponses {
         response
     }
 
-    /// Returns the number of position periods.
+    /// Returns the number of position cycles.
     pub fn periods(&self) -> usize {
         self.setpoint_norms.len()
     }

@@ -48,7 +48,7 @@ impl MotionLimits {
         random.between(self.low - low.min(0.0), self.high - high.max(0.0))
     }
 
-    /// Draws the displacements of a rest-to-rest motion over `periods` position periods, one per period.
+    /// Draws the displacements of a rest-to-rest motion over `periods` position cycles, one per period.
     ///
     /// The velocity is the convolution of three rectangular pulses of n₁, n₂ and n₃ periods: velocity ≤ D/(n₁T),
     /// acceleration ≤ D/(n₁n₂T²), jerk ≤ D/(n₁n₂n₃T³), or twice that if no pulse is as wide as the other two together
@@ -82,7 +82,7 @@ impl MotionLimits {
         summed(steps)
     }
 
-    /// Draws the displacements of a random walk over `periods` position periods that ends at rest.
+    /// Draws the displacements of a random walk over `periods` position cycles that ends at rest.
     pub fn walk(&self, random: &mut RandomSource, periods: usize) -> Vec<f64> {
         let (t, change) = (self.period, self.acceleration * self.period);
         let (mut velocity, mut acceleration) = (0.0, 0.0);

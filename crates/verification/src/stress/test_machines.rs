@@ -32,20 +32,20 @@ pub enum TestMachinesError {
     /// A machine cannot be simulated.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The position period of a machine has too many ticks.
+    /// The position cycle of a machine has too many ticks.
     #[error(
-        "{machine}: a position period has {ticks} current cycles, at most {most} are allowed in the stress test",
+        "{machine}: a position cycle has {ticks} current cycles, at most {most} are allowed in the stress test",
         most = MAX_TICKS / MIN_PERIODS
     )]
     Ticks {
         /// Name of the machine.
         machine: String,
-        /// Ticks of its position period.
+        /// Ticks of its position cycle.
         ticks: usize,
     },
 }
 
-/// Smallest number of position periods of the longest trajectory.
+/// Smallest number of position cycles of the longest trajectory.
 const MIN_PERIODS: usize = 32;
 
 /// Controller settings of an axis.
@@ -170,12 +170,12 @@ impl MachineVariant {
         self.config.periods().position
     }
 
-    /// Returns the ticks of a position period.
+    /// Returns the ticks of a position cycle.
     pub fn ticks(&self) -> usize {
         self.config.periods().ticks_per_position() as usize
     }
 
-    /// Returns the largest number of position periods of a trajectory.
+    /// Returns the largest number of position cycles of a trajectory.
     pub fn longest(&self) -> usize {
         MAX_TICKS / self.ticks()
     }

@@ -26,7 +26,7 @@ pub struct TestRecord {
     pub number: u64,
     /// Index of its machine variant and its kind; `None` if it was rejected.
     pub ran: Option<(usize, TrajectoryKind)>,
-    /// Simulated position periods.
+    /// Simulated position cycles.
     pub periods: usize,
     /// Observations of each axis.
     pub axes: Vec<AxisObservation>,
@@ -219,7 +219,7 @@ impl CheckedSimulation {
         Ok(())
     }
 
-    /// Simulates one position period and checks each tick. Returns false if the simulation did not advance.
+    /// Simulates one position cycle and checks each tick. Returns false if the simulation did not advance.
     fn step(
         &mut self,
         variant: &MachineVariant,
@@ -241,15 +241,15 @@ impl CheckedSimulation {
         })
     }
 
-    /// Checks the figures of the last position period. `limited` counts, per axis, its ticks at a limit after the
-    /// position instant of the sample.
+    /// Checks the figures of the last position cycle. `limited` counts, per axis, its ticks at a limit after the
+    /// position cycle of the sample.
     fn check_period(&mut self, variant: &MachineVariant, violations: &mut Violations, limited: &mut [u64]) {
         let CheckedSimulation { simulation, checkers } = self;
         for (index, checker) in checkers.iter_mut().enumerate() {
             let (name, at) = (variant.joints[index].name.as_str(), checker.ticks());
             let activity = simulation.machine().activity(index);
             checker.end_period(&activity, &mut |failed| violations.add(name, at, failed));
-            // The sample of a position instant reports limits at any tick since the previous instant.
+            // The sample of a position cycle reports limits at any tick since the previous instant.
             let sample = &simulation.samples()[index];
             let instant = simulation.machine().axis(index).sample().saturated;
             if sample.saturated != (instant || limited[index] > 0) {
