@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks language and names: doc comments, banned words, spelling, public type names, layers of the crates.
+"""Checks language and names: doc comments, banned words, spelling, public type names, paths in ARCHITECTURE.md.
 
     tools/check_style.py [--root DIR]    prints each violation as FILE:LINE: RULE: TEXT; exit status 1 if there is any
 

@@ -15,10 +15,10 @@ const TOLERANCE: f64 = 0.08;
 const SHORTEST_STEP: f64 = 0.25;
 /// Maximum number of points of a curve. If a curve has more, the step is doubled up to `LONGEST_STEP`, which
 /// preserves the shape; if it still has more, every n-th point is kept.
-const MOST_POINTS: usize = 6000;
+const MAX_POINTS: usize = 6000;
 const LONGEST_STEP: f64 = 4.0;
 /// Maximum number of markers; if there are more, markers close to others are dropped.
-const MOST_MARKERS: usize = 9000;
+const MAX_MARKERS: usize = 9000;
 
 /// Returns the decimated line through points, split at points that cannot be drawn.
 ///
@@ -54,7 +54,7 @@ pub(super) fn separate_points(points: &[PixelPoint]) -> Vec<usize> {
             points.iter().enumerate().map(|(i, p)| (p.map(|v| (v / cell).round() as i64), i)).collect();
         cells.sort_unstable();
         cells.dedup_by_key(|(cell, _)| *cell);
-        if cells.len() <= MOST_MARKERS || cell > 1e4 {
+        if cells.len() <= MAX_MARKERS || cell > 1e4 {
             let mut kept: Vec<usize> = cells.into_iter().map(|(_, i)| i).collect();
             kept.sort_unstable();
             return kept;
@@ -143,12 +143,12 @@ pub(super) fn steps(length: usize, same: impl Fn(usize, usize, f64) -> bool) -> 
                 kept.push(i);
             }
         }
-        if kept.len() <= MOST_POINTS {
+        if kept.len() <= MAX_POINTS {
             return kept;
         }
         if within >= LONGEST_STEP {
             let last = kept.pop();
-            let every = kept.len().div_ceil(MOST_POINTS - 1);
+            let every = kept.len().div_ceil(MAX_POINTS - 1);
             return kept.into_iter().step_by(every).chain(last).collect();
         }
         within *= 2.0;
@@ -252,7 +252,7 @@ mod tests {
         points.insert(123_456, [800.0, 700.0]);
         let kept = separate_points(&points);
         assert!(
-            kept.contains(&123_456) && kept.len() <= MOST_MARKERS && kept.len() > MOST_MARKERS / 3,
+            kept.contains(&123_456) && kept.len() <= MAX_MARKERS && kept.len() > MAX_MARKERS / 3,
             "{}",
             kept.len()
         );
@@ -262,10 +262,10 @@ mod tests {
     #[test]
     fn a_curve_has_a_bounded_number_of_points() {
         let kept = steps(100_000, |i, j, within| ((i as f64) - (j as f64)).abs() < within);
-        assert!(kept.len() <= MOST_POINTS && kept.contains(&99_999));
+        assert!(kept.len() <= MAX_POINTS && kept.contains(&99_999));
         // A curve that no step length decimates.
         let kept = steps(100_000, |_, _, _| false);
-        assert!((MOST_POINTS / 2..=MOST_POINTS).contains(&kept.len()) && kept.contains(&99_999));
+        assert!((MAX_POINTS / 2..=MAX_POINTS).contains(&kept.len()) && kept.contains(&99_999));
     }
 
     #[test]

@@ -13,7 +13,7 @@ const MAX_LINES: u32 = 50;
 /// Largest number of kinds that are counted separately; the program has a few hundred log statements.
 const MAX_KINDS: usize = 1024;
 
-/// LineKind of a log line: log statement, and target for records of `log`.
+/// Kind of a log line: log statement, and target for records of `log`.
 pub(super) type LineKind = (Identifier, String);
 
 /// Decision about a line.

@@ -1,8 +1,9 @@
-//! Contour error against the polyline through the setpoints.
+//! Contour error of the linear axes against the polyline through the setpoints. Offline runs along a continuous path
+//! use `path_tracker` instead.
 
 /// Number of stored setpoints: the largest lag of the axes before the oldest setpoint is overwritten.
 pub(super) const CAPACITY: usize = 512;
-/// Segments searched before the last nearest one, for a point that moves back.
+/// Segments searched before the last nearest one, in which a point may move backwards.
 const LOOK_BACK: u64 = 8;
 
 /// Contour error along a path that is extended setpoint by setpoint.

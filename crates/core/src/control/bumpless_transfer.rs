@@ -6,7 +6,7 @@
 /// out over `cycles`: as an offset of Ω*, or as an offset of θ* for a controller with integral action.
 ///
 /// ```text
-/// offset(x) = offset(0) (1 − 10 x³ + 15 x⁴ − 6 x⁵)          x = age / cycles
+/// offset(x) = offset(0) (1 − 10 x³ + 15 x⁴ − 6 x⁵)          x = elapsed_cycles / cycles
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BumplessTransfer {
@@ -22,11 +22,11 @@ pub struct BumplessTransferState {
     /// True if the controller has changed since the last position cycle.
     pub(super) is_pending: bool,
     /// Initial offset added to Ω*, rad/s.
-    command: f64,
+    command_offset: f64,
     /// Initial offset subtracted from θ*, rad.
-    setpoint: f64,
+    setpoint_offset: f64,
     /// Position cycles since the change.
-    age: u32,
+    elapsed_cycles: u32,
 }
 
 impl BumplessTransferState {
@@ -35,28 +35,29 @@ impl BumplessTransferState {
         *self = BumplessTransferState::default();
     }
 
-    /// Begins a transfer with offsets `command` of Ω* (rad/s) and `setpoint` of θ* (rad).
-    pub(super) fn begin(&mut self, command: f64, setpoint: f64) {
-        *self = BumplessTransferState { is_pending: false, command, setpoint, age: 0 };
+    /// Begins a transfer with offsets of Ω* (rad/s) and θ* (rad).
+    pub(super) fn begin(&mut self, command_offset: f64, setpoint_offset: f64) {
+        *self =
+            BumplessTransferState { is_pending: false, command_offset, setpoint_offset, elapsed_cycles: 0 };
     }
 
     /// Returns the offsets of this position cycle: to be added to Ω* (rad/s), to be subtracted from θ* (rad).
     #[inline]
     pub(super) fn advance(&mut self, transfer: &BumplessTransfer) -> (f64, f64) {
-        if self.command == 0.0 && self.setpoint == 0.0 {
+        if self.command_offset == 0.0 && self.setpoint_offset == 0.0 {
             return (0.0, 0.0);
         }
-        if self.age >= transfer.cycles {
+        if self.elapsed_cycles >= transfer.cycles {
             self.end();
             return (0.0, 0.0);
         }
-        let remaining = fade(f64::from(self.age) / f64::from(transfer.cycles));
-        self.age += 1;
-        (self.command * remaining, self.setpoint * remaining)
+        let remaining = quintic_blend(f64::from(self.elapsed_cycles) / f64::from(transfer.cycles));
+        self.elapsed_cycles += 1;
+        (self.command_offset * remaining, self.setpoint_offset * remaining)
     }
 }
 
 /// Returns the quintic from 1 at x = 0 to 0 at x = 1 with zero first and second derivatives at both ends.
-fn fade(x: f64) -> f64 {
+fn quintic_blend(x: f64) -> f64 {
     1.0 - x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
 }

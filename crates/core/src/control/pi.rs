@@ -12,17 +12,19 @@ soa_struct! {
     /// I ← I  if (w − y) e > 0,  else J
     /// ```
     ///
-    /// The anti-windup keeps the integral while the output is limited and the error would increase the excess. The
-    /// output of that cycle is not recomputed.
+    /// The anti-windup is conditional integration, not back-calculation: it keeps the integral while the output is
+    /// limited and the error would increase the excess. The output of that cycle is not recomputed.
     ///
     /// `scale` converts the output: the velocity loop computes a torque and is limited in current, with scale 1/Kt.
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct Pi {
         /// K T/Ti.
         integral_gain: N,
-        /// (K + K T/Ti) scale, the immediate gain of the error.
+        /// (K + K T/Ti) scale: gain of the present error.
         gain: N,
+        /// Factor of the output.
         scale: N,
+        /// Limit of the output, after the factor.
         limit: N,
     }
 }
@@ -62,9 +64,9 @@ impl<N: SimdReal> Pi<N> {
     }
 
     #[inline(always)]
-    fn output(&self, s: &mut PiState<N>, error: N, rest: N) -> N {
+    fn output(&self, s: &mut PiState<N>, error: N, offset: N) -> N {
         let step = self.integral_gain * error;
-        let unlimited = self.gain.mul_add(error, rest);
+        let unlimited = self.gain.mul_add(error, offset);
         let y = clamp_abs(unlimited, self.limit);
         s.excess = unlimited - y;
         let zero = error.splat(0.0);

@@ -87,6 +87,7 @@ impl<N: SimdReal> Friction<N> {
         self.limit_to_resisting(speed, expansion.at(distance))
     }
 
+    /// Returns the friction torque bound at motor speed ω (rad/s): breakaway at ω = 0; a negative bound is set to 0.
     #[inline(always)]
     fn limit_to_resisting(&self, speed: N, moving: N) -> N {
         let zero = speed.splat(0.0);

@@ -7,11 +7,11 @@ use crate::simd::{SimdReal, soa_struct};
 /// Torques over one tick, N·m at the motor (N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Torques {
-    /// Friction, positive against motion towards plus.
+    /// Friction; positive opposes motion in the positive direction.
     pub friction: f64,
-    /// Gravity, positive against motion towards plus.
+    /// Gravity; positive opposes motion in the positive direction.
     pub gravity: f64,
-    /// External load, positive towards plus.
+    /// External load; positive acts in the positive direction.
     pub load: f64,
 }
 

@@ -1,4 +1,5 @@
-//! Validation of trajectory requests: joints, times, NaN, travel limits, speed, velocity at the end.
+//! Validation of trajectory requests: joints, times, travel limits, speed, velocity at the end. NaN and infinity are
+//! rejected when points are added to a request ([`TrajectoryRequest::push`]).
 
 use super::joint_trajectory::Trajectory;
 use super::limits::JointLimits;
@@ -7,7 +8,8 @@ use super::request::TrajectoryRequest;
 use super::spline::{Segment, SplineDegree};
 use crate::units::{Nanoseconds, Rounded, seconds};
 
-/// Number of instants checked per joint and trajectory, if each segment gets [`MIN_SHARE`].
+/// Number of instants checked per joint and trajectory, shared by its segments; each segment gets at least
+/// [`MIN_SHARE`].
 const BUDGET: usize = 1 << 22;
 /// Smallest number of instants checked of a longer segment; see [`Trajectory::new`] for the error.
 const MIN_SHARE: usize = 64;

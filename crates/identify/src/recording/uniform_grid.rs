@@ -14,32 +14,32 @@ use virtual_axes_core::statistics::{median, quantile, rms};
 /// Longest run of missing samples that is interpolated by a cubic.
 pub(super) const MAX_BRIDGED: usize = 2;
 /// Interval in periods above which an event is analyzed; half a period of jitter at both ends stays below.
-const LONG: f64 = 1.7;
+const LONG_INTERVAL: f64 = 1.7;
 /// Interval in periods below which a stamp is repeated.
-const REPEATED: f64 = 0.02;
+const REPEATED_INTERVAL: f64 = 0.02;
 /// Share of repeated stamps above which the clock of the logger is coarser than its sampling.
-const COARSE: f64 = 0.1;
+const MAX_REPEATED_SHARE: f64 = 0.1;
 /// Mean interval in periods below which a burst continues.
-const BURST: f64 = 0.85;
+const BURST_INTERVAL: f64 = 0.85;
 /// Number of intervals in that mean.
 const BURST_MEAN: usize = 4;
 /// Samples that determine the lateness before and behind an event; with jitter of at most half a period their
 /// median deviates by a tenth of it.
-const LEVEL: usize = 31;
+const LATENESS_SAMPLES: usize = 31;
 /// Fewest such samples behind an event.
-const FEWEST_LEVEL: usize = 3;
+const MIN_LATENESS_SAMPLES: usize = 3;
 /// Lateness in periods above which a sample is stalled.
-const STALL: f64 = 2.5;
+const STALL_LATENESS: f64 = 2.5;
 /// Longest gap that is counted in periods; longer gaps are limited to it.
-const LONGEST_GAP: f64 = 1e12;
+const MAX_GAP: f64 = 1e12;
 /// Largest shift of any sample, in periods, by rounding of the period to a decimal.
-const ROUNDING: f64 = 0.02;
+const MAX_ROUNDING_SHIFT: f64 = 0.02;
 /// Jitter in periods below which no finding is reported.
-const ON_GRID: f64 = 0.01;
+const MIN_REPORTED_JITTER: f64 = 0.01;
 /// Median distance from the grid, in periods, above which the sampling is irregular.
-const WANDERING: f64 = 0.5;
+const MAX_MEDIAN_DEVIATION: f64 = 0.5;
 /// Share of long intervals without a burst above which the sampling is irregular.
-const UNCAUGHT: f64 = 0.25;
+const MAX_GAP_SHARE: f64 = 0.25;
 
 /// Samples assigned to a uniform grid.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -94,7 +94,7 @@ pub(super) fn assign_to_grid(
     let stamps = &ordered.stamps;
     let intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let repeated = intervals.iter().filter(|d| **d == 0.0).count();
-    let coarse = repeated as f64 > COARSE * intervals.len() as f64;
+    let coarse = repeated as f64 > MAX_REPEATED_SHARE * intervals.len() as f64;
     let first = estimate_period(&intervals, coarse);
     check_period(name, first, periods)?;
     // The second pass uses the period found by the first.
@@ -112,9 +112,9 @@ pub(super) fn assign_to_grid(
     // A clock coarser than the sampling moves each stamp by up to its step.
     let step = if coarse { coarse_step(stamps) } else { 0.0 };
     let wandering = median(&mut distance.iter().map(|d| d.abs()).collect::<Vec<_>>()).unwrap_or(0.0);
-    let uncaught = slots.gaps as f64 > UNCAUGHT * intervals.len() as f64;
+    let uncaught = slots.gaps as f64 > MAX_GAP_SHARE * intervals.len() as f64;
     let smoother = || !coarse && stamped_smoother(&placed);
-    if wandering > WANDERING + step / placed.period || uncaught || smoother() {
+    if wandering > MAX_MEDIAN_DEVIATION + step / placed.period || uncaught || smoother() {
         placed = keep_stamps(ordered, placed.period.max(step));
         let spread = |at| quantile(&mut intervals.clone(), at).unwrap_or(0.0) * 1e3;
         let what = format!(
@@ -148,7 +148,7 @@ fn report_grid(name: &str, slots: &Slots, distance: &[f64], period: f64, finding
     }
     let rms = rms(distance.iter().copied()).unwrap_or(0.0);
     let largest = distance.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
-    if rms > ON_GRID || largest > 5.0 * ON_GRID {
+    if rms > MIN_REPORTED_JITTER || largest > 5.0 * MIN_REPORTED_JITTER {
         let what = format!(
             "{name}: the stamps jitter by {:.3} ms RMS, {:.3} ms at most; \
              the samples are moved to the grid of {:.4} ms",
@@ -173,10 +173,10 @@ fn count_slots(stamps: &[f64], period: f64, coarse: bool) -> Slots {
     };
     let interval = |n: usize| stamps[n] - stamps[n - 1];
     // A coarse clock adds its own step to an interval.
-    let long = if coarse { LONG * period + coarse_step(stamps) } else { LONG * period };
+    let long = if coarse { LONG_INTERVAL * period + coarse_step(stamps) } else { LONG_INTERVAL * period };
     let mut n = 1;
     while n < count {
-        if interval(n) <= long && (coarse || interval(n) > REPEATED * period) {
+        if interval(n) <= long && (coarse || interval(n) > REPEATED_INTERVAL * period) {
             s.slot[n] = s.slot[n - 1] + 1;
             n += 1;
             continue;
@@ -186,12 +186,12 @@ fn count_slots(stamps: &[f64], period: f64, coarse: bool) -> Slots {
         let base = s.slot[n - 1];
         let lateness = |j: usize| stamps[j] - (base + 1 + (j - n) as i64) as f64 * period - before;
         let after = median(&mut window.map(lateness).collect::<Vec<_>>()).unwrap_or(0.0);
-        let missing = (after / period).round().clamp(-LONGEST_GAP, LONGEST_GAP) as i64;
+        let missing = (after / period).round().clamp(-MAX_GAP, MAX_GAP) as i64;
         let mut surplus = (-missing).max(0);
         let mut slot = base;
         let mut latest = 0.0_f64;
         for (j, stamp) in stamps.iter().enumerate().take(settled + 1).skip(n) {
-            let repeats = interval(j) <= REPEATED * period;
+            let repeats = interval(j) <= REPEATED_INTERVAL * period;
             if surplus > 0 && repeats && !coarse {
                 surplus -= 1;
                 s.keep[j] = false;
@@ -205,10 +205,10 @@ fn count_slots(stamps: &[f64], period: f64, coarse: bool) -> Slots {
             s.slot[j] = slot;
             let late = (stamp - slot as f64 * period - before) / period;
             latest = latest.max(late);
-            s.late[j] = late > STALL;
+            s.late[j] = late > STALL_LATENESS;
         }
         s.gaps += usize::from(missing > 0);
-        if latest > STALL {
+        if latest > STALL_LATENESS {
             s.stalls.push((stamps[n - 1], latest * period));
         }
         n = settled + 1;
@@ -218,7 +218,8 @@ fn count_slots(stamps: &[f64], period: f64, coarse: bool) -> Slots {
 
 /// Returns the median lateness of the samples before sample `n`, s.
 fn level_before(stamps: &[f64], s: &Slots, n: usize, period: f64) -> f64 {
-    let calm = (0..n).rev().take(4 * LEVEL).filter(|&j| s.keep[j] && !s.late[j]).take(LEVEL);
+    let calm =
+        (0..n).rev().take(4 * LATENESS_SAMPLES).filter(|&j| s.keep[j] && !s.late[j]).take(LATENESS_SAMPLES);
     let mut levels: Vec<f64> = calm.map(|j| stamps[j] - s.slot[j] as f64 * period).collect();
     if levels.is_empty() {
         return stamps[n - 1] - s.slot[n - 1] as f64 * period;
@@ -238,16 +239,16 @@ fn find_burst_end(stamps: &[f64], n: usize, period: f64, long: f64) -> (usize, R
             let limit = (settled + BURST_MEAN).min(last);
             let ahead = (settled..limit).find(|&j| interval(j + 1) > long).unwrap_or(limit);
             if ahead == settled
-                || stamps[ahead] - stamps[settled] >= BURST * period * (ahead - settled) as f64
+                || stamps[ahead] - stamps[settled] >= BURST_INTERVAL * period * (ahead - settled) as f64
             {
                 break;
             }
             settled += 1;
         }
-        let limit = (settled + LEVEL).min(stamps.len());
+        let limit = (settled + LATENESS_SAMPLES).min(stamps.len());
         let end = (settled + 1..limit).find(|&j| interval(j) > long).unwrap_or(limit);
         // A burst that is interrupted by another stall continues behind it.
-        let interrupted = settled > from && end < limit && end - settled < FEWEST_LEVEL;
+        let interrupted = settled > from && end < limit && end - settled < MIN_LATENESS_SAMPLES;
         if !interrupted {
             return (settled, settled..end, largest);
         }
@@ -328,7 +329,8 @@ fn round_period(period: f64, blocks: &[SampleBlock]) -> f64 {
         let scale = 10_f64.powi(digits);
         (period * scale).round() / scale
     });
-    let same = |round: &f64| *round > 0.0 && (round - period).abs() * longest as f64 <= ROUNDING * period;
+    let same =
+        |round: &f64| *round > 0.0 && (round - period).abs() * longest as f64 <= MAX_ROUNDING_SHIFT * period;
     decimals.into_iter().find(same).unwrap_or(period)
 }
 
@@ -349,7 +351,7 @@ fn keep_stamps(ordered: &OrderedSamples, period: f64) -> UniformGrid {
     for (&row, &stamp) in ordered.rows.iter().zip(&ordered.stamps) {
         if stamp - before > longest {
             blocks.push(SampleBlock { start: stamp, ..SampleBlock::default() });
-        } else if stamp - before <= REPEATED * period {
+        } else if stamp - before <= REPEATED_INTERVAL * period {
             continue;
         }
         before = stamp;

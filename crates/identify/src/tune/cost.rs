@@ -209,11 +209,11 @@ impl FromStr for Cost {
             let term = CostTerm::ALL.into_iter().find(|term| term.name() == name);
             let term = term
                 .ok_or_else(|| CostError::UnknownTerm { term: virtual_axes_core::text::shortened(name) })?;
-            let refused = || CostError::Weight {
+            let rejected = || CostError::Weight {
                 term: term.name(),
                 weight: virtual_axes_core::text::shortened(weight),
             };
-            Ok((term, weight.parse().map_err(|_| refused())?))
+            Ok((term, weight.parse().map_err(|_| rejected())?))
         });
         Cost::new(&terms.collect::<Result<Vec<_>, _>>()?)
     }

@@ -221,7 +221,7 @@ fn the_range_in_the_rejection_is_sufficient() {
 #[test]
 fn ranges_and_feeds_beyond_the_axis_are_rejected() {
     let config = shipped(MACHINES[0]);
-    let refused = |axis: usize, range: Option<[f64; 2]>, max_feed: Option<f64>| {
+    let rejected = |axis: usize, range: Option<[f64; 2]>, max_feed: Option<f64>| {
         let error =
             Campaign::plan(&config, axis, &FeedforwardMode::ALL, &CampaignOptions { range, max_feed })
                 .unwrap_err();
@@ -229,12 +229,12 @@ fn ranges_and_feeds_beyond_the_axis_are_rejected() {
         error
     };
     for range in [[-0.4, 0.1], [0.1, 0.4], [0.1, -0.1], [0.1, 0.1], [f64::NAN, 0.1], [0.0, f64::INFINITY]] {
-        assert!(matches!(refused(0, Some(range), None), CampaignError::Range { .. }), "{range:?}");
+        assert!(matches!(rejected(0, Some(range), None), CampaignError::Range { .. }), "{range:?}");
     }
     for feed in [0.0, -1.0, f64::NAN, f64::INFINITY, 28.6 * M_MIN] {
-        assert!(matches!(refused(0, None, Some(feed)), CampaignError::Feed { .. }), "{feed}");
+        assert!(matches!(rejected(0, None, Some(feed)), CampaignError::Feed { .. }), "{feed}");
     }
-    assert_eq!(refused(5, None, None), CampaignError::NoAxis { number: 6, count: 5 });
+    assert_eq!(rejected(5, None, None), CampaignError::NoAxis { number: 6, count: 5 });
     // The campaign would take days.
     let slow = CampaignOptions { range: None, max_feed: Some(1e-4 * RPM) };
     let error = Campaign::plan(&config, 4, &[FeedforwardMode::Off], &slow).unwrap_err();

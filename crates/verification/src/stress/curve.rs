@@ -1,4 +1,4 @@
-//! RandomSource trajectory points with velocities and accelerations for cubic and quintic interpolation.
+//! Random trajectory points with velocities and accelerations for cubic and quintic interpolation.
 
 use super::random::RandomSource;
 use super::shape::{MotionLimits, extent};

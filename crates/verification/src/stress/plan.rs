@@ -1,4 +1,4 @@
-//! RandomSource trajectory: machine variant, start, commands and loads.
+//! Random trajectory: machine variant, start, commands and loads.
 
 use super::curve::{self, CurvePoint};
 use super::random::RandomSource;
@@ -7,7 +7,7 @@ use super::test_machines::TestMachines;
 use virtual_axes_core::trajectory::{Rejection, Start, TrajectoryPoint, TrajectoryRequest};
 use virtual_axes_core::units::Nanoseconds;
 
-/// TrajectoryKind of a random trajectory.
+/// Kind of a random trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TrajectoryKind {
     /// Rest-to-rest motion within velocity, acceleration and jerk limits, one setpoint per position cycle.
@@ -16,11 +16,11 @@ pub enum TrajectoryKind {
     Cubic,
     /// Points with velocities and accelerations, interpolated by quintic polynomials.
     Quintic,
-    /// RandomSource walk within velocity and acceleration limits.
+    /// Random walk within velocity and acceleration limits.
     Walk,
     /// Streamed setpoints with stepwise constant velocity.
     Stream,
-    /// RandomSource walk with a controlled stop.
+    /// Random walk with a controlled stop.
     Stop,
     /// Standstill under loads.
     Hold,
@@ -95,14 +95,14 @@ pub enum TestCommand {
     Rest,
 }
 
-/// RandomSource trajectory with its machine, start and loads.
+/// Random trajectory with its machine, start and loads.
 #[derive(Debug, Clone)]
 pub struct TestPlan {
     /// Number of the trajectory.
     pub number: u64,
     /// Index of the machine variant.
     pub variant: usize,
-    /// TrajectoryKind of the trajectory.
+    /// Kind of the trajectory.
     pub kind: TrajectoryKind,
     /// Initial positions of the axes at rest, m or rad.
     pub start: Vec<f64>,

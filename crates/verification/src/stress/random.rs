@@ -7,7 +7,7 @@ const BLOCK: usize = 64;
 /// Resolution of random numbers in [0, 1): 2⁻⁵³.
 const RESOLUTION: f64 = 1.0 / (1_u64 << 53) as f64;
 
-/// RandomSource numbers of one trajectory: the output of BLAKE3 over seed and number.
+/// Random numbers of one trajectory: the output of BLAKE3 over seed and number.
 ///
 /// Numbers are derived by additions, multiplications and divisions only, so they are bit-identical on every processor.
 pub struct RandomSource {

@@ -21,7 +21,7 @@ const MAX_LEAD: u64 = 256;
 /// Polling interval while a thread waits for the oldest batch.
 const POLL: Duration = Duration::from_millis(1);
 
-/// StressOptions of a stress test.
+/// Options of a stress run.
 #[derive(Debug, Clone, Copy)]
 pub struct StressOptions {
     /// Seed of all random numbers.

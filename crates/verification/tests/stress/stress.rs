@@ -1,4 +1,4 @@
-//! RandomSource trajectories: every check passes, each check detects an injected violation, and the digest depends on the
+//! Random trajectories: every check passes, each check detects an injected violation, and the digest depends on the
 //! seed only.
 
 use std::process::{Command, Output};

@@ -104,7 +104,7 @@ proptest! {
                 ParameterKind::Text => Value::Text(format!("{fraction}")),
                 ParameterKind::TextList => continue,
             };
-            // What is at odds with another parameter is refused, and nothing is changed.
+            // A value that contradicts another parameter is rejected, and nothing is changed.
             let _ = parameters.set(key, value, &source());
         }
         assert_reads_back(&parameters)?;
