@@ -484,3 +484,15 @@ fn shipped_machines_and_scenarios_are_checked_by_name() {
     assert!(assert_runs(&["check", "corner-90"]).contains("valid"));
     assert_rejected(&run(&["check", "corner-91"]), &["corner-91", "corner-90", "linear_motor_center"]);
 }
+
+#[test]
+fn an_unknown_scenario_suggests_the_nearest_name() {
+    for arguments in
+        [["run", "balbar"], ["check", "balbar"], ["tune", "balbar"], ["scenarios", "--show=balbar"]]
+    {
+        assert_rejected(&run(&arguments), &["balbar: ", "; the nearest is ballbar"]);
+    }
+    assert_rejected(&run(&["check", "linear_moter_center"]), &["; the nearest is linear_motor_center"]);
+    let unrelated = run(&["run", "no/such.yaml"]);
+    assert!(!String::from_utf8_lossy(&unrelated.stderr).contains("nearest"));
+}

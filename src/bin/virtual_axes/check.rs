@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::scenario::Scenario;
+use virtual_axes_core::text::{nearest_hint, nearest_name};
 use virtual_axes_core::trial::Trial;
 use virtual_axes_io::files::{self, FileKind};
 
@@ -60,9 +61,10 @@ fn is_shipped_machine(name: &str) -> Result<bool, String> {
     match machine || scenarios.contains(&name) {
         true => Ok(machine),
         false => Err(format!(
-            "{name}: no such file, no shipped machine ({}) and no shipped scenario ({})",
+            "{name}: no such file, no shipped machine ({}) and no shipped scenario ({}){}",
             machines.join(", "),
-            scenarios.join(", ")
+            scenarios.join(", "),
+            nearest_hint(&nearest_name(name, machines.iter().chain(&scenarios)))
         )),
     }
 }

@@ -1,6 +1,7 @@
 //! Errors of scenarios.
 
 use crate::path::{PathError, PlanError};
+use crate::text::nearest_hint;
 use crate::units::Rounded;
 
 /// Rejection of a scenario. The text is one line that begins with the file and, if known, the line.
@@ -8,12 +9,14 @@ use crate::units::Rounded;
 #[non_exhaustive]
 pub enum ScenarioError {
     /// Neither a built-in scenario nor a readable file.
-    #[error("{name}: {reason}; built-in scenarios: {known}")]
+    #[error("{name}: {reason}{}; built-in scenarios: {known}", nearest_hint(.nearest))]
     Unknown {
         /// Requested name or path.
         name: String,
         /// Error of the operating system.
         reason: String,
+        /// Most similar built-in scenario.
+        nearest: Option<String>,
         /// Names of the built-in scenarios, separated by commas.
         known: String,
     },

@@ -23,6 +23,7 @@ use std::path::Path as FilePath;
 
 use crate::config::MachineConfig;
 use crate::path::Program;
+use crate::text::nearest_name;
 use crate::yaml;
 
 pub use error::ScenarioError;
@@ -138,6 +139,7 @@ fn unknown(name: &str, reason: &str) -> ScenarioError {
     ScenarioError::Unknown {
         name: name.to_owned(),
         reason: reason.to_owned(),
+        nearest: nearest_name(name, Scenario::builtin_names()),
         known: Scenario::builtin_names().collect::<Vec<_>>().join(", "),
     }
 }
