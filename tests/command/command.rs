@@ -496,3 +496,21 @@ fn an_unknown_scenario_suggests_the_nearest_name() {
     let unrelated = run(&["run", "no/such.yaml"]);
     assert!(!String::from_utf8_lossy(&unrelated.stderr).contains("nearest"));
 }
+
+#[test]
+fn a_controller_uses_its_parameters_of_the_command_line() {
+    let folder = TestFolder::new("rst_options");
+    let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.6,0.01\n");
+    let polynomials = ["r=[132.0]", "s=[1.0]", "t=[132.0]"];
+    let set: Vec<String> = ["x", "y", "z", "a", "c"]
+        .iter()
+        .flat_map(|axis| polynomials.map(|value| format!("--set={axis}.position_loop.rst.{value}")))
+        .collect();
+    let mut arguments = vec!["run", &psec, "--controller", "rst"];
+    assert_rejected(&run(&arguments), &["--controller: x.position_loop.rst.r is missing"]);
+    arguments.extend(set.iter().map(String::as_str));
+    assert_runs(&arguments);
+    // The controller of a removed axis is not set.
+    let joints = ["run", &psec, "--controller", "gpc", "--set=joints=[x,y,z]"];
+    assert_runs(&joints);
+}

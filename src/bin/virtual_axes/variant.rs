@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use virtual_axes_core::config::{
-    Assignment, MachineConfig, Parameters, Value, ValueSource, parse_assignment,
+    Assignment, ConfigError, MachineConfig, Parameters, Value, ValueSource, parse_assignment,
 };
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::trial::TrialOutcome;
@@ -66,23 +66,36 @@ pub fn controller_name(parameters: &Parameters) -> String {
     }
 }
 
-/// Returns the machine with the controller and the parameters of `--set` and `--compare`, in this order.
+/// Returns the machine with the controller and the parameters of `--set` and `--compare`. `--set` has priority over the
+/// controller, and `--compare` over both. Controller and `--set` are checked together, because a controller can require
+/// parameters.
 pub fn parameters(
     machine: &Parameters,
     controller: Option<ControllerName>,
     set: &[String],
     compared: &[String],
 ) -> Result<Parameters, Box<dyn Error>> {
-    let mut parameters = machine.clone();
-    if let Some(controller) = controller {
-        parameters.set_all(controller.assignments(machine))?;
-    }
-    for (option, texts) in [("--set", set), ("--compare", compared)] {
+    let parsed = |option: &str, texts: &[String]| -> Result<Vec<Assignment>, ConfigError> {
         let source = ValueSource::named(option);
-        let assignments = texts.iter().map(|text| parse_assignment(text, &source));
-        parameters.set_all(assignments.collect::<Result<_, _>>()?)?;
+        texts.iter().map(|text| parse_assignment(text, &source)).collect()
+    };
+    let set = parsed("--set", set)?;
+    let mut assignments = controller.map_or_else(Vec::new, |controller| controller.assignments(machine));
+    if let Some(joints) = set.iter().rev().find(|assignment| assignment.key == "joints") {
+        // Removed axes have no controller.
+        assignments.retain(|assignment| is_of_joints(&assignment.key, &joints.value));
     }
+    assignments.extend(set);
+    let mut parameters = machine.clone();
+    parameters.set_all(assignments)?;
+    parameters.set_all(parsed("--compare", compared)?)?;
     Ok(parameters)
+}
+
+/// Returns true if the parameter `key` belongs to an axis of the list `joints`.
+fn is_of_joints(key: &str, joints: &Value) -> bool {
+    let joint = key.split_once('.').map_or("", |(joint, _)| joint);
+    matches!(joints, Value::TextList(names) if names.iter().any(|name| name == joint))
 }
 
 /// Builds and validates the machine. An error names the source of the invalid parameters: the machine file
