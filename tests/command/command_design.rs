@@ -145,6 +145,6 @@ fn invalid_options_are_rejected_by_name() {
     assert_rejected(&["p", "--feedforward", "1e300"], &["velocity_feedforward = 1e300 must"]);
     assert_rejected(&["poles", "--pole", "1.5"], &["the desired pole 1.500000 has the modulus 1.5"]);
     assert_rejected(&["poles", "--pole", "a"], &["--pole"]);
-    assert_rejected(&["poles"], &["--bandwidth"]);
+    assert_rejected(&["poles"], &["--bandwidth <BANDWIDTH>|--pole <RE[,IM]>"]);
     assert_rejected(&["gpc", "--set", "x.no_such=1"], &["x.no_such"]);
 }

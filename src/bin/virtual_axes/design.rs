@@ -2,6 +2,7 @@
 
 use std::error::Error;
 
+use clap::ArgGroup;
 use nalgebra::Complex;
 use virtual_axes_core::config::{AxisConfig, DEFAULT_MACHINE, Parameters, Periods, Value};
 use virtual_axes_core::control::Rst;
@@ -82,9 +83,10 @@ enum DesignMethod {
         common: CommonDesignArguments,
     },
     /// Design by pole placement; unspecified closed-loop poles are at 0.
+    #[command(group(ArgGroup::new("poles").args(["bandwidth", "pole"]).required(true).multiple(true)))]
     Poles {
         /// Natural frequency of a pole pair, rad/s.
-        #[arg(long, allow_negative_numbers = true, required_unless_present = "pole")]
+        #[arg(long, allow_negative_numbers = true)]
         bandwidth: Option<f64>,
         /// Damping ratio of that pole pair.
         #[arg(long, allow_negative_numbers = true, requires = "bandwidth", default_value_t = 0.7)]
