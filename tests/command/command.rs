@@ -514,3 +514,21 @@ fn a_controller_uses_its_parameters_of_the_command_line() {
     let joints = ["run", &psec, "--controller", "gpc", "--set=joints=[x,y,z]"];
     assert_runs(&joints);
 }
+
+#[test]
+fn control_characters_are_escaped() {
+    let folder = TestFolder::new("control_characters");
+    let text = include_str!("../../config/mikron_ucp710.yaml");
+    let renamed = text.replace("machine: Mikron UCP 710", "machine: \"Mill \\e[31m\\u202e\"");
+    assert_ne!(renamed, text);
+    let machine = folder.text_file("machine.yaml", &renamed);
+    assert!(assert_runs(&["check", &machine]).starts_with("machine: Mill \\u{1b}[31m\\u{202e}\n"));
+    let psec = folder.text_file("psec.csv", "time,x\n0,0\n0.6,0.01\n");
+    assert!(assert_runs(&["check", &psec, "--machine", &machine]).contains("Mill \\u{1b}[31m\\u{202e}: "));
+    assert_rejected(&run(&["run", "a\u{1b}[31m.csv"]), &["a\\u{1b}[31m.csv: "]);
+    let unexpected = run(&["check", &psec, "a\u{9b}31m"]);
+    assert_eq!(unexpected.status.code(), Some(2));
+    let message = String::from_utf8_lossy(&unexpected.stderr);
+    assert!(message.contains("a\\u{9b}31m"), "{message}");
+    assert!(!message.contains('\u{9b}'), "{message}");
+}

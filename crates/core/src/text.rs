@@ -16,6 +16,23 @@ pub fn shortened(text: &str) -> String {
     out.replace(is_control, " ")
 }
 
+/// Returns `text` with escape sequences instead of control characters: `\u{1b}`, `\n`.
+pub fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match is_control(c) {
+            true => out.extend(c.escape_default()),
+            false => out.push(c),
+        }
+    }
+    out
+}
+
+/// Returns `text` with escape sequences instead of all control characters except line feeds.
+pub fn escaped_lines(text: &str) -> String {
+    text.split('\n').map(escaped).collect::<Vec<_>>().join("\n")
+}
+
 /// Returns true for characters that change the layout of a line: control characters, line and paragraph separators,
 /// and bidirectional formatting characters.
 pub fn is_control(c: char) -> bool {
@@ -41,6 +58,12 @@ pub fn nearest_hint(nearest: &Option<String>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn control_characters_are_escaped() {
+        assert_eq!(escaped("a\u{1b}[31m\n\u{202e}µ\\"), "a\\u{1b}[31m\\n\\u{202e}µ\\");
+        assert_eq!(escaped_lines("a\n\u{7f}b\n"), "a\n\\u{7f}b\n");
+    }
 
     #[test]
     fn suggests_a_misspelt_name_and_no_unrelated_one() {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::scenario::Scenario;
-use virtual_axes_core::text::{nearest_hint, nearest_name};
+use virtual_axes_core::text::{escaped, nearest_hint, nearest_name};
 use virtual_axes_core::trial::Trial;
 use virtual_axes_io::files::{self, FileKind};
 
@@ -50,7 +50,7 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     let setpoints = input.setpoints(&config, program.as_ref())?;
     let outcome = virtual_axes_core::trial::run(&trial, setpoints, |_| interrupt::check())
         .map_err(|error| input.name_error(error))?;
-    Ok(format!("{kind} for {}: {:.3} s\nvalid\n", config.name(), outcome.figures.duration))
+    Ok(format!("{kind} for {}: {:.3} s\nvalid\n", escaped(config.name()), outcome.figures.duration))
 }
 
 /// Returns true for a shipped machine, false for a shipped scenario.
@@ -78,5 +78,5 @@ fn machine(machine: &MachineConfig) -> String {
             AxisKind::Rotary => format!("{} (rotary)", axis.name()),
         })
         .collect();
-    format!("machine: {}\njoints: {}\nvalid\n", machine.name(), joints.join(", "))
+    format!("machine: {}\njoints: {}\nvalid\n", escaped(machine.name()), joints.join(", "))
 }

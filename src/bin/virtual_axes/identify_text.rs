@@ -1,5 +1,6 @@
 //! Text output of `virtual_axes identify`.
 
+use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::identify::summary::{
     DelaySummary, FrictionSummary, GravitySummary, IdentificationSummary, InertiaSummary, LawSummary,
@@ -52,7 +53,7 @@ fn or_none(value: Option<f64>, text: impl Fn(f64) -> String) -> String {
 /// Returns the result as text and tables.
 pub fn text(found: &IdentificationSummary) -> String {
     let mut parts = vec![
-        format!("{}: {}\n", found.machine, found.axis),
+        format!("{}: {}\n", escaped(&found.machine), found.axis),
         table::text(&recordings(found)),
         table::aligned(&values(&found.values), &[0, 2, 5]),
     ];

@@ -42,6 +42,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use virtual_axes_core::config::listing;
+use virtual_axes_core::text::{escaped_lines, is_control};
 
 /// Exit status of a command that rejected its input or could not write its output.
 const BAD_INPUT: u8 = 2;
@@ -107,7 +108,7 @@ enum Command {
 
 fn main() -> ExitCode {
     interrupt::install_handler();
-    let text = match run_command(&CommandLine::parse().command) {
+    let text = match run_command(&command_line().command) {
         Ok(text) => text,
         Err(error) => {
             print_error(&*error);
@@ -124,9 +125,21 @@ fn main() -> ExitCode {
     }
 }
 
-/// Prints an error; a failure of standard error is ignored.
+/// Parses the command line; ends the process for `--help`, `--version` and invalid arguments.
+fn command_line() -> CommandLine {
+    CommandLine::try_parse().unwrap_or_else(|error| {
+        let text = error.render().to_string();
+        if error.use_stderr() && text.chars().any(|c| c != '\n' && is_control(c)) {
+            print_error(text.trim_end());
+            std::process::exit(i32::from(BAD_INPUT));
+        }
+        error.exit()
+    })
+}
+
+/// Prints an error with escaped control characters; a failure of standard error is ignored.
 fn print_error(error: &(impl Display + ?Sized)) {
-    let _ = writeln!(io::stderr(), "{error}");
+    let _ = writeln!(io::stderr(), "{}", escaped_lines(&error.to_string()));
 }
 
 /// Runs a command and returns its output.

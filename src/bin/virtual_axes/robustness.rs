@@ -4,6 +4,7 @@ use std::error::Error;
 
 use serde_json::{Value, json};
 use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::text::escaped;
 use virtual_axes_identify::tune::{Cost, DeviatingRun, PlantDeviation, Robustness, analyze_robustness};
 use virtual_axes_report::Table;
 
@@ -67,7 +68,8 @@ pub fn run(arguments: &RobustnessArguments) -> Result<String, Box<dyn Error>> {
         });
         return Ok(format!("{object:#}\n"));
     }
-    let head = format!("{}: {}, {controller}, cost {}", input.name(), config.name(), arguments.cost);
+    let (path, machine) = (escaped(input.name()), escaped(config.name()));
+    let head = format!("{path}: {machine}, {controller}, cost {}", arguments.cost);
     Ok(format!("{head}\n\n{}", table::text(&rows(arguments, &config, &found))))
 }
 

@@ -1,6 +1,7 @@
 //! Output of `virtual_axes tune`: text, JSON, and scatter plots of the report.
 
 use serde_json::{Map, Value, json};
+use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::tune::{
     CostTerm, MarginLimits, Tuning, TuningCandidate, TuningProblem, pareto_front,
@@ -47,8 +48,8 @@ pub fn text(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
     tunings.rows.push(candidate_row(name.to_owned(), &found.best, problem));
     let mut text = format!(
         "{}: {} of {}, cost {}\n\n{}\n{}",
-        problem.workload().name(),
-        problem.config().name(),
+        escaped(problem.workload().name()),
+        escaped(problem.config().name()),
         problem.joints().join(", "),
         problem.cost(),
         table::text(&tunings),
