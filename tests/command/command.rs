@@ -532,3 +532,22 @@ fn control_characters_are_escaped() {
     assert!(message.contains("a\\u{9b}31m"), "{message}");
     assert!(!message.contains('\u{9b}'), "{message}");
 }
+
+#[test]
+fn a_machine_file_for_another_node_gives_a_warning() {
+    let folder = TestFolder::new("node_key");
+    let text = include_str!("../../config/mikron_ucp710.yaml");
+    assert!(text.contains("\n/**:\n"));
+    for (key, is_foreign) in
+        [("foo", true), ("/**", false), ("virtual_axes", false), ("/cell/virtual_axes", false)]
+    {
+        let file = folder.text_file("machine.yaml", &text.replace("\n/**:\n", &format!("\n{key}:\n")));
+        let output = run(&["check", &file]);
+        assert!(output.status.success());
+        assert!(String::from_utf8_lossy(&output.stdout).ends_with("valid\n"));
+        let message = String::from_utf8_lossy(&output.stderr);
+        let warning = "machine.yaml: the node key foo does not match the node virtual_axes";
+        assert_eq!(message.contains(warning), is_foreign, "{message}");
+        assert_eq!(message.lines().count(), usize::from(is_foreign), "{message}");
+    }
+}

@@ -11,7 +11,7 @@ use virtual_axes_core::trial::Trial;
 use virtual_axes_io::files::{self, FileKind};
 
 use crate::input::CommandInput;
-use crate::interrupt;
+use crate::{interrupt, print_error};
 
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
@@ -34,6 +34,12 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     if is_machine {
         let config = Parameters::load(&name)?.machine_config()?;
         MachineParameters::new(&config).map_err(|error| format!("{name}: {error}"))?;
+        if let Some(key) = foreign_node_key(arguments)? {
+            print_error(&format!(
+                "warning: {name}: the node key {key} does not match the node virtual_axes, which ignores these \
+                 parameters; use /** or virtual_axes"
+            ));
+        }
         return Ok(machine(&config));
     }
     let config = Parameters::load(&arguments.machine)?.machine_config()?;
@@ -67,6 +73,17 @@ fn is_shipped_machine(name: &str) -> Result<bool, String> {
             nearest_hint(&nearest_name(name, machines.iter().chain(&scenarios)))
         )),
     }
+}
+
+/// Returns the node key of a machine file, if it is of a node with another name than `virtual_axes`, in any namespace.
+fn foreign_node_key(arguments: &CheckArguments) -> Result<Option<String>, Box<dyn Error>> {
+    if !arguments.file.exists() {
+        return Ok(None);
+    }
+    let report = Parameters::embedded_default()?.overlay_file(&arguments.file, Some("/virtual_axes"))?;
+    let is_foreign = |key: &&String| !matches!(key.rsplit('/').next(), Some("virtual_axes" | "*" | "**"));
+    let key = report.skipped.iter().find(is_foreign).filter(|_| report.sections == 0);
+    Ok(key.map(|key| key.trim_start_matches('/').to_owned()))
 }
 
 fn machine(machine: &MachineConfig) -> String {
