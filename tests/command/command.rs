@@ -156,8 +156,12 @@ fn a_trace_has_one_row_per_trace_period() {
         &run(&["run", &psec, "--trace", &trace, "--trace-period", "130us"]),
         &["--trace-period", "130000 ns", "125000 ns"],
     );
-    let wrong = run(&["run", &psec, "--trace", &trace, "--trace-period", "130"]);
-    assert_eq!(wrong.status.code(), Some(2));
+    for (period, reason) in [("130", "must be a number with a unit"), ("-1ms", "must be greater than 0")] {
+        let wrong = run(&["run", &psec, "--trace", &trace, "--trace-period", period]);
+        assert_eq!(wrong.status.code(), Some(2));
+        let message = String::from_utf8_lossy(&wrong.stderr);
+        assert!(message.contains(&format!("'{period}' for '--trace-period <125us>': {reason}")), "{message}");
+    }
 }
 
 #[test]

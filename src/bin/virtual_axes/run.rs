@@ -32,7 +32,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "FILE.csv|FILE.mcap")]
     trace: Option<PathBuf>,
     /// Sampling period of the trace, a multiple of the current cycle [default: position cycle].
-    #[arg(long, value_name = "125us", requires = "trace")]
+    #[arg(long, value_name = "125us", requires = "trace", allow_hyphen_values = true)]
     trace_period: Option<PeriodArgument>,
     /// Write a page with plots to this file.
     #[arg(long, value_name = "FILE.html")]
