@@ -77,6 +77,8 @@ fn the_first_grid_has_the_requested_number_of_designs() {
     let mut arguments = vec!["tune", circle, "--controller", "gpc", "--json"];
     arguments.extend(FEW);
     let coarse = json(&arguments);
+    // The default grid is the smallest.
+    assert_eq!(json(&[&arguments[..], &["--designs", "1"]].concat()), coarse);
     // More than the 1968 designs of the default grid and its refinement.
     const DESIGNS: u64 = 4000;
     let designs = DESIGNS.to_string();

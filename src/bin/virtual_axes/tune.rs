@@ -41,7 +41,8 @@ pub struct TuneArguments {
     /// Seed of the starting points of the cascade search [default: 1].
     #[arg(long, allow_negative_numbers = true)]
     seed: Option<u64>,
-    /// Minimum number of predictive controllers in the first grid; refines the grid of λ.
+    /// Minimum number of predictive controllers in the first grid. The default grid has 1968; a larger N
+    /// refines its λ, a smaller N does not change it.
     #[arg(long, allow_negative_numbers = true, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_DESIGNS))]
     designs: Option<u64>,
     /// Evaluate the best tuning on this path as well; can be repeated.

@@ -42,11 +42,14 @@ pub fn design_grid() -> Vec<Tuning> {
     horizons.flat_map(of_horizon).collect()
 }
 
-/// Returns a grid of at least `designs` tunings with logarithmically spaced λ_rel over the range of
-/// [`GRID_LAMBDA`].
+/// Returns a grid of at least `designs` tunings: [`design_grid`] if it has as many, otherwise logarithmically spaced
+/// λ_rel over the range of [`GRID_LAMBDA`].
 pub fn fine_design_grid(designs: usize) -> Vec<Tuning> {
     let horizons = || (1..=GRID_N2).flat_map(|n2| (1..=GRID_NU.min(n2)).map(move |nu| (n2, nu)));
-    let count = designs.div_ceil(horizons().count()).max(2);
+    let count = designs.div_ceil(horizons().count());
+    if count <= GRID_LAMBDA.len() {
+        return design_grid();
+    }
     let (least, most) = (GRID_LAMBDA[0], GRID_LAMBDA[GRID_LAMBDA.len() - 1]);
     let lambda = |i: usize| least * (most / least).powf(i as f64 / (count - 1) as f64);
     let of_horizon = |(n2, nu)| (0..count).map(move |i| Tuning::Gpc { n1: 1, n2, nu, lambda_rel: lambda(i) });
