@@ -144,6 +144,18 @@ fn invalid_options_are_rejected_by_name() {
     }
     assert_rejected(&["p", "--feedforward", "1e300"], &["velocity_feedforward = 1e300 must"]);
     assert_rejected(&["poles", "--pole", "1.5"], &["the desired pole 1.500000 has the modulus 1.5"]);
+    assert_rejected(
+        &["poles", "--pole", "1e300"],
+        &["the desired pole 1e300 + 0j has the modulus 1e300; it must"],
+    );
+    assert_rejected(
+        &["poles", "--bandwidth", "30", "--damping", "1e300"],
+        &["damping = 1e300 must be above 0 and at most 1e9"],
+    );
+    assert_rejected(
+        &["gpc", "--set", "x.velocity_loop.gain=-0.12345678901234567"],
+        &["--set: x.velocity_loop.gain = -0.123457: must"],
+    );
     assert_rejected(&["poles", "--pole", "a"], &["--pole"]);
     assert_rejected(&["poles"], &["--bandwidth <BANDWIDTH>|--pole <RE[,IM]>"]);
     assert_rejected(&["gpc", "--set", "x.no_such=1"], &["x.no_such"]);

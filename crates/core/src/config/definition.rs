@@ -218,7 +218,7 @@ impl ParameterDefinition {
         checked.ok_or_else(|| ConfigError::NotAllowed {
             at: at.clone(),
             key: shortened(key),
-            value: shortened(&value.to_string()),
+            value: value.rounded(),
             allowed: self.allowed(),
         })
     }

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::text::shortened;
+use crate::units::Rounded;
 
 /// Value of a parameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +27,14 @@ pub enum Value {
 }
 
 impl Value {
+    /// Returns the value for messages: a number with at most six significant digits, or a shortened text.
+    pub(super) fn rounded(&self) -> String {
+        match self {
+            Self::Double(value) => Rounded(*value).to_string(),
+            other => shortened(&other.to_string()),
+        }
+    }
+
     /// Returns the numbers of a list of numbers or integers. An empty list of any type counts as a list of numbers.
     pub(super) fn numbers(&self) -> Option<Vec<f64>> {
         match self {

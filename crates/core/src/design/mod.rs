@@ -35,8 +35,9 @@ pub enum DesignError {
     },
     /// Singular matrix GᵀG + λI.
     #[error(
-        "the matrix GᵀG + λI of n1 = {n1}, n2 = {n2}, nu = {nu} is singular with lambda = {lambda}; use \
-         lambda > 0 or a smaller nu"
+        "the matrix GᵀG + λI of n1 = {n1}, n2 = {n2}, nu = {nu} is singular with lambda = {}; use \
+         lambda > 0 or a smaller nu",
+        Rounded(*lambda)
     )]
     Singular {
         /// N1.
@@ -53,8 +54,9 @@ pub enum DesignError {
     Model(String),
     /// Pole of the closed loop on or outside the unit circle.
     #[error(
-        "the closed loop is unstable: its pole {} has the modulus {modulus:.9}; it must be below 1 − 10⁻⁶",
-        format_complex(*re, *im)
+        "the closed loop is unstable: its pole {} has the modulus {}; it must be below 1 − 10⁻⁶",
+        format_complex(*re, *im),
+        format_modulus(*modulus)
     )]
     Unstable {
         /// Real part.
@@ -68,7 +70,7 @@ pub enum DesignError {
     #[error("the poles of the closed loop cannot be computed from these polynomials")]
     NoPoles,
     /// Desired pole on or outside the unit circle.
-    #[error("the desired pole {} has the modulus {modulus}; it must be below 1 − 10⁻⁶", format_complex(*re, *im))]
+    #[error("the desired pole {} has the modulus {}; it must be below 1 − 10⁻⁶", format_complex(*re, *im), Rounded(*modulus))]
     PoleOutside {
         /// Real part.
         re: f64,
@@ -102,11 +104,17 @@ pub enum DesignError {
 }
 
 /// Formats a complex number for messages.
+fn format_modulus(modulus: f64) -> String {
+    // Near 1, the digits show the distance to the limit.
+    const LARGE: f64 = 10.0;
+    if modulus < LARGE { format!("{modulus:.9}") } else { Rounded(modulus).to_string() }
+}
+
 fn format_complex(re: f64, im: f64) -> String {
     // Larger numbers are printed with an exponent.
     const LARGE: f64 = 1e6;
     if re.abs() > LARGE || im.abs() > LARGE {
-        return format!("{re:e} {} {:e}j", if im < 0.0 { '−' } else { '+' }, im.abs());
+        return format!("{} {} {}j", Rounded(re), if im < 0.0 { '−' } else { '+' }, Rounded(im.abs()));
     }
     if im == 0.0 {
         return format!("{re:.6}");

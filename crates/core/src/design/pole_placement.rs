@@ -81,19 +81,22 @@ pub fn pole_placement(model: &PredictionModel, wanted: &PolePlacement) -> Result
     with_feedforward(&r, &product(&s, factor), &[gain], wanted.velocity_feedforward, model.period())
 }
 
+/// Largest damping ratio of a pole pair. The slow pole of larger values exceeds 1 − 10⁻⁶ at any bandwidth.
+const MAX_DAMPING: f64 = 1e9;
+
 /// Computes the pole pair exp(s Tsp) in z for a bandwidth (natural frequency, rad/s) and a damping ratio, sampled every
 /// `period` s. Both poles are real for a damping ratio of at least 1.
 ///
 /// # Errors
-/// [`DesignError::OutOfRange`] unless 0 < bandwidth ≤ π/period and 0 < damping.
+/// [`DesignError::OutOfRange`] unless 0 < bandwidth ≤ π/period and 0 < damping ≤ 1e9.
 pub fn pole_pair(bandwidth: f64, damping: f64, period: f64) -> Result<[Complex<f64>; 2], DesignError> {
     let nyquist = std::f64::consts::PI / period;
     if !(bandwidth > 0.0 && bandwidth <= nyquist) {
         let allowed = format!("be above 0 and at most {nyquist:.3}, half the sampling rate in rad/s");
         return Err(DesignError::OutOfRange { name: "bandwidth", value: bandwidth, allowed });
     }
-    if !(damping > 0.0 && damping.is_finite()) {
-        let allowed = "be finite and above 0".to_owned();
+    if !(damping > 0.0 && damping <= MAX_DAMPING) {
+        let allowed = format!("be above 0 and at most {MAX_DAMPING:e}");
         return Err(DesignError::OutOfRange { name: "damping", value: damping, allowed });
     }
     let turn = Complex::new(damping * damping - 1.0, 0.0).sqrt();
