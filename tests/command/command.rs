@@ -496,7 +496,13 @@ fn an_unknown_scenario_suggests_the_nearest_name() {
     {
         assert_rejected(&run(&arguments), &["balbar: ", "; the nearest is ballbar"]);
     }
-    assert_rejected(&run(&["check", "linear_moter_center"]), &["; the nearest is linear_motor_center"]);
+    for arguments in [
+        &["check", "linear_moter_center"][..],
+        &["machines", "--show", "linear_moter_center"],
+        &["run", "ballbar", "--machine", "linear_moter_center"],
+    ] {
+        assert_rejected(&run(arguments), &["; the nearest is linear_motor_center"]);
+    }
     let unrelated = run(&["run", "no/such.yaml"]);
     assert!(!String::from_utf8_lossy(&unrelated.stderr).contains("nearest"));
 }

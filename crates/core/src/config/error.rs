@@ -71,10 +71,12 @@ pub enum ConfigError {
         reason: String,
     },
     /// Name of no built-in machine.
-    #[error("unknown machine {name}; built-in machines: {known}")]
+    #[error("unknown machine {name}{}; built-in machines: {known}", nearest_hint(.nearest))]
     UnknownMachine {
         /// Requested name.
         name: String,
+        /// Most similar built-in machine.
+        nearest: Option<String>,
         /// Names of the built-in machines, separated by commas.
         known: String,
     },

@@ -10,7 +10,7 @@ use super::error::{ConfigError, ValueSource};
 use super::layout::{ParameterLayout, plain_definition};
 use super::parameter_file::{self, Assignment, parse_assignment};
 use super::value::Value;
-use crate::text::shortened;
+use crate::text::{nearest_hint, nearest_name, shortened};
 
 /// Built-in machines: name and parameter file, the default first.
 const BUILTIN: &[(&str, &str)] = &[
@@ -79,9 +79,11 @@ impl Parameters {
     /// [`ConfigError::UnknownMachine`].
     pub fn builtin_text(name: &str) -> Result<&'static str, ConfigError> {
         let found = BUILTIN.iter().find(|(known, _)| *known == name);
-        found
-            .map(|(_, text)| *text)
-            .ok_or_else(|| ConfigError::UnknownMachine { name: shortened(name), known: builtin_name_list() })
+        found.map(|(_, text)| *text).ok_or_else(|| ConfigError::UnknownMachine {
+            name: shortened(name),
+            nearest: nearest_name(name, Self::builtin_names()),
+            known: builtin_name_list(),
+        })
     }
 
     /// Parses a complete machine file; messages name it `source`.
@@ -118,9 +120,10 @@ impl Parameters {
         }
         Self::from_file(machine).map_err(|error| match error {
             ConfigError::Unreadable { path, reason } if !Path::new(machine).exists() => {
+                let hint = nearest_hint(&nearest_name(machine, Self::builtin_names()));
                 ConfigError::Unreadable {
                     path,
-                    reason: format!("{reason}; built-in machines: {}", builtin_name_list()),
+                    reason: format!("{reason}{hint}; built-in machines: {}", builtin_name_list()),
                 }
             }
             other => other,

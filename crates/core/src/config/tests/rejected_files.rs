@@ -75,7 +75,9 @@ fn unreadable_files() {
 fn unknown_builtin_machine() {
     assert_eq!(
         Parameters::builtin("mikron").map_err(|error| error.to_string()),
-        Err("unknown machine mikron; built-in machines: mikron_ucp710, linear_motor_center".to_owned())
+        Err("unknown machine mikron; the nearest is mikron_ucp710; built-in machines: mikron_ucp710, \
+             linear_motor_center"
+            .to_owned())
     );
 }
 
