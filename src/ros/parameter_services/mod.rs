@@ -60,7 +60,7 @@ impl ParameterServices {
     /// Creates the services of `node`, which belongs to `context`, and the publisher of `/parameter_events`.
     ///
     /// # Errors
-    /// [`ServiceError`] naming the first that cannot be created.
+    /// `ServiceError` naming the first that cannot be created.
     pub fn new(node: &mut Node, context: &Context, args: &RosArgs) -> Result<Self, ServiceError> {
         let mut factory = ParameterServiceFactory { node, context, args };
         Ok(Self {
