@@ -250,7 +250,10 @@ fn invalid_input_is_rejected_with_its_name() {
     );
     // Wrong units and columns.
     rejected(&["--column", "time=time[ms]"], &["off.csv: sampling period 6e-6 s", "time=COLUMN[s]"]);
-    rejected(&["--column", "position=x.position[deg]"], &["--column: position in [deg]", "linear axis x"]);
+    rejected(
+        &["--column", "position=x.position[deg]"],
+        &["--column: the unit of position is [deg]", "linear axis x"],
+    );
     rejected(&["--column", "position=x.positon"], &["off.csv:1: ", "x.positon", "nearest is x.position"]);
     rejected(&["--column", "velocity=y.velocity"], &["off.csv: the velocity "]);
     rejected(&["--column", "current=x.current[-1 A]"], &["off.csv: the current opposes the motion"]);
