@@ -36,7 +36,7 @@ ARGUMENTS = [
 ]
 SIDES = ["left", "right"]
 APART_S = 2.0
-"""Delay between their starts, s: a participant that starts with both at once may miss topics (docs/middleware.md)."""
+"""Delay between their starts, s: a participant that starts with both at once may miss topics (docs/internals/middleware.md)."""
 
 
 def start(context: LaunchContext) -> list[object]:

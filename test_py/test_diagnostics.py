@@ -75,7 +75,7 @@ def test_an_axis_that_leaves_its_travel_limits_is_logged(real: Drive):
 
 
 def test_the_document_has_every_key_and_no_other(real: Drive):
-    document = (Path(__file__).resolve().parent.parent / "docs" / "graph.md").read_text()
+    document = (Path(__file__).resolve().parent.parent / "docs" / "reference" / "graph.md").read_text()
     section = document.split("## Keys of `/diagnostics`\n")[1].split("\n## ")[0]
     documented = re.findall(r"^\| [^|]*\| `(\w+)` \|", section, re.MULTILINE)
     found = real.next_diagnostics().status

@@ -65,7 +65,7 @@ def machine(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> Dr
 
 
 def wait_for_topics(process: Node) -> None:
-    """Waits until all topics of a node exist: docs/middleware.md, "Processes that start at the same time"."""
+    """Waits until all topics of a node exist: docs/internals/middleware.md, "Processes that start at the same time"."""
     deadline = time.monotonic() + 20
     while "Ctrl-C" not in process.output():
         assert time.monotonic() < deadline, process.output()

@@ -157,7 +157,7 @@ def test_two_machines_run_in_one_domain():
     assert len(found["rviz2"]) == 1
     assert [action.period for action in actions(TWO) if isinstance(action, launch.actions.TimerAction)] == [0.0, 2.0]
     with ExitStack() as stack:
-        # One after the other: docs/middleware.md, "Processes that start at the same time".
+        # One after the other: docs/internals/middleware.md, "Processes that start at the same time".
         first = process(left, stack)
         drives = [stack.enter_context(Drive(process=first))]
         drives.append(stack.enter_context(Drive(process=process(right, stack, first.domain_id))))

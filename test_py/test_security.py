@@ -1,4 +1,4 @@
-"""DDS Security: nodes without the plugins, and access control of nodes with them (docs/security.md).
+"""DDS Security: nodes without the plugins, and access control of nodes with them (docs/internals/security.md).
 
 Who takes part needs a node that is built with the cargo feature `security`: VIRTUAL_AXES_SECURE_NODE names it.
 """
@@ -22,7 +22,7 @@ SECURE = os.environ.get("VIRTUAL_AXES_SECURE_NODE")
 needs_secure_node = pytest.mark.skipif(
     not SECURE,
     reason="DDS Security is a cargo feature that needs OpenSSL's headers and is not built by default; build the node "
-    "with --features security and name it in VIRTUAL_AXES_SECURE_NODE (docs/security.md)",
+    "with --features security and name it in VIRTUAL_AXES_SECURE_NODE (docs/internals/security.md)",
 )
 HEARD, UNHEARD = 500, 100
 """Messages in the recording of a node that receives its clock (a thousand a second), and of another."""

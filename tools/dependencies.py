@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks the crates of the workspace and the fuzz targets; writes their table in docs/dependencies.md.
+"""Checks the crates of the workspace and the fuzz targets; writes their table in docs/internals/dependencies.md.
 
     tools/dependencies.py               fails if the table is out of date, a license is not in deny.toml's list,
                                         a crate does not come from the registry, or a member of the workspace
@@ -24,7 +24,7 @@ from typing import Any
 import options
 
 ROOT = Path(__file__).resolve().parent.parent
-TABLE = ROOT / "docs" / "dependencies.md"
+TABLE = ROOT / "docs" / "internals" / "dependencies.md"
 BEGIN, END = "<!-- crates -->\n", "<!-- /crates -->\n"
 PLATFORMS = ("x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu")
 FILES_AND_NETWORK = {"clap", "mcap", "rustdds", "ros2-client", "tokio"}
@@ -163,7 +163,7 @@ def main() -> int:
         TABLE.write_text(before + BEGIN + table + END + after)
     elif present != table:
         faults.append("table")
-        print("dependencies: docs/dependencies.md is out of date: tools/dependencies.py --write", file=sys.stderr)
+        print("dependencies: docs/internals/dependencies.md is out of date: tools/dependencies.py --write", file=sys.stderr)
     print(f"{len(rows)} crates, {sum(what == PROGRAMS for *_, what, _ in rows)} of them in the programs")
     return bool(faults or layers)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Figure 11 of the paper by `tune`: better on the circle, worse at a corner; writes docs/figure-11.svg.
+"""Figure 11 of the paper by `tune`: better on the circle, worse at a corner; writes docs/images/figure-11.svg.
 
 Needs `cargo build --release` and `source .build/env.sh`. Takes minutes: `tune` searches the whole grid.
 """
@@ -20,7 +20,7 @@ import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen before)
 
 ROOT = Path(__file__).resolve().parent.parent
 COMMAND = ROOT / "target" / "release" / "virtual_axes"
-PICTURE = ROOT / "docs" / "figure-11.svg"
+PICTURE = ROOT / "docs" / "images" / "figure-11.svg"
 CIRCLE, CORNER = "ballbar", "corner-45"
 RADIUS_MM = 150.0
 # End of the first leg, and the displayed range around the corner, mm.

@@ -96,7 +96,7 @@ LONG = 5_000
 SAMPLE_S = 0.25
 """Wall time between two samples of memory, s."""
 KEPT_MB = 0.83e-3
-"""Memory that the middleware keeps for an endpoint that has left, MB (docs/middleware.md)."""
+"""Memory that the middleware keeps for an endpoint that has left, MB (docs/internals/middleware.md)."""
 LOOKS = 60
 LOOK_S = 12.0
 """Minimum interval of looks, s: twice the 6 s of the middleware's history cleanup."""

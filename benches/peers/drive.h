@@ -1,6 +1,6 @@
 /* One feed drive and its cascade: parameters, state, and the operations of a tick.
  *
- * A plain scalar form of the equations of docs/performance.md: no SIMD intrinsics, no approximation of
+ * A plain scalar form of the equations of docs/internals/performance.md: no SIMD intrinsics, no approximation of
  * exp or sin. All functions are inlined into the loop of scalar.c; constants are computed once.
  * SI units; motor quantities in rad and N·m.
  */

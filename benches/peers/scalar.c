@@ -1,4 +1,4 @@
-/* The model of docs/performance.md as a scalar C loop, with its figures: the reference of the comparison.
+/* The model of docs/internals/performance.md as a scalar C loop, with its figures: the reference of the comparison.
  *
  *     gcc -O3 -march=native -ffast-math -o scalar scalar.c -lm
  *     scalar TABLE SETPOINTS [--circle RADIUS FIRST LAST] [--machines COUNT] [--positions]

@@ -4,7 +4,7 @@
 //! Everything else runs on tokio and exchanges data with that thread through bounded channels.
 //!
 //! Workarounds for interoperability with Fast DDS and for limits of RustDDS, each described in its module
-//! (overview: docs/middleware.md):
+//! (overview: docs/internals/middleware.md):
 //!
 //! | module | RTPS submessage | purpose |
 //! |---|---|---|

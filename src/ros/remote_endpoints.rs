@@ -11,7 +11,7 @@ use tracing::warn;
 
 /// Number of discovered endpoints between two warnings about their memory use.
 const WARN_EVERY: u64 = 100_000;
-/// Memory that the middleware keeps for an endpoint that has left, kB (docs/middleware.md).
+/// Memory that the middleware keeps for an endpoint that has left, kB (docs/internals/middleware.md).
 const RETAINED_KB: f64 = 0.83;
 
 /// Shared counter of remote endpoints discovered since the start.

@@ -8,7 +8,7 @@ use super::inner_loops::{
 use crate::drive::MotorState;
 
 /// Lanes of the small block, used for up to four axes if the widest vector of the processor has at most four lanes:
-/// there one axis takes 37 % less time in it than in the large block (docs/performance.md, block sizes).
+/// there one axis takes 37 % less time in it than in the large block (docs/internals/performance.md, block sizes).
 const X4: usize = 4;
 /// Lanes of the large block: one vector of eight lanes, or two interleaved vectors of four lanes ([`Unroll2`]), so that
 /// the latencies of one overlap with the operations of the other. On vectors of four lanes this saves 10 to 17 %.

@@ -116,7 +116,7 @@ pub(super) struct Aligned<T>(pub T);
 /// Aligns the stack frame of the calling function to 64 bytes; returns the address of a local aligned that way.
 ///
 /// The compiler aligns a stack frame as its most aligned local requires. SIMD vectors that are spilled to an aligned
-/// frame do not cross cache lines (docs/performance.md, block sizes). [`black_box`] keeps the local from being
+/// frame do not cross cache lines (docs/internals/performance.md, block sizes). [`black_box`] keeps the local from being
 /// optimized away. The function is always inlined: a call would align only its own frame.
 #[inline(always)]
 fn align_stack_frame() -> usize {
