@@ -95,7 +95,8 @@ def test_a_page_with_errors(tmp_path: Path):
     page = tmp_path / "page.md"
     page.write_text(
         "<!-- file: hello.txt -->\n```text\nhello 1.0\n```\n"
-        "```console\n$ mkdir new && cd new\n$ cat ../hello.txt\nhello 1.0\n$ cat ../hello.txt\nhello 1.5\n$ exit_3() {\n> return 3; }\n$ exit_3\n```\n"
+        "```console\n$ mkdir new && cd new\n$ cat ../hello.txt\nhello 1.0\n$ cat ../hello.txt\nhello 1.5\n"
+        "$ exit_3() {\n> return 3; }\n$ exit_3\n```\n"
         "<!-- run: terminal=other background -->\n```console\n$ echo ready; sleep 60\nready\n```\n",
         encoding="utf-8",
     )

@@ -56,7 +56,7 @@ def test_appears_and_disappears_within_two_seconds():
 
 
 def test_type_hash_is_not_sent(fast: Drive):
-    """Limit of RustDDS (docs/internals/middleware.md). If this test fails, the hash is sent: compare it with rclpy's then."""
+    """Limit of RustDDS (docs/internals/middleware.md). If this test fails, compare the hash with rclpy's."""
     fast.node.create_publisher(JointState, "/joint_states", 10)
     hashes = fast.wait_for(
         lambda: (
