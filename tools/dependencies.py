@@ -163,7 +163,10 @@ def main() -> int:
         TABLE.write_text(before + BEGIN + table + END + after)
     elif present != table:
         faults.append("table")
-        print("dependencies: docs/internals/dependencies.md is out of date: tools/dependencies.py --write", file=sys.stderr)
+        print(
+            "dependencies: docs/internals/dependencies.md is out of date: tools/dependencies.py --write",
+            file=sys.stderr,
+        )
     print(f"{len(rows)} crates, {sum(what == PROGRAMS for *_, what, _ in rows)} of them in the programs")
     return bool(faults or layers)
 
