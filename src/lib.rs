@@ -1,7 +1,7 @@
 //! ROS 2 node that simulates the axes of a machine tool.
 //!
-//! [`ingress`] converts and validates command-line arguments and incoming messages. [`ros`] holds the node: topics,
-//! services, the action, parameters and pacing; `ros::node::run` runs it until a signal ends it. The simulation
+//! [`ingress`] converts and validates command-line arguments and incoming messages. [`interface`] describes topics,
+//! services and diagnostics as data. [`ros`] holds the node: its endpoints, parameters and pacing; `ros::node::run` runs it until a signal ends it. The simulation
 //! itself is in `virtual_axes_core` and needs no ROS.
 //!
 //! ```
@@ -18,5 +18,6 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
 pub mod ingress;
+pub mod interface;
 #[cfg(feature = "ros")]
 pub mod ros;

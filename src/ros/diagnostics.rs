@@ -8,6 +8,7 @@ use super::convert::header;
 use super::health::{AxisHealth, ClockSource, Health};
 use super::process_memory::private_memory_mb;
 use super::remote_endpoints::DiscoveredEndpoints;
+use crate::interface::diagnostics::{self as keys, DiagnosticKey};
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds};
 
 /// Constant contents of the diagnostics, and the source of the discovery count.
@@ -25,8 +26,8 @@ pub struct Diagnostics {
     pub discovered: DiscoveredEndpoints,
 }
 
-fn value(key: &str, value: impl Display) -> KeyValue {
-    KeyValue { key: key.to_owned(), value: value.to_string() }
+fn value(key: DiagnosticKey, value: impl Display) -> KeyValue {
+    KeyValue { key: key.key.to_owned(), value: value.to_string() }
 }
 
 impl Diagnostics {
@@ -42,8 +43,8 @@ impl Diagnostics {
     ) -> DiagnosticArray {
         let axes = self.axes(before, now).map(|(joint, before, now)| self.axis(joint, before, now));
         let mut node = self.node_status(before, now, outputs_dropped);
-        node.values.push(value("endpoints_discovered", self.discovered.count()));
-        node.values.extend(private_memory_mb().map(|memory| value("memory_mb", format!("{memory:.1}"))));
+        node.values.push(value(keys::ENDPOINTS_DISCOVERED, self.discovered.count()));
+        node.values.extend(private_memory_mb().map(|memory| value(keys::MEMORY_MB, format!("{memory:.1}"))));
         let status = std::iter::once(node).chain(axes).collect();
         DiagnosticArray { header: header(time), status }
     }
@@ -76,26 +77,26 @@ impl Diagnostics {
         let problems = node_problems(before, now, new - old);
         let state = node_state(periods, now);
         let values = vec![
-            value("state", state),
-            value("time", self.time_mode),
-            value("clock", now.clock.source.name()),
-            value("clock_jumps", now.clock.jumps),
-            value("behind_clock_ms", now.clock.behind as f64 / MILLISECOND_NS as f64),
-            value("position_periods", now.periods),
-            value("missed_periods", now.missed),
-            value("missed_periods_last_second", missed),
-            value("unpublished_periods", now.unpublished),
-            value("dropped_samples", now.dropped + new),
-            value("mean_lateness_ms", format!("{:.3}", mean * 1e3)),
-            value("max_lateness_ms", format!("{:.3}", now.max_lateness * 1e3)),
-            value("stream_drives", now.stream.is_active),
-            value("stream_delay_ms", now.stream.delay as f64 / MILLISECOND_NS as f64),
-            value("stream_setpoints_rejected", now.stream.rejected),
-            value("stream_setpoints_ignored", now.stream.ignored),
-            value("stream_messages_out_of_order", now.stream.reordered),
-            value("stream_gaps", now.stream.counts.gaps),
-            value("stream_speed_limited_periods", now.stream.counts.limited),
-            value("stream_held_off", now.stream.is_inhibited),
+            value(keys::STATE, state),
+            value(keys::TIME, self.time_mode),
+            value(keys::CLOCK, now.clock.source.name()),
+            value(keys::CLOCK_JUMPS, now.clock.jumps),
+            value(keys::BEHIND_CLOCK_MS, now.clock.behind as f64 / MILLISECOND_NS as f64),
+            value(keys::POSITION_PERIODS, now.periods),
+            value(keys::MISSED_PERIODS, now.missed),
+            value(keys::MISSED_PERIODS_LAST_SECOND, missed),
+            value(keys::UNPUBLISHED_PERIODS, now.unpublished),
+            value(keys::DROPPED_SAMPLES, now.dropped + new),
+            value(keys::MEAN_LATENESS_MS, format!("{:.3}", mean * 1e3)),
+            value(keys::MAX_LATENESS_MS, format!("{:.3}", now.max_lateness * 1e3)),
+            value(keys::STREAM_DRIVES, now.stream.is_active),
+            value(keys::STREAM_DELAY_MS, now.stream.delay as f64 / MILLISECOND_NS as f64),
+            value(keys::STREAM_SETPOINTS_REJECTED, now.stream.rejected),
+            value(keys::STREAM_SETPOINTS_IGNORED, now.stream.ignored),
+            value(keys::STREAM_MESSAGES_OUT_OF_ORDER, now.stream.reordered),
+            value(keys::STREAM_GAPS, now.stream.counts.gaps),
+            value(keys::STREAM_SPEED_LIMITED_PERIODS, now.stream.counts.limited),
+            value(keys::STREAM_HELD_OFF, now.stream.is_inhibited),
         ];
         self.status(format!("{}: axes", self.node), &problems, state, values)
     }
@@ -112,9 +113,9 @@ impl Diagnostics {
             problems.push("outside its travel limits");
         }
         let values = vec![
-            value("saturated_periods", now.saturated),
-            value("friction_extrapolated_periods", now.extrapolated),
-            value("outside_travel_limits_periods", now.outside),
+            value(keys::SATURATED_PERIODS, now.saturated),
+            value(keys::FRICTION_EXTRAPOLATED_PERIODS, now.extrapolated),
+            value(keys::OUTSIDE_TRAVEL_LIMITS_PERIODS, now.outside),
         ];
         self.status(format!("{}: {joint}", self.node), &problems, "ok", values)
     }
@@ -179,5 +180,25 @@ mod tests {
         assert_eq!((first.status[0].level, first.status[1].level), (0, 1));
         let second = diagnostics.message(0, &now, &now, (0, 0));
         assert_eq!(second.status[1].level, 0);
+    }
+
+    #[test]
+    fn statuses_have_the_keys_of_the_interface() {
+        let diagnostics = Diagnostics {
+            node: "/virtual_axes".into(),
+            machine: "m".into(),
+            joints: vec!["x".into()],
+            time_mode: "real",
+            discovered: DiscoveredEndpoints::default(),
+        };
+        let message = diagnostics.message(0, &Health::default(), &Health::default(), (0, 0));
+        for (status, expected) in message.status.iter().zip([keys::NODE_KEYS, keys::JOINT_KEYS]) {
+            let found: Vec<&str> = status.values.iter().map(|value| value.key.as_str()).collect();
+            // Other systems than Linux have no figure for the memory.
+            let expected = expected.iter().map(|key| key.key);
+            let expected: Vec<&str> =
+                expected.filter(|&key| key != "memory_mb" || found.contains(&key)).collect();
+            assert_eq!(found, expected, "{}", status.name);
+        }
     }
 }

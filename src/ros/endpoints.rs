@@ -11,6 +11,7 @@ use rustdds::{DomainParticipant, QosPolicies, QosPolicyBuilder, Topic, TopicKind
 
 use super::args::RosArgs;
 use super::recorder::{Direction, Tap, TopicRecorder};
+use crate::interface::{self, TopicQos};
 use serde::Serialize;
 
 use virtual_axes_core::config::{Parameters, QosConfig, TimeMode};
@@ -157,8 +158,7 @@ pub(super) fn create_topic(
 }
 
 /// Topics created by other modules or by ros2-client, with their types.
-const OTHER_TOPICS: [(&str, &str); 2] =
-    [("/rosout", "rcl_interfaces/msg/Log"), ("/parameter_events", "rcl_interfaces/msg/ParameterEvent")];
+const OTHER_TOPICS: [interface::Topic; 2] = [interface::ROSOUT, interface::PARAMETER_EVENTS];
 
 /// Factory for the topics of a node.
 pub struct Endpoints<'a> {
@@ -185,16 +185,20 @@ impl<'a> Endpoints<'a> {
         recorder: &'a mut TopicRecorder,
     ) -> Self {
         let is_blocking = parameters.node_config().time != TimeMode::Real;
-        let known = OTHER_TOPICS.iter().filter_map(|&(name, type_name)| {
-            Some((args.resolve_topic(name).ok()?, (name, type_name.to_owned())))
+        let known = OTHER_TOPICS.iter().filter_map(|topic| {
+            Some((args.resolve_topic(topic.name).ok()?, (topic.name, topic.type_name())))
         });
         Endpoints { node, participant, args, parameters, recorder, is_blocking, known: known.collect() }
     }
 
-    fn configured(&self, name: &str) -> Result<QosConfig, EndpointError> {
-        let own_name = name.trim_start_matches(['~', '/']);
-        self.parameters.qos(own_name).ok_or_else(|| EndpointError::NotCreated {
-            name: name.to_owned(),
+    fn qos(&self, topic: &interface::Topic) -> Result<QosConfig, EndpointError> {
+        let own_name = topic.name.trim_start_matches(['~', '/']);
+        let qos = match topic.qos {
+            TopicQos::Constant(qos) => Some(qos),
+            TopicQos::Parameters => self.parameters.qos(own_name),
+        };
+        qos.ok_or_else(|| EndpointError::NotCreated {
+            name: topic.name.to_owned(),
             reason: "the parameter schema has no QoS for it".to_owned(),
         })
     }
@@ -202,19 +206,20 @@ impl<'a> Endpoints<'a> {
     /// Creates a topic under its resolved name, which can carry one type only.
     fn topic(
         &mut self,
-        name: &'static str,
-        type_name: &MessageTypeName,
+        topic: &interface::Topic,
         qos: &QosPolicies,
     ) -> Result<(Topic, String), EndpointError> {
+        let name = topic.name;
         let failed = |reason: String| EndpointError::NotCreated { name: name.to_owned(), reason };
         let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
-        let wanted = format!("{}/msg/{}", type_name.package_name(), type_name.type_name());
+        let wanted = topic.type_name();
         let (first, carried) = self.known.entry(resolved.clone()).or_insert_with(|| (name, wanted.clone()));
         if *carried != wanted {
             let carried = carried.clone();
             return Err(EndpointError::TopicTypeConflict { resolved, first, carried, name, wanted });
         }
-        let topic = create_topic(self.participant, &resolved, type_name, qos).map_err(failed)?;
+        let type_name = MessageTypeName::new(topic.package, topic.message);
+        let topic = create_topic(self.participant, &resolved, &type_name, qos).map_err(failed)?;
         Ok((topic, resolved))
     }
 
@@ -224,17 +229,14 @@ impl<'a> Endpoints<'a> {
     /// [`EndpointError`] naming the topic.
     pub fn publisher<M: Recorded>(
         &mut self,
-        name: &'static str,
-        type_name: MessageTypeName,
+        description: &interface::Topic,
     ) -> Result<(Publisher<M>, String), EndpointError> {
-        let qos = self.configured(name)?;
+        let qos = self.qos(description)?;
         let max_unacknowledged = if self.is_blocking { blocking_window(qos) } else { MAX_UNACKNOWLEDGED };
         let (topic, resolved) =
-            self.topic(name, &type_name, &with_sample_limit(&profile(qos), max_unacknowledged))?;
-        let network = self
-            .node
-            .create_publisher(&topic, None)
-            .map_err(|e| EndpointError::NotCreated { name: name.to_owned(), reason: e.to_string() })?;
+            self.topic(description, &with_sample_limit(&profile(qos), max_unacknowledged))?;
+        let failed = |reason: String| EndpointError::NotCreated { name: description.name.to_owned(), reason };
+        let network = self.node.create_publisher(&topic, None).map_err(|e| failed(e.to_string()))?;
         let tap = self.recorder.tap(&resolved, qos, Direction::Out);
         let is_volatile = !qos.is_transient_local;
         let publisher = Publisher { network, tap, topic, is_volatile, max_unacknowledged };
@@ -247,27 +249,12 @@ impl<'a> Endpoints<'a> {
     /// [`EndpointError`] naming the topic.
     pub fn subscription<M: Message + Recorded + 'static>(
         &mut self,
-        name: &'static str,
-        type_name: MessageTypeName,
+        description: &interface::Topic,
     ) -> Result<(Subscription<M>, String), EndpointError> {
-        self.subscription_with_qos(name, type_name, self.configured(name)?)
-    }
-
-    /// Creates a subscription with a QoS that is not a parameter; returns it with its resolved name.
-    ///
-    /// # Errors
-    /// [`EndpointError`] naming the topic.
-    pub fn subscription_with_qos<M: Message + Recorded + 'static>(
-        &mut self,
-        name: &'static str,
-        type_name: MessageTypeName,
-        qos: QosConfig,
-    ) -> Result<(Subscription<M>, String), EndpointError> {
-        let (topic, resolved) = self.topic(name, &type_name, &QosPolicies::from(&profile(qos)))?;
-        let network = self
-            .node
-            .create_subscription(&topic, None)
-            .map_err(|e| EndpointError::NotCreated { name: name.to_owned(), reason: e.to_string() })?;
+        let qos = self.qos(description)?;
+        let (topic, resolved) = self.topic(description, &QosPolicies::from(&profile(qos)))?;
+        let failed = |reason: String| EndpointError::NotCreated { name: description.name.to_owned(), reason };
+        let network = self.node.create_subscription(&topic, None).map_err(|e| failed(e.to_string()))?;
         let tap = self.recorder.tap(&resolved, qos, Direction::In);
         Ok((Subscription { network, tap }, resolved))
     }

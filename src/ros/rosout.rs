@@ -15,15 +15,11 @@ use super::args::{LogLevel, RosArgs};
 use super::endpoints::{EndpointError, Publisher, create_topic, with_sample_limit};
 use super::log::LogRecord;
 use super::recorder::{Direction, TopicRecorder};
-use virtual_axes_core::config::QosConfig;
+use crate::interface::{ROSOUT, ROSOUT_QOS, Topic};
 
 /// Capacity of the queue, in messages. Further messages are dropped, so that logging never blocks.
 pub const QUEUE: usize = 256;
 
-/// Name of the topic.
-const NAME: &str = "/rosout";
-/// Depth of rcl's publisher (`rcl_qos_profile_rosout_default`).
-const DEPTH: usize = 1000;
 /// Lifespan of rcl's publisher.
 const LIFESPAN: Duration = Duration::from_secs(10);
 /// Longest time for which a write waits for a slow reader.
@@ -42,21 +38,22 @@ pub(super) fn publisher(
     if !args.log_sinks().rosout {
         return Ok(None);
     }
-    let failed = |reason: String| EndpointError::NotCreated { name: NAME.to_owned(), reason };
-    let resolved = args.resolve_topic(NAME).map_err(|e| failed(e.to_string()))?;
+    let Topic { name, package, message, .. } = ROSOUT;
+    let depth = ROSOUT_QOS.depth;
+    let failed = |reason: String| EndpointError::NotCreated { name: name.to_owned(), reason };
+    let resolved = args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
     let profile = QosProfile {
         durability: Durability::TransientLocal,
-        history: History::KeepLast { depth: DEPTH },
+        history: History::KeepLast { depth },
         lifespan: Some(LIFESPAN),
         ..QosProfile::publisher_default().reliability_reliable(WhenFull::Wait(WRITE_TIMEOUT))
     };
-    let type_name = MessageTypeName::new("rcl_interfaces", "Log");
-    let topic = create_topic(participant, &resolved, &type_name, &with_sample_limit(&profile, DEPTH))
+    let type_name = MessageTypeName::new(package, message);
+    let topic = create_topic(participant, &resolved, &type_name, &with_sample_limit(&profile, depth))
         .map_err(failed)?;
     let network = node.create_publisher(&topic, None).map_err(|e| failed(e.to_string()))?;
-    let qos = QosConfig { is_reliable: true, is_transient_local: true, depth: DEPTH };
-    let tap = recorder.tap(&resolved, qos, Direction::Out);
-    Ok(Some(Publisher { network, tap, topic, is_volatile: false, max_unacknowledged: DEPTH }))
+    let tap = recorder.tap(&resolved, ROSOUT_QOS, Direction::Out);
+    Ok(Some(Publisher { network, tap, topic, is_volatile: false, max_unacknowledged: depth }))
 }
 
 /// Publishes log records until the log is closed.

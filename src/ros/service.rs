@@ -28,6 +28,7 @@ use super::large_response::LargeResponses;
 use super::readers::Readers;
 use super::response_limiter::ResponsePermit;
 use super::rtps::Guid;
+use crate::interface::NodeService;
 
 /// Longest time for which a write waits for a slow reader.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
@@ -124,7 +125,7 @@ pub struct Service<Q: Serialize + DeserializeOwned, A: Serialize + DeserializeOw
 }
 
 impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned + 'static> Service<Q, A> {
-    /// Creates the service `~/label` of `node`, which belongs to `context`.
+    /// Creates `service` of `node`, which belongs to `context`.
     ///
     /// # Errors
     /// [`ServiceError`] if the name cannot be resolved or the middleware cannot create the service.
@@ -132,16 +133,17 @@ impl<Q: Serialize + DeserializeOwned + 'static, A: Serialize + DeserializeOwned 
         node: &mut Node,
         context: &Context,
         args: &RosArgs,
-        label: &'static str,
-        type_name: &ServiceTypeName,
+        service: &NodeService,
         depth: usize,
     ) -> Result<Self, ServiceError>
     where
         Q: Clone,
     {
+        let label = service.label;
         let failed = |reason: String| ServiceError { name: label.to_owned(), reason };
-        let resolved = args.resolve_service(&format!("~/{label}")).map_err(|e| failed(e.to_string()))?;
-        Self::with_name(node, context, &resolved, label, type_name, depth)
+        let resolved = args.resolve_service(&service.name()).map_err(|e| failed(e.to_string()))?;
+        let type_name = ServiceTypeName::new(service.package, service.service);
+        Self::with_name(node, context, &resolved, label, &type_name, depth)
     }
 
     /// Creates a service with a resolved name; `label` is its name in log messages.

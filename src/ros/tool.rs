@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use nalgebra::UnitQuaternion;
-use ros2_client::MessageTypeName;
 use ros2_interfaces_jazzy_serde::geometry_msgs::msg::PoseStamped;
 use ros2_interfaces_jazzy_serde::nav_msgs::msg::Path;
 use tokio::time::{Instant, MissedTickBehavior};
@@ -14,6 +13,7 @@ use super::axes_interface::SampleFrame;
 use super::endpoints::{EndpointError, Endpoints, Publisher};
 use super::outputs::{Output, OutputFactory};
 use super::overflow::OverflowPolicy;
+use crate::interface;
 use virtual_axes_core::config::ToolConfig;
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
 use virtual_axes_core::machine::AxisSample;
@@ -49,11 +49,9 @@ impl ToolTopics {
         if !kinematics.has_linear_axis() && !kinematics.has_rotary_axis() {
             return Ok(None);
         }
-        let path_type = || MessageTypeName::new("nav_msgs", "Path");
-        let (pose, pose_name) =
-            endpoints.publisher("~/tool_pose", MessageTypeName::new("geometry_msgs", "PoseStamped"))?;
-        let (path, path_name) = endpoints.publisher("~/tool_path", path_type())?;
-        let (setpoint, setpoint_name) = endpoints.publisher("~/tool_path_setpoint", path_type())?;
+        let (pose, pose_name) = endpoints.publisher(&interface::TOOL_POSE)?;
+        let (path, path_name) = endpoints.publisher(&interface::TOOL_PATH)?;
+        let (setpoint, setpoint_name) = endpoints.publisher(&interface::TOOL_PATH_SETPOINT)?;
         let names = vec![pose_name, path_name, setpoint_name];
         Ok(Some(ToolTopics { pose, path, setpoint, kinematics, names }))
     }

@@ -2,7 +2,6 @@
 
 use std::io::Write;
 
-use ros2_client::MessageTypeName;
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
 use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
@@ -10,14 +9,11 @@ use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 
 use super::args::RosArgs;
 use super::endpoints::{EndpointError, Endpoints, Publisher, Subscription};
-use virtual_axes_core::config::{QosConfig, TimeMode};
+use crate::interface;
+use virtual_axes_core::config::TimeMode;
 use virtual_axes_io::messages::{
-    CONTROL_PACKAGE, DriveStates, JointTrajectoryControllerState, MotorCurrents, PACKAGE, TrajectoryResult,
+    DriveStates, JointTrajectoryControllerState, MotorCurrents, TrajectoryResult,
 };
-
-/// QoS of the `/clock` subscription. Best effort matches reliable and best-effort publishers; the depth allows for
-/// several publishers.
-const CLOCK_QOS: QosConfig = QosConfig { is_reliable: false, is_transient_local: false, depth: 10 };
 
 /// Publishers and subscriptions of the node.
 pub struct Topics {
@@ -78,32 +74,21 @@ impl Topics {
         args: &RosArgs,
         time: TimeMode,
     ) -> Result<Self, EndpointError> {
-        let joint_state = || MessageTypeName::new("sensor_msgs", "JointState");
-        let trajectory = MessageTypeName::new("trajectory_msgs", "JointTrajectory");
-        let diagnostic = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");
-        let own = |name: &str| MessageTypeName::new(PACKAGE, name);
-
-        let (psec, psec_name) = endpoints.subscription("psec", trajectory)?;
-        let (psec_stream, stream_name) = endpoints.subscription("psec_stream", joint_state())?;
-        let (load, load_name) = endpoints.subscription("load", joint_state())?;
-        let (joint_states, joint_states_name) = endpoints.publisher("joint_states", joint_state())?;
-        let (motor_currents, currents_name) =
-            endpoints.publisher("~/motor_currents", own("MotorCurrents"))?;
-        let (drive_states, states_name) = endpoints.publisher("~/drive_states", own("DriveStates"))?;
-        let controller_type = MessageTypeName::new(CONTROL_PACKAGE, "JointTrajectoryControllerState");
-        let (controller_state, controller_name) =
-            endpoints.publisher("~/controller_state", controller_type)?;
-        let (results, results_name) = endpoints.publisher("~/trajectory_result", own("TrajectoryResult"))?;
-        let (diagnostics, diagnostics_name) = endpoints.publisher("/diagnostics", diagnostic)?;
-        let clock_type = || MessageTypeName::new("rosgraph_msgs", "Clock");
+        let (psec, psec_name) = endpoints.subscription(&interface::PSEC)?;
+        let (psec_stream, stream_name) = endpoints.subscription(&interface::PSEC_STREAM)?;
+        let (load, load_name) = endpoints.subscription(&interface::LOAD)?;
+        let (joint_states, joint_states_name) = endpoints.publisher(&interface::JOINT_STATES)?;
+        let (motor_currents, currents_name) = endpoints.publisher(&interface::MOTOR_CURRENTS)?;
+        let (drive_states, states_name) = endpoints.publisher(&interface::DRIVE_STATES)?;
+        let (controller_state, controller_name) = endpoints.publisher(&interface::CONTROLLER_STATE)?;
+        let (results, results_name) = endpoints.publisher(&interface::TRAJECTORY_RESULT)?;
+        let (diagnostics, diagnostics_name) = endpoints.publisher(&interface::DIAGNOSTICS)?;
         let clock = match time {
-            TimeMode::Fast => Some(endpoints.publisher("/clock", clock_type())?),
+            TimeMode::Fast => Some(endpoints.publisher(&interface::CLOCK)?),
             TimeMode::Real | TimeMode::SimTime => None,
         };
         let clock_input = match time {
-            TimeMode::Fast | TimeMode::SimTime => {
-                Some(endpoints.subscription_with_qos("/clock", clock_type(), CLOCK_QOS)?)
-            }
+            TimeMode::Fast | TimeMode::SimTime => Some(endpoints.subscription(&interface::CLOCK_INPUT)?),
             TimeMode::Real => None,
         };
         let names = GraphNames {
@@ -122,7 +107,10 @@ impl Topics {
             .into_iter()
             .chain(clock.iter().map(|(_, name)| name.clone()))
             .collect(),
-            services: ["~/reset", "~/stop"].iter().filter_map(|s| args.resolve_service(s).ok()).collect(),
+            services: [interface::RESET, interface::STOP]
+                .iter()
+                .filter_map(|service| args.resolve_service(&service.name()).ok())
+                .collect(),
             actions: Vec::new(),
         };
         let subscriptions = TopicSubscriptions { psec, psec_stream, load, clock: clock_input };

@@ -3,17 +3,14 @@
 use futures::StreamExt;
 use futures::future::BoxFuture;
 use futures::stream::FuturesUnordered;
-use ros2_client::{Context, Node, ServiceTypeName};
+use ros2_client::{Context, Node};
 use ros2_interfaces_jazzy_serde::std_srvs::srv::{TriggerRequest, TriggerResponse};
 
 use super::args::RosArgs;
 use super::response_limiter::ResponseLimiter;
 use super::service::{Service, ServiceError};
+use crate::interface::NodeService;
 
-/// Label of the service that resets the axes to rest at home.
-pub const RESET: &str = "reset";
-/// Label of the service that stops the axes within their limits.
-pub const STOP: &str = "stop";
 /// Number of requests that may wait.
 const DEPTH: usize = 10;
 
@@ -21,7 +18,7 @@ const DEPTH: usize = 10;
 pub struct TriggerService(Service<TriggerRequest, TriggerResponse>);
 
 impl TriggerService {
-    /// Creates the service `~/label`.
+    /// Creates `service`.
     ///
     /// # Errors
     /// [`ServiceError`] if the service cannot be created.
@@ -29,10 +26,9 @@ impl TriggerService {
         node: &mut Node,
         context: &Context,
         args: &RosArgs,
-        label: &'static str,
+        service: &NodeService,
     ) -> Result<Self, ServiceError> {
-        let type_name = ServiceTypeName::new("std_srvs", "Trigger");
-        Service::new(node, context, args, label, &type_name, DEPTH).map(TriggerService)
+        Service::new(node, context, args, service, DEPTH).map(TriggerService)
     }
 
     /// Serves until the node shuts down; `act` executes a request and returns the message of its response.

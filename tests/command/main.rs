@@ -7,5 +7,6 @@ mod command_design;
 mod files_output;
 mod identify_command;
 mod ingress_properties;
+mod interface;
 mod readme;
 mod tune_command;

@@ -13,10 +13,12 @@ mod identify;
 mod identify_result;
 mod identify_text;
 mod input;
+mod interface;
 mod interrupt;
 mod json;
 mod list;
 mod machine_file;
+mod parameters;
 mod period;
 mod pose;
 mod progress;
@@ -98,6 +100,15 @@ enum Command {
         /// Print a Markdown table.
         #[arg(long)]
         markdown: bool,
+        /// Print a JSON list.
+        #[arg(long, conflicts_with = "markdown")]
+        json: bool,
+    },
+    /// List topics, services and actions of the node, rejection codes and keys of /diagnostics.
+    Interface {
+        /// Print a JSON object.
+        #[arg(long)]
+        json: bool,
     },
     /// Print a completion script for a shell.
     Completions {
@@ -158,8 +169,11 @@ fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Machines { json, show: None } => list::machines(*json),
         Command::Scenarios { show: Some(name), .. } => list::scenario(name),
         Command::Scenarios { json, show: None } => list::scenarios(*json),
-        Command::Parameters { markdown: true } => Ok(listing::markdown()),
-        Command::Parameters { markdown: false } => Ok(listing::text()),
+        Command::Parameters { markdown: true, .. } => Ok(listing::markdown()),
+        Command::Parameters { json: true, .. } => Ok(parameters::json()),
+        Command::Parameters { .. } => Ok(listing::text()),
+        Command::Interface { json: true } => Ok(interface::json()),
+        Command::Interface { json: false } => Ok(interface::text()),
         Command::Completions { shell } => {
             let mut text = Vec::new();
             let name = CommandLine::command().get_name().to_owned();

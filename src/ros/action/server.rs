@@ -19,6 +19,7 @@ use super::goals::{GoalState, GoalTable, MAX_ACTIVE_GOALS, ResultReply};
 use super::outcome;
 use super::{GoalId, GoalValidator};
 use crate::ingress::args::RosArgs;
+use crate::interface::{FOLLOW_JOINT_TRAJECTORY, NodeAction};
 use crate::ros::axes_interface::Command;
 use crate::ros::endpoints::{
     BLOCKING_WINDOW, MAX_UNACKNOWLEDGED, Publisher, create_topic, with_sample_limit,
@@ -34,14 +35,10 @@ use virtual_axes_core::trajectory::{Rejection, RejectionCode};
 use virtual_axes_io::messages::action_msgs::msg::GoalStatusArray;
 use virtual_axes_io::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
 use virtual_axes_io::messages::{
-    CONTROL_PACKAGE, FeedbackMessage, FollowJointTrajectoryResult, GetResultRequest, GetResultResponse,
-    SendGoalRequest, SendGoalResponse, stamp,
+    FeedbackMessage, FollowJointTrajectoryResult, GetResultRequest, GetResultResponse, SendGoalRequest,
+    SendGoalResponse, stamp,
 };
 
-/// Name of the action before remapping.
-const ACTION: &str = "~/follow_joint_trajectory";
-/// Type of the action.
-const TYPE: &str = "FollowJointTrajectory";
 /// Number of requests that may wait, rmw's default for services.
 const SERVICE_DEPTH: usize = 10;
 /// History depth of feedback.
@@ -76,7 +73,7 @@ impl ActionServer {
         context: &Context,
         args: &RosArgs,
     ) -> Result<(Self, ActionTopics), ServiceError> {
-        let name = args.resolve_service(ACTION).map_err(|e| failure(e.to_string()))?;
+        let name = args.resolve_service(FOLLOW_JOINT_TRAJECTORY.name).map_err(|e| failure(e.to_string()))?;
         let server = Self::create_services(node, context, &name)?;
         let topics = ActionTopics::new(node, context, name)?;
         Ok((server, topics))
@@ -156,11 +153,12 @@ fn part_name(name: &str, part: &str) -> String {
 
 /// Returns the DDS name of a type of the action.
 fn type_name(part: &str) -> String {
-    format!("{CONTROL_PACKAGE}::action::dds_::{TYPE}_{part}")
+    let NodeAction { package, action, .. } = FOLLOW_JOINT_TRAJECTORY;
+    format!("{package}::action::dds_::{action}_{part}")
 }
 
 fn failure(reason: String) -> ServiceError {
-    ServiceError { name: ACTION.to_owned(), reason }
+    ServiceError { name: FOLLOW_JOINT_TRAJECTORY.name.to_owned(), reason }
 }
 
 impl ActionTopics {

@@ -6,6 +6,7 @@ use rustdds::DomainParticipant;
 
 use super::NodeError;
 use super::setup::NodeSetup;
+use crate::interface::{RESET, STOP};
 use crate::ros::action::{ActionServer, ActionTopics};
 use crate::ros::args::RosArgs;
 use crate::ros::endpoints::{Endpoints, Publisher};
@@ -14,7 +15,7 @@ use crate::ros::recorder::TopicRecorder;
 use crate::ros::rosout;
 use crate::ros::tool::ToolTopics;
 use crate::ros::topics::Topics;
-use crate::ros::trigger::{RESET, STOP, TriggerService};
+use crate::ros::trigger::TriggerService;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::kinematics::Kinematics;
 
@@ -57,8 +58,8 @@ impl NodeEndpoints {
         topics.names.add_published(tool.as_ref().map_or(&[], |tool| &tool.names));
         let (action, action_topics) = ActionServer::new(&mut node, context, args)?;
         topics.names.actions.push(action_topics.name.clone());
-        let reset = TriggerService::new(&mut node, context, args, RESET)?;
-        let stop = TriggerService::new(&mut node, context, args, STOP)?;
+        let reset = TriggerService::new(&mut node, context, args, &RESET)?;
+        let stop = TriggerService::new(&mut node, context, args, &STOP)?;
         let parameters = ParameterServices::new(&mut node, context, args)?;
         let services = NodeServices { reset, stop, parameters };
         Ok(NodeEndpoints { node, rosout, topics, tool, action, action_topics, services })

@@ -25,14 +25,13 @@ use super::environment::Environment;
 use super::health::Health;
 use super::log::LogRecord;
 use super::parameter_host::LiveNodeParameters;
-use super::parameter_services;
 use super::participant::Participant;
 use super::recorder::{TopicRecorder, TopicRecording};
 use super::security::Security;
 use super::service;
 use super::topics::Topics;
-use super::trigger::{RESET, STOP};
 use super::writer_rotation::RotationContext;
+use crate::interface::SERVICES;
 use endpoints::NodeEndpoints;
 use outputs::{NodeOutputs, NodePublishers, start_outputs};
 use setup::NodeSetup;
@@ -73,7 +72,7 @@ async fn serve(
     parameters: Parameters,
     log: mpsc::Receiver<LogRecord>,
 ) -> Result<(), NodeError> {
-    service::check_names(args, parameter_services::LABELS.into_iter().chain([RESET, STOP]))?;
+    service::check_names(args, SERVICES.iter().map(|service| service.label))?;
     let signals = ShutdownSignals::new()?;
     let setup = NodeSetup::new(&parameters)?;
     let (health_out, health) = watch::channel(Health::default());

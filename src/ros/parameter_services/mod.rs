@@ -11,9 +11,7 @@ use futures::{
     future::BoxFuture,
     stream::{FuturesUnordered, select_all},
 };
-use ros2_client::{
-    Context, Message, MessageTypeName, Name, Node, Publisher, ServiceTypeName, service::RmwRequestId,
-};
+use ros2_client::{Context, Message, MessageTypeName, Name, Node, Publisher, service::RmwRequestId};
 use ros2_interfaces_jazzy_serde::{
     builtin_interfaces::msg::Time,
     rcl_interfaces::{
@@ -29,8 +27,9 @@ use ros2_interfaces_jazzy_serde::{
 
 use super::args::RosArgs;
 use super::response_limiter::{ResponseLimiter, ResponsePermit};
-use super::service::{RESPONSE_DEPTH, Service, ServiceError, profile};
+use super::service::{Service, ServiceError, profile};
 use crate::ingress::parameters::{self as wire, ParameterHost, list_parameters};
+use crate::interface::{self, NodeService, PARAMETER_EVENTS_QOS, Topic};
 
 /// Depth of rmw's profile for parameter services: number of requests that a client may send at once.
 const QUEUE_DEPTH: usize = 1000;
@@ -64,12 +63,12 @@ impl ParameterServices {
     pub fn new(node: &mut Node, context: &Context, args: &RosArgs) -> Result<Self, ServiceError> {
         let mut factory = ParameterServiceFactory { node, context, args };
         Ok(Self {
-            get: factory.service("get_parameters", "GetParameters")?,
-            types: factory.service("get_parameter_types", "GetParameterTypes")?,
-            set: factory.service("set_parameters", "SetParameters")?,
-            set_atomically: factory.service("set_parameters_atomically", "SetParametersAtomically")?,
-            list: factory.service("list_parameters", "ListParameters")?,
-            describe: factory.service("describe_parameters", "DescribeParameters")?,
+            get: factory.service(&interface::GET_PARAMETERS)?,
+            types: factory.service(&interface::GET_PARAMETER_TYPES)?,
+            set: factory.service(&interface::SET_PARAMETERS)?,
+            set_atomically: factory.service(&interface::SET_PARAMETERS_ATOMICALLY)?,
+            list: factory.service(&interface::LIST_PARAMETERS)?,
+            describe: factory.service(&interface::DESCRIBE_PARAMETERS)?,
             events: factory.events()?,
             node_name: args.node().to_string(),
         })
@@ -215,16 +214,6 @@ fn list_limited(names: &[String], prefixes: &[String], depth: u64) -> msg::ListP
     list_parameters(names, prefixes, depth)
 }
 
-/// Labels of the services.
-pub(super) const LABELS: [&str; 6] = [
-    "get_parameters",
-    "get_parameter_types",
-    "set_parameters",
-    "set_parameters_atomically",
-    "describe_parameters",
-    "list_parameters",
-];
-
 /// Factory of the services, reliable and with rmw's depth.
 struct ParameterServiceFactory<'a> {
     node: &'a mut Node,
@@ -235,21 +224,20 @@ struct ParameterServiceFactory<'a> {
 impl ParameterServiceFactory<'_> {
     fn service<Q: Message + Clone + 'static, A: Message + 'static>(
         &mut self,
-        label: &'static str,
-        type_name: &str,
+        service: &NodeService,
     ) -> Result<Service<Q, A>, ServiceError> {
-        let type_name = ServiceTypeName::new("rcl_interfaces", type_name);
-        Service::new(self.node, self.context, self.args, label, &type_name, QUEUE_DEPTH)
+        Service::new(self.node, self.context, self.args, service, QUEUE_DEPTH)
     }
 
     fn events(&mut self) -> Result<Publisher<msg::ParameterEvent>, ServiceError> {
-        let error = |reason: String| ServiceError { name: "/parameter_events".to_owned(), reason };
-        let resolved = self.args.resolve_topic("/parameter_events").map_err(|e| error(e.to_string()))?;
+        let Topic { name, package, message, .. } = interface::PARAMETER_EVENTS;
+        let error = |reason: String| ServiceError { name: name.to_owned(), reason };
+        let resolved = self.args.resolve_topic(name).map_err(|e| error(e.to_string()))?;
         let name = Name::parse(&resolved).map_err(|e| error(e.to_string()))?;
-        let type_name = MessageTypeName::new("rcl_interfaces", "ParameterEvent");
+        let type_name = MessageTypeName::new(package, message);
         let topic = self
             .node
-            .create_topic(&name, type_name, &profile(RESPONSE_DEPTH))
+            .create_topic(&name, type_name, &profile(PARAMETER_EVENTS_QOS.depth))
             .map_err(|e| error(e.to_string()))?;
         self.node.create_publisher(&topic, None).map_err(|e| error(e.to_string()))
     }

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::{DiagnosticStatus, KeyValue};
 
 use super::Shared;
+use crate::interface::diagnostics::{self as keys, DiagnosticKey};
 
 /// Bytes per megabyte.
 pub(super) const MEGABYTE: u64 = 1_000_000;
@@ -41,13 +42,13 @@ impl RecordingStatus {
             }
             None => (DiagnosticStatus::OK, "recording".to_owned()),
         };
-        let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
+        let value = |key: DiagnosticKey, value: String| KeyValue { key: key.key.to_owned(), value };
         let values = vec![
-            value("file", shared.path.clone()),
-            value("recording", ended.is_none().to_string()),
-            value("size_mb", format!("{:.3}", number(&shared.bytes) as f64 / MEGABYTE as f64)),
-            value("messages", number(&shared.messages).to_string()),
-            value("left_out", left_out.to_string()),
+            value(keys::FILE, shared.path.clone()),
+            value(keys::RECORDING, ended.is_none().to_string()),
+            value(keys::SIZE_MB, format!("{:.3}", number(&shared.bytes) as f64 / MEGABYTE as f64)),
+            value(keys::MESSAGES, number(&shared.messages).to_string()),
+            value(keys::LEFT_OUT, left_out.to_string()),
         ];
         let (name, hardware_id) = (format!("{node}: recording"), machine.to_owned());
         DiagnosticStatus { level, name, message, hardware_id, values }

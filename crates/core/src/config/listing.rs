@@ -1,10 +1,11 @@
-//! Parameter table as text and as Markdown for the README.
+//! Parameter table as text and as Markdown, and the groups of parameters.
 
 use std::fmt::Write;
 
 use super::definition::{MotorKind, ParameterDefinition, Presence, Scope};
 use super::machine::AxisKind;
 use super::schema::DEFINITIONS;
+use crate::text::wrapped;
 
 /// Column headings.
 const HEADINGS: [&str; 6] = ["key", "range", "default", "live", "for", "description"];
@@ -15,11 +16,44 @@ pub fn rows() -> Vec<[String; 6]> {
     DEFINITIONS.iter().map(row).collect()
 }
 
-fn row(definition: &ParameterDefinition) -> [String; 6] {
-    let key = match definition.scope {
+/// Returns the name of the parameter, with `<joint>` for the joint name.
+pub fn key(definition: &ParameterDefinition) -> String {
+    match definition.scope {
         Scope::Axis => format!("<joint>.{}", definition.key),
         Scope::Machine | Scope::Node => definition.key.to_owned(),
-    };
+    }
+}
+
+/// Returns the owner of the parameter: machine, node, or a kind of axis or motor.
+pub fn owner(definition: &ParameterDefinition) -> &'static str {
+    match (definition.scope, definition.axis, definition.motor) {
+        (Scope::Machine, ..) => "machine",
+        (Scope::Node, ..) => "node",
+        (_, Some(AxisKind::Linear), _) => "linear axis",
+        (_, Some(AxisKind::Rotary), _) => "rotary axis",
+        (_, _, Some(MotorKind::Linear)) => "linear motor",
+        (_, _, Some(MotorKind::Rotary)) => "rotary motor",
+        (Scope::Axis, None, None) => "axis",
+    }
+}
+
+/// Returns the group of the parameter, a page of the reference.
+pub fn group(definition: &ParameterDefinition) -> &'static str {
+    let first = definition.key.split('.').next().unwrap_or_default();
+    match (definition.scope, first) {
+        (Scope::Node, "qos") => "qos",
+        (Scope::Node, _) => "node",
+        (Scope::Machine, _) => "machine",
+        (Scope::Axis, "friction" | "gravity") => "friction",
+        (Scope::Axis, "position_loop") => "position-loop",
+        (Scope::Axis, "velocity_loop" | "current_loop" | "feedforward" | "delays") => "inner-loops",
+        (Scope::Axis, "limits" | "tolerances") => "limits",
+        (Scope::Axis, "deviation") => "deviation",
+        (Scope::Axis, _) => "axis",
+    }
+}
+
+fn row(definition: &ParameterDefinition) -> [String; 6] {
     let default = match definition.presence {
         Presence::Required => "required".to_owned(),
         Presence::Optional => "none".to_owned(),
@@ -28,21 +62,12 @@ fn row(definition: &ParameterDefinition) -> [String; 6] {
             _ => "empty".to_owned(),
         },
     };
-    let owner = match (definition.scope, definition.axis, definition.motor) {
-        (Scope::Machine, ..) => "machine",
-        (Scope::Node, ..) => "node",
-        (_, Some(AxisKind::Linear), _) => "linear axis",
-        (_, Some(AxisKind::Rotary), _) => "rotary axis",
-        (_, _, Some(MotorKind::Linear)) => "linear motor",
-        (_, _, Some(MotorKind::Rotary)) => "rotary motor",
-        (Scope::Axis, None, None) => "axis",
-    };
     [
-        key,
+        key(definition),
         definition.range(),
         default,
         if definition.is_live { "yes" } else { "no" }.to_owned(),
-        owner.to_owned(),
+        owner(definition).to_owned(),
         definition.description.to_owned(),
     ]
 }
@@ -58,19 +83,17 @@ pub fn markdown() -> String {
     out
 }
 
-/// Returns the table as aligned text.
+/// Returns a paragraph per parameter: name, range, default and owner in one line, then the description.
 pub fn text() -> String {
-    let mut rows = rows();
-    rows.insert(0, HEADINGS.map(str::to_owned));
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default();
-    let widths: Vec<usize> = (0..HEADINGS.len()).map(width).collect();
     let mut out = String::new();
-    for row in &rows {
-        let mut line = String::new();
-        for (cell, &width) in row.iter().zip(&widths) {
-            let _ = write!(line, "{cell:<width$}  ");
+    for [key, range, default, live, owner, description] in rows() {
+        let default = if default == "required" { default } else { format!("default {default}") };
+        let live = if live == "yes" { ", live" } else { "" };
+        let _ = writeln!(out, "{key}");
+        let _ = writeln!(out, "    {range}; {default}{live}; {owner}");
+        for line in wrapped(&description, 96) {
+            let _ = writeln!(out, "    {line}");
         }
-        let _ = writeln!(out, "{}", line.trim_end());
     }
     out
 }

@@ -7,69 +7,63 @@ use crate::text::{is_control, shortened};
 /// Largest length of a text, characters; it can contain names of any length from the received message.
 const MAX_TEXT_LENGTH: usize = 500;
 
-/// Code of a rejection; the values are those of the message `TrajectoryResult` and never change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum RejectionCode {
-    /// Unknown joint.
-    UnknownJoint = 1,
-    /// Joint given twice.
-    DuplicateJoint = 2,
-    /// Array with a wrong number of values.
-    WrongSize = 3,
-    /// Time of a point not after the time of the previous point.
-    TimesNotIncreasing = 4,
-    /// Negative time of the first point.
-    NegativeTime = 5,
-    /// NaN or infinity.
-    NotFinite = 6,
-    /// Position outside the travel limits.
-    OutsideTravelLimits = 7,
-    /// First setpoint not reachable from the commanded one within one position cycle.
-    Jump = 8,
-    /// Speed above Vmax of the axis.
-    Speed = 9,
-    /// Last point in the past.
-    EndedInThePast = 10,
-    /// More points than `max_points`.
-    TooManyPoints = 11,
-    /// Velocity at the last point, which is not allowed by default.
-    VelocityAtEnd = 12,
-    /// Time outside the range of 64-bit nanoseconds, or an invalid nanosec field.
-    InvalidTime = 13,
-    /// Queue of a joint full, or too many trajectories or points in total (admission control).
-    QueueFull = 14,
-    /// Invalid path or goal tolerance.
-    InvalidTolerance = 15,
-    /// Multi-DOF trajectory or component tolerances, which are not supported.
-    MultiDof = 16,
-    /// Too many goals at the same time.
-    TooManyGoals = 17,
+/// Defines the codes, each with the number and name of the message `TrajectoryResult` and its meaning.
+macro_rules! rejection_codes {
+    ($($variant:ident = $code:literal, $name:literal, $meaning:literal;)*) => {
+        /// Code of a rejection; the values are those of the message `TrajectoryResult` and never change.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        pub enum RejectionCode {
+            $(#[doc = concat!("`", $name, "`: ", $meaning, ".")] $variant = $code,)*
+        }
+
+        impl RejectionCode {
+            /// All codes.
+            pub const ALL: &[RejectionCode] = &[$(RejectionCode::$variant),*];
+
+            /// Returns the name of the constant in the message `TrajectoryResult`.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(RejectionCode::$variant => $name,)*
+                }
+            }
+
+            /// Returns the reason for a rejection with this code.
+            pub fn meaning(self) -> &'static str {
+                match self {
+                    $(RejectionCode::$variant => $meaning,)*
+                }
+            }
+        }
+    };
 }
 
-impl RejectionCode {
-    /// Returns the name of the constant in the message `TrajectoryResult`.
-    pub fn name(self) -> &'static str {
-        match self {
-            RejectionCode::UnknownJoint => "UNKNOWN_JOINT",
-            RejectionCode::DuplicateJoint => "DUPLICATE_JOINT",
-            RejectionCode::WrongSize => "WRONG_SIZE",
-            RejectionCode::TimesNotIncreasing => "TIMES_NOT_INCREASING",
-            RejectionCode::NegativeTime => "NEGATIVE_TIME",
-            RejectionCode::NotFinite => "NOT_FINITE",
-            RejectionCode::OutsideTravelLimits => "OUTSIDE_TRAVEL_LIMITS",
-            RejectionCode::Jump => "JUMP",
-            RejectionCode::Speed => "SPEED",
-            RejectionCode::EndedInThePast => "ENDED_IN_THE_PAST",
-            RejectionCode::TooManyPoints => "TOO_MANY_POINTS",
-            RejectionCode::VelocityAtEnd => "VELOCITY_AT_END",
-            RejectionCode::InvalidTime => "INVALID_TIME",
-            RejectionCode::QueueFull => "QUEUE_FULL",
-            RejectionCode::InvalidTolerance => "INVALID_TOLERANCE",
-            RejectionCode::MultiDof => "MULTI_DOF",
-            RejectionCode::TooManyGoals => "TOO_MANY_GOALS",
-        }
-    }
+rejection_codes! {
+    UnknownJoint = 1, "UNKNOWN_JOINT", "a joint that the machine does not have";
+    DuplicateJoint = 2, "DUPLICATE_JOINT", "a joint that is given twice";
+    WrongSize = 3, "WRONG_SIZE",
+        "a point without a position for each joint; velocities or accelerations that are neither none nor one per \
+         joint; accelerations without velocities";
+    TimesNotIncreasing = 4, "TIMES_NOT_INCREASING",
+        "the `time_from_start` of a point is not after that of the previous point";
+    NegativeTime = 5, "NEGATIVE_TIME", "the `time_from_start` of the first point is negative";
+    NotFinite = 6, "NOT_FINITE", "NaN or infinity";
+    OutsideTravelLimits = 7, "OUTSIDE_TRAVEL_LIMITS",
+        "a point, or the path between two points, is outside the travel limits";
+    Jump = 8, "JUMP", "the first setpoint is further than Vmax·Tsp from the previous one";
+    Speed = 9, "SPEED", "faster than Vmax of the axis";
+    EndedInThePast = 10, "ENDED_IN_THE_PAST", "the last point is in the past";
+    TooManyPoints = 11, "TOO_MANY_POINTS", "more points than `max_points`";
+    VelocityAtEnd = 12, "VELOCITY_AT_END",
+        "the last velocity is not zero, and `allow_nonzero_velocity_at_trajectory_end` is false";
+    InvalidTime = 13, "INVALID_TIME", "a time outside the range of 64-bit nanoseconds, or an invalid `nanosec` field";
+    QueueFull = 14, "QUEUE_FULL",
+        "1024 trajectories wait for the same joint, or 64 for the first `/clock`; or 8192 trajectories, or \
+         4 × `max_points` points, are active or waiting in all";
+    InvalidTolerance = 15, "INVALID_TOLERANCE", "of a goal: an invalid path or goal tolerance";
+    MultiDof = 16, "MULTI_DOF",
+        "of a goal: a multi-DOF trajectory or component tolerances, which are not supported";
+    TooManyGoals = 17, "TOO_MANY_GOALS", "of a goal: 1024 goals are active";
 }
 
 /// Rejection of a trajectory: code, joint, point, value and limit.

@@ -1,0 +1,54 @@
+//! Services of the node.
+
+use super::NodeService;
+
+/// Creates a parameter service of rcl_interfaces.
+const fn parameters(label: &'static str, service: &'static str, content: &'static str) -> NodeService {
+    NodeService { label, package: "rcl_interfaces", service, content }
+}
+
+/// Creates a service of type std_srvs/Trigger.
+const fn trigger(label: &'static str, content: &'static str) -> NodeService {
+    NodeService { label, package: "std_srvs", service: "Trigger", content }
+}
+
+/// Service that resets the axes to rest at home.
+pub const RESET: NodeService = trigger("reset", "resets all axes to rest at home");
+/// Service that stops the axes within their limits.
+pub const STOP: NodeService = trigger("stop", "controlled stop of every axis within its limits");
+
+/// Service that lists the parameters.
+pub const LIST_PARAMETERS: NodeService =
+    parameters("list_parameters", "ListParameters", "names of all parameters");
+/// Service that describes parameters.
+pub const DESCRIBE_PARAMETERS: NodeService = parameters(
+    "describe_parameters",
+    "DescribeParameters",
+    "type, description, unit and range of parameters, and if they are live",
+);
+/// Service that returns the types of parameters.
+pub const GET_PARAMETER_TYPES: NodeService =
+    parameters("get_parameter_types", "GetParameterTypes", "types of parameters");
+/// Service that returns the values of parameters.
+pub const GET_PARAMETERS: NodeService = parameters("get_parameters", "GetParameters", "values of parameters");
+/// Service that sets parameters one by one.
+pub const SET_PARAMETERS: NodeService =
+    parameters("set_parameters", "SetParameters", "sets live parameters one by one");
+/// Service that sets parameters together.
+pub const SET_PARAMETERS_ATOMICALLY: NodeService = parameters(
+    "set_parameters_atomically",
+    "SetParametersAtomically",
+    "sets several live parameters in the same position cycle, or none",
+);
+
+/// All services, those of the action excluded.
+pub const SERVICES: &[NodeService] = &[
+    RESET,
+    STOP,
+    LIST_PARAMETERS,
+    DESCRIBE_PARAMETERS,
+    GET_PARAMETER_TYPES,
+    GET_PARAMETERS,
+    SET_PARAMETERS,
+    SET_PARAMETERS_ATOMICALLY,
+];
