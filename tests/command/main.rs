@@ -8,5 +8,5 @@ mod files_output;
 mod identify_command;
 mod ingress_properties;
 mod interface;
-mod readme;
+mod reference;
 mod tune_command;

@@ -36,7 +36,7 @@ pub(super) const NODE: &[ParameterDefinition] = &[
     ParameterDefinition::number("publish_rate", "Hz", 0.0, 1e6)
         .of_node()
         .default(Number(0.0))
-        .describe("Publication rate of joint_states, at most one message per position cycle; 0 publishes in every position cycle."),
+        .describe("Publication rate of joint_states, motor currents, drive states, controller state and tool pose, at most one message per position cycle; 0 publishes in every position cycle."),
     ParameterDefinition::new("joint_prefix", "", ParameterKind::Text)
         .of_node()
         .default(Text(""))

@@ -1,4 +1,4 @@
-//! Parameter schema: the single table for validation, typed configuration, ROS descriptors and the README.
+//! Parameter schema: the single table for validation, typed configuration, ROS descriptors and the reference.
 //!
 //! Equation numbers refer to Prévost, Lavernhe, Lartigue, Dumur: *Feed drive modelling for the simulation of tool path
 //! tracking in multi-axis High Speed Machining*.
