@@ -103,6 +103,7 @@ stage "style" tools/check_style.py || finish 1
 background set_up
 stage "dependencies" tools/dependencies.py || finish 1
 stage "cargo build" cargo build --release --workspace --locked --bins || finish 1
+stage "reference" tools/reference.py || finish 1
 join_background set_up
 stage "ruff" bash -c ".venv/bin/ruff format --check && .venv/bin/ruff check" || finish 1
 background rust_checks

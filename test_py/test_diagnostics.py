@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 
 from drive import NANOSECONDS, RECORDING_KEYS, Drive, joint_trajectory, own_mb, status_values, to_ns
+from interface import printed
 from motion import go_home, start_swing
 
 
@@ -74,13 +72,15 @@ def test_an_axis_that_leaves_its_travel_limits_is_logged(real: Drive):
     real.wait_for(lambda: "x has left its travel limits" in process.output(), 5, "a line of the log")
 
 
-def test_the_document_has_every_key_and_no_other(real: Drive):
-    document = (Path(__file__).resolve().parent.parent / "docs" / "reference" / "graph.md").read_text()
-    section = document.split("## Keys of `/diagnostics`\n")[1].split("\n## ")[0]
-    documented = re.findall(r"^\| [^|]*\| `(\w+)` \|", section, re.MULTILINE)
-    found = real.next_diagnostics().status
-    reported = dict.fromkeys(key for status in found for key in status_values(status))
-    assert [*reported, *RECORDING_KEYS] == documented
+def test_the_description_has_every_key_and_no_other(real: Drive):
+    """Keys by status, in their order; test_record.py has the status of a recording."""
+    described = {kind["status"]: [row["key"] for row in kind["keys"]] for kind in printed("interface")["diagnostics"]}
+    assert described.pop("NODE: recording") == RECORDING_KEYS
+    for status in real.next_diagnostics().status:
+        joint = status.name.rsplit(": ", 1)[1]
+        kind = "NODE: axes" if joint == "axes" else "NODE: JOINT"
+        assert list(status_values(status)) == described[kind], status.name
+    assert set(described) == {"NODE: axes", "NODE: JOINT"}
 
 
 def test_endpoints_are_counted_and_memory_is_reported(real: Drive):

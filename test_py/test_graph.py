@@ -7,7 +7,7 @@ import signal
 from sensor_msgs.msg import JointState
 
 from drive import Drive, Node
-from tables import interfaces
+from interface import interfaces
 
 
 def of_the_node(drive: Drive) -> set[str]:
@@ -30,7 +30,7 @@ def of_the_node(drive: Drive) -> set[str]:
 def test_appears_and_disappears_within_two_seconds():
     """All interfaces appear, and none remains afterwards."""
     process = Node()
-    rows = [row for row in interfaces() if row.condition is None and row.direction != "action"]
+    rows = [row for row in interfaces() if not row.conditions and row.direction != "action"]
     wanted = {row.resolved(process.name, {}) for row in rows}
     try:
         with Drive(process=process, connect=False) as drive:

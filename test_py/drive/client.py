@@ -38,7 +38,7 @@ from .recording import CURRENT_FIELDS, JOINT_FIELDS, STATE_FIELDS, Recording, Se
 from .trajectories import NANOSECONDS, to_ns, to_time
 
 RECORDING_KEYS = ["file", "recording", "size_mb", "messages", "left_out"]
-"""Name of the recording's status in /diagnostics (docs/reference/graph.md)."""
+"""Keys of the recording's status in /diagnostics (docs/reference/diagnostics.md)."""
 SAMPLES_AT_ONCE = 200
 """Samples taken per callback, few enough that other callbacks are executed in time."""
 TURN_S = 20.0

@@ -1,7 +1,11 @@
-"""Tables of README.md and the running node are equal in both directions."""
+"""The described interface and the running node are equal in both directions; the reference pages are up to date."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -10,14 +14,17 @@ from typing import Any
 
 import pytest
 import yaml
+from control_msgs.action import FollowJointTrajectory
 from rcl_interfaces.msg import ParameterType
 from rclpy.action import graph
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from virtual_axes.msg import TrajectoryResult
 
-from drive import DEFAULT_NODE, Drive, Node
-from tables import Interface, interfaces, parameters
+from drive import DEFAULT_NODE, Drive, Node, node_binary
+from interface import Interface, ParameterRow, interfaces, parameters, printed
 
-CONFIG = Path(__file__).resolve().parent.parent / "config"
+ROOT = Path(__file__).resolve().parent.parent
+CONFIG = ROOT / "config"
 DEFAULT_MACHINE = CONFIG / "mikron_ucp710.yaml"
 LINEAR_MOTORS = CONFIG / "linear_motor_center.yaml"
 
@@ -25,6 +32,9 @@ HIDDEN = "/_action/"
 """Part of the names of an action's topics and services."""
 ACTION_SERVICES = ["cancel_goal", "get_result", "send_goal"]
 ACTION_TOPICS = ["feedback", "status"]
+STATUSES = {"ACCEPTED", "REJECTED", "COMPLETED", "PREEMPTED", "STOPPED", "ABORTED"}
+"""Constants of the status of TrajectoryResult."""
+QOS_POLICIES = ("reliability", "durability", "depth")
 EVERY_NODE_HAS = {"/rosout", "/parameter_events"}
 """Interfaces that the start screen omits, in addition to the parameter services."""
 
@@ -48,16 +58,15 @@ class Run:
         return args + [part for key, value in self.settings.items() for part in ("-p", f"{key}:={value}")]
 
     def expected(self, *directions: str) -> dict[str, Interface]:
-        """Returns the README's interfaces of these directions by name in the graph."""
+        """Returns the described interfaces of these directions by name in the graph."""
         return {
             row.resolved(self.name, self.remaps): row
             for row in interfaces()
-            if row.direction in directions
-            and (row.condition is None or self.settings.get(row.condition[0]) == row.condition[1])
+            if row.direction in directions and row.exists(self.settings)
         }
 
 
-CONDITIONS = sorted({row.condition for row in interfaces() if row.condition})
+CONDITIONS = sorted({condition for row in interfaces() for condition in row.conditions})
 RUNS = {
     "default": Run(),
     # Names of every kind, in another namespace, and interfaces that require a parameter.
@@ -73,7 +82,7 @@ HALT = {"halt": "/cell/halt"}
 
 @pytest.fixture(scope="module", params=RUNS)
 def seen(request: pytest.FixtureRequest) -> Iterator[tuple[Run, Drive]]:
-    """Yields a node started in one of these ways, after all interfaces of the README exist."""
+    """Yields a node started in one of these ways, after all described interfaces exist."""
     run = RUNS[request.param]
     with Node(run.ros_args, name=run.name) as process, Drive(process=process, connect=False) as drive:
         drive.wait_for(drive.sees, 10, "node in the graph")
@@ -144,8 +153,9 @@ def test_quality_of_service_and_node_name_of_every_endpoint(seen: tuple[Run, Dri
         for topic, row in run.expected(direction).items():
             found = {(f"{info.node_namespace.rstrip('/')}/{info.node_name}", quality(info)) for info in ask(topic)}
             assert {node for node, _ in found} <= known, topic
-            reliability = ReliabilityPolicy.RELIABLE if row.reliable else ReliabilityPolicy.BEST_EFFORT
-            durability = DurabilityPolicy.TRANSIENT_LOCAL if row.transient_local else DurabilityPolicy.VOLATILE
+            assert row.qos is not None
+            reliability = ReliabilityPolicy[row.qos["reliability"].upper()]
+            durability = DurabilityPolicy[row.qos["durability"].upper()]
             assert (run.name, (reliability, durability)) in found, topic
 
 
@@ -154,14 +164,12 @@ def quality(info: Any) -> tuple[ReliabilityPolicy, DurabilityPolicy]:
     return info.qos_profile.reliability, info.qos_profile.durability
 
 
-def test_depths(seen: tuple[Run, Drive]):
-    """Depths equal the parameters that set them."""
+def test_policies_are_those_of_the_parameters(seen: tuple[Run, Drive]):
+    """Described profiles equal the parameters that set them."""
     run, drive = seen
-    documented = {
-        f"qos.{row.name.removeprefix('~').strip('/')}.depth": row.depth
-        for row in run.expected("in", "out").values()
-        if row.depth
-    }
+    profiles = [row.qos for row in run.expected("in", "out").values() if row.qos and row.qos["parameters"]]
+    documented = {f"{qos['parameters']}.{policy}": qos[policy] for qos in profiles for policy in QOS_POLICIES}
+    assert len(documented) >= 3 * 12
     assert drive.get_parameters(list(documented)) == documented
 
 
@@ -189,22 +197,22 @@ def test_the_screen_at_the_start(seen: tuple[Run, Drive]):
 class Machine:
     """Expected parameters of a node."""
 
-    rows: dict[str, Any]
-    """Row of the table by parameter."""
+    rows: dict[str, ParameterRow]
+    """Definition by parameter."""
     given: dict[str, Any]
     """Values that the machine file or the arguments set."""
 
 
 @pytest.fixture(scope="module")
 def machine(seen: tuple[Run, Drive]) -> Machine:
-    """Returns the parameters of the started node, from the README and from the file that it read."""
+    """Returns the parameters of the started node, from the description and from the file that it read."""
     run, drive = seen
     file = yaml.safe_load((run.machine or DEFAULT_MACHINE).read_text(encoding="utf-8"))
     settings = {key: yaml.safe_load(value) for key, value in run.settings.items()}
     given = {**flat(file["/**"]["ros__parameters"]), **settings}
     joints = {joint: kinds_of(joint, given) for joint in given["joints"]}
     rows = [(name, row) for row in parameters() for name in row.names(joints)]
-    assert len(dict(rows)) == len(rows), "a parameter has two rows"
+    assert len(dict(rows)) == len(rows), "a parameter has two definitions"
     return Machine(dict(rows), given)
 
 
@@ -230,6 +238,16 @@ def test_parameter_names(seen: tuple[Run, Drive], machine: Machine):
     assert sorted(seen[1].list_parameters()) == sorted(machine.rows)
 
 
+PARAMETER_TYPES = {
+    "bool": ParameterType.PARAMETER_BOOL,
+    "integer": ParameterType.PARAMETER_INTEGER,
+    "double": ParameterType.PARAMETER_DOUBLE,
+    "string": ParameterType.PARAMETER_STRING,
+    "string_array": ParameterType.PARAMETER_STRING_ARRAY,
+    "double_array": ParameterType.PARAMETER_DOUBLE_ARRAY,
+}
+
+
 def test_parameter_descriptions(seen: tuple[Run, Drive], machine: Machine):
     """Text, unit, type, range, choices, and whether the parameter is read-only."""
     for descriptor in seen[1].describe(list(machine.rows)):
@@ -239,18 +257,7 @@ def test_parameter_descriptions(seen: tuple[Run, Drive], machine: Machine):
         assert descriptor.additional_constraints == row.constraint, descriptor.name
         ranges = [(r.from_value, r.to_value) for r in (*descriptor.floating_point_range, *descriptor.integer_range)]
         assert ranges == ([row.bounds] if row.bounds else []), descriptor.name
-        kinds = {
-            "text": [ParameterType.PARAMETER_STRING],
-            "list of texts": [ParameterType.PARAMETER_STRING_ARRAY],
-            "true, false": [ParameterType.PARAMETER_BOOL],
-        }
-        numbers = [ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER]
-        if row.bounds:
-            assert descriptor.type in numbers, descriptor.name
-        elif "numbers" in row.range:
-            assert descriptor.type == ParameterType.PARAMETER_DOUBLE_ARRAY, descriptor.name
-        else:
-            assert descriptor.type in kinds.get(row.range, kinds["text"]), descriptor.name
+        assert descriptor.type == PARAMETER_TYPES[row.type], descriptor.name
 
 
 def test_parameter_values(seen: tuple[Run, Drive], machine: Machine):
@@ -261,5 +268,64 @@ def test_parameter_values(seen: tuple[Run, Drive], machine: Machine):
         if name in machine.given:
             assert value == machine.given[name], name
         else:
-            assert row.default != "required", name
-            assert value == row.default_value(value), name
+            assert not row.required, name
+            assert value == row.default, name
+
+
+# ---------------------------------------------------------------------------- codes and the pages
+
+
+def test_rejection_codes_are_the_constants_of_the_message():
+    """Names and numbers of the described codes equal those of TrajectoryResult."""
+    constants = {
+        name: value for name, value in vars(type(TrajectoryResult)).items() if name.isupper() and name[0] != "_"
+    }
+    others = {"NONE", *(name for name in constants if name.startswith("SOURCE_")), *STATUSES}
+    described = {row["name"]: row["code"] for row in printed("interface")["rejection_codes"]}
+    found = {name: getattr(TrajectoryResult, name) for name in constants if name not in others}
+    assert described == found
+
+
+def test_error_codes_are_the_constants_of_the_action():
+    """Names and numbers of the described codes equal those of the result of FollowJointTrajectory."""
+    described = {row["name"]: row["code"] for row in printed("interface")["action_error_codes"]}
+    names = [name for name in vars(type(FollowJointTrajectory.Result)) if name.isupper() and name[0] != "_"]
+    assert described == {name: getattr(FollowJointTrajectory.Result, name) for name in names}
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """Returns a copy of what tools/reference.py reads and writes."""
+    for folder in ("docs/reference", "launch", "msg", "tools"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    return tmp_path
+
+
+def generate(checkout: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Returns the finished tools/reference.py of a checkout, with the programs of this one."""
+    environment = {**os.environ, "CARGO_TARGET_DIR": str(node_binary().parent.parent)}
+    command = [sys.executable, checkout / "tools" / "reference.py", *arguments]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+
+
+def test_the_stored_pages_are_the_generated_ones(checkout: Path):
+    """The check succeeds, and writing changes nothing."""
+    result = generate(checkout)
+    assert result.returncode == 0, result.stderr
+
+
+@pytest.mark.parametrize("page", ["topics.md", "parameters/qos.md", "command-line.md"])
+def test_a_changed_missing_or_surplus_page_is_reported(checkout: Path, page: str):
+    """Each fault has exit status 1 and names the page; writing repairs the first two."""
+    path = checkout / "docs" / "reference" / page
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("reliab", "probab").replace("help", "hulp"), encoding="utf-8")
+    result = generate(checkout)
+    assert (result.returncode, page in result.stderr) == (1, True), result.stderr
+    path.unlink()
+    assert generate(checkout).returncode == 1
+    assert generate(checkout, "--write").returncode == 0
+    assert path.read_text(encoding="utf-8") == text
+    (checkout / "docs" / "reference" / "old.md").write_text(text, encoding="utf-8")
+    result = generate(checkout)
+    assert (result.returncode, "old.md" in result.stderr) == (1, True), result.stderr
