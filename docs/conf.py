@@ -42,7 +42,8 @@ def read_page(_app: Sphinx, name: str, source: list[str]) -> None:
     if name in ROOT_PAGES:
         page = ROOT / ROOT_PAGES[name]
         source[0] = page.read_text(encoding="utf-8")
-    pages = {ROOT / file: DOCS / f"{one}.md" for one, file in ROOT_PAGES.items()} | {ROOT / "README.md": DOCS / "index.md"}
+    pages = {ROOT / file: DOCS / f"{one}.md" for one, file in ROOT_PAGES.items()}
+    pages[ROOT / "README.md"] = DOCS / "index.md"
 
     def rewritten(link: re.Match[str]) -> str:
         text, target, anchor = link[1], link[2], link[3] or ""
