@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import options
-from reference_markdown import MARK, console, page, table
+from reference_markdown import MARK, console, page, section, table
+from reference_parameters import parameter_pages
 from reference_sources import help_texts, launch_file, message
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -27,50 +28,6 @@ PROGRAMS = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release"
 PAGES = ROOT / "docs" / "reference"
 DIFFERENCE_LINES = 12
 """Printed lines of the difference between a stored page and the generated one."""
-
-GROUPS = {
-    "machine": (
-        "Machine and kinematics",
-        "Name, axes, periods of the control loops, and dimensions of the kinematic chain. See also "
-        "[Kinematics](../kinematics.md) and [Machines](../machines.md).",
-    ),
-    "axis": (
-        "Axis, transmission and motor",
-        "Type of each axis, its transmission, and the electrical and mechanical constants of its motor.",
-    ),
-    "friction": (
-        "Friction and gravity",
-        "Friction law and weight of each axis. [Identification](../../explanation/identification.md) finds these "
-        "values from recordings.",
-    ),
-    "position-loop": (
-        "Position loop",
-        "Position controller of each axis and its tuning. "
-        "[Predictive control](../../explanation/predictive-control.md) explains `gpc` and `rst`.",
-    ),
-    "inner-loops": (
-        "Velocity loop, current loop, feedforward and delays",
-        "PI controllers below the position loop, weights of the feedforward, and delays of the setpoint.",
-    ),
-    "limits": (
-        "Limits and tolerances",
-        "Limits of trajectories and controlled stops, and default tolerances of [action goals](../action.md).",
-    ),
-    "deviation": (
-        "Deviation of the plant",
-        "Factors on the simulated drive; the controllers are designed for the nominal values.",
-    ),
-    "node": ("Node", "Time, topics, action goals and recording of `virtual_axes_node`."),
-    "qos": (
-        "Quality of service",
-        "QoS profile of each topic. The keys are `qos.TOPIC.reliability` (reliable, best_effort), "
-        "`qos.TOPIC.durability` (volatile, transient_local) and `qos.TOPIC.depth` (1 … 100000, keep last), for example "
-        "`-p qos.joint_states.depth:=100`.",
-    ),
-}
-"""Title and introduction of the page of each group of parameters."""
-
-POLICIES = ("reliability", "durability", "depth")
 
 
 def output(*arguments: str) -> Any:
@@ -85,17 +42,14 @@ class Reference:
     def __init__(self) -> None:
         self.interface = output("interface")
         self.parameters = output("parameters")
-        unknown = {row["group"] for row in self.parameters} ^ set(GROUPS)
-        if unknown:
-            raise ValueError(f"parameter groups without page or parameters: {sorted(unknown)}")
         self.groups = {row["key"]: row["group"] for row in self.parameters}
 
     def linked(self, text: str) -> str:
-        """Returns a text of the interface with links to the pages of the parameters that it names."""
+        """Returns a text of the interface with links to the parameters that it names."""
 
         def link(found: re.Match[str]) -> str:
             key = found[1].split(":")[0]
-            return f"[`{found[1]}`](parameters/{self.groups[key]}.md)" if key in self.groups else found[0]
+            return f"[`{found[1]}`](parameters/{self.groups[key]}.md#{key})" if key in self.groups else found[0]
 
         return re.sub(r"`([^`]+)`", link, text)
 
@@ -108,60 +62,50 @@ class Reference:
             "messages.md": messages(),
             "launch.md": launch(),
             "command-line.md": command_line(),
-            "parameters/index.md": self.parameter_index(),
         }
-        for group in GROUPS:
-            pages[f"parameters/{group}.md"] = self.parameter_page(group)
-        return pages
+        return pages | parameter_pages(self.parameters)
 
     # ------------------------------------------------------------------------------ interface
 
     def topics(self) -> str:
         """Returns the page of topics, services and the action."""
-        headings = ["name", "type", "content", "rate", "QoS"]
-        ways = {"in": "Subscribed topics", "out": "Published topics"}
         parts = []
-        for direction, title in ways.items():
-            rows = [self.topic(topic) for topic in self.interface["topics"] if topic["direction"] == direction]
-            parts.append(f"## {title}\n\n{table(headings, rows)}")
+        for direction, title in (("in", "Subscribed topics"), ("out", "Published topics")):
+            topics = [topic for topic in self.interface["topics"] if topic["direction"] == direction]
+            overview = [[f"`{topic['name']}`", type_link(topic["type"])] for topic in topics]
+            parts += [f"## {title}", table(["name", "type"], overview), *(self.topic(topic) for topic in topics)]
         services = [[f"`{row['name']}`", type_link(row["type"]), row["content"]] for row in self.interface["services"]]
         parts.append("## Services\n\n" + table(["name", "type", "content"], services))
-        actions = [
-            [f"`{row['name']}`", type_link(row["type"]), row["content"], self.linked(row["rate"])]
-            for row in self.interface["actions"]
-        ]
-        parts.append(
-            "## Actions\n\n"
-            + table(["name", "type", "content", "rate"], actions)
-            + "\n\n[Action](action.md) describes tolerances and cancellation. Values of `error_code` in the result:\n\n"
-            + table(
-                ["`error_code`", "name", "reason"],
-                [[str(row["code"]), row["name"], row["meaning"]] for row in self.interface["action_error_codes"]],
-            )
-        )
+        parts.append("## Actions")
+        for row in self.interface["actions"]:
+            facts = [f"Type: {type_link(row['type'])}", f"Rate: {self.linked(row['rate'])}"]
+            parts.append(section(f"`{row['name']}`", self.linked(row["content"]), facts))
+        codes = [[str(row["code"]), row["name"], row["meaning"]] for row in self.interface["action_error_codes"]]
+        parts.append("[Action](action.md) describes tolerances and cancellation. Values of `error_code` in the result:")
+        parts += [table(["`error_code`", "name", "reason"], codes), DELIVERY]
         return page(
             "Topics, services and the action",
             "Everything that the node `virtual_axes_node` has in the ROS 2 graph. Units are those of ROS: m, rad, s, "
             "A, N, N·m.\n\nNames in a namespace and `~` follow ROS (`~` is the name of the node, "
-            "`/virtual_axes` by default); every name can be remapped. QoS profiles are the defaults; "
-            "[parameters](parameters/qos.md) change them. `virtual_axes interface` prints this page as text, "
-            "`virtual_axes interface --json` as data.",
+            "`/virtual_axes` by default); every name can be remapped. QoS profiles are the defaults. "
+            "`virtual_axes interface` prints this page as text, `virtual_axes interface --json` as data.",
             *parts,
-            DELIVERY,
         )
 
-    def topic(self, topic: dict[str, Any]) -> list[str]:
-        """Returns the row of a topic."""
-        content = topic["content"]
-        if topic["conditions"]:
-            conditions = (f"`{row['parameter']}: {row['value']}`" for row in topic["conditions"])
-            content = f"only with {' or '.join(conditions)}: {content}"
+    def topic(self, topic: dict[str, Any]) -> str:
+        """Returns the section of a topic."""
         qos = topic["qos"]
         profile = f"{qos['reliability']}, {qos['durability']}, keep last {qos['depth']}".replace("_", " ")
-        if qos["parameters"] is None:
-            profile += ", constant"
-        cells = [f"`{topic['name']}`", type_link(topic["type"]), self.linked(content), self.linked(topic["rate"])]
-        return [*cells, profile]
+        changed = "constant" if qos["parameters"] is None else f"[`{qos['parameters']}.*`](parameters/qos.md)"
+        facts = [
+            f"Type: {type_link(topic['type'])}",
+            f"Rate: {self.linked(topic['rate'])}",
+            f"QoS: {profile} ({changed})",
+        ]
+        if topic["conditions"]:
+            conditions = (f"`{row['parameter']}: {row['value']}`" for row in topic["conditions"])
+            facts.append(f"Exists only with {self.linked(' or '.join(conditions))}")
+        return section(f"`{topic['name']}`", self.linked(topic["content"]), facts)
 
     def rejections(self) -> str:
         """Returns the page of rejection codes."""
@@ -201,48 +145,6 @@ class Reference:
             *parts,
         )
 
-    # ----------------------------------------------------------------------------- parameters
-
-    def parameter_index(self) -> str:
-        """Returns the page that lists the groups of parameters."""
-        rows = []
-        for group, (title, _) in GROUPS.items():
-            count = sum(row["group"] == group for row in self.parameters)
-            rows.append(f"- [{title}]({group}.md), {count} parameters")
-        toctree = "\n".join(["```{toctree}", ":hidden:", "", *GROUPS, "```"])
-        return page(
-            "Parameters",
-            "All parameters of a machine and of the node. The same keys serve machine files, `-p KEY:=VALUE` of the "
-            "node and `--set KEY=VALUE` of the command.\n\nKeys of an axis begin with the name of its joint, for "
-            "example `x.velocity_loop.gain`. A parameter that is live can be set while the axes run (`ros2 param set`) "
-            'and takes effect at the next position cycle; the others are read at the start. The column "for" names '
-            "the machines, axes or motors that have the parameter. `virtual_axes parameters` prints all of them, "
-            "`--json` as data and `--markdown` as one table.",
-            "\n".join(rows),
-            toctree,
-        )
-
-    def parameter_page(self, group: str) -> str:
-        """Returns the page of a group of parameters."""
-        title, introduction = GROUPS[group]
-        rows = [row for row in self.parameters if row["group"] == group]
-        if group == "qos":
-            return page(title, introduction, qos_table(rows))
-        cells = [
-            [
-                f"`{row['key']}`",
-                row["type"],
-                row["range"],
-                default_text(row),
-                "yes" if row["live"] else "no",
-                row["owner"],
-                row["description"],
-            ]
-            for row in rows
-        ]
-        headings = ["key", "type", "range", "default", "live", "for", "description"]
-        return page(title, introduction, table(headings, cells))
-
 
 DELIVERY = """## Delivery
 
@@ -252,29 +154,6 @@ their subscribers, at most 30 s for one that takes no samples; idle axes run at 
 many trajectories at once needs a queue for two messages of `~/trajectory_result` per trajectory. Up to 64 trajectories
 wait on `psec`, so the memory of the node grows to 64 times the largest message. A service response has at most
 65 380 octets."""
-
-
-def qos_table(rows: list[dict[str, Any]]) -> str:
-    """Returns one row per topic for the parameters of its QoS policies."""
-    defaults = {row["key"]: str(row["default"]) for row in rows}
-    prefixes = list(dict.fromkeys(key.rpartition(".")[0] for key in defaults))
-    cells = [[f"`{prefix}.*`", *(defaults.pop(f"{prefix}.{policy}") for policy in POLICIES)] for prefix in prefixes]
-    if defaults:
-        raise ValueError(f"no QoS policies: {sorted(defaults)}")
-    return table(["keys", *POLICIES], cells)
-
-
-def default_text(row: dict[str, Any]) -> str:
-    """Returns the default of a parameter."""
-    if row["required"]:
-        return "required"
-    if row["default"] is None:
-        return "none"
-    if isinstance(row["default"], bool):
-        return str(row["default"]).lower()
-    if isinstance(row["default"], float):
-        return f"{row['default']:g}"
-    return str(row["default"]) or "empty"
 
 
 def type_link(name: str) -> str:
@@ -290,13 +169,13 @@ def messages() -> str:
     parts = []
     for path in sorted((ROOT / "msg").glob("*.msg")):
         parts.append(f"## {path.stem}")
-        for section in message(path):
-            if section.comment:
-                parts.append(section.comment)
-            constants = [[f"`{name}`", value, kind, text] for kind, name, value, text in section.constants]
+        for block in message(path):
+            if block.comment:
+                parts.append(block.comment)
+            constants = [[f"`{name}`", value, kind, text] for kind, name, value, text in block.constants]
             if constants:
                 parts.append(table(["constant", "value", "type", "meaning"], constants))
-            fields = [[f"`{name}`", f"`{kind}`", text] for kind, name, text in section.fields]
+            fields = [[f"`{name}`", f"`{kind}`", text] for kind, name, text in block.fields]
             if fields:
                 parts.append(table(["field", "type", "meaning"], fields))
     return page(

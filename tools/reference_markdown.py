@@ -28,3 +28,9 @@ def table(headings: list[str], rows: list[list[str]]) -> str:
 def console(commands: str) -> str:
     """Returns a block of commands with prompts."""
     return "\n".join(["```console", *(f"$ {line}" for line in commands.splitlines()), "```"])
+
+
+def section(title: str, text: str, facts: list[str]) -> str:
+    """Returns a section of the third level: a sentence and a list of facts."""
+    sentence = text[0].upper() + text[1:]
+    return "\n\n".join([f"### {title}", f"{sentence}.", "\n".join(f"- {fact}" for fact in facts)])
