@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -291,6 +292,15 @@ def test_error_codes_are_the_constants_of_the_action():
     described = {row["name"]: row["code"] for row in printed("interface")["action_error_codes"]}
     names = [name for name in vars(type(FollowJointTrajectory.Result)) if name.isupper() and name[0] != "_"]
     assert described == {name: getattr(FollowJointTrajectory.Result, name) for name in names}
+
+
+def test_the_page_of_the_environment_has_every_variable_and_no_other():
+    """Names of variables in the sources of the node equal those of the page."""
+    sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.rs"))
+    page = (ROOT / "docs" / "reference" / "environment.md").read_text(encoding="utf-8")
+    variable = r"(?:ROS|RMW|RCUTILS|RUST)_[A-Z_]+"
+    read = set(re.findall(rf'"({variable})"', sources))
+    assert read == set(re.findall(rf"^\| `({variable})` \|", page, re.MULTILINE))
 
 
 @pytest.fixture

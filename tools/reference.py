@@ -217,7 +217,8 @@ def command_line() -> str:
         "Command line",
         "Help texts of the command `virtual_axes`, which needs no ROS, and of the node `virtual_axes_node`.\n\n"
         "Exit status and JSON keys are in [JSON output](json.md), input and output files in "
-        "[File formats](file-formats.md), search and cost of `tune` in [Tuning](tuning.md).",
+        "[File formats](file-formats.md), search and cost of `tune` in [Tuning](tuning.md), environment variables of "
+        "the node in [Environment](environment.md).",
         *parts,
     )
 
