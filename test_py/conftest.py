@@ -78,3 +78,11 @@ def start() -> Iterator[Callable[..., Drive]]:
             return stack.enter_context(Drive(process=process, connect=connect))
 
         yield start_one
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Names the stand-ins that the documentation test used, with the number of pages."""
+    reports = [report for reports in terminalreporter.stats.values() for report in reports]
+    used = [value for report in reports for name, value in getattr(report, "user_properties", []) if name == "stand-in"]
+    for name in sorted(set(used)):
+        terminalreporter.write_line(f"stand-in of the documentation test: {name} ({used.count(name)} pages)")

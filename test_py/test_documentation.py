@@ -1,4 +1,7 @@
-"""README and tutorials: each command is executed, and its output compared with the page."""
+"""Commands of README.md, of the tutorials and of marked blocks of the how-to pages, executed as printed.
+
+`documentation` is the runner; where ROS 2 is not installed, stand-ins replace it, and the summary of pytest names them.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +9,48 @@ from pathlib import Path
 
 import pytest
 
-from documentation import PageError, blocks, mismatch, run_page
-from drive import DomainId
+from documentation import Page, PageError, difference, read
+from documentation.place import ROOT, Place
+from drive import DomainId, node_binary
 
-ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "tutorials").glob("*.md"))]
+PARTLY = sorted((ROOT / "docs" / "how-to").glob("*.md"))
+"""Pages where only marked blocks are executed."""
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_commands_and_output(page: Path, tmp_path: Path):
-    """The commands of a page succeed and print what the page shows."""
+def place(directory: Path, domain: DomainId) -> Place:
+    """Returns a home directory and the like below a directory."""
+    return Place(directory.resolve(), node_binary(), domain.value)
+
+
+def faults(directory: Path, text: str) -> list[str]:
+    """Executes a page with this text."""
+    file = directory / "page.md"
+    file.write_text(text, encoding="utf-8")
     domain = DomainId()
     try:
-        differences = list(run_page(page, tmp_path, domain.value))
+        return Page(file, place(directory, domain)).run()
     finally:
         domain.release()
-    report = [f"{page.name}:{one.command.line}: {one.text}\n" + "\n".join(one.actual) for one in differences]
-    assert not report, "\n\n".join(report)
+
+
+def console(*lines: str, comment: str = "") -> str:
+    """Returns a block of console."""
+    return "\n".join([*([f"<!-- run: {comment} -->"] if comment else []), "```console", *lines, "```", "", ""])
+
+
+@pytest.mark.parametrize("file", [*PAGES, *PARTLY], ids=lambda file: file.relative_to(ROOT).as_posix())
+def test_commands_do_what_the_page_shows(file: Path, tmp_path: Path, record_property):
+    """Each command runs, and prints the shown output."""
+    domain = DomainId()
+    here = place(tmp_path, domain)
+    try:
+        found = Page(file, here, marked_only=file in PARTLY).run()
+    finally:
+        domain.release()
+    for name in sorted(here.standins):
+        record_property("stand-in", name)
+    assert not found, "\n".join(found)
 
 
 def test_the_readme_is_short():
@@ -30,80 +58,106 @@ def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 200
 
 
-# ------------------------------------------------------------------------------- the runner itself
-
-
-@pytest.mark.parametrize(
-    ("expected", "actual"),
-    [
-        (["mean  49.0 µm"], ["mean 49.1 µm"]),
-        (["a", "...", "z"], ["a", "b", "c", "z"]),
-        (["a", "...", "z"], ["a", "z"]),
-        (["Summary: 1 package finished [...]"], ["Summary: 1 package finished [1min 2s]"]),
-        (["1.5e-3"], ["0.0016"]),
-        (["−0.4"], ["-0.4"]),
-    ],
-)
-def test_equal_output(expected: list[str], actual: list[str]):
-    """Output within the tolerance matches."""
-    assert mismatch(expected, actual) is None
-
-
-@pytest.mark.parametrize(
-    ("expected", "actual"),
-    [
-        (["mean 49.0 µm"], ["mean 49.2 µm"]),
-        (["5 axes"], ["6 axes"]),
-        (["mean 49.0 µm"], ["mean 49.0 mm"]),
-        (["a", "b"], ["a"]),
-        (["a"], ["a", "b"]),
-        ([], ["a"]),
-        (["a", "...", "z"], ["a", "b", "c"]),
-        (["x1 2.0"], ["x2 2.0"]),
-    ],
-)
-def test_different_output(expected: list[str], actual: list[str]):
-    """A wrong number, unit, name, a missing line and an unexpected line are differences."""
-    assert mismatch(expected, actual) is not None
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "```bash\n$ ls\n```\n",
-        "```\nls\n```\n",
-        "    $ ls\n",
-        "```console\nls\n```\n",
-        "```console\n$ ls\n",
-        "<!-- run: skip -->\n```console\n$ ls\n```\n",
-        "<!-- run: covered-by=nothing -->\n```console\n$ ls\n```\n",
-        "<!-- run: in=/tmp -->\n```console\n$ ls\n```\n",
-        "<!-- run: background -->\n\ntext\n",
-        "<!-- run: background -->\n```python\nprint()\n```\n",
-    ],
-)
-def test_invalid_pages(text: str, tmp_path: Path):
-    """A command that would not be executed, an unknown option and an unfinished block are errors."""
-    page = tmp_path / "page.md"
-    page.write_text(text, encoding="utf-8")
-    with pytest.raises(PageError):
-        blocks(page)
-
-
-def test_a_page_with_errors(tmp_path: Path):
-    """A wrong output and a failing command are found, and what they print; shells keep their directory."""
-    page = tmp_path / "page.md"
-    page.write_text(
-        "<!-- file: hello.txt -->\n```text\nhello 1.0\n```\n"
-        "```console\n$ mkdir new && cd new\n$ cat ../hello.txt\nhello 1.0\n$ cat ../hello.txt\nhello 1.5\n"
-        "$ exit_3() {\n> return 3; }\n$ exit_3\n```\n"
-        "<!-- run: terminal=other background -->\n```console\n$ echo ready; sleep 60\nready\n```\n",
-        encoding="utf-8",
+def test_a_correct_page_passes(tmp_path: Path):
+    """Directory and variables last from block to block; `...` stands for lines and for parts of a line."""
+    text = "<!-- file: sub/data.txt -->\n```csv\n1.50\n```\n\n" + console(
+        "$ cd sub; export NAME=x", "$ cat data.txt; ls ~", "1.50"
     )
-    folder = tmp_path / "run"
-    folder.mkdir()
-    found = [(one.command.line, one.text, one.actual) for one in run_page(page, folder, 1)]
-    assert found == [
-        (9, "expected `hello 1.5`, found `hello 1.0`", ["hello 1.0"]),
-        (13, "exit status 3", []),
-    ]
+    text += console("$ echo $NAME $(basename $PWD); seq 9; echo took 7.23 s", "x sub", "...", "8", "9", "took ... s")
+    text += console("$ for i in 1 2; do", ">   echo line $i", "> done", "line 1", "line 2")
+    text += console("$ false", comment="status=1")
+    text += console("$ (echo up; sleep 60)", "up", comment="terminal=two background")
+    text += console("$ pwd", f"{tmp_path}/work", comment="terminal=two")
+    assert faults(tmp_path, text) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (console("$ echo 12.34 µm", "12.32 µm"), "expected '12.32 µm', got '12.34 µm'"),
+        (console("$ echo 12.34 µm", "12.3 µm"), "expected '12.3 µm'"),
+        (console("$ seq 3", "1", "3"), "expected '3', got '2'"),
+        (console("$ seq 2", "1", "2", "3"), "got the end of the output"),
+        (console("$ seq 2", "1"), "more output than shown, from: '2'"),
+        (console("$ seq 2"), "more output than shown"),
+        (console("$ seq 2", "...", "4"), "no line after '...' matches '4'"),
+        (console("$ false"), "status 1, expected 0"),
+        (console("$ true", comment="status=1"), "status 0, expected 1"),
+        (console("$ no-such-program"), "status 127"),
+        (console("$ sleep 60", comment="timeout=1"), "did not end within 1 s"),
+        (console("$ echo up", "up", comment="terminal=a background"), "expected to keep running"),
+        (console("$ sleep 60", "up", comment="terminal=a background timeout=1"), "got the end of the output"),
+    ],
+)
+def test_a_wrong_page_fails(text: str, message: str, tmp_path: Path):
+    """Differing numbers and lines, failing commands and commands that do not end are found."""
+    [fault] = faults(tmp_path, text)
+    assert message in fault and "page.md:" in fault
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("```bash\nls\n```\n", "commands stand in a block of console"),
+        ("```sh\nls\n```\n", "commands stand in a block of console"),
+        ("```\nls\n```\n", "commands stand in a block of console"),
+        ("```text\n$ ls\n```\n", "commands stand in a block of console"),
+        ("Text:\n\n    cargo build\n", "indented code block (cargo build)"),
+        ("```python\nprint(1)\n```\n", "executed by no test"),
+        (console("$ ls", comment="skip"), "unknown option skip"),
+        (console("$ ls", comment="in=elsewhere"), "must be one of checkout, copy"),
+        (console("$ ls", comment="background"), "needs a terminal=NAME"),
+        (console("$ cargo build", comment="covered-by=./test.sh"), "'cargo build' is not executed by ./test.sh"),
+        (console("$ ./test.sh", comment="covered-by=nightly"), "continuous integration executes"),
+        (console("output", "$ ls"), "output before the first command"),
+        ("```console\n```\n", "no command"),
+        ("```console\n$ ls\n", "the block does not end"),
+        ("<!-- run: in=checkout -->\nText\n", "is not directly before a block"),
+        ("<!-- run: in=checkout -->\n```yaml\na: 1\n```\n", "belongs before a block of console"),
+    ],
+)
+def test_commands_that_nothing_executes_are_faults(text: str, message: str):
+    """Commands outside of blocks of console, and undocumented exceptions, are errors of the page."""
+    with pytest.raises(PageError, match=message.replace("(", r"\(").replace(")", r"\)")):
+        read(text)
+
+
+def test_lists_and_excerpts_are_no_commands():
+    """Continued list items, YAML excerpts and tables of numbers pass."""
+    blocks, page = read("- item\n\n      more\n\n<!-- page: installed=virtual_axes -->\n```yaml\nx: 1\n```\n")
+    assert (blocks, page) == ([], {"installed": "virtual_axes"})
+    blocks, _ = read("```bash\nls\n```\n" + console("$ ls", comment="in=checkout"), marked_only=True)
+    assert [block.commands[0].text for block in blocks] == ["ls"]
+
+
+@pytest.mark.parametrize(
+    ("expected", "actual", "equal"),
+    [
+        ("x 3.14 mm", "x 3.15 mm", True),
+        ("x 3.14 mm", "x 3.16 mm", False),
+        ("x 3.14 mm", "x 3.140 mm", False),
+        ("−0.4", "−0.5", True),
+        ("+0.1", "-0.1", False),
+        ("1.0e-9", "1.1e-9", True),
+        ("1.0e-9", "1.0e-8", False),
+        ("7 axes", "8 axes", False),
+        ("version 0.1.0", "version 0.1.1", False),
+        ("cycle-1.csv", "cycle-2.csv", False),
+        ("took ... of 2.5 s", "took 1.234 of 2.6 s", True),
+        ("took ... of 2.5 s", "took 1.234 of 2.7 s", False),
+        ("mean ...", "mean 4", True),
+        ("mean ...", "meal 4", False),
+    ],
+)
+def test_numbers_match_within_one_unit_of_the_last_digit(expected: str, actual: str, equal: bool):
+    """Integers, text, versions and names are compared literally."""
+    assert (difference([expected], [actual]) == "") == equal
+
+
+def test_nothing_that_a_page_starts_survives_it(tmp_path: Path):
+    """Processes in the background end with the page."""
+    text = console("$ sleep 987 & echo $! >~/pid; wait", comment="terminal=a background")
+    text += console("$ while [ ! -s ~/pid ]; do sleep 0.05; done; cat ~/pid >../pid")
+    assert faults(tmp_path, text) == []
+    pid = int((tmp_path / "pid").read_text())
+    assert not Path(f"/proc/{pid}").exists()

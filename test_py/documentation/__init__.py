@@ -1,25 +1,14 @@
-"""Execution of the documentation: runs the commands of a page and compares their output with the page.
+"""Runner of the documentation: executes the commands of a Markdown page and compares their output.
 
-    python -m documentation PAGE.md            # reports differences
-    python -m documentation PAGE.md --update   # writes the actual output into the page
+    cd test_py && python -m documentation ../README.md            # what the test does
+    cd test_py && python -m documentation ../README.md --update   # writes the output of this run into the page
 
-Each ```console block of a page is executed. A line that begins with "$ " is a command ("> " continues it); the other
-lines are its expected output. A comment directly before a block sets options:
-
-    <!-- run: in=checkout -->            runs in the checkout, with its .venv and .build, not in an empty directory
-    <!-- run: in=copy -->                runs in a copy of the checkout without build folders
-    <!-- run: terminal=NAME -->          runs in another shell; each shell keeps its directory and environment
-    <!-- run: background -->             leaves the last command running until the page ends
-    <!-- run: covered-by=./test.sh -->   is not executed here: ./test.sh executes it
-    <!-- file: NAME -->                  writes the block, of any language, to NAME in the directory of the shell
-
-Output is compared line by line. `...` alone in a line stands for any lines, `...` within a line for any text, blanks
-for any number of blanks. A number matches if it differs by at most one unit of the last decimal shown; an integer must
-be equal.
+`blocks` reads a page, `compare` compares output, `terminal` is a shell, `place` prepares home directory, checkout and
+stand-ins, `page` executes a page. The format of the blocks is described in CONTRIBUTING.md.
 """
 
-from .blocks import Block, PageError, blocks
-from .compare import mismatch
-from .page import Difference, run_page
+from .blocks import Block, Command, FileBlock, PageError, read
+from .compare import difference
+from .page import Page
 
-__all__ = ["Block", "Difference", "PageError", "blocks", "mismatch", "run_page"]
+__all__ = ["Block", "Command", "FileBlock", "Page", "PageError", "difference", "read"]

@@ -1,4 +1,4 @@
-"""Command line: `python -m documentation PAGE.md… [--update]`."""
+"""Command line of the runner."""
 
 from __future__ import annotations
 
@@ -7,28 +7,36 @@ import sys
 import tempfile
 from pathlib import Path
 
-from drive import DomainId
+from drive import DomainId, node_binary
 
-from .page import run_page, update
+from .page import Page
+from .place import Place
 
 
 def main() -> int:
-    """Runs pages and reports differences."""
-    parser = argparse.ArgumentParser(description="Runs the commands of pages and compares their output.")
-    parser.add_argument("pages", nargs="+", type=Path, metavar="PAGE.md")
-    parser.add_argument("--update", action="store_true", help="write the actual output into the pages")
-    options = parser.parse_args()
+    """Executes pages and returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m documentation", description="Executes the commands of pages.")
+    parser.add_argument("page", type=Path, nargs="+")
+    parser.add_argument("--update", action="store_true", help="write differing output into the page")
+    parser.add_argument("--marked-only", action="store_true", help="execute only blocks after a comment")
+    arguments = parser.parse_args()
     status = 0
-    for page in options.pages:
-        with tempfile.TemporaryDirectory() as folder:
-            found = []
-            for difference in run_page(page, Path(folder), DomainId().value):
-                found.append(difference)
-                print(f"{page}:{difference.command.line}: $ {difference.command.text}\n  {difference.text}")
-                print("".join(f"  | {line}\n" for line in difference.actual))
-        if options.update:
-            update(page, found)
-        status = status or bool(found)
+    for file in arguments.page:
+        domain = DomainId()
+        with tempfile.TemporaryDirectory(prefix="documentation-") as directory:
+            place = Place(Path(directory).resolve(), node_binary(), domain.value)
+            page = Page(file, place, marked_only=arguments.marked_only)
+            faults = page.run(keep_going=arguments.update)
+        domain.release()
+        if arguments.update and page.outputs:
+            print(page.update())
+            faults = [fault for fault in faults if fault not in page.output_faults]
+        print(
+            "\n".join(faults) or f"{file}: as shown",
+            *(f"stand-in: {name}" for name in sorted(place.standins)),
+            sep="\n",
+        )
+        status |= bool(faults)
     return status
 
 

@@ -1,117 +1,206 @@
-"""Blocks of a page that are executed, and the files that a page creates."""
+"""Blocks of a Markdown page that are executed, written to files, or forbidden."""
 
 from __future__ import annotations
 
 import re
+import shlex
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
-OPTIONS = {"in", "terminal", "background", "covered-by", "file"}
-COVERED_BY = {"./test.sh"}
-"""Commands that CI executes and that a page therefore only shows."""
+RUN_KEYS = {"in", "terminal", "background", "covered-by", "status", "timeout"}
+PAGE_KEYS = {"installed"}
 PLACES = ["checkout", "copy"]
-"""Directories of the package: the checkout itself, or a copy of it without build folders."""
-SHELL_LANGUAGES = {"", "bash", "sh", "shell", "zsh", "terminal", "text"}
-"""Languages of a block that must not contain commands, since they would not be executed."""
-FENCE = re.compile(r"^(\s*)```(\S*)\s*$")
-COMMENT = re.compile(r"^\s*<!-- (run|file): (.*) -->\s*$")
+"""Values of `in`; both are a copy of the checkout."""
+SHELLS = {"", "bash", "sh", "shell", "zsh", "shell-session", "bash-session"}
+"""Languages of fences that may hide commands."""
+
+COVERED_BY = {"./test.sh"}
+"""Commands of continuous integration, which may cover a block."""
+COVERABLE = re.compile(
+    r"\./test\.sh\b|(sudo )?apt(-get)? |rustup |curl .*https://sh\.rustup\.rs|git clone "
+    r"|(source|\.) \"?(~|\$HOME)/\.cargo/env"
+)
+"""Commands that may be executed elsewhere: the tests themselves, and what installs software of the system."""
+
+FENCE = re.compile(r"^(?P<indent> *)(?P<ticks>`{3,}|~{3,})\s*(?P<language>[^`\s]*)[^`]*$")
+COMMENT = re.compile(r"^\s*<!-- (?P<kind>run|file|page): (?P<text>.*?) *-->\s*$")
+LIST_ITEM = re.compile(r"^\s*([-*+]|\d+[.)]) ")
 
 
 class PageError(Exception):
-    """Invalid block of a page."""
+    """Fault of a page that is found before anything is executed."""
 
 
 @dataclass
 class Command:
-    """Command with its expected output."""
+    """One command with the output that the page shows."""
 
-    text: str
     line: int
-    """Line of the page, from 1."""
+    text: str
     expected: list[str] = field(default_factory=list)
-    end: int = 0
-    """Line after the expected output, from 1."""
+    first_output: int = 0
+    """Line of the page after the command, counted from 1."""
 
 
 @dataclass
 class Block:
-    """Block of commands, or file."""
+    """Commands that one terminal executes in order."""
 
     line: int
+    indent: int
     options: dict[str, str]
-    commands: list[Command] = field(default_factory=list)
-    content: str = ""
-    """Content of a file block."""
+    commands: list[Command]
 
     @property
     def terminal(self) -> str:
-        """Returns the name of the shell."""
-        return self.options.get("terminal", "main")
+        """Returns the name of the terminal; empty for the main one."""
+        return self.options.get("terminal", "")
+
+    @property
+    def is_covered(self) -> bool:
+        """Returns true if the block is executed elsewhere."""
+        return "covered-by" in self.options
 
 
-def blocks(page: Path) -> list[Block]:
-    """Returns the blocks of a page in their order; raises PageError for an invalid one."""
-    lines = page.read_text(encoding="utf-8").splitlines()
-    found: list[Block] = []
-    options: dict[str, str] = {}
-    index = 0
-    while index < len(lines):
-        line = lines[index]
-        index += 1
-        if comment := COMMENT.match(line):
-            options = _options(comment[1], comment[2], f"{page.name}:{index}")
-            continue
-        fence = FENCE.match(line)
-        if not fence:
-            if options:
-                raise PageError(f"{page.name}:{index}: a block must follow the comment")
-            if re.match(r"^(    |\t)\$ ", line):
-                raise PageError(f"{page.name}:{index}: a command outside a ```console block is not executed")
-            continue
-        start, body = index, []
-        while index < len(lines) and lines[index].strip() != "```":
-            body.append(lines[index].removeprefix(fence[1]))
-            index += 1
-        if index == len(lines):
-            raise PageError(f"{page.name}:{start}: the block has no end")
-        index += 1
-        block = _block(fence[2], body, start, options, page.name)
-        found += [block] if block else []
-        options = {}
-    return found
+@dataclass
+class FileBlock:
+    """Content of a file that the reader saves."""
+
+    line: int
+    name: str
+    content: str
 
 
-def _options(kind: str, text: str, place: str) -> dict[str, str]:
+@dataclass
+class Fence:
+    """Fenced block with the comment before it."""
+
+    line: int
+    indent: int
+    language: str
+    comment: tuple[str, str] | None
+    lines: list[str]
+
+
+def read(text: str, *, marked_only: bool = False) -> tuple[list[Block | FileBlock], dict[str, str]]:
+    """Reads the blocks and the options of a page.
+
+    With `marked_only`, only blocks after a comment are executed, and commands in other blocks are no fault.
+    """
+    items: list[Block | FileBlock] = []
+    page: dict[str, str] = {}
+    for element in _elements(text):
+        if isinstance(element, tuple):
+            line, indented = element
+            if not marked_only:
+                raise PageError(f"line {line}: indented code block ({indented.strip()}): use a fence of console")
+        elif element.language == "page":
+            page |= _options(element, PAGE_KEYS)
+        elif element.comment or not marked_only:
+            items += _items(element)
+    return items, page
+
+
+def _items(fence: Fence) -> list[Block | FileBlock]:
+    kind, text = fence.comment or ("", "")
     if kind == "file":
-        return {"file": text}
-    options = dict(word.partition("=")[::2] for word in text.split())
-    if unknown := set(options) - OPTIONS:
-        raise PageError(f"{place}: unknown option {', '.join(sorted(unknown))}; allowed: {', '.join(sorted(OPTIONS))}")
+        if not text or fence.language == "console":
+            raise PageError(f"line {fence.line}: a file block needs a name and a language other than console")
+        return [FileBlock(fence.line, text, "".join(f"{line}\n" for line in fence.lines))]
+    if fence.language == "console":
+        return [_block(fence)]
+    if kind == "run":
+        raise PageError(f"line {fence.line}: <!-- run --> belongs before a block of console, not '{fence.language}'")
+    if fence.language in SHELLS or any(line.startswith("$ ") for line in fence.lines):
+        raise PageError(f"line {fence.line}: block of '{fence.language}': commands stand in a block of console")
+    if fence.language in ("python", "py"):
+        raise PageError(f"line {fence.line}: Python without <!-- file: NAME --> is executed by no test")
+    return []
+
+
+def _block(fence: Fence) -> Block:
+    options = _options(fence, RUN_KEYS) if fence.comment else {}
+    block = Block(fence.line, fence.indent, options, _commands(fence))
+    if not block.commands:
+        raise PageError(f"line {fence.line}: no command in a block of console")
     if options.get("in", PLACES[0]) not in PLACES:
-        raise PageError(f"{place}: in={options['in']}: must be one of {', '.join(PLACES)}")
-    if options.get("covered-by", "./test.sh") not in COVERED_BY:
-        raise PageError(f"{place}: covered-by={options['covered-by']}: must be {' or '.join(COVERED_BY)}")
+        raise PageError(f"line {fence.line}: in={options['in']}: must be one of {', '.join(PLACES)}")
+    if "background" in options and not block.terminal:
+        raise PageError(f"line {fence.line}: a command in the background needs a terminal=NAME of its own")
+    for number in ("status", "timeout"):
+        if number in options and not options[number].isdigit():
+            raise PageError(f"line {fence.line}: {number}={options[number]} is not a number")
+    if block.is_covered:
+        _check_cover(block)
+    return block
+
+
+def _check_cover(block: Block) -> None:
+    """Rejects blocks that are executed nowhere."""
+    if (cover := block.options["covered-by"]) not in COVERED_BY:
+        raise PageError(f"line {block.line}: covered-by={cover}: continuous integration executes {COVERED_BY}")
+    for command in block.commands:
+        if not COVERABLE.match(command.text):
+            raise PageError(f"line {command.line}: covered-by: '{command.text}' is not executed by {cover}")
+
+
+def _commands(fence: Fence) -> list[Command]:
+    commands: list[Command] = []
+    for offset, line in enumerate(fence.lines, 1):
+        number = fence.line + offset
+        if line.startswith("$ "):
+            commands.append(Command(number, line[2:], first_output=number + 1))
+        elif not commands:
+            raise PageError(f"line {number}: output before the first command")
+        elif line.startswith("> ") and not commands[-1].expected:
+            commands[-1].text += f"\n{line[2:]}"
+            commands[-1].first_output = number + 1
+        else:
+            commands[-1].expected.append(line.rstrip())
+    return commands
+
+
+def _options(fence: Fence, allowed: set[str]) -> dict[str, str]:
+    options = {}
+    for word in shlex.split(fence.comment[1]):
+        key, _, value = word.partition("=")
+        if key not in allowed:
+            raise PageError(f"line {fence.line}: unknown option {key}; allowed: {', '.join(sorted(allowed))}")
+        options[key] = value
     return options
 
 
-def _block(language: str, body: list[str], start: int, options: dict[str, str], page: str) -> Block | None:
-    if "file" in options:
-        return Block(start, options, content="\n".join(body) + "\n")
-    if language != "console":
-        if options:
-            raise PageError(f"{page}:{start}: a `run` comment needs a ```console block, not ```{language}")
-        if language in SHELL_LANGUAGES:
-            raise PageError(f"{page}:{start}: ```{language} is not executed; use ```console, or name the language")
-        return None
-    commands: list[Command] = []
-    for number, line in enumerate(body, start + 1):
-        if line.startswith("$ "):
-            commands.append(Command(line[2:], number))
-        elif not commands:
-            raise PageError(f"{page}:{number}: a ```console block must begin with a command, `$ …`")
-        elif line.startswith("> ") and not commands[-1].expected:
-            commands[-1].text += "\n" + line[2:]
-        else:
-            commands[-1].expected.append(line.rstrip())
-        commands[-1].end = number + 1
-    return Block(start, options, commands)
+def _elements(text: str) -> Iterator[Fence | tuple[int, str]]:
+    """Yields fences, options of the page as a fence of the language `page`, and lines of indented code."""
+    comment: tuple[str, str] | None = None
+    fence: Fence | None = None
+    ticks, previous_blank, in_list = "", True, False
+    for number, line in enumerate(text.splitlines(), 1):
+        if fence:
+            if line.strip().startswith(ticks) and not line.strip().strip(ticks[0]):
+                yield fence
+                fence = None
+            else:
+                fence.lines.append(line[min(fence.indent, len(line) - len(line.lstrip())) :])
+            continue
+        if match := FENCE.match(line):
+            ticks = match["ticks"]
+            fence = Fence(number, len(match["indent"]), match["language"].lower(), comment, [])
+            comment, previous_blank = None, False
+            continue
+        if comment and line.strip():
+            raise PageError(f"line {number}: the comment '{comment[0]}: {comment[1]}' is not directly before a block")
+        if match := COMMENT.match(line):
+            if match["kind"] == "page":
+                yield Fence(number, 0, "page", ("page", match["text"]), [])
+            else:
+                comment = (match["kind"], match["text"])
+            continue
+        in_list = bool(LIST_ITEM.match(line)) or (in_list and (not line.strip() or line.startswith(" ")))
+        if line.startswith(("    ", "\t")) and previous_blank and line.strip() and not in_list:
+            yield number, line
+        previous_blank = not line.strip()
+    if fence:
+        raise PageError(f"line {fence.line}: the block does not end")
+    if comment:
+        raise PageError(f"the comment '{comment[0]}: {comment[1]}' at the end is before no block")

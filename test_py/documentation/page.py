@@ -1,99 +1,125 @@
-"""Execution of one page."""
+"""Execution of a page."""
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-from collections.abc import Iterator
-from contextlib import ExitStack
-from dataclasses import dataclass
+import difflib
 from pathlib import Path
 
-from .blocks import Block, Command, PageError, blocks
-from .compare import mismatch
-from .environment import environment
+from .blocks import Block, Command, FileBlock, read
+from .compare import difference
+from .place import Place
 from .terminal import Terminal
 
-ROOT = Path(__file__).resolve().parent.parent.parent
-TIMEOUT_S = 600.0
-"""Time limit of a command, s: it allows for a build from an empty cache."""
-READY_S = 20.0
-"""Time limit for the first output of a background command, s."""
+SECONDS = 240
+"""Longest time of a command, unless `timeout=` says another."""
+BACKGROUND_SECONDS = 30
+"""Longest time until a command in the background has printed the shown output."""
+
+SETTLE_SECONDS = 0.3
+"""Time that a command in the background must outlive its first output."""
 
 
-@dataclass(frozen=True)
-class Difference:
-    """Difference between a page and its execution."""
+class Page:
+    """One page: its blocks, and the terminals of a reader who follows it."""
 
-    command: Command
-    text: str
-    actual: list[str]
+    def __init__(self, file: Path, place: Place, *, marked_only: bool = False) -> None:
+        """Reads the page and rejects commands that would not be executed."""
+        self.file, self.place = file, place
+        self.text = file.read_text(encoding="utf-8")
+        self.items, self.options = read(self.text, marked_only=marked_only)
+        self.outputs: list[tuple[Block, Command, list[str]]] = []
+        """Commands whose output differs, with the output."""
+        self.output_faults: list[str] = []
+        """Faults that `update` mends."""
+        self._terminals: dict[str, Terminal] = {}
 
+    def run(self, *, keep_going: bool = False) -> list[str]:
+        """Executes the page and returns its faults: the first, or with `keep_going` differing output of all."""
+        faults: list[str] = []
+        installed = self.options.get("installed")
+        if installed == "virtual_axes":
+            self.place.install_command()
+        elif installed is not None:
+            return [f"installed={installed}: only installed=virtual_axes is known"]
+        try:
+            for item in self.items:
+                faults += self._file(item) if isinstance(item, FileBlock) else self._block(item)
+                if faults and not keep_going:
+                    break
+        finally:
+            for terminal in self._terminals.values():
+                terminal.close()
+            self.place.remove()
+        return faults
 
-def run_page(page: Path, directory: Path, domain: int) -> Iterator[Difference]:
-    """Executes a page in an empty directory and yields the differences."""
-    found = blocks(page)
-    places = {"checkout": ROOT, "copy": directory / "virtual_axes"}
-    if any(block.options.get("in") == "copy" for block in found):
-        copy_checkout(places["copy"])
-    home, start = directory / "home", directory / "start"
-    home.mkdir()
-    start.mkdir()
-    terminals: dict[str, Terminal] = {}
-    with ExitStack() as stack:
-        for block in found:
-            if "covered-by" in block.options:
-                continue
-            if block.terminal not in terminals:
-                terminals[block.terminal] = Terminal(start, environment(home, directory, domain))
-                stack.callback(terminals[block.terminal].close)
-            if place := block.options.get("in"):
-                terminals[block.terminal].execute(f"cd '{places[place]}'", 10)
-            yield from _run_block(block, terminals[block.terminal])
+    def _terminal(self, name: str) -> Terminal:
+        if name not in self._terminals:
+            self._terminals[name] = Terminal(self.place.work, self.place.environment)
+        return self._terminals[name]
 
+    def _file(self, item: FileBlock) -> list[str]:
+        """Saves a file in the directory of the main terminal."""
+        name = item.name.replace("~", str(self.place.home), 1) if item.name.startswith("~/") else item.name
+        path = self._terminal("").directory / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(item.content, encoding="utf-8")
+        return []
 
-def _run_block(block: Block, terminal: Terminal) -> Iterator[Difference]:
-    if name := block.options.get("file"):
-        _, folder = terminal.execute("pwd", 10)
-        Path(folder[0], name).write_text(block.content, encoding="utf-8")
-    for command in block.commands:
-        if "background" in block.options and command is block.commands[-1]:
-            expected = command.expected
-            actual = terminal.start(command.text, lambda lines, e=expected: mismatch(e, lines) is None, READY_S)
-            status = 0
-        else:
-            status, actual = terminal.execute(command.text, TIMEOUT_S)
-        if status:
-            yield Difference(command, f"exit status {status}", actual)
-        elif text := mismatch(_without_blank_end(command.expected), actual):
-            yield Difference(command, text, actual)
+    def _block(self, block: Block) -> list[str]:
+        if block.is_covered:
+            return []
+        if "in" in block.options:
+            checkout = self.place.copy_checkout()
+            terminal = self._terminal(block.terminal)
+            target = self.place.environment.get("CARGO_TARGET_DIR", "")
+            terminal.run(f"cd '{checkout}'; export CARGO_TARGET_DIR='{target}'", 10)
+        terminal = self._terminal(block.terminal)
+        faults = []
+        for command in block.commands:
+            is_last = command is block.commands[-1]
+            found = self._command(block, command, terminal, is_last)
+            if found:
+                faults.append(f"{self.file.name}:{command.line}: $ {command.text}\n  {found}")
+                if not self.outputs or self.outputs[-1][1] is not command:
+                    break
+                self.output_faults.append(faults[-1])
+        return faults
 
+    def _command(self, block: Block, command: Command, terminal: Terminal, is_last: bool) -> str:
+        """Executes a command and returns its fault, or an empty text."""
+        terminal.start(self.place.command(command.text))
+        in_background = is_last and "background" in block.options
+        seconds = float(block.options.get("timeout", BACKGROUND_SECONDS if in_background else SECONDS))
 
-def _without_blank_end(lines: list[str]) -> list[str]:
-    kept = list(lines)
-    while kept and not kept[-1]:
-        kept.pop()
-    return kept
+        def is_shown(lines: list[str]) -> bool:
+            return not difference(command.expected, [*map(self.place.shown, lines)], is_prefix=True)
 
+        lines, status = terminal.wait(seconds, is_shown if in_background else None)
+        if in_background and status is None:
+            # Finds a command that ends directly after its output.
+            lines, status = terminal.wait(SETTLE_SECONDS)
+        lines = [*map(self.place.shown, lines)]
+        text = "\n".join(f"  | {line}" for line in lines)
+        wanted = int(block.options.get("status", 0)) if is_last else 0
+        if in_background and status is not None:
+            return f"ended with status {status}, expected to keep running; output:\n{text}"
+        if not in_background and status is None:
+            return f"did not end within {seconds:g} s; output:\n{text}"
+        if not in_background and status != wanted:
+            return f"status {status}, expected {wanted}; output:\n{text}"
+        found = difference(command.expected, lines, is_prefix=in_background)
+        if found:
+            self.outputs.append((block, command, lines))
+            return f"{found}; output:\n{text}"
+        return ""
 
-def copy_checkout(target: Path) -> None:
-    """Copies the files of the checkout that are under version control, or would be."""
-    listed = ["git", "-C", str(ROOT), "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    names = subprocess.run(listed, check=True, capture_output=True, text=True, timeout=30).stdout.split("\0")
-    for name in filter(None, names):
-        if (ROOT / name).is_file():
-            (target / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, target / name)
-
-
-def update(page: Path, differences: list[Difference]) -> None:
-    """Writes the actual output of the commands with differences into the page."""
-    lines = page.read_text(encoding="utf-8").splitlines()
-    for difference in sorted(differences, key=lambda one: one.command.line, reverse=True):
-        command = difference.command
-        first = command.line + command.text.count("\n")
-        lines[first : command.end - 1] = difference.actual
-    page.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-__all__ = ["Difference", "PageError", "copy_checkout", "run_page", "update"]
+    def update(self) -> str:
+        """Writes differing output into the page and returns the changes as a diff."""
+        lines = self.text.splitlines()
+        for block, command, output in reversed(self.outputs):
+            start = command.first_output - 1
+            indented = [f"{' ' * block.indent}{line}".rstrip() for line in output]
+            lines[start : start + len(command.expected)] = indented
+        updated = "\n".join(lines) + "\n"
+        self.file.write_text(updated, encoding="utf-8")
+        return "\n".join(difflib.unified_diff(self.text.splitlines(), updated.splitlines(), lineterm="", n=1))

@@ -1,101 +1,141 @@
-"""A shell that executes the commands of a page."""
+"""Terminal: one bash that keeps its directory and environment from command to command."""
 
 from __future__ import annotations
 
 import os
-import re
-import selectors
+import secrets
 import signal
 import subprocess
+import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-MARK = "\x1e"
-"""Character between the output of a command and its status."""
-ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-
-
-class Timeout(Exception):
-    """A command that did not end in time."""
-
 
 class Terminal:
-    """A bash process that keeps directory and environment between commands."""
+    """Bash in a process group of its own, with standard output and error in one text."""
 
     def __init__(self, directory: Path, environment: Mapping[str, str]) -> None:
-        """Starts bash in a directory, in a session of its own."""
-        self._process = subprocess.Popen(
+        """Starts bash."""
+        self._bash = subprocess.Popen(
             ["bash", "--noprofile", "--norc"],
-            cwd=directory,
-            env=dict(environment),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
+            cwd=directory,
+            env=dict(environment),
             start_new_session=True,
         )
-        self._output = b""
-        assert self._process.stdout is not None
-        os.set_blocking(self._process.stdout.fileno(), False)
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._process.stdout, selectors.EVENT_READ)
+        self._output = bytearray()
+        self._changed = threading.Condition()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self._mark = b""
+        self._begin = 0
+        self.is_busy = False
+        # A program that is interrupted must not end the shell, as in an interactive one.
+        self.run("trap : INT", 10)
 
-    def execute(self, command: str, timeout: float) -> tuple[int, list[str]]:
-        """Executes a command; returns its status and the lines of its output."""
-        self._send(f"{{ {command}\n}} </dev/null; printf '{MARK}%s{MARK}' $?\n")
-        pattern = re.compile(f"{MARK}(\\d+){MARK}".encode())
-        self._read_until(lambda text: pattern.search(text) is not None, timeout)
-        found = pattern.search(self._output)
-        if not found:
-            raise Timeout(f"no end of `{command}` after {timeout:.0f} s; output so far:\n{self._text()}")
-        text, self._output = self._output[: found.start()], self._output[found.end() :]
-        return int(found[1]), lines(text)
+    def _read(self) -> None:
+        while chunk := os.read(self._bash.stdout.fileno(), 65536):
+            with self._changed:
+                self._output += chunk
+                self._changed.notify_all()
 
-    def start(self, command: str, is_ready: Callable[[list[str]], bool], timeout: float) -> list[str]:
-        """Starts a command that keeps running; returns its output when it is ready, or at the end of the time."""
-        self._send(f"{command} </dev/null\n")
-        self._read_until(lambda text: is_ready(lines(text)), timeout)
-        return lines(self._output)
+    @property
+    def directory(self) -> Path:
+        """Returns the current directory."""
+        return Path(os.readlink(f"/proc/{self._bash.pid}/cwd"))
+
+    def start(self, command: str) -> None:
+        """Starts a command and does not wait for its end."""
+        self.interrupt()
+        mark = f"end of command {secrets.token_hex(8)} "
+        self._mark = f"\n{mark}".encode()
+        self._begin = len(self._output)
+        self.is_busy = True
+        # The command ends with a line end: it may contain a comment or a here-document. Its standard input is
+        # empty, since bash reads its own commands from the pipe.
+        text = f"{{ {command}\n}} </dev/null\nprintf '\\n{mark}%d\\n' $?\n"
+        self._bash.stdin.write(text.encode())
+        self._bash.stdin.flush()
+
+    def wait(self, seconds: float, until: Callable[[list[str]], bool] | None = None) -> tuple[list[str], int | None]:
+        """Waits for the end of the command, or until its output satisfies a condition.
+
+        Returns the output, and the exit status or None for a command that is still running.
+        """
+        deadline = time.monotonic() + seconds
+        with self._changed:
+            while True:
+                lines, status = self._state()
+                if status is not None or (until and until(lines)):
+                    self.is_busy = status is None
+                    return lines, status
+                left = deadline - time.monotonic()
+                if left <= 0 or self._bash.poll() is not None:
+                    return lines, None
+                self._changed.wait(min(left, 0.2))
+
+    def run(self, command: str, seconds: float) -> tuple[list[str], int | None]:
+        """Executes a command."""
+        self.start(command)
+        return self.wait(seconds)
+
+    def _state(self) -> tuple[list[str], int | None]:
+        output = bytes(self._output[self._begin :])
+        text, found, rest = output.partition(self._mark)
+        status = int(rest) if found and rest.endswith(b"\n") else None
+        # Progress bars overwrite their line.
+        lines = [line.rsplit("\r", 1)[-1] for line in text.decode(errors="replace").splitlines()]
+        return lines, status
+
+    def interrupt(self, seconds: float = 15) -> None:
+        """Ends a running command as Ctrl+C does."""
+        if not self.is_busy:
+            return
+        for pid in _descendants(self._bash.pid):
+            os.kill(pid, signal.SIGINT)
+        _, status = self.wait(seconds)
+        if status is None:
+            raise TimeoutError(f"the command of process {self._bash.pid} does not end within {seconds} s of SIGINT")
 
     def close(self) -> None:
-        """Ends the shell and all its processes: SIGINT, then SIGKILL after five seconds."""
-        group = self._process.pid
-        for number, wait in ((signal.SIGINT, 0.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0)):
+        """Ends bash and everything that it started."""
+        for name in (signal.SIGTERM, signal.SIGKILL):
             try:
-                # Processes of a non-interactive shell stay in its group.
-                os.killpg(group, number)
+                os.killpg(self._bash.pid, name)
             except ProcessLookupError:
                 break
+            deadline = time.monotonic() + 5
+            while time.monotonic() < deadline and _group_exists(self._bash.pid):
+                self._bash.poll()
+                time.sleep(0.02)
+        self._bash.wait(5)
+        self._reader.join(1)
+
+
+def _group_exists(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def _descendants(pid: int) -> list[int]:
+    """Returns the processes below one."""
+    children: dict[int, list[int]] = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
             try:
-                self._process.wait(wait)
-            except subprocess.TimeoutExpired:
+                fields = (entry / "stat").read_text().rpartition(")")[2].split()
+            except OSError:
                 continue
-        self._process.communicate(timeout=10)
-
-    def _send(self, text: str) -> None:
-        assert self._process.stdin is not None
-        self._process.stdin.write(text.encode())
-        self._process.stdin.flush()
-
-    def _read_until(self, is_complete: Callable[[bytes], bool], timeout: float) -> None:
-        deadline = time.monotonic() + timeout
-        assert self._process.stdout is not None
-        while not is_complete(self._output) and time.monotonic() < deadline:
-            if self._selector.select(0.1):
-                chunk = self._process.stdout.read()
-                if chunk == b"":
-                    return
-                self._output += chunk or b""
-
-    def _text(self) -> str:
-        return "\n".join(lines(self._output)[-30:])
-
-
-def lines(output: bytes) -> list[str]:
-    """Returns the lines of an output without colors, trailing blanks and blank lines at the end."""
-    text = ESCAPES.sub("", output.decode(errors="replace"))
-    # A carriage return overwrites its line, as in a progress bar.
-    found = [line.rstrip("\r").rpartition("\r")[2].rstrip() for line in text.split("\n")]
-    while found and not found[-1]:
-        found.pop()
+            children.setdefault(int(fields[1]), []).append(int(entry.name))
+    found, queue = [], [pid]
+    while queue:
+        below = children.get(queue.pop(), [])
+        found += below
+        queue += below
     return found
