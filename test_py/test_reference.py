@@ -67,7 +67,8 @@ class Run:
         }
 
 
-CONDITIONS = sorted({condition for row in interfaces() for condition in row.conditions})
+CONDITIONS = [("time", "fast"), ("use_sim_time", "true")]
+"""Parameters that add interfaces; listed here, so that a condition missing from the description is found."""
 RUNS = {
     "default": Run(),
     # Names of every kind, in another namespace, and interfaces that require a parameter.
@@ -114,6 +115,11 @@ def types_of(expected: dict[str, Interface]) -> dict[str, list[str]]:
 def visible(found: dict[str, list[str]]) -> dict[str, list[str]]:
     """Returns the interfaces without the parts of actions."""
     return {name: types for name, types in found.items() if HIDDEN not in name}
+
+
+def test_the_tested_conditions_are_the_described_ones():
+    """A node runs with each described condition."""
+    assert sorted({condition for row in interfaces() for condition in row.conditions}) == CONDITIONS
 
 
 @pytest.mark.parametrize(
