@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from reference_markdown import page, table
@@ -75,10 +76,16 @@ def parameter_pages(parameters: list[dict[str, Any]]) -> dict[str, str]:
                 keys.setdefault(row["key"], []).append(row)
         parts = [qos_table(keys)] if group == "qos" else [definition(key, rows) for key, rows in keys.items()]
         pages[f"parameters/{group}.md"] = page(title, introduction, *parts)
-        links.append(f"- [{title}]({group}.md), {len(keys)} parameters")
+        names = "`qos.TOPIC.*`" if group == "qos" else ", ".join(link(group, key) for key in keys)
+        links.append(f"**[{title}]({group}.md)**: {names}")
     toctree = "\n".join(["```{toctree}", ":hidden:", "", *GROUPS, "```"])
-    pages["parameters/index.md"] = page("Parameters", INTRODUCTION, "\n".join(links), toctree)
+    pages["parameters/index.md"] = page("Parameters", INTRODUCTION, *links, toctree)
     return pages
+
+
+def link(group: str, key: str) -> str:
+    """Returns a link to the section of a parameter; the anchor is that of Sphinx and of Git hosts."""
+    return f"[`{key}`]({group}.md#{re.sub('[^a-z0-9_-]', '', key.lower())})"
 
 
 def definition(key: str, rows: list[dict[str, Any]]) -> str:
