@@ -15,7 +15,7 @@ from drive import DomainId, node_binary
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "tutorials").glob("*.md"))]
 PARTLY = sorted((ROOT / "docs" / "how-to").glob("*.md"))
-"""Pages where only marked blocks are executed."""
+"""Pages where only marked blocks are executed, with `virtual_axes` on the PATH."""
 
 
 def place(directory: Path, domain: DomainId) -> Place:

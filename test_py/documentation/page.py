@@ -27,6 +27,8 @@ class Page:
         self.file, self.place = file, place
         self.text = file.read_text(encoding="utf-8")
         self.items, self.options = read(self.text, marked_only=marked_only)
+        if marked_only:
+            self.options.setdefault("installed", "virtual_axes")
         self.outputs: list[tuple[Block, Command, list[str]]] = []
         """Commands whose output differs, with the output."""
         self.output_faults: list[str] = []
