@@ -6,12 +6,15 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ROS = Path("/opt/ros/jazzy")
 STANDIN = ROOT / "test_py" / "ros2_standin"
 
+LEFT_SECONDS = 3600
+"""Age from which a copy of cargo's output is a remainder."""
 LINKED = {"bin", "cmeel.prefix", "include", "install", "lib", "lib64", "pyvenv.cfg", "share"}
 """Entries of .venv and .build that the copy of the checkout has by links."""
 
@@ -90,7 +93,12 @@ class Place:
     def _copy_target(self) -> Path:
         """Copies cargo's output: the locks of a build elsewhere do not matter, and nothing there changes."""
         release = self._program.resolve().parent
-        self._target = release.parent / "documentation" / self.directory.name
+        folder = release.parent / "documentation"
+        for left in folder.glob("*"):
+            # Of a run that was killed.
+            if left.stat().st_mtime < time.time() - LEFT_SECONDS:
+                shutil.rmtree(left, ignore_errors=True)
+        self._target = folder / f"{self.directory.parent.name}-{self.directory.name}"
         shutil.rmtree(self._target, ignore_errors=True)
         (self._target / "release").mkdir(parents=True)
         for name in (".fingerprint", "build", "deps"):
