@@ -65,7 +65,10 @@ def launch(arguments: argparse.Namespace) -> None:
         f"{Path.home()}/.ros/log/{time.strftime('%Y-%m-%d-%H-%M-%S')}-{os.getpid()}"
     )
     print("[INFO] [launch]: Default logging verbosity is set to INFO", flush=True)
-    nodes = [action for action in execute(description, values) if isinstance(action, Node)]
+    try:
+        nodes = [action for action in execute(description, values) if isinstance(action, Node)]
+    except Exception as error:
+        raise Failure(f"[ERROR] [launch]: Caught exception in launch (see debug for traceback): {error}") from error
     processes, threads = [], []
     for number, node in enumerate(nodes, 1):
         label = f"{node.executable}-{number}"
