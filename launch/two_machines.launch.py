@@ -19,6 +19,7 @@ from launch.actions import (
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.substitutions import ExecutableInPackage
 
 SHARE = Path(__file__).resolve().parent.parent
 CONTROLLERS = ["as_machine", "cascade", "gpc", "rst"]
@@ -29,20 +30,35 @@ ARGUMENTS = [
     ("right_controller", "as_machine", CONTROLLERS, "Position controller of every joint on the right"),
     ("distance", "2.5", None, "Distance of the right machine frame from the left one along X, m"),
     ("time", "real", ["real", "fast", "sim"], "As in virtual_axes.launch.py"),
+    ("use_sim_time", "", ["", "true", "false"], "As in virtual_axes.launch.py"),
     ("robot_state_publisher", "true", ["true", "false"], "Publish models and transforms"),
-    ("rviz", "false", ["true", "false"], "Show both in RViz"),
+    ("rviz", "false", ["true", "false"], "Show both in RViz (package rviz2)"),
     ("record", "", None, "Folder for the recordings left.mcap and right.mcap; empty: none"),
     ("log_level", "info", None, "Log level of the nodes"),
 ]
 SIDES = ["left", "right"]
 APART_S = 2.0
-"""Delay between their starts, s: a participant that starts with both at once may miss topics (docs/internals/middleware.md)."""
+"""Delay between their starts, s: a participant that starts with both at once may miss topics.
+
+See docs/internals/middleware.md.
+"""
+
+
+def require_rviz(context: LaunchContext) -> None:
+    """Rejects rviz:=true without the package rviz2."""
+    try:
+        ExecutableInPackage("rviz2", "rviz2").perform(context)
+    except Exception as error:
+        raise RuntimeError(
+            "rviz:=true: package rviz2 not found; install it with "
+            "apt install ros-$ROS_DISTRO-rviz2 ros-$ROS_DISTRO-rviz-default-plugins, or leave out rviz:=true"
+        ) from error
 
 
 def start(context: LaunchContext) -> list[object]:
     """Returns both machines, and the common frame `world`."""
     argument = {key: LaunchConfiguration(key).perform(context) for key, *_ in ARGUMENTS}
-    clock = {"use_sim_time": argument["time"] != "real"}
+    clock = {"use_sim_time": argument["time"] != "real" or argument["use_sim_time"] == "true"}
     source = str(SHARE / "launch" / "virtual_axes.launch.py")
     actions: list[object] = []
     for index, side in enumerate(SIDES):
@@ -55,7 +71,7 @@ def start(context: LaunchContext) -> list[object]:
             "frame_prefix": f"{side}/",
             "rviz": "false",
             "record": str(Path(argument["record"], f"{side}.mcap")) if argument["record"] else "",
-            **{key: argument[key] for key in ("time", "robot_state_publisher", "log_level")},
+            **{key: argument[key] for key in ("time", "use_sim_time", "robot_state_publisher", "log_level")},
         }
         # In a group: the arguments of one must not reach the other.
         include = IncludeLaunchDescription(PythonLaunchDescriptionSource(source), launch_arguments=of_side.items())
@@ -71,6 +87,7 @@ def start(context: LaunchContext) -> list[object]:
                 )
             )
     if argument["rviz"] == "true":
+        require_rviz(context)
         config = SHARE / "rviz" / "two_machines.rviz"
         actions.append(Node(package="rviz2", executable="rviz2", arguments=["-d", str(config)], parameters=[clock]))
     return actions

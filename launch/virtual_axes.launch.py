@@ -40,11 +40,33 @@ ARGUMENTS = [
         ["real", "fast", "sim"],
         "Real time; as fast as possible with its own /clock; or following an external /clock",
     ),
+    ("use_sim_time", "", ["", "true", "false"], "true: as time:=sim; empty: as `time` has it"),
     ("robot_state_publisher", "true", ["true", "false"], "Publish the model of the machine and its transforms"),
-    ("rviz", "false", ["true", "false"], "Show the machine in RViz"),
+    ("rviz", "false", ["true", "false"], "Show the machine in RViz (package rviz2)"),
     ("record", "", None, "MCAP file that the node records its topics to; empty: none"),
     ("log_level", "info", None, "Log level of the node"),
 ]
+
+
+def time_source(time: str, use_sim_time: str) -> str:
+    """Returns the time source: `time`, or sim if use_sim_time:=true. Rejects contradictions."""
+    if (use_sim_time, time) in (("true", "fast"), ("false", "sim")):
+        raise RuntimeError(
+            f"use_sim_time:={use_sim_time} contradicts time:={time}; use_sim_time:=true is time:=sim, "
+            "and with time:=fast the node publishes /clock itself: give only one of the two arguments"
+        )
+    return "sim" if use_sim_time == "true" else time
+
+
+def require_rviz(context: LaunchContext) -> None:
+    """Rejects rviz:=true without the package rviz2."""
+    try:
+        ExecutableInPackage("rviz2", "rviz2").perform(context)
+    except Exception as error:
+        raise RuntimeError(
+            "rviz:=true: package rviz2 not found; install it with "
+            "apt install ros-$ROS_DISTRO-rviz2 ros-$ROS_DISTRO-rviz-default-plugins, or leave out rviz:=true"
+        ) from error
 
 
 def machine_file(machine: str) -> Path:
@@ -129,10 +151,11 @@ def start(context: LaunchContext) -> list[object]:
     argument = {key: LaunchConfiguration(key).perform(context) for key, *_ in ARGUMENTS}
     machine = machine_file(argument["machine"])
     namespace, name, frame_prefix = argument["namespace"], argument["name"], argument["frame_prefix"]
-    clock = {"use_sim_time": argument["time"] != "real"}
+    time = time_source(argument["time"], argument["use_sim_time"])
+    clock = {"use_sim_time": time != "real"}
 
     parameters: dict[str, object] = controller_parameters(argument["controller"], machine)
-    parameters |= {"use_sim_time": True} if argument["time"] == "sim" else {"time": argument["time"]}
+    parameters |= {"use_sim_time": True} if time == "sim" else {"time": time}
     parameters["joint_prefix"] = ParameterValue(argument["joint_prefix"], value_type=str)
     parameters["workpiece_frame"] = ParameterValue(f"{frame_prefix}workpiece", value_type=str)
     if argument["record"]:
@@ -167,6 +190,7 @@ def start(context: LaunchContext) -> list[object]:
             )
         )
     if argument["rviz"] == "true":
+        require_rviz(context)
         actions.append(
             Node(
                 package="rviz2",

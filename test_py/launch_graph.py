@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+import sys
 from pathlib import Path
 
 import launch
@@ -13,6 +14,8 @@ from drive import node_binary
 
 ROOT = Path(__file__).resolve().parent.parent
 substitutions.PROGRAMS["virtual_axes", "virtual_axes"] = str(node_binary().with_name("virtual_axes"))
+# Any executable file: RViz is not installed here, and launch only looks for it.
+substitutions.PROGRAMS["rviz2", "rviz2"] = sys.executable
 
 
 def description(file: str) -> launch.LaunchDescription:

@@ -91,6 +91,33 @@ def test_simulated_time_is_use_sim_time():
     assert "time" not in node.values
 
 
+@pytest.mark.parametrize("file", [ONE, TWO])
+def test_use_sim_time_is_time_sim(file: str):
+    """`use_sim_time:=true` alone selects simulated time for every node; `false` keeps real and fast."""
+    found = by_executable(nodes(file, use_sim_time="true"))
+    for node in found["virtual_axes_node"] + found["robot_state_publisher"]:
+        assert node.values["use_sim_time"] is True and "time" not in node.values
+    for time in ("real", "fast"):
+        for node in by_executable(nodes(file, use_sim_time="false", time=time))["virtual_axes_node"]:
+            assert node.values["time"] == time and "use_sim_time" not in node.values
+
+
+@pytest.mark.parametrize("file", [ONE, TWO])
+@pytest.mark.parametrize(("use_sim_time", "time"), [("true", "fast"), ("false", "sim")])
+def test_contradicting_time_arguments_are_rejected(file: str, use_sim_time: str, time: str):
+    """The message contains both arguments."""
+    with pytest.raises(RuntimeError, match=f"use_sim_time:={use_sim_time} contradicts time:={time}"):
+        nodes(file, use_sim_time=use_sim_time, time=time)
+
+
+@pytest.mark.parametrize("file", [ONE, TWO])
+def test_rviz_without_its_package_is_rejected(file: str, monkeypatch: pytest.MonkeyPatch):
+    """The message names the Debian packages."""
+    monkeypatch.delitem(substitutions.PROGRAMS, ("rviz2", "rviz2"))
+    with pytest.raises(RuntimeError, match=r"ros-\$ROS_DISTRO-rviz2 ros-\$ROS_DISTRO-rviz-default-plugins"):
+        nodes(file, rviz="true", robot_state_publisher="false")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -193,12 +220,13 @@ def test_the_stand_in_scopes_arguments_as_launch_does():
 
 
 def test_files_of_the_launch_files_are_installed():
-    """Folders in CMakeLists.txt, packages in package.xml."""
+    """Folders in CMakeLists.txt, packages in package.xml; RViz is optional, since it needs a display."""
     cmake = (ROOT / "CMakeLists.txt").read_text()
     [folders] = re.findall(r"foreach\(folder ([^)]*)\)", cmake)
     assert {"config", "launch", "layouts", "rviz", "urdf"} <= set(folders.split())
     manifest = (ROOT / "package.xml").read_text()
-    packages = {node.package for node in nodes(TWO, rviz="true")} - {"virtual_axes"}
+    packages = {node.package for node in nodes(TWO, rviz="true")} - {"virtual_axes", "rviz2"}
+    assert "<exec_depend>rviz" not in manifest
     for package in packages | {"launch", "launch_ros", "geometry_msgs", "nav_msgs"}:
         assert f"<exec_depend>{package}</exec_depend>" in manifest, package
 
