@@ -2,8 +2,9 @@
 """Checks the crates of the workspace and the fuzz targets; writes their table in docs/internals/dependencies.md.
 
     tools/dependencies.py               fails if the table is out of date, a license is not in deny.toml's list,
-                                        a crate does not come from the registry, or a member of the workspace
-                                        depends on what its layer excludes
+                                        a crate does not come from the registry or requires a newer Rust than
+                                        rust-version, or a member of the workspace depends on what its layer
+                                        excludes
     tools/dependencies.py --write       writes the table
     tools/dependencies.py --advisories  asks cargo-audit or cargo-deny, where one of them is installed
 
@@ -19,7 +20,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import options
 
@@ -37,6 +38,17 @@ LAYERS: dict[str, set[str]] = {
 """Crates that a member of the workspace must not depend on, directly or through others."""
 REGISTRY = "registry+https://github.com/rust-lang/crates.io-index"
 PROGRAMS, SECURITY, TESTS, FUZZ = "programs", "feature security", "tests and benchmarks", "fuzz targets"
+
+
+class Row(NamedTuple):
+    """Crate with its license, what needs it, its source and the Rust version that it requires."""
+
+    name: str
+    version: str
+    license: str
+    what: str
+    source: str | None
+    rust: str | None
 
 
 def metadata(manifest: Path, *features: str) -> dict[str, Any]:
@@ -84,8 +96,20 @@ def clarified(rules: dict[str, Any], package: dict[str, Any]) -> str:
     return package["license"] or clarified_licenses.get(package["name"], "not stated")
 
 
-def crates(rules: dict[str, Any]) -> list[tuple[str, str, str, str, str | None]]:
-    """Returns name, version, license, dependent and source of each crate, sorted by name."""
+def version(text: str | None) -> tuple[int, ...]:
+    """Returns a Rust version as numbers, major and minor; none is the oldest."""
+    return tuple(int(part) for part in (text or "0.0").split(".")[:2])
+
+
+def newest_rust(rows: list[Row]) -> tuple[str, list[str]]:
+    """Returns the newest Rust version that crates require, and these crates."""
+    newest = max(version(row.rust) for row in rows)
+    names = [f"{row.name} {row.version}" for row in rows if version(row.rust) == newest]
+    return ".".join(map(str, newest)), names
+
+
+def crates(rules: dict[str, Any]) -> list[Row]:
+    """Returns the crates, sorted by name."""
     own = ROOT / "Cargo.toml"
     default, secured, fuzz = metadata(own), metadata(own, "--all-features"), metadata(ROOT / "fuzz" / "Cargo.toml")
     where: dict[tuple[str, str], str] = {}
@@ -106,7 +130,7 @@ def crates(rules: dict[str, Any]) -> list[tuple[str, str, str, str, str | None]]
     rows = []
     for key in sorted(packages):
         package = packages[key]
-        rows.append((*key, clarified(rules, package), where[key], package["source"]))
+        rows.append(Row(*key, clarified(rules, package), where[key], package["source"], package["rust_version"]))
     return rows
 
 
@@ -144,18 +168,24 @@ def main() -> int:
     allowed = set(rules["allow"])
     rows = crates(rules)
     faults = []
-    for name, version, license, _, source in rows:
-        if not is_allowed(license, allowed):
-            faults.append(f"{name} {version}: license {license}")
-        if source != REGISTRY:
-            faults.append(f"{name} {version}: from {source}")
+    for row in rows:
+        if not is_allowed(row.license, allowed):
+            faults.append(f"{row.name} {row.version}: license {row.license}")
+        if row.source != REGISTRY:
+            faults.append(f"{row.name} {row.version}: from {row.source}")
     layers = layer_faults()
     for fault in layers:
         print(f"dependencies: {fault}, which LAYERS of tools/dependencies.py excludes", file=sys.stderr)
     for fault in faults:
         print(f"dependencies: {fault}, which deny.toml does not allow", file=sys.stderr)
-    head = "| crate | version | license | needed by |\n|---|---|---|---|\n"
-    table = head + "".join(f"| {name} | {version} | {license} | {what} |\n" for name, version, license, what, _ in rows)
+    rust, names = newest_rust(rows)
+    stated = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["rust-version"]
+    is_too_new = version(rust) > version(stated)
+    if is_too_new:
+        print(f"dependencies: rust-version in Cargo.toml is {stated}, {names[0]} requires {rust}", file=sys.stderr)
+    head = f"Newest Rust required by a crate: {rust} ({', '.join(names)}).\n\n"
+    head += "| crate | version | license | needed by |\n|---|---|---|---|\n"
+    table = head + "".join(f"| {row.name} | {row.version} | {row.license} | {row.what} |\n" for row in rows)
     text = TABLE.read_text()
     before, rest = text.split(BEGIN)
     present, after = rest.split(END)
@@ -167,8 +197,8 @@ def main() -> int:
             "dependencies: docs/internals/dependencies.md is out of date: tools/dependencies.py --write",
             file=sys.stderr,
         )
-    print(f"{len(rows)} crates, {sum(what == PROGRAMS for *_, what, _ in rows)} of them in the programs")
-    return bool(faults or layers)
+    print(f"{len(rows)} crates, {sum(row.what == PROGRAMS for row in rows)} of them in the programs")
+    return bool(faults or layers or is_too_new)
 
 
 if __name__ == "__main__":
