@@ -30,7 +30,7 @@ ARGUMENTS = [
     ("right_controller", "as_machine", CONTROLLERS, "Position controller of every joint on the right"),
     ("distance", "2.5", None, "Distance of the right machine frame from the left one along X, m"),
     ("time", "real", ["real", "fast", "sim"], "As in virtual_axes.launch.py"),
-    ("use_sim_time", "", ["", "true", "false"], "As in virtual_axes.launch.py"),
+    ("use_sim_time", "as_time", ["as_time", "true", "false"], "As in virtual_axes.launch.py"),
     ("robot_state_publisher", "true", ["true", "false"], "Publish models and transforms"),
     ("rviz", "false", ["true", "false"], "Show both in RViz (package rviz2)"),
     ("record", "", None, "Folder for the recordings left.mcap and right.mcap; empty: none"),

@@ -40,7 +40,7 @@ ARGUMENTS = [
         ["real", "fast", "sim"],
         "Real time; as fast as possible with its own /clock; or following an external /clock",
     ),
-    ("use_sim_time", "", ["", "true", "false"], "true: as time:=sim; empty: as `time` has it"),
+    ("use_sim_time", "as_time", ["as_time", "true", "false"], "true: as time:=sim; as_time: as `time` has it"),
     ("robot_state_publisher", "true", ["true", "false"], "Publish the model of the machine and its transforms"),
     ("rviz", "false", ["true", "false"], "Show the machine in RViz (package rviz2)"),
     ("record", "", None, "MCAP file that the node records its topics to; empty: none"),
