@@ -79,6 +79,10 @@ def report(path: Ballbar, runs: dict[str, Recording]) -> str:
         for row in rows
     ]
     lines.insert(1, "  ".join("-" * width for width in widths))
+    lines += [
+        "",
+        "Sampled every position cycle, as published; `virtual_axes run` takes every tick, so that its G is larger.",
+    ]
     return "\n".join(["Radial deviation and following errors in µm:", "", *lines])
 
 
