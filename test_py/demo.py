@@ -14,11 +14,10 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import FuncFormatter
 
 from drive import Ballbar, Drive, Node, Recording, ballbar, circular_deviation, joint_trajectory
+from polar_chart import Circle, draw
 
 AXES = ("x", "y")
 RUNS: dict[str, dict[str, object]] = {
@@ -86,53 +85,13 @@ def report(path: Ballbar, runs: dict[str, Recording]) -> str:
     return "\n".join(["Radial deviation and following errors in µm:", "", *lines])
 
 
-def draw(path: Ballbar, runs: dict[str, Recording], file: Path) -> None:
-    """Draws polar plots of the radial deviation, magnified as on a ballbar chart."""
-    figure, plots = plt.subplots(
-        1, len(runs), figsize=(14.5, 6.2), subplot_kw={"projection": "polar"}, layout="constrained"
-    )
-    # Black and one strong color, solid and dashed: readable in grayscale print.
-    for plot, (title, run) in zip(np.atleast_1d(plots), runs.items()):
-        steady = run.within(path.steady)
-        x, y = (run.joints["position", axis][steady] for axis in AXES)
-        angle = np.unwrap(np.arctan2(y - path.center[1], x - path.center[0]))
-        deviation = run.radial_deviation(path.center, path.radius)[steady] * 1e6
-        turn = np.linspace(0, 2 * np.pi, 361)
-        step = _round_step(np.abs(deviation).max() / 2)
-        plot.plot(
-            turn,
-            np.zeros_like(turn),
-            color="black",
-            linewidth=1.2,
-            linestyle="--",
-            label="programmed circle, R = 150 mm",
-        )
-        plot.plot(angle, deviation, color="#b2182b", linewidth=1.6, label="simulated position")
-        # The nominal circle has a radius of four grid steps, so that an inward deviation stays off the center.
-        plot.set_rorigin(-6 * step)
-        plot.set_rlim(-4 * step, 3 * step)
-        plot.set_rticks([factor * step for factor in range(-3, 4)])
-        plot.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:+g}" if value else "0"))
-        # Vertical axis: most space for labels one above the other.
-        plot.set_rlabel_position(80)
-        for label in plot.get_yticklabels():
-            label.set(fontsize=8, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})
-        plot.grid(color="0.8", linewidth=0.6)
-        plot.set_title(
-            f"{title}\nmean {deviation.mean():+.1f} µm, G = {circular_deviation(deviation):.1f} µm", fontsize=11
-        )
-    figure.legend(*plot.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=10, frameon=False)
-    figure.suptitle(
-        "Ballbar in X–Y at 15 m/min: radial deviation in µm over the polar angle, individual scales", fontsize=12
-    )
-    figure.savefig(file, dpi=150)
-    plt.close(figure)
-
-
-def _round_step(value: float) -> float:
-    """Rounds up to 1, 2 or 5 times a power of ten."""
-    power = 10 ** np.floor(np.log10(max(value, 1e-3)))
-    return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= value))
+def circle(path: Ballbar, run: Recording) -> Circle:
+    """Returns the radial deviation over the polar angle, in µm."""
+    steady = run.within(path.steady)
+    x, y = (run.joints["position", axis][steady] for axis in AXES)
+    angle = np.unwrap(np.arctan2(y - path.center[1], x - path.center[0]))
+    deviation = run.radial_deviation(path.center, path.radius)[steady] * 1e6
+    return Circle(angle, deviation, deviation.mean(), circular_deviation(deviation))
 
 
 def main() -> int:
@@ -165,7 +124,7 @@ def main() -> int:
         status = process.stop()
     print(f"node ended with status {status}\n")
     print(report(path, runs))
-    draw(path, runs, arguments.out)
+    draw({title: circle(path, run) for title, run in runs.items()}).savefig(arguments.out, dpi=150)
     print(f"\npicture: {arguments.out}")
     return 0
 

@@ -32,6 +32,7 @@ LOOKS = 60
         ("keystore", ["--domain", "233", "store", "/one"], ["--domain", "'233'", "from 0 to 232"]),
         ("run_graph", ["--seconds", "long"], ["--seconds", "'long'"]),
         ("figure11", ["--fast"], ["unrecognized arguments: --fast"]),
+        ("ballbar_picture", ["--fast"], ["unrecognized arguments: --fast"]),
     ],
 )
 def test_invalid_options_are_rejected(tool: str, options: list[str], words: list[str]):

@@ -1,72 +1,75 @@
 #!/usr/bin/env python3
-"""Figure 11 of the paper by `tune`: better on the circle, worse at a corner; writes docs/images/figure-11.svg.
+"""Draws docs/images/figure-11.svg, the paper's figure 11: a tuning better on the circle, worse at a corner.
 
-Needs `cargo build --release` and `source .build/env.sh`. Takes minutes: `tune` searches the whole grid.
+Needs `cargo build --release` and `source .build/env.sh`. The tuning is the one that `--search` finds by `tune`.
 """
 
-import csv
 import json
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
-import matplotlib
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 import options
+import pictures
 
-matplotlib.use("svg")
-import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen before)
-
-ROOT = Path(__file__).resolve().parent.parent
-COMMAND = ROOT / "target" / "release" / "virtual_axes"
-PICTURE = ROOT / "docs" / "images" / "figure-11.svg"
+PICTURE = pictures.IMAGES / "figure-11.svg"
+TITLE = "Radial deviation on a circle and position at a corner, of two controllers"
 CIRCLE, CORNER = "ballbar", "corner-45"
-RADIUS_MM = 150.0
+TUNING = {"n1": 1, "n2": 9, "nu": 8, "lambda_rel": 0.5}
+SYMBOLS = {"n1": "N1", "n2": "N2", "nu": "Nu", "lambda_rel": "λ_rel"}
 # End of the first leg, and the displayed range around the corner, mm.
 LEG_MM, AROUND_MM = 50.0, 2.5
-# Span between the ramps, as in the definition of the radial deviation, s.
-STEADY = (1.5, 8.04)
+TRACE = ("--trace-period", "1ms")
+GROUP = 8
+"""Samples of which the picture of the circle has minimum and maximum: half a pixel."""
 
 
-def search() -> dict:
-    """Returns the contrast that `tune` finds."""
+def search() -> dict[str, float]:
+    """Returns the tuning that `tune` finds, and prints its margins."""
     arguments = ["tune", CIRCLE, "--controller", "gpc", "--also", CORNER, "--contrast", "--json"]
-    return json.loads(subprocess.run([COMMAND, *arguments], check=True, capture_output=True).stdout)
+    found = subprocess.run([pictures.PROGRAM, *arguments], check=True, capture_output=True).stdout
+    best = json.loads(found)["best"]
+    print(f"tuning     {best['tuning']}")
+    print(f"margins    {best['margins']}")
+    return best["tuning"]
 
 
-def trace(scenario: str, changes: list[str]) -> dict[str, list[float]]:
-    """Returns positions of X and Y in mm, every millisecond."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "trace.csv"
-        arguments = ["run", scenario, "--trace", path, "--trace-period", "1ms"]
-        for change in changes:
-            arguments += ["--set", change]
-        subprocess.run([COMMAND, *arguments], check=True, capture_output=True)
-        with path.open() as file:
-            rows = list(csv.DictReader(file))
-    columns = {"time": "time", "x": "x.position", "y": "y.position"}
-    scale = {"time": 1.0, "x": 1e3, "y": 1e3}
-    return {name: [float(row[column]) * scale[name] for row in rows] for name, column in columns.items()}
-
-
-def draw(contrast: dict) -> None:
-    """Draws the circle's deviation over its angle and the corner, of both controllers."""
-    tuning = contrast["best"]["tuning"]
-    names = {"n1": "N1", "n2": "N2", "nu": "Nu", "lambda_rel": "λ_rel"}
-    changes = [f"{axis}.position_loop.controller=gpc" for axis in "xy"]
-    changes += [f"{axis}.position_loop.gpc.{name}={tuning[name]}" for axis in "xy" for name in names]
-    label = "GPC " + ", ".join(f"{text} {tuning[name]:g}" for name, text in names.items())
-    figure, (circle, corner) = plt.subplots(1, 2, figsize=(11, 5))
-    for changed, name, color in ([], "cascade with feedforward", "#2a7ab9"), (changes, label, "#d95f02"):
-        run = trace(CIRCLE, changed)
-        steady = [i for i, time in enumerate(run["time"]) if STEADY[0] <= time <= STEADY[1]]
-        # The circle starts at home, at its rightmost point.
-        deviation = [((run["x"][i] + RADIUS_MM) ** 2 + run["y"][i] ** 2) ** 0.5 - RADIUS_MM for i in steady]
-        circle.plot([run["time"][i] for i in steady], [d * 1e3 for d in deviation], color=color, label=name)
-        run = trace(CORNER, changed)
-        corner.plot(run["x"], run["y"], color=color, label=name)
+def figure(tuning: dict[str, float], group: int) -> Figure:
+    """Runs circle and corner with both controllers, draws them and prints the contour errors."""
+    loops = [f"{axis}.position_loop" for axis in "xy"]
+    changes = [f"--set={loop}.controller=gpc" for loop in loops]
+    changes += [f"--set={loop}.gpc.{name}={value}" for loop in loops for name, value in tuning.items()]
+    gpc = "GPC " + ", ".join(f"{symbol} {tuning[name]:g}" for name, symbol in SYMBOLS.items())
+    drawing, (circle, corner) = plt.subplots(1, 2, figsize=(11, 5))
+    runs = ("cascade", "cascade with feedforward", "#2a7ab9", []), ("gpc", gpc, "#d95f02", changes)
+    for part, name, color, changed in runs:
+        figures, run = pictures.ballbar(*TRACE, *changed)
+        kept = pictures.extremes(run["deviation"], group)
+        circle.plot(run["time"][kept], run["deviation"][kept], color=color, label=name, gid=f"circle-{part}")
+        report(CIRCLE, name, figures)
+        figures, run = pictures.run(CORNER, *TRACE, *changed)
+        near = abs(run["x"] - LEG_MM) < 2 * AROUND_MM
+        corner.plot(run["x"][near], run["y"][near], color=color, label=name, gid=f"corner-{part}")
+        report(CORNER, name, figures)
     corner.plot([0, LEG_MM, LEG_MM + LEG_MM], [0, 0, LEG_MM], "k--", linewidth=0.8, label="path")
+    describe(circle, corner)
+    drawing.tight_layout(rect=(0, 0.08, 1, 1))
+    drawing.legend(*corner.get_legend_handles_labels(), loc="lower center", ncols=3)
+    return drawing
+
+
+def report(scenario: str, name: str, figures: dict) -> None:
+    """Prints the contour errors of a run."""
+    error = figures["contour_error_um"]
+    print(f"{scenario:10} {name:36} {error['max']:5.1f} µm, within the ends {error['max_within_ends']:5.1f} µm")
+
+
+def describe(circle: Axes, corner: Axes) -> None:
+    """Sets titles, labels and limits."""
     circle.set(xlabel="time (s)", ylabel="radial deviation (µm)", title=f"{CIRCLE}: R 150 mm at 15 m/min")
     corner.set(
         xlabel="X (mm)",
@@ -78,22 +81,21 @@ def draw(contrast: dict) -> None:
     )
     for axes in circle, corner:
         axes.grid(alpha=0.3)
-    figure.tight_layout(rect=(0, 0.08, 1, 1))
-    figure.legend(*corner.get_legend_handles_labels(), loc="lower center", ncols=3)
-    figure.savefig(PICTURE, metadata={"Date": None})
+
+
+def write(path: Path, tuning: dict[str, float], group: int = GROUP, tolerance: float = pictures.TOLERANCE) -> None:
+    """Writes the picture."""
+    with plt.rc_context(pictures.STYLE):
+        pictures.save(figure(tuning, group), path, TITLE, tolerance)
 
 
 def main() -> int:
-    """Searches, draws and prints the result."""
-    options.parser(__doc__).parse_args()
-    contrast = search()
-    draw(contrast)
-    there = contrast["also"][0]
-    print(f"tuning     {contrast['best']['tuning']}")
-    print(f"{CIRCLE:10} {contrast['present']['cost']:.1f} µm, tuned {contrast['best']['cost']:.1f} µm")
-    print(f"{CORNER:10} {there['present']['cost']:.1f} µm, tuned {there['tuned']['cost']:.1f} µm")
-    print(f"margins    {contrast['best']['margins']}")
-    print(f"picture    {PICTURE.relative_to(ROOT)}")
+    """Searches if requested, and draws."""
+    parser = options.parser(__doc__)
+    parser.add_argument("--search", action="store_true", help="search the tuning anew, over the whole grid")
+    arguments = parser.parse_args()
+    write(PICTURE, search() if arguments.search else TUNING)
+    print(f"picture    {PICTURE.relative_to(pictures.ROOT)}")
     return 0
 
 

@@ -1,0 +1,88 @@
+"""Pictures of the documentation: small, and the same as drawn from all samples of a new run.
+
+tools/ballbar_picture.py and tools/figure11.py draw them again.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tools"))
+
+import ballbar_picture  # noqa: E402  (its folder is added before)
+import figure11  # noqa: E402
+import pictures  # noqa: E402
+
+MOST_BYTES = 40_000
+HALF_PIXEL = 0.75 / 2
+"""Half a pixel in points, the unit of the files."""
+
+
+def draw_ballbar(path: Path) -> None:
+    """Draws the ballbars with all samples."""
+    ballbar_picture.write(path, tolerance=0)
+
+
+def draw_figure_11(path: Path, **changes: float) -> None:
+    """Draws figure 11 with all samples."""
+    figure11.write(path, {**figure11.TUNING, **changes}, group=1, tolerance=0)
+
+
+PICTURES = [(ballbar_picture.PICTURE, draw_ballbar, 3), (figure11.PICTURE, draw_figure_11, 4)]
+
+
+def distance(points: np.ndarray, line: np.ndarray) -> float:
+    """Returns the largest distance of the points to a polyline."""
+    # In parts, as each takes memory for every point and segment.
+    parts = np.array_split(points, len(points) // 500 + 1)
+    return max(pictures.distance_to_segments(part, line).max() for part in parts)
+
+
+def difference(one: Path, other: Path) -> dict[str, float]:
+    """Returns the largest distance between each curve of two pictures, points."""
+    curves, others = (pictures.curves(path.read_text()) for path in (one, other))
+    assert curves.keys() == others.keys()
+    return {name: max(distance(curve, others[name]), distance(others[name], curve)) for name, curve in curves.items()}
+
+
+def texts(path: Path) -> list[str]:
+    """Returns the texts of a picture."""
+    return re.findall(r"<text[^>]*>([^<]*)</text>", path.read_text())
+
+
+@pytest.mark.parametrize(("stored", "draw", "count"), PICTURES, ids=["ballbar", "figure-11"])
+def test_stored_picture(stored: Path, draw: Callable[[Path], None], count: int, tmp_path: Path):
+    """A stored picture is small, has a white background, and each curve within half a pixel of all samples."""
+    svg = stored.read_text()
+    assert stored.stat().st_size < MOST_BYTES
+    width, height = re.search(r'viewBox="0 0 (\S+) (\S+)"', svg).groups()
+    first = re.search(r"<path[^>]*>", svg[svg.index("</defs>") :])
+    assert first[0] == f'<path d="M0 {height}L{width} {height}L{width} 0L0 0z" style="fill: #ffffff"/>'
+    every_sample = tmp_path / stored.name
+    draw(every_sample)
+    distances = difference(stored, every_sample)
+    assert len(distances) == count and max(distances.values()) < HALF_PIXEL, distances
+    assert texts(stored) == texts(every_sample)
+
+
+def test_a_different_curve_is_found(tmp_path: Path):
+    """Another tuning changes the curves of predictive control by more than half a pixel."""
+    draw_figure_11(tmp_path / "other.svg", lambda_rel=0.45)
+    distances = difference(figure11.PICTURE, tmp_path / "other.svg")
+    assert min(distances["circle-gpc"], distances["corner-gpc"]) > HALF_PIXEL, distances
+
+
+def test_simplified_curve_keeps_its_extremes():
+    """A simplified curve has fewer points, and every sample within the tolerance."""
+    time = np.linspace(0, 20, 2001)
+    wave = np.column_stack([10 * time, 30 * np.sin(time) + 5 * np.exp(-((time - 10) ** 2) * 100)])
+    kept = pictures.simplified(wave, 0.15)
+    assert len(kept) < len(wave) / 10 and {0, 2000} <= set(kept)
+    assert pictures.distance_to_segments(wave, wave[kept]).max() <= 0.15
+    assert pictures.extremes(np.array([0, 3, 1, 2, -1, 2, 0]), 3).tolist() == [0, 1, 3, 4, 6]
