@@ -110,6 +110,8 @@ stage "cargo build" cargo build --release --workspace --locked --bins || finish 
 stage "reference" tools/reference.py || finish 1
 join_background set_up
 stage "ruff" bash -c ".venv/bin/ruff format --check && .venv/bin/ruff check" || finish 1
+# Before the rclpy tests, which open the site in a browser.
+stage "documentation" tools/build_docs.sh || finish 1
 background rust_checks
 stage "rclpy tests" python_tests "$@" || finish 1
 join_background rust_checks
