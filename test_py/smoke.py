@@ -60,19 +60,29 @@ def messages() -> None:
 
 def trajectory() -> None:
     """Starts the installed node, submits a trajectory and waits for its result."""
-    # Not the user's domain; nothing leaves the machine.
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 99)
+    # Not at the top: it imports rclpy, whose absence must be a failure in the result file.
+    from drive import DomainId, die_with_parent
+
+    # Not the user's domain, nor one of another test; nothing leaves the machine.
+    domain = DomainId()
+    os.environ["ROS_DOMAIN_ID"] = str(domain.value)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    with subprocess.Popen([PROGRAMS / "virtual_axes_node"], stdin=subprocess.DEVNULL) as node:
-        try:
-            submit(node)
-        finally:
-            node.terminate()
+    for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY"):
+        os.environ.pop(variable, None)
+    program = PROGRAMS / "virtual_axes_node"
+    try:
+        with subprocess.Popen([program], stdin=subprocess.DEVNULL, preexec_fn=die_with_parent) as node:
             try:
-                status = node.wait(STOP_S)
-            except subprocess.TimeoutExpired:
-                node.kill()
-                raise
+                submit(node)
+            finally:
+                node.terminate()
+                try:
+                    status = node.wait(STOP_S)
+                except subprocess.TimeoutExpired:
+                    node.kill()
+                    raise
+    finally:
+        domain.release()
     assert status == 0, f"the node ended with status {status}"
 
 

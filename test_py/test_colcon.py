@@ -6,81 +6,97 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from documentation.place import Place
 from drive import node_binary
 
-ROOT = Path(__file__).resolve().parent.parent
-FILES = ("CMakeLists.txt", "package.xml", "config", "launch", "layouts", "msg", "rviz", "test_py/smoke.py", "urdf")
 PREFIX = Path(sys.prefix)
+PROGRAMS = ("virtual_axes", "virtual_axes_node")
 
 
-def copy_package(source: Path) -> None:
-    """Copies what colcon installs and tests."""
-    for name in FILES:
-        target = source / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, target)
+class Workspace:
+    """Copy of the checkout, with the crates compiled before, and the folders that colcon writes."""
 
+    def __init__(self, folder: Path) -> None:
+        """Copies the checkout."""
+        self.folder = folder
+        # Its domain is unused: the smoke test reserves one itself.
+        self.place = Place(folder, node_binary(), domain_id=0)
+        self.source = self.place.copy_checkout()
+        self.result = folder / "build/virtual_axes/test_results/virtual_axes/smoke.xunit.xml"
+        self.installed = folder / "install/virtual_axes/lib/virtual_axes"
 
-def colcon(workspace: Path, verb: str, *words: str) -> subprocess.CompletedProcess[str]:
-    """Runs a verb of colcon in the environment of the wheels alone."""
-    environment = os.environ | {
-        "AMENT_PREFIX_PATH": str(PREFIX),
-        "CMAKE_PREFIX_PATH": str(PREFIX),
-        "LD_LIBRARY_PATH": str(PREFIX / "lib"),
-        "PYTHONPATH": "",
-        "VIRTUAL_ENV": str(PREFIX),
-        "COLCON_HOME": str(workspace / "colcon"),
-    }
-    # Set by ros_wheels_bootstrapper, which then no longer adds the wheels' libraries to LD_LIBRARY_PATH.
-    environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
-    command = [PREFIX / "bin" / "colcon", "--log-base", "log", verb, *words]
-    return subprocess.run(command, cwd=workspace, env=environment, capture_output=True, text=True, timeout=240)
+    def colcon(self, verb: str, *words: str) -> subprocess.CompletedProcess[str]:
+        """Runs a verb of colcon in the environment of the wheels alone."""
+        environment = os.environ | {
+            "AMENT_PREFIX_PATH": str(PREFIX),
+            "CMAKE_PREFIX_PATH": str(PREFIX),
+            "LD_LIBRARY_PATH": str(PREFIX / "lib"),
+            "PYTHONPATH": "",
+            "VIRTUAL_ENV": str(PREFIX),
+            "COLCON_HOME": str(self.folder / "colcon"),
+            "CARGO_TARGET_DIR": self.place.environment["CARGO_TARGET_DIR"],
+            "CARGO_NET_OFFLINE": "true",
+        }
+        # Set by ros_wheels_bootstrapper, which then no longer adds the wheels' libraries to LD_LIBRARY_PATH.
+        environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
+        command = [PREFIX / "bin" / "colcon", "--log-base", "log", verb, "--paths", self.source, *words]
+        return subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True, timeout=240)
 
-
-def build(workspace: Path, programs: Path) -> subprocess.CompletedProcess[str]:
-    """Builds the package with programs compiled before."""
-    return colcon(
-        workspace,
-        "build",
-        "--cmake-args",
-        "-GNinja",
-        f"-DPython3_EXECUTABLE={PREFIX / 'bin' / 'python'}",
-        "-DBUILD_TESTING=ON",
-        f"-DVIRTUAL_AXES_BINARY_DIR={programs}",
-    )
+    def build(self, *definitions: str) -> subprocess.CompletedProcess[str]:
+        """Builds the package as the README has it, plus definitions of CMake."""
+        python = f"-DPython3_EXECUTABLE={PREFIX / 'bin' / 'python'}"
+        return self.colcon("build", "--cmake-args", "-GNinja", python, "-DBUILD_TESTING=ON", *definitions)
 
 
 @pytest.fixture(scope="module")
-def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workspace]:
     """Workspace with the built package."""
-    folder = tmp_path_factory.mktemp("workspace")
-    copy_package(folder / "src" / "virtual_axes")
-    done = build(folder, node_binary().parent)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return folder
+    space = Workspace(tmp_path_factory.mktemp("workspace").resolve())
+    try:
+        done = space.build()
+        assert done.returncode == 0, done.stdout + done.stderr
+        yield space
+    finally:
+        space.place.remove()
 
 
-def test_the_installed_package_passes_its_smoke_test(workspace: Path):
+def test_the_installed_package_passes_its_smoke_test(workspace: Workspace):
     """All four checks run and pass; without the command's program the same test fails."""
-    result = workspace / "build/virtual_axes/test_results/virtual_axes/smoke.xunit.xml"
-    done = colcon(workspace, "test", "--return-code-on-test-failure", "--event-handlers", "console_direct+")
+    done = workspace.colcon("test", "--return-code-on-test-failure", "--event-handlers", "console_direct+")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert 'tests="4" failures="0"' in result.read_text()
-    (workspace / "install/virtual_axes/lib/virtual_axes/virtual_axes").unlink()
-    done = colcon(workspace, "test", "--return-code-on-test-failure")
+    assert 'tests="4" failures="0"' in workspace.result.read_text()
+    (workspace.installed / "virtual_axes").unlink()
+    done = workspace.colcon("test", "--return-code-on-test-failure")
     assert done.returncode != 0
-    assert 'tests="4" failures="1"' in result.read_text()
+    assert 'tests="4" failures="1"' in workspace.result.read_text()
 
 
-def test_a_missing_program_is_an_error(tmp_path: Path, workspace: Path):
+def test_without_the_programs_there_is_no_smoke_test(workspace: Workspace):
+    """Messages alone build, and no test is registered that could only fail."""
+    done = workspace.build("-DVIRTUAL_AXES_BUILD_NODE=OFF")
+    assert done.returncode == 0, done.stdout + done.stderr
+    listed = subprocess.run(
+        [PREFIX / "bin" / "ctest", "-N"],
+        cwd=workspace.folder / "build/virtual_axes",
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "Total Tests: 0" in listed.stdout
+
+
+@pytest.mark.parametrize("missing", PROGRAMS)
+def test_a_missing_program_is_an_error(tmp_path: Path, workspace: Workspace, missing: str):
     """The installation names the program that is not there."""
-    programs = tmp_path / "programs"
-    programs.mkdir()
-    shutil.copy(node_binary(), programs)
-    done = build(workspace, programs)
+    for name in PROGRAMS:
+        if name != missing:
+            shutil.copy(node_binary().with_name(name), tmp_path)
+    done = workspace.build(f"-DVIRTUAL_AXES_BINARY_DIR={tmp_path}")
     assert done.returncode != 0
-    assert f"{programs}/virtual_axes" in done.stdout + done.stderr
+    # CMake breaks the lines of its messages.
+    assert f'cannot find "{tmp_path}/{missing}"' in " ".join((done.stdout + done.stderr).split())
