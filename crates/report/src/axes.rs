@@ -3,6 +3,7 @@
 use virtual_axes_core::assess::AxisTrace;
 
 use super::html::{Caption, run_class};
+use super::limits;
 use super::page::Page;
 use super::scale::Extent;
 use super::strip::{Strip, error_strip, legend, peak, run_series, strip, time};
@@ -115,7 +116,15 @@ fn position(page: &mut Page, axis: &Axis, time: Extent) {
     legend.drain(1..setpoints.max(1));
     let unit = DisplayUnit::position(axis.traces[0].2.kind);
     let caption = Caption { title: "Setpoint and position".to_owned(), note: String::new(), legend };
-    let plot = TimePlot { quantity: "Position", unit, from_zero: false, time, series, at_least: None };
+    let plot = TimePlot {
+        quantity: "Position",
+        unit,
+        from_zero: false,
+        time,
+        series,
+        at_least: None,
+        shaded: Vec::new(),
+    };
     let title = format!("{} axis: setpoint and position", axis.name);
     page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
 }
@@ -147,13 +156,18 @@ fn currents(page: &mut Page, axis: &Axis, time: Extent) {
             parts.into_iter().partition(|(_, _, signal)| peak(signal(trace)) > NEGLIGIBLE_CURRENT);
         series
             .extend(plotted.into_iter().map(|(label, class, signal)| line(label, class.to_owned(), signal)));
+        let shaded = limits::ranges(times, trace);
         let negligible: Vec<String> = negligible.into_iter().map(|(label, ..)| label.to_owned()).collect();
         let note = match negligible.as_slice() {
             [] => String::new(),
             [one] => format!("{one} component is negligible"),
             several => format!("{} components are negligible", listed(several)),
         };
-        let caption = Caption { title: page.caption_for_run("Current", run), note, legend: legend(&series) };
+        let mut legend = legend(&series);
+        if !shaded.is_empty() {
+            legend.push(("band at-limit".to_owned(), "at a limit".to_owned()));
+        }
+        let caption = Caption { title: page.caption_for_run("Current", run), note, legend };
         let plot = TimePlot {
             quantity: "Current",
             unit: DisplayUnit::AMPERE,
@@ -161,6 +175,7 @@ fn currents(page: &mut Page, axis: &Axis, time: Extent) {
             time,
             series,
             at_least: range,
+            shaded,
         };
         let title = page.caption_for_run(&format!("{} axis: current and its components", axis.name), run);
         page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));

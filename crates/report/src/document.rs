@@ -4,7 +4,7 @@ use std::io;
 
 use super::chart::Chart;
 use super::html::Html;
-use super::table::{RunTable, Table, fact, names};
+use super::table::{Table, fact, names};
 use super::text::Text;
 
 /// A self-contained page of sections, in the style of a [`Report`](super::Report).
@@ -113,7 +113,7 @@ impl Section {
                 Text(text)
             ));
         }
-        self.tables.iter().for_each(|table| html.table(&[RunTable { run: None, table }]));
+        self.tables.iter().for_each(|table| html.table(table));
         self.charts.iter().for_each(|chart| chart.append_to(html));
         html.close_section();
     }

@@ -82,6 +82,11 @@ impl Html {
         self.append(format_args!("</section>\n"));
     }
 
+    /// Appends the result in one line per compared run.
+    pub(super) fn verdict(&mut self, lines: &[String]) {
+        lines.iter().for_each(|line| self.append(format_args!("<p class=\"verdict\">{}</p>\n", Text(line))));
+    }
+
     /// Appends a paragraph.
     pub(super) fn paragraph(&mut self, text: &str) {
         self.append(format_args!("<p>{}</p>\n", Text(text)));

@@ -33,6 +33,7 @@ mod decimate;
 mod document;
 mod html;
 mod identification;
+mod limits;
 mod markers;
 mod page;
 mod path_plot;

@@ -2,7 +2,7 @@
 
 use super::html::{Html, run_class, swatch};
 use super::report::ReportRun;
-use super::table::{RunTable, are_comparable, fact, names};
+use super::table::{fact, names};
 use super::text::Text;
 
 /// A page of runs while it is written.
@@ -44,30 +44,5 @@ impl Page<'_> {
         let line =
             if self.is_comparison() { swatch(&format!("line {}", run_class(run))) } else { String::new() };
         format!("{line}{}", Text(self.runs.get(run).map_or("", |run| run.title)))
-    }
-
-    /// Writes the tables of figures: merged row by row if the runs have equal rows, one after the other if
-    /// not.
-    pub(super) fn tables(&mut self) {
-        let runs = self.runs;
-        let most = runs.iter().map(|run| run.tables.len()).max().unwrap_or(0);
-        if most == 0 {
-            return;
-        }
-        self.html.open_section("figures", "Figures");
-        for index in 0..most {
-            let tables: Vec<RunTable> = runs
-                .iter()
-                .enumerate()
-                .filter_map(|(i, run)| Some((i, run.tables.get(index)?)))
-                .map(|(i, table)| RunTable { run: self.is_comparison().then(|| self.head(i)), table })
-                .collect();
-            if tables.windows(2).all(|pair| are_comparable(pair[0].table, pair[1].table)) {
-                self.html.table(&tables);
-            } else {
-                tables.chunks(1).for_each(|one| self.html.table(one));
-            }
-        }
-        self.html.close_section();
     }
 }

@@ -34,6 +34,14 @@ const SEPARATE: f64 = 0.3;
 /// Maximum number of lines from the path to the magnified points.
 const WHISKERS: usize = 100;
 
+/// Number of classes of the contour error, equally wide up to the largest error.
+const ERROR_CLASSES: usize = 4;
+
+/// Returns the CSS class of the path in a class of the contour error.
+fn error_class(class: usize) -> String {
+    format!("line solid error-{class}")
+}
+
 /// Projection plane that is common to the plots of several runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PathView {
@@ -52,6 +60,8 @@ pub(super) struct PathPlot<'a> {
     pub magnification: RoundNumber,
     /// Ranges of the horizontal and the vertical coordinate, m.
     pub range: [Extent; 2],
+    /// Largest contour error of the plots of all runs, m, which the classes of color divide.
+    pub largest_error: f64,
     /// CSS class of the run.
     pub class: String,
 }
@@ -151,6 +161,42 @@ impl PathPlot<'_> {
         format!("error × {}{projection}", number(self.magnification.value(), 0))
     }
 
+    /// Returns CSS class and label of each class of the contour error.
+    pub(super) fn error_legend(&self) -> Vec<(String, String)> {
+        let limit = |class: usize| {
+            DisplayUnit::MICROMETER.format(self.largest_error * class as f64 / ERROR_CLASSES as f64)
+        };
+        let label = |class: usize| format!("contour error up to {}", limit(class + 1));
+        (1..ERROR_CLASSES).map(|class| (error_class(class), label(class))).collect()
+    }
+
+    /// Returns the parts of the magnified path by class of their contour error, without the lowest class, which has
+    /// the color of the run.
+    fn colored(
+        &self,
+        kept: &[usize],
+        point: impl Fn(usize) -> PixelPoint,
+    ) -> Vec<(String, Vec<Vec<PixelPoint>>)> {
+        let class = |pair: &[usize]| {
+            let errors = pair[0]..=pair[1];
+            let error = errors.filter_map(|i| self.tool.contour_error.get(i)).copied().fold(0.0, f64::max);
+            let share = error / self.largest_error.max(f64::MIN_POSITIVE);
+            ((share * ERROR_CLASSES as f64) as usize).min(ERROR_CLASSES - 1)
+        };
+        let mut lines: Vec<Vec<Vec<PixelPoint>>> = vec![Vec::new(); ERROR_CLASSES];
+        let mut last = None;
+        for pair in kept.windows(2) {
+            let class = class(pair);
+            match lines[class].last_mut().filter(|_| last == Some(class)) {
+                Some(line) => line.push(point(pair[1])),
+                None => lines[class].push(vec![point(pair[0]), point(pair[1])]),
+            }
+            last = Some(class);
+        }
+        let classes = lines.into_iter().enumerate().skip(1).filter(|(_, lines)| !lines.is_empty());
+        classes.map(|(class, lines)| (error_class(class), lines)).collect()
+    }
+
     /// Draws the plot as SVG.
     pub(super) fn draw(&self, id: &str, title: &str) -> String {
         let [across, up] = self.range.map(|e| e.in_unit(&DisplayUnit::MILLIMETER).with_margin(MARGIN));
@@ -194,6 +240,11 @@ impl PathPlot<'_> {
         svg.path("reference", &[kept.iter().map(|&i| points[i].0).collect()]);
         svg.path(&format!("whisker {}", self.class), &whiskers);
         svg.path(&format!("line solid {}", self.class), &[kept.iter().map(|&i| points[i].1).collect()]);
+        for (class, lines) in self.colored(&kept, |i| points[i].1) {
+            svg.path(&class, &lines);
+        }
+        let note = format!("error × {}", number(self.magnification.value(), 0));
+        svg.text("halo", [RIGHT - 8.0, TOP + 18.0], Anchor::End, &note);
         if let Some((start, _)) = points.first() {
             svg.circle("start", *start, 4.0);
         }

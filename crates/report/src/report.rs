@@ -5,14 +5,22 @@ use virtual_axes_core::assess::SignalRecording;
 use super::table::Table;
 
 /// Contents of a page with tables and plots of one or several runs.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Report<'a> {
     /// Heading, and title of the browser window.
     pub title: &'a str,
     /// Description of the trial in one or two sentences; can be empty.
     pub description: &'a str,
+    /// Result in one line per compared run; can be empty.
+    pub verdict: Vec<String>,
+    /// Tables of figures, with a column per run where runs are compared.
+    pub tables: Vec<Table>,
+    /// Remarks below the tables, such as the sampling of the figures.
+    pub notes: Vec<String>,
     /// Runs to compare. Line styles repeat after six runs.
     pub runs: Vec<ReportRun<'a>>,
+    /// Names and values that allow the runs to be repeated: date, version, command line, digest of the machine file.
+    pub provenance: Vec<(String, String)>,
 }
 
 /// One run of a report.
@@ -22,8 +30,6 @@ pub struct ReportRun<'a> {
     pub title: &'a str,
     /// Names and values: machine, controller, changed parameters. Values with equal names share a row.
     pub facts: Vec<(String, String)>,
-    /// Tables of figures. Tables with equal columns and equal first cells are compared row by row.
-    pub tables: Vec<Table>,
     /// Signals to plot.
     pub recording: &'a SignalRecording,
 }

@@ -6,7 +6,7 @@ use super::html::Html;
 use super::page::Page;
 use super::report::Report;
 use super::scatter::Scatter;
-use super::{axes, scatter, tool};
+use super::{axes, limits, scatter, tool};
 
 impl Report<'_> {
     /// Writes the page in UTF-8.
@@ -29,11 +29,30 @@ impl Report<'_> {
 
     fn page(&self, scatters: &[Scatter]) -> String {
         let mut page = Page { runs: &self.runs, html: Html::begin(self.title, self.description) };
+        page.html.verdict(&self.verdict);
+        self.figures(&mut page.html);
         page.facts();
-        page.tables();
+        limits::section(&mut page);
         scatter::section(&mut page.html, scatters);
         tool::sections(&mut page);
         axes::sections(&mut page);
+        if !self.provenance.is_empty() {
+            let rows: Vec<_> =
+                self.provenance.iter().map(|(name, value)| (name.as_str(), vec![value.clone()])).collect();
+            page.html.open_section("facts", "Provenance");
+            page.html.facts(&[], &rows);
+            page.html.close_section();
+        }
         page.html.end()
+    }
+
+    fn figures(&self, html: &mut Html) {
+        if self.tables.iter().all(|table| table.rows.is_empty()) {
+            return;
+        }
+        html.open_section("figures", "Figures");
+        self.tables.iter().for_each(|table| html.table(table));
+        self.notes.iter().for_each(|note| html.paragraph(note));
+        html.close_section();
     }
 }

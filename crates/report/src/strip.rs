@@ -53,7 +53,7 @@ pub(super) fn strip(page: &mut Page, of: &str, time: Extent, strip: Strip, serie
     let Strip { title, note, quantity, unit } = strip;
     let legend = if page.is_comparison() { legend(&series) } else { Vec::new() };
     let caption = Caption { title: title.to_owned(), note: note.to_owned(), legend };
-    let plot = TimePlot { quantity, unit, from_zero: true, time, series, at_least: None };
+    let plot = TimePlot { quantity, unit, from_zero: true, time, series, at_least: None, shaded: Vec::new() };
     let title = if of.is_empty() { title.to_owned() } else { format!("{of}: {}", title.to_lowercase()) };
     page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
 }

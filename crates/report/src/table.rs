@@ -1,6 +1,6 @@
 //! Tables of figures and tables of facts.
 
-use super::html::Html;
+use super::html::{Html, run_class, swatch};
 use super::text::{Text, cell, is_number};
 
 /// Number of characters above which a cell wraps as text.
@@ -24,20 +24,20 @@ pub struct TableColumn {
     pub name: String,
     /// DisplayUnit of its numbers; can be empty.
     pub unit: String,
+    /// Index of the run whose figures the column contains; its heading has a sample of the run's line.
+    pub run: Option<usize>,
 }
 
 impl TableColumn {
     /// Creates a column heading; `unit` can be empty.
     pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
-        TableColumn { name: name.into(), unit: unit.into() }
+        TableColumn { name: name.into(), unit: unit.into(), run: None }
     }
-}
 
-/// A table of one run. `run` is the run's heading as HTML, if the page compares runs.
-#[derive(Debug)]
-pub(super) struct RunTable<'a> {
-    pub run: Option<String>,
-    pub table: &'a Table,
+    /// Creates the heading of the figures of a run, by its index.
+    pub fn of_run(title: impl Into<String>, run: usize) -> Self {
+        TableColumn { name: title.into(), unit: String::new(), run: Some(run) }
+    }
 }
 
 impl Html {
@@ -68,56 +68,43 @@ impl Html {
         self.append(format_args!("</tbody>\n</table></div>\n"));
     }
 
-    /// Appends one table. Rows of several runs are grouped by their first cell.
-    pub(super) fn table(&mut self, tables: &[RunTable]) {
-        let Some(RunTable { run, table: first }) = tables.first().filter(|t| !t.table.rows.is_empty()) else {
+    /// Appends a table. Empty tables are omitted.
+    pub(super) fn table(&mut self, table: &Table) {
+        if table.rows.is_empty() {
             return;
-        };
+        }
         self.append(format_args!("<div class=\"table\"><table>\n"));
-        if !first.caption.is_empty() {
-            self.append(format_args!("<caption>{}</caption>\n", Text(&first.caption)));
+        if !table.caption.is_empty() {
+            self.append(format_args!("<caption>{}</caption>\n", Text(&table.caption)));
         }
         self.append(format_args!("<thead><tr>"));
-        for (i, column) in first.columns.iter().enumerate() {
-            let class = if i > 0 && is_numeric(tables, i) { " class=\"number\"" } else { "" };
-            self.append(format_args!("<th scope=\"col\"{class}>{}", Text(&column.name)));
+        for (i, column) in table.columns.iter().enumerate() {
+            let class = if i > 0 && is_numeric(table, i) { " class=\"number\"" } else { "" };
+            let line = column.run.map(|run| swatch(&format!("line {}", run_class(run)))).unwrap_or_default();
+            self.append(format_args!("<th scope=\"col\"{class}>{line}{}", Text(&column.name)));
             if !column.unit.is_empty() {
                 self.append(format_args!(" <span class=\"unit\">{}</span>", Text(&column.unit)));
             }
             self.append(format_args!("</th>"));
-            if i == 0 && run.is_some() {
-                self.append(format_args!("<th scope=\"col\">run</th>"));
-            }
         }
-        self.append(format_args!("</tr></thead>\n"));
-        for (r, row) in first.rows.iter().enumerate() {
-            self.append(format_args!("<tbody>\n"));
-            for (n, RunTable { run, table }) in tables.iter().enumerate() {
-                self.append(format_args!("<tr>"));
-                if n == 0 {
-                    let (span, head) = (tables.len(), row.first().map_or("", String::as_str));
-                    self.append(format_args!(
-                        "<th scope=\"rowgroup\" rowspan=\"{span}\">{}</th>",
-                        Text(head)
-                    ));
-                }
-                if let Some(run) = run {
-                    self.append(format_args!("<th scope=\"row\" class=\"run\">{run}</th>"));
-                }
-                for i in 1..first.columns.len() {
-                    let text = table.rows.get(r).and_then(|row| row.get(i)).map_or("", String::as_str);
-                    let class = match text {
-                        _ if is_numeric(tables, i) => " class=\"number\"",
-                        _ if text.chars().count() > LONG => " class=\"text\"",
-                        _ => "",
-                    };
-                    self.append(format_args!("<td{class}>{}</td>", Text(&cell(text))));
-                }
-                self.append(format_args!("</tr>\n"));
+        self.append(format_args!("</tr></thead>\n<tbody>\n"));
+        for row in &table.rows {
+            let head = row.first().map_or("", String::as_str);
+            // A row with a name only is the heading of the rows below it.
+            let class = if row.len() == 1 { " class=\"group\"" } else { "" };
+            self.append(format_args!("<tr><th scope=\"row\"{class}>{}</th>", Text(head)));
+            for i in 1..table.columns.len() {
+                let text = row.get(i).map_or("", String::as_str);
+                let class = match text {
+                    _ if is_numeric(table, i) => " class=\"number\"",
+                    _ if text.chars().count() > LONG => " class=\"text\"",
+                    _ => "",
+                };
+                self.append(format_args!("<td{class}>{}</td>", Text(&cell(text))));
             }
-            self.append(format_args!("</tbody>\n"));
+            self.append(format_args!("</tr>\n"));
         }
-        self.append(format_args!("</table></div>\n"));
+        self.append(format_args!("</tbody>\n</table></div>\n"));
     }
 }
 
@@ -138,15 +125,11 @@ pub(super) fn fact(facts: &[(String, String)], name: &str) -> String {
     values.collect::<Vec<_>>().join(", ")
 }
 
-/// Returns true if two tables have equal columns and equal first cells.
-pub(super) fn are_comparable(a: &Table, b: &Table) -> bool {
-    a.columns == b.columns
-        && a.rows.len() == b.rows.len()
-        && a.rows.iter().zip(&b.rows).all(|(a, b)| a.first() == b.first())
-}
-
-/// Returns true if all cells of a column are numbers, dashes or empty.
-fn is_numeric(tables: &[RunTable], column: usize) -> bool {
-    let mut cells = tables.iter().flat_map(|t| &t.table.rows).filter_map(|row| row.get(column));
-    cells.all(|cell| is_number(cell) || matches!(cell.trim(), "" | "-" | "–" | "—"))
+/// Returns true if all cells of a column are numbers, also with a difference in parentheses, dashes or empty.
+fn is_numeric(table: &Table, column: usize) -> bool {
+    let mut cells = table.rows.iter().filter_map(|row| row.get(column));
+    cells.all(|cell| {
+        let value = cell.split_once(" (").map_or(cell.as_str(), |(value, _)| value);
+        is_number(value) || matches!(cell.trim(), "" | "-" | "–" | "—")
+    })
 }

@@ -46,6 +46,8 @@ pub(super) struct TimePlot<'a> {
     pub series: Vec<TimeSeries<'a>>,
     /// Smallest range of values, SI units.
     pub at_least: Option<Extent>,
+    /// Time ranges that are shaded, s.
+    pub shaded: Vec<[f64; 2]>,
 }
 
 impl TimePlot<'_> {
@@ -61,6 +63,10 @@ impl TimePlot<'_> {
         let mut svg = Svg::new(WIDTH, HEIGHT);
         let label = DisplayUnit::SECOND.label("Time");
         area.draw(&mut svg, Some(&label), &self.unit.label(self.quantity), [false, true]);
+        for [begin, end] in &self.shaded {
+            let [left, right] = [*begin, *end].map(|time| area.to_pixels([time, 0.0])[0]);
+            svg.rectangle("at-limit", [left, TOP], [right.max(left + 1.0), BOTTOM]);
+        }
         for series in &self.series {
             let pairs = series.time.iter().zip(series.values);
             let points: Vec<Option<PixelPoint>> = pairs

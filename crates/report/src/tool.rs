@@ -108,12 +108,14 @@ fn paths(page: &mut Page, tools: &[(usize, &ToolTrace)]) -> bool {
     let ranges = at_one_scale(&drawn.iter().map(|(.., range)| *range).collect::<Vec<_>>());
     for (&(run, tool, peak, _), &range) in drawn.iter().zip(&ranges) {
         let class = run_class(run);
-        let legend = vec![
+        let mut legend = vec![
             ("reference".to_owned(), "path".to_owned()),
             (format!("line solid {class}"), "tool tip".to_owned()),
             ("start".to_owned(), "start".to_owned()),
         ];
-        let plot = PathPlot { view, tool, magnification: magnification(peak), range, class };
+        let largest_error = traces.iter().map(|tool| self::peak(&tool.contour_error)).fold(0.0, f64::max);
+        let plot = PathPlot { view, tool, magnification: magnification(peak), range, largest_error, class };
+        legend.extend(plot.error_legend());
         let title = page.caption_for_run(&format!("{} path", view.name()), run);
         let caption = Caption { title: title.clone(), note: plot.note(), legend };
         page.html.figure("plane", &caption, &title, |id, title| plot.draw(id, title));

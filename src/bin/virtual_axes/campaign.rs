@@ -12,7 +12,7 @@ use virtual_axes_report::{Table, TableColumn};
 
 use crate::axis::{self, AxisUnits};
 use crate::input::must_not_replace;
-use crate::{interrupt, table, variant};
+use crate::{interrupt, text_table, variant};
 
 /// Arguments of `virtual_axes psec campaign`.
 #[derive(Debug, clap::Args)]
@@ -139,7 +139,7 @@ impl CampaignOutput<'_> {
         let [low, high] = self.campaign.range().map(|position| position / self.units.length);
         let start = self.campaign.start() / self.units.length;
         let unit = self.units.length_name;
-        let mut text = table::text(&table);
+        let mut text = text_table::text(&table);
         let first = if start == 0.0 { "" } else { "; move it there before the start" };
         text.push_str(&format!(
             "{} starts and ends at {start:.3} {unit}{first}; it moves between {low:.3} and {high:.3} {unit}\n",

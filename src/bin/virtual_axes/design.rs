@@ -14,6 +14,7 @@ use virtual_axes_core::machine::prediction_model;
 use virtual_axes_core::units::{MILLISECOND, POSITION_GAIN, Rounded};
 
 use crate::design_output::{self, AxisDesign};
+use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::variant;
 
 /// Smallest `--gain`, (m/min)/mm. Below it the rounding error of the feedforward is not negligible.
@@ -131,11 +132,10 @@ struct CommonDesignArguments {
     /// Accept an unstable closed loop.
     #[arg(long)]
     force: bool,
-    /// Print one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Print the controllers as parameters of a machine file (ROS 2 parameter file).
-    #[arg(long, conflicts_with = "json")]
+    #[arg(long, conflicts_with_all = ["quiet", "json", "csv"])]
     yaml: bool,
 }
 
@@ -157,11 +157,15 @@ pub fn run(arguments: &DesignArguments) -> Result<String, Box<dyn Error>> {
             .map_err(|error| format!("axis {}: {error}", axis.name()))?;
         designs.push(design);
     }
-    if common.json {
-        let object = design_output::object(config.name(), method, &designs);
-        return Ok(format!("{object:#}\n"));
+    if common.yaml {
+        return Ok(design_output::yaml(&designs));
     }
-    Ok(if common.yaml { design_output::yaml(&designs) } else { design_output::text(method, &designs) })
+    Ok(match common.output.format() {
+        OutputFormat::Json => format!("{:#}\n", design_output::object(config.name(), method, &designs)),
+        OutputFormat::Csv => design_output::csv(&designs),
+        OutputFormat::Quiet => design_output::verdict(&designs),
+        OutputFormat::Text => design_output::text(method, &designs),
+    })
 }
 
 /// Returns the axes with these names in machine order; all axes if `names` is empty.

@@ -7,7 +7,7 @@ use virtual_axes_core::design::{DesignError, Margins, PredictionModel};
 use virtual_axes_core::units::{DEGREE, MILLISECOND};
 use virtual_axes_report::{Table, TableColumn};
 
-use crate::table;
+use crate::text_table;
 
 /// Modulus below which a pole represents a delay; such poles are counted and not listed.
 const DELAY_MODULUS: f64 = 1e-3;
@@ -31,9 +31,27 @@ pub struct AxisDesign {
 
 /// Returns the controllers and a table of the margins of all axes.
 pub fn text(method: &str, designs: &[AxisDesign]) -> String {
-    let mut text: String = designs.iter().map(|design| axis_text(method, design) + "\n").collect();
-    text.push_str(&table::text(&margins_table(designs)));
+    let mut text = verdict(designs) + "\n";
+    text.extend(designs.iter().map(|design| axis_text(method, design) + "\n"));
+    text.push_str(&text_table::text(&margins_table(designs)));
     text
+}
+
+/// Returns the worst margins in one line.
+pub fn verdict(designs: &[AxisDesign]) -> String {
+    let of = if designs.len() > 1 { " of the worst axis" } else { "" };
+    match worst(designs) {
+        Some(margins) => {
+            let [modulus, delay] = [margins.modulus, margins.delay / MILLISECOND];
+            format!("modulus margin {modulus:.3}, delay margin {delay:.2} ms{of}\n")
+        }
+        None => "unstable\n".to_owned(),
+    }
+}
+
+/// Returns the margins of all axes as comma-separated values.
+pub fn csv(designs: &[AxisDesign]) -> String {
+    text_table::csv(&margins_table(designs))
 }
 
 fn axis_text(method: &str, design: &AxisDesign) -> String {
@@ -45,11 +63,16 @@ fn axis_text(method: &str, design: &AxisDesign) -> String {
     text.push_str(&format!(
         "prediction model of order {order}, period {period} ms, powers of 1/q from 0 on\n"
     ));
-    text.push_str(&format!("A = {}\nB = {}\n", list(model.a()), list(model.b())));
+    let polynomial =
+        |name: &str, values: &[f64]| text_table::wrapped_line(&format!("{name} = {}", list(values)));
+    text.push_str(&polynomial("A", model.a()));
+    text.push_str(&polynomial("B", model.b()));
     text.push_str("controller, powers of 1/q from 0 on; T: powers of q from t_first on\n");
-    text.push_str(&format!("R = {}\nS = {}\n", list(rst.r()), list(rst.s())));
-    text.push_str(&format!("T = {}\nt_first = {}\n", list(rst.t()), rst.t_first()));
-    text.push_str(&table::text(&poles_table(design)));
+    text.push_str(&polynomial("R", rst.r()));
+    text.push_str(&polynomial("S", rst.s()));
+    text.push_str(&polynomial("T", rst.t()));
+    text.push_str(&format!("t_first = {}\n", rst.t_first()));
+    text.push_str(&text_table::text(&poles_table(design)));
     let delays = design.poles.iter().filter(|pole| is_delay(**pole)).count();
     if delays > 0 {
         text.push_str(&format!("and {delays} poles at or near 0 (modulus below {DELAY_MODULUS})\n"));

@@ -18,6 +18,7 @@ use virtual_axes_report::{IdentificationPage, ValidationRecording};
 use crate::campaign::FeedforwardName;
 use crate::identify_result::{AxisValidation, IdentificationResult};
 use crate::input::must_not_replace;
+use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::progress::Spinner;
 use crate::recordings::{self, ConditionedRecording, RecordingArguments};
 use crate::{axis, identify_text, machine_file, report, variant};
@@ -85,9 +86,8 @@ pub struct IdentifyArguments {
     /// Write a page with the results of each step and plots of measured and simulated signals.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Print the result as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 /// Runs the command and returns tables or JSON.
@@ -108,10 +108,12 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
         write_report(page, &found, config.periods())?;
     }
     drop(spinner);
-    if arguments.json {
-        return Ok(serde_json::to_string_pretty(&found.summary)? + "\n");
-    }
-    Ok(identify_text::text(&found.summary))
+    Ok(match arguments.output.format() {
+        OutputFormat::Json => serde_json::to_string_pretty(&found.summary)? + "\n",
+        OutputFormat::Csv => identify_text::csv(&found.summary),
+        OutputFormat::Quiet => identify_text::verdict(&found.summary),
+        OutputFormat::Text => identify_text::text(&found.summary),
+    })
 }
 
 /// Rejects invalid output files before the identification starts.

@@ -12,7 +12,7 @@ use virtual_axes_identify::identify::{
 use virtual_axes_identify::recording::{Finding, Severity};
 use virtual_axes_report::{Table, TableColumn};
 
-use crate::table;
+use crate::{table, text_table};
 
 /// Cell without a value.
 const NONE: &str = "–";
@@ -53,16 +53,40 @@ fn or_none(value: Option<f64>, text: impl Fn(f64) -> String) -> String {
 /// Returns the result as text and tables.
 pub fn text(found: &IdentificationSummary) -> String {
     let mut parts = vec![
+        verdict(found),
         format!("{}: {}\n", escaped(&found.machine), found.axis),
-        table::text(&recordings(found)),
-        table::aligned(&values(&found.values), &[0, 2, 5]),
+        text_table::text(&recordings(found)),
+        text_table::aligned(&values(&found.values), &[0, 2, 5]),
     ];
     parts.extend(steps(found));
-    parts.push(table::text(&agreement(found)));
-    let findings: Vec<String> = found.findings.iter().map(|f| finding(f) + "\n").collect();
+    parts.push(text_table::text(&agreement(found)));
+    let findings: Vec<String> =
+        found.findings.iter().map(|f| text_table::wrapped_line(&finding(f))).collect();
     parts.push(findings.concat());
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
+}
+
+/// Returns the result in one line: number of identified parameters, position residual, warnings.
+pub fn verdict(found: &IdentificationSummary) -> String {
+    let count = |severity| found.findings.iter().filter(|finding| finding.severity == severity).count();
+    let unit = table::scale(found.kind).0;
+    let residual = found.refinement.as_ref().map_or_else(
+        || "not refined".to_owned(),
+        |fit| format!("position residual {} {unit} RMS", digits(fit.position_rms.after, 3)),
+    );
+    format!(
+        "{}: {} parameters identified, {residual}, {} missing, {} warnings\n",
+        found.axis,
+        found.values.len(),
+        count(Severity::Missing),
+        count(Severity::Warning)
+    )
+}
+
+/// Returns the identified values as comma-separated values.
+pub fn csv(found: &IdentificationSummary) -> String {
+    text_table::csv(&values(&found.values))
 }
 
 /// Returns the name of a validation recording.
@@ -128,7 +152,7 @@ fn steps(found: &IdentificationSummary) -> Vec<String> {
     ];
     let lines = lines.into_iter().flatten().chain(found.delays.iter().map(delay));
     let refined = found.refinement.as_ref().map(|fit| refinement(fit, table::scale(found.kind).0));
-    let lines: Vec<String> = lines.chain(refined).map(|line| line + "\n").collect();
+    let lines: Vec<String> = lines.chain(refined).map(|line| text_table::wrapped_line(&line)).collect();
     friction.into_iter().chain([lines.concat()]).collect()
 }
 
@@ -187,7 +211,7 @@ fn friction(friction: &FrictionSummary, speed_unit: &str) -> String {
     laws.rows.push(row("both directions", law));
     laws.rows.extend(friction.directions.plus.as_ref().map(|law| row("positive direction", law)));
     laws.rows.extend(friction.directions.minus.as_ref().map(|law| row("negative direction", law)));
-    text.push_str(&table::text(&laws));
+    text.push_str(&text_table::text(&laws));
     text.push('\n');
     let mut table = table_of(&[
         ("speed", speed_unit),
@@ -206,7 +230,7 @@ fn friction(friction: &FrictionSummary, speed_unit: &str) -> String {
         row.push(format!("{:.4}", at.law));
         table.rows.push(row);
     }
-    text + &table::text(&table)
+    text + &text_table::text(&table)
 }
 
 fn gravity(gravity: &GravitySummary) -> String {

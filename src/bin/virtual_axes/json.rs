@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use virtual_axes_core::trial::{
     AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
 };
-use virtual_axes_core::units::{DEGREE, MILLIMETER};
+use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER};
 
 use crate::input::CommandInput;
 use crate::table::{MICROMETER, MILLIDEGREE, scale};
@@ -96,12 +96,18 @@ fn circle(circle: &CircleFigures) -> Value {
         "plane": circle.plane,
         "direction": if circle.counterclockwise { "counterclockwise" } else { "clockwise" },
         "radius_mm": circle.radius / MILLIMETER,
+        "feed_m_min": circle.feed / METER_PER_MINUTE,
         "radial_deviation_um": {
             "mean": circle.mean / MICROMETER,
             "min": circle.min / MICROMETER,
             "max": circle.max / MICROMETER,
         },
         "circular_deviation_um": circle.circular_deviation.map(|g| g / MICROMETER),
+        "reversal_spikes_um": circle.reversal_spikes.map(|spikes| {
+            let names = ["plus_first", "plus_second", "minus_first", "minus_second"];
+            let spikes = names.iter().zip(spikes).map(|(name, spike)| ((*name).to_owned(), json!(spike / MICROMETER)));
+            Value::Object(spikes.collect())
+        }),
     })
 }
 

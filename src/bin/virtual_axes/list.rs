@@ -1,12 +1,15 @@
-//! `virtual_axes machines` and `virtual_axes scenarios`: lists of shipped files.
+//! `virtual_axes machines` and `virtual_axes scenarios`: lists of built-in files.
 
 use std::error::Error;
 
 use serde_json::json;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::scenario::Scenario;
+use virtual_axes_report::{Table, TableColumn};
 
-/// Returns the shipped machines, one per line or as JSON.
+use crate::text_table;
+
+/// Returns the built-in machines, one per line or as JSON.
 pub fn machines(as_json: bool) -> Result<String, Box<dyn Error>> {
     let mut list = Vec::new();
     for name in Parameters::builtin_names() {
@@ -24,12 +27,12 @@ pub fn machines(as_json: bool) -> Result<String, Box<dyn Error>> {
     Ok(list.iter().map(|(name, title, _)| format!("{name}: {title}\n")).collect())
 }
 
-/// Returns the file of a shipped machine.
+/// Returns the file of a built-in machine.
 pub fn machine(name: &str) -> Result<String, Box<dyn Error>> {
     Ok(Parameters::builtin_text(name)?.to_owned())
 }
 
-/// Returns the shipped scenarios, one per line or as JSON.
+/// Returns the built-in scenarios, one per line or as JSON.
 pub fn scenarios(as_json: bool) -> Result<String, Box<dyn Error>> {
     let list: Vec<Scenario> = Scenario::builtin_names().map(Scenario::builtin).collect::<Result<_, _>>()?;
     if as_json {
@@ -39,17 +42,16 @@ pub fn scenarios(as_json: bool) -> Result<String, Box<dyn Error>> {
             .collect();
         return Ok(format!("{:#}\n", json!(list)));
     }
-    let width = list.iter().map(|s| s.name().len()).max().unwrap_or(0);
-    Ok(list
-        .iter()
-        .map(|s| {
-            let source = s.source().map(|source| format!(" ({source})")).unwrap_or_default();
-            format!("{:width$}  {}{source}\n", s.name(), s.description())
-        })
-        .collect())
+    let columns = ["scenario", "motion"].map(|name| TableColumn::new(name, "")).to_vec();
+    let row = |s: &Scenario| {
+        let source = s.source().map(|source| format!(" ({source})")).unwrap_or_default();
+        vec![s.name().to_owned(), format!("{}{source}", s.description())]
+    };
+    let table = Table { columns, rows: list.iter().map(row).collect(), ..Table::default() };
+    Ok(text_table::aligned(&table, &[0, 1]))
 }
 
-/// Returns the file of a shipped scenario.
+/// Returns the file of a built-in scenario.
 pub fn scenario(name: &str) -> Result<String, Box<dyn Error>> {
     Ok(Scenario::builtin_text(name)?.to_owned())
 }

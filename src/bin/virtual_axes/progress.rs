@@ -26,11 +26,12 @@ pub struct TrialProgress {
     began: Instant,
     cycles: u32,
     is_shown: bool,
+    is_quiet: bool,
 }
 
 impl TrialProgress {
-    /// Creates the progress of `name` with its simulated duration, s, if it is known.
-    pub fn new(name: &str, duration: Option<f64>) -> Self {
+    /// Creates the progress of `name` with its simulated duration, s, if it is known; `is_quiet` hides it.
+    pub fn new(name: &str, duration: Option<f64>, is_quiet: bool) -> Self {
         let bar = ProgressBar::with_draw_target(
             duration.map(|duration| (duration * STEPS_PER_SECOND) as u64),
             ProgressDrawTarget::hidden(),
@@ -43,13 +44,13 @@ impl TrialProgress {
             bar.set_style(style);
         }
         bar.set_prefix(name.to_owned());
-        TrialProgress { bar, began: Instant::now(), cycles: 0, is_shown: false }
+        TrialProgress { bar, began: Instant::now(), cycles: 0, is_shown: false, is_quiet }
     }
 
     /// Reports that `time` s have been simulated.
     pub fn set_time(&mut self, time: f64) {
         self.cycles = (self.cycles + 1) % CYCLES_PER_CHECK;
-        if self.cycles != 0 || self.began.elapsed() < SHOW_AFTER {
+        if self.cycles != 0 || self.is_quiet || self.began.elapsed() < SHOW_AFTER {
             return;
         }
         if !self.is_shown {
@@ -73,21 +74,25 @@ pub struct SearchProgress {
     bar: ProgressBar,
     began: Instant,
     is_shown: AtomicBool,
+    is_quiet: bool,
 }
 
 impl SearchProgress {
-    /// Creates a hidden bar without runs.
-    pub fn new() -> Self {
+    /// Creates a hidden bar without runs; `is_quiet` keeps it hidden.
+    pub fn new(is_quiet: bool) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template("{prefix} {wide_bar} {pos} of {len} runs, {eta} left")
         {
             bar.set_style(style);
         }
-        SearchProgress { bar, began: Instant::now(), is_shown: AtomicBool::new(false) }
+        SearchProgress { bar, began: Instant::now(), is_shown: AtomicBool::new(false), is_quiet }
     }
 
     fn show(&self) {
-        if self.began.elapsed() >= SHOW_AFTER && !self.is_shown.swap(true, Ordering::Relaxed) {
+        if !self.is_quiet
+            && self.began.elapsed() >= SHOW_AFTER
+            && !self.is_shown.swap(true, Ordering::Relaxed)
+        {
             // The bar remains hidden if standard error is no terminal.
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }

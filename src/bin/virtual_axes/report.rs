@@ -3,13 +3,15 @@
 use std::error::Error;
 use std::path::Path;
 
+use time::OffsetDateTime;
 use virtual_axes_core::assess::SignalRecording;
+use virtual_axes_core::config::Parameters;
 use virtual_axes_io::files::OutputFile;
 use virtual_axes_report::{Report, ReportRun, Scatter};
 
 use crate::input::CommandInput;
-use crate::table;
 use crate::variant::VariantRun;
+use crate::{table, verdict};
 
 /// Rejects a file name with an extension other than `.html` or `.htm`. Devices and pipes have no extension.
 pub fn check_name(path: &Path) -> Result<(), String> {
@@ -24,42 +26,101 @@ pub fn check_name(path: &Path) -> Result<(), String> {
 pub fn write(
     path: &Path,
     input: &CommandInput,
-    machine: &str,
+    machine: &ReportMachine,
     runs: &[VariantRun],
     scatters: &[Scatter],
 ) -> Result<(), Box<dyn Error>> {
     let titles: Vec<String> = runs.iter().map(VariantRun::title).collect();
     let empty = SignalRecording::default();
-    // The tables of all runs have equal rows, so that they can be compared.
-    let overshoots = runs.iter().map(|run| table::overshoots(&run.outcome.figures));
-    let ends = overshoots.fold([false; 2], |all, run| [all[0] || run[0], all[1] || run[1]]);
-    let runs = runs.iter().zip(&titles).map(|(run, title)| {
-        let figures = &run.outcome.figures;
-        let mut facts = vec![
-            ("machine".to_owned(), machine.to_owned()),
-            ("controller".to_owned(), run.controller.clone()),
-        ];
-        let extrapolated = figures.axes.iter().filter(|axis| axis.friction_extrapolated);
-        facts.extend(extrapolated.map(|axis| ("friction law extrapolated".to_owned(), axis.name.clone())));
-        for axis in &figures.axes {
-            if let Some(time) = table::outside(axis) {
-                facts.push(("outside its travel limits".to_owned(), format!("{}, {time} s", axis.name)));
-            }
-        }
-        if figures.contour.is_none() {
-            facts.push(("contour error".to_owned(), table::NO_CONTOUR.to_owned()));
-        }
-        facts.extend(table::more(figures).map(|line| ("without figures".to_owned(), line)));
-        facts.extend(run.changes.iter().map(|change| ("set".to_owned(), change.clone())));
-        ReportRun {
-            title,
-            facts,
-            tables: vec![table::axes(figures), table::path(figures, ends)],
-            recording: run.outcome.recording.as_ref().unwrap_or(&empty),
-        }
-    });
-    let report = Report { title: input.name(), description: input.description(), runs: runs.collect() };
+    let report = Report {
+        title: input.name(),
+        description: input.description(),
+        verdict: verdict::lines(runs),
+        tables: table::comparison(runs).to_vec(),
+        notes: table::comparison_note(runs)
+            .into_iter()
+            .chain(table::spike_note(runs))
+            .chain([table::SAMPLING.to_owned()])
+            .collect(),
+        runs: runs
+            .iter()
+            .zip(&titles)
+            .map(|(run, title)| ReportRun {
+                title,
+                facts: facts(&machine.title, run),
+                recording: run.outcome.recording.as_ref().unwrap_or(&empty),
+            })
+            .collect(),
+        provenance: provenance(machine),
+    };
     let mut file = OutputFile::create(path)?;
     report.write_with(scatters, &mut file)?;
     Ok(file.finish()?)
+}
+
+/// Machine of a report.
+#[derive(Debug, Clone)]
+pub struct ReportMachine {
+    /// Name in the machine file.
+    pub title: String,
+    /// Built-in machine or machine file, as given.
+    pub source: String,
+}
+
+/// Returns machine, controller and changed parameters of a run, and remarks on it.
+fn facts(machine: &str, run: &VariantRun) -> Vec<(String, String)> {
+    let figures = &run.outcome.figures;
+    let mut facts =
+        vec![("machine".to_owned(), machine.to_owned()), ("controller".to_owned(), run.controller.clone())];
+    let extrapolated = figures.axes.iter().filter(|axis| axis.friction_extrapolated);
+    facts.extend(extrapolated.map(|axis| ("friction law extrapolated".to_owned(), axis.name.clone())));
+    for axis in &figures.axes {
+        if let Some(time) = table::outside(axis) {
+            facts.push(("outside its travel limits".to_owned(), format!("{}, {time} s", axis.name)));
+        }
+    }
+    if figures.contour.is_none() {
+        facts.push(("contour error".to_owned(), table::NO_CONTOUR.to_owned()));
+    }
+    facts.extend(table::more(figures).map(|line| ("without figures".to_owned(), line)));
+    facts.extend(run.changes.iter().map(|change| ("set".to_owned(), change.clone())));
+    facts
+}
+
+/// Returns what is needed to repeat the runs.
+fn provenance(machine: &ReportMachine) -> Vec<(String, String)> {
+    let command: Vec<String> = std::env::args().skip(1).map(|argument| quoted(&argument)).collect();
+    let file = match Parameters::builtin_text(&machine.source) {
+        Ok(text) => Some(blake3::hash(text.as_bytes())),
+        Err(_) => std::fs::read(&machine.source).ok().map(|bytes| blake3::hash(&bytes)),
+    };
+    let facts = [
+        ("date", Some(date())),
+        ("program", Some(format!("virtual_axes {}", env!("CARGO_PKG_VERSION")))),
+        ("command", Some(format!("virtual_axes {}", command.join(" ")))),
+        ("machine file", Some(machine.source.clone())),
+        ("BLAKE3 digest of the machine file", file.map(|digest| digest.to_hex().to_string())),
+    ];
+    facts.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
+}
+
+/// Returns an argument as a shell accepts it.
+fn quoted(argument: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_=.,/:+%@".contains(c);
+    if !argument.is_empty() && argument.chars().all(is_plain) {
+        argument.to_owned()
+    } else {
+        format!("'{}'", argument.replace('\'', "'\\''"))
+    }
+}
+
+/// Returns the date in UTC: that of `SOURCE_DATE_EPOCH` if it is set, for pages that are equal in every byte.
+fn date() -> String {
+    let epoch = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse::<i64>().ok());
+    let time = match epoch {
+        Some(seconds) => OffsetDateTime::from_unix_timestamp(seconds).unwrap_or(OffsetDateTime::UNIX_EPOCH),
+        None => OffsetDateTime::now_utc(),
+    };
+    let [date, clock] = [time.date().to_string(), format!("{:02}:{:02}", time.hour(), time.minute())];
+    format!("{date} {clock} UTC")
 }

@@ -8,9 +8,10 @@ use virtual_axes_core::text::escaped;
 use virtual_axes_identify::tune::{Cost, DeviatingRun, PlantDeviation, Robustness, analyze_robustness};
 use virtual_axes_report::Table;
 
+use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::progress::SearchProgress;
 use crate::search::{columns, name_error, object, read_workload, row};
-use crate::table;
+use crate::text_table;
 use crate::trial_arguments::TrialArguments;
 use crate::variant::{self, ControllerName};
 
@@ -28,9 +29,8 @@ pub struct RobustnessArguments {
     /// Cost function to compare, see `tune`.
     #[arg(long, default_value = "contour", value_name = "TERM=WEIGHT[,…]")]
     cost: Cost,
-    /// Print the figures as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 fn relative_deviation(text: &str) -> Result<f64, String> {
@@ -48,29 +48,51 @@ pub fn run(arguments: &RobustnessArguments) -> Result<String, Box<dyn Error>> {
     let input = arguments.trial.input()?;
     let config = variant::checked(&parameters, &machine, &arguments.trial.machine)?;
     let path = read_workload(&input, &config, arguments.trial.feed)?;
-    let progress = SearchProgress::new();
+    let progress = SearchProgress::new(arguments.output.is_quiet());
     let found = analyze_robustness(&parameters, &path, &arguments.cost, arguments.by, &progress);
     progress.finish();
     let found = found.map_err(|error| name_error(&input, error))?;
     let controller = variant::controller_name(&parameters);
-    if arguments.json {
-        let plain = |one: &DeviatingRun| json_of(one, &config);
-        let object = json!({
-            "input": input.name(),
-            "description": input.description(),
-            "machine": config.name(),
-            "controller": controller,
-            "by": arguments.by,
-            "cost_unit": arguments.cost.unit(&found.nominal.figures),
-            "nominal": plain(&found.nominal),
-            "single": found.single.iter().map(plain).collect::<Vec<_>>(),
-            "worst_combination": plain(&found.worst),
-        });
-        return Ok(format!("{object:#}\n"));
-    }
-    let (path, machine) = (escaped(input.name()), escaped(config.name()));
-    let head = format!("{path}: {machine}, {controller}, cost {}", arguments.cost);
-    Ok(format!("{head}\n\n{}", table::text(&rows(arguments, &config, &found))))
+    Ok(match arguments.output.format() {
+        OutputFormat::Json => {
+            let plain = |one: &DeviatingRun| json_of(one, &config);
+            let object = json!({
+                "input": input.name(),
+                "description": input.description(),
+                "machine": config.name(),
+                "controller": controller,
+                "by": arguments.by,
+                "cost_unit": arguments.cost.unit(&found.nominal.figures),
+                "nominal": plain(&found.nominal),
+                "single": found.single.iter().map(plain).collect::<Vec<_>>(),
+                "worst_combination": plain(&found.worst),
+            });
+            format!("{object:#}\n")
+        }
+        OutputFormat::Csv => text_table::csv(&rows(arguments, &config, &found)),
+        OutputFormat::Quiet => verdict(arguments, &found),
+        OutputFormat::Text => {
+            let (path, machine) = (escaped(input.name()), escaped(config.name()));
+            let verdict = verdict(arguments, &found);
+            let table = text_table::text(&rows(arguments, &config, &found));
+            format!("{verdict}\n{path}: {machine}, {controller}, cost {}\n\n{table}", arguments.cost)
+        }
+    })
+}
+
+/// Returns the nominal result and the worst one in one line.
+fn verdict(arguments: &RobustnessArguments, found: &Robustness) -> String {
+    let unit = arguments.cost.unit(&found.nominal.figures);
+    let margin =
+        |one: &DeviatingRun| one.margins.as_ref().map_or("none".to_owned(), |m| format!("{:.3}", m.modulus));
+    format!(
+        "cost {}: {:.2} {unit} nominal, {:.2} {unit} at worst; modulus margin {} → {}\n",
+        arguments.cost,
+        found.nominal.cost,
+        found.worst.cost,
+        margin(&found.nominal),
+        margin(&found.worst)
+    )
 }
 
 fn rows(arguments: &RobustnessArguments, config: &MachineConfig, found: &Robustness) -> Table {

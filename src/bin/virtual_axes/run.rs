@@ -6,16 +6,18 @@ use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::machine::AxisSample;
-use virtual_axes_core::trial::{Tick, Trial, TrialOutcome};
+use virtual_axes_core::trial::{Figures, Tick, Trial, TrialOutcome};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::files::{TraceWriter, trace_writer};
 
 use crate::input::CommandInput;
+use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::period::PeriodArgument;
 use crate::progress::TrialProgress;
+use crate::report::ReportMachine;
 use crate::trial_arguments::TrialArguments;
 use crate::variant::{self, ControllerName, VariantRun};
-use crate::{interrupt, json, report, table};
+use crate::{figure, interrupt, json, report, table, text_table, verdict};
 
 /// Arguments of `virtual_axes run`.
 #[derive(Debug, clap::Args)]
@@ -37,9 +39,8 @@ pub struct RunArguments {
     /// Write a page with plots to this file.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Print the figures as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 /// Runs the command and returns tables of errors or JSON.
@@ -48,8 +49,7 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
     let mut variants = Vec::new();
     for controller in controllers(&arguments.controller) {
         for compared in std::iter::once(None).chain(arguments.compare.iter().map(Some)) {
-            let compared: Vec<String> =
-                compared.iter().flat_map(|c| c.split(',')).map(|change| change.trim().to_owned()).collect();
+            let compared: Vec<String> = compared.iter().flat_map(|list| variant::changes(list)).collect();
             let parameters = variant::parameters(&machine, controller, &arguments.trial.set, &compared)?;
             variants.push((parameters, [arguments.trial.set.clone(), compared].concat()));
         }
@@ -82,12 +82,15 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
     }
     let name = machine.machine_config()?.name().to_owned();
     if let Some(path) = &arguments.report {
-        report::write(path, &input, &name, &runs, &[])?;
+        let machine = ReportMachine { title: name.clone(), source: arguments.trial.machine.clone() };
+        report::write(path, &input, &machine, &runs, &[])?;
     }
-    if arguments.json {
-        return Ok(format!("{:#}\n", json::object(&input, &name, &runs)));
-    }
-    Ok(runs.iter().map(|run| text(run, runs.len() > 1)).collect::<Vec<_>>().join("\n"))
+    Ok(match arguments.output.format() {
+        OutputFormat::Json => format!("{:#}\n", json::object(&input, &name, &runs)),
+        OutputFormat::Csv => csv(&runs),
+        OutputFormat::Quiet => verdict::text(&runs),
+        OutputFormat::Text => text(&runs),
+    })
 }
 
 /// Returns the controllers to run; `None` is the controller of the machine file.
@@ -109,7 +112,8 @@ fn trial(
         record: arguments.report.is_some(),
     };
     let setpoints = input.setpoints(config, program.as_ref())?;
-    let mut progress = TrialProgress::new(input.name(), program.as_ref().map(|p| p.duration()));
+    let mut progress =
+        TrialProgress::new(input.name(), program.as_ref().map(|p| p.duration()), arguments.output.is_quiet());
     let mut trace = match &arguments.trace {
         Some(path) => Some(TraceRecorder::new(path, arguments.trace_period, config)?),
         None => None,
@@ -173,22 +177,61 @@ impl TraceRecorder {
     }
 }
 
-/// Returns the tables of one run, with its title if there are several runs.
-fn text(run: &VariantRun, several: bool) -> String {
-    let figures = &run.outcome.figures;
-    let mut text = String::new();
-    if several {
-        text.push_str(&format!("{}\n\n", run.title()));
+/// Returns the verdict and the tables of the runs: a row per axis of a single run, a column per run of several.
+fn text(runs: &[VariantRun]) -> String {
+    let mut parts = vec![verdict::text(runs)];
+    match runs {
+        [run] => parts.extend(single(&run.outcome.figures)),
+        _ => parts.extend(several(runs)),
     }
-    text.push_str(&table::text(&table::axes(figures)));
-    for remark in table::remarks(figures) {
-        text.push_str(&remark);
-        text.push('\n');
+    parts.join("\n")
+}
+
+fn single(figures: &Figures) -> Vec<String> {
+    let mut axes = text_table::text(&table::axes(figures));
+    axes.extend(table::remarks(figures).into_iter().map(|remark| remark + "\n"));
+    let path = table::path(figures);
+    let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
+    std::iter::once(axes).chain(path).collect()
+}
+
+fn several(runs: &[VariantRun]) -> Vec<String> {
+    let mut parts = Vec::new();
+    for mut table in table::comparison(runs).into_iter().filter(|table| !table.rows.is_empty()) {
+        let (head, values) = (2, table.columns.split_off(2));
+        let most = text_table::columns_beside_text(runs.iter().map(VariantRun::title));
+        for (index, columns) in values.chunks(most).enumerate() {
+            let first = head + index * most;
+            let mut part = table.clone();
+            part.columns.extend_from_slice(columns);
+            for row in &mut part.rows {
+                row.drain(head.min(row.len())..first.min(row.len()));
+                row.truncate(head + columns.len());
+            }
+            parts.push(text_table::aligned(&part, &[0, 1]));
+        }
     }
-    let path = table::path(figures, table::overshoots(figures));
-    if !path.rows.is_empty() {
-        text.push('\n');
-        text.push_str(&table::text(&path));
+    let remarks = runs.iter().flat_map(|run| {
+        let title = run.title();
+        table::remarks(&run.outcome.figures).into_iter().map(move |remark| format!("{title}: {remark}\n"))
+    });
+    let notes = table::comparison_note(runs).into_iter().chain([table::SAMPLING.to_owned()]);
+    parts.push(remarks.chain(notes.map(|note| note + "\n")).collect());
+    parts
+}
+
+/// Returns all figures as CSV, a row per run and figure.
+fn csv(runs: &[VariantRun]) -> String {
+    let mut text = "run,figure,value,unit\n".to_owned();
+    for run in runs {
+        let figures = &run.outcome.figures;
+        for figure in
+            [figure::of_axes(figures), figure::of_path(figures, [true; 2]), figure::of_circles(figures)]
+                .concat()
+        {
+            let cells = [run.title(), figure.title(), figure.value.to_string(), figure.unit.to_owned()];
+            text.push_str(&text_table::csv_row(&cells));
+        }
     }
     text
 }

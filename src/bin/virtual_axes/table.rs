@@ -1,9 +1,12 @@
 //! Tables of figures for the terminal and for reports.
 
 use virtual_axes_core::config::AxisKind;
-use virtual_axes_core::trial::{AxisFigures, Figures, Reference};
-use virtual_axes_core::units::{DEGREE, MILLIMETER};
+use virtual_axes_core::trial::{AxisFigures, Figures};
+use virtual_axes_core::units::DEGREE;
 use virtual_axes_report::{Table, TableColumn};
+
+use crate::figure::{self, Figure};
+use crate::variant::VariantRun;
 
 /// Micrometer, m.
 pub const MICROMETER: f64 = 1e-6;
@@ -18,40 +21,6 @@ pub fn scale(kind: AxisKind) -> (&'static str, &'static str, f64) {
     match kind {
         AxisKind::Linear => ("µm", "um", MICROMETER),
         AxisKind::Rotary => ("mdeg", "mdeg", MILLIDEGREE),
-    }
-}
-
-/// Formats a table for the terminal with the first column aligned left, the others right.
-pub fn text(table: &Table) -> String {
-    aligned(table, &[0])
-}
-
-/// Formats a table for the terminal with the columns `left` aligned left, the others right.
-pub fn aligned(table: &Table, left: &[usize]) -> String {
-    let header: Vec<String> = table.columns.iter().map(heading).collect();
-    let all = || std::iter::once(&header).chain(&table.rows);
-    let width = |column: usize| all().filter_map(|row| row.get(column)).map(|c| c.chars().count()).max();
-    let mut text = String::new();
-    for row in all() {
-        let mut line = String::new();
-        for (column, cell) in row.iter().enumerate() {
-            let pad = " ".repeat(width(column).unwrap_or(0) - cell.chars().count());
-            if column > 0 {
-                line.push_str("  ");
-            }
-            let parts = if left.contains(&column) { [cell.as_str(), &pad] } else { [pad.as_str(), cell] };
-            line.extend(parts);
-        }
-        text.push_str(line.trim_end());
-        text.push('\n');
-    }
-    text
-}
-
-fn heading(column: &TableColumn) -> String {
-    match column.unit.as_str() {
-        "" => column.name.clone(),
-        unit => format!("{}, {unit}", column.name),
     }
 }
 
@@ -128,75 +97,73 @@ pub fn more(figures: &Figures) -> impl Iterator<Item = String> {
     circles.into_iter().chain(corners)
 }
 
-/// Returns true for the largest and for the RMS contour error if its printed value changes when the overshoot
-/// at the ends of the path is excluded.
-pub fn overshoots(figures: &Figures) -> [bool; 2] {
-    let differ = |a: f64, b: f64| signed(a / MICROMETER) != signed(b / MICROMETER);
-    figures
-        .contour
-        .map_or([false; 2], |c| [differ(c.max, c.max_within_ends), differ(c.rms, c.rms_within_ends)])
-}
-
-/// Creates the table of contour error, orientation error, circles and corners. `ends` adds the largest and
-/// the RMS contour error without the overshoot at the ends of the path.
-pub fn path(figures: &Figures, ends: [bool; 2]) -> Table {
+/// Creates the table of contour error, orientation error, circles and corners.
+pub fn path(figures: &Figures) -> Table {
     let mut table = table("Path", &[("path error", ""), ("value", ""), ("unit", "")]);
-    let mut add = |name: String, value: f64, unit: &str, scale: f64| {
-        table.rows.push(vec![name, signed(value / scale), unit.to_owned()]);
-    };
-    if let Some(contour) = &figures.contour {
-        let reference = match contour.reference {
-            Reference::Path => "",
-            Reference::Setpoints => " (from the polyline of setpoints)",
-        };
-        let parts = [
-            ("contour error, max", contour.max, contour.max_within_ends, ends[0]),
-            ("contour error, RMS", contour.rms, contour.rms_within_ends, ends[1]),
-        ];
-        for (name, whole, within_ends, differ) in parts {
-            add(format!("{name}{reference}"), whole, "µm", MICROMETER);
-            if differ {
-                add(format!("{name}, without overshoot at the path ends"), within_ends, "µm", MICROMETER);
-            }
-        }
-    }
-    if let Some(orientation) = &figures.orientation
-        && orientation.max > 0.0
-    {
-        add("orientation error, max".to_owned(), orientation.max, "mdeg", MILLIDEGREE);
-        add("orientation error, RMS".to_owned(), orientation.rms, "mdeg", MILLIDEGREE);
-    }
-    for circle in &figures.circles {
-        let plane = circle.plane.join("–");
-        let direction = if circle.counterclockwise { "counterclockwise" } else { "clockwise" };
-        let name = format!("circle R {} mm in {plane}, {direction}", millimeters(circle.radius));
-        add(format!("{name}: radial deviation, mean"), circle.mean, "µm", MICROMETER);
-        add(format!("{name}: radial deviation, min"), circle.min, "µm", MICROMETER);
-        add(format!("{name}: radial deviation, max"), circle.max, "µm", MICROMETER);
-        if let Some(deviation) = circle.circular_deviation {
-            add(format!("{name}: circular deviation G"), deviation, "µm", MICROMETER);
-        }
-    }
-    for pair in &figures.bidirectional {
-        add("both directions: circular deviation G(b)".to_owned(), pair.circular_deviation, "µm", MICROMETER);
-        let mean = pair.mean_radial_deviation;
-        add("both directions: mean radial deviation D".to_owned(), mean, "µm", MICROMETER);
-    }
-    for corner in &figures.corners {
-        let name =
-            format!("corner after move {}, {:.0}°: contour error, max", corner.index, corner.turn / DEGREE);
-        add(name, corner.max_contour_error, "µm", MICROMETER);
+    let figures =
+        figure::of_path(figures, figure::overshoots(figures)).into_iter().chain(figure::of_circles(figures));
+    for figure in figures {
+        table.rows.push(vec![figure.title(), figure.text(), figure.unit.to_owned()]);
     }
     table
 }
 
-fn signed(value: f64) -> String {
-    // Avoids "-0.0".
-    let text = format!("{value:.1}");
-    if text == "-0.0" { "0.0".to_owned() } else { text }
+/// Creates tables with a row per figure and a column per run: path, circular tests, and axes. From the second run on, a
+/// cell has the difference from the first run.
+pub fn comparison(runs: &[VariantRun]) -> [Table; 3] {
+    let ends = runs.iter().map(|run| figure::overshoots(&run.outcome.figures));
+    // The tables of all runs have equal rows.
+    let ends = ends.fold([false; 2], |all, run| [all[0] || run[0], all[1] || run[1]]);
+    let axes: Vec<_> = runs.iter().map(|run| figure::of_axes(&run.outcome.figures)).collect();
+    let path: Vec<_> = runs.iter().map(|run| figure::of_path(&run.outcome.figures, ends)).collect();
+    let circles: Vec<_> = runs.iter().map(|run| figure::of_circles(&run.outcome.figures)).collect();
+    [
+        columns_of("Path", runs, &path),
+        columns_of("Circular tests (ISO 230-4)", runs, &circles),
+        columns_of("Axes", runs, &axes),
+    ]
 }
 
-fn millimeters(value: f64) -> String {
-    // Rounded to 1 µm, so that 0.15 m is 150 and not 150.00000000000003.
-    format!("{}", (value / MILLIMETER * 1e3).round() / 1e3)
+fn columns_of(caption: &str, runs: &[VariantRun], figures: &[Vec<Figure>]) -> Table {
+    let mut table = table(caption, &[("figure", ""), ("unit", "")]);
+    match runs {
+        [_] => table.columns.push(TableColumn::new("value", "")),
+        _ => {
+            table.columns.extend(runs.iter().enumerate().map(|(i, run)| TableColumn::of_run(run.title(), i)))
+        }
+    }
+    let Some((first, others)) = figures.split_first() else { return table };
+    let mut subject = "";
+    for (row, base) in first.iter().enumerate() {
+        // The figures of an axis, circle or corner stand below its name.
+        if base.subject != subject {
+            table.rows.push(vec![base.subject.clone()]);
+            subject = &base.subject;
+        }
+        let name = if base.subject.is_empty() { base.name.clone() } else { format!("– {}", base.name) };
+        let mut cells = vec![name, base.unit.to_owned(), base.text()];
+        let same = |run: &Vec<Figure>| run.get(row).map(|figure| figure.compared_text(base));
+        cells.extend(others.iter().map(|run| same(run).unwrap_or_default()));
+        table.rows.push(cells);
+    }
+    table
 }
+
+/// Explanation of the differences in [`comparison`].
+pub fn comparison_note(runs: &[VariantRun]) -> Option<String> {
+    let first = runs.first().filter(|_| runs.len() > 1)?;
+    Some(format!("in parentheses: difference from {}, in percent; of radial deviations in µm", first.title()))
+}
+
+/// Definition of the reversal spikes, for runs with circles.
+pub fn spike_note(runs: &[VariantRun]) -> Option<String> {
+    let has_circle = runs.iter().any(|run| !run.outcome.figures.circles.is_empty());
+    has_circle.then(|| {
+        "reversal spike: the radial deviation within 20° of a reversal that differs most from the mean, minus the mean"
+            .to_owned()
+    })
+}
+
+/// Sampling of the contour errors and radial deviations.
+pub const SAMPLING: &str =
+    "evaluated at every current cycle; messages and traces have one sample per position cycle";

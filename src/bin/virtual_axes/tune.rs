@@ -11,7 +11,9 @@ use virtual_axes_identify::tune::{
 };
 
 use crate::input::{CommandInput, must_not_replace};
+use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::progress::SearchProgress;
+use crate::report::ReportMachine;
 use crate::search::{name_error, read_workload};
 use crate::trial_arguments::TrialArguments;
 use crate::tune_result::{ComparedPath, TunableController, TuningResult};
@@ -59,9 +61,8 @@ pub struct TuneArguments {
     /// the --also path).
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Print the result as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl TuneArguments {
@@ -113,7 +114,7 @@ pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
         others.iter().map(|other| read_workload(other, &config, None)).collect::<Result<Vec<_>, _>>()?;
     let limits = limits(arguments);
 
-    let progress = SearchProgress::new();
+    let progress = SearchProgress::new(arguments.output.is_quiet());
     let found = TuningProblem::new(&parameters, &path, &arguments.cost, &progress)
         .and_then(|problem| Ok((search(arguments, tunable, &problem, &paths, &limits)?, problem)));
     progress.finish();
@@ -136,15 +137,20 @@ pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
             _ => (&input, &path),
         };
         let runs = record(workload, &problem, &found).map_err(|error| name_error(shown, error))?;
-        report::write(page, shown, problem.config().name(), &runs, &output::scatters(&problem, &found))?;
+        let machine = ReportMachine {
+            title: problem.config().name().to_owned(),
+            source: arguments.trial.machine.clone(),
+        };
+        report::write(page, shown, &machine, &runs, &output::scatters(&problem, &found))?;
     }
-    if arguments.json {
-        return Ok(format!(
-            "{:#}\n",
-            output::object(&input, tunable, &limits, arguments.seed(), &problem, &found)
-        ));
-    }
-    Ok(output::text(&problem, &found))
+    Ok(match arguments.output.format() {
+        OutputFormat::Json => {
+            format!("{:#}\n", output::object(&input, tunable, &limits, arguments.seed(), &problem, &found))
+        }
+        OutputFormat::Csv => output::csv(&problem, &found),
+        OutputFormat::Quiet => output::verdict(&problem, &found),
+        OutputFormat::Text => output::text(&problem, &found),
+    })
 }
 
 /// Returns the controller of the machine if it can be tuned.

@@ -11,7 +11,7 @@ use virtual_axes_report::{PointGroup, PointStyle, Scatter, Table, TableColumn};
 use crate::input::CommandInput;
 use crate::search::{candidate, columns, row};
 use crate::tune_result::{TunableController, TuningResult};
-use crate::{json, table};
+use crate::{json, text_table};
 
 /// Maximum number of rows of a table of tunings; the JSON output contains all.
 const ROWS: usize = 12;
@@ -39,21 +39,49 @@ fn table_rows<T>(all: &[T]) -> Vec<&T> {
     (0..ROWS).filter_map(|i| all.get(i * (all.len() - 1) / (ROWS - 1))).collect()
 }
 
+/// Returns initial and best cost and the margins of the best tuning in one line.
+pub fn verdict(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
+    let (from, to) = (problem.present().cost, found.best.cost);
+    let unit = problem.cost().unit(&found.best.figures);
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let margins = found.best.margins.map_or(String::new(), |m| {
+        format!("; modulus margin {:.3}, delay margin {:.2} ms", m.modulus, m.delay / MILLISECOND)
+    });
+    let change = 100.0 * (to / from - 1.0);
+    let change =
+        if change.is_finite() { format!(", {change:+.0} %").replace('-', "−") } else { String::new() };
+    format!("cost {}: {from:.2} → {to:.2}{unit}{change}{margins}\n", problem.cost())
+}
+
+/// Creates the table of the initial and the best tuning.
+fn tunings(problem: &TuningProblem<'_>, found: &TuningResult) -> Table {
+    let columns = columns("tuning", problem.cost(), &problem.present().figures);
+    let name = if found.contrasts.is_empty() { "best" } else { "found" };
+    let rows = [("initial", problem.present()), (name, &found.best)];
+    let rows = rows.map(|(name, one)| candidate_row(name.to_owned(), one, problem)).to_vec();
+    Table { columns, rows, ..Table::default() }
+}
+
+/// Returns initial and best tuning and all tunings of the Pareto front as comma-separated values.
+pub fn csv(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
+    let mut table = tunings(problem, found);
+    let front = pareto(found).into_iter();
+    table.rows.extend(front.map(|one| candidate_row(one.tuning.to_string(), one, problem)));
+    text_table::csv(&table)
+}
+
 /// Returns the result as tables.
 pub fn text(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
     let columns = |first: &str| columns(first, problem.cost(), &problem.present().figures);
-    let mut tunings = Table { columns: columns("tuning"), ..Table::default() };
-    tunings.rows.push(candidate_row("initial".to_owned(), problem.present(), problem));
-    let name = if found.contrasts.is_empty() { "best" } else { "found" };
-    tunings.rows.push(candidate_row(name.to_owned(), &found.best, problem));
     let mut text = format!(
-        "{}: {} of {}, cost {}\n\n{}\n{}",
+        "{}\n{}: {} of {}, cost {}\n\n{}\n{}",
+        verdict(problem, found),
         escaped(problem.workload().name()),
         escaped(problem.config().name()),
         problem.joints().join(", "),
         problem.cost(),
-        table::text(&tunings),
-        table::text(&values(problem, &found.best.tuning)),
+        text_table::text(&tunings(problem, found)),
+        text_table::text(&values(problem, &found.best.tuning)),
     );
     if found.best.cost >= problem.present().cost {
         text.push_str("\nno tuning within these margins is better than the initial tuning\n");
@@ -64,20 +92,20 @@ pub fn text(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
         for one in table_rows(&front) {
             rows.rows.push(candidate_row(one.tuning.to_string(), one, problem));
         }
-        text.push_str(&format!("\n{}", table::text(&rows)));
+        text.push_str(&format!("\n{}", text_table::text(&rows)));
         if front.len() > ROWS {
             text.push_str(&format!("{} more rows between these: use --json\n", front.len() - ROWS));
         }
         text.push_str(&format!("\n{} tunings designed, {} simulated\n", search.designs, search.runs));
     }
     if !found.contrasts.is_empty() {
-        text.push_str(&format!("\n{}", table::text(&contrasts(problem, found))));
+        text.push_str(&format!("\n{}", text_table::text(&contrasts(problem, found))));
         if found.contrasts.len() > ROWS {
             text.push_str(&format!("{} more rows: use --json\n", found.contrasts.len() - ROWS));
         }
     }
     if !found.elsewhere.is_empty() {
-        text.push_str(&format!("\n{}", table::text(&elsewhere(problem, found))));
+        text.push_str(&format!("\n{}", text_table::text(&elsewhere(problem, found))));
     }
     text
 }

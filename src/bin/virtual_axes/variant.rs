@@ -92,6 +92,16 @@ pub fn parameters(
     Ok(parameters)
 }
 
+/// Splits `KEY=VALUE,KEY=VALUE` at the commas outside brackets, since a value can be a list such as `[1, -0.5]`.
+pub fn changes(list: &str) -> Vec<String> {
+    let mut depth = 0_i32;
+    let parts = list.split(|c| {
+        depth += i32::from(c == '[') - i32::from(c == ']');
+        c == ',' && depth == 0
+    });
+    parts.map(|change| change.trim().to_owned()).collect()
+}
+
 /// Returns true if the parameter `key` belongs to an axis of the list `joints`.
 fn is_of_joints(key: &str, joints: &Value) -> bool {
     let joint = key.split_once('.').map_or("", |(joint, _)| joint);

@@ -8,6 +8,8 @@ use nalgebra::{Matrix3, Vector3};
 const BINS: usize = 3600;
 /// Number of sectors, each of which contains a point in a full circle.
 const SECTORS: usize = 36;
+/// Bins on each side of a reversal point in which its spike is sought: 20 degrees.
+const SPIKE_BINS: usize = 200;
 
 /// Accumulator of the points of a circular path in one direction; its memory is constant (200 kB).
 ///
@@ -77,6 +79,9 @@ pub struct FullCircle {
     pub center: [f64; 2],
     /// Radius of the least-squares circle minus the nominal radius, m.
     pub radius_deviation: f64,
+    /// Reversal spikes where an axis reverses, at the polar angles 0, 90, 180 and 270 degrees, m: within 20 degrees of
+    /// the reversal, the radial deviation that differs most from the mean one, minus the mean one.
+    pub reversal_spikes: [f64; 4],
 }
 
 /// Figures of a full circle in both directions, m.
@@ -126,16 +131,28 @@ impl CircleAssessor {
     /// Returns the figures so far, `None` without a point.
     pub fn report(&self) -> Option<CircleReport> {
         let sums = self.sums.means()?;
+        let mean = sums.deviation * self.radius;
         let full = self.is_full().then(|| Fit::new(&sums)).flatten().map(|fit| {
             let center = fit.center.map(|offset| offset * self.radius);
             FullCircle {
                 circular_deviation: self.range_about(center).width(),
                 center,
                 radius_deviation: fit.radius_deviation * self.radius,
+                reversal_spikes: self.reversal_spikes(mean),
             }
         });
         let [min, max] = self.range;
-        Some(CircleReport { mean: sums.deviation * self.radius, min, max, full })
+        Some(CircleReport { mean, min, max, full })
+    }
+
+    /// Returns the reversal spikes relative to a mean radial deviation, m.
+    fn reversal_spikes(&self, mean: f64) -> [f64; 4] {
+        // The first bin begins at −π.
+        [BINS / 2, BINS / 4 * 3, 0, BINS / 4].map(|reversal| {
+            let bins = self.bins.iter().cycle().skip(BINS + reversal - SPIKE_BINS).take(2 * SPIKE_BINS);
+            let spikes = bins.filter_map(|bin| bin.points).flatten().map(|point| point.deviation - mean);
+            spikes.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+        })
     }
 
     /// Returns true if every sector contains a point.

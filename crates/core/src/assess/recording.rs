@@ -47,6 +47,8 @@ pub struct AxisTrace {
     pub gravity_current: Vec<f64>,
     /// Component of the current from the external load, A.
     pub load_current: Vec<f64>,
+    /// Share of the current cycles of a position cycle in which speed, current or voltage setpoint is at its limit.
+    pub saturation: Vec<f64>,
 }
 
 /// Tool tip in the workpiece frame.

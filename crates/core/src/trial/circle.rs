@@ -25,6 +25,8 @@ struct SteadyCircle {
     /// Move, counted from 0.
     index: usize,
     window: Range<f64>,
+    /// Feed in the window, m/s.
+    feed: f64,
     circle: Circle,
     assessor: CircleAssessor,
     trace: CircleTrace,
@@ -59,7 +61,9 @@ impl Circles {
                 deviation: Vec::new(),
             };
             let assessor = CircleAssessor::new(circle.center, circle.radius);
-            Some(SteadyCircle { index, window, circle, assessor, trace })
+            let length = program.progress(window.end) - program.progress(window.start);
+            let feed = length / (window.end - window.start);
+            Some(SteadyCircle { index, window, feed, circle, assessor, trace })
         };
         let list = circles.by_ref().filter_map(steady).take(MAX_COUNT).collect();
         let more = circles.filter(|(_, circle)| circle.sweep.abs() >= TAU).count();
@@ -97,10 +101,12 @@ impl Circles {
                 plane: steady.trace.plane.clone(),
                 counterclockwise: steady.circle.sweep > 0.0,
                 radius: steady.circle.radius,
+                feed: steady.feed,
                 mean: found.mean,
                 min: found.min,
                 max: found.max,
                 circular_deviation: found.full.map(|full| full.circular_deviation),
+                reversal_spikes: found.full.map(|full| full.reversal_spikes),
             })
         });
         figures.collect()

@@ -88,6 +88,8 @@ pub struct CircleFigures {
     pub counterclockwise: bool,
     /// Nominal radius, m.
     pub radius: f64,
+    /// Feed, m/s.
+    pub feed: f64,
     /// Mean radial deviation, m, positive outside.
     pub mean: f64,
     /// Smallest radial deviation, m.
@@ -96,6 +98,8 @@ pub struct CircleFigures {
     pub max: f64,
     /// Circular deviation G, m; `None` if the points leave part of the circle open.
     pub circular_deviation: Option<f64>,
+    /// Reversal spikes at +first, +second, −first and −second axis, m; `None` as for the circular deviation.
+    pub reversal_spikes: Option<[f64; 4]>,
 }
 
 /// Circle run in both directions (ISO 230-4).

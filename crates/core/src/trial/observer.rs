@@ -142,7 +142,8 @@ impl<'a> Observer<'a> {
         if let Some(recorder) = &mut self.recorder {
             let axes = (0..self.axes.len()).map(|index| {
                 let (machine, at) = axis(index);
-                (machine.axis(at).sample(), machine.signed_peak_current(at))
+                let share = machine.activity(at).saturated_ticks as f64 / cycle.ticks() as f64;
+                (machine.axis(at).sample(), machine.signed_peak_current(at), share)
             });
             let largest = |errors: &[f64]| errors.iter().copied().fold(0.0, f64::max);
             let tool = first.map(|nearest| ToolSample {

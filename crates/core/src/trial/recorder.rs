@@ -70,9 +70,9 @@ fn farther(one: TipPair, other: TipPair) -> TipPair {
 }
 
 /// Number of signals of an axis, in the order of [`AxisTrace`].
-const AXIS_SIGNALS: usize = 10;
+const AXIS_SIGNALS: usize = 11;
 
-fn axis_values(s: &AxisSample, current: f64) -> [f64; AXIS_SIGNALS] {
+fn axis_values(s: &AxisSample, current: f64, saturated: f64) -> [f64; AXIS_SIGNALS] {
     [
         s.psec,
         s.position,
@@ -84,6 +84,7 @@ fn axis_values(s: &AxisSample, current: f64) -> [f64; AXIS_SIGNALS] {
         s.friction_current,
         s.gravity_current,
         s.load_current,
+        saturated,
     ]
 }
 
@@ -132,17 +133,17 @@ impl SignalRecorder {
     }
 
     /// Adds the position cycle that begins at `time`, s from the start: for each axis its sample at that
-    /// instant and the largest current at any tick, A.
+    /// instant, the largest current at any tick, A, and the share of its ticks at a limit.
     pub(super) fn push<'a>(
         &mut self,
         time: f64,
-        axes: impl Iterator<Item = (&'a AxisSample, f64)>,
+        axes: impl Iterator<Item = (&'a AxisSample, f64, f64)>,
         tool: Option<ToolSample>,
     ) {
         let (count, bucket) = (self.count, self.bucket);
         self.last = time;
-        for (signals, (sample, current)) in self.axes.iter_mut().zip(axes) {
-            for (signal, value) in signals.iter_mut().zip(axis_values(sample, current)) {
+        for (signals, (sample, current, saturated)) in self.axes.iter_mut().zip(axes) {
+            for (signal, value) in signals.iter_mut().zip(axis_values(sample, current, saturated)) {
                 signal.push(value, count, bucket);
             }
         }
@@ -220,6 +221,7 @@ impl SignalRecorder {
                 friction_current,
                 gravity_current,
                 load_current,
+                saturation,
             ] = signals.map(|signal| signal.values);
             AxisTrace {
                 name: axis.name().to_owned(),
@@ -235,6 +237,7 @@ impl SignalRecorder {
                 friction_current,
                 gravity_current,
                 load_current,
+                saturation,
             }
         });
         let tool = (!self.tool.is_empty()).then(|| ToolTrace {
@@ -259,7 +262,7 @@ mod tests {
         for k in 0..length {
             let position = if k == length / 2 + 1 { 1.0 } else { 0.0 };
             let sample = AxisSample { position, ..AxisSample::default() };
-            recorder.push(k as f64, [(&sample, 0.0)].into_iter(), None);
+            recorder.push(k as f64, [(&sample, 0.0, 0.0)].into_iter(), None);
             signal.push(position, 0, 1);
         }
         let values = &recorder.axes[0][1].values;
@@ -294,7 +297,7 @@ mod tests {
                 contour_error: 0.1 + at(5),
                 orientation_error: at(6),
             };
-            recorder.push(k as f64, [(&sample, at(3))].into_iter(), Some(tool));
+            recorder.push(k as f64, [(&sample, at(3), 0.0)].into_iter(), Some(tool));
         }
         let machine = crate::config::Parameters::embedded_default()
             .and_then(|p| p.machine_config())
@@ -330,7 +333,7 @@ mod tests {
         for length in [1, CAPACITY - 1, CAPACITY, CAPACITY + 3, 2 * CAPACITY + 5] {
             let mut recorder = SignalRecorder::new(1);
             for k in 0..length {
-                recorder.push(k as f64, [(&AxisSample::default(), 0.0)].into_iter(), None);
+                recorder.push(k as f64, [(&AxisSample::default(), 0.0, 0.0)].into_iter(), None);
             }
             let config = crate::config::Parameters::embedded_default()
                 .and_then(|p| p.machine_config())

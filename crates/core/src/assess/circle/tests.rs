@@ -1,5 +1,7 @@
 //! Circularity compared with closed forms and with a fit to all points.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::*;
 
 const CENTER: [f64; 2] = [-0.15, 0.02];
@@ -229,4 +231,20 @@ fn push_returns_the_radial_deviation() {
     let report = assessor.report().expect("points");
     assert_near("mean", report.mean, 4.0 / 3.0, ROUNDING);
     assert_eq!((report.min, report.max), (-1.0, 5.0));
+}
+
+#[test]
+fn reversal_spikes_are_those_of_the_four_quadrants() {
+    // Spikes of 12, −5, 7 and 3 µm, 8 degrees wide, behind the reversals, on a circle that is 20 µm too large.
+    let heights = [12e-6, -5e-6, 7e-6, 3e-6];
+    let spike = |angle: f64| {
+        let quadrant = (angle / FRAC_PI_2).floor();
+        let after = (angle - quadrant * FRAC_PI_2) / 8f64.to_radians();
+        if after < 1.0 { heights[quadrant as usize % 4] * (PI * after).sin().powi(2) } else { 0.0 }
+    };
+    let found = report(&points(2.0, [0.0; 2], |angle| R + 20e-6 + spike(angle)));
+    let mean = found.0.mean;
+    for (spike, height) in found.1.reversal_spikes.into_iter().zip(heights) {
+        assert_near("spike", spike, 20e-6 + height - mean, 1e-9);
+    }
 }

@@ -1,0 +1,98 @@
+//! Tables as text for the terminal, at most 100 columns wide.
+
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
+use virtual_axes_core::text::wrapped;
+use virtual_axes_report::{Table, TableColumn};
+
+/// Largest length of a line, characters.
+pub const WIDTH: u16 = 100;
+/// Width up to which columns of text are not wrapped, characters.
+const TEXT_WIDTH: u16 = 24;
+
+/// Formats a table with the first column aligned left, the others right.
+pub fn text(table: &Table) -> String {
+    aligned(table, &[0])
+}
+
+/// Formats a table with the columns `left` aligned left, the others right. Headings and texts are wrapped between words
+/// if the table is wider than [`WIDTH`]; numbers are not.
+pub fn aligned(table: &Table, left: &[usize]) -> String {
+    let mut out = comfy_table::Table::new();
+    out.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
+    out.set_header(table.columns.iter().map(heading));
+    out.add_rows(&table.rows);
+    for (index, column) in out.column_iter_mut().enumerate() {
+        column.set_padding((0, 2));
+        column.set_cell_alignment(if left.contains(&index) {
+            CellAlignment::Left
+        } else {
+            CellAlignment::Right
+        });
+        let smallest = if left.contains(&index) { widest(table, index).min(TEXT_WIDTH) } else { 0 };
+        let smallest = smallest.max(longest_word(table, index));
+        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(smallest + 2)));
+    }
+    let lines: Vec<String> = out.lines().map(|line| line.trim_end().to_owned() + "\n").collect();
+    lines.concat()
+}
+
+/// Returns the number of columns of figures with these headings, at least 1, that fit beside a column of names and one
+/// of units.
+pub fn columns_beside_text(headings: impl Iterator<Item = String>) -> usize {
+    /// Length of a figure with its difference, such as "12974.2 (+332 %)".
+    const FIGURE: usize = 16;
+    /// Length of a unit and its gap.
+    const UNIT: usize = 7;
+    let words = headings.map(|heading| heading.split_whitespace().map(|word| word.chars().count()).max());
+    let width = words.flatten().fold(FIGURE, usize::max) + 2;
+    ((usize::from(WIDTH) - usize::from(TEXT_WIDTH) - 2 - UNIT) / width).max(1)
+}
+
+/// Returns the length of the longest word of a column, which is not divided.
+fn longest_word(table: &Table, index: usize) -> u16 {
+    let heading = table.columns.get(index).map(heading).unwrap_or_default();
+    let cells = table.rows.iter().filter_map(|row| row.get(index));
+    longest(cells.map(String::as_str).chain([heading.as_str()]).flat_map(str::split_whitespace))
+}
+
+/// Returns the length of the longest cell of a column.
+fn widest(table: &Table, index: usize) -> u16 {
+    longest(table.rows.iter().filter_map(|row| row.get(index)).map(String::as_str))
+}
+
+fn longest<'a>(texts: impl Iterator<Item = &'a str>) -> u16 {
+    let longest = texts.map(|text| text.chars().count()).max().unwrap_or(0);
+    u16::try_from(longest).unwrap_or(u16::MAX).min(WIDTH / 2)
+}
+
+/// Wraps a text to lines of at most [`WIDTH`] characters; further lines are indented.
+pub fn wrapped_line(text: &str) -> String {
+    const INDENT: &str = "    ";
+    let lines = wrapped(text, usize::from(WIDTH) - INDENT.len());
+    lines.join(&format!("\n{INDENT}")) + "\n"
+}
+
+/// Returns a row of comma-separated values; cells with commas, quotation marks or line breaks are quoted.
+pub fn csv_row(cells: &[String]) -> String {
+    let cells: Vec<String> = cells
+        .iter()
+        .map(|cell| match cell.contains([',', '"', '\n', '\r']) {
+            true => format!("\"{}\"", cell.replace('"', "\"\"")),
+            false => cell.clone(),
+        })
+        .collect();
+    cells.join(",") + "\n"
+}
+
+/// Returns a table as comma-separated values with its headings.
+pub fn csv(table: &Table) -> String {
+    let headings: Vec<String> = table.columns.iter().map(heading).collect();
+    std::iter::once(&headings).chain(&table.rows).map(|row| csv_row(row)).collect()
+}
+
+fn heading(column: &TableColumn) -> String {
+    match column.unit.as_str() {
+        "" => column.name.clone(),
+        unit => format!("{}, {unit}", column.name),
+    }
+}

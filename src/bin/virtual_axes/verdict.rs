@@ -1,0 +1,85 @@
+//! The result of runs in one line each, with which text output and reports begin.
+
+use virtual_axes_core::text::escaped;
+use virtual_axes_core::trial::Figures;
+
+use crate::figure::{self, Figure, percent};
+use crate::table;
+use crate::variant::VariantRun;
+
+/// Returns the verdict of a single run, or a line for each further run that compares it with the first one.
+pub fn lines(runs: &[VariantRun]) -> Vec<String> {
+    match runs {
+        [] => Vec::new(),
+        [run] => vec![single(&run.outcome.figures)],
+        [first, others @ ..] => others.iter().map(|run| compared(first, run)).collect(),
+    }
+}
+
+/// Returns the lines as text.
+pub fn text(runs: &[VariantRun]) -> String {
+    lines(runs).into_iter().map(|line| escaped(&line) + "\n").collect()
+}
+
+fn single(figures: &Figures) -> String {
+    let main = main_figure(figures);
+    let contour = figure::of_path(figures, [false; 2]);
+    let text = match contour.get(1) {
+        Some(rms) if main.subject.is_empty() => {
+            format!("contour error {} µm max, {} µm RMS", main.text(), rms.text())
+        }
+        _ => format!("{} {} {}", without_max(&main), main.text(), main.unit),
+    };
+    text + &limits(figures)
+}
+
+fn compared(first: &VariantRun, run: &VariantRun) -> String {
+    let [from, to] = [main_figure(&first.outcome.figures), main_figure(&run.outcome.figures)];
+    let change = percent(&from, &to).map(|change| format!(", {change}")).unwrap_or_default();
+    let limits = limits(&run.outcome.figures);
+    let (title, name) = (run.title(), without_max(&to));
+    format!("{title}: {name} {} → {} {}{change}{limits}", from.text(), to.text(), to.unit)
+}
+
+fn without_max(figure: &Figure) -> String {
+    figure.title().replace(", max", "")
+}
+
+/// Returns the largest contour error if several axes move, else the largest delay-compensated following error.
+fn main_figure(figures: &Figures) -> Figure {
+    let moving = figures.axes.iter().filter(|axis| axis.moves).count();
+    let contour = figure::of_path(figures, [false; 2]).into_iter().next();
+    let contour = contour.filter(|_| figures.contour.is_some_and(|contour| contour.max > 0.0));
+    match (worst_axis(figures), contour) {
+        (Some(worst), None) => worst,
+        (Some(worst), Some(_)) if moving < 2 => worst,
+        (_, Some(contour)) => contour,
+        (None, None) => Figure::default(),
+    }
+}
+
+/// Returns the largest delay-compensated following error of the axes.
+fn worst_axis(figures: &Figures) -> Option<Figure> {
+    let errors = figure::of_axes(figures).into_iter();
+    errors
+        .filter(|figure| figure.name == "delay-compensated following error, max")
+        .max_by(|a, b| a.value.total_cmp(&b.value))
+}
+
+/// Returns the limits that axes reached, beginning with a semicolon; empty if there are none.
+fn limits(figures: &Figures) -> String {
+    let mut text = String::new();
+    for axis in &figures.axes {
+        if axis.report.saturation_time > 0.0 {
+            let time = axis.report.saturation_time;
+            text.push_str(&format!(
+                "; {} at a limit of speed, current or voltage for {time:.3} s",
+                axis.name
+            ));
+        }
+        if let Some(time) = table::outside(axis) {
+            text.push_str(&format!("; {} outside its travel limits for {time} s", axis.name));
+        }
+    }
+    text
+}
