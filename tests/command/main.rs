@@ -8,5 +8,6 @@ mod files_output;
 mod identify_command;
 mod ingress_properties;
 mod interface;
+mod output_form;
 mod reference;
 mod tune_command;

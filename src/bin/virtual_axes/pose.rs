@@ -45,7 +45,8 @@ pub fn run(arguments: &PoseArguments) -> Result<String, Box<dyn Error>> {
             [] => String::new(),
             names => format!("; outside the travel limits: {}", names.join(", ")),
         };
-        lines += &format!("tip {x} {y} {z} m, axis {u} {v} {w}{remark}\n");
+        let [tip, axis] = [[x, y, z], [u, v, w]].map(|values| values.map(decimals).join(" "));
+        lines += &format!("tip {tip} m, axis {axis}{remark}\n");
         // Quaternion in ROS order: x, y, z, w.
         let orientation: [f64; 4] = kinematics.orientation(&joints).coords.into();
         list.push(json!({
@@ -54,6 +55,13 @@ pub fn run(arguments: &PoseArguments) -> Result<String, Box<dyn Error>> {
         }));
     }
     Ok(if arguments.json { format!("{:#}\n", json!(list)) } else { lines })
+}
+
+/// Formats a coordinate with at most 12 decimals; the JSON output has all digits.
+fn decimals(value: f64) -> String {
+    let text = format!("{value:.12}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 /// Parses the positions of all joints of the machine.

@@ -11,7 +11,9 @@ const RISE: f64 = 0.01;
 
 fn page(runs: Vec<ReportRun>) -> String {
     let mut bytes = Vec::new();
-    Report { title: "compared", description: "", runs }.write(&mut bytes).expect("memory takes it");
+    Report { title: "compared", description: "", runs, ..Report::default() }
+        .write(&mut bytes)
+        .expect("memory takes it");
     String::from_utf8(bytes).expect("UTF-8")
 }
 
@@ -71,7 +73,7 @@ fn a_long_name_of_a_run_wraps() {
     let recording = helix([0.0; 3]);
     let page = page(vec![report_run("cascade", &recording), report_run("cascade, x.y=1", &recording)]);
     let style = between(&page, "<style>", "</style>")[0];
-    let rules: Vec<&str> = style.split('}').filter(|rule| rule.contains("th.run")).collect();
+    let rules: Vec<&str> = style.split('}').filter(|rule| rule.contains(".figures thead th")).collect();
     assert!(rules.iter().any(|rule| rule.contains("overflow-wrap: anywhere") && rule.contains("max-width")));
     assert!(!rules.iter().any(|rule| rule.contains("nowrap")), "{rules:?}");
 }

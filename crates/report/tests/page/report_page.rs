@@ -15,7 +15,8 @@ static BALLBAR: LazyLock<[SignalRecording; 2]> =
 
 fn page(title: &str, runs: Vec<ReportRun>) -> String {
     let mut bytes = Vec::new();
-    Report { title, description: "", runs }.write(&mut bytes).expect("memory can be written");
+    let report = Report { title, runs, ..Report::default() };
+    report.write(&mut bytes).expect("memory can be written");
     String::from_utf8(bytes).expect("UTF-8")
 }
 
@@ -87,11 +88,18 @@ fn untrusted_names_are_escaped() {
     let run = || ReportRun {
         title: hostile,
         facts: vec![(hostile.to_owned(), hostile.to_owned())],
-        tables: vec![table.clone()],
         recording: &recording,
     };
     let mut bytes = Vec::new();
-    let report = Report { title: hostile, description: hostile, runs: vec![run(), run()] };
+    let report = Report {
+        title: hostile,
+        description: hostile,
+        verdict: vec![hostile.to_owned()],
+        tables: vec![table],
+        notes: vec![hostile.to_owned()],
+        runs: vec![run(), run()],
+        provenance: vec![(hostile.to_owned(), hostile.to_owned())],
+    };
     report.write(&mut bytes).expect("memory can be written");
     let page = String::from_utf8(bytes).expect("UTF-8");
     for tag in ["<script", "<img", "alert(1)</script>", "onerror=alert(2)>", "&amp;amp;amp;"] {
@@ -144,7 +152,7 @@ fn any_signal_gives_a_valid_page() {
                 recording.circles[0].angle.push(nan);
             }
             // Only the plots are checked, not the tables.
-            let run = |title| ReportRun { tables: Vec::new(), ..report_run(title, &recording) };
+            let run = |title| report_run(title, &recording);
             let page = page("broken", vec![run("one"), run("two")]);
             let bad = words(&page).find(|w| ["nan", "inf", "infinity"].contains(&w.to_lowercase().as_str()));
             let position = bad.and_then(|word| page.find(word)).unwrap_or(0);
@@ -320,15 +328,45 @@ fn the_path_error_is_magnified_by_the_factor_of_the_caption() {
 }
 
 #[test]
-fn figures_of_comparable_runs_share_rows() {
-    let page_of_two = page("two", two_runs());
-    assert_eq!(page_of_two.matches("<caption>Axes</caption>").count(), 1);
-    assert!(page_of_two.contains("<th scope=\"rowgroup\" rowspan=\"2\">x</th>"));
-    let mut runs = two_runs();
-    runs[1].tables[0].rows.pop();
-    let different = page("two", runs);
-    assert_eq!(different.matches("<caption>Axes</caption>").count(), 2);
-    // Values with equal names share a cell.
+fn figures_stand_in_columns_below_the_verdict() {
+    let [ballbar, _] = &*BALLBAR;
+    let table = Table {
+        caption: "Path".to_owned(),
+        columns: vec![
+            TableColumn::new("figure", ""),
+            TableColumn::new("unit", ""),
+            TableColumn::of_run("cascade", 0),
+            TableColumn::of_run("gpc", 1),
+        ],
+        rows: vec![
+            vec!["circle".to_owned()],
+            vec!["contour error".to_owned(), "µm".to_owned(), "68.6".to_owned(), "13.2 (−81 %)".to_owned()],
+        ],
+    };
+    let report = Report {
+        title: "ballbar",
+        verdict: vec!["gpc: contour error 68.6 → 13.2 µm, −81 %".to_owned()],
+        tables: vec![table, Table::default()],
+        notes: vec!["in parentheses: difference from cascade".to_owned()],
+        runs: vec![report_run("cascade", ballbar), report_run("gpc", ballbar)],
+        provenance: vec![("command".to_owned(), "virtual_axes run ballbar".to_owned())],
+        ..Report::default()
+    };
+    let mut bytes = Vec::new();
+    report.write(&mut bytes).expect("memory can be written");
+    let page = String::from_utf8(bytes).expect("UTF-8");
+    let verdict = page.find("<p class=\"verdict\">gpc: contour error").expect("a verdict");
+    assert!(verdict < page.find("<caption>Path</caption>").expect("a table"));
+    assert!(page.contains("<th scope=\"row\" class=\"group\">circle</th>"));
+    assert!(page.contains("<td class=\"number\">13.2 (−81 %)</td>"));
+    assert!(page.contains("<p>in parentheses: difference from cascade</p>"));
+    assert!(page.contains("<th scope=\"row\">command</th>") && page.contains("Provenance"));
+    // Each run has a sample of its line in the heading of its column.
+    assert!(between(&page, "<thead>", "</thead>")[0].contains("line run-2"));
+}
+
+#[test]
+fn facts_of_runs_are_merged() {
     let mut runs = two_runs();
     for change in ["x.position_loop.gain=2", "y.position_loop.gain=2"] {
         runs[1].facts.push(("set".to_owned(), change.to_owned()));
@@ -336,5 +374,46 @@ fn figures_of_comparable_runs_share_rows() {
     let changed = page("two", runs);
     assert!(changed.contains("<td></td><td>x.position_loop.gain=2, y.position_loop.gain=2</td>"));
     // Equal values of all runs are merged.
-    assert!(page_of_two.contains("<td class=\"same\" colspan=\"2\">mikron_ucp710</td>"));
+    assert!(changed.contains("<td class=\"same\" colspan=\"2\">mikron_ucp710</td>"));
+}
+
+#[test]
+fn reached_limits_are_stated_and_shaded() {
+    let mut recording = run_of(&[0.0, 1.0, 2.0, 3.0, 4.0]);
+    recording.axes[0].saturation = vec![0.0, 0.5, 1.0, 0.0, 0.25];
+    let limited = page("limits", vec![report_run("one", &recording)]);
+    let first = recording.time[1];
+    let sentence = format!("at a limit of speed, current or voltage 2 times, first at {first:.3} s");
+    assert!(limited.contains(&sentence), "{sentence}");
+    assert_eq!(picture(&limited, "X axis: current").matches("class=\"at-limit\"").count(), 2);
+    recording.axes[0].saturation = vec![0.0; 5];
+    assert!(!page("limits", vec![report_run("one", &recording)]).contains("Limits reached"));
+}
+
+#[test]
+fn the_path_is_colored_by_its_error() {
+    // The error rises linearly to 80 µm: each quarter of the path is in one class.
+    let reference: Vec<[f64; 3]> = (0..=100).map(|i| [f64::from(i) * 1e-3, 0.0, 0.0]).collect();
+    let error = |i: usize| 80e-6 * i as f64 / 100.0;
+    let position = reference.iter().enumerate().map(|(i, [x, ..])| [*x, error(i), 0.0]).collect();
+    let contour_error = (0..=100).map(error).collect();
+    let recording = SignalRecording {
+        time: (0..=100).map(f64::from).collect(),
+        tool: Some(ToolTrace { reference, position, contour_error, orientation_error: Vec::new() }),
+        ..SignalRecording::default()
+    };
+    let page = page("line", vec![report_run("one", &recording)]);
+    let path = picture(&page, "X–Y path");
+    let span = |class: usize| {
+        let line = points(between(path, &format!("<path class=\"line solid error-{class}\" d=\""), "\"")[0]);
+        line[line.len() - 1][0] - line[0][0]
+    };
+    let quarter = span(2);
+    assert!(quarter > 60.0, "{quarter}");
+    assert!((span(1) - quarter).abs() < 8.0 && (span(3) - quarter).abs() < 8.0);
+    assert!(
+        page.contains("contour error up to 80.0\u{a0}µm"),
+        "{}",
+        between(&page, "<span class=\"legend\">", "</figcaption>")[0]
+    );
 }

@@ -4,7 +4,7 @@ use virtual_axes_report::{PointGroup, PointStyle, Report, Scatter};
 
 fn page(scatters: &[Scatter]) -> String {
     let mut bytes = Vec::new();
-    let report = Report { title: "search", description: "", runs: Vec::new() };
+    let report = Report { title: "search", description: "", runs: Vec::new(), ..Report::default() };
     report.write_with(scatters, &mut bytes).expect("memory can be written");
     String::from_utf8(bytes).expect("UTF-8")
 }

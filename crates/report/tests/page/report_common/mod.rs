@@ -4,7 +4,7 @@ pub mod charts;
 
 use virtual_axes_core::assess::{AxisTrace, CircleTrace, SignalRecording, ToolTrace};
 use virtual_axes_core::config::AxisKind;
-use virtual_axes_report::{ReportRun, Table, TableColumn};
+use virtual_axes_report::ReportRun;
 
 use virtual_axes_verification::fixtures::machines::{self, AXES, Ballbar, machine};
 
@@ -47,6 +47,7 @@ pub fn empty_axis(name: &str, kind: AxisKind) -> AxisTrace {
         friction_current: none(),
         gravity_current: none(),
         load_current: none(),
+        saturation: none(),
     }
 }
 
@@ -81,6 +82,7 @@ pub fn record(
             axis.friction_current.push(s.friction_current);
             axis.gravity_current.push(s.gravity_current);
             axis.load_current.push(s.load_current);
+            axis.saturation.push(f64::from(u8::from(s.saturated)));
             if i < 3 {
                 tip[i] = s.position;
             }
@@ -184,27 +186,11 @@ pub fn five_axes(every: u64) -> SignalRecording {
     recording
 }
 
-/// Returns the table of figures of the moving axes.
-pub fn figures(recording: &SignalRecording) -> Table {
-    let peak = |values: &[f64]| values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    let columns = [("axis", ""), ("largest delay-compensated error", "µm, mdeg"), ("peak current", "A")];
-    let rows = recording.axes.iter().filter(|a| a.moves).map(|a| {
-        let unit = if a.kind == AxisKind::Linear { 1e6 } else { 180e3 / std::f64::consts::PI };
-        let error = peak(&a.delay_compensated_following_error) * unit;
-        vec![a.name.clone(), format!("{error:.1}"), format!("{:.2}", peak(&a.current))]
-    });
-    Table {
-        caption: "Axes".to_owned(),
-        columns: columns.map(|(name, unit)| TableColumn::new(name, unit)).to_vec(),
-        rows: rows.collect(),
-    }
-}
-
 /// Returns a run of a report with its figures.
 pub fn report_run<'a>(title: &'a str, recording: &'a SignalRecording) -> ReportRun<'a> {
     let facts = [("machine", "mikron_ucp710"), ("controller", title)];
     let facts = facts.map(|(name, value)| (name.to_owned(), value.to_owned())).to_vec();
-    ReportRun { title, facts, tables: vec![figures(recording)], recording }
+    ReportRun { title, facts, recording }
 }
 
 /// Returns the SVG plots of a page.

@@ -1,0 +1,146 @@
+//! Form of the output: verdict, columns of runs, width of tables, `--quiet`, `--csv`.
+
+use std::process::{Command, Output};
+
+use virtual_axes_core::scenario::Scenario;
+use virtual_axes_verification::fixtures::folder::TestFolder;
+
+/// Largest length of a line, characters.
+const WIDTH: usize = 100;
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_virtual_axes")).args(arguments).output().expect("the command starts")
+}
+
+#[track_caller]
+fn text(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+#[track_caller]
+fn assert_fits(arguments: &[&str]) {
+    for line in text(arguments).lines() {
+        assert!(line.chars().count() <= WIDTH, "{arguments:?}: {line}");
+    }
+}
+
+#[test]
+fn tables_fit_a_terminal_of_100_columns() {
+    for scenario in Scenario::builtin_names() {
+        assert_fits(&["run", scenario]);
+    }
+    assert_fits(&["run", "corner-90", "--controller", "cascade,cascade-noff,gpc"]);
+    let changes = "x.velocity_loop.integral_time_ms=5,y.velocity_loop.integral_time_ms=7";
+    let runs = ["run", "corner-90", "--controller", "cascade,cascade-noff,gpc", "--compare", changes];
+    assert_fits(&runs);
+    assert_fits(&["robustness", "corner-90", "--controller", "gpc"]);
+    assert_fits(&["tune", "corner-90", "--controller", "cascade"]);
+    assert_fits(&["tune", "x-constant", "--controller", "gpc"]);
+    assert_fits(&["design", "gpc"]);
+    for list in ["scenarios", "machines", "parameters", "interface"] {
+        assert_fits(&[list]);
+    }
+}
+
+#[test]
+fn compared_runs_stand_in_columns_below_their_verdict() {
+    let text = text(&["run", "ballbar", "--controller", "cascade,gpc"]);
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("gpc: contour error 68.6 → 13.2 µm, −81 %"));
+    let row = lines.find(|line| line.starts_with("contour error, max")).expect("a row");
+    assert_eq!(row.split_whitespace().collect::<Vec<_>>()[3..], ["µm", "68.6", "13.2", "(−81", "%)"]);
+    // Signed figures are compared by their difference.
+    let row = lines.find(|line| line.contains("radial deviation, mean")).expect("a row");
+    assert!(row.contains("49.0") && row.contains("-0.4 (−49.4)"), "{row}");
+}
+
+#[test]
+fn quiet_prints_the_verdict_only() {
+    assert_eq!(text(&["run", "ballbar", "--quiet"]), "contour error 68.6 µm max, 42.2 µm RMS\n");
+    assert_eq!(text(&["run", "c-constant", "-q"]), "c: delay-compensated following error 35.4 mdeg\n");
+    let two = text(&["run", "ballbar", "--controller", "cascade,gpc", "--quiet"]);
+    assert_eq!(two, "gpc: contour error 68.6 → 13.2 µm, −81 %\n");
+    assert_eq!(text(&["design", "gpc", "--axis", "x", "--quiet"]).lines().count(), 1);
+    assert_eq!(text(&["robustness", "x-constant", "--quiet"]).lines().count(), 1);
+}
+
+#[test]
+fn a_reached_limit_is_part_of_the_verdict() {
+    let text = text(&["run", "x-constant", "--set", "x.motor.max_current_a=6", "--quiet"]);
+    assert!(text.contains("; x at a limit of speed, current or voltage for "), "{text}");
+}
+
+#[test]
+fn comma_separated_values_have_all_digits_of_the_json_output() {
+    let arguments = ["run", "ballbar", "--controller", "cascade,gpc"];
+    let csv = text(&[&arguments[..], &["--csv"]].concat());
+    let json: serde_json::Value =
+        serde_json::from_str(&text(&[&arguments[..], &["--json"]].concat())).expect("JSON");
+    assert_eq!(csv.lines().next(), Some("run,figure,value,unit"));
+    let row = csv.lines().find(|line| line.starts_with("gpc,\"contour error, max\",")).expect("a row");
+    let value: f64 = row.split(',').nth(3).expect("a value").parse().expect("a number");
+    assert_eq!(value, json["runs"][1]["contour_error_um"]["max"].as_f64().expect("a number"));
+    let circle = &json["runs"][0]["circles"][0];
+    assert_eq!(circle["feed_m_min"].as_f64().map(|feed| (feed * 1e6).round() / 1e6), Some(15.0));
+    let spikes: Vec<f64> =
+        circle["reversal_spikes_um"].as_object().expect("four").values().filter_map(|v| v.as_f64()).collect();
+    // The largest spike reaches the largest radial deviation.
+    let deviation = &circle["radial_deviation_um"];
+    let height = deviation["max"].as_f64().expect("max") - deviation["mean"].as_f64().expect("mean");
+    assert_eq!(spikes.len(), 4);
+    assert!((spikes.iter().copied().fold(0.0, f64::max) - height).abs() < 1e-9);
+    for list in [vec!["design", "gpc"], vec!["robustness", "x-constant"]] {
+        let csv = text(&[&list[..], &["--csv"]].concat());
+        let columns = csv.lines().next().expect("a heading").split(", ").count();
+        assert!(columns >= 1 && csv.lines().count() > 2, "{csv}");
+    }
+}
+
+#[test]
+fn forms_of_output_exclude_each_other() {
+    for pair in [["--json", "--csv"], ["--quiet", "--json"], ["--quiet", "--csv"]] {
+        assert_eq!(run(&["run", "x-constant", pair[0], pair[1]]).status.code(), Some(2), "{pair:?}");
+    }
+}
+
+#[test]
+fn compare_takes_lists_as_values() {
+    let r = "x.position_loop.rst.r=[1.0, -0.5],x.position_loop.rst.s=[1.0],x.position_loop.rst.t=[0.5]";
+    let compared = format!("{r},x.position_loop.rst.t_first=0,x.position_loop.controller=rst");
+    let output = run(&["run", "x-constant", "--compare", &compared]);
+    let message = String::from_utf8_lossy(&output.stderr);
+    // The list is read as a whole: the loop that it closes is stable.
+    assert!(output.status.success(), "{message}");
+    let verdict = String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned();
+    assert!(verdict.contains("x.position_loop.rst.r=[1.0, -0.5]"), "{verdict}");
+}
+
+#[test]
+fn a_report_has_verdict_and_provenance_and_equal_bytes_for_equal_dates() {
+    let folder = TestFolder::new("report_provenance");
+    let page = folder.0.join("page.html");
+    let path = page.to_string_lossy().into_owned();
+    let arguments = ["run", "ballbar", "--controller", "cascade,gpc", "--report", &path];
+    let write = || {
+        let status = Command::new(env!("CARGO_BIN_EXE_virtual_axes"))
+            .args(arguments)
+            .env("SOURCE_DATE_EPOCH", "1790000000")
+            .output()
+            .expect("the command starts")
+            .status;
+        assert!(status.success());
+        std::fs::read_to_string(&page).expect("a page")
+    };
+    let first = write();
+    assert!(first.contains("<p class=\"verdict\">gpc: contour error 68.6 → 13.2 µm, −81 %</p>"));
+    for wanted in
+        ["2026-09-21", "virtual_axes run ballbar --controller cascade,gpc", "mikron_ucp710", "ISO 230-4"]
+    {
+        assert!(first.contains(wanted), "{wanted}");
+    }
+    let digest = blake3::hash(include_bytes!("../../config/mikron_ucp710.yaml")).to_hex().to_string();
+    assert!(first.contains(&digest));
+    assert_eq!(first, write());
+}
