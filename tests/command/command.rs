@@ -411,18 +411,6 @@ fn memory_is_independent_of_the_number_of_setpoints() {
 }
 
 #[test]
-fn the_readme_shows_the_printed_table() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
-    let text = std::fs::read_to_string(path).expect("the README is there");
-    let command = "`virtual_axes run corner-90` prints";
-    let (_, behind) = text.split_once(command).expect("the README shows it");
-    let lines = behind.lines().skip(2).take_while(|line| line.is_empty() || line.starts_with("    "));
-    let shown: Vec<&str> = lines.map(str::trim_start).collect();
-    let printed = assert_runs(&["run", "corner-90"]);
-    assert_eq!(shown.join("\n").trim_end(), printed.trim_end());
-}
-
-#[test]
 fn an_interrupted_command_leaves_no_file() {
     for signal in ["INT", "TERM"] {
         let folder = TestFolder::new(&format!("interrupted_{signal}"));

@@ -27,7 +27,7 @@ pub struct CampaignArguments {
     /// `ros2 topic pub`.
     #[arg(long, value_name = "FILE.csv|FILE.mcap|FILE.yaml")]
     out: PathBuf,
-    /// Shipped machine or machine file whose limits and sampling period apply.
+    /// Built-in machine or machine file whose limits and sampling period apply.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
     /// Set a parameter, for example `x.limits.jerk_m_s3=20`; can be repeated.

@@ -16,10 +16,10 @@ use crate::{interrupt, print_error};
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArguments {
-    /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML), or name of a shipped
+    /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML), or name of a built-in
     /// machine or scenario.
     file: PathBuf,
-    /// Machine for a scenario or setpoints: shipped machine or machine file.
+    /// Machine for a scenario or setpoints: built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
 }
@@ -59,7 +59,7 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     Ok(format!("{kind} for {}: {:.3} s\nvalid\n", escaped(config.name()), outcome.figures.duration))
 }
 
-/// Returns true for a shipped machine, false for a shipped scenario.
+/// Returns true for a built-in machine, false for a built-in scenario.
 fn is_shipped_machine(name: &str) -> Result<bool, String> {
     let machines: Vec<&str> = Parameters::builtin_names().collect();
     let scenarios: Vec<&str> = Scenario::builtin_names().collect();
@@ -67,7 +67,7 @@ fn is_shipped_machine(name: &str) -> Result<bool, String> {
     match machine || scenarios.contains(&name) {
         true => Ok(machine),
         false => Err(format!(
-            "{name}: no such file, no shipped machine ({}) and no shipped scenario ({}){}",
+            "{name}: no such file, no built-in machine ({}) and no built-in scenario ({}){}",
             machines.join(", "),
             scenarios.join(", "),
             nearest_hint(&nearest_name(name, machines.iter().chain(&scenarios)))

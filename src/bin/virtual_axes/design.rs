@@ -120,7 +120,7 @@ struct ProportionalArguments {
 /// Arguments of all design methods.
 #[derive(Debug, clap::Args)]
 struct CommonDesignArguments {
-    /// Shipped machine or machine file.
+    /// Built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
     /// Set a parameter, for example `x.velocity_loop.gain=4.5`; can be repeated.

@@ -46,7 +46,7 @@ pub struct IdentifyArguments {
     /// Recorded axis.
     #[arg(long)]
     axis: String,
-    /// Initial machine: shipped machine or machine file.
+    /// Initial machine: built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
     /// Set a parameter, for example `x.motor.torque_constant_nm_a=1.2`; can be repeated.

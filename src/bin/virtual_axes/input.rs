@@ -34,16 +34,16 @@ enum Content {
 }
 
 impl CommandInput {
-    /// Opens the shipped scenario `name`, or the file `name`. `topic` selects the topic of an MCAP recording.
+    /// Opens the built-in scenario `name`, or the file `name`. `topic` selects the topic of an MCAP recording.
     ///
     /// # Errors
     ///
     /// Returns an error if the file cannot be read or is invalid, or if `topic` is given for another kind of
     /// file.
     pub fn open(name: &str, topic: Option<&str>) -> Result<Self, Box<dyn Error>> {
-        let shipped = Scenario::builtin_names().any(|known| known == name);
-        let content = if shipped || !Path::new(name).exists() {
-            // The error of an unknown name lists the shipped scenarios.
+        let is_builtin = Scenario::builtin_names().any(|known| known == name);
+        let content = if is_builtin || !Path::new(name).exists() {
+            // The error of an unknown name lists the built-in scenarios.
             Content::Scenario(Box::new(Scenario::load(name)?))
         } else {
             content_of(files::Input::open(Path::new(name))?, topic)?

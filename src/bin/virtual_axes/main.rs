@@ -81,7 +81,7 @@ enum Command {
     Urdf(urdf::UrdfArguments),
     /// Print the tool pose in the workpiece frame for joint positions (forward kinematics).
     Pose(pose::PoseArguments),
-    /// List the shipped machines.
+    /// List the built-in machines.
     Machines {
         /// Print a JSON list.
         #[arg(long)]
@@ -90,7 +90,7 @@ enum Command {
         #[arg(long, value_name = "MACHINE", conflicts_with = "json")]
         show: Option<String>,
     },
-    /// List the shipped scenarios.
+    /// List the built-in scenarios.
     Scenarios {
         /// Print a JSON list.
         #[arg(long)]

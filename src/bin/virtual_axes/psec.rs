@@ -31,13 +31,13 @@ enum PsecKind {
 /// Arguments of `virtual_axes psec` for a scenario.
 #[derive(Debug, clap::Args)]
 struct ScenarioPsecArguments {
-    /// Shipped scenario or scenario file.
+    /// Built-in scenario or scenario file.
     scenario: String,
     /// Output file: CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory on `/psec`, or YAML for
     /// `ros2 topic pub`.
     #[arg(long, value_name = "FILE.csv|FILE.mcap|FILE.yaml")]
     out: PathBuf,
-    /// Shipped machine or machine file whose limits and sampling period apply.
+    /// Built-in machine or machine file whose limits and sampling period apply.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
     /// Set a parameter, for example `x.limits.jerk_m_s3=20`; can be repeated.

@@ -179,7 +179,7 @@ impl TraceRecorder {
 
 /// Returns the verdict and the tables of the runs: a row per axis of a single run, a column per run of several.
 fn text(runs: &[VariantRun]) -> String {
-    let mut parts = vec![verdict::text(runs)];
+    let mut parts = vec![verdict::wrapped(runs)];
     match runs {
         [run] => parts.extend(single(&run.outcome.figures)),
         _ => parts.extend(several(runs)),
@@ -213,10 +213,10 @@ fn several(runs: &[VariantRun]) -> Vec<String> {
     }
     let remarks = runs.iter().flat_map(|run| {
         let title = run.title();
-        table::remarks(&run.outcome.figures).into_iter().map(move |remark| format!("{title}: {remark}\n"))
+        table::remarks(&run.outcome.figures).into_iter().map(move |remark| format!("{title}: {remark}"))
     });
     let notes = table::comparison_note(runs).into_iter().chain([table::SAMPLING.to_owned()]);
-    parts.push(remarks.chain(notes.map(|note| note + "\n")).collect());
+    parts.push(remarks.chain(notes).map(|line| text_table::wrapped_line(&line)).collect());
     parts
 }
 

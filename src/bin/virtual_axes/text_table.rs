@@ -6,8 +6,8 @@ use virtual_axes_report::{Table, TableColumn};
 
 /// Largest length of a line, characters.
 pub const WIDTH: u16 = 100;
-/// Width up to which columns of text are not wrapped, characters.
-const TEXT_WIDTH: u16 = 24;
+/// Blanks between two columns.
+const GAP: u16 = 2;
 
 /// Formats a table with the first column aligned left, the others right.
 pub fn text(table: &Table) -> String {
@@ -21,16 +21,21 @@ pub fn aligned(table: &Table, left: &[usize]) -> String {
     out.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
     out.set_header(table.columns.iter().map(heading));
     out.add_rows(&table.rows);
+    // What the columns of numbers leave is shared by the columns of text.
+    let numbers = (0..table.columns.len()).filter(|index| !left.contains(index));
+    let used: u16 = numbers.map(|index| longest_word(table, index) + GAP).sum();
+    let texts = u16::try_from(left.len()).unwrap_or(1).max(1);
+    let spare = (WIDTH.saturating_sub(used) / texts).saturating_sub(GAP);
     for (index, column) in out.column_iter_mut().enumerate() {
-        column.set_padding((0, 2));
+        column.set_padding((0, GAP));
         column.set_cell_alignment(if left.contains(&index) {
             CellAlignment::Left
         } else {
             CellAlignment::Right
         });
-        let smallest = if left.contains(&index) { widest(table, index).min(TEXT_WIDTH) } else { 0 };
+        let smallest = if left.contains(&index) { widest(table, index).min(spare) } else { 0 };
         let smallest = smallest.max(longest_word(table, index));
-        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(smallest + 2)));
+        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(smallest + GAP)));
     }
     let lines: Vec<String> = out.lines().map(|line| line.trim_end().to_owned() + "\n").collect();
     lines.concat()
@@ -41,11 +46,11 @@ pub fn aligned(table: &Table, left: &[usize]) -> String {
 pub fn columns_beside_text(headings: impl Iterator<Item = String>) -> usize {
     /// Length of a figure with its difference, such as "12974.2 (+332 %)".
     const FIGURE: usize = 16;
-    /// Length of a unit and its gap.
-    const UNIT: usize = 7;
+    /// Length of a column of names, and of a unit with its gap.
+    const BESIDE: usize = 26 + 7;
     let words = headings.map(|heading| heading.split_whitespace().map(|word| word.chars().count()).max());
     let width = words.flatten().fold(FIGURE, usize::max) + 2;
-    ((usize::from(WIDTH) - usize::from(TEXT_WIDTH) - 2 - UNIT) / width).max(1)
+    ((usize::from(WIDTH) - BESIDE) / width).max(1)
 }
 
 /// Returns the length of the longest word of a column, which is not divided.

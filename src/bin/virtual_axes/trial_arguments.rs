@@ -11,7 +11,7 @@ use crate::variant;
 /// Machine and parameters.
 #[derive(Debug, clap::Args)]
 pub struct MachineArguments {
-    /// Shipped machine or machine file.
+    /// Built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
     /// Set a parameter, for example `kinematics.tool_length_mm=150`; can be repeated.
@@ -39,11 +39,11 @@ impl MachineArguments {
 /// Setpoints, machine and parameters.
 #[derive(Debug, clap::Args)]
 pub struct TrialArguments {
-    /// Shipped scenario, scenario file, or file with setpoints: CSV (`time,x,y,…` in s, m, rad), MCAP with a
+    /// Built-in scenario, scenario file, or file with setpoints: CSV (`time,x,y,…` in s, m, rad), MCAP with a
     /// JointTrajectory, or YAML for `ros2 topic pub`.
     #[arg(value_name = "SCENARIO|FILE")]
     input: String,
-    /// Shipped machine or machine file.
+    /// Built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     pub machine: String,
     /// Set a parameter, for example `x.velocity_loop.gain=4.5`; can be repeated.

@@ -4,8 +4,8 @@ use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::Figures;
 
 use crate::figure::{self, Figure, percent};
-use crate::table;
 use crate::variant::VariantRun;
+use crate::{table, text_table};
 
 /// Returns the verdict of a single run, or a line for each further run that compares it with the first one.
 pub fn lines(runs: &[VariantRun]) -> Vec<String> {
@@ -16,9 +16,14 @@ pub fn lines(runs: &[VariantRun]) -> Vec<String> {
     }
 }
 
-/// Returns the lines as text.
+/// Returns the lines as text, one per run.
 pub fn text(runs: &[VariantRun]) -> String {
     lines(runs).into_iter().map(|line| escaped(&line) + "\n").collect()
+}
+
+/// Returns the lines as text that fits a terminal.
+pub fn wrapped(runs: &[VariantRun]) -> String {
+    lines(runs).into_iter().map(|line| text_table::wrapped_line(&escaped(&line))).collect()
 }
 
 fn single(figures: &Figures) -> String {
