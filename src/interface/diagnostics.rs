@@ -62,7 +62,7 @@ keys! {
         "position cycles in which the stream exceeded Vmax";
     STREAM_HELD_OFF = "stream_held_off", "", "true if a stream is ignored until it pauses";
     ENDPOINTS_DISCOVERED = "endpoints_discovered", "",
-        "discovered remote endpoints: publishers, subscriptions, two of each service and client";
+        "appearances of remote endpoints since the start (publishers, subscriptions, two of each service and client); one that returns counts again";
     MEMORY_MB = "memory_mb", "MB", "private memory of the process (RssAnon; Linux only)";
 }
 

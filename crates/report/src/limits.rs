@@ -5,7 +5,7 @@ use virtual_axes_core::assess::AxisTrace;
 use super::axes::axis_name;
 use super::page::Page;
 
-/// Time ranges in which an axis is at a limit, s: begin and end.
+/// Returns the time ranges in which an axis is at a limit, s: begin and end.
 pub(super) fn ranges(time: &[f64], axis: &AxisTrace) -> Vec<[f64; 2]> {
     let mut found: Vec<[f64; 2]> = Vec::new();
     let ends = time.iter().skip(1).chain(time.last());

@@ -149,13 +149,13 @@ fn columns_of(caption: &str, runs: &[VariantRun], figures: &[Vec<Figure>]) -> Ta
     table
 }
 
-/// Explanation of the differences in [`comparison`].
+/// Returns the explanation of the differences in [`comparison`].
 pub fn comparison_note(runs: &[VariantRun]) -> Option<String> {
     let first = runs.first().filter(|_| runs.len() > 1)?;
     Some(format!("in parentheses: difference from {}, in percent; of radial deviations in µm", first.title()))
 }
 
-/// Definition of the reversal spikes, for runs with circles.
+/// Returns the definition of the reversal spikes, for runs with circles.
 pub fn spike_note(runs: &[VariantRun]) -> Option<String> {
     let has_circle = runs.iter().any(|run| !run.outcome.figures.circles.is_empty());
     has_circle.then(|| {
