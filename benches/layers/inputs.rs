@@ -106,12 +106,12 @@ fn report(criterion: &mut Criterion) {
         let run = |(i, recording): (usize, _)| ReportRun {
             title: ["cascade", "predictive"][i % 2],
             facts: Vec::new(),
-            tables: Vec::new(),
             recording,
         };
         let runs = recordings.iter().enumerate().map(run).take(runs).collect();
         let mut page = Vec::new();
-        Report { title: "ballbar", description: "", runs }.write(&mut page).expect("written to memory");
+        let report = Report { title: "ballbar", runs, ..Report::default() };
+        report.write(&mut page).expect("written to memory");
         page
     };
     let mut group = criterion.benchmark_group("report, position cycles shown");
