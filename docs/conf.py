@@ -15,6 +15,7 @@ ROOT_PAGES = {
     "internals/architecture": "ARCHITECTURE.md",
     "internals/contributing": "CONTRIBUTING.md",
     "changelog": "CHANGELOG.md",
+    "readme": "README.md",
 }
 """Pages whose text is a file of the top level; on a Git host the page itself links to the file."""
 LINK = re.compile(r"\[([^\]]*)\]\(([^)#\s]+)(#[^)\s]*)?\)")
@@ -30,6 +31,7 @@ myst_heading_anchors = 4
 highlight_language = "none"
 html_theme = "furo"
 html_title = "virtual_axes"
+html_show_copyright = False
 html_show_sphinx = False
 html_copy_source = False
 html_static_path = ["_static"]
@@ -43,7 +45,6 @@ def read_page(_app: Sphinx, name: str, source: list[str]) -> None:
         page = ROOT / ROOT_PAGES[name]
         source[0] = page.read_text(encoding="utf-8")
     pages = {ROOT / file: DOCS / f"{one}.md" for one, file in ROOT_PAGES.items()}
-    pages[ROOT / "README.md"] = DOCS / "index.md"
 
     def rewritten(link: re.Match[str]) -> str:
         text, target, anchor = link[1], link[2], link[3] or ""
