@@ -38,12 +38,13 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 
 
-def read_page(_app: Sphinx, name: str, source: list[str]) -> None:
+def read_page(app: Sphinx, name: str, source: list[str]) -> None:
     """Takes the text of a page from the top level where it is there, and rewrites links that leave docs/."""
     page = DOCS / f"{name}.md"
     if name in ROOT_PAGES:
         page = ROOT / ROOT_PAGES[name]
         source[0] = page.read_text(encoding="utf-8")
+        app.env.note_dependency(str(page))
     pages = {ROOT / file: DOCS / f"{one}.md" for one, file in ROOT_PAGES.items()}
 
     def rewritten(link: re.Match[str]) -> str:
