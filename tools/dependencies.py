@@ -3,8 +3,8 @@
 
     tools/dependencies.py               fails if the table is out of date, a license is not in deny.toml's list,
                                         a crate does not come from the registry or requires a newer Rust than
-                                        rust-version, or a member of the workspace depends on what its layer
-                                        excludes
+                                        rust-version, README.md or fuzz/ state another version, or a member of
+                                        the workspace depends on what its layer excludes
     tools/dependencies.py --write       writes the table
     tools/dependencies.py --advisories  asks cargo-audit or cargo-deny, where one of them is installed
 
@@ -108,6 +108,20 @@ def newest_rust(rows: list[Row]) -> tuple[str, list[str]]:
     return ".".join(map(str, newest)), names
 
 
+def rust_faults(rust: str, names: list[str]) -> list[str]:
+    """Returns contradictions of rust-version in Cargo.toml: newer crates, other versions in fuzz/ and README.md."""
+    stated = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["rust-version"]
+    of_fuzz = tomllib.loads((ROOT / "fuzz" / "Cargo.toml").read_text())["package"]["rust-version"]
+    faults = []
+    if version(rust) > version(stated):
+        faults.append(f"rust-version in Cargo.toml is {stated}, {names[0]} requires {rust}")
+    if of_fuzz != stated:
+        faults.append(f"rust-version in fuzz/Cargo.toml is {of_fuzz}, expected {stated}")
+    if f"Rust {stated} or newer" not in " ".join((ROOT / "README.md").read_text().split()):
+        faults.append(f"README.md does not contain: Rust {stated} or newer")
+    return faults
+
+
 def crates(rules: dict[str, Any]) -> list[Row]:
     """Returns the crates, sorted by name."""
     own = ROOT / "Cargo.toml"
@@ -179,10 +193,9 @@ def main() -> int:
     for fault in faults:
         print(f"dependencies: {fault}, which deny.toml does not allow", file=sys.stderr)
     rust, names = newest_rust(rows)
-    stated = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["rust-version"]
-    is_too_new = version(rust) > version(stated)
-    if is_too_new:
-        print(f"dependencies: rust-version in Cargo.toml is {stated}, {names[0]} requires {rust}", file=sys.stderr)
+    of_rust = rust_faults(rust, names)
+    for fault in of_rust:
+        print(f"dependencies: {fault}", file=sys.stderr)
     head = f"Newest Rust required by a crate: {rust} ({', '.join(names)}).\n\n"
     head += "| crate | version | license | needed by |\n|---|---|---|---|\n"
     table = head + "".join(f"| {row.name} | {row.version} | {row.license} | {row.what} |\n" for row in rows)
@@ -198,7 +211,7 @@ def main() -> int:
             file=sys.stderr,
         )
     print(f"{len(rows)} crates, {sum(row.what == PROGRAMS for row in rows)} of them in the programs")
-    return bool(faults or layers or is_too_new)
+    return bool(faults or layers or of_rust)
 
 
 if __name__ == "__main__":
