@@ -62,6 +62,7 @@ class Reference:
             "messages.md": messages(),
             "launch.md": launch(),
             "command-line.md": command_line(),
+            "scenarios.md": scenarios(),
         }
         return pages | parameter_pages(self.parameters)
 
@@ -220,6 +221,18 @@ def command_line() -> str:
         "[File formats](file-formats.md), search and cost of `tune` in [Tuning](tuning.md), environment variables of "
         "the node in [Environment](environment.md).",
         *parts,
+    )
+
+
+def scenarios() -> str:
+    """Returns the page of the built-in scenarios."""
+    rows = [[f"`{row['name']}`", row["description"], row["source"] or "–"] for row in output("scenarios")]
+    return page(
+        "Scenarios",
+        "Built-in motions for `virtual_axes run`, `tune`, `robustness` and `psec`. `virtual_axes scenarios --show NAME` "
+        "prints one as a template for your own; [File formats](file-formats.md) describes the keys. The column of the "
+        "source names the figure or section of Prévost, Lavernhe, Lartigue and Dumur.",
+        table(["scenario", "motion", "source"], rows),
     )
 
 
