@@ -230,8 +230,9 @@ def scenarios() -> str:
     return page(
         "Scenarios",
         "Built-in motions for `virtual_axes run`, `tune`, `robustness` and `psec`. "
-        "`virtual_axes scenarios --show NAME` prints one as a template for your own; [File formats](file-formats.md) describes the keys. The column of the "
-        "source names the figure or section of Prévost, Lavernhe, Lartigue and Dumur.",
+        "`virtual_axes scenarios --show NAME` prints one as a template for your own; [File formats](file-formats.md) "
+        "describes the keys. The column of the source names the figure or section of Prévost, Lavernhe, Lartigue and "
+        "Dumur.",
         table(["scenario", "motion", "source"], rows),
     )
 
