@@ -34,8 +34,14 @@ mkdir -p "$root/.build/logs"
 "$root/tools/setup.sh" >"$root/.build/logs/demo-setup.log" 2>&1 </dev/null &
 setup=$!
 trap 'kill -TERM "$setup" 2>/dev/null || true' EXIT
-(cd "$root" && cargo build --release --locked --bins)
-wait "$setup" || { cat "$root/.build/logs/demo-setup.log" >&2; exit 1; }
+echo "demo: building, and setting up Python beside it (log: .build/logs/demo-setup.log); minutes at the first run" >&2
+(cd "$root" && exec cargo build --release --locked --bins) &
+build=$!
+trap 'kill -TERM "$setup" "$build" 2>/dev/null || true' EXIT
+# Whichever fails first ends the demo.
+for _ in setup build; do
+  wait -n || { cat "$root/.build/logs/demo-setup.log" >&2; exit 1; }
+done
 trap - EXIT
 # shellcheck source=/dev/null
 source "$root/.build/env.sh"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import secrets
 import signal
@@ -94,9 +95,13 @@ class Terminal:
         """Ends a running command as Ctrl+C does."""
         if not self.is_busy:
             return
-        for pid in _descendants(self._bash.pid):
-            os.kill(pid, signal.SIGINT)
-        _, status = self.wait(seconds)
+        status, ends = None, time.monotonic() + seconds
+        # Again each second: a signal before the start of the last command of a list does not end that command.
+        while status is None and time.monotonic() < ends:
+            for pid in _descendants(self._bash.pid):
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGINT)
+            _, status = self.wait(1)
         if status is None:
             raise TimeoutError(f"the command of process {self._bash.pid} does not end within {seconds} s of SIGINT")
 

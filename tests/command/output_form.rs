@@ -53,7 +53,7 @@ fn compared_runs_stand_in_columns_below_their_verdict() {
     assert_eq!(row.split_whitespace().collect::<Vec<_>>()[3..], ["µm", "68.6", "13.2", "(−81", "%)"]);
     // Signed figures are compared by their difference.
     let row = lines.find(|line| line.contains("radial deviation, mean")).expect("a row");
-    assert!(row.contains("49.0") && row.contains("-0.4 (−49.4)"), "{row}");
+    assert!(row.contains("49.0") && row.contains("−0.4 (−49.4)"), "{row}");
 }
 
 #[test]

@@ -163,11 +163,16 @@ impl PathPlot<'_> {
 
     /// Returns CSS class and label of each class of the contour error.
     pub(super) fn error_legend(&self) -> Vec<(String, String)> {
-        let limit = |class: usize| {
-            DisplayUnit::MICROMETER.format(self.largest_error * class as f64 / ERROR_CLASSES as f64)
+        let largest = self.tool.contour_error.iter().copied().fold(0.0, f64::max);
+        let limit = |class: usize| self.largest_error * class as f64 / ERROR_CLASSES as f64;
+        let label = |class: usize| {
+            format!("contour error up to {}", DisplayUnit::MICROMETER.format(limit(class + 1)))
         };
-        let label = |class: usize| format!("contour error up to {}", limit(class + 1));
-        (1..ERROR_CLASSES).map(|class| (error_class(class), label(class))).collect()
+        // Classes that the path does not reach are not in the legend.
+        (1..ERROR_CLASSES)
+            .filter(|&class| largest > limit(class))
+            .map(|class| (error_class(class), label(class)))
+            .collect()
     }
 
     /// Returns the parts of the magnified path by class of their contour error, without the lowest class, which has
@@ -244,7 +249,7 @@ impl PathPlot<'_> {
             svg.path(&class, &lines);
         }
         let note = format!("error × {}", number(self.magnification.value(), 0));
-        svg.text("halo", [RIGHT - 8.0, TOP + 18.0], Anchor::End, &note);
+        svg.text("label", [LEFT, bottom + BELOW - 7.0], Anchor::Start, &note);
         if let Some((start, _)) = points.first() {
             svg.circle("start", *start, 4.0);
         }

@@ -114,10 +114,13 @@ fn paths(page: &mut Page, tools: &[(usize, &ToolTrace)]) -> bool {
             ("start".to_owned(), "start".to_owned()),
         ];
         let largest_error = traces.iter().map(|tool| self::peak(&tool.contour_error)).fold(0.0, f64::max);
+        let is_other_scale = magnification(peak).value() != magnification(largest).value();
         let plot = PathPlot { view, tool, magnification: magnification(peak), range, largest_error, class };
         legend.extend(plot.error_legend());
+        let scale = if is_other_scale { ", not the scale of the run with the largest error" } else { "" };
+        let note = format!("{}{scale}", plot.note());
         let title = page.caption_for_run(&format!("{} path", view.name()), run);
-        let caption = Caption { title: title.clone(), note: plot.note(), legend };
+        let caption = Caption { title: title.clone(), note, legend };
         page.html.figure("plane", &caption, &title, |id, title| plot.draw(id, title));
     }
     !drawn.is_empty()

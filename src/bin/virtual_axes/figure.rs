@@ -52,7 +52,7 @@ impl Figure {
 
     /// Returns the value with its decimals, without a negative zero.
     pub fn text(&self) -> String {
-        rounded(self.value, self.decimals)
+        rounded(self.value, self.decimals).replace('-', "−")
     }
 
     /// Returns the value and its difference from `base`: in percent, or in the unit of a signed value.

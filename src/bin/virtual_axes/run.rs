@@ -78,7 +78,12 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
     for (parameters, changes) in variants {
         let config = variant::checked(&parameters, &machine, &arguments.trial.machine)?;
         let outcome = trial(arguments, &input, &parameters, &config)?;
-        runs.push(VariantRun { controller: variant::controller_name(&parameters), changes, outcome });
+        runs.push(VariantRun {
+            controller: variant::controller_name(&parameters),
+            changes,
+            shared_changes: arguments.trial.set.len(),
+            outcome,
+        });
     }
     let name = machine.machine_config()?.name().to_owned();
     if let Some(path) = &arguments.report {
@@ -211,12 +216,20 @@ fn several(runs: &[VariantRun]) -> Vec<String> {
             parts.push(text_table::aligned(&part, &[0, 1]));
         }
     }
-    let remarks = runs.iter().flat_map(|run| {
-        let title = run.title();
-        table::remarks(&run.outcome.figures).into_iter().map(move |remark| format!("{title}: {remark}"))
-    });
+    let all: Vec<Vec<String>> = runs.iter().map(|run| table::remarks(&run.outcome.figures)).collect();
+    let remarks: Vec<String> = match all.split_first() {
+        Some((first, others)) if others.iter().all(|other| other == first) => first.clone(),
+        _ => runs
+            .iter()
+            .zip(all)
+            .flat_map(|(run, remarks)| {
+                let title = run.title();
+                remarks.into_iter().map(move |remark| format!("{title}: {remark}"))
+            })
+            .collect(),
+    };
     let notes = table::comparison_note(runs).into_iter().chain([table::SAMPLING.to_owned()]);
-    parts.push(remarks.chain(notes).map(|line| text_table::wrapped_line(&line)).collect());
+    parts.push(remarks.into_iter().chain(notes).map(|line| text_table::wrapped_line(&line)).collect());
     parts
 }
 

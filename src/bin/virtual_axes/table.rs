@@ -152,7 +152,10 @@ fn columns_of(caption: &str, runs: &[VariantRun], figures: &[Vec<Figure>]) -> Ta
 /// Returns the explanation of the differences in [`comparison`].
 pub fn comparison_note(runs: &[VariantRun]) -> Option<String> {
     let first = runs.first().filter(|_| runs.len() > 1)?;
-    Some(format!("in parentheses: difference from {}, in percent; of radial deviations in µm", first.title()))
+    Some(format!(
+        "in parentheses: difference from {} in percent, of signed figures in their unit; none below 0.5 %",
+        first.title()
+    ))
 }
 
 /// Returns the definition of the reversal spikes, for runs with circles.
@@ -166,4 +169,4 @@ pub fn spike_note(runs: &[VariantRun]) -> Option<String> {
 
 /// Sampling of the contour errors and radial deviations.
 pub const SAMPLING: &str =
-    "evaluated at every current cycle; messages and traces have one sample per position cycle";
+    "errors are evaluated at every current cycle; a trace or message has one sample per position cycle";

@@ -282,7 +282,7 @@ fn record(
             Tuning::Cascade(_) => "cascade".to_owned(),
         };
         let outcome = problem.record_on(workload, tuning)?;
-        Ok(VariantRun { controller, changes: vec![tuning.to_string()], outcome })
+        Ok(VariantRun { controller, changes: vec![tuning.to_string()], shared_changes: 0, outcome })
     };
     Ok([run(&Tuning::Present)?, run(&found.best.tuning)?])
 }

@@ -129,8 +129,10 @@ pub fn checked(
 pub struct VariantRun {
     /// Name of the controller.
     pub controller: String,
-    /// Changed parameters, in the syntax of the command line.
+    /// Changed parameters of all runs, then of this run, in the syntax of the command line.
     pub changes: Vec<String>,
+    /// Number of changes that all runs share.
+    pub shared_changes: usize,
     /// Result of the run.
     pub outcome: TrialOutcome,
 }
@@ -139,7 +141,7 @@ impl VariantRun {
     /// Returns the title that distinguishes the run from the others.
     pub fn title(&self) -> String {
         let mut title = self.controller.clone();
-        for change in &self.changes {
+        for change in self.changes.iter().skip(self.shared_changes) {
             title.push_str(", ");
             title.push_str(change);
         }

@@ -74,6 +74,8 @@ fn a_long_name_of_a_run_wraps() {
     let page = page(vec![report_run("cascade", &recording), report_run("cascade, x.y=1", &recording)]);
     let style = between(&page, "<style>", "</style>")[0];
     let rules: Vec<&str> = style.split('}').filter(|rule| rule.contains(".figures thead th")).collect();
-    assert!(rules.iter().any(|rule| rule.contains("overflow-wrap: anywhere") && rule.contains("max-width")));
+    assert!(
+        rules.iter().any(|rule| rule.contains("overflow-wrap: break-word") && rule.contains("max-width"))
+    );
     assert!(!rules.iter().any(|rule| rule.contains("nowrap")), "{rules:?}");
 }
