@@ -153,7 +153,7 @@ fn columns_of(caption: &str, runs: &[VariantRun], figures: &[Vec<Figure>]) -> Ta
 pub fn comparison_note(runs: &[VariantRun]) -> Option<String> {
     let first = runs.first().filter(|_| runs.len() > 1)?;
     Some(format!(
-        "in parentheses: difference from {} in percent, of signed figures in their unit; none below 0.5 %",
+        "in parentheses: difference from {} in percent, of signed figures in their unit",
         first.title()
     ))
 }
