@@ -13,6 +13,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 
+def _interrupt_by_default() -> None:
+    """Restores the effect of SIGINT, which processes ignore that a shell started in the background."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 class Terminal:
     """Bash in a process group of its own, with standard output and error in one text."""
 
@@ -26,6 +31,7 @@ class Terminal:
             cwd=directory,
             env=dict(environment),
             start_new_session=True,
+            preexec_fn=_interrupt_by_default,
         )
         self._output = bytearray()
         self._changed = threading.Condition()
