@@ -1,6 +1,8 @@
-//! Verification of the library: stress test with random trajectories, and fixtures shared by the tests of all crates.
+//! Verification of the library: stress test with random trajectories, production traces, and fixtures shared by the tests
+//! of all crates.
 //!
 //! - [`stress`] runs random trajectories and checks limits, friction, energy balance and following errors at every tick.
+//! - [`production_traces`] generates recordings of hidden axes in production.
 //! - [`fixtures`] contains test machines, recordings, tuning problems and temporary folders.
 //!
 //! The crate is a development dependency only and is not published.
@@ -24,4 +26,5 @@
 #![forbid(unsafe_code)]
 
 pub mod fixtures;
+pub mod production_traces;
 pub mod stress;

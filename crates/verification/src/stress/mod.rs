@@ -14,7 +14,7 @@ mod exponential;
 mod invariants;
 mod linear_axis;
 mod plan;
-mod random;
+pub(crate) mod random;
 mod response;
 mod runs;
 mod shape;

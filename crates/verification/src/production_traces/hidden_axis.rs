@@ -1,0 +1,150 @@
+//! Axis with hidden random parameters, and its simulation.
+
+use std::sync::Arc;
+
+use virtual_axes_core::config::{AxisConfig, LimitsConfig, MachineConfig, Periods};
+use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters};
+use virtual_axes_core::units::{METER_PER_MINUTE, Nanoseconds, seconds};
+
+use super::drawn::{draw_axis, draw_periods};
+use super::error::TraceError;
+use super::program::ProductionProgram;
+use crate::fixtures::recordings::stribeck_current;
+use crate::stress::random::RandomSource;
+
+/// Numbers of the random streams of a seed.
+pub(super) mod stream {
+    /// Periods of a machine.
+    pub const PERIODS: u64 = 1;
+    /// Knowledge of the periods.
+    pub const PERIOD_KNOWLEDGE: u64 = 2;
+    /// Moves of a program.
+    pub const PROGRAM: u64 = 3;
+    /// Stamps and gaps of a trace, common to its axes.
+    pub const STAMPS: u64 = 4;
+    /// Parameters of an axis, plus its joint index.
+    pub const AXIS: u64 = 100;
+    /// Guess of an axis, plus its joint index.
+    pub const GUESS: u64 = 200;
+    /// Noise of an axis, plus its joint index.
+    pub const NOISE: u64 = 300;
+}
+
+/// Names of the joints of a [`ProductionProgram`].
+pub(super) const JOINT_NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// Orientation of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisOrientation {
+    /// Horizontal axis without weight.
+    Horizontal,
+    /// Vertical axis with a weight of 3000 to 6000 N.
+    Vertical,
+}
+
+/// Axis with parameters that an identification must find.
+///
+/// Backlash and Stribeck friction are effects beyond the model, 0 after drawing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HiddenAxis {
+    /// Parameters of drive and control, SI units.
+    pub config: AxisConfig,
+    /// Periods of the control.
+    pub periods: Periods,
+    /// Index in [`ProductionProgram`]: 0 for X, 1 for Y, 2 for Z.
+    pub joint: usize,
+    /// True if the recorded current has the opposite sign of the motor current.
+    pub is_current_inverted: bool,
+    /// Backlash, m: width of the hysteresis between the motor and the load, whose position is recorded. The control
+    /// closes its loops on the motor; the recorded velocity is that of the motor.
+    pub backlash: f64,
+    /// Additional friction near standstill, A (Stribeck effect): peak of an exponential of 0.5 m/min.
+    pub stribeck: f64,
+}
+
+/// Simulated signals of an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedAxis {
+    /// Period of the samples, s.
+    pub period: f64,
+    /// Samples of the motor side, one per period, from the start of the program.
+    pub samples: Vec<AxisSample>,
+    /// Part of the position cycles with speed, current or voltage setpoint at its limit, 0 … 1.
+    pub saturated: f64,
+}
+
+impl HiddenAxis {
+    /// Draws an axis: X if horizontal, Z if vertical.
+    pub fn draw(seed: u64, orientation: AxisOrientation) -> Self {
+        let joint = match orientation {
+            AxisOrientation::Horizontal => 0,
+            AxisOrientation::Vertical => 2,
+        };
+        Self::draw_joint(seed, joint)
+    }
+
+    /// Draws the axis of a joint: X and Y are horizontal, Z is vertical. Joints of one seed have equal periods.
+    pub(super) fn draw_joint(seed: u64, joint: usize) -> Self {
+        let periods = draw_periods(&mut RandomSource::new(seed, stream::PERIODS));
+        let mut random = RandomSource::new(seed, stream::AXIS + joint as u64);
+        let orientation = if joint == 2 { AxisOrientation::Vertical } else { AxisOrientation::Horizontal };
+        let config = draw_axis(&mut random, JOINT_NAMES[joint], orientation, &periods);
+        let is_current_inverted = random.chance(0.5);
+        HiddenAxis { config, periods, joint, is_current_inverted, backlash: 0.0, stribeck: 0.0 }
+    }
+
+    /// Returns a machine with this axis only.
+    pub fn machine(&self) -> MachineConfig {
+        MachineConfig::from_axis(self.config.clone(), self.periods)
+    }
+
+    /// Plans program `seed` of up to `duration` s within the limits of this axis.
+    ///
+    /// # Errors
+    /// [`TraceError`] if the duration is out of range or the program cannot be planned.
+    pub fn program(&self, seed: u64, duration: f64) -> Result<ProductionProgram, TraceError> {
+        let limits: [LimitsConfig; 3] = [*self.config.limits(); 3];
+        ProductionProgram::draw(seed, duration, &limits)
+    }
+
+    /// Returns the lag of the position behind the commanded position at constant velocity, s: α rounded up to whole
+    /// position cycles, at which the position controller reads its setpoint.
+    pub fn lag(&self) -> f64 {
+        let ticks = (self.config.delays.alpha + self.periods.current / 2) / self.periods.current;
+        let cycles = (ticks as u64).div_ceil(self.periods.ticks_per_position());
+        seconds(cycles as Nanoseconds * self.periods.position)
+    }
+
+    /// Simulates the axis on a program with one sample every `period` ns, but at most one per position cycle.
+    ///
+    /// # Errors
+    /// [`TraceError::Machine`] if the axis cannot be simulated.
+    pub fn simulate(
+        &self,
+        program: &ProductionProgram,
+        period: Nanoseconds,
+    ) -> Result<SimulatedAxis, TraceError> {
+        let mut machine = Machine::new(Arc::new(MachineParameters::new(&self.machine())?));
+        let tsp = seconds(self.periods.position);
+        machine.reset(&[program.psec(self.joint, 0.0)]);
+        let sampling = period.max(self.periods.position);
+        let every = (sampling / self.periods.current).max(1) as u64;
+        let force_constant = self.config.motor.torque_constant / self.config.transmission_ratio;
+        let cycles = (program.duration() / tsp).floor() as u64;
+        let (mut samples, mut saturated) = (Vec::new(), 0_u64);
+        for k in 0..=cycles {
+            if self.stribeck != 0.0 {
+                let velocity = machine.axis(0).sample().velocity / METER_PER_MINUTE;
+                machine.set_load(0, -force_constant * stribeck_current(self.stribeck, velocity));
+            }
+            machine.advance_with(&[program.psec(self.joint, k as f64 * tsp)], &[], |machine| {
+                if machine.tick().is_multiple_of(every) {
+                    samples.push(*machine.axis(0).sample());
+                }
+            });
+            saturated += u64::from(machine.activity(0).saturated_ticks > 0);
+        }
+        let saturated = saturated as f64 / (cycles + 1) as f64;
+        Ok(SimulatedAxis { period: seconds(sampling), samples, saturated })
+    }
+}

@@ -1,0 +1,4 @@
+//! Tests of the production traces.
+
+mod hidden_axes;
+mod traces;
