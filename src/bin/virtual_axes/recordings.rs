@@ -7,7 +7,7 @@ use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::identify::{FeedforwardMode, IdentificationInput};
 use virtual_axes_identify::recording::{Conditioning, Finding, Signals, condition};
-use virtual_axes_io::files::{Columns, RecordingOptions, read_recording};
+use virtual_axes_io::files::{Columns, RecordingFormat, RecordingOptions, read_recording};
 
 use crate::campaign::FeedforwardName;
 
@@ -25,9 +25,15 @@ pub struct RecordingArguments {
     /// Topic of an MCAP recording, or a prefix of its name, if several topics have one type; can be repeated.
     #[arg(long)]
     topic: Vec<String>,
-    /// Joint name in the recordings [default: axis name].
+    /// Joint in the recordings, or name or number of the axis in their columns [default: axis name].
     #[arg(long)]
     joint: Option<String>,
+    /// Format of the recordings [default: detected]: csv, halsampler or mcap.
+    #[arg(long, value_name = "NAME")]
+    format: Option<RecordingFormat>,
+    /// Sampling rate of recordings without a column of time, Hz.
+    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    rate_hz: Option<f64>,
     /// Cut-off frequency (−3 dB) of the filter of velocity, acceleration and current, Hz [default: 100, less
     /// for low sampling rates].
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
@@ -46,7 +52,13 @@ impl RecordingArguments {
     /// Returns the options for reading files.
     pub fn options(&self) -> Result<RecordingOptions, Box<dyn Error>> {
         let columns = Columns::read(self.map(), &self.column, "--column")?;
-        Ok(RecordingOptions { columns, topics: self.topic.clone(), joint: self.joint.clone() })
+        Ok(RecordingOptions {
+            columns,
+            topics: self.topic.clone(),
+            joint: self.joint.clone(),
+            format: self.format,
+            rate_hz: self.rate_hz,
+        })
     }
 
     fn conditioning(&self) -> Conditioning {

@@ -36,8 +36,9 @@ pub use psec_mcap::{McapTrajectories, TrajectoryRecordingError};
 pub use psec_writer::{PsecCsvWriter, PsecMcapWriter, PsecWriter, PsecYamlWriter, psec_writer};
 pub use psec_yaml::{TrajectoryYamlError, read_psec_yaml};
 pub use recording::{
-    AxisRecordingError, Channel, Columns, ColumnsError, RecordingOptions, read_recording, read_recording_csv,
-    read_recording_mcap,
+    AxisRecordingError, Channel, ColumnUnit, Columns, ColumnsError, FoundColumn, RecordingColumns,
+    RecordingFormat, RecordingFormatError, RecordingOptions, inspect_recording, read_recording,
+    read_recording_csv, read_recording_mcap,
 };
 pub use trace::{TraceWriter, trace_writer};
 pub use trace_csv::TraceCsvWriter;

@@ -4,6 +4,8 @@ mod bounded_recording;
 mod psec_csv;
 mod psec_mcap;
 mod psec_yaml;
+mod recording_columns;
 mod recording_csv;
+mod recording_halsampler;
 mod recording_mcap;
 mod urdf;

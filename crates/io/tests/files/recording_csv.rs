@@ -363,20 +363,18 @@ fn csv_variants_of_oscilloscopes_are_read() {
 #[test]
 fn an_error_of_a_missing_column_lists_the_columns() {
     assert_eq!(
-        error("time,Position,i\n0,0,0\n", &[]),
-        "r.csv:1: there is no column \"x.position\" or \"position\" for position; there are time, Position, i; \
-         the nearest is Position; time and position are required: select a column by CHANNEL=COLUMN[UNIT]"
+        error("time,Positon,i\n0,0,0\n", &[]),
+        "r.csv:1: there is no column \"x.position\" or \"position\" for position; there are time, Positon, i; \
+         the nearest is Positon; time and position are required: select a column by CHANNEL=COLUMN[UNIT]"
     );
     assert_eq!(
         error("time,y.position,y.current\n0,0,0\n", &[]),
-        "r.csv:1: there is no column \"x.position\" or \"position\" for position; there are time, y.position, \
-         y.current; the nearest is y.position; time and position are required: select a column by \
-         CHANNEL=COLUMN[UNIT]"
+        "r.csv:1: the file has no columns of axis x; there are the axes y: select one by --joint"
     );
     // Setpoints, not a recording.
     let message = error("time,x,y\n0,0,0\n", &[]);
     assert!(message.contains("there are time, x, y; the nearest is x"), "{message}");
-    assert!(error("t,position\n0,0\n", &[]).starts_with("r.csv:1: there is no column \"time\" for time;"));
+    assert!(error("k,position\n0,0\n", &[]).starts_with("r.csv:1: there is no column \"time\" for time;"));
     let message = error("time,position,current_A\n0,0,0\n", &["current=current_a[A]"]);
     assert!(
         message.starts_with(

@@ -2,26 +2,19 @@
 
 use std::io::Read;
 
-use super::columns::Columns;
 use super::error::{AxisRecordingError, MAX_ROWS};
 use super::layout::{Context, Layout, next_line, parse_number};
+use super::recording_builder::build_recording;
 use super::unit::Channel;
 use crate::files::lines::{Lines, fields_between};
-use virtual_axes_core::config::AxisConfig;
 use virtual_axes_core::text::shortened;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
 type Found<T> = Result<T, AxisRecordingError>;
 
-/// Reads the recording of an axis from CSV. `name` is the file name in errors, `joint` the prefix of trace headers.
-pub(super) fn read(
-    input: impl Read,
-    name: &str,
-    axis: &AxisConfig,
-    joint: &str,
-    columns: &Columns,
-) -> Found<(RawRecording, Vec<Finding>)> {
-    let context = Context { name, axis, joint, columns };
+/// Reads the recording of an axis from CSV.
+pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
+    let Context { name, columns, .. } = *context;
     let factors = context.factors()?;
     let mut lines = Lines::new(input);
     let Some((line, text)) = first_line(&mut lines, columns.skip_lines, name)? else {
@@ -31,7 +24,7 @@ pub(super) fn read(
     };
     let layout = context.layout(line, &text, &factors).map_err(|mut error| {
         if let AxisRecordingError::NoColumn { hint, .. } = &mut error {
-            *hint = context.hint(line, &text, &mut lines, &factors).into();
+            *hint = format!("{hint}{}", context.hint(line, &text, &mut lines, &factors)).into();
         }
         error
     })?;
@@ -72,43 +65,9 @@ pub(super) fn read(
         );
         findings.push(Finding::warning("unended", what, "end the last line with a line break, or delete it"));
     }
-    context.report_default_columns(&layout, &mut findings);
-    Ok((build_recording(name, channels, &layout, rows, &mut findings)?, findings))
-}
-
-/// Builds a recording from the channels that have values.
-fn build_recording(
-    name: &str,
-    channels: [Vec<f64>; Channel::ALL.len()],
-    layout: &Layout,
-    rows: usize,
-    findings: &mut Vec<Finding>,
-) -> Found<RawRecording> {
-    let mut recording = RawRecording { name: name.to_owned(), ..RawRecording::default() };
-    for (index, (channel, values)) in Channel::ALL.into_iter().zip(channels).enumerate() {
-        let Some(column) = layout.slots.iter().position(|slot| slot.is_some_and(|(p, _)| p == index)) else {
-            continue;
-        };
-        if values.iter().all(|value| value.is_nan()) {
-            if channel.is_required() {
-                return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel, rows });
-            }
-            let column = &layout.columns[column];
-            let what = format!("{name}: column {column} ({channel}) has no values and is ignored");
-            findings.push(Finding::note("empty-channel", what));
-            continue;
-        }
-        match channel {
-            Channel::Time => recording.time = values,
-            Channel::Psec => recording.psec = Some(values),
-            Channel::Position => recording.position = Some(values),
-            Channel::Velocity => recording.velocity = Some(values),
-            Channel::Current => recording.current = Some(values),
-            Channel::VelocityFeedforward => recording.velocity_feedforward = Some(values),
-            Channel::TorqueFeedforward => recording.torque_feedforward = Some(values),
-        }
-    }
-    Ok(recording)
+    let recording =
+        build_recording(context, channels, (&layout.assignment, &layout.found), rows, &mut findings)?;
+    Ok((recording, findings))
 }
 
 /// Returns the first line that is neither blank nor skipped.
@@ -124,14 +83,14 @@ fn first_line(lines: &mut Lines<impl Read>, skip: u64, name: &str) -> Found<Opti
 impl Layout {
     /// Adds the values of a line to their channels.
     fn row(&self, name: &str, line: u64, text: &str, channels: &mut [Vec<f64>]) -> Found<()> {
-        let wanted = self.slots.len();
+        let wanted = self.assignment.slots.len();
         let mut found = 0;
         let mut values = [f64::NAN; Channel::ALL.len()];
         let mut wrong = None;
         let mut surplus_is_blank = true;
         for (column, field) in fields_between(text, self.delimiter).enumerate() {
             found += 1;
-            let Some(slot) = self.slots.get(column) else {
+            let Some(slot) = self.assignment.slots.get(column) else {
                 surplus_is_blank &= field.is_empty();
                 continue;
             };

@@ -1,5 +1,6 @@
 //! Errors of reading recordings of an axis.
 
+use super::format::RecordingFormat;
 use super::unit::Channel;
 use crate::files::{FileKind, McapFileError};
 use virtual_axes_core::text::nearest_hint;
@@ -97,6 +98,66 @@ pub enum AxisRecordingError {
         column: String,
         /// Number of columns with this header.
         count: usize,
+    },
+    /// Several columns fit a channel.
+    #[error(
+        "{at}: columns {} all fit {channel}: select one, for example by --column '{channel}=#{number}'",
+        .columns.join(", ")
+    )]
+    Ambiguous {
+        /// File and line.
+        at: String,
+        /// Channel of the recording.
+        channel: Channel,
+        /// Numbers and headers of the columns.
+        columns: Vec<String>,
+        /// Number of the first column.
+        number: usize,
+    },
+    /// The axis is not in the file, or not unique.
+    #[error("{at}: {reason} axis {axis}; there are the axes {}: select one by --joint", .axes.join(", "))]
+    Axis {
+        /// File and line.
+        at: String,
+        /// Reason of the error.
+        reason: &'static str,
+        /// Name of the axis or joint searched for.
+        axis: String,
+        /// Axes of the file.
+        axes: Vec<String>,
+    },
+    /// The unit of a detected column does not fit the channel or the axis.
+    #[error(
+        "{at}: {channel} from column {column} {found}, must be in one of {allowed}; give the unit by \
+         --column '{channel}=COLUMN[UNIT]', for example with a factor: [25.4 mm]"
+    )]
+    ColumnUnit {
+        /// File and line.
+        at: String,
+        /// Channel of the recording.
+        channel: Channel,
+        /// Header of the column.
+        column: String,
+        /// Description of the unit found.
+        found: String,
+        /// Allowed units, separated by commas.
+        allowed: String,
+    },
+    /// The sampling rate is invalid.
+    #[error("--rate-hz: the sampling rate is {found}, must be a finite number above 0")]
+    Rate {
+        /// Sampling rate found, Hz.
+        found: f64,
+    },
+    /// The content does not have the selected format.
+    #[error("{at}: not a recording of the format {format}: {reason}")]
+    Content {
+        /// File, and line if known.
+        at: String,
+        /// Selected or detected format.
+        format: RecordingFormat,
+        /// Content found, and what is allowed.
+        reason: String,
     },
     /// Two channels use the same column.
     #[error("{at}: {first} and {second} both use column #{number}")]

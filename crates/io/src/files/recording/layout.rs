@@ -2,13 +2,15 @@
 
 use std::io::Read;
 
+use super::assignment::ColumnAssignment;
 use super::columns::{Column, Columns};
 use super::error::AxisRecordingError;
+use super::found_column::FoundColumn;
+use super::inspect::detect_columns;
 use super::unit::Channel;
 use crate::files::lines::{Lines, fields_between};
 use virtual_axes_core::config::{AxisConfig, AxisKind};
-use virtual_axes_core::text::{nearest_name, shortened};
-use virtual_axes_identify::recording::Finding;
+use virtual_axes_core::text::shortened;
 
 /// Number of lines searched for a header, for a hint.
 const PREAMBLE: u64 = 100;
@@ -26,20 +28,25 @@ pub(super) struct Layout {
     pub decimal_comma: bool,
     /// Headers, or column numbers if there is no header.
     pub columns: Vec<String>,
-    /// Per column: index of its channel in [`Channel::ALL`], and factor to SI.
-    pub slots: Vec<Option<(usize, f64)>>,
-    /// Indices of the channels found by their default headers.
-    pub default_channels: Vec<usize>,
+    /// Detected meanings of the columns.
+    pub found: Vec<FoundColumn>,
+    /// Channels of the columns.
+    pub assignment: ColumnAssignment,
     /// True if the first line contains values instead of a header.
     pub is_data: bool,
 }
 
-/// File, axis and column mapping of a CSV file.
+/// File, axis, column mapping and sampling rate of a recording.
+#[derive(Clone, Copy)]
 pub(super) struct Context<'a> {
     pub name: &'a str,
     pub axis: &'a AxisConfig,
     pub joint: &'a str,
+    /// True if the user names the joint.
+    pub is_joint_given: bool,
     pub columns: &'a Columns,
+    /// Sampling rate, Hz, of a file without a column of time.
+    pub rate: Option<f64>,
 }
 
 /// Parses a number: NaN for an empty field, `None` if invalid.
@@ -60,7 +67,7 @@ pub(super) fn parse_number(text: &str, decimal_comma: bool) -> Option<f64> {
 }
 
 /// Formats names for an error message.
-fn format_names(names: &[String]) -> String {
+pub(super) fn format_names(names: &[String]) -> String {
     let shown: Vec<String> = names.iter().take(MAX_NAMES).map(|name| shortened(name)).collect();
     let more =
         if names.len() > MAX_NAMES { format!(", … ({} columns)", names.len()) } else { String::new() };
@@ -76,6 +83,17 @@ pub(super) fn next_line<'a>(lines: &'a mut Lines<impl Read>, name: &str) -> Foun
         }
         Ok(found) => Ok(found),
         Err((line, reason)) => Err(not_text(line, reason)),
+    }
+}
+
+impl Columns {
+    /// Returns the delimiter of a line: that of the mapping, or the one detected.
+    pub(super) fn delimiter_of(&self, text: &str) -> char {
+        let found = || {
+            let usable = |d: &char| !(self.decimal_comma && *d == ',');
+            DELIMITERS.into_iter().find(|d| usable(d) && text.contains(*d)).unwrap_or(DELIMITERS[0])
+        };
+        self.delimiter.unwrap_or_else(found)
     }
 }
 
@@ -105,64 +123,41 @@ impl Context<'_> {
         Ok(factors)
     }
 
-    fn delimiter(&self, text: &str) -> char {
-        let found = || {
-            let usable = |d: &char| !(self.columns.decimal_comma && *d == ',');
-            DELIMITERS.into_iter().find(|d| usable(d) && text.contains(*d)).unwrap_or(DELIMITERS[0])
-        };
-        self.columns.delimiter.unwrap_or_else(found)
-    }
-
     /// Determines the layout from the header, or from the first line of values.
     pub fn layout(&self, line: u64, text: &str, factors: &[f64]) -> Found<Layout> {
         let at = || format!("{}:{line}", self.name);
-        let delimiter = self.delimiter(text);
+        let delimiter = self.columns.delimiter_of(text);
         let decimal_comma = self.columns.decimal_comma;
         let mut columns: Vec<String> = fields_between(text, delimiter).map(str::to_owned).collect();
         if columns.len() > 1 && columns.last().is_some_and(String::is_empty) {
             columns.pop();
         }
-        let mut slots = vec![None; columns.len()];
-        let mut default_channels = Vec::new();
-        let is_trace =
-            Channel::ALL.iter().any(|c| *c != Channel::Time && columns.contains(&self.trace_header(*c)));
-        for (index, channel) in Channel::ALL.into_iter().enumerate() {
-            let wanted = self.candidate_headers(channel, is_trace);
-            let Some(column) = self.find(channel, &wanted, &columns, &at)? else {
-                if channel.is_required() || self.columns.mapping(channel).is_some() {
-                    return Err(self.no_column(channel, &wanted, &columns, at()));
-                }
-                continue;
-            };
-            if let Some((before, _)) = slots[column] {
-                let (first, number): (usize, _) = (before, column + 1);
-                let first = Channel::ALL[first];
-                return Err(AxisRecordingError::SameColumn { at: at(), first, second: channel, number });
-            }
-            slots[column] = Some((index, factors[index]));
-            if self.columns.mapping(channel).is_none() {
-                default_channels.push(index);
-            }
-        }
-        let is_by_index = Channel::ALL.into_iter().filter(|channel| channel.is_required()).all(|channel| {
+        let found = detect_columns(&columns);
+        let assignment = self.assign(&columns, &found, &at, factors)?;
+        let is_by_index = Channel::ALL.into_iter().filter(|channel| self.is_required(*channel)).all(|channel| {
             matches!(self.columns.mapping(channel), Some(m) if matches!(m.column, Column::Index(_)))
         });
         let is_number = |column: &String| parse_number(column, decimal_comma).is_some_and(|v| !v.is_nan());
-        let is_data =
-            is_by_index && slots.iter().zip(&columns).all(|(slot, c)| slot.is_none() || is_number(c));
+        let is_data = is_by_index
+            && assignment.slots.iter().zip(&columns).all(|(slot, c)| slot.is_none() || is_number(c));
         if is_data {
             columns = (1..=columns.len()).map(|number| format!("#{number}")).collect();
         }
-        Ok(Layout { delimiter, decimal_comma, columns, slots, default_channels, is_data })
+        Ok(Layout { delimiter, decimal_comma, columns, found, assignment, is_data })
+    }
+
+    /// Returns true if the recording must have a column of the channel.
+    pub fn is_required(&self, channel: Channel) -> bool {
+        channel.is_required() && !(channel == Channel::Time && self.rate.is_some())
     }
 
     /// Returns the header of a channel in a trace.
-    fn trace_header(&self, channel: Channel) -> String {
+    pub fn trace_header(&self, channel: Channel) -> String {
         format!("{}.{channel}", self.joint)
     }
 
     /// Returns the possible headers of a channel; the first one found is used.
-    fn candidate_headers(&self, channel: Channel, is_trace: bool) -> Vec<String> {
+    pub fn candidate_headers(&self, channel: Channel, is_trace: bool) -> Vec<String> {
         let defaults = || match channel {
             Channel::Time => vec![channel.name().to_owned()],
             // In a trace, only trace headers are used.
@@ -179,55 +174,9 @@ impl Context<'_> {
         }
     }
 
-    fn find(
-        &self,
-        channel: Channel,
-        wanted: &[String],
-        columns: &[String],
-        at: &dyn Fn() -> String,
-    ) -> Found<Option<usize>> {
-        if let Some(Column::Index(index)) = self.columns.mapping(channel).map(|mapping| &mapping.column) {
-            return Ok((*index < columns.len()).then_some(*index));
-        }
-        for name in wanted {
-            let count = columns.iter().filter(|column| *column == name).count();
-            if count > 1 {
-                let column = shortened(name);
-                return Err(AxisRecordingError::SameHeader { at: at(), channel, column, count });
-            }
-            if count == 1 {
-                return Ok(columns.iter().position(|column| column == name));
-            }
-        }
-        Ok(None)
-    }
-
-    fn no_column(
-        &self,
-        channel: Channel,
-        wanted: &[String],
-        columns: &[String],
-        at: String,
-    ) -> AxisRecordingError {
-        let names = || columns.iter().map(String::as_str);
-        let nearest = wanted.iter().find_map(|name| nearest_name(name, names()));
-        // A column named after the axis is probably its position.
-        let axis = || names().find(|name| *name == self.joint).map(str::to_owned);
-        let mut wanted: Vec<String> = wanted.iter().map(|name| format!("\"{}\"", shortened(name))).collect();
-        wanted.dedup();
-        AxisRecordingError::NoColumn {
-            at,
-            channel,
-            wanted: wanted.join(" or "),
-            found: format_names(columns),
-            nearest: nearest.or_else(axis),
-            hint: Box::default(),
-        }
-    }
-
     /// Returns a hint if the columns are not found in the first line.
     pub fn hint(&self, line: u64, text: &str, lines: &mut Lines<impl Read>, factors: &[f64]) -> String {
-        let delimiter = self.delimiter(text);
+        let delimiter = self.columns.delimiter_of(text);
         if fields_between(text, delimiter)
             .all(|field| parse_number(field, self.columns.decimal_comma).is_some())
         {
@@ -242,25 +191,5 @@ impl Context<'_> {
             }
         }
         String::new()
-    }
-
-    /// Reports the channels found by their default headers, if a mapping selects others.
-    pub fn report_default_columns(&self, layout: &Layout, findings: &mut Vec<Finding>) {
-        if self.columns.mappings.is_empty() || layout.default_channels.is_empty() {
-            return;
-        }
-        let columns: Vec<String> = layout
-            .default_channels
-            .iter()
-            .filter_map(|&index| {
-                let channel = Channel::ALL[index];
-                let slot = layout.slots.iter().position(|slot| slot.is_some_and(|(p, _)| p == index))?;
-                let unit = channel.units(self.axis).first().map_or("", |(symbol, _)| *symbol);
-                Some(format!("{channel} from column {} in {unit}", shortened(&layout.columns[slot])))
-            })
-            .collect();
-        let what =
-            format!("{}: channels without a mapping use default columns: {}", self.name, columns.join(", "));
-        findings.push(Finding::note("usual-columns", what));
     }
 }

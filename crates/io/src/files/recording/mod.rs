@@ -1,13 +1,22 @@
-//! Reading of recordings of one axis from CSV and MCAP, for identification.
+//! Reading of recordings of one axis from CSV, MCAP and exports of controls, for identification.
 
+mod assignment;
 mod columns;
 mod csv;
 mod error;
+mod format;
+mod found_column;
+mod halsampler;
+mod header;
+mod inspect;
 mod join;
 mod layout;
 mod mcap;
+mod recording_builder;
 mod series;
+mod sinumerik_signal;
 mod unit;
+mod vocabulary;
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
@@ -15,9 +24,13 @@ use std::path::Path;
 
 pub use columns::{Columns, ColumnsError};
 pub use error::AxisRecordingError;
+pub use format::{RecordingFormat, RecordingFormatError};
+pub use found_column::{ColumnUnit, FoundColumn};
+pub use inspect::{RecordingColumns, inspect_recording};
 pub use unit::Channel;
 
-use super::input::{FileKind, Input, kind_from_head};
+use super::input::{FileKind, Input};
+use layout::Context;
 use virtual_axes_core::config::AxisConfig;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
@@ -28,17 +41,51 @@ pub struct RecordingOptions {
     pub columns: Columns,
     /// Topics of MCAP recordings, or prefixes of their names (`/mill`), if several topics have the same type.
     pub topics: Vec<String>,
-    /// Full name of the joint; default is the name of the axis, with or without a prefix.
+    /// Full name of the joint, or the name or number of the axis in the file; default is the name of the axis, with or
+    /// without a prefix.
     pub joint: Option<String>,
+    /// Format of the file; detected from the content if `None`.
+    pub format: Option<RecordingFormat>,
+    /// Sampling rate, Hz, of a file without a column of time.
+    pub rate_hz: Option<f64>,
 }
+
+/// Number of bytes that determine the format of a file.
+const HEAD_BYTES: u64 = 1 << 16;
 
 impl RecordingOptions {
     fn joint<'a>(&'a self, axis: &'a AxisConfig) -> &'a str {
         self.joint.as_deref().unwrap_or(&axis.name)
     }
+
+    fn context<'a>(&'a self, name: &'a str, axis: &'a AxisConfig) -> Result<Context<'a>, AxisRecordingError> {
+        if let Some(found) = self.rate_hz.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+            return Err(AxisRecordingError::Rate { found });
+        }
+        Ok(Context {
+            name,
+            axis,
+            joint: self.joint(axis),
+            is_joint_given: self.joint.is_some(),
+            columns: &self.columns,
+            rate: self.rate_hz,
+        })
+    }
 }
 
-/// Reads the recording of one axis with its findings from CSV or MCAP, detected by content.
+/// Opens a file and reads its first bytes.
+fn open(path: &Path, name: &str) -> Result<(Vec<u8>, File), AxisRecordingError> {
+    let unreadable = |error: std::io::Error| AxisRecordingError::Unreadable {
+        at: name.to_owned(),
+        reason: error.to_string(),
+    };
+    let mut file = File::open(path).map_err(unreadable)?;
+    let mut head = Vec::new();
+    (&mut file).take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
+    Ok((head, file))
+}
+
+/// Reads the recording of one axis with its findings; the format is detected from the content.
 ///
 /// The axis determines the allowed units and the conversion from torque to current.
 ///
@@ -50,26 +97,26 @@ pub fn read_recording(
     options: &RecordingOptions,
 ) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
     let name = path.display().to_string();
-    let unreadable = |error: std::io::Error| AxisRecordingError::Unreadable {
-        at: name.clone(),
-        reason: error.to_string(),
-    };
-    let mut file = File::open(path).map_err(unreadable)?;
-    let mut head = Vec::new();
-    (&mut file).take(::mcap::MAGIC.len() as u64).read_to_end(&mut head).map_err(unreadable)?;
-    if kind_from_head(&head) == Some(FileKind::Mcap) {
-        let (recording, mut findings) = read_recording_mcap(file, &name, axis, options)?;
-        if !options.columns.mappings.is_empty() {
-            let what = format!("{name}: the column mapping is ignored for MCAP");
-            findings.push(Finding::note("unused-columns", what));
+    let (head, file) = open(path, &name)?;
+    let context = options.context(&name, axis)?;
+    match options.format.unwrap_or_else(|| RecordingFormat::detect(&head)) {
+        RecordingFormat::Mcap => {
+            let (recording, mut findings) = read_recording_mcap(file, &name, axis, options)?;
+            if !options.columns.mappings.is_empty() {
+                let what = format!("{name}: the column mapping is ignored for MCAP");
+                findings.push(Finding::note("unused-columns", what));
+            }
+            Ok((recording, findings))
         }
-        return Ok((recording, findings));
+        RecordingFormat::Halsampler => halsampler::read(Cursor::new(head).chain(file), &context),
+        RecordingFormat::Csv => {
+            let read = csv::read(Cursor::new(head).chain(file), &context);
+            read.map_err(|error| match detect_other_kind(path, &error) {
+                Some(kind) => AxisRecordingError::OtherKind { at: name.clone(), kind },
+                None => error,
+            })
+        }
     }
-    let read = read_recording_csv(Cursor::new(head).chain(file), &name, axis, options);
-    read.map_err(|error| match detect_other_kind(path, &error) {
-        Some(kind) => AxisRecordingError::OtherKind { at: name, kind },
-        None => error,
-    })
 }
 
 /// Reads the recording of one axis from CSV. `name` is the file name in errors.
@@ -82,7 +129,7 @@ pub fn read_recording_csv(
     axis: &AxisConfig,
     options: &RecordingOptions,
 ) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
-    csv::read(input, name, axis, options.joint(axis), &options.columns)
+    csv::read(input, &options.context(name, axis)?)
 }
 
 /// Reads the recording of one axis from MCAP. `name` is the file name in errors.

@@ -60,6 +60,30 @@ impl Channel {
         matches!(self, Channel::Time | Channel::Position)
     }
 
+    /// Returns the symbols of the units of the channel for all types of axes.
+    pub(super) const fn symbols(self) -> &'static [&'static str] {
+        match self {
+            Channel::Time => &["s", "ms", "us", "ns"],
+            Channel::Psec | Channel::Position => &["m", "mm", "um", "rad", "deg", "mdeg"],
+            Channel::Velocity => &["m/s", "mm/s", "m/min", "mm/min", "rad/s", "deg/s", "deg/min", "rpm"],
+            Channel::VelocityFeedforward => &["rad/s", "rpm", "m/s", "mm/s", "m/min", "mm/min"],
+            Channel::Current => &["A", "mA", "N.m", "N"],
+            Channel::TorqueFeedforward => &["N.m", "N", "A", "mA"],
+        }
+    }
+
+    /// Returns the SI units of the channel for linear and rotary axes, for messages.
+    pub(super) const fn si_units(self) -> &'static str {
+        match self {
+            Channel::Time => "s",
+            Channel::Psec | Channel::Position => "m or rad",
+            Channel::Velocity => "m/s or rad/s",
+            Channel::Current => "A",
+            Channel::VelocityFeedforward => "rad/s of the motor",
+            Channel::TorqueFeedforward => "N.m",
+        }
+    }
+
     /// Returns the allowed units for `axis` with their factors to SI; the SI unit comes first.
     pub(super) fn units(self, axis: &AxisConfig) -> Vec<(&'static str, f64)> {
         let linear = axis.kind == AxisKind::Linear;
@@ -145,6 +169,26 @@ const SPELLINGS: [(&str, &str); 12] = [
     ("1/min", "rpm"),
 ];
 
+/// Spellings of symbols in headers, in addition to [`SPELLINGS`].
+const HEADER_SPELLINGS: [(&str, &str); 16] = [
+    ("sec", "s"),
+    ("seconds", "s"),
+    ("msec", "ms"),
+    ("usec", "us"),
+    ("degree", "deg"),
+    ("degrees", "deg"),
+    ("Grad", "deg"),
+    ("U/min", "rpm"),
+    ("r/min", "rpm"),
+    ("min-1", "rpm"),
+    ("min^-1", "rpm"),
+    ("RPM", "rpm"),
+    ("Ampere", "A"),
+    ("amps", "A"),
+    ("N m", "N.m"),
+    ("N*m", "N.m"),
+];
+
 /// Unit of a column: `factor` times the unit `symbol`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unit {
@@ -181,6 +225,18 @@ impl Unit {
                 shortened(symbol),
                 SYMBOLS.join(", ")
             )),
+        }
+    }
+}
+
+impl Unit {
+    /// Returns the unit of a header: the text between its brackets, or its last words joined by `/`.
+    pub fn from_header(text: &str) -> Option<Self> {
+        let text = text.trim();
+        let spelling = HEADER_SPELLINGS.into_iter().find(|(spelling, _)| *spelling == text);
+        match spelling {
+            Some((_, symbol)) => Some(Unit { factor: 1.0, symbol }),
+            None => Unit::parse(text).ok(),
         }
     }
 }

@@ -1,0 +1,373 @@
+//! Assignment of columns to channels: by column mappings, default headers, or detected meanings.
+
+use super::columns::Column;
+use super::error::AxisRecordingError;
+use super::found_column::{ColumnFactor, FoundColumn};
+use super::layout::{Context, format_names};
+use super::unit::Channel;
+use virtual_axes_core::text::{nearest_name, shortened};
+use virtual_axes_identify::recording::Finding;
+
+type Found<T> = Result<T, AxisRecordingError>;
+
+/// Columns of the channels of one axis.
+#[derive(Debug, Default)]
+pub(super) struct ColumnAssignment {
+    /// Per column: index of its channel in [`Channel::ALL`], and factor to SI.
+    pub slots: Vec<Option<(usize, f64)>>,
+    /// Indices of the channels found by their default headers.
+    pub default_channels: Vec<usize>,
+    /// Indices of the channels found by their detected meaning.
+    pub detected_channels: Vec<usize>,
+    /// Findings about columns that are not read.
+    pub findings: Vec<Finding>,
+}
+
+impl ColumnAssignment {
+    /// Returns the column of the channel with an index, if any.
+    pub fn column_of(&self, index: usize) -> Option<usize> {
+        self.slots.iter().position(|slot| slot.is_some_and(|(channel, _)| channel == index))
+    }
+
+    /// Reports the columns of channels without a mapping: those with default headers beside a mapping, and those with
+    /// detected meanings.
+    pub fn report(&self, context: &Context, found: &[FoundColumn], findings: &mut Vec<Finding>) {
+        findings.extend(self.findings.iter().cloned());
+        let column = |index: &usize| {
+            let channel = Channel::ALL.get(*index)?;
+            Some((*channel, found.get(self.column_of(*index)?)?))
+        };
+        if !context.columns.mappings.is_empty() && !self.default_channels.is_empty() {
+            let columns = self.default_channels.iter().filter_map(column).map(|(channel, column)| {
+                let unit = channel.units(context.axis).first().map_or("", |(symbol, _)| *symbol);
+                format!("{channel} from column {} in {unit}", shortened(&column.header))
+            });
+            let columns = columns.collect::<Vec<_>>().join(", ");
+            let what = format!("{}: channels without a mapping use default columns: {columns}", context.name);
+            findings.push(Finding::note("usual-columns", what));
+        }
+        if !self.detected_channels.is_empty() {
+            let columns = self.detected_channels.iter().filter_map(column).map(|(channel, column)| {
+                let mapped = context.columns.mapping(channel).and_then(|mapping| mapping.unit);
+                let unit = match (mapped, &column.unit) {
+                    (Some(unit), _) => format!(" in {unit}"),
+                    (None, Some(unit)) => format!(" in {unit}"),
+                    (None, None) => String::new(),
+                };
+                format!("{channel} from column {}{unit}", shortened(&column.header))
+            });
+            let columns = columns.collect::<Vec<_>>().join(", ");
+            findings.push(Finding::note("detected-columns", format!("{}: detected {columns}", context.name)));
+        }
+    }
+}
+
+/// Selection of the columns of one axis among the columns of a file.
+struct Selector<'a> {
+    context: &'a Context<'a>,
+    found: &'a [FoundColumn],
+    at: &'a dyn Fn() -> String,
+    /// Name of the selected axis; `None` if the file names none.
+    axis: Found<Option<&'a str>>,
+}
+
+impl Context<'_> {
+    /// Assigns the columns with the headers `columns` and the meanings `found` to channels.
+    pub fn assign(
+        &self,
+        columns: &[String],
+        found: &[FoundColumn],
+        at: &dyn Fn() -> String,
+        factors: &[f64],
+    ) -> Found<ColumnAssignment> {
+        let mut assignment =
+            ColumnAssignment { slots: vec![None; columns.len()], ..ColumnAssignment::default() };
+        let is_trace =
+            Channel::ALL.iter().any(|c| *c != Channel::Time && columns.contains(&self.trace_header(*c)));
+        let selector = Selector::new(self, if is_trace { &[] } else { found }, at);
+        for (index, channel) in Channel::ALL.into_iter().enumerate() {
+            let factor = factors.get(index).copied().unwrap_or(1.0);
+            let wanted = self.candidate_headers(channel, is_trace);
+            let choice = match self.find(channel, &wanted, columns, at)? {
+                Some(column) => Some((column, factor)),
+                None if self.has_selected_column(channel) => None,
+                None => selector.choose(channel, &mut assignment)?,
+            };
+            let Some((column, factor)) = choice else {
+                self.check_missing(channel, &wanted, columns, found, at)?;
+                continue;
+            };
+            let Some(slot) = assignment.slots.get_mut(column) else { continue };
+            if let Some((before, _)) = *slot {
+                let first = Channel::ALL.get(before).copied().unwrap_or(channel);
+                return Err(AxisRecordingError::SameColumn {
+                    at: at(),
+                    first,
+                    second: channel,
+                    number: column + 1,
+                });
+            }
+            *slot = Some((index, factor));
+            let is_default = !assignment.detected_channels.contains(&index);
+            if is_default && self.columns.mapping(channel).is_none() {
+                assignment.default_channels.push(index);
+            }
+        }
+        Ok(assignment)
+    }
+
+    /// Returns true if a mapping selects the column of the channel.
+    fn has_selected_column(&self, channel: Channel) -> bool {
+        self.columns.mapping(channel).is_some_and(|mapping| mapping.column != Column::Default)
+    }
+
+    fn check_missing(
+        &self,
+        channel: Channel,
+        wanted: &[String],
+        columns: &[String],
+        found: &[FoundColumn],
+        at: &dyn Fn() -> String,
+    ) -> Found<()> {
+        if self.columns.mapping(channel).is_none() && !self.is_required(channel) {
+            return Ok(());
+        }
+        let mut error = self.no_column(channel, wanted, columns, at());
+        let counter = found.iter().find(|column| column.unit.as_ref().is_some_and(|unit| unit.is_samples()));
+        if let (AxisRecordingError::NoColumn { hint, .. }, Channel::Time) = (&mut error, channel) {
+            *hint = match counter {
+                Some(column) => {
+                    let header = shortened(&column.header);
+                    format!(", or give the sampling rate by --rate-hz, since column {header} counts samples")
+                }
+                None => ", or give the sampling rate by --rate-hz".to_owned(),
+            }
+            .into();
+        }
+        Err(error)
+    }
+
+    fn find(
+        &self,
+        channel: Channel,
+        wanted: &[String],
+        columns: &[String],
+        at: &dyn Fn() -> String,
+    ) -> Found<Option<usize>> {
+        if let Some(Column::Index(index)) = self.columns.mapping(channel).map(|mapping| &mapping.column) {
+            return Ok((*index < columns.len()).then_some(*index));
+        }
+        for name in wanted {
+            let count = columns.iter().filter(|column| *column == name).count();
+            if count > 1 {
+                let column = shortened(name);
+                return Err(AxisRecordingError::SameHeader { at: at(), channel, column, count });
+            }
+            if count == 1 {
+                return Ok(columns.iter().position(|column| column == name));
+            }
+        }
+        Ok(None)
+    }
+
+    fn no_column(
+        &self,
+        channel: Channel,
+        wanted: &[String],
+        columns: &[String],
+        at: String,
+    ) -> AxisRecordingError {
+        let names = || columns.iter().map(String::as_str);
+        let nearest = wanted.iter().find_map(|name| nearest_name(name, names()));
+        // A column named after the axis is probably its position.
+        let axis = || names().find(|name| *name == self.joint).map(str::to_owned);
+        let mut wanted: Vec<String> = wanted.iter().map(|name| format!("\"{}\"", shortened(name))).collect();
+        wanted.dedup();
+        AxisRecordingError::NoColumn {
+            at,
+            channel,
+            wanted: wanted.join(" or "),
+            found: format_names(columns),
+            nearest: nearest.or_else(axis),
+            hint: Box::default(),
+        }
+    }
+}
+
+impl<'a> Selector<'a> {
+    fn new(context: &'a Context<'a>, found: &'a [FoundColumn], at: &'a dyn Fn() -> String) -> Self {
+        let mut selector = Selector { context, found, at, axis: Ok(None) };
+        selector.axis = selector.select_axis();
+        selector
+    }
+
+    /// Returns the columns with a channel that no mapping selects.
+    fn detected(&self) -> impl Iterator<Item = &'a FoundColumn> {
+        let is_open = |column: &&FoundColumn| {
+            column.channel.is_some_and(|channel| !self.context.has_selected_column(channel))
+        };
+        self.found.iter().filter(is_open)
+    }
+
+    /// Returns the name of the axis to read: the one that the joint names, or the only one of the file.
+    fn select_axis(&self) -> Found<Option<&'a str>> {
+        let mut axes: Vec<(&'a str, Option<&'a str>)> = Vec::new();
+        for column in self.detected() {
+            let Some(axis) = column.axis.as_deref() else { continue };
+            if !axes.iter().any(|(known, _)| *known == axis) {
+                axes.push((axis, column.axis_number.as_deref()));
+            }
+        }
+        if axes.is_empty() {
+            return Ok(None);
+        }
+        let wanted = self.context.joint;
+        for similarity in [is_same, is_numbered, is_prefixed] {
+            let matching: Vec<&str> = axes
+                .iter()
+                .filter(|(name, number)| {
+                    similarity(name, wanted) || number.is_some_and(|number| is_same(number, wanted))
+                })
+                .map(|(name, _)| *name)
+                .collect();
+            match matching.as_slice() {
+                [] => {}
+                [axis] => return Ok(Some(axis)),
+                several => return Err(self.axis_error("several axes of the file fit", several)),
+            }
+        }
+        // A number does not contradict the name of the axis.
+        if let ([(axis, _)], false) = (axes.as_slice(), self.context.is_joint_given)
+            && axis.bytes().all(|byte| byte.is_ascii_digit())
+        {
+            return Ok(Some(axis));
+        }
+        let names: Vec<&str> = axes.iter().map(|(name, _)| *name).collect();
+        Err(self.axis_error("the file has no columns of", &names))
+    }
+
+    fn axis_error(&self, reason: &'static str, axes: &[&str]) -> AxisRecordingError {
+        AxisRecordingError::Axis {
+            at: (self.at)(),
+            reason,
+            axis: shortened(self.context.joint),
+            axes: axes.iter().map(|axis| shortened(axis)).collect(),
+        }
+    }
+
+    /// Returns the detected column of the channel with its factor to SI.
+    fn choose(&self, channel: Channel, assignment: &mut ColumnAssignment) -> Found<Option<(usize, f64)>> {
+        let mut fitting: Vec<&FoundColumn> =
+            self.detected().filter(|column| column.channel == Some(channel)).collect();
+        if channel != Channel::Time {
+            match &self.axis {
+                Ok(None) => {}
+                Ok(Some(axis)) => self.keep_axis(&mut fitting, axis, assignment),
+                Err(error) if channel == Channel::Position && fitting.iter().any(|c| c.axis.is_some()) => {
+                    return Err(error.clone());
+                }
+                Err(_) => fitting.retain(|column| column.axis.is_none()),
+            }
+        }
+        if fitting.iter().any(|column| !column.is_secondary) {
+            fitting.retain(|column| !column.is_secondary);
+        }
+        match fitting.as_slice() {
+            [] => Ok(None),
+            [column] => self.accept(channel, column, assignment),
+            several => Err(AxisRecordingError::Ambiguous {
+                at: (self.at)(),
+                channel,
+                columns: several
+                    .iter()
+                    .map(|column| format!("#{} \"{}\"", column.number, shortened(&column.header)))
+                    .collect(),
+                number: several.first().map_or(1, |column| column.number),
+            }),
+        }
+    }
+
+    /// Keeps the columns of the axis; columns without an axis are those of the only axis.
+    fn keep_axis(&self, fitting: &mut Vec<&FoundColumn>, axis: &str, assignment: &mut ColumnAssignment) {
+        let is_only = self.detected().filter_map(|column| column.axis.as_deref()).all(|other| other == axis);
+        fitting.retain(|column| match column.axis.as_deref() {
+            Some(other) => other == axis,
+            None if is_only => true,
+            None => {
+                let header = shortened(&column.header);
+                let what = format!(
+                    "{}: column {header} names no axis, the file has several: it is not read",
+                    self.context.name
+                );
+                assignment.findings.push(Finding::note("unassigned-column", what));
+                false
+            }
+        });
+    }
+
+    fn accept(
+        &self,
+        channel: Channel,
+        column: &FoundColumn,
+        assignment: &mut ColumnAssignment,
+    ) -> Found<Option<(usize, f64)>> {
+        let context = self.context;
+        let index = Channel::ALL.iter().position(|other| *other == channel).unwrap_or_default();
+        let place = column.number.saturating_sub(1);
+        let Some(unit) = &column.unit else { return Ok(None) };
+        if let Some(mapping) = context.columns.mapping(channel)
+            && mapping.unit.is_some()
+        {
+            let factor = context.factors()?.get(index).copied().unwrap_or(1.0);
+            assignment.detected_channels.push(index);
+            return Ok(Some((place, factor)));
+        }
+        let factor = match (unit.factor(channel, context.axis), context.rate) {
+            (ColumnFactor::Value(factor), _) => factor,
+            (ColumnFactor::Samples, Some(_)) => 1.0,
+            (ColumnFactor::Samples, None) => return Ok(None),
+            (problem @ (ColumnFactor::Unfit | ColumnFactor::Unknown), _) => {
+                let error = AxisRecordingError::ColumnUnit {
+                    at: (self.at)(),
+                    channel,
+                    column: shortened(&column.header),
+                    found: match problem {
+                        ColumnFactor::Unfit => format!("is in {unit}"),
+                        _ => format!("has the {}", unit.to_string().replacen("unknown:", "unknown unit", 1)),
+                    },
+                    allowed: channel
+                        .units(context.axis)
+                        .iter()
+                        .map(|(s, _)| *s)
+                        .collect::<Vec<_>>()
+                        .join(", "),
+                };
+                if channel.is_required() {
+                    return Err(error);
+                }
+                let what = format!("{error}; it is not read");
+                assignment.findings.push(Finding::note("unfit-unit", what));
+                return Ok(None);
+            }
+        };
+        assignment.detected_channels.push(index);
+        Ok(Some((place, factor)))
+    }
+}
+
+/// Returns true for equal names, whatever their case.
+fn is_same(axis: &str, wanted: &str) -> bool {
+    axis.eq_ignore_ascii_case(wanted)
+}
+
+/// Returns true for a name with a number: `X1` for `x`.
+fn is_numbered(axis: &str, wanted: &str) -> bool {
+    let name = axis.trim_end_matches(|c: char| c.is_ascii_digit());
+    !name.is_empty() && is_same(name, wanted)
+}
+
+/// Returns true for a joint with a prefix: `mill_x` for `x` or `X1`.
+fn is_prefixed(axis: &str, wanted: &str) -> bool {
+    let last = wanted.rsplit(['_', '/', '.']).next().unwrap_or_default();
+    is_same(axis, last) || is_numbered(axis, last)
+}

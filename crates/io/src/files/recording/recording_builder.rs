@@ -1,0 +1,75 @@
+//! Construction of a recording from the values of its channels.
+
+use super::assignment::ColumnAssignment;
+use super::error::AxisRecordingError;
+use super::found_column::{ColumnUnit, FoundColumn};
+use super::layout::Context;
+use super::unit::Channel;
+use virtual_axes_core::text::shortened;
+use virtual_axes_identify::recording::{Finding, RawRecording};
+
+/// Values of all channels, in the order of [`Channel::ALL`]; NaN where a value is missing.
+pub(super) type ChannelValues = [Vec<f64>; Channel::ALL.len()];
+
+/// Builds a recording from the channels that have values. Without a column of time, the time is the sample number or the
+/// index of the row, from 0, divided by the sampling rate.
+pub(super) fn build_recording(
+    context: &Context,
+    channels: ChannelValues,
+    (assignment, found): (&ColumnAssignment, &[FoundColumn]),
+    rows: usize,
+    findings: &mut Vec<Finding>,
+) -> Result<RawRecording, AxisRecordingError> {
+    let name = context.name;
+    assignment.report(context, found, findings);
+    let mut recording = RawRecording { name: name.to_owned(), ..RawRecording::default() };
+    for (index, (channel, values)) in Channel::ALL.into_iter().zip(channels).enumerate() {
+        let Some(column) = assignment.column_of(index) else { continue };
+        if values.iter().all(|value| value.is_nan()) {
+            if channel.is_required() {
+                return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel, rows });
+            }
+            let column = found.get(column).map_or_else(String::new, |column| shortened(&column.header));
+            let what = format!("{name}: column {column} ({channel}) has no values and is ignored");
+            findings.push(Finding::note("empty-channel", what));
+            continue;
+        }
+        match channel {
+            Channel::Time => recording.time = values,
+            Channel::Psec => recording.psec = Some(values),
+            Channel::Position => recording.position = Some(values),
+            Channel::Velocity => recording.velocity = Some(values),
+            Channel::Current => recording.current = Some(values),
+            Channel::VelocityFeedforward => recording.velocity_feedforward = Some(values),
+            Channel::TorqueFeedforward => recording.torque_feedforward = Some(values),
+        }
+    }
+    set_time(context, assignment, found, rows, findings, &mut recording);
+    Ok(recording)
+}
+
+/// Computes the time from the sample number or the index of the row; reports a sampling rate that is not used.
+fn set_time(
+    context: &Context,
+    assignment: &ColumnAssignment,
+    found: &[FoundColumn],
+    rows: usize,
+    findings: &mut Vec<Finding>,
+    recording: &mut RawRecording,
+) {
+    let Some(rate) = context.rate else { return };
+    let Some(column) = assignment.column_of(0) else {
+        recording.time = (0..rows).map(|row| row as f64 / rate).collect();
+        return;
+    };
+    let column = found.get(column);
+    let is_counter = column.and_then(|c| c.unit.as_ref()).is_some_and(ColumnUnit::is_samples);
+    if is_counter && context.columns.mapping(Channel::Time).is_none() {
+        let first = recording.time.first().copied().unwrap_or_default();
+        recording.time.iter_mut().for_each(|time| *time = (*time - first) / rate);
+        return;
+    }
+    let header = column.map_or_else(String::new, |column| shortened(&column.header));
+    let what = format!("{}: --rate-hz is not used: the time is that of column {header}", context.name);
+    findings.push(Finding::note("unused-rate", what));
+}

@@ -1,0 +1,236 @@
+//! Words in the headers of recordings, English and German.
+
+/// Quantity that a word names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum HeaderQuantity {
+    Position,
+    Velocity,
+    Current,
+    Torque,
+    Time,
+    /// Number of a sample or cycle.
+    Counter,
+}
+
+/// Meaning of a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum WordMeaning {
+    Quantity(HeaderQuantity),
+    Setpoint,
+    Actual,
+    /// Position setpoint.
+    Psec,
+    Feedforward,
+    /// Velocity feedforward signal.
+    Vffws,
+    /// Torque feedforward signal.
+    Tffws,
+    Motor,
+    /// Filler without a meaning of its own.
+    Filler,
+    /// Signal that is no channel of a recording, with its description.
+    Other(&'static str),
+}
+
+use HeaderQuantity::{Counter, Current, Position, Time, Torque, Velocity};
+use WordMeaning::{Actual, Feedforward, Filler, Motor, Other, Psec, Setpoint, Tffws, Vffws};
+
+/// Words by meaning.
+const WORDS: &[(WordMeaning, &[&str])] = &[
+    (WordMeaning::Quantity(Position), &["position", "positions", "pos", "lage", "winkel", "angle"]),
+    (WordMeaning::Quantity(Velocity), &["velocity", "vel", "velo", "speed", "geschwindigkeit", "drehzahl"]),
+    (WordMeaning::Quantity(Current), &["current", "curr", "strom", "iq"]),
+    (WordMeaning::Quantity(Torque), &["torque", "trq", "moment", "drehmoment", "force", "kraft"]),
+    (WordMeaning::Quantity(Time), &["time", "zeit", "timestamp", "zeitstempel"]),
+    (WordMeaning::Quantity(Counter), &["sample", "samples", "cycle", "cycles"]),
+    (
+        Setpoint,
+        &[
+            "setpoint",
+            "set",
+            "commanded",
+            "command",
+            "cmd",
+            "desired",
+            "des",
+            "target",
+            "soll",
+            "sollwert",
+            "reference",
+            "ref",
+            "nominal",
+            "demand",
+        ],
+    ),
+    (Actual, &["actual", "act", "ist", "istwert", "measured", "meas", "encoder", "enc", "feedback", "fb"]),
+    (Psec, &["psec"]),
+    (Feedforward, &["feedforward", "ffw", "vorsteuerung", "forward"]),
+    (Vffws, &["vffws"]),
+    (Tffws, &["tffws"]),
+    (Motor, &["motor", "mot"]),
+    (Filler, &["wert", "value", "val"]),
+    (
+        Other("an error or a deviation"),
+        &[
+            "error",
+            "err",
+            "following",
+            "lag",
+            "difference",
+            "diff",
+            "deviation",
+            "dev",
+            "abweichung",
+            "schleppfehler",
+            "regeldifferenz",
+            "delta",
+        ],
+    ),
+    (Other("an acceleration or a jerk"), &["acceleration", "acc", "accel", "beschleunigung", "jerk", "ruck"]),
+    (Other("a load or a power"), &["load", "auslastung", "power", "leistung"]),
+    (Other("a limit"), &["limit", "limits", "max", "maximum"]),
+    (Other("a voltage"), &["voltage", "spannung"]),
+    (Other("a temperature"), &["temperature", "temp", "temperatur"]),
+    (Other("a state"), &["status", "state", "mode", "flag", "override"]),
+    (Other("no torque-producing current"), &["phase", "flux", "dclink", "bus"]),
+    (Other("a friction"), &["friction", "reibung"]),
+    (Other("an offset"), &["offset", "correction", "compensation"]),
+    (Other("a count of increments"), &["counts", "increments", "inc"]),
+];
+
+/// Words too short for compounds.
+const SHORT_WORDS: &[(WordMeaning, &str)] = &[
+    (WordMeaning::Quantity(Time), "t"),
+    (WordMeaning::Quantity(Current), "i"),
+    (Feedforward, "ff"),
+    (Other("no torque-producing current"), "id"),
+];
+
+/// Letters of axes.
+const AXIS_LETTERS: &str = "xyzabcuvw";
+/// Minimum length of a part of a compound.
+const MIN_PART: usize = 3;
+/// Maximum length of a compound, bytes.
+const MAX_COMPOUND: usize = 40;
+
+/// Returns the meaning of a word in lower case.
+pub(super) fn meaning(word: &str) -> Option<WordMeaning> {
+    let short = SHORT_WORDS.iter().find(|(_, known)| *known == word).map(|(meaning, _)| *meaning);
+    short.or_else(|| WORDS.iter().find(|(_, known)| known.contains(&word)).map(|(meaning, _)| *meaning))
+}
+
+/// Returns the name of the axis if the word is one: `x`, `x1`, `sp`, `sp1`, `spindle`.
+pub(super) fn axis_name(word: &str) -> Option<String> {
+    let name = word.trim_end_matches(|c: char| c.is_ascii_digit());
+    let has_few_digits = word.len() - name.len() <= 2;
+    let is_letter = name.len() == 1 && AXIS_LETTERS.contains(name);
+    let is_spindle = matches!(name, "sp" | "spindle" | "spindel");
+    ((is_letter || is_spindle) && has_few_digits).then(|| word.to_owned())
+}
+
+/// Returns true if the word announces the number or name of an axis.
+pub(super) fn announces_axis(word: &str) -> bool {
+    matches!(word, "axis" | "achse" | "ax" | "joint")
+}
+
+/// Splits a compound (`lageistwert`, `actpos`, `posx`, `pos1`) into its meanings and the axis it names; `None` if any part
+/// is unknown.
+pub(super) fn compound(word: &str) -> Option<(Vec<WordMeaning>, Option<String>)> {
+    if word.len() > MAX_COMPOUND || !word.is_ascii() {
+        return None;
+    }
+    let letters = word.trim_end_matches(|c: char| c.is_ascii_digit());
+    if letters.is_empty() {
+        return None;
+    }
+    let digits = word.get(letters.len()..).filter(|digits| digits.len() <= 2)?;
+    let number = || (!digits.is_empty()).then(|| digits.to_owned());
+    if announces_axis(letters) || letters == "j" {
+        return number().map(|number| (Vec::new(), Some(number)));
+    }
+    if let Some(meaning) = meaning(letters) {
+        // The number of an encoder is not that of an axis.
+        return Some((vec![meaning], if matches!(meaning, Actual) { None } else { number() }));
+    }
+    if let Some(meanings) = parts(letters) {
+        return Some((meanings, number()));
+    }
+    let with_letter = |rest: &str, letter: &str| {
+        let meanings = meaning(rest).map(|meaning| vec![meaning]).or_else(|| parts(rest))?;
+        AXIS_LETTERS.contains(letter).then(|| (meanings, Some(format!("{letter}{digits}"))))
+    };
+    let (first, last) = (letters.get(..1)?, letters.get(letters.len() - 1..)?);
+    let from_end = letters.get(..letters.len() - 1).filter(|rest| rest.len() >= MIN_PART);
+    let from_start = letters.get(1..).filter(|rest| rest.len() >= MIN_PART);
+    from_end
+        .and_then(|rest| with_letter(rest, last))
+        .or_else(|| from_start.and_then(|rest| with_letter(rest, first)))
+}
+
+/// Splits a word into known words, with `s` or `en` between them.
+fn parts(word: &str) -> Option<Vec<WordMeaning>> {
+    // Shortest lists of parts that end at each byte.
+    let mut best: Vec<Option<Vec<WordMeaning>>> = vec![None; word.len() + 1];
+    *best.first_mut()? = Some(Vec::new());
+    for end in MIN_PART..=word.len() {
+        let mut found: Option<Vec<WordMeaning>> = None;
+        for start in 0..=end - MIN_PART {
+            let Some(before) = best.get(start).and_then(Option::as_ref) else { continue };
+            let Some(part) = word.get(start..end) else { continue };
+            let joint = if start == 0 { &[""][..] } else { &["", "s", "en"] };
+            let bare = joint.iter().find_map(|joint| {
+                let rest = part.strip_prefix(joint)?;
+                (rest.len() >= MIN_PART).then(|| meaning(rest)).flatten()
+            });
+            let Some(meaning) = bare else { continue };
+            if found.as_ref().is_none_or(|found| before.len() + 1 < found.len()) {
+                found = Some([before.as_slice(), &[meaning]].concat());
+            }
+        }
+        if let Some(slot) = best.get_mut(end) {
+            *slot = found;
+        }
+    }
+    best.pop().flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn compounds_are_split_into_known_words() {
+        let meanings =
+            |word: &str| compound(word).map(|(meanings, axis)| (meanings, axis.unwrap_or_default()));
+        let position = WordMeaning::Quantity(Position);
+        let none = String::new();
+        assert_eq!(meanings("lageistwert"), Some((vec![position, WordMeaning::Actual], none.clone())));
+        assert_eq!(
+            meanings("istgeschwindigkeit"),
+            Some((vec![Actual, WordMeaning::Quantity(Velocity)], none.clone()))
+        );
+        assert_eq!(meanings("positionssollwert"), Some((vec![position, Setpoint], none.clone())));
+        assert_eq!(
+            meanings("momentenvorsteuerung"),
+            Some((vec![WordMeaning::Quantity(Torque), Feedforward], none.clone()))
+        );
+        assert_eq!(meanings("actposx"), Some((vec![Actual, position], "x".to_owned())));
+        assert_eq!(meanings("xpos"), Some((vec![position], "x".to_owned())));
+        assert_eq!(meanings("pos1"), Some((vec![position], "1".to_owned())));
+        assert_eq!(meanings("enc2"), Some((vec![Actual], none)));
+        for unknown in ["distance", "resistance", "history", "offsets", "xyz", "", "äöü", "feedrate", "timer"]
+        {
+            assert_eq!(compound(unknown), None, "{unknown}");
+        }
+    }
+
+    #[test]
+    fn axis_names_are_letters_with_up_to_two_digits() {
+        for name in ["x", "x1", "c12", "sp", "sp1", "spindle"] {
+            assert_eq!(axis_name(name).as_deref(), Some(name));
+        }
+        for word in ["t", "x123", "xy", "", "1"] {
+            assert_eq!(axis_name(word), None, "{word}");
+        }
+    }
+}
