@@ -46,7 +46,9 @@ fn csv(recordings: &[RawRecording]) -> String {
         for Column { values, unit, decimals, .. } in &columns {
             text.push(',');
             if let Some(value) = values.and_then(|values| values.get(k)).filter(|value| value.is_finite()) {
-                let _ = write!(text, "{:.decimals$}", value / unit);
+                let power = 10.0_f64.powi(*decimals as i32);
+                // Adding 0 turns -0 into 0.
+                let _ = write!(text, "{:.decimals$}", (value / unit * power).round() / power + 0.0);
             }
         }
         text.push('\n');

@@ -69,6 +69,8 @@ pub struct SimulatedAxis {
     pub period: f64,
     /// Samples of the motor side, one per period, from the start of the program.
     pub samples: Vec<AxisSample>,
+    /// Mean current over one period around each sample, A.
+    pub mean_current: Vec<f64>,
     /// Part of the position cycles with speed, current or voltage setpoint at its limit, 0 … 1.
     pub saturated: f64,
 }
@@ -115,7 +117,7 @@ impl HiddenAxis {
         seconds(cycles as Nanoseconds * self.periods.position)
     }
 
-    /// Simulates the axis on a program with one sample every `period` ns, but at most one per position cycle.
+    /// Simulates the axis on a program with one sample every `period` ns, or every position cycle if Tsp is longer.
     ///
     /// # Errors
     /// [`TraceError::Machine`] if the axis cannot be simulated.
@@ -131,20 +133,67 @@ impl HiddenAxis {
         let every = (sampling / self.periods.current).max(1) as u64;
         let force_constant = self.config.motor.torque_constant / self.config.transmission_ratio;
         let cycles = (program.duration() / tsp).floor() as u64;
-        let (mut samples, mut saturated) = (Vec::new(), 0_u64);
+        let (mut samples, mut mean_current, mut saturated) = (Vec::new(), PeriodMeans::new(every), 0_u64);
         for k in 0..=cycles {
             if self.stribeck != 0.0 {
                 let velocity = machine.axis(0).sample().velocity / METER_PER_MINUTE;
                 machine.set_load(0, -force_constant * stribeck_current(self.stribeck, velocity));
             }
             machine.advance_with(&[program.psec(self.joint, k as f64 * tsp)], &[], |machine| {
+                let sample = machine.axis(0).sample();
+                mean_current.push(machine.tick(), sample.current);
                 if machine.tick().is_multiple_of(every) {
-                    samples.push(*machine.axis(0).sample());
+                    samples.push(*sample);
                 }
             });
             saturated += u64::from(machine.activity(0).saturated_ticks > 0);
         }
         let saturated = saturated as f64 / (cycles + 1) as f64;
-        Ok(SimulatedAxis { period: seconds(sampling), samples, saturated })
+        let mut mean_current = mean_current.values();
+        mean_current.truncate(samples.len());
+        Ok(SimulatedAxis { period: seconds(sampling), samples, mean_current, saturated })
+    }
+}
+
+/// Means of a signal over periods of `every` ticks, each centered at a multiple of `every`.
+struct PeriodMeans {
+    every: u64,
+    /// Sum and number of values per period.
+    sums: Vec<(f64, u64)>,
+}
+
+impl PeriodMeans {
+    fn new(every: u64) -> Self {
+        PeriodMeans { every, sums: Vec::new() }
+    }
+
+    /// Adds the value at `tick`; ticks ascend by one from 0.
+    fn push(&mut self, tick: u64, value: f64) {
+        if tick == 0 || (tick + self.every / 2).is_multiple_of(self.every) {
+            self.sums.push((0.0, 0));
+        }
+        if let Some((sum, count)) = self.sums.last_mut() {
+            *sum += value;
+            *count += 1;
+        }
+    }
+
+    fn values(self) -> Vec<f64> {
+        self.sums.into_iter().map(|(sum, count)| sum / count as f64).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PeriodMeans;
+
+    #[test]
+    fn means_are_centered_at_the_samples() {
+        let mut means = PeriodMeans::new(4);
+        (0..10).for_each(|tick| means.push(tick, tick as f64));
+        assert_eq!(means.values(), [0.5, 3.5, 7.5]);
+        let mut means = PeriodMeans::new(1);
+        (0..3).for_each(|tick| means.push(tick, tick as f64));
+        assert_eq!(means.values(), [0.0, 1.0, 2.0]);
     }
 }

@@ -48,4 +48,4 @@ pub use hidden_axis::{AxisOrientation, HiddenAxis, SimulatedAxis};
 pub use hidden_machine::HiddenMachine;
 pub use machine_file::{machine_file, truth_file};
 pub use program::ProductionProgram;
-pub use recorder::TraceRecorder;
+pub use recorder::{CurrentSampling, TraceRecorder};

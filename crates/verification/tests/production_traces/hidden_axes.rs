@@ -1,6 +1,6 @@
 //! Parameters and simulation of hidden axes.
 
-use virtual_axes_core::config::{MachineConfig, Parameters};
+use virtual_axes_core::config::{FrictionConfig, MachineConfig, Parameters};
 use virtual_axes_core::design::margins;
 use virtual_axes_core::machine::{AxisSample, design_controller, prediction_model};
 use virtual_axes_core::units::{METER_PER_MINUTE, MILLISECOND_NS, POSITION_GAIN};
@@ -114,6 +114,37 @@ fn simulations_are_finite_and_seldom_saturated_and_the_position_lags_by_alpha() 
         assert!(error < 3e-3, "seed {seed}: {error} m");
         let duration = samples_at_rapid_feed(seed, &axis, &simulated) as f64 * simulated.period;
         assert!(duration > 0.03, "seed {seed}: {duration} s at rapid feed");
+    }
+}
+
+/// Returns friction and weight as motor current at velocity `v` in m/s.
+fn static_current(axis: &HiddenAxis, v: f64) -> f64 {
+    let (config, speed) = (&axis.config, v.abs() / METER_PER_MINUTE);
+    let FrictionConfig { a, b, c, d, .. } = config.friction;
+    let weight = config.gravity.weight * config.transmission_ratio / config.motor.torque_constant;
+    weight + v.signum() * (a * (b * speed).exp() + c * (d * speed).exp())
+}
+
+#[test]
+fn the_mean_current_is_that_of_inertia_friction_and_weight() {
+    for (seed, axis) in axes(0..10) {
+        let program = axis.program(seed, 4.0).expect("a program");
+        let simulated = axis.simulate(&program, PERIOD).expect("simulated");
+        let (samples, mean, period) = (&simulated.samples, &simulated.mean_current, simulated.period);
+        let (mut product, mut square) = (0.0, 0.0);
+        for k in 1..samples.len() - 1 {
+            if samples[k].velocity.abs() > 0.05 {
+                let acceleration = (samples[k + 1].velocity - samples[k - 1].velocity) / (2.0 * period);
+                let current = 0.25 * mean[k - 1] + 0.5 * mean[k] + 0.25 * mean[k + 1];
+                product += acceleration * (current - static_current(&axis, samples[k].velocity));
+                square += acceleration * acceleration;
+            }
+        }
+        let motor = &axis.config.motor;
+        let expected = motor.inertia / motor.torque_constant / axis.config.transmission_ratio;
+        let ratio = product / square / expected;
+        println!("seed {seed} {}, Tsp {period} s: {ratio:.4}", axis.config.name);
+        assert!((ratio - 1.0).abs() < 0.03, "seed {seed}: {ratio}");
     }
 }
 
