@@ -87,7 +87,7 @@ def contour_rows(run: dict) -> list[tuple[str, str, str, str]]:
     contour, orientation = run["contour_error_um"], run["orientation_error_mdeg"]
     rows = [
         ("contour error, max, µm", "—", "—", number(contour["max"])),
-        ("the same without overshoot at the path ends, µm", "—", "—", number(contour["max_within_ends"])),
+        ("the same without end overshoot, µm", "—", "—", number(contour["max_within_ends"])),
         ("contour error, RMS, µm", "—", "—", number(contour["rms"])),
     ]
     if orientation["max"] > 0:

@@ -23,7 +23,7 @@ COVERABLE = re.compile(
 """Commands that may be executed elsewhere: the tests themselves, and what installs software of the system."""
 
 FENCE = re.compile(r"^(?P<indent> *)(?P<ticks>`{3,}|~{3,})\s*(?P<language>[^`\s]*)[^`]*$")
-COMMENT = re.compile(r"^\s*<!-- (?P<kind>run|file|page): (?P<text>.*?) *-->\s*$")
+COMMENT = re.compile(r"^\s*<!-- (?P<kind>run|file|edit|page): (?P<text>.*?) *-->\s*$")
 LIST_ITEM = re.compile(r"^\s*([-*+]|\d+[.)]) ")
 
 
@@ -72,6 +72,16 @@ class FileBlock:
 
 
 @dataclass
+class EditBlock:
+    """Changes of a file that the reader makes in an editor, as a diff."""
+
+    line: int
+    name: str
+    hunks: list[tuple[str, str]]
+    """Lines before and after, each."""
+
+
+@dataclass
 class Fence:
     """Fenced block with the comment before it."""
 
@@ -82,12 +92,12 @@ class Fence:
     lines: list[str]
 
 
-def read(text: str, *, marked_only: bool = False) -> tuple[list[Block | FileBlock], dict[str, str]]:
+def read(text: str, *, marked_only: bool = False) -> tuple[list[Block | FileBlock | EditBlock], dict[str, str]]:
     """Reads the blocks and the options of a page.
 
     With `marked_only`, only blocks after a comment are executed, and commands in other blocks are no fault.
     """
-    items: list[Block | FileBlock] = []
+    items: list[Block | FileBlock | EditBlock] = []
     page: dict[str, str] = {}
     for element in _elements(text):
         if isinstance(element, tuple):
@@ -101,12 +111,14 @@ def read(text: str, *, marked_only: bool = False) -> tuple[list[Block | FileBloc
     return items, page
 
 
-def _items(fence: Fence) -> list[Block | FileBlock]:
+def _items(fence: Fence) -> list[Block | FileBlock | EditBlock]:
     kind, text = fence.comment or ("", "")
     if kind == "file":
         if not text or fence.language == "console":
             raise PageError(f"line {fence.line}: a file block needs a name and a language other than console")
         return [FileBlock(fence.line, text, "".join(f"{line}\n" for line in fence.lines))]
+    if kind == "edit":
+        return [EditBlock(fence.line, text, _hunks(fence))]
     if fence.language == "console":
         return [_block(fence)]
     if kind == "run":
@@ -116,6 +128,23 @@ def _items(fence: Fence) -> list[Block | FileBlock]:
     if fence.language in ("python", "py"):
         raise PageError(f"line {fence.line}: Python without <!-- file: NAME --> is executed by no test")
     return []
+
+
+def _hunks(fence: Fence) -> list[tuple[str, str]]:
+    """Returns the hunks of a block of diff, which lines of `...` separate."""
+    hunks = [([], [])]
+    for line in fence.lines:
+        if line == "...":
+            hunks.append(([], []))
+            continue
+        if line[:1] not in (" ", "-", "+"):
+            raise PageError(f"line {fence.line}: a line of an edit begins with a space, - or +: {line}")
+        before, after = hunks[-1]
+        if line[0] != "+":
+            before.append(f"{line[1:]}\n")
+        if line[0] != "-":
+            after.append(f"{line[1:]}\n")
+    return [("".join(before), "".join(after)) for before, after in hunks]
 
 
 def _block(fence: Fence) -> Block:

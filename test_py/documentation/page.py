@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from .blocks import Block, Command, FileBlock, read
+from .blocks import Block, Command, EditBlock, FileBlock, read
 from .compare import difference
 from .place import Place
 from .terminal import Terminal
@@ -45,7 +45,10 @@ class Page:
             return [f"installed={installed}: only installed=virtual_axes is known"]
         try:
             for item in self.items:
-                faults += self._file(item) if isinstance(item, FileBlock) else self._block(item)
+                if isinstance(item, EditBlock):
+                    faults += self._edit(item)
+                else:
+                    faults += self._file(item) if isinstance(item, FileBlock) else self._block(item)
                 if faults and not keep_going:
                     break
         finally:
@@ -65,6 +68,17 @@ class Page:
         path = self._terminal("").directory / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(item.content, encoding="utf-8")
+        return []
+
+    def _edit(self, item: EditBlock) -> list[str]:
+        """Applies the changes of a file."""
+        path = self._terminal("").directory / item.name
+        text = path.read_text(encoding="utf-8")
+        for before, after in item.hunks:
+            if (count := text.count(before)) != 1:
+                return [f"{self.file.name}:{item.line}: {item.name} has {count} times, not once:\n{before}"]
+            text = text.replace(before, after)
+        path.write_text(text, encoding="utf-8")
         return []
 
     def _block(self, block: Block) -> list[str]:

@@ -20,6 +20,16 @@ fn text(arguments: &[&str]) -> String {
 }
 
 #[track_caller]
+fn assert_rejected(arguments: &[&str], words: &[&str]) {
+    let output = run(arguments);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        !output.status.success() && words.iter().all(|word| message.contains(word)),
+        "{arguments:?}: {message}"
+    );
+}
+
+#[track_caller]
 fn assert_fits(arguments: &[&str]) {
     for line in text(arguments).lines() {
         assert!(line.chars().count() <= WIDTH, "{arguments:?}: {line}");
@@ -143,4 +153,60 @@ fn a_report_has_verdict_and_provenance_and_equal_bytes_for_equal_dates() {
     let digest = blake3::hash(include_bytes!("../../config/mikron_ucp710.yaml")).to_hex().to_string();
     assert!(first.contains(&digest));
     assert_eq!(first, write());
+}
+
+#[test]
+fn a_feed_that_is_not_reached_is_a_remark() {
+    let folder = TestFolder::new("unreached_feed");
+    let scenario = "description: One line\nfeed_m_min: 6000\nmoves:\n  - line: {x_mm: 50}\n";
+    let file = folder.file("feed.yaml", scenario);
+    let file = file.to_str().expect("UTF-8");
+    assert!(
+        text(&["run", file]).contains("the programmed feed of 6000.00 m/min is not reached; the highest")
+    );
+    assert!(!text(&["run", file, "--feed", "10"]).contains("programmed feed"));
+}
+
+#[test]
+fn an_unstable_position_loop_is_part_of_the_verdict() {
+    let verdict = |gain: &str| {
+        let set = format!("x.position_loop.gain={gain}");
+        text(&["run", "x-constant", "--set", &set, "--quiet"])
+    };
+    assert!(verdict("50").contains("; the position loop of x is unstable"));
+    assert!(!verdict("1.5").contains("unstable"));
+}
+
+#[test]
+fn checked_scenarios_show_path_and_range() {
+    let printed = text(&["check", "corner-90"]);
+    // Two lines of 50 mm at right angles.
+    for line in
+        ["path: 100.000 mm, open", "x: 0.000 to 50.000 mm, range 0.000 to 50.000 mm", "y: 0.000 to 50.000 mm"]
+    {
+        assert!(printed.contains(line), "{printed}");
+    }
+}
+
+#[test]
+fn setpoints_in_another_unit_or_with_another_separator_are_suspected() {
+    let folder = TestFolder::new("units_of_setpoints");
+    let rejected = |content: &str, words: &[&str]| {
+        let file = folder.file("setpoints.csv", content);
+        assert_rejected(&["run", file.to_str().expect("UTF-8")], words);
+    };
+    rejected("time,x\n0,0\n1,100\n", &["outside the travel limits", "are these in mm or degrees?"]);
+    rejected("time;x;y\n0;0;0\n", &["separated by commas, not by semicolons"]);
+}
+
+#[test]
+fn the_end_of_a_key_and_a_similar_file_name_are_suggested() {
+    let folder = TestFolder::new("similar_names");
+    let file = folder.file("slot.yaml", "");
+    let other = file.with_extension("yml");
+    assert_rejected(&["run", other.to_str().expect("UTF-8")], &["the nearest is", "slot.yaml"]);
+    assert_rejected(
+        &["run", "ballbar", "--compare", "gain=3"],
+        &["x.position_loop.gain or x.velocity_loop.gain"],
+    );
 }

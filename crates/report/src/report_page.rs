@@ -1,4 +1,4 @@
-//! Layout of a report page: facts, figures, search, tool and axes.
+//! Layout of a report page: limits, search, tool, figures, axes, runs and provenance.
 
 use std::io;
 
@@ -30,12 +30,12 @@ impl Report<'_> {
     fn page(&self, scatters: &[Scatter]) -> String {
         let mut page = Page { runs: &self.runs, html: Html::begin(self.title, self.description) };
         page.html.verdict(&self.verdict);
-        self.figures(&mut page.html);
-        page.facts();
         limits::section(&mut page);
         scatter::section(&mut page.html, scatters);
         tool::sections(&mut page);
+        self.figures(&mut page.html);
         axes::sections(&mut page);
+        page.facts();
         if !self.provenance.is_empty() {
             let rows: Vec<_> =
                 self.provenance.iter().map(|(name, value)| (name.as_str(), vec![value.clone()])).collect();

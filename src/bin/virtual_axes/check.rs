@@ -5,15 +5,13 @@ use std::path::PathBuf;
 
 use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
 use virtual_axes_core::machine::MachineParameters;
-use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::Scenario;
 use virtual_axes_core::text::{escaped, nearest_hint, nearest_name};
 use virtual_axes_core::trial::Trial;
-use virtual_axes_core::units::METER_PER_MINUTE;
 use virtual_axes_io::files::{self, FileKind};
 
 use crate::input::CommandInput;
-use crate::{interrupt, print_error};
+use crate::{interrupt, print_error, program_text};
 
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
@@ -58,22 +56,13 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     let setpoints = input.setpoints(&config, program.as_ref())?;
     let outcome = virtual_axes_core::trial::run(&trial, setpoints, |_| interrupt::check())
         .map_err(|error| input.name_error(error))?;
-    let feed = program.as_ref().map_or(String::new(), |program| {
-        let highest = highest_feed(program) / METER_PER_MINUTE;
-        if highest > 0.0 { format!(", highest feed {highest:.2} m/min") } else { String::new() }
-    });
+    let path = program.as_ref().map(|program| program_text::description(program, config.axes()));
+    let remark = program.as_ref().and_then(|program| program_text::unreached_feed(program));
+    if let Some(remark) = remark {
+        print_error(&format!("warning: {name}: {remark}"));
+    }
     let (machine, duration) = (escaped(config.name()), outcome.figures.duration);
-    Ok(format!("{kind} for {machine}: {duration:.3} s{feed}\nvalid\n"))
-}
-
-/// Returns the highest feed that a program reaches, m/s.
-fn highest_feed(program: &Program) -> f64 {
-    /// Number of intervals in which the feed is evaluated.
-    const SAMPLES: u32 = 2000;
-    let step = program.duration() / f64::from(SAMPLES);
-    let progress = (0..=SAMPLES).map(|i| program.progress(step * f64::from(i)));
-    let progress: Vec<f64> = progress.collect();
-    progress.windows(2).map(|pair| (pair[1] - pair[0]) / step).fold(0.0, f64::max)
+    Ok(format!("{kind} for {machine}: {duration:.3} s\n{}valid\n", path.unwrap_or_default()))
 }
 
 /// Returns true for a built-in machine, false for a built-in scenario.

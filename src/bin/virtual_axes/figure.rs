@@ -125,9 +125,9 @@ fn of_axis(axis: &AxisFigures) -> Vec<Figure> {
     ]
 }
 
-/// Returns contour error, orientation error and corners. `ends` adds the largest and the RMS contour error
+/// Returns contour error, orientation error and corners. `ends` adds the contour errors
 /// without the overshoot at the ends of the path.
-pub fn of_path(figures: &Figures, ends: [bool; 2]) -> Vec<Figure> {
+pub fn of_path(figures: &Figures, ends: bool) -> Vec<Figure> {
     let mut found = of_contour(figures, ends);
     if let Some(orientation) = figures.orientation.filter(|orientation| orientation.max > 0.0) {
         found.push(Figure::new("", "orientation error, max", orientation.max / MILLIDEGREE, "mdeg"));
@@ -172,34 +172,31 @@ pub fn spike_names(circle: &CircleFigures) -> [String; 4] {
     [format!("+{first}"), format!("+{second}"), format!("−{first}"), format!("−{second}")]
 }
 
-fn of_contour(figures: &Figures, ends: [bool; 2]) -> Vec<Figure> {
+fn of_contour(figures: &Figures, ends: bool) -> Vec<Figure> {
     let Some(contour) = &figures.contour else { return Vec::new() };
     let reference = match contour.reference {
         Reference::Path => "",
         Reference::Setpoints => " (from the polyline of setpoints)",
     };
     let parts = [
-        ("contour error, max", contour.max, contour.max_within_ends, ends[0]),
-        ("contour error, RMS", contour.rms, contour.rms_within_ends, ends[1]),
+        ("contour error, max", contour.max, contour.max_within_ends),
+        ("contour error, RMS", contour.rms, contour.rms_within_ends),
     ];
     let mut found = Vec::new();
-    for (name, whole, within_ends, differ) in parts {
+    for (name, whole, within_ends) in parts {
         found.push(Figure::new("", &format!("{name}{reference}"), whole / MICROMETER, "µm"));
-        if differ {
-            let name = format!("{name}, without overshoot at the path ends");
+        if ends {
+            let name = format!("{name}, without end overshoot");
             found.push(Figure::new("", &name, within_ends / MICROMETER, "µm"));
         }
     }
     found
 }
 
-/// Returns true for the largest and for the RMS contour error if its printed value changes when the overshoot at the
-/// ends of the path is excluded.
-pub fn overshoots(figures: &Figures) -> [bool; 2] {
+/// Returns true if a printed contour error changes when the overshoot at the ends of the path is excluded.
+pub fn overshoots(figures: &Figures) -> bool {
     let differ = |a: f64, b: f64| rounded(a / MICROMETER, 1) != rounded(b / MICROMETER, 1);
-    figures
-        .contour
-        .map_or([false; 2], |c| [differ(c.max, c.max_within_ends), differ(c.rms, c.rms_within_ends)])
+    figures.contour.is_some_and(|c| differ(c.max, c.max_within_ends) || differ(c.rms, c.rms_within_ends))
 }
 
 fn millimeters(value: f64) -> String {

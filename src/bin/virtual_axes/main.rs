@@ -23,6 +23,7 @@ mod output_arguments;
 mod parameters;
 mod period;
 mod pose;
+mod program_text;
 mod progress;
 mod psec;
 mod recordings;

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use time::OffsetDateTime;
 use virtual_axes_core::assess::SignalRecording;
-use virtual_axes_core::config::Parameters;
+use virtual_axes_core::config::{AxisConfig, AxisKind, Parameters};
+use virtual_axes_core::units::{MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds};
 use virtual_axes_io::files::OutputFile;
 use virtual_axes_report::{Report, ReportRun, Scatter};
 
@@ -83,8 +84,30 @@ fn facts(machine: &str, run: &VariantRun) -> Vec<(String, String)> {
         facts.push(("contour error".to_owned(), table::NO_CONTOUR.to_owned()));
     }
     facts.extend(table::more(figures).map(|line| ("without figures".to_owned(), line)));
+    facts.extend(run.program_remark.iter().map(|remark| ("feed".to_owned(), remark.clone())));
     facts.extend(run.changes.iter().map(|change| ("set".to_owned(), change.clone())));
+    let moving = run.machine.axes().iter().zip(&figures.axes).filter(|(_, figures)| figures.moves);
+    facts.extend(moving.map(|(axis, _)| (axis.name().to_owned(), values(axis))));
     facts
+}
+
+/// Returns gains, feedforward and delays of an axis.
+fn values(axis: &AxisConfig) -> String {
+    let unit = match axis.kind() {
+        AxisKind::Linear => "(m/min)/mm",
+        AxisKind::Rotary => "(1000 °/min)/°",
+    };
+    let rounded = |value: f64| Rounded(value).to_string();
+    let milliseconds = |delay: Nanoseconds| format!("{} ms", Rounded(seconds(delay) / MILLISECOND));
+    format!(
+        "Kp {} {unit}, VFFW {}, TFFW {} kg·m², α {}, β {}, γ {}",
+        rounded(axis.position_loop.gain / POSITION_GAIN),
+        rounded(axis.feedforward.velocity),
+        rounded(axis.feedforward.torque),
+        milliseconds(axis.delays.alpha),
+        milliseconds(axis.delays.beta),
+        milliseconds(axis.delays.gamma),
+    )
 }
 
 /// Returns what is needed to repeat the runs.

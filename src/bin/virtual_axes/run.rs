@@ -3,10 +3,12 @@
 use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::machine::AxisSample;
-use virtual_axes_core::trial::{Figures, Tick, Trial, TrialOutcome};
+use virtual_axes_core::path::Program;
+use virtual_axes_core::trial::{Tick, Trial, TrialOutcome};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::files::{TraceWriter, trace_writer};
 
@@ -17,7 +19,7 @@ use crate::progress::TrialProgress;
 use crate::report::ReportMachine;
 use crate::trial_arguments::TrialArguments;
 use crate::variant::{self, ControllerName, VariantRun};
-use crate::{figure, interrupt, json, report, table, text_table, verdict};
+use crate::{figure, interrupt, json, program_text, report, table, text_table, verdict};
 
 /// Arguments of `virtual_axes run`.
 #[derive(Debug, clap::Args)]
@@ -77,11 +79,14 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
     let mut runs = Vec::new();
     for (parameters, changes) in variants {
         let config = variant::checked(&parameters, &machine, &arguments.trial.machine)?;
-        let outcome = trial(arguments, &input, &parameters, &config)?;
+        let program = input.program(&config, arguments.trial.feed)?;
+        let outcome = trial(arguments, &input, program.as_ref(), &parameters, &config)?;
         runs.push(VariantRun {
             controller: variant::controller_name(&parameters),
             changes,
             shared_changes: arguments.trial.set.len(),
+            machine: config,
+            program_remark: program.as_deref().and_then(program_text::unreached_feed),
             outcome,
         });
     }
@@ -106,19 +111,19 @@ fn controllers(given: &[ControllerName]) -> Vec<Option<ControllerName>> {
 fn trial(
     arguments: &RunArguments,
     input: &CommandInput,
+    program: Option<&Arc<Program>>,
     parameters: &Parameters,
     config: &MachineConfig,
 ) -> Result<TrialOutcome, Box<dyn Error>> {
-    let program = input.program(config, arguments.trial.feed)?;
     let trial = Trial {
         machine: config,
-        program: program.clone(),
+        program: program.cloned(),
         allow_nonzero_end_velocity: parameters.node_config().allow_nonzero_velocity_at_trajectory_end,
         record: arguments.report.is_some(),
     };
-    let setpoints = input.setpoints(config, program.as_ref())?;
+    let setpoints = input.setpoints(config, program)?;
     let mut progress =
-        TrialProgress::new(input.name(), program.as_ref().map(|p| p.duration()), arguments.output.is_quiet());
+        TrialProgress::new(input.name(), program.map(|p| p.duration()), arguments.output.is_quiet());
     let mut trace = match &arguments.trace {
         Some(path) => Some(TraceRecorder::new(path, arguments.trace_period, config)?),
         None => None,
@@ -186,15 +191,16 @@ impl TraceRecorder {
 fn text(runs: &[VariantRun]) -> String {
     let mut parts = vec![verdict::wrapped(runs)];
     match runs {
-        [run] => parts.extend(single(&run.outcome.figures)),
+        [run] => parts.extend(single(run)),
         _ => parts.extend(several(runs)),
     }
     parts.join("\n")
 }
 
-fn single(figures: &Figures) -> Vec<String> {
+fn single(run: &VariantRun) -> Vec<String> {
+    let figures = &run.outcome.figures;
     let mut axes = text_table::text(&table::axes(figures));
-    axes.extend(table::remarks(figures).into_iter().map(|remark| remark + "\n"));
+    axes.extend(run.remarks().iter().map(|remark| text_table::wrapped_line(remark)));
     let path = table::path(figures);
     let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
     std::iter::once(axes).chain(path).collect()
@@ -216,7 +222,7 @@ fn several(runs: &[VariantRun]) -> Vec<String> {
             parts.push(text_table::aligned(&part, &[0, 1]));
         }
     }
-    let all: Vec<Vec<String>> = runs.iter().map(|run| table::remarks(&run.outcome.figures)).collect();
+    let all: Vec<Vec<String>> = runs.iter().map(VariantRun::remarks).collect();
     let remarks: Vec<String> = match all.split_first() {
         Some((first, others)) if others.iter().all(|other| other == first) => first.clone(),
         _ => runs
@@ -239,8 +245,7 @@ fn csv(runs: &[VariantRun]) -> String {
     for run in runs {
         let figures = &run.outcome.figures;
         for figure in
-            [figure::of_axes(figures), figure::of_path(figures, [true; 2]), figure::of_circles(figures)]
-                .concat()
+            [figure::of_axes(figures), figure::of_path(figures, true), figure::of_circles(figures)].concat()
         {
             let cells = [run.title(), figure.title(), figure.value.to_string(), figure.unit.to_owned()];
             text.push_str(&text_table::csv_row(&cells));

@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::trial::{AxisFigures, Figures};
-use virtual_axes_core::units::DEGREE;
+use virtual_axes_core::units::{DEGREE, Rounded};
 use virtual_axes_report::{Table, TableColumn};
 
 use crate::figure::{self, Figure};
@@ -39,7 +39,7 @@ pub fn axes(figures: &Figures) -> Table {
         ("RMS", ""),
         ("delay-compensated max", ""),
         ("RMS", ""),
-        ("peak current", "A"),
+        ("peak current of limit", "A"),
         ("saturated", "s"),
         ("activity", "A"),
     ];
@@ -56,7 +56,7 @@ pub fn axes(figures: &Figures) -> Table {
         ];
         let mut row = vec![axis.name.clone(), unit.to_owned()];
         row.extend(errors.iter().map(|error| format!("{:.1}", error / scale)));
-        row.push(format!("{:.2}", r.peak_current));
+        row.push(format!("{:.2} of {}", r.peak_current, Rounded(axis.max_current)));
         row.push(format!("{:.3}", r.saturation_time));
         row.push(format!("{:.3}", r.control_activity));
         table.rows.push(row);
@@ -111,9 +111,8 @@ pub fn path(figures: &Figures) -> Table {
 /// Creates tables with a row per figure and a column per run: path, circular tests, and axes. From the second run on, a
 /// cell has the difference from the first run.
 pub fn comparison(runs: &[VariantRun]) -> [Table; 3] {
-    let ends = runs.iter().map(|run| figure::overshoots(&run.outcome.figures));
     // The tables of all runs have equal rows.
-    let ends = ends.fold([false; 2], |all, run| [all[0] || run[0], all[1] || run[1]]);
+    let ends = runs.iter().any(|run| figure::overshoots(&run.outcome.figures));
     let axes: Vec<_> = runs.iter().map(|run| figure::of_axes(&run.outcome.figures)).collect();
     let path: Vec<_> = runs.iter().map(|run| figure::of_path(&run.outcome.figures, ends)).collect();
     let circles: Vec<_> = runs.iter().map(|run| figure::of_circles(&run.outcome.figures)).collect();

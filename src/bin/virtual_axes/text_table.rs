@@ -21,11 +21,7 @@ pub fn aligned(table: &Table, left: &[usize]) -> String {
     out.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
     out.set_header(table.columns.iter().map(heading));
     out.add_rows(&table.rows);
-    // What the columns of numbers leave is shared by the columns of text.
-    let numbers = (0..table.columns.len()).filter(|index| !left.contains(index));
-    let used: u16 = numbers.map(|index| longest_word(table, index) + GAP).sum();
-    let texts = u16::try_from(left.len()).unwrap_or(1).max(1);
-    let spare = (WIDTH.saturating_sub(used) / texts).saturating_sub(GAP);
+    let texts = text_widths(table, left);
     for (index, column) in out.column_iter_mut().enumerate() {
         column.set_padding((0, GAP));
         column.set_cell_alignment(if left.contains(&index) {
@@ -33,12 +29,29 @@ pub fn aligned(table: &Table, left: &[usize]) -> String {
         } else {
             CellAlignment::Right
         });
-        let smallest = if left.contains(&index) { widest(table, index).min(spare) } else { 0 };
-        let smallest = smallest.max(longest_word(table, index));
+        let text = texts.iter().find(|(column, _)| *column == index).map_or(0, |(_, width)| *width);
+        let smallest = text.max(longest_word(table, index));
         column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(smallest + GAP)));
     }
     let lines: Vec<String> = out.lines().map(|line| line.trim_end().to_owned() + "\n").collect();
     lines.concat()
+}
+
+/// Returns the smallest width of each column of text. They share what the columns of numbers leave; the narrowest gets
+/// what it needs first.
+fn text_widths(table: &Table, left: &[usize]) -> Vec<(usize, u16)> {
+    let numbers = (0..table.columns.len()).filter(|index| !left.contains(index));
+    let used: u16 = numbers.map(|index| longest_word(table, index) + GAP).sum();
+    let mut widths: Vec<(usize, u16)> = left.iter().map(|&index| (index, widest(table, index))).collect();
+    widths.sort_by_key(|(_, width)| *width);
+    let mut spare = WIDTH.saturating_sub(used);
+    let mut count = u16::try_from(left.len()).unwrap_or(1);
+    for (_, width) in &mut widths {
+        *width = (*width).min((spare / count.max(1)).saturating_sub(GAP));
+        spare = spare.saturating_sub(*width + GAP);
+        count = count.saturating_sub(1);
+    }
+    widths
 }
 
 /// Returns the number of columns of figures with these headings, at least 1, that fit beside a column of names and one
@@ -73,6 +86,9 @@ fn longest<'a>(texts: impl Iterator<Item = &'a str>) -> u16 {
 /// Wraps a text to lines of at most [`WIDTH`] characters; further lines are indented.
 pub fn wrapped_line(text: &str) -> String {
     const INDENT: &str = "    ";
+    if text.chars().count() <= usize::from(WIDTH) {
+        return format!("{text}\n");
+    }
     let lines = wrapped(text, usize::from(WIDTH) - INDENT.len());
     lines.join(&format!("\n{INDENT}")) + "\n"
 }

@@ -282,7 +282,14 @@ fn record(
             Tuning::Cascade(_) => "cascade".to_owned(),
         };
         let outcome = problem.record_on(workload, tuning)?;
-        Ok(VariantRun { controller, changes: vec![tuning.to_string()], shared_changes: 0, outcome })
+        Ok(VariantRun {
+            controller,
+            changes: vec![tuning.to_string()],
+            shared_changes: 0,
+            machine: tuning.apply(problem.parameters(), problem.joints())?.machine_config()?,
+            program_remark: None,
+            outcome,
+        })
     };
     Ok([run(&Tuning::Present)?, run(&found.best.tuning)?])
 }

@@ -14,7 +14,7 @@ use crate::tune_result::{TunableController, TuningResult};
 use crate::{json, text_table};
 
 /// Maximum number of rows of a table of tunings; the JSON output contains all.
-const ROWS: usize = 12;
+const ROWS: usize = 6;
 /// Cost above which tunings are not plotted, relative to the larger of initial and best cost.
 const MAX_PLOTTED_COST: f64 = 2.0;
 

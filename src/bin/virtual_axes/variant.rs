@@ -5,8 +5,11 @@ use std::error::Error;
 use virtual_axes_core::config::{
     Assignment, ConfigError, MachineConfig, Parameters, Value, ValueSource, parse_assignment,
 };
-use virtual_axes_core::machine::MachineParameters;
+use virtual_axes_core::design::{DesignError, check_stable};
+use virtual_axes_core::machine::{MachineParameters, design_controller, prediction_model};
 use virtual_axes_core::trial::TrialOutcome;
+
+use crate::table;
 
 /// Position controller of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -133,6 +136,10 @@ pub struct VariantRun {
     pub changes: Vec<String>,
     /// Number of changes that all runs share.
     pub shared_changes: usize,
+    /// Machine of the run.
+    pub machine: MachineConfig,
+    /// Remark on the program, such as a feed that is not reached.
+    pub program_remark: Option<String>,
     /// Result of the run.
     pub outcome: TrialOutcome,
 }
@@ -146,5 +153,32 @@ impl VariantRun {
             title.push_str(change);
         }
         title
+    }
+    /// Returns remarks on the run, one per line.
+    pub fn remarks(&self) -> Vec<String> {
+        let unstable = self.unstable_axes();
+        let loops = (!unstable.is_empty()).then(|| {
+            format!(
+                "unstable position loop: {}; the unit of position_loop.gain is (m/min)/mm or (1000 °/min)/°, 16.667 1/s",
+                unstable.join(", ")
+            )
+        });
+        loops
+            .into_iter()
+            .chain(self.program_remark.clone())
+            .chain(table::remarks(&self.outcome.figures))
+            .collect()
+    }
+
+    /// Returns the names of the moving axes whose position loop is unstable by the linear model.
+    pub fn unstable_axes(&self) -> Vec<&str> {
+        let figures = self.outcome.figures.axes.iter();
+        let moving = self.machine.axes().iter().zip(figures).filter(|(_, figures)| figures.moves);
+        let unstable = moving.filter(|(axis, _)| {
+            let Ok(model) = prediction_model(axis, &self.machine.periods()) else { return false };
+            let stability = design_controller(axis, &model).and_then(|rst| check_stable(&model, &rst));
+            matches!(stability, Err(DesignError::Unstable { .. }))
+        });
+        unstable.map(|(axis, _)| axis.name()).collect()
     }
 }

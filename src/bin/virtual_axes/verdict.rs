@@ -11,7 +11,7 @@ use crate::{table, text_table};
 pub fn lines(runs: &[VariantRun]) -> Vec<String> {
     match runs {
         [] => Vec::new(),
-        [run] => vec![single(&run.outcome.figures)],
+        [run] => vec![single(run)],
         [first, others @ ..] => others.iter().map(|run| compared(first, run)).collect(),
     }
 }
@@ -26,24 +26,25 @@ pub fn wrapped(runs: &[VariantRun]) -> String {
     lines(runs).into_iter().map(|line| text_table::wrapped_line(&escaped(&line))).collect()
 }
 
-fn single(figures: &Figures) -> String {
+fn single(run: &VariantRun) -> String {
+    let figures = &run.outcome.figures;
     let main = main_figure(figures);
-    let contour = figure::of_path(figures, [false; 2]);
+    let contour = figure::of_path(figures, false);
     let text = match contour.get(1) {
         Some(rms) if main.subject.is_empty() => {
             format!("contour error {} µm max, {} µm RMS", main.text(), rms.text())
         }
         _ => format!("{} {} {}", without_max(&main), main.text(), main.unit),
     };
-    text + &limits(figures)
+    text + &warnings(run)
 }
 
 fn compared(first: &VariantRun, run: &VariantRun) -> String {
     let [from, to] = [main_figure(&first.outcome.figures), main_figure(&run.outcome.figures)];
     let change = percent(&from, &to).map(|change| format!(", {change}")).unwrap_or_default();
-    let limits = limits(&run.outcome.figures);
+    let warnings = warnings(run);
     let (title, name) = (run.title(), without_max(&to));
-    format!("{title}: {name} {} → {} {}{change}{limits}", from.text(), to.text(), to.unit)
+    format!("{title}: {name} {} → {} {}{change}{warnings}", from.text(), to.text(), to.unit)
 }
 
 fn without_max(figure: &Figure) -> String {
@@ -53,7 +54,7 @@ fn without_max(figure: &Figure) -> String {
 /// Returns the largest contour error if several axes move, else the largest delay-compensated following error.
 fn main_figure(figures: &Figures) -> Figure {
     let moving = figures.axes.iter().filter(|axis| axis.moves).count();
-    let contour = figure::of_path(figures, [false; 2]).into_iter().next();
+    let contour = figure::of_path(figures, false).into_iter().next();
     let contour = contour.filter(|_| figures.contour.is_some_and(|contour| contour.max > 0.0));
     match (worst_axis(figures), contour) {
         (Some(worst), None) => worst,
@@ -71,10 +72,13 @@ fn worst_axis(figures: &Figures) -> Option<Figure> {
         .max_by(|a, b| a.value.total_cmp(&b.value))
 }
 
-/// Returns the limits that axes reached, beginning with a semicolon; empty if there are none.
-fn limits(figures: &Figures) -> String {
+/// Returns unstable loops and the limits that axes reached, beginning with a semicolon; empty if there are none.
+fn warnings(run: &VariantRun) -> String {
     let mut text = String::new();
-    for axis in &figures.axes {
+    for axis in run.unstable_axes() {
+        text.push_str(&format!("; the position loop of {axis} is unstable"));
+    }
+    for axis in &run.outcome.figures.axes {
         if axis.report.saturation_time > 0.0 {
             let time = axis.report.saturation_time;
             text.push_str(&format!(

@@ -98,8 +98,24 @@ impl ParameterLayout {
         ConfigError::UnknownKey {
             at: at.clone(),
             key: shortened(key),
-            nearest: nearest_name(key, self.definitions().map(|(known, _)| known)),
+            nearest: self
+                .keys_with_end(key)
+                .or_else(|| nearest_name(key, self.definitions().map(|(known, _)| known))),
         }
+    }
+
+    /// Returns the keys of the first joint that has keys ending in `.` and `end`, joined by "or"; `None` if there are
+    /// none.
+    fn keys_with_end(&self, end: &str) -> Option<String> {
+        let suffix = format!(".{end}");
+        let found: Vec<String> = self
+            .definitions()
+            .map(|(known, _)| known.to_string())
+            .filter(|known| known.ends_with(&suffix))
+            .collect();
+        let joint = found.first()?.split('.').next()?;
+        let of_joint = |key: &&String| key.split('.').next() == Some(joint);
+        Some(found.iter().filter(of_joint).map(String::as_str).collect::<Vec<_>>().join(" or "))
     }
 }
 

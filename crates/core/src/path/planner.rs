@@ -295,7 +295,8 @@ impl ProgramDraft {
             return Err(PlanError::NotComputable { index: self.moves.len(), found: t });
         }
         first_span.push(spans.len());
-        Ok(Program { path: Arc::clone(&self.path), spans, first_span, duration: t })
+        let programmed_feed = self.moves.iter().map(|parameters| parameters.feed).fold(0.0, f64::max);
+        Ok(Program { path: Arc::clone(&self.path), spans, first_span, duration: t, programmed_feed })
     }
 
     /// Returns the properties of each span that the verification needs.

@@ -121,6 +121,8 @@ pub struct Program {
     /// Index of the first span of each block, followed by the number of spans.
     pub(super) first_span: Vec<usize>,
     pub(super) duration: f64,
+    /// Highest programmed feed of the moves, m/s or rad/s.
+    pub(super) programmed_feed: f64,
 }
 
 impl Program {
@@ -132,6 +134,20 @@ impl Program {
     /// Returns the total time including rests and dwells, s.
     pub fn duration(&self) -> f64 {
         self.duration
+    }
+
+    /// Returns the highest programmed feed of the moves, m/s or rad/s.
+    pub fn programmed_feed(&self) -> f64 {
+        self.programmed_feed
+    }
+
+    /// Returns the highest feed that is reached, m/s or rad/s: the largest mean of 2000 equal intervals of time.
+    pub fn highest_feed(&self) -> f64 {
+        const SAMPLES: u32 = 2000;
+        let step = self.duration / f64::from(SAMPLES);
+        let progress = (0..=SAMPLES).map(|i| self.progress(step * f64::from(i)));
+        let progress: Vec<f64> = progress.collect();
+        progress.windows(2).map(|pair| (pair[1] - pair[0]) / step).fold(0.0, f64::max)
     }
 
     /// Returns the progress along the path at time `t`, s, clamped; monotonic in time.

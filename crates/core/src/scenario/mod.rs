@@ -135,11 +135,23 @@ impl Scenario {
     }
 }
 
+/// Returns the paths of the files in the directory of `name`, at most 1000, as `name` states the directory.
+fn neighbors(name: &str) -> Vec<String> {
+    const MOST: usize = 1000;
+    let path = FilePath::new(name);
+    let parent = path.parent().unwrap_or(FilePath::new(""));
+    let directory = if parent.as_os_str().is_empty() { FilePath::new(".") } else { parent };
+    let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
+    let files =
+        entries.take(MOST).flatten().filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_file()));
+    files.map(|entry| parent.join(entry.file_name()).to_string_lossy().into_owned()).collect()
+}
+
 fn unknown(name: &str, reason: &str) -> ScenarioError {
     ScenarioError::Unknown {
         name: name.to_owned(),
         reason: reason.to_owned(),
-        nearest: nearest_name(name, Scenario::builtin_names()),
+        nearest: nearest_name(name, Scenario::builtin_names().map(str::to_owned).chain(neighbors(name))),
         known: Scenario::builtin_names().collect::<Vec<_>>().join(", "),
     }
 }

@@ -35,6 +35,8 @@ pub struct AxisFigures {
     pub kind: AxisKind,
     /// True if its setpoints changed.
     pub moves: bool,
+    /// Limit of the motor current, A.
+    pub max_current: f64,
     /// Errors, current, saturation.
     pub report: AxisReport,
     /// Time outside its travel limits at position cycles, over the whole run, s.

@@ -206,6 +206,7 @@ impl<'a> Observer<'a> {
             name: axis.name().to_owned(),
             kind: axis.kind(),
             moves: self.moves[index],
+            max_current: axis.motor.max_current,
             report: self.axes[index].report(self.tick),
             outside_travel_limits_time: self.outside_travel[index] as f64
                 * seconds(machine.periods().position),

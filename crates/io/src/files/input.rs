@@ -168,8 +168,23 @@ fn kind_from_yaml(bytes: &[u8], name: &str) -> Result<FileKind, InputError> {
             let keys: Vec<&str> = entries.iter().map(|(key, _)| key.as_str()).collect();
             format!("the file is a mapping with keys {}", shortened(&keys.join(", ")))
         }
-        Some(YamlOutline::Other) => format!("the first line is \"{}\"", shortened(first_line(text))),
+        Some(YamlOutline::Other) => {
+            let line = first_line(text);
+            format!("the first line is \"{}\"{}", shortened(line), separator_hint(line))
+        }
     }))
+}
+
+/// Returns the cause of a header whose columns are separated by another character than a comma; else an empty text.
+fn separator_hint(line: &str) -> String {
+    let Some(separator) = line.strip_prefix(TIME).and_then(|rest| rest.chars().next()) else {
+        return String::new();
+    };
+    match separator {
+        ';' => "; columns must be separated by commas, not by semicolons".to_owned(),
+        '\t' | ' ' => "; columns must be separated by commas, not by tabs or spaces".to_owned(),
+        _ => String::new(),
+    }
 }
 
 /// Structure of a YAML document: its keys without scalar values.

@@ -1,7 +1,7 @@
 //! Errors of position setpoints from CSV.
 
 use virtual_axes_core::text::nearest_hint;
-use virtual_axes_core::trajectory::Rejection;
+use virtual_axes_core::trajectory::{Rejection, RejectionCode};
 use virtual_axes_core::units::Rounded;
 
 /// Header of the time column.
@@ -87,7 +87,7 @@ pub enum PsecError {
         before: f64,
     },
     /// A setpoint exceeds the limits of a joint.
-    #[error("{at}: {rejection}")]
+    #[error("{at}: {rejection}{}", unit_hint(.rejection))]
     Point {
         /// File and line.
         at: String,
@@ -100,4 +100,19 @@ pub enum PsecError {
         /// Name of the file.
         at: String,
     },
+}
+
+/// Returns the probable cause of a setpoint far beyond a limit: another unit. Else an empty text.
+fn unit_hint(rejection: &Rejection) -> &'static str {
+    /// Ratio to the limit from which the unit is doubted; a degree in place of a radian is a factor of 57.
+    const DOUBTFUL_RATIO: f64 = 20.0;
+    let is_limit = matches!(
+        rejection.code,
+        RejectionCode::OutsideTravelLimits | RejectionCode::Jump | RejectionCode::Speed
+    );
+    if is_limit && rejection.value.abs() > DOUBTFUL_RATIO * rejection.limit.abs() {
+        "; positions are in m or rad: are these in mm or degrees?"
+    } else {
+        ""
+    }
 }
