@@ -8,4 +8,5 @@ mod recording_columns;
 mod recording_csv;
 mod recording_halsampler;
 mod recording_mcap;
+mod recording_sinumerik_edge;
 mod urdf;

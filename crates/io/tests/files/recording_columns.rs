@@ -1,6 +1,7 @@
 //! Detection of columns from their headers, the list of the columns of a file, and sampling rates.
 
 use std::sync::LazyLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_identify::recording::{Finding, RawRecording};
@@ -28,9 +29,12 @@ pub(crate) struct Recorded {
 
 impl Recorded {
     pub(crate) fn new(name: &str, content: impl AsRef<[u8]>) -> Self {
+        // Tests run at the same time.
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
         let options = RecordingOptions::default();
         Recorded {
-            folder: TestFolder::new(&format!("recording_{name}")),
+            folder: TestFolder::new(&format!("recording_{name}_{number}")),
             options,
             content: content.as_ref().to_vec(),
         }

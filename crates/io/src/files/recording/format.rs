@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use super::{halsampler, sinumerik_edge};
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 
 /// Format of a recording of axes.
@@ -10,6 +11,8 @@ use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 pub enum RecordingFormat {
     /// CSV with a header, or with columns selected by number.
     Csv,
+    /// High-frequency data of Sinumerik Edge, JSON.
+    SinumerikEdge,
     /// Text of LinuxCNC's halsampler.
     Halsampler,
     /// MCAP with ROS messages.
@@ -26,13 +29,18 @@ pub struct RecordingFormatError {
 
 impl RecordingFormat {
     /// All formats.
-    pub const ALL: [RecordingFormat; 3] =
-        [RecordingFormat::Csv, RecordingFormat::Halsampler, RecordingFormat::Mcap];
+    pub const ALL: [RecordingFormat; 4] = [
+        RecordingFormat::Csv,
+        RecordingFormat::SinumerikEdge,
+        RecordingFormat::Halsampler,
+        RecordingFormat::Mcap,
+    ];
 
     /// Returns the name of the format, as in the option `--format`.
     pub const fn name(self) -> &'static str {
         match self {
             RecordingFormat::Csv => "csv",
+            RecordingFormat::SinumerikEdge => "sinumerik-edge",
             RecordingFormat::Halsampler => "halsampler",
             RecordingFormat::Mcap => "mcap",
         }
@@ -48,7 +56,9 @@ impl RecordingFormat {
             return RecordingFormat::Mcap;
         }
         let text = String::from_utf8_lossy(head);
-        if super::halsampler::is_halsampler(&text) {
+        if sinumerik_edge::is_sinumerik_edge(&text) {
+            RecordingFormat::SinumerikEdge
+        } else if halsampler::is_halsampler(&text) {
             RecordingFormat::Halsampler
         } else {
             RecordingFormat::Csv

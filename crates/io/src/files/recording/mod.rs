@@ -14,6 +14,7 @@ mod layout;
 mod mcap;
 mod recording_builder;
 mod series;
+mod sinumerik_edge;
 mod sinumerik_signal;
 mod unit;
 mod vocabulary;
@@ -108,6 +109,7 @@ pub fn read_recording(
             }
             Ok((recording, findings))
         }
+        RecordingFormat::SinumerikEdge => sinumerik_edge::read(Cursor::new(head).chain(file), &context),
         RecordingFormat::Halsampler => halsampler::read(Cursor::new(head).chain(file), &context),
         RecordingFormat::Csv => {
             let read = csv::read(Cursor::new(head).chain(file), &context);
