@@ -9,4 +9,5 @@ mod recording_csv;
 mod recording_halsampler;
 mod recording_mcap;
 mod recording_sinumerik_edge;
+mod recording_twincat;
 mod urdf;

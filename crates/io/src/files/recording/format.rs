@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{halsampler, sinumerik_edge};
+use super::{halsampler, sinumerik_edge, twincat_header};
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 
 /// Format of a recording of axes.
@@ -13,6 +13,8 @@ pub enum RecordingFormat {
     Csv,
     /// High-frequency data of Sinumerik Edge, JSON.
     SinumerikEdge,
+    /// CSV exported by TwinCAT Scope.
+    TwinCatScope,
     /// Text of LinuxCNC's halsampler.
     Halsampler,
     /// MCAP with ROS messages.
@@ -29,9 +31,10 @@ pub struct RecordingFormatError {
 
 impl RecordingFormat {
     /// All formats.
-    pub const ALL: [RecordingFormat; 4] = [
+    pub const ALL: [RecordingFormat; 5] = [
         RecordingFormat::Csv,
         RecordingFormat::SinumerikEdge,
+        RecordingFormat::TwinCatScope,
         RecordingFormat::Halsampler,
         RecordingFormat::Mcap,
     ];
@@ -41,6 +44,7 @@ impl RecordingFormat {
         match self {
             RecordingFormat::Csv => "csv",
             RecordingFormat::SinumerikEdge => "sinumerik-edge",
+            RecordingFormat::TwinCatScope => "twincat-scope",
             RecordingFormat::Halsampler => "halsampler",
             RecordingFormat::Mcap => "mcap",
         }
@@ -58,6 +62,8 @@ impl RecordingFormat {
         let text = String::from_utf8_lossy(head);
         if sinumerik_edge::is_sinumerik_edge(&text) {
             RecordingFormat::SinumerikEdge
+        } else if twincat_header::is_twincat(&text) {
+            RecordingFormat::TwinCatScope
         } else if halsampler::is_halsampler(&text) {
             RecordingFormat::Halsampler
         } else {

@@ -9,7 +9,7 @@ use super::found_column::FoundColumn;
 use super::layout::{next_line, parse_number};
 use super::sinumerik_signal::edge_signal;
 use super::unit::Channel;
-use super::{RecordingOptions, halsampler, header, open, sinumerik_edge};
+use super::{RecordingOptions, halsampler, header, open, sinumerik_edge, twincat};
 use crate::files::lines::{Lines, fields_between};
 
 /// Number of lines searched for a header.
@@ -74,6 +74,7 @@ fn inspect(
     let columns = match format {
         RecordingFormat::Csv => return inspect_csv(input, name, options),
         RecordingFormat::SinumerikEdge => sinumerik_edge::inspect(input, name)?,
+        RecordingFormat::TwinCatScope => twincat::inspect(input, name)?,
         RecordingFormat::Halsampler => halsampler::inspect(input, name)?,
         RecordingFormat::Mcap => Vec::new(),
     };

@@ -16,6 +16,8 @@ mod recording_builder;
 mod series;
 mod sinumerik_edge;
 mod sinumerik_signal;
+mod twincat;
+mod twincat_header;
 mod unit;
 mod vocabulary;
 
@@ -110,6 +112,7 @@ pub fn read_recording(
             Ok((recording, findings))
         }
         RecordingFormat::SinumerikEdge => sinumerik_edge::read(Cursor::new(head).chain(file), &context),
+        RecordingFormat::TwinCatScope => twincat::read(Cursor::new(head).chain(file), &context),
         RecordingFormat::Halsampler => halsampler::read(Cursor::new(head).chain(file), &context),
         RecordingFormat::Csv => {
             let read = csv::read(Cursor::new(head).chain(file), &context);
