@@ -66,11 +66,15 @@ pub fn columns_beside_text(headings: impl Iterator<Item = String>) -> usize {
     ((usize::from(WIDTH) - BESIDE) / width).max(1)
 }
 
-/// Returns the length of the longest word of a column, which is not divided.
+/// Returns the length of the longest part of a column that is not divided: a word, or a figure of some words such as
+/// "8.75 … 11".
 fn longest_word(table: &Table, index: usize) -> u16 {
+    /// Longest figure, characters.
+    const FIGURE: usize = 10;
     let heading = table.columns.get(index).map(heading).unwrap_or_default();
-    let cells = table.rows.iter().filter_map(|row| row.get(index));
-    longest(cells.map(String::as_str).chain([heading.as_str()]).flat_map(str::split_whitespace))
+    let cells = table.rows.iter().filter_map(|row| row.get(index)).map(String::as_str);
+    let figures = cells.clone().filter(|cell| cell.chars().count() <= FIGURE);
+    longest(figures.chain(cells.chain([heading.as_str()]).flat_map(str::split_whitespace)))
 }
 
 /// Returns the length of the longest cell of a column.
