@@ -28,8 +28,8 @@ pub struct RecordingArguments {
     /// Joint in the recordings, or name or number of the axis in their columns [default: axis name].
     #[arg(long)]
     joint: Option<String>,
-    /// Format of the recordings [default: detected]: csv, sinumerik-edge, twincat-scope, halsampler
-    /// or mcap.
+    /// Format of the recordings [default: detected]: csv, sinumerik-trace, sinumerik-edge,
+    /// twincat-scope, halsampler or mcap.
     #[arg(long, value_name = "NAME")]
     format: Option<RecordingFormat>,
     /// Sampling rate of recordings without a column of time, Hz.

@@ -8,7 +8,7 @@ use virtual_axes_io::files::RecordingFormat;
 const MANUAL: &str = "123.55 33.4 0 -12\n";
 
 /// Lines as `sampler_usr.c` prints them with the option `-t`: `"%ld "` for the sample number, `"%f "` for each pin.
-const TAGGED: &str = "overrun\n4711 0.100000 0.098500 1.250000 \n4712 0.200000 0.197000 1.500000 \n4713 0.300000 0.295500 1.750000 \n";
+pub(crate) const TAGGED: &str = "overrun\n4711 0.100000 0.098500 1.250000 \n4712 0.200000 0.197000 1.500000 \n4713 0.300000 0.295500 1.750000 \n";
 
 #[test]
 fn the_line_of_the_manual_page_is_read() {

@@ -6,7 +6,7 @@ use virtual_axes_io::files::RecordingFormat;
 /// Excerpt of `example/example_data_ff429d74-6482-4d4f-80e1-31419d9bd56c.json` of
 /// <https://github.com/max-scw/CaptureDataParser>: the signals of the axes X1 and Y1 and some others, six rows in two
 /// items of the Payload, and the item between them.
-const EXCERPT: &str = r#"{
+pub(crate) const EXCERPT: &str = r#"{
 "Header":
 {
   "Version" : {

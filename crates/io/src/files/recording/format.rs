@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{halsampler, sinumerik_edge, twincat_header};
+use super::{halsampler, sinumerik_edge, sinumerik_trace, twincat_header};
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 
 /// Format of a recording of axes.
@@ -11,6 +11,8 @@ use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 pub enum RecordingFormat {
     /// CSV with a header, or with columns selected by number.
     Csv,
+    /// Trace of Sinumerik Operate on Sinumerik 840D sl, XML.
+    SinumerikTrace,
     /// High-frequency data of Sinumerik Edge, JSON.
     SinumerikEdge,
     /// CSV exported by TwinCAT Scope.
@@ -31,8 +33,9 @@ pub struct RecordingFormatError {
 
 impl RecordingFormat {
     /// All formats.
-    pub const ALL: [RecordingFormat; 5] = [
+    pub const ALL: [RecordingFormat; 6] = [
         RecordingFormat::Csv,
+        RecordingFormat::SinumerikTrace,
         RecordingFormat::SinumerikEdge,
         RecordingFormat::TwinCatScope,
         RecordingFormat::Halsampler,
@@ -43,6 +46,7 @@ impl RecordingFormat {
     pub const fn name(self) -> &'static str {
         match self {
             RecordingFormat::Csv => "csv",
+            RecordingFormat::SinumerikTrace => "sinumerik-trace",
             RecordingFormat::SinumerikEdge => "sinumerik-edge",
             RecordingFormat::TwinCatScope => "twincat-scope",
             RecordingFormat::Halsampler => "halsampler",
@@ -60,7 +64,9 @@ impl RecordingFormat {
             return RecordingFormat::Mcap;
         }
         let text = String::from_utf8_lossy(head);
-        if sinumerik_edge::is_sinumerik_edge(&text) {
+        if sinumerik_trace::is_sinumerik_trace(&text) {
+            RecordingFormat::SinumerikTrace
+        } else if sinumerik_edge::is_sinumerik_edge(&text) {
             RecordingFormat::SinumerikEdge
         } else if twincat_header::is_twincat(&text) {
             RecordingFormat::TwinCatScope

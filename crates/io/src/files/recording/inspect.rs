@@ -7,9 +7,9 @@ use super::error::AxisRecordingError;
 use super::format::RecordingFormat;
 use super::found_column::FoundColumn;
 use super::layout::{next_line, parse_number};
-use super::sinumerik_signal::edge_signal;
+use super::sinumerik_signal::{edge_signal, trace_signal};
 use super::unit::Channel;
-use super::{RecordingOptions, halsampler, header, open, sinumerik_edge, twincat};
+use super::{RecordingOptions, halsampler, header, open, sinumerik_edge, sinumerik_trace, twincat};
 use crate::files::lines::{Lines, fields_between};
 
 /// Number of lines searched for a header.
@@ -73,6 +73,7 @@ fn inspect(
 ) -> Result<RecordingColumns, AxisRecordingError> {
     let columns = match format {
         RecordingFormat::Csv => return inspect_csv(input, name, options),
+        RecordingFormat::SinumerikTrace => sinumerik_trace::inspect(input, name)?,
         RecordingFormat::SinumerikEdge => sinumerik_edge::inspect(input, name)?,
         RecordingFormat::TwinCatScope => twincat::inspect(input, name)?,
         RecordingFormat::Halsampler => halsampler::inspect(input, name)?,
@@ -133,7 +134,8 @@ fn columns_of_line(text: &str, options: &RecordingOptions) -> Vec<FoundColumn> {
 /// Returns the meanings of columns from their headers.
 pub(super) fn detect_columns(headers: &[String]) -> Vec<FoundColumn> {
     let detect = |(text, number): (&String, usize)| {
-        edge_signal(number, text).unwrap_or_else(|| header::detect(number, text))
+        let signal = edge_signal(number, text).or_else(|| trace_signal(number, text));
+        signal.unwrap_or_else(|| header::detect(number, text))
     };
     let mut columns: Vec<FoundColumn> = headers.iter().zip(1..).map(detect).collect();
     header::resolve_axis_a(&mut columns);

@@ -11,11 +11,14 @@ mod header;
 mod inspect;
 mod join;
 mod layout;
+mod line_counter;
 mod mcap;
 mod recording_builder;
 mod series;
 mod sinumerik_edge;
 mod sinumerik_signal;
+mod sinumerik_trace;
+mod trace_samples;
 mod twincat;
 mod twincat_header;
 mod unit;
@@ -111,6 +114,7 @@ pub fn read_recording(
             }
             Ok((recording, findings))
         }
+        RecordingFormat::SinumerikTrace => sinumerik_trace::read(Cursor::new(head).chain(file), &context),
         RecordingFormat::SinumerikEdge => sinumerik_edge::read(Cursor::new(head).chain(file), &context),
         RecordingFormat::TwinCatScope => twincat::read(Cursor::new(head).chain(file), &context),
         RecordingFormat::Halsampler => halsampler::read(Cursor::new(head).chain(file), &context),
