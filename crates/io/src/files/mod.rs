@@ -2,9 +2,9 @@
 //!
 //! The kind of an input file is detected by its content ([`Input`]), that of an output file by its extension.
 //! Position setpoints are read from CSV ([`PsecCsvReader`], streaming), YAML ([`read_psec_yaml`]) and MCAP
-//! ([`McapTrajectories`]), measured axis data from CSV and MCAP ([`read_recording`]). Traces ([`TraceWriter`]) and
-//! setpoints ([`PsecWriter`]) are written atomically ([`OutputFile`]); recordings of the node
-//! ([`BoundedRecording`]) are readable up to the last complete chunk.
+//! ([`McapTrajectories`]), measured axis data from CSV, MCAP and exports of controls ([`read_recording`],
+//! [`inspect_recording`]). Traces ([`TraceWriter`]) and setpoints ([`PsecWriter`]) are written atomically
+//! ([`OutputFile`]); recordings of the node ([`BoundedRecording`]) are readable up to the last complete chunk.
 
 mod bounded_recording;
 mod cdr;

@@ -40,7 +40,7 @@ fn any_change() -> impl Strategy<Value = (prop::sample::Index, Vec<u8>, usize)> 
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1500))]
+    #![proptest_config(ProptestConfig::with_cases(600))]
 
     #[test]
     fn accepted_recordings_are_complete(

@@ -7,8 +7,10 @@ use virtual_axes_io::files::RecordingFormat;
 /// string "ffbs".
 const MANUAL: &str = "123.55 33.4 0 -12\n";
 
-/// Lines as `sampler_usr.c` prints them with the option `-t`: `"%ld "` for the sample number, `"%f "` for each pin.
-pub(crate) const TAGGED: &str = "overrun\n4711 0.100000 0.098500 1.250000 \n4712 0.200000 0.197000 1.500000 \n4713 0.300000 0.295500 1.750000 \n";
+/// Lines of `tests/limit3.1/expected` in <https://github.com/LinuxCNC/linuxcnc>, written with the option `-t` at 1 kHz: input
+/// and output of a limiter, and a bit.
+pub(crate) const TAGGED: &str = "496 -1.002000 -1.002000 0 \n497 -1.002000 -1.002000 0 \n498 -1.002000 -1.002000 0 \n\
+    499 1.002000 -1.001900 1 \n500 1.002000 -1.001700 1 \n501 1.002000 -1.001400 1 \n";
 
 #[test]
 fn the_line_of_the_manual_page_is_read() {
@@ -27,18 +29,25 @@ fn the_line_of_the_manual_page_is_read() {
 
 #[test]
 fn the_sample_number_gives_the_time() {
-    let mapping = ["psec=#2[mm]", "position=#3[mm]", "current=#4"];
+    let mapping = ["psec=#2[mm]", "position=#3[mm]"];
     let recorded = Recorded::new("halsampler", TAGGED).columns(&mapping).rate(1000.0);
-    let columns: Vec<String> = recorded.inspect().columns.iter().map(summary).collect();
-    assert_eq!(columns, ["time [samples]", "-", "-", "-"]);
+    let found = recorded.inspect();
+    let columns: Vec<String> = found.columns.iter().map(summary).collect();
+    assert_eq!(
+        (found.format, columns),
+        (RecordingFormat::Halsampler, ["time [samples]", "-", "-", "-"].map(String::from).to_vec())
+    );
     let found = recorded.good("x");
-    assert_eq!(found.time, [0.0, 0.001, 0.002]);
-    assert_eq!(found.current, Some(vec![1.25, 1.5, 1.75]));
-    let with_gap = format!("{TAGGED}overrun\n4720 1.000000 0.985000 3.500000 \n");
+    assert_eq!(found.time, [0.0, 0.001, 0.002, 0.003, 0.004, 0.005]);
+    assert_eq!(found.psec.expect("there")[2..4], [-1.002 * 1e-3, 1.002 * 1e-3]);
+    assert_eq!(found.position.expect("there")[4..], [-1.0017 * 1e-3, -1.0014 * 1e-3]);
+    // An overrun in front of the first line, and one with lost samples.
+    let with_gap = format!("overrun\n{TAGGED}overrun\n510 1.002000 -0.994200 1 \n");
     let (found, findings) =
         Recorded::new("halsampler", with_gap).columns(&mapping).rate(1.0).read("x").expect("good");
-    assert_eq!(found.time, [0.0, 1.0, 2.0, 9.0]);
-    assert!(findings.iter().any(|finding| finding.code == "overrun"), "{findings:?}");
+    assert_eq!(found.time, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 14.0]);
+    let overrun = findings.iter().find(|finding| finding.code == "overrun").expect("reported");
+    assert!(overrun.what.ends_with("lines with \"overrun\": 1"), "{overrun}");
     let without_rate = Recorded::new("halsampler", TAGGED).columns(&mapping).error("x");
     assert!(
         without_rate.contains("give the sampling rate by --rate-hz, since column #1 counts"),

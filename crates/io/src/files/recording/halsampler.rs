@@ -3,8 +3,8 @@
 //! A line has the values of the HAL pins in the order of the configuration string of `sampler`, separated by spaces, with
 //! a space at the end; with the option `-t` the sample number comes first. `overrun` on a line of its own states that
 //! samples were lost. There is neither header nor time. Sources: the manual page
-//! <https://linuxcnc.org/docs/2.9/html/man/man1/halsampler.1.html> and `src/hal/components/sampler_usr.c` of
-//! <https://github.com/LinuxCNC/linuxcnc>, which prints `"%ld "`, `"%f "` and `"overrun\n"`.
+//! <https://linuxcnc.org/docs/2.9/html/man/man1/halsampler.1.html>, and `src/hal/components/sampler_usr.c` and
+//! `tests/limit3.1/expected` of <https://github.com/LinuxCNC/linuxcnc>.
 
 use std::io::Read;
 
@@ -120,8 +120,7 @@ pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, 
     }
     let mut findings = Vec::new();
     if rows.overruns > 0 {
-        let what =
-            format!("{name}: halsampler reports {} overruns: samples are missing there", rows.overruns);
+        let what = format!("{name}: samples are missing; lines with \"overrun\": {}", rows.overruns);
         findings.push(Finding::warning("overrun", what, "increase the depth of the FIFO of sampler"));
     }
     let Rows { channels, count, .. } = rows;

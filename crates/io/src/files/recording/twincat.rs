@@ -4,7 +4,7 @@
 //! group of channels, where the lines of values have the time of the group: milliseconds since the start, or file times of
 //! 100 ns. Groups with different sampling times run down the lines independently of each other. Decimal marks are points or
 //! commas; a line `EOF` can end the file. Sources: the settings of the export,
-//! <https://infosys.beckhoff.com/content/1033/te13xx_tc3_scopeview/6193063051.html>, the example of TwinCAT 2,
+//! <https://infosys.beckhoff.com/content/1031/te13xx_tc3_scopeview/6193063051.html>, the example of TwinCAT 2,
 //! <https://infosys.beckhoff.com/content/1033/tcscope2/11171654667.html>, and the exports in `tests/data` of
 //! <https://github.com/CagtayFabry/pytcs>.
 
