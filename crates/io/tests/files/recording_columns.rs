@@ -147,6 +147,11 @@ fn headers_name_channel_unit_and_axis() {
         ("torque_ffw_Nm", "torque_feedforward [N.m]"),
         ("Drehzahlvorsteuerung", "velocity_feedforward [rad/s of the motor (assumed)]"),
         ("Position [inch]", "position [unknown: inch]"),
+        ("x_cmd", "psec [m or rad (assumed)] x"),
+        ("X Ist [mm]", "position [mm] x"),
+        ("v [mm/s]", "velocity [mm/s]"),
+        ("v_act_m_min", "velocity [m/min]"),
+        ("Encoder 2 position [mm]", "position [mm]"),
         // No channels.
         ("following error [mm]", "-"),
         ("Schleppfehler X [mm]", "- x"),
@@ -155,6 +160,8 @@ fn headers_name_channel_unit_and_axis() {
         ("motor speed [rpm]", "-"),
         ("torque", "-"),
         ("x", "- x"),
+        ("v", "- v"),
+        ("x_ref_limit", "- x"),
         ("tool", "-"),
         ("distance", "-"),
         ("", "-"),
@@ -188,6 +195,11 @@ fn the_list_of_columns_has_reasons_axes_and_the_line_of_the_header() {
     assert!(!second.unit.as_ref().expect("a unit").is_assumed());
     assert_eq!(found.columns[5].reason, "no known word");
 
+    assert_eq!(
+        (found.readable_axes(), found.axis_of("X")),
+        (vec!["x".to_owned(), "y".to_owned()], Some("x"))
+    );
+    assert_eq!((found.axis_of("mill_y"), found.axis_of("z")), (Some("y"), None));
     let bare = Recorded::new("bare", "0.1;0.2\n0.2;0.3\n").inspect();
     assert_eq!(bare.columns[1].header, "#2");
     assert!(bare.columns[1].reason.contains("no header"), "{}", bare.columns[1].reason);
@@ -245,6 +257,10 @@ fn several_fitting_columns_are_an_error() {
     );
     let chosen = Recorded::new("several", text).columns(&["position=#3[mm]"]).good("x");
     assert_eq!(chosen.position, Some(vec![0.002]));
+    // A column that a mapping selects is that of no other channel.
+    let text = "time,Soll [mm],Ist [mm]\n0,1,2\n";
+    let swapped = Recorded::new("several", text).columns(&["position=#2[mm]"]).good("x");
+    assert_eq!((swapped.psec, swapped.position), (None, Some(vec![0.001])));
     // A current takes precedence over a torque, an exact header over similar ones.
     let text = "time,position,Position [mm],torque [Nm],current\n0,1,2,3,4\n";
     let found = Recorded::new("several", text).good("x");

@@ -99,6 +99,21 @@ fn channels_are_selected_by_a_mapping() {
     );
 }
 
+/// A channel in several charts is exported several times, as `test space` and `test space (1)` in the export.
+#[test]
+fn copies_of_a_channel_are_read_once() {
+    let names = "Name\tActPos\tvar_REAL64\tName\tfunc_OS\tName\tActPos (1)\tfunc_units_scaled";
+    let copies = SHARED_TIMES
+        .replace("Name\tvar_REAL32\tvar_REAL64\tName\tfunc_OS\tName\tfunc_scaled\tfunc_units_scaled", names);
+    let recorded = Recorded::new("twincat", &copies);
+    assert_eq!(recorded.inspect().columns[6].reason, "copy of column #2 with the same symbol");
+    assert_eq!(recorded.good("x").position, Some(vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]));
+    // Another symbol is another channel.
+    let others = copies.replace("MAIN.var_REAL\tMAIN.var_REAL\n", "MAIN.other\tMAIN.var_REAL\n");
+    let error = Recorded::new("twincat", others).error("x");
+    assert!(error.contains("#2 \"ActPos\", #7 \"ActPos (1)\" all fit position"), "{error}");
+}
+
 #[test]
 fn axes_are_selected_by_name_or_symbol() {
     let first = Recorded::new("twincat", axes()).joint("1").good("x");

@@ -1,5 +1,6 @@
 //! Assignment of columns to channels: by column mappings, default headers, or detected meanings.
 
+use super::axis_match::{axes_of, matching_axes};
 use super::columns::Column;
 use super::error::AxisRecordingError;
 use super::found_column::{ColumnFactor, FoundColumn};
@@ -66,6 +67,8 @@ impl ColumnAssignment {
 struct Selector<'a> {
     context: &'a Context<'a>,
     found: &'a [FoundColumn],
+    /// Indices of the columns that mappings and default headers select.
+    taken: Vec<usize>,
     at: &'a dyn Fn() -> String,
     /// Name of the selected axis; `None` if the file names none.
     axis: Found<Option<&'a str>>,
@@ -84,16 +87,21 @@ impl Context<'_> {
             ColumnAssignment { slots: vec![None; columns.len()], ..ColumnAssignment::default() };
         let is_trace =
             Channel::ALL.iter().any(|c| *c != Channel::Time && columns.contains(&self.trace_header(*c)));
-        let selector = Selector::new(self, if is_trace { &[] } else { found }, at);
-        for (index, channel) in Channel::ALL.into_iter().enumerate() {
+        let mut direct = [None; Channel::ALL.len()];
+        for (place, channel) in direct.iter_mut().zip(Channel::ALL) {
+            *place = self.find(channel, &self.candidate_headers(channel, is_trace), columns, at)?;
+        }
+        let found = if is_trace { &[] } else { found };
+        let selector = Selector::new(self, found, direct.into_iter().flatten().collect(), at);
+        for ((index, channel), direct) in Channel::ALL.into_iter().enumerate().zip(direct) {
             let factor = factors.get(index).copied().unwrap_or(1.0);
-            let wanted = self.candidate_headers(channel, is_trace);
-            let choice = match self.find(channel, &wanted, columns, at)? {
+            let choice = match direct {
                 Some(column) => Some((column, factor)),
                 None if self.has_selected_column(channel) => None,
                 None => selector.choose(channel, &mut assignment)?,
             };
             let Some((column, factor)) = choice else {
+                let wanted = self.candidate_headers(channel, is_trace);
                 self.check_missing(channel, &wanted, columns, found, at)?;
                 continue;
             };
@@ -195,46 +203,36 @@ impl Context<'_> {
 }
 
 impl<'a> Selector<'a> {
-    fn new(context: &'a Context<'a>, found: &'a [FoundColumn], at: &'a dyn Fn() -> String) -> Self {
-        let mut selector = Selector { context, found, at, axis: Ok(None) };
+    fn new(
+        context: &'a Context<'a>,
+        found: &'a [FoundColumn],
+        taken: Vec<usize>,
+        at: &'a dyn Fn() -> String,
+    ) -> Self {
+        let mut selector = Selector { context, found, taken, at, axis: Ok(None) };
         selector.axis = selector.select_axis();
         selector
     }
 
-    /// Returns the columns with a channel that no mapping selects.
+    /// Returns the columns with a channel that are not selected otherwise.
     fn detected(&self) -> impl Iterator<Item = &'a FoundColumn> {
         let is_open = |column: &&FoundColumn| {
-            column.channel.is_some_and(|channel| !self.context.has_selected_column(channel))
+            let is_free = !self.taken.contains(&column.number.saturating_sub(1));
+            is_free && column.channel.is_some_and(|channel| !self.context.has_selected_column(channel))
         };
         self.found.iter().filter(is_open)
     }
 
     /// Returns the name of the axis to read: the one that the joint names, or the only one of the file.
     fn select_axis(&self) -> Found<Option<&'a str>> {
-        let mut axes: Vec<(&'a str, Option<&'a str>)> = Vec::new();
-        for column in self.detected() {
-            let Some(axis) = column.axis.as_deref() else { continue };
-            if !axes.iter().any(|(known, _)| *known == axis) {
-                axes.push((axis, column.axis_number.as_deref()));
-            }
-        }
+        let axes = axes_of(self.detected());
         if axes.is_empty() {
             return Ok(None);
         }
-        let wanted = self.context.joint;
-        for similarity in [is_same, is_numbered, is_prefixed] {
-            let matching: Vec<&str> = axes
-                .iter()
-                .filter(|(name, number)| {
-                    similarity(name, wanted) || number.is_some_and(|number| is_same(number, wanted))
-                })
-                .map(|(name, _)| *name)
-                .collect();
-            match matching.as_slice() {
-                [] => {}
-                [axis] => return Ok(Some(axis)),
-                several => return Err(self.axis_error("several axes of the file fit", several)),
-            }
+        match matching_axes(&axes, self.context.joint).as_slice() {
+            [] => {}
+            [axis] => return Ok(Some(axis)),
+            several => return Err(self.axis_error("several axes of the file fit", several)),
         }
         // A number does not contradict the name of the axis.
         if let ([(axis, _)], false) = (axes.as_slice(), self.context.is_joint_given)
@@ -353,21 +351,4 @@ impl<'a> Selector<'a> {
         assignment.detected_channels.push(index);
         Ok(Some((place, factor)))
     }
-}
-
-/// Returns true for equal names, whatever their case.
-fn is_same(axis: &str, wanted: &str) -> bool {
-    axis.eq_ignore_ascii_case(wanted)
-}
-
-/// Returns true for a name with a number: `X1` for `x`.
-fn is_numbered(axis: &str, wanted: &str) -> bool {
-    let name = axis.trim_end_matches(|c: char| c.is_ascii_digit());
-    !name.is_empty() && is_same(name, wanted)
-}
-
-/// Returns true for a joint with a prefix: `mill_x` for `x` or `X1`.
-fn is_prefixed(axis: &str, wanted: &str) -> bool {
-    let last = wanted.rsplit(['_', '/', '.']).next().unwrap_or_default();
-    is_same(axis, last) || is_numbered(axis, last)
 }

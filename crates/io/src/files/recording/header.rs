@@ -33,6 +33,8 @@ struct Facts {
     has_v: bool,
     /// Words with a meaning, for the reason.
     words: Vec<String>,
+    /// True behind the word for an encoder, whose number is not that of an axis.
+    is_behind_encoder: bool,
 }
 
 /// Returns the meaning of a column from its header.
@@ -177,6 +179,7 @@ impl Facts {
             for word in words {
                 facts.add(&word, is_announced);
                 is_announced = announces_axis(&word);
+                facts.is_behind_encoder = matches!(word.as_str(), "encoder" | "enc" | "geber");
             }
         }
         if facts.quantity.is_none() && facts.has_v && facts.axis.is_some() {
@@ -199,6 +202,8 @@ impl Facts {
             } else {
                 self.axis = Some(self.axis.take().filter(|axis| !is_digits(axis)).unwrap_or(name));
             }
+        } else if is_number && self.is_behind_encoder {
+            self.is_actual = true;
         } else if is_number || is_announced {
             self.axis.get_or_insert_with(|| word.to_owned());
         } else if let Some((meanings, axis)) = compound(word) {
@@ -246,7 +251,7 @@ impl Facts {
             matches!(unit, HeaderUnit::Known(unit) if Channel::Position.symbols().contains(&unit.symbol));
         let is_role = self.is_setpoint || self.is_actual;
         let quantity = match self.quantity {
-            None if is_role && is_length => HeaderQuantity::Position,
+            None if is_role && (is_length || self.has_letter_of_axis()) => HeaderQuantity::Position,
             None if is_role => {
                 return Err(format!("{}: no word for position, velocity or current", self.quoted()));
             }
@@ -284,8 +289,28 @@ impl Facts {
         }
     }
 
+    /// Returns true for an axis with a letter other than v, which can be a velocity: `x_cmd` is a position.
+    fn has_letter_of_axis(&self) -> bool {
+        self.axis.as_deref().is_some_and(|axis| !axis.starts_with(['v', 's']) && !is_digits(axis))
+    }
+
+    /// Interprets `v [mm/s]` as a velocity.
+    fn interpret_v(&mut self, unit: &HeaderUnit) {
+        let is_speed = |unit: &Unit| Channel::Velocity.symbols().contains(&unit.symbol);
+        let is_v = self.quantity.is_none() && self.axis.as_deref() == Some("v");
+        if let (true, HeaderUnit::Known(unit)) = (is_v, unit)
+            && is_speed(unit)
+        {
+            (self.quantity, self.axis) = (Some(HeaderQuantity::Velocity), None);
+            self.words.push("v".to_owned());
+        }
+    }
+
     /// Returns true if `unit` is one of the channel that the words name.
     fn allows(&self, unit: Unit) -> bool {
+        if self.quantity.is_none() && self.axis.as_deref() == Some("v") {
+            return Channel::Velocity.symbols().contains(&unit.symbol);
+        }
         let channel = self.channel(&HeaderUnit::Known(unit));
         channel.is_ok_and(|channel| channel.symbols().contains(&unit.symbol))
     }
@@ -294,7 +319,8 @@ impl Facts {
         format!("\"{}\"", self.words.join(" "))
     }
 
-    fn into_column(self, number: usize, header: &str, unit: HeaderUnit) -> FoundColumn {
+    fn into_column(mut self, number: usize, header: &str, unit: HeaderUnit) -> FoundColumn {
+        self.interpret_v(&unit);
         let channel = self.channel(&unit);
         let mut column = FoundColumn::unknown(number, header, "");
         column.axis = self.axis.clone();

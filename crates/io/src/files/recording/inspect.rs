@@ -3,6 +3,7 @@
 use std::io::{Cursor, Read};
 use std::path::Path;
 
+use super::axis_match::{axes_of, matching_axes};
 use super::error::AxisRecordingError;
 use super::format::RecordingFormat;
 use super::found_column::FoundColumn;
@@ -31,15 +32,22 @@ pub struct RecordingColumns {
 impl RecordingColumns {
     /// Returns the names of the axes of the detected channels, in the order of the file.
     pub fn axes(&self) -> Vec<String> {
-        let mut axes: Vec<String> = Vec::new();
-        for column in self.columns.iter().filter(|column| column.channel.is_some()) {
-            if let Some(axis) = &column.axis
-                && !axes.contains(axis)
-            {
-                axes.push(axis.clone());
-            }
+        axes_of(self.columns.iter()).into_iter().map(|(name, _)| name.to_owned()).collect()
+    }
+
+    /// Returns the names of the axes that have a position, in the order of the file.
+    pub fn readable_axes(&self) -> Vec<String> {
+        let positions = self.columns.iter().filter(|column| column.channel == Some(Channel::Position));
+        axes_of(positions).into_iter().map(|(name, _)| name.to_owned()).collect()
+    }
+
+    /// Returns the name of the axis in the file that [`read_recording`](super::read_recording) reads for a joint: `X1` for
+    /// `x`; `None` if there is none, or more than one.
+    pub fn axis_of(&self, joint: &str) -> Option<&str> {
+        match matching_axes(&axes_of(self.columns.iter()), joint).as_slice() {
+            [axis] => Some(axis),
+            _ => None,
         }
-        axes
     }
 
     /// Returns true if a column states the time; other recordings require a sampling rate.

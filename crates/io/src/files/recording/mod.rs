@@ -1,6 +1,7 @@
 //! Reading of recordings of one axis from CSV, MCAP and exports of controls, for identification.
 
 mod assignment;
+mod axis_match;
 mod columns;
 mod csv;
 mod error;

@@ -125,7 +125,17 @@ impl ScopeHeader {
             value.map(String::as_str).filter(|value| !value.is_empty())
         };
         let columns = fields.iter().enumerate().map(|(column, field)| match times.get(column) {
-            Some(Some(_)) => describe(column + 1, field, values(SYMBOL, column), values(UNIT, column)),
+            Some(Some(_)) => {
+                let symbol = values(SYMBOL, column);
+                let original = original_name(field).and_then(|name| fields.iter().position(|f| f == name));
+                match original.filter(|original| symbol.is_some() && values(SYMBOL, *original) == symbol) {
+                    Some(original) => {
+                        let reason = format!("copy of column #{} with the same symbol", original + 1);
+                        FoundColumn::unknown(column + 1, field, &reason)
+                    }
+                    None => describe(column + 1, field, symbol, values(UNIT, column)),
+                }
+            }
             _ => time_column(column + 1),
         });
         let columns = columns.collect();
@@ -140,6 +150,12 @@ impl ScopeHeader {
         let scalings = (0..fields.len()).map(scaling).collect();
         Some(ScopeHeader { delimiter, columns, times, scalings, line: names.number, first })
     }
+}
+
+/// Returns `name` of `name (1)`: a channel in several charts is exported several times.
+fn original_name(name: &str) -> Option<&str> {
+    let (name, number) = name.strip_suffix(')')?.rsplit_once(" (")?;
+    (!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(name)
 }
 
 /// Parses a number whose decimal mark is a point or a comma; `None` if it is no number.
@@ -165,7 +181,7 @@ fn time_column(number: usize) -> FoundColumn {
 fn describe(number: usize, name: &str, symbol: Option<&str>, unit: Option<&str>) -> FoundColumn {
     let unit = unit.filter(|unit| *unit != NO_UNIT).and_then(|unit| unit.split_whitespace().next());
     let with_unit = |text: &str| unit.map_or_else(|| text.to_owned(), |unit| format!("{text} [{unit}]"));
-    let mut column = header::detect(number, &with_unit(name));
+    let mut column = header::detect(number, &with_unit(original_name(name).unwrap_or(name)));
     if let Some(symbol) = symbol {
         let of_symbol = header::detect(number, &with_unit(symbol));
         if column.channel.is_none() && of_symbol.channel.is_some() {

@@ -62,7 +62,10 @@ const WORDS: &[(WordMeaning, &[&str])] = &[
             "demand",
         ],
     ),
-    (Actual, &["actual", "act", "ist", "istwert", "measured", "meas", "encoder", "enc", "feedback", "fb"]),
+    (
+        Actual,
+        &["actual", "act", "ist", "istwert", "measured", "meas", "encoder", "enc", "geber", "feedback", "fb"],
+    ),
     (Psec, &["psec"]),
     (Feedforward, &["feedforward", "ffw", "vorsteuerung", "forward"]),
     (Vffws, &["vffws"]),
