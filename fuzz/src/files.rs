@@ -5,8 +5,8 @@ use std::io::Cursor;
 use virtual_axes_core::trajectory::{Trajectory, ValidationContext};
 use virtual_axes_identify::recording::{Conditioning, Finding, RawRecording, condition};
 use virtual_axes_io::files::{
-    Columns, McapTrajectories, PsecCsvReader, PsecCsvWriter, RecordingOptions, read_psec_yaml,
-    read_recording_csv, read_recording_mcap,
+    Columns, McapTrajectories, PsecCsvReader, PsecCsvWriter, RecordingFormat, RecordingOptions,
+    inspect_recording_stream, read_psec_yaml, read_recording_csv, read_recording_mcap, read_recording_stream,
 };
 use virtual_axes_io::messages;
 
@@ -142,9 +142,8 @@ fn check_recording(read: (RawRecording, Vec<Finding>)) {
     }
 }
 
-/// Reads a recording in CSV; text before a line `---` assigns the columns.
-pub fn recording_csv(data: &[u8]) {
-    let mut options = RecordingOptions::default();
+/// Sets the columns from the text before a line `---`; returns the rest.
+fn set_columns<'a>(data: &'a [u8], options: &mut RecordingOptions) -> &'a [u8] {
     let mut body = data;
     if let Ok(text) = str::from_utf8(data)
         && let Some((columns, rest)) = text.split_once("---\n")
@@ -159,9 +158,36 @@ pub fn recording_csv(data: &[u8]) {
         }
         body = rest.as_bytes();
     }
+    body
+}
+
+/// Reads a recording in CSV; text before a line `---` assigns the columns.
+pub fn recording_csv(data: &[u8]) {
+    let mut options = RecordingOptions::default();
+    let body = set_columns(data, &mut options);
     bounded(data.len(), || match read_recording_csv(body, "my.csv", &MACHINE.axes()[0], &options) {
         Ok(read) => check_recording(read),
         Err(error) => assert_one_line(&error.to_string()),
+    });
+}
+
+/// Lists and reads an export of a control; text before a line `---` assigns the columns.
+pub fn recording_control(data: &[u8]) {
+    let mut options = RecordingOptions { rate_hz: Some(500.0), ..RecordingOptions::default() };
+    let body = set_columns(data, &mut options);
+    bounded(data.len(), || {
+        match inspect_recording_stream(body, "my.xml", &options) {
+            // MCAP is not read from a stream.
+            Ok(found) => {
+                assert!(!found.columns.is_empty() || found.format == RecordingFormat::Mcap);
+                options.joint = found.readable_axes().into_iter().next();
+            }
+            Err(error) => assert_one_line(&error.to_string()),
+        }
+        match read_recording_stream(body, "my.xml", &MACHINE.axes()[0], &options) {
+            Ok(read) => check_recording(read),
+            Err(error) => assert_one_line(&error.to_string()),
+        }
     });
 }
 

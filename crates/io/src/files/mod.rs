@@ -37,8 +37,8 @@ pub use psec_writer::{PsecCsvWriter, PsecMcapWriter, PsecWriter, PsecYamlWriter,
 pub use psec_yaml::{TrajectoryYamlError, read_psec_yaml};
 pub use recording::{
     AxisRecordingError, Channel, ColumnUnit, Columns, ColumnsError, FoundColumn, RecordingColumns,
-    RecordingFormat, RecordingFormatError, RecordingOptions, inspect_recording, read_recording,
-    read_recording_csv, read_recording_mcap,
+    RecordingFormat, RecordingFormatError, RecordingOptions, inspect_recording, inspect_recording_stream,
+    read_recording, read_recording_csv, read_recording_mcap, read_recording_stream,
 };
 pub use trace::{TraceWriter, trace_writer};
 pub use trace_csv::TraceCsvWriter;

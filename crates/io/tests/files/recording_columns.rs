@@ -77,13 +77,9 @@ impl Recorded {
         error.replace(&*self.folder.0.join("r").to_string_lossy(), "r")
     }
 
-    pub(crate) fn try_inspect(&self) -> Result<RecordingColumns, AxisRecordingError> {
-        inspect_recording(&self.folder.file("r", &self.content), &self.options)
-    }
-
     #[track_caller]
     pub(crate) fn inspect(&self) -> RecordingColumns {
-        self.try_inspect().expect("columns")
+        inspect_recording(&self.folder.file("r", &self.content), &self.options).expect("columns")
     }
 }
 

@@ -6,6 +6,7 @@ use super::error::AxisRecordingError;
 use super::found_column::{ColumnFactor, FoundColumn};
 use super::layout::{Context, format_names};
 use super::unit::Channel;
+use crate::files::MAX_LISTED;
 use virtual_axes_core::text::{nearest_name, shortened};
 use virtual_axes_identify::recording::Finding;
 
@@ -249,7 +250,7 @@ impl<'a> Selector<'a> {
             at: (self.at)(),
             reason,
             axis: shortened(self.context.joint),
-            axes: axes.iter().map(|axis| shortened(axis)).collect(),
+            axes: axes.iter().take(MAX_LISTED).map(|axis| shortened(axis)).collect(),
         }
     }
 
@@ -278,6 +279,7 @@ impl<'a> Selector<'a> {
                 channel,
                 columns: several
                     .iter()
+                    .take(MAX_LISTED)
                     .map(|column| format!("#{} \"{}\"", column.number, shortened(&column.header)))
                     .collect(),
                 number: several.first().map_or(1, |column| column.number),
@@ -288,19 +290,21 @@ impl<'a> Selector<'a> {
     /// Keeps the columns of the axis; columns without an axis are those of the only axis.
     fn keep_axis(&self, fitting: &mut Vec<&FoundColumn>, axis: &str, assignment: &mut ColumnAssignment) {
         let is_only = self.detected().filter_map(|column| column.axis.as_deref()).all(|other| other == axis);
-        fitting.retain(|column| match column.axis.as_deref() {
-            Some(other) => other == axis,
-            None if is_only => true,
-            None => {
-                let header = shortened(&column.header);
-                let what = format!(
-                    "{}: column {header} names no axis, the file has several: it is not read",
-                    self.context.name
-                );
-                assignment.findings.push(Finding::note("unassigned-column", what));
-                false
-            }
-        });
+        let bare: Vec<String> = fitting
+            .iter()
+            .filter(|column| !is_only && column.axis.is_none())
+            .take(MAX_LISTED)
+            .map(|column| shortened(&column.header))
+            .collect();
+        if !bare.is_empty() {
+            let what = format!(
+                "{}: the file has several axes; columns without an axis are not read: {}",
+                self.context.name,
+                bare.join(", ")
+            );
+            assignment.findings.push(Finding::note("unassigned-column", what));
+        }
+        fitting.retain(|column| column.axis.as_deref().map_or(is_only, |other| other == axis));
     }
 
     fn accept(

@@ -10,11 +10,17 @@ use super::found_column::FoundColumn;
 use super::layout::{next_line, parse_number};
 use super::sinumerik_signal::{edge_signal, trace_signal};
 use super::unit::Channel;
-use super::{RecordingOptions, halsampler, header, open, sinumerik_edge, sinumerik_trace, twincat};
+use super::{
+    RecordingOptions, halsampler, header, open, read_head, sinumerik_edge, sinumerik_trace, twincat,
+};
 use crate::files::lines::{Lines, fields_between};
 
 /// Number of lines searched for a header.
 const PREAMBLE: u64 = 100;
+/// Maximum number of columns whose headers are interpreted.
+const MAX_COLUMNS: usize = 1000;
+/// Maximum number of columns in lines searched for a header.
+pub(super) const MAX_SEARCHED: usize = 5000;
 /// Minimum number of detected channels in a header behind other lines.
 const MIN_CHANNELS: usize = 2;
 
@@ -69,16 +75,30 @@ pub fn inspect_recording(
 ) -> Result<RecordingColumns, AxisRecordingError> {
     let name = path.display().to_string();
     let (head, file) = open(path, &name)?;
-    let format = options.format.unwrap_or_else(|| RecordingFormat::detect(&head));
-    inspect(Cursor::new(head).chain(file), format, &name, options)
+    inspect(head, file, &name, options)
 }
 
-fn inspect(
-    input: impl Read,
-    format: RecordingFormat,
+/// Lists the columns of a recording in a stream. `name` is the file name in errors.
+///
+/// # Errors
+/// Returns an [`AxisRecordingError`] if the stream cannot be read or has no columns.
+pub fn inspect_recording_stream(
+    mut input: impl Read,
     name: &str,
     options: &RecordingOptions,
 ) -> Result<RecordingColumns, AxisRecordingError> {
+    let head = read_head(&mut input, name)?;
+    inspect(head, input, name, options)
+}
+
+fn inspect(
+    head: Vec<u8>,
+    rest: impl Read,
+    name: &str,
+    options: &RecordingOptions,
+) -> Result<RecordingColumns, AxisRecordingError> {
+    let format = options.format.unwrap_or_else(|| RecordingFormat::detect(&head));
+    let input = Cursor::new(head).chain(rest);
     let columns = match format {
         RecordingFormat::Csv => return inspect_csv(input, name, options),
         RecordingFormat::SinumerikTrace => sinumerik_trace::inspect(input, name)?,
@@ -98,11 +118,13 @@ fn inspect_csv(
     let mut lines = Lines::new(input);
     let mut first: Option<(u64, Vec<FoundColumn>)> = None;
     let mut header_line = None;
+    let mut searched = 0;
     while let Some((line, text)) = next_line(&mut lines, name)? {
         if line <= options.columns.skip_lines {
             continue;
         }
         let columns = columns_of_line(text, options);
+        searched += columns.len();
         let count = columns.iter().filter(|column| column.channel.is_some()).count();
         match &mut first {
             None => first = Some((line, columns)),
@@ -113,7 +135,7 @@ fn inspect_csv(
             Some(_) => {}
         }
         let begin = first.as_ref().map_or(line, |(line, _)| *line);
-        if count > 0 || header_line.is_some() || line > begin + PREAMBLE {
+        if count > 0 || header_line.is_some() || line > begin + PREAMBLE || searched > MAX_SEARCHED {
             break;
         }
     }
@@ -142,6 +164,9 @@ fn columns_of_line(text: &str, options: &RecordingOptions) -> Vec<FoundColumn> {
 /// Returns the meanings of columns from their headers.
 pub(super) fn detect_columns(headers: &[String]) -> Vec<FoundColumn> {
     let detect = |(text, number): (&String, usize)| {
+        if number > MAX_COLUMNS {
+            return FoundColumn::unknown(number, text, "behind the first 1000 columns");
+        }
         let signal = edge_signal(number, text).or_else(|| trace_signal(number, text));
         signal.unwrap_or_else(|| header::detect(number, text))
     };

@@ -6,7 +6,7 @@ use super::assignment::ColumnAssignment;
 use super::columns::{Column, Columns};
 use super::error::AxisRecordingError;
 use super::found_column::FoundColumn;
-use super::inspect::detect_columns;
+use super::inspect::{MAX_SEARCHED, detect_columns};
 use super::unit::Channel;
 use crate::files::lines::{Lines, fields_between};
 use virtual_axes_core::config::{AxisConfig, AxisKind};
@@ -182,8 +182,10 @@ impl Context<'_> {
         {
             return "; for a file without a header select columns by number: time=#1, position=#2".to_owned();
         }
+        let mut searched = 0;
         while let Ok(Some((found, text))) = next_line(lines, self.name) {
-            if found > line + PREAMBLE {
+            searched += text.matches(self.columns.delimiter_of(text)).count();
+            if found > line + PREAMBLE || searched > MAX_SEARCHED {
                 break;
             }
             if self.layout(found, text, factors).is_ok() {

@@ -33,7 +33,7 @@ pub use columns::{Columns, ColumnsError};
 pub use error::AxisRecordingError;
 pub use format::{RecordingFormat, RecordingFormatError};
 pub use found_column::{ColumnUnit, FoundColumn};
-pub use inspect::{RecordingColumns, inspect_recording};
+pub use inspect::{RecordingColumns, inspect_recording, inspect_recording_stream};
 pub use unit::Channel;
 
 use super::input::{FileKind, Input};
@@ -82,14 +82,20 @@ impl RecordingOptions {
 
 /// Opens a file and reads its first bytes.
 fn open(path: &Path, name: &str) -> Result<(Vec<u8>, File), AxisRecordingError> {
-    let unreadable = |error: std::io::Error| AxisRecordingError::Unreadable {
-        at: name.to_owned(),
-        reason: error.to_string(),
-    };
-    let mut file = File::open(path).map_err(unreadable)?;
-    let mut head = Vec::new();
-    (&mut file).take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
+    let mut file = File::open(path).map_err(|error| unreadable(name, &error))?;
+    let head = read_head(&mut file, name)?;
     Ok((head, file))
+}
+
+/// Reads the first bytes of a file.
+fn read_head(input: &mut impl Read, name: &str) -> Result<Vec<u8>, AxisRecordingError> {
+    let mut head = Vec::new();
+    input.take(HEAD_BYTES).read_to_end(&mut head).map_err(|error| unreadable(name, &error))?;
+    Ok(head)
+}
+
+fn unreadable(name: &str, error: &std::io::Error) -> AxisRecordingError {
+    AxisRecordingError::Unreadable { at: name.to_owned(), reason: error.to_string() }
 }
 
 /// Reads the recording of one axis with its findings; the format is detected from the content.
@@ -105,27 +111,61 @@ pub fn read_recording(
 ) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
     let name = path.display().to_string();
     let (head, file) = open(path, &name)?;
-    let context = options.context(&name, axis)?;
-    match options.format.unwrap_or_else(|| RecordingFormat::detect(&head)) {
-        RecordingFormat::Mcap => {
-            let (recording, mut findings) = read_recording_mcap(file, &name, axis, options)?;
-            if !options.columns.mappings.is_empty() {
-                let what = format!("{name}: the column mapping is ignored for MCAP");
-                findings.push(Finding::note("unused-columns", what));
-            }
-            Ok((recording, findings))
+    let format = options.format.unwrap_or_else(|| RecordingFormat::detect(&head));
+    if format == RecordingFormat::Mcap {
+        let (recording, mut findings) = read_recording_mcap(file, &name, axis, options)?;
+        if !options.columns.mappings.is_empty() {
+            let what = format!("{name}: the column mapping is ignored for MCAP");
+            findings.push(Finding::note("unused-columns", what));
         }
-        RecordingFormat::SinumerikTrace => sinumerik_trace::read(Cursor::new(head).chain(file), &context),
-        RecordingFormat::SinumerikEdge => sinumerik_edge::read(Cursor::new(head).chain(file), &context),
-        RecordingFormat::TwinCatScope => twincat::read(Cursor::new(head).chain(file), &context),
-        RecordingFormat::Halsampler => halsampler::read(Cursor::new(head).chain(file), &context),
-        RecordingFormat::Csv => {
-            let read = csv::read(Cursor::new(head).chain(file), &context);
-            read.map_err(|error| match detect_other_kind(path, &error) {
-                Some(kind) => AxisRecordingError::OtherKind { at: name.clone(), kind },
-                None => error,
-            })
-        }
+        return Ok((recording, findings));
+    }
+    let read = read_stream(head, file, &name, axis, options);
+    if format != RecordingFormat::Csv {
+        return read;
+    }
+    read.map_err(|error| match detect_other_kind(path, &error) {
+        Some(kind) => AxisRecordingError::OtherKind { at: name.clone(), kind },
+        None => error,
+    })
+}
+
+/// Reads the recording of one axis from a stream of any format but MCAP. `name` is the file name in errors.
+///
+/// # Errors
+/// Returns an [`AxisRecordingError`] for the first error in the stream.
+pub fn read_recording_stream(
+    mut input: impl Read,
+    name: &str,
+    axis: &AxisConfig,
+    options: &RecordingOptions,
+) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
+    let head = read_head(&mut input, name)?;
+    read_stream(head, input, name, axis, options)
+}
+
+/// Reads the recording from a stream after its first bytes.
+fn read_stream(
+    head: Vec<u8>,
+    rest: impl Read,
+    name: &str,
+    axis: &AxisConfig,
+    options: &RecordingOptions,
+) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
+    let context = options.context(name, axis)?;
+    let format = options.format.unwrap_or_else(|| RecordingFormat::detect(&head));
+    let input = Cursor::new(head).chain(rest);
+    match format {
+        RecordingFormat::Csv => csv::read(input, &context),
+        RecordingFormat::SinumerikTrace => sinumerik_trace::read(input, &context),
+        RecordingFormat::SinumerikEdge => sinumerik_edge::read(input, &context),
+        RecordingFormat::TwinCatScope => twincat::read(input, &context),
+        RecordingFormat::Halsampler => halsampler::read(input, &context),
+        RecordingFormat::Mcap => Err(AxisRecordingError::Content {
+            at: name.to_owned(),
+            format,
+            reason: "MCAP is read from a file, not from a stream".to_owned(),
+        }),
     }
 }
 

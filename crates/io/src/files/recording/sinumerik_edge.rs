@@ -19,6 +19,7 @@ use super::layout::Context;
 use super::recording_builder::{ChannelValues, build_recording};
 use super::sinumerik_signal::edge_signal;
 use super::unit::Channel;
+use virtual_axes_core::text::shortened;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
@@ -144,11 +145,14 @@ impl<'a> Document<'a> {
             return Err(error);
         }
         if error.is_io() {
-            return Err(AxisRecordingError::Unreadable { at: name.to_owned(), reason: error.to_string() });
+            return Err(AxisRecordingError::Unreadable {
+                at: name.to_owned(),
+                reason: shortened(&error.to_string()),
+            });
         }
         let text = error.to_string();
         let position = format!(" at line {} column {}", error.line(), error.column());
-        let reason = text.strip_suffix(&position).unwrap_or(&text).to_owned();
+        let reason = shortened(text.strip_suffix(&position).unwrap_or(&text));
         let at = format!("{name}:{}", error.line());
         Err(AxisRecordingError::Content { at, format: RecordingFormat::SinumerikEdge, reason })
     }

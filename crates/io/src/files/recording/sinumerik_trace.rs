@@ -35,6 +35,10 @@ const MAX_SIGNALS: usize = 10_000;
 /// Smallest value of a missing sample: the bits of infinity as an integer.
 const MISSING: f64 = 9.218_868_437_227_4e18;
 
+/// Maximum number of samples for each record, and independent of them: values that do not change are left out.
+const SAMPLES_PER_RECORD: usize = 100;
+const FREE_SAMPLES: usize = 100_000;
+
 /// Returns true for the XML of a trace.
 pub(super) fn is_sinumerik_trace(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim_start().starts_with('<') && text.contains(&format!("<{ROOT}"))
@@ -76,16 +80,24 @@ pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, 
     let name = context.name;
     let mut frame = Frame::new(name, Some(*context));
     frame.read(input)?;
-    let Frame { columns, assignment, samples, last_time, mut findings, .. } = frame;
+    let Frame { columns, assignment, samples, last_time, mut findings, rows, .. } = frame;
     let is_position = |index: usize| Channel::ALL.get(index) == Some(&Channel::Position);
     let position = samples.iter().find(|(index, ..)| is_position(*index)).map(|(.., samples)| samples);
-    let times = position.map(|samples| samples.times(last_time)).unwrap_or_default();
+    let limit = rows.saturating_mul(SAMPLES_PER_RECORD).saturating_add(FREE_SAMPLES).min(MAX_ROWS);
+    let times = match position.map(|samples| samples.times(last_time, limit)) {
+        Some(Ok(times)) => times,
+        Some(Err(count)) => {
+            let reason = format!(
+                "{rows} rec and the interval of the position give {count:.1e} samples, more than {limit}; record with \
+                 less time at rest"
+            );
+            return Err(frame_error(name, reason));
+        }
+        None => Vec::new(),
+    };
     let Some(assignment) = assignment.filter(|_| !times.is_empty()) else {
         return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel: Channel::Position, rows: 0 });
     };
-    if times.len() > MAX_ROWS {
-        return Err(AxisRecordingError::TooLong { at: name.to_owned() });
-    }
     let mut channels = ChannelValues::default();
     for (index, factor, samples) in &samples {
         if let Some(channel) = channels.get_mut(*index) {
@@ -101,6 +113,10 @@ pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, 
     let mut recording = build_recording(&context, channels, (&assignment, &columns), rows, &mut findings)?;
     recording.time = times;
     Ok((recording, findings))
+}
+
+fn frame_error(at: &str, reason: String) -> AxisRecordingError {
+    AxisRecordingError::Content { at: at.to_owned(), format: RecordingFormat::SinumerikTrace, reason }
 }
 
 impl<'a> Frame<'a> {
@@ -119,8 +135,7 @@ impl<'a> Frame<'a> {
     }
 
     fn error(&self, line: u64, reason: String) -> AxisRecordingError {
-        let at = format!("{}:{line}", self.name);
-        AxisRecordingError::Content { at, format: RecordingFormat::SinumerikTrace, reason }
+        frame_error(&format!("{}:{line}", self.name), reason)
     }
 
     /// Reads the first frame of values.
@@ -293,7 +308,7 @@ impl<'a> Frame<'a> {
         mut visit: impl FnMut(&mut Self, &str, &str) -> Found<()>,
     ) -> Found<()> {
         for attribute in element.attributes() {
-            let attribute = attribute.map_err(|error| self.error(line, error.to_string()))?;
+            let attribute = attribute.map_err(|error| self.error(line, shortened(&error.to_string())))?;
             visit(self, attribute.key.local_name().as_ref(), &attribute.value)?;
         }
         Ok(())

@@ -28,16 +28,23 @@ impl TraceSamples {
         self.samples.push((time, value));
     }
 
-    /// Returns the sampling times up to `end`: all multiples of the interval from the first sample.
-    pub fn times(&self, end: f64) -> Vec<f64> {
-        let Some((first, _)) = self.samples.first() else { return Vec::new() };
-        let last = (end - first) / self.interval;
-        if !(self.interval > 0.0 && last < super::error::MAX_ROWS as f64) {
-            return self.samples.iter().map(|(time, _)| *time).collect();
+    /// Returns the sampling times up to `end`: all multiples of the interval from the first sample. Without an interval
+    /// these are the times of the samples.
+    ///
+    /// # Errors
+    /// Returns the number of times if it is greater than `limit`.
+    pub fn times(&self, end: f64, limit: usize) -> Result<Vec<f64>, f64> {
+        let Some((first, _)) = self.samples.first() else { return Ok(Vec::new()) };
+        if self.interval <= 0.0 {
+            return Ok(self.samples.iter().map(|(time, _)| *time).collect());
         }
-        // Not negative, and within the number of samples of a recording.
-        let count = (last + GRID_TOLERANCE).floor() as usize + 1;
-        (0..count).map(|k| first + k as f64 * self.interval).collect()
+        let count = ((end - first) / self.interval + GRID_TOLERANCE).floor() + 1.0;
+        // False for NaN.
+        if count <= limit as f64 {
+            Ok((0..count as usize).map(|k| first + k as f64 * self.interval).collect())
+        } else {
+            Err(count)
+        }
     }
 
     /// Returns the values at `times`, in ascending order; NaN before the first sample and between sampling times.
@@ -71,7 +78,7 @@ mod tests {
     #[test]
     fn omitted_values_are_those_before() {
         let signal = samples(0.002, &[(0.0, 1.0), (0.004, 2.0), (0.008, f64::NAN)]);
-        let times = signal.times(0.008);
+        let times = signal.times(0.008, 5).expect("five");
         assert_eq!(times, [0.0, 0.002, 0.004, 0.006, 0.008]);
         let values = signal.values(&times);
         assert_eq!(values[..4], [1.0, 1.0, 2.0, 2.0]);
@@ -84,8 +91,10 @@ mod tests {
         let values = signal.values(&[0.0, 0.002, 0.004, 0.006, 0.010]);
         assert_eq!((values[1], values[3], values[4]), (1.0, 2.0, 2.0));
         assert!(values[0].is_nan() && values[2].is_nan());
-        assert_eq!(samples(0.0, &[(0.5, 1.0)]).times(9.0), [0.5]);
-        assert!(samples(1.0, &[]).times(9.0).is_empty() && samples(1.0, &[]).values(&[0.0])[0].is_nan());
-        assert_eq!(samples(1e-300, &[(0.0, 1.0)]).times(9.0), [0.0]);
+        assert_eq!(samples(0.0, &[(0.5, 1.0)]).times(9.0, 9), Ok(vec![0.5]));
+        assert_eq!(samples(1.0, &[]).times(9.0, 9), Ok(Vec::new()));
+        assert!(samples(1.0, &[]).values(&[0.0])[0].is_nan());
+        assert_eq!(samples(1.0, &[(0.0, 1.0)]).times(9.0, 9), Err(10.0));
+        assert_eq!(samples(1e-300, &[(0.0, 1.0)]).times(9.0, 9), Err(9.0 / 1e-300));
     }
 }

@@ -1,5 +1,8 @@
 //! Words in the headers of recordings, English and German.
 
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
 /// Quantity that a word names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeaderQuantity {
@@ -114,12 +117,24 @@ const AXIS_LETTERS: &str = "xyzabcuvw";
 /// Minimum length of a part of a compound.
 const MIN_PART: usize = 3;
 /// Maximum length of a compound, bytes.
-const MAX_COMPOUND: usize = 40;
+const MAX_COMPOUND: usize = 30;
+/// Length of the longest text between two parts, bytes.
+const MAX_JOINT: usize = 2;
+/// Length of the longest word, bytes.
+const MAX_WORD: usize = 16;
+
+/// Meanings by word.
+static MEANINGS: LazyLock<HashMap<&'static str, WordMeaning>> = LazyLock::new(|| {
+    let words = WORDS.iter().flat_map(|(meaning, words)| words.iter().map(|word| (*word, *meaning)));
+    words.chain(SHORT_WORDS.iter().map(|(meaning, word)| (*word, *meaning))).collect()
+});
 
 /// Returns the meaning of a word in lower case.
 pub(super) fn meaning(word: &str) -> Option<WordMeaning> {
-    let short = SHORT_WORDS.iter().find(|(_, known)| *known == word).map(|(meaning, _)| *meaning);
-    short.or_else(|| WORDS.iter().find(|(_, known)| known.contains(&word)).map(|(meaning, _)| *meaning))
+    if word.len() > MAX_WORD {
+        return None;
+    }
+    MEANINGS.get(word).copied()
 }
 
 /// Returns the name of the axis if the word is one: `x`, `x1`, `sp`, `sp1`, `spindle`.
@@ -177,7 +192,7 @@ fn parts(word: &str) -> Option<Vec<WordMeaning>> {
     *best.first_mut()? = Some(Vec::new());
     for end in MIN_PART..=word.len() {
         let mut found: Option<Vec<WordMeaning>> = None;
-        for start in 0..=end - MIN_PART {
+        for start in end.saturating_sub(MAX_WORD + MAX_JOINT)..=end - MIN_PART {
             let Some(before) = best.get(start).and_then(Option::as_ref) else { continue };
             let Some(part) = word.get(start..end) else { continue };
             let joint = if start == 0 { &[""][..] } else { &["", "s", "en"] };
@@ -225,6 +240,13 @@ mod tests {
         {
             assert_eq!(compound(unknown), None, "{unknown}");
         }
+    }
+
+    #[test]
+    fn no_word_is_longer_than_the_limit() {
+        assert!(MEANINGS.keys().all(|word| word.len() <= MAX_WORD && *word == word.to_lowercase()));
+        let count = WORDS.iter().map(|(_, words)| words.len()).sum::<usize>() + SHORT_WORDS.len();
+        assert_eq!(MEANINGS.len(), count, "each word has one meaning");
     }
 
     #[test]
