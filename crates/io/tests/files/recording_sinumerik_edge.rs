@@ -114,7 +114,9 @@ fn assert_close(found: &[f64], wanted: &[f64]) {
 fn the_columns_have_axes_with_names_and_numbers() {
     let found = Recorded::new("edge", EXCERPT).inspect();
     assert_eq!((found.format, found.columns.len()), (RecordingFormat::SinumerikEdge, 12));
-    assert_eq!(found.axes(), ["X1", "Y1"]);
+    assert_eq!((found.axes(), found.has_time()), (vec!["X1".to_owned(), "Y1".to_owned()], true));
+    let without_period = EXCERPT.replace("\"CycleTimeMs\" : 2,", "");
+    assert!(!Recorded::new("edge", without_period).inspect().has_time());
     assert_eq!(found.columns[1].axis_number.as_deref(), Some("1"));
     let columns: Vec<String> = found.columns.iter().map(summary).collect();
     assert_eq!(

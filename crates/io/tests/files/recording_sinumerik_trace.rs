@@ -24,6 +24,7 @@ fn assert_close(found: &[f64], wanted: &[f64]) {
 fn signals_are_listed() {
     let found = Recorded::new("trace", MOTION).inspect();
     assert_eq!((found.format, found.axes()), (RecordingFormat::SinumerikTrace, vec!["7".to_owned()]));
+    assert!(found.has_time());
     let columns: Vec<String> = found.columns.iter().map(summary).collect();
     assert_eq!(
         columns,

@@ -33,6 +33,8 @@ pub struct RecordingColumns {
     pub columns: Vec<FoundColumn>,
     /// Line of the header of CSV, if it is not the first line that is read: `skip_lines` must be one less.
     pub header_line: Option<u64>,
+    /// True if the format states the sampling period or the times.
+    is_periodic: bool,
 }
 
 impl RecordingColumns {
@@ -56,12 +58,13 @@ impl RecordingColumns {
         }
     }
 
-    /// Returns true if a column states the time; other recordings require a sampling rate.
+    /// Returns true if the file states the time; other recordings require a sampling rate.
     pub fn has_time(&self) -> bool {
-        self.columns.iter().any(|column| {
+        let is_time = |column: &FoundColumn| {
             column.channel == Some(Channel::Time)
                 && column.unit.as_ref().is_some_and(|unit| !unit.is_samples())
-        })
+        };
+        self.is_periodic || self.columns.iter().any(is_time)
     }
 }
 
@@ -99,15 +102,15 @@ fn inspect(
 ) -> Result<RecordingColumns, AxisRecordingError> {
     let format = options.format.unwrap_or_else(|| RecordingFormat::detect(&head));
     let input = Cursor::new(head).chain(rest);
-    let columns = match format {
+    let (columns, is_periodic) = match format {
         RecordingFormat::Csv => return inspect_csv(input, name, options),
-        RecordingFormat::SinumerikTrace => sinumerik_trace::inspect(input, name)?,
+        RecordingFormat::SinumerikTrace => (sinumerik_trace::inspect(input, name)?, true),
         RecordingFormat::SinumerikEdge => sinumerik_edge::inspect(input, name)?,
-        RecordingFormat::TwinCatScope => twincat::inspect(input, name)?,
-        RecordingFormat::Halsampler => halsampler::inspect(input, name)?,
-        RecordingFormat::Mcap => Vec::new(),
+        RecordingFormat::TwinCatScope => (twincat::inspect(input, name)?, true),
+        RecordingFormat::Halsampler => (halsampler::inspect(input, name)?, false),
+        RecordingFormat::Mcap => (Vec::new(), true),
     };
-    Ok(RecordingColumns { format, columns, header_line: None })
+    Ok(RecordingColumns { format, columns, header_line: None, is_periodic })
 }
 
 fn inspect_csv(
@@ -142,7 +145,7 @@ fn inspect_csv(
     let Some((_, columns)) = first else {
         return Err(AxisRecordingError::Empty { at: name.to_owned(), what: "the file is empty" });
     };
-    Ok(RecordingColumns { format: RecordingFormat::Csv, columns, header_line })
+    Ok(RecordingColumns { format: RecordingFormat::Csv, columns, header_line, is_periodic: false })
 }
 
 /// Returns the columns of a line: by their headers, or by number for a line of numbers.

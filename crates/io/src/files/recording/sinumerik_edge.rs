@@ -98,11 +98,11 @@ struct Document<'a> {
     is_done: bool,
 }
 
-/// Returns the columns of a recording.
-pub(super) fn inspect(input: impl Read, name: &str) -> Found<Vec<FoundColumn>> {
+/// Returns the columns of a recording, and true if it states its period.
+pub(super) fn inspect(input: impl Read, name: &str) -> Found<(Vec<FoundColumn>, bool)> {
     let mut document = Document::new(None);
     document.parse(input, name)?;
-    Ok(document.columns)
+    Ok((document.columns, document.rate.is_some()))
 }
 
 /// Reads the recording of an axis.
@@ -164,6 +164,7 @@ impl<'a> Document<'a> {
         }
         self.columns = header.columns();
         let Some(mut context) = self.context else {
+            self.rate = header.rate();
             self.is_done = true;
             return Err("only the header is read");
         };
