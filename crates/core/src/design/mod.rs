@@ -14,7 +14,7 @@ pub use margins::{Margins, margins};
 pub use model::PredictionModel;
 pub use pid::{MAX_GAIN, PidTuning, p_controller, pi_controller, pid_controller};
 pub use pole_placement::{PolePlacement, pole_pair, pole_placement};
-pub use poles::{check_stable, poles, require_stable};
+pub use poles::{check_stable, has_stable_poles, poles, require_stable};
 
 use crate::control::RstError;
 use crate::units::Rounded;
@@ -52,6 +52,9 @@ pub enum DesignError {
     /// Invalid prediction model.
     #[error("prediction model: {0}")]
     Model(String),
+    /// Unstable velocity or current loop.
+    #[error("prediction model: the inner loops {0}")]
+    UnstableInnerLoops(String),
     /// Pole of the closed loop on or outside the unit circle.
     #[error(
         "the closed loop is unstable: its pole {} has the modulus {}; it must be below 1 − 10⁻⁶",

@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::polynomial::{product, roots, sum};
+use super::polynomial::{has_roots_within, product, roots, sum, without_integrators};
 use super::{DesignError, PredictionModel};
 use crate::control::Rst;
 
@@ -20,6 +20,11 @@ pub(super) const STABILITY_MARGIN: f64 = 1e-6;
 /// [`DesignError::NoPoles`] if the roots cannot be computed.
 pub fn poles(model: &PredictionModel, rst: &Rst) -> Result<Vec<Complex<f64>>, DesignError> {
     roots(&characteristic_polynomial(model, rst)).ok_or(DesignError::NoPoles)
+}
+
+/// Returns true if the poles of `model` except its integrator are stable: those of the velocity and current loop.
+pub fn has_stable_poles(model: &PredictionModel) -> bool {
+    has_roots_within(&without_integrators(model.a()), 1.0 - STABILITY_MARGIN)
 }
 
 /// Checks that every pole of the closed loop is inside the unit circle by more than 10⁻⁶.

@@ -139,7 +139,7 @@ fn minimal_realization(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignErr
     const SIZE: usize = VELOCITY_STATES;
     let hankel = |shift: usize| DMatrix::from_fn(SIZE, SIZE, |i, j| markov[i + j + shift]);
     if !markov.iter().all(|h| h.is_finite()) {
-        return Err(DesignError::Model("the inner loops diverge within a position cycle".to_owned()));
+        return Err(DesignError::UnstableInnerLoops("diverge within a position cycle".to_owned()));
     }
     if markov.iter().all(|h| *h == 0.0) {
         let no_gain = "velocity_loop.gain or current_loop.gain is 0; both must be above 0";
@@ -147,8 +147,8 @@ fn minimal_realization(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignErr
     }
     let (first, largest) = (markov[0].abs(), markov.iter().fold(0.0, |m: f64, h| m.max(h.abs())));
     if largest > MAX_GROWTH * first {
-        return Err(DesignError::Model(format!(
-            "the inner loops are unstable: their response to Ω* grows by a factor of {:.1e} within {} position \
+        return Err(DesignError::UnstableInnerLoops(format!(
+            "are unstable: their response to Ω* grows by a factor of {:.1e} within {} position \
              cycles; change velocity_loop, current_loop or the periods",
             largest / first,
             markov.len()

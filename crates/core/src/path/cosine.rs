@@ -31,6 +31,16 @@ impl CosineProfile {
         2.0 * self.ramp + self.cruise_time
     }
 
+    /// Returns the highest speed.
+    pub fn highest_speed(&self) -> f64 {
+        self.feed
+    }
+
+    /// Returns a time at the highest speed, s.
+    pub fn time_of_highest_speed(&self) -> f64 {
+        0.5 * self.duration()
+    }
+
     /// Returns the distance in a ramp, v/2 (t − ramp/π sin(π t/ramp)).
     fn ramped(&self, t: f64) -> f64 {
         0.5 * self.feed * self.ramp / PI * minus_sine(PI * t / self.ramp)

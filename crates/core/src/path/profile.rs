@@ -91,6 +91,16 @@ impl SpeedProfile {
         self.up.duration() + self.cruise_time + self.down.duration()
     }
 
+    /// Returns the highest speed.
+    pub fn highest_speed(&self) -> f64 {
+        self.peak
+    }
+
+    /// Returns a time at the highest speed, s.
+    pub fn time_of_highest_speed(&self) -> f64 {
+        self.up.duration() + 0.5 * self.cruise_time
+    }
+
     /// Returns the distance after `t` seconds, monotonic. The second half is computed backward from the
     /// end, so that terms of equal sign are added wherever the speed is small.
     pub fn at(&self, t: f64) -> f64 {

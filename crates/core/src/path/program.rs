@@ -86,6 +86,14 @@ impl SpanProfile {
             Self::Cosine(cosine) => cosine.at(t),
         }
     }
+
+    /// Returns the highest speed, and a time at which it is reached, s.
+    fn highest_speed(&self) -> (f64, f64) {
+        match self {
+            Self::Jerk(profile) => (profile.highest_speed(), profile.time_of_highest_speed()),
+            Self::Cosine(cosine) => (cosine.highest_speed(), cosine.time_of_highest_speed()),
+        }
+    }
 }
 
 /// Part of a block with one feed profile.
@@ -141,13 +149,13 @@ impl Program {
         self.programmed_feed
     }
 
-    /// Returns the highest feed that is reached, m/s or rad/s: the largest mean of 2000 equal intervals of time.
-    pub fn highest_feed(&self) -> f64 {
-        const SAMPLES: u32 = 2000;
-        let step = self.duration / f64::from(SAMPLES);
-        let progress = (0..=SAMPLES).map(|i| self.progress(step * f64::from(i)));
-        let progress: Vec<f64> = progress.collect();
-        progress.windows(2).map(|pair| (pair[1] - pair[0]) / step).fold(0.0, f64::max)
+    /// Returns the highest feed that is reached, m/s or rad/s, and a time at which it is reached, s.
+    pub fn highest_feed(&self) -> (f64, f64) {
+        let feeds = self.spans.iter().map(|span| {
+            let (feed, time) = span.profile.highest_speed();
+            (feed, span.start + time)
+        });
+        feeds.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
     }
 
     /// Returns the progress along the path at time `t`, s, clamped; monotonic in time.

@@ -21,6 +21,8 @@ const MAX_MOVES: usize = 1_000_000;
 /// Maximum rest, dwell, ramp and duration of a scenario, s: one day.
 const MAX_DURATION: f64 = 86_400.0;
 
+/// Relative tolerance of the comparison with the limits of axes, which are converted to SI units and back.
+const LIMIT_TOLERANCE: f64 = 1e-9;
 /// Relative tolerance for a ramp as long as its move.
 const RAMP_TOLERANCE: f64 = 1e-12;
 
@@ -296,6 +298,25 @@ fn feed_of(at: &str, key: &str, value: Option<YamlNumber>, unit: f64) -> Result<
         }
         feed => Ok(feed.map(|YamlNumber(feed)| feed * unit)),
     }
+}
+
+/// Returns a note on each limit that exceeds that of every axis.
+pub(super) fn notes_on_limits(values: &Values, machine: &MachineConfig) -> Vec<String> {
+    let note = |(key, &YamlNumber(value)): (&String, &YamlNumber)| {
+        let (kind, unit) = match key.contains("_rev_") {
+            true => (AxisKind::Rotary, REVOLUTION),
+            false => (AxisKind::Linear, 1.0),
+        };
+        let is_jerk = key.starts_with("jerk");
+        let axes = machine.axes().iter().filter(|axis| axis.kind() == kind).map(|axis| axis.limits());
+        let limits = axes.map(|limits| if is_jerk { limits.jerk } else { limits.acceleration });
+        let largest = limits.fold(0.0, f64::max) / unit;
+        (largest > 0.0 && value > largest * (1.0 + LIMIT_TOLERANCE)).then(|| {
+            let [value, largest] = [Rounded(value), Rounded(largest)];
+            format!("limits.{key}: {value} exceeds that of the axes, {largest}, which keep their own")
+        })
+    };
+    values.iter().filter_map(note).collect()
 }
 
 /// Parses the path limits, which apply in addition to the axis limits.

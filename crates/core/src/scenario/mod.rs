@@ -125,6 +125,11 @@ impl Scenario {
         self.file.source.as_deref()
     }
 
+    /// Returns a note on each limit that exceeds that of every axis of `machine`, which keep their own.
+    pub fn notes_on_limits(&self, machine: &MachineConfig) -> Vec<String> {
+        self.file.limits.iter().flat_map(|limits| build::notes_on_limits(&limits.value, machine)).collect()
+    }
+
     /// Plans path and feed profile on `machine`. `feed` replaces the default feed of the scenario, in m/min, or in rpm
     /// for rotary moves.
     ///

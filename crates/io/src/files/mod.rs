@@ -30,7 +30,7 @@ pub use cdr::encode_cdr;
 pub use input::{FileKind, Input, InputError};
 pub use mcap_reader::McapFileError;
 pub use output::OutputFile;
-pub use psec_csv::PsecCsvReader;
+pub use psec_csv::{PsecCsvReader, TimeGap};
 pub use psec_error::PsecError;
 pub use psec_mcap::{McapTrajectories, TrajectoryRecordingError};
 pub use psec_writer::{PsecCsvWriter, PsecMcapWriter, PsecWriter, PsecYamlWriter, psec_writer};

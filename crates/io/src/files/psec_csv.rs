@@ -24,6 +24,55 @@ struct Point {
     index: usize,
 }
 
+/// Gap between two rows: a time step with motion that is far longer than the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimeGap {
+    /// Line of the row after the gap.
+    pub line: u64,
+    /// Time step, s.
+    pub step: f64,
+    /// Median of the time steps, s.
+    pub median: f64,
+}
+
+/// Time steps between the rows read so far.
+#[derive(Debug, Default)]
+struct TimeSteps {
+    /// First steps, up to [`Self::MOST`].
+    first: Vec<Nanoseconds>,
+    /// Longest step with motion, and the line after it.
+    longest: Nanoseconds,
+    line: u64,
+}
+
+impl TimeSteps {
+    /// Number of steps from which the median is computed.
+    const MOST: usize = 1000;
+    /// Ratio to the median above which a step is a gap.
+    const GAP: i64 = 10;
+
+    fn add(&mut self, before: &Point, after: &Point) {
+        let step = after.time - before.time;
+        if self.first.len() < Self::MOST {
+            self.first.push(step);
+        }
+        if step > self.longest && before.positions != after.positions {
+            (self.longest, self.line) = (step, after.line);
+        }
+    }
+
+    fn gap(&self) -> Option<TimeGap> {
+        let mut first = self.first.clone();
+        first.sort_unstable();
+        let median = *first.get(first.len() / 2)?;
+        (self.longest > Self::GAP * median).then(|| TimeGap {
+            line: self.line,
+            step: seconds(self.longest),
+            median: seconds(median),
+        })
+    }
+}
+
 /// Streaming reader of the position setpoints of a CSV file at the times k·Tsp, k = 0, 1, …, with constant memory.
 ///
 /// Rows are interpolated linearly with the arithmetic of a trajectory of positions; rows at a position cycle are used
@@ -49,6 +98,7 @@ pub struct PsecCsvReader<R> {
     /// Last setpoints returned, m or rad.
     previous: Vec<f64>,
     first_time: Nanoseconds,
+    steps: TimeSteps,
     /// True if `after` is the last row.
     is_last_row: bool,
     is_done: bool,
@@ -88,6 +138,7 @@ impl<R: Read> PsecCsvReader<R> {
             next_k: 0,
             previous: Vec::new(),
             first_time: 0,
+            steps: TimeSteps::default(),
             is_last_row: false,
             is_done: false,
         };
@@ -134,6 +185,12 @@ impl<R: Read> PsecCsvReader<R> {
         self.first_time
     }
 
+    /// Returns the longest time step with motion among the rows read so far, if it is more than 10 times the median of
+    /// the first 1000 steps.
+    pub fn gap(&self) -> Option<TimeGap> {
+        self.steps.gap()
+    }
+
     /// Returns the index of the next position cycle, from 0.
     pub fn next_instant(&self) -> i64 {
         self.next_k
@@ -171,6 +228,8 @@ impl<R: Read> PsecCsvReader<R> {
             // The last row stays in `after`.
             std::mem::swap(&mut self.before, &mut self.after);
             self.is_last_row = true;
+        } else {
+            self.steps.add(&self.before, &self.after);
         }
         Ok(())
     }
