@@ -11,3 +11,4 @@ mod interface;
 mod output_form;
 mod reference;
 mod tune_command;
+mod warnings;

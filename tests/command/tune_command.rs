@@ -226,3 +226,13 @@ fn an_interrupted_search_leaves_no_file() {
     assert_eq!(child.wait().expect("it ends").code(), Some(130));
     assert!(folder.names().is_empty(), "{:?}", folder.names());
 }
+
+#[test]
+fn a_feed_that_is_not_reached_is_part_of_the_verdict() {
+    let folder = TestFolder::new("tune_feed");
+    let corner = folder.file("corner.yaml", CORNER);
+    let mut arguments = vec!["tune", corner.to_str().expect("UTF-8"), "--quiet", "--feed", "600"];
+    arguments.extend(FEW);
+    let verdict = printed(&[&arguments[..], &["--controller", "gpc"]].concat());
+    assert!(verdict.contains("; feed 600.00 m/min not reached, at most "), "{verdict}");
+}

@@ -7,11 +7,12 @@ use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parame
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::scenario::Scenario;
 use virtual_axes_core::text::{escaped, nearest_hint, nearest_name};
-use virtual_axes_core::trial::Trial;
+use virtual_axes_core::trial::{Tick, Trial};
 use virtual_axes_io::files::{self, FileKind};
 
 use crate::input::CommandInput;
-use crate::{interrupt, print_error, program_text};
+use crate::setpoint_summary::SetpointSummary;
+use crate::{axis_warnings, interrupt, print_error, program_text};
 
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
@@ -40,6 +41,11 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
                  parameters; use /** or virtual_axes"
             ));
         }
+        for axis in config.axes() {
+            for warning in axis_warnings::all(axis, &config.periods()) {
+                print_error(&format!("warning: {name}: {warning}"));
+            }
+        }
         return Ok(machine(&config));
     }
     let config = Parameters::load(&arguments.machine)?.machine_config()?;
@@ -54,15 +60,25 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     };
     // The setpoints are validated by a simulation.
     let setpoints = input.setpoints(&config, program.as_ref())?;
-    let outcome = virtual_axes_core::trial::run(&trial, setpoints, |_| interrupt::check())
-        .map_err(|error| input.name_error(error))?;
-    let path = program.as_ref().map(|program| program_text::description(program, config.axes()));
-    let remark = program.as_ref().and_then(|program| program_text::unreached_feed(program));
-    if let Some(remark) = remark {
-        print_error(&format!("warning: {name}: {remark}"));
-    }
+    let mut summary = SetpointSummary::default();
+    let on_tick = |tick: Tick<'_>| {
+        summary.add(&tick);
+        interrupt::check()
+    };
+    let outcome =
+        virtual_axes_core::trial::run(&trial, setpoints, on_tick).map_err(|error| input.name_error(error))?;
+    let axes = config.axes();
+    let (text, warning) = match &program {
+        Some(program) => {
+            (program_text::description(program, axes), program_text::unreached_feed(program, axes))
+        }
+        None => (summary.text(axes), summary.slow_warning(axes)),
+    };
+    let warnings = warning.into_iter().chain(input.notes_on_limits(&config));
+    let warnings = warnings.map(|warning| format!("{name}: {warning}")).chain(input.gap_warning());
+    warnings.for_each(|warning| print_error(&format!("warning: {warning}")));
     let (machine, duration) = (escaped(config.name()), outcome.figures.duration);
-    Ok(format!("{kind} for {machine}: {duration:.3} s\n{}valid\n", path.unwrap_or_default()))
+    Ok(format!("{kind} for {machine}: {duration:.3} s\n{text}valid\n"))
 }
 
 /// Returns true for a built-in machine, false for a built-in scenario.

@@ -1,6 +1,6 @@
 //! Input of a command: a scenario or a file with setpoints.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::error::Error;
 use std::fs;
 use std::io::Read;
@@ -13,13 +13,16 @@ use virtual_axes_core::scenario::Scenario;
 use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::trajectory::TrajectoryRequest;
 use virtual_axes_core::trial::{GridSource, ProgramSource, SetpointSource, SourceError, TrialError};
-use virtual_axes_io::files::{self, FileKind, McapTrajectories, PsecCsvReader, read_psec_yaml};
+use virtual_axes_core::units::Rounded;
+use virtual_axes_io::files::{self, FileKind, McapTrajectories, PsecCsvReader, TimeGap, read_psec_yaml};
 
 /// Scenario or file with setpoints.
 #[derive(Debug)]
 pub struct CommandInput {
     name: String,
     content: Content,
+    /// Gap in the rows of a CSV file that was read.
+    gap: Cell<Option<TimeGap>>,
 }
 
 #[derive(Debug)]
@@ -51,7 +54,7 @@ impl CommandInput {
         if topic.is_some() && !matches!(content, Content::Mcap { .. }) {
             return Err(format!("{name}: --topic requires an MCAP recording").into());
         }
-        Ok(CommandInput { name: name.to_owned(), content })
+        Ok(CommandInput { name: name.to_owned(), content, gap: Cell::new(None) })
     }
 
     /// Returns the name of the scenario or file.
@@ -65,6 +68,26 @@ impl CommandInput {
             Content::Scenario(scenario) => scenario.description(),
             _ => "",
         }
+    }
+
+    /// Returns notes on the limits of a scenario.
+    pub fn notes_on_limits(&self, machine: &MachineConfig) -> Vec<String> {
+        match &self.content {
+            Content::Scenario(scenario) => scenario.notes_on_limits(machine),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Returns a warning with the line if a CSV file that was read to its end has a gap.
+    pub fn gap_warning(&self) -> Option<String> {
+        self.gap.get().map(|TimeGap { line, step, median }| {
+            format!(
+                "{}:{line}: the time step to this row is {} s, the median {} s; setpoints between are interpolated",
+                self.name,
+                Rounded(step),
+                Rounded(median)
+            )
+        })
     }
 
     /// Rejects an output file that is the input file.
@@ -104,7 +127,10 @@ impl CommandInput {
                     None => files::Input::open(Path::new(&self.name))?,
                 };
                 let psec = PsecCsvReader::new(file.into_reader(), &self.name, period, &limits)?;
-                Ok(SetpointSource::Grid(Box::new(CsvSource(psec.with_start_at_first_row()))))
+                Ok(SetpointSource::Grid(Box::new(CsvSource {
+                    psec: psec.with_start_at_first_row(),
+                    gap: &self.gap,
+                })))
             }
             Content::Yaml(requests) => Ok(SetpointSource::Requests(Box::new(
                 requests.iter().map(|request| Ok((0, request.clone()))),
@@ -160,14 +186,21 @@ fn content_of(file: files::Input, topic: Option<&str>) -> Result<Content, Box<dy
 }
 
 /// Setpoints of a CSV file, read row by row.
-struct CsvSource<R>(PsecCsvReader<R>);
+struct CsvSource<'a, R> {
+    psec: PsecCsvReader<R>,
+    gap: &'a Cell<Option<TimeGap>>,
+}
 
-impl<R: Read> GridSource for CsvSource<R> {
+impl<R: Read> GridSource for CsvSource<'_, R> {
     fn joints(&self) -> &[usize] {
-        self.0.joints()
+        self.psec.joints()
     }
 
     fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
-        Ok(self.0.next(row)?)
+        let has_row = self.psec.next(row)?;
+        if !has_row {
+            self.gap.set(self.psec.gap());
+        }
+        Ok(has_row)
     }
 }

@@ -5,6 +5,7 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
 mod axis;
+mod axis_warnings;
 mod campaign;
 mod check;
 mod design;
@@ -31,6 +32,7 @@ mod report;
 mod robustness;
 mod run;
 mod search;
+mod setpoint_summary;
 mod table;
 mod text_table;
 mod trial_arguments;

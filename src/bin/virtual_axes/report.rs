@@ -5,7 +5,7 @@ use std::path::Path;
 
 use time::OffsetDateTime;
 use virtual_axes_core::assess::SignalRecording;
-use virtual_axes_core::config::{AxisConfig, AxisKind, Parameters};
+use virtual_axes_core::config::{AxisConfig, AxisKind, GpcConfig, Parameters, PositionControllerConfig};
 use virtual_axes_core::units::{MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds};
 use virtual_axes_io::files::OutputFile;
 use virtual_axes_report::{Report, ReportRun, Scatter};
@@ -84,14 +84,16 @@ fn facts(machine: &str, run: &VariantRun) -> Vec<(String, String)> {
         facts.push(("contour error".to_owned(), table::NO_CONTOUR.to_owned()));
     }
     facts.extend(table::more(figures).map(|line| ("without figures".to_owned(), line)));
-    facts.extend(run.program_remark.iter().map(|remark| ("feed".to_owned(), remark.clone())));
+    let warnings = run.axis_warnings().into_iter().chain(run.input_warnings.clone());
+    facts.extend(warnings.map(|warning| ("warning".to_owned(), warning)));
+    facts.extend(run.input_notes.iter().map(|note| ("note".to_owned(), note.clone())));
     facts.extend(run.changes.iter().map(|change| ("set".to_owned(), change.clone())));
     let moving = run.machine.axes().iter().zip(&figures.axes).filter(|(_, figures)| figures.moves);
     facts.extend(moving.map(|(axis, _)| (axis.name().to_owned(), values(axis))));
     facts
 }
 
-/// Returns gains, feedforward and delays of an axis.
+/// Returns the tuning of the position controller of an axis, and its delays.
 fn values(axis: &AxisConfig) -> String {
     let unit = match axis.kind() {
         AxisKind::Linear => "(m/min)/mm",
@@ -99,15 +101,31 @@ fn values(axis: &AxisConfig) -> String {
     };
     let rounded = |value: f64| Rounded(value).to_string();
     let milliseconds = |delay: Nanoseconds| format!("{} ms", Rounded(seconds(delay) / MILLISECOND));
-    format!(
-        "Kp {} {unit}, VFFW {}, TFFW {} kg·m², α {}, β {}, γ {}",
-        rounded(axis.position_loop.gain / POSITION_GAIN),
-        rounded(axis.feedforward.velocity),
-        rounded(axis.feedforward.torque),
-        milliseconds(axis.delays.alpha),
-        milliseconds(axis.delays.beta),
-        milliseconds(axis.delays.gamma),
-    )
+    let delays = &axis.delays;
+    let alpha = milliseconds(delays.alpha);
+    match &axis.position_loop.controller {
+        PositionControllerConfig::Cascade => format!(
+            "Kp {} {unit}, VFFW {}, TFFW {} kg·m², α {alpha}, β {}, γ {}",
+            rounded(axis.position_loop.gain / POSITION_GAIN),
+            rounded(axis.feedforward.velocity),
+            rounded(axis.feedforward.torque),
+            milliseconds(delays.beta),
+            milliseconds(delays.gamma),
+        ),
+        PositionControllerConfig::Gpc(GpcConfig { n1, n2, nu, lambda_rel, lambda }) => {
+            let lambda = match lambda {
+                Some(lambda) => format!("λ {} s²", rounded(*lambda)),
+                None => format!("λ_rel {}", rounded(*lambda_rel)),
+            };
+            format!("N1 {n1}, N2 {n2}, Nu {nu}, {lambda}, α {alpha}")
+        }
+        PositionControllerConfig::Rst(rst) => format!(
+            "degrees of R, S, T: {}, {}, {}, α {alpha}",
+            rst.r.len().saturating_sub(1),
+            rst.s.len().saturating_sub(1),
+            rst.t.len().saturating_sub(1),
+        ),
+    }
 }
 
 /// Returns what is needed to repeat the runs.

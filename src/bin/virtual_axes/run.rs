@@ -17,6 +17,7 @@ use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::period::PeriodArgument;
 use crate::progress::TrialProgress;
 use crate::report::ReportMachine;
+use crate::setpoint_summary::SetpointSummary;
 use crate::trial_arguments::TrialArguments;
 use crate::variant::{self, ControllerName, VariantRun};
 use crate::{figure, interrupt, json, program_text, report, table, text_table, verdict};
@@ -80,13 +81,18 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
     for (parameters, changes) in variants {
         let config = variant::checked(&parameters, &machine, &arguments.trial.machine)?;
         let program = input.program(&config, arguments.trial.feed)?;
-        let outcome = trial(arguments, &input, program.as_ref(), &parameters, &config)?;
+        let (outcome, setpoints) = trial(arguments, &input, program.as_ref(), &parameters, &config)?;
+        let feed =
+            program.as_deref().and_then(|program| program_text::unreached_feed(program, config.axes()));
+        let slow = setpoints.slow_warning(config.axes()).filter(|_| program.is_none());
+        let input_notes = input.notes_on_limits(&config).into_iter().chain(input.gap_warning());
         runs.push(VariantRun {
             controller: variant::controller_name(&parameters),
             changes,
             shared_changes: arguments.trial.set.len(),
+            input_warnings: feed.into_iter().chain(slow).collect(),
+            input_notes: input_notes.collect(),
             machine: config,
-            program_remark: program.as_deref().and_then(program_text::unreached_feed),
             outcome,
         });
     }
@@ -108,13 +114,14 @@ fn controllers(given: &[ControllerName]) -> Vec<Option<ControllerName>> {
     if given.is_empty() { vec![None] } else { given.iter().copied().map(Some).collect() }
 }
 
+/// Simulates a run; returns its outcome and a summary of its setpoints.
 fn trial(
     arguments: &RunArguments,
     input: &CommandInput,
     program: Option<&Arc<Program>>,
     parameters: &Parameters,
     config: &MachineConfig,
-) -> Result<TrialOutcome, Box<dyn Error>> {
+) -> Result<(TrialOutcome, SetpointSummary), Box<dyn Error>> {
     let trial = Trial {
         machine: config,
         program: program.cloned(),
@@ -129,7 +136,9 @@ fn trial(
         None => None,
     };
     let is_subsampled = trace.as_ref().is_some_and(|t| t.period % config.periods().position != 0);
+    let mut summary = SetpointSummary::default();
     let on_tick = |tick: Tick<'_>| {
+        summary.add(&tick);
         if tick.position_instant {
             interrupt::check()?;
             progress.set_time(seconds(tick.time));
@@ -146,7 +155,7 @@ fn trial(
     if let Some(trace) = trace {
         trace.finish()?;
     }
-    Ok(outcome)
+    Ok((outcome, summary))
 }
 
 /// Writer of signals at the trace period.
@@ -200,7 +209,9 @@ fn text(runs: &[VariantRun]) -> String {
 fn single(run: &VariantRun) -> Vec<String> {
     let figures = &run.outcome.figures;
     let mut axes = text_table::text(&table::axes(figures));
-    axes.extend(run.remarks().iter().map(|remark| text_table::wrapped_line(remark)));
+    let verdict = verdict::lines(std::slice::from_ref(run)).concat();
+    let remarks = run.remarks().into_iter().filter(|remark| !verdict.contains(remark.as_str()));
+    axes.extend(remarks.map(|remark| text_table::wrapped_line(&remark)));
     let path = table::path(figures);
     let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
     std::iter::once(axes).chain(path).collect()

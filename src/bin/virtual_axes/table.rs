@@ -77,8 +77,20 @@ pub fn remarks(figures: &Figures) -> Vec<String> {
     let outside = figures.axes.iter().filter_map(|axis| {
         Some(format!("{} was outside its travel limits for {} s", axis.name, outside(axis)?))
     });
+    let overshoot = names(|axis| axis.report.peak_current > axis.max_current).map(|names| {
+        format!(
+            "the current limit bounds the setpoint of the current loop; the current overshoots it: {names}"
+        )
+    });
     let no_contour = figures.contour.is_none().then(|| format!("no contour error: {NO_CONTOUR}"));
-    stationary.into_iter().chain(outside).chain(extrapolated).chain(no_contour).chain(more(figures)).collect()
+    stationary
+        .into_iter()
+        .chain(outside)
+        .chain(overshoot)
+        .chain(extrapolated)
+        .chain(no_contour)
+        .chain(more(figures))
+        .collect()
 }
 
 /// Returns the time that an axis was outside its travel limits, s; `None` if it was always inside.

@@ -18,7 +18,7 @@ use crate::search::{name_error, read_workload};
 use crate::trial_arguments::TrialArguments;
 use crate::tune_result::{ComparedPath, TunableController, TuningResult};
 use crate::variant::VariantRun;
-use crate::{machine_file, report, tune_output as output, variant};
+use crate::{machine_file, program_text, report, tune_output as output, variant};
 
 /// Maximum of `--designs`, about an hour of computation.
 const MOST_DESIGNS: u64 = 1_000_000;
@@ -108,6 +108,8 @@ pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
     check_outputs(arguments, &input)?;
     let config = variant::checked(&parameters, &machine, &arguments.trial.machine)?;
     let path = read_workload(&input, &config, arguments.trial.feed)?;
+    let program = input.program(&config, arguments.trial.feed)?;
+    let warning = program.and_then(|program| program_text::unreached_feed(&program, config.axes()));
     let others =
         arguments.also.iter().map(|name| CommandInput::open(name, None)).collect::<Result<Vec<_>, _>>()?;
     let paths =
@@ -148,8 +150,8 @@ pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
             format!("{:#}\n", output::object(&input, tunable, &limits, arguments.seed(), &problem, &found))
         }
         OutputFormat::Csv => output::csv(&problem, &found),
-        OutputFormat::Quiet => output::verdict(&problem, &found),
-        OutputFormat::Text => output::text(&problem, &found),
+        OutputFormat::Quiet => output::verdict(&problem, &found, warning.as_deref()),
+        OutputFormat::Text => output::text(&problem, &found, warning.as_deref()),
     })
 }
 
@@ -287,7 +289,8 @@ fn record(
             changes: vec![tuning.to_string()],
             shared_changes: 0,
             machine: tuning.apply(problem.parameters(), problem.joints())?.machine_config()?,
-            program_remark: None,
+            input_warnings: Vec::new(),
+            input_notes: Vec::new(),
             outcome,
         })
     };

@@ -39,8 +39,8 @@ fn table_rows<T>(all: &[T]) -> Vec<&T> {
     (0..ROWS).filter_map(|i| all.get(i * (all.len() - 1) / (ROWS - 1))).collect()
 }
 
-/// Returns initial and best cost and the margins of the best tuning in one line.
-pub fn verdict(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
+/// Returns initial and best cost, the margins of the best tuning, and a warning on the path in one line.
+pub fn verdict(problem: &TuningProblem<'_>, found: &TuningResult, warning: Option<&str>) -> String {
     let (from, to) = (problem.present().cost, found.best.cost);
     let unit = problem.cost().unit(&found.best.figures);
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
@@ -50,7 +50,8 @@ pub fn verdict(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
     let change = 100.0 * (to / from - 1.0);
     let change =
         if change.is_finite() { format!(", {change:+.0} %").replace('-', "−") } else { String::new() };
-    format!("cost {}: {from:.2} → {to:.2}{unit}{change}{margins}\n", problem.cost())
+    let warning = warning.map_or(String::new(), |warning| format!("; {warning}"));
+    format!("cost {}: {from:.2} → {to:.2}{unit}{change}{margins}{warning}\n", problem.cost())
 }
 
 /// Creates the table of the initial and the best tuning.
@@ -71,11 +72,11 @@ pub fn csv(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
 }
 
 /// Returns the result as tables.
-pub fn text(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
+pub fn text(problem: &TuningProblem<'_>, found: &TuningResult, warning: Option<&str>) -> String {
     let columns = |first: &str| columns(first, problem.cost(), &problem.present().figures);
     let mut text = format!(
         "{}\n{}: {} of {}, cost {}\n\n{}\n{}",
-        verdict(problem, found),
+        text_table::wrapped_line(verdict(problem, found, warning).trim_end()),
         escaped(problem.workload().name()),
         escaped(problem.config().name()),
         problem.joints().join(", "),

@@ -5,11 +5,10 @@ use std::error::Error;
 use virtual_axes_core::config::{
     Assignment, ConfigError, MachineConfig, Parameters, Value, ValueSource, parse_assignment,
 };
-use virtual_axes_core::design::{DesignError, check_stable};
-use virtual_axes_core::machine::{MachineParameters, design_controller, prediction_model};
+use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::trial::TrialOutcome;
 
-use crate::table;
+use crate::{axis_warnings, table};
 
 /// Position controller of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -138,8 +137,10 @@ pub struct VariantRun {
     pub shared_changes: usize,
     /// Machine of the run.
     pub machine: MachineConfig,
-    /// Remark on the program, such as a feed that is not reached.
-    pub program_remark: Option<String>,
+    /// Warnings on the input, such as a feed that is not reached. The verdict contains them.
+    pub input_warnings: Vec<String>,
+    /// Notes on the input, such as a limit without effect.
+    pub input_notes: Vec<String>,
     /// Result of the run.
     pub outcome: TrialOutcome,
 }
@@ -156,29 +157,23 @@ impl VariantRun {
     }
     /// Returns remarks on the run, one per line.
     pub fn remarks(&self) -> Vec<String> {
-        let unstable = self.unstable_axes();
-        let loops = (!unstable.is_empty()).then(|| {
-            format!(
-                "unstable position loop: {}; the unit of position_loop.gain is (m/min)/mm or (1000 °/min)/°, 16.667 1/s",
-                unstable.join(", ")
-            )
-        });
+        let unit = "the unit of position_loop.gain is (m/min)/mm or (1000 °/min)/°, 16.667 1/s";
+        let with_unit = |warning: String| match warning.contains("position loop") {
+            true => format!("{warning}; {unit}"),
+            false => warning,
+        };
+        let loops = self.axis_warnings().into_iter().map(with_unit);
         loops
-            .into_iter()
-            .chain(self.program_remark.clone())
+            .chain(self.input_warnings.clone())
+            .chain(self.input_notes.clone())
             .chain(table::remarks(&self.outcome.figures))
             .collect()
     }
 
-    /// Returns the names of the moving axes whose position loop is unstable by the linear model.
-    pub fn unstable_axes(&self) -> Vec<&str> {
+    /// Returns warnings on the loops of the moving axes.
+    pub fn axis_warnings(&self) -> Vec<String> {
         let figures = self.outcome.figures.axes.iter();
         let moving = self.machine.axes().iter().zip(figures).filter(|(_, figures)| figures.moves);
-        let unstable = moving.filter(|(axis, _)| {
-            let Ok(model) = prediction_model(axis, &self.machine.periods()) else { return false };
-            let stability = design_controller(axis, &model).and_then(|rst| check_stable(&model, &rst));
-            matches!(stability, Err(DesignError::Unstable { .. }))
-        });
-        unstable.map(|(axis, _)| axis.name()).collect()
+        moving.flat_map(|(axis, _)| axis_warnings::loops(axis, &self.machine.periods())).collect()
     }
 }

@@ -72,11 +72,11 @@ fn worst_axis(figures: &Figures) -> Option<Figure> {
         .max_by(|a, b| a.value.total_cmp(&b.value))
 }
 
-/// Returns unstable loops and the limits that axes reached, beginning with a semicolon; empty if there are none.
+/// Returns warnings on loops and input, and the limits that axes reached, beginning with a semicolon; empty if there are none.
 fn warnings(run: &VariantRun) -> String {
     let mut text = String::new();
-    for axis in run.unstable_axes() {
-        text.push_str(&format!("; the position loop of {axis} is unstable"));
+    for warning in run.axis_warnings().iter().chain(&run.input_warnings) {
+        text.push_str(&format!("; {warning}"));
     }
     for axis in &run.outcome.figures.axes {
         if axis.report.saturation_time > 0.0 {
