@@ -257,7 +257,6 @@ fn invalid_input_is_rejected_with_its_name() {
     );
     rejected(&["--column", "position=x.positon"], &["off.csv:1: ", "x.positon", "nearest is x.position"]);
     rejected(&["--column", "velocity=y.velocity"], &["off.csv: the velocity "]);
-    rejected(&["--column", "current=x.current[-1 A]"], &["off.csv: the current opposes the motion"]);
     rejected(&["--column", "positon=x"], &["--column: unknown key \"positon\"", "nearest is position"]);
     rejected(&["--columns", &map], &["off.csv: "]);
     rejected(&["--cutoff-hz", "1000"], &["off.csv: cut-off 1000 Hz"]);

@@ -16,6 +16,7 @@ use virtual_axes_io::files::OutputFile;
 use virtual_axes_report::{IdentificationPage, ValidationRecording};
 
 use crate::campaign::FeedforwardName;
+use crate::identify_columns as columns;
 use crate::identify_result::{AxisValidation, IdentificationResult};
 use crate::input::must_not_replace;
 use crate::output_arguments::{OutputArguments, OutputFormat};
@@ -34,6 +35,8 @@ enum RefinedGroup {
     Gravity,
     /// VFFW and TFFW, if their signals were not recorded.
     Feedforward,
+    /// Position-loop gain, from recordings that are coarser than the position cycle.
+    Gain,
 }
 
 /// Arguments of `virtual_axes identify`.
@@ -43,9 +46,9 @@ pub struct IdentifyArguments {
     /// each feedforward mode.
     #[arg(value_name = "RECORDING", required = true)]
     recordings: Vec<PathBuf>,
-    /// Recorded axis.
+    /// Recorded axis, or `all`; without it the columns of the recordings are listed.
     #[arg(long)]
-    axis: String,
+    axis: Option<String>,
     /// Initial machine: built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
@@ -54,8 +57,8 @@ pub struct IdentifyArguments {
     set: Vec<String>,
     #[command(flatten)]
     reading: RecordingArguments,
-    /// Active feedforward, one for all recordings or one for each; required for recordings without
-    /// feedforward signals (VFFWS, TFFWS).
+    /// Active feedforward, one for all recordings or one for each [default: by the signals VFFWS and TFFWS, or by the lag
+    /// of the position].
     #[arg(long, value_enum, value_delimiter = ',', value_name = "off|velocity|both[,…]")]
     feedforward: Vec<FeedforwardName>,
     /// Refine i0 independently of a + c; requires several slow starts from rest.
@@ -96,23 +99,96 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     let machine = Parameters::load(&arguments.machine)?;
     let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
     let config = variant::checked(&parameters, &machine, &arguments.machine)?;
-    let index = axis::index(&config, &arguments.axis)?;
-
-    let spinner = Spinner::new();
-    let (found, identified) = identify(arguments, &parameters, &config, index, &spinner)?;
-    spinner.set_activity("writing")?;
-    if let Some(out) = &arguments.out {
-        machine_file::write(out, &machine_text(arguments, &found.summary, &identified))?;
+    let Some(name) = &arguments.axis else {
+        return columns::listing(&arguments.recordings, &arguments.reading, &config, &arguments.machine);
+    };
+    let indices = if name == ALL {
+        columns::recorded_axes(&arguments.recordings, &arguments.reading, &config)?
+    } else {
+        vec![axis::index(&config, name)?]
+    };
+    if let (Some(page), true) = (&arguments.report, indices.len() > 1) {
+        return Err(format!("{}: a report has one axis; give --axis", page.display()).into());
     }
-    if let Some(page) = &arguments.report {
-        write_report(page, &found, config.periods())?;
+    let spinner = Spinner::new();
+    let (mut texts, mut summaries, mut present) = (Vec::new(), Vec::new(), parameters);
+    for index in indices {
+        let config = present.machine_config()?;
+        let (found, identified) = identify(arguments, &present, &config, index, &spinner)?;
+        spinner.set_activity("writing")?;
+        if let Some(page) = &arguments.report {
+            write_report(page, &found, config.periods())?;
+        }
+        texts.push(output(arguments, &found.summary));
+        summaries.push(found.summary);
+        present = identified;
+    }
+    if let Some(invalid) = invalid_result(&summaries) {
+        drop(spinner);
+        return Err(Box::new(InvalidResult {
+            text: joined(arguments, &summaries, &texts)?,
+            reason: invalid,
+        }));
+    }
+    if let Some(out) = &arguments.out {
+        machine_file::write(out, &machine_text(arguments, &summaries, &present))?;
     }
     drop(spinner);
-    Ok(match arguments.output.format() {
-        OutputFormat::Json => serde_json::to_string_pretty(&found.summary)? + "\n",
-        OutputFormat::Csv => identify_text::csv(&found.summary),
-        OutputFormat::Quiet => identify_text::verdict(&found.summary),
-        OutputFormat::Text => identify_text::text(&found.summary),
+    joined(arguments, &summaries, &texts)
+}
+
+/// Value of `--axis` for all recorded axes.
+const ALL: &str = "all";
+
+/// Results that must not be used, with the output and the reason.
+#[derive(Debug)]
+pub struct InvalidResult {
+    /// Output of the command.
+    pub text: String,
+    reason: String,
+}
+
+impl std::fmt::Display for InvalidResult {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.reason)
+    }
+}
+
+impl Error for InvalidResult {}
+
+/// Returns the reasons why results must not be used; none if they can be.
+fn invalid_result(summaries: &[IdentificationSummary]) -> Option<String> {
+    let invalid = summaries.iter().flat_map(|summary| {
+        let findings = summary.findings.iter().filter(|finding| finding.severity == Severity::Invalid);
+        findings.map(|finding| format!("{}: {finding}", summary.axis))
+    });
+    let reasons: Vec<String> = invalid.collect();
+    (!reasons.is_empty())
+        .then(|| format!("invalid result, no machine file is written:\n{}", reasons.join("\n")))
+}
+
+/// Returns the output for one axis, without JSON.
+fn output(arguments: &IdentifyArguments, summary: &IdentificationSummary) -> String {
+    match arguments.output.format() {
+        OutputFormat::Json => String::new(),
+        OutputFormat::Csv => identify_text::csv(summary),
+        OutputFormat::Quiet => identify_text::verdict(summary),
+        OutputFormat::Text => identify_text::text(summary),
+    }
+}
+
+/// Returns the output for all axes: a JSON list for `--axis all`, an object for one axis.
+fn joined(
+    arguments: &IdentifyArguments,
+    summaries: &[IdentificationSummary],
+    texts: &[String],
+) -> Result<String, Box<dyn Error>> {
+    Ok(match (arguments.output.format(), summaries) {
+        (OutputFormat::Json, [one]) if arguments.axis.as_deref() != Some(ALL) => {
+            serde_json::to_string_pretty(one)? + "\n"
+        }
+        (OutputFormat::Json, all) => serde_json::to_string_pretty(all)? + "\n",
+        _ => texts.join("\n"),
     })
 }
 
@@ -215,8 +291,11 @@ fn identify(
 
     spinner.set_activity(format!("validating {}", axis.name()))?;
     let validations = others.into_iter().map(|recorded| {
-        let agreement =
-            virtual_axes_identify::identify::validate(&recorded.input(), &updated.axes()[index], &periods)?;
+        let agreement = virtual_axes_identify::identify::validate(
+            &recorded.input(),
+            &updated.axes()[index],
+            &updated.periods(),
+        )?;
         Ok(AxisValidation { recorded, agreement })
     });
     let validations: Vec<AxisValidation> = validations.collect::<Result<_, Box<dyn Error>>>()?;
@@ -250,28 +329,34 @@ fn no_result_message(axis: &str, findings: &[Finding]) -> String {
 /// Returns the machine file.
 fn machine_text(
     arguments: &IdentifyArguments,
-    found: &IdentificationSummary,
+    found: &[IdentificationSummary],
     identified: &Parameters,
 ) -> String {
-    let recordings: Vec<&str> = found.recordings.iter().map(|r| r.name.as_str()).collect();
     let mut head = format!(
-        "{}, from the machine {} by `virtual_axes identify`; see there for the sources of the other values.\n\
-         {} was identified from {}; ± is the standard error.",
-        found.machine,
+        "{}, from the machine {} by `virtual_axes identify`; see there for the sources of the other values.",
+        found.first().map_or("", |summary| summary.machine.as_str()),
         arguments.machine,
-        found.axis,
-        recordings.join(", "),
     );
-    if !found.validation.is_empty() {
-        let others: Vec<&str> = found.validation.iter().map(|v| v.recording.name.as_str()).collect();
-        head.push_str(&format!("\nValidated on {}.", others.join(", ")));
+    for summary in found {
+        let recordings: Vec<&str> = summary.recordings.iter().map(|r| r.name.as_str()).collect();
+        head.push_str(&format!(
+            "\n{} was identified from {}; ± is the standard error.",
+            summary.axis,
+            recordings.join(", ")
+        ));
+        if !summary.validation.is_empty() {
+            let others: Vec<&str> = summary.validation.iter().map(|v| v.recording.name.as_str()).collect();
+            head.push_str(&format!("\nValidated on {}.", others.join(", ")));
+        }
+        for finding in summary.findings.iter().filter(|finding| finding.severity > Severity::Note) {
+            head.push_str(&format!("\n{}", identify_text::finding(finding)));
+        }
     }
-    for finding in found.findings.iter().filter(|finding| finding.severity > Severity::Note) {
-        head.push_str(&format!("\n{}", identify_text::finding(finding)));
-    }
-    identified.to_yaml(&head, |key| {
-        found.values.iter().find(|value| value.key == key).map(IdentifiedValue::comment)
-    })
+    let comment = |key: &str| {
+        let values = found.iter().flat_map(|summary| &summary.values);
+        values.filter(|value| value.key == key).last().map(IdentifiedValue::comment)
+    };
+    identified.to_yaml(&head, comment)
 }
 
 /// Returns the parameters that the refinement adjusts.
@@ -285,6 +370,7 @@ fn refined_groups(arguments: &IdentifyArguments) -> RefinementScope {
             friction: has(RefinedGroup::Friction),
             gravity: has(RefinedGroup::Gravity),
             feedforward: has(RefinedGroup::Feedforward),
+            gain: has(RefinedGroup::Gain),
         },
     }
 }

@@ -2,6 +2,7 @@
 
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::MILLISECOND;
+use virtual_axes_core::units::Rounded;
 use virtual_axes_identify::identify::summary::{
     DelaySummary, FrictionSummary, GravitySummary, IdentificationSummary, InertiaSummary, LawSummary,
     PartSummary, RefinementSummary, ResidualSummary,
@@ -20,6 +21,7 @@ const NONE: &str = "–";
 /// Formats a finding with its remedy on one line.
 pub fn finding(finding: &Finding) -> String {
     let severity = match finding.severity {
+        Severity::Invalid => "invalid",
         Severity::Missing => "missing",
         Severity::Warning => "warning",
         Severity::Note => "note",
@@ -60,6 +62,7 @@ pub fn text(found: &IdentificationSummary) -> String {
     ];
     parts.extend(steps(found));
     parts.push(text_table::text(&agreement(found)));
+    parts.push(baselines(found));
     let findings: Vec<String> =
         found.findings.iter().map(|f| text_table::wrapped_line(&finding(f))).collect();
     parts.push(findings.concat());
@@ -126,15 +129,15 @@ fn values(values: &[IdentifiedValue]) -> Table {
     let mut table = table_of(&columns);
     for value in values {
         let spread = match (value.interval, value.error) {
-            (Some([low, high]), _) => format!("{low} … {high}"),
+            (Some([low, high]), _) => format!("{} … {}", Rounded(low), Rounded(high)),
             (None, error) => or_none(error, |error| digits(error, 2)),
         };
         table.rows.push(vec![
             value.key.clone(),
-            value.value.to_string(),
+            if value.interval.is_some() { Rounded(value.value).to_string() } else { value.value.to_string() },
             value.unit.to_owned(),
             spread,
-            or_none(Some(value.before), |before| before.to_string()),
+            or_none(Some(value.before), |before| Rounded(before).to_string()),
             value.source.clone(),
         ]);
     }
@@ -157,12 +160,16 @@ fn steps(found: &IdentificationSummary) -> Vec<String> {
 }
 
 fn delay(fit: &DelaySummary) -> String {
-    let [low, high] = fit.interval_ms;
+    let [low, high] = fit.interval_ms.map(Rounded);
     let left = if fit.is_unchanged { ", unchanged" } else { "" };
+    let value = Rounded(fit.value_ms);
+    // Below one cycle the interval contains zero.
+    if high.0 == 0.0 {
+        return format!("{}: {value} ms{left}; no longer delay gives the same motion", fit.name.name());
+    }
     format!(
-        "{}: {} ms{left}; delays above {low} and up to {high} ms give the same motion",
-        fit.name.name(),
-        fit.value_ms,
+        "{}: {value} ms{left}; delays above {low} and up to {high} ms give the same motion",
+        fit.name.name()
     )
 }
 
@@ -284,6 +291,24 @@ fn regression(name: &str, found: &FeedforwardRegression) -> String {
 /// Returns the largest value of a figure over the parts of a recording.
 fn worst(residuals: &ResidualSummary, figure: impl Fn(&PartSummary) -> Option<f64>) -> Option<f64> {
     residuals.parts.iter().filter_map(figure).reduce(f64::max)
+}
+
+/// Returns the position residuals of the model beside those of simple predictions, a line per recording.
+fn baselines(found: &IdentificationSummary) -> String {
+    let unit = table::scale(found.kind).0;
+    let identified = found.agreement.iter().map(|a| (a.name.clone(), &a.residuals));
+    let validated = found.validation.iter().map(|v| (validation_name(&v.recording.name), &v.residuals));
+    let line = |(name, residuals): (String, &ResidualSummary)| {
+        let baseline = residuals.baseline.as_ref()?;
+        Some(text_table::wrapped_line(&format!(
+            "{name}: position RMS from PSEC {} {unit}, from PSEC delayed by {:.2} ms {} {unit}, from the model {} {unit}",
+            digits(baseline.command, 4),
+            baseline.lag_ms,
+            digits(baseline.delayed, 4),
+            digits(baseline.model, 4)
+        )))
+    };
+    identified.chain(validated).filter_map(line).collect()
 }
 
 fn agreement(found: &IdentificationSummary) -> Table {

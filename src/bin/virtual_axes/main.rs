@@ -12,6 +12,7 @@ mod design;
 mod design_output;
 mod figure;
 mod identify;
+mod identify_columns;
 mod identify_result;
 mod identify_text;
 mod input;
@@ -55,6 +56,8 @@ use virtual_axes_core::text::{escaped_lines, is_control};
 
 /// Exit status of a command that rejected its input or could not write its output.
 const BAD_INPUT: u8 = 2;
+/// Exit status of a command whose result must not be used.
+const INVALID_RESULT: u8 = 3;
 
 /// Simulate virtual machine-tool axes offline.
 #[derive(Debug, Parser)]
@@ -129,6 +132,12 @@ fn main() -> ExitCode {
     let text = match run_command(&command_line().command) {
         Ok(text) => text,
         Err(error) => {
+            if let Some(invalid) = error.downcast_ref::<identify::InvalidResult>() {
+                // The results are shown, with the reason why they must not be used.
+                let _ = io::stdout().write_all(invalid.text.as_bytes());
+                print_error(invalid);
+                return ExitCode::from(INVALID_RESULT);
+            }
             print_error(&*error);
             return ExitCode::from(if interrupt::is_raised() { interrupt::INTERRUPTED } else { BAD_INPUT });
         }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::MILLISECOND;
-use virtual_axes_identify::identify::{FeedforwardMode, IdentificationInput};
-use virtual_axes_identify::recording::{Conditioning, Finding, Signals, condition};
+use virtual_axes_identify::identify::{FeedforwardMode, IdentificationInput, infer_velocity_feedforward};
+use virtual_axes_identify::recording::{Conditioning, Finding, PsecShift, Signals, condition};
 use virtual_axes_io::files::{Columns, RecordingFormat, RecordingOptions, read_recording};
 
 use crate::campaign::FeedforwardName;
@@ -42,6 +42,24 @@ pub struct RecordingArguments {
     /// Lag of the recorded current, ms [default: estimated].
     #[arg(long, value_name = "MS", allow_negative_numbers = true)]
     current_lag_ms: Option<f64>,
+    /// Low-pass filter of the control (second-order Butterworth, −3 dB), Hz, that all recorded signals but the setpoint
+    /// have passed; simulated signals pass it too.
+    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    trace_filter_hz: Option<f64>,
+    /// Moves a setpoint that the recording delays forward in time: `auto`, or a time in ms.
+    #[arg(long, value_name = "auto|MS", allow_negative_numbers = true, value_parser = parse_psec_shift)]
+    psec_shift: Option<PsecShift>,
+}
+
+fn parse_psec_shift(text: &str) -> Result<PsecShift, String> {
+    /// Largest shift, ms.
+    const LARGEST: f64 = 1000.0;
+    if text == "auto" {
+        return Ok(PsecShift::Auto);
+    }
+    let milliseconds = text.parse::<f64>().ok().filter(|value| value.abs() <= LARGEST);
+    let shift = milliseconds.map(|value| PsecShift::By(value * MILLISECOND));
+    shift.ok_or_else(|| format!("must be auto, or a time from -{LARGEST} to {LARGEST} ms"))
 }
 
 impl RecordingArguments {
@@ -66,6 +84,8 @@ impl RecordingArguments {
         Conditioning {
             cutoff: self.cutoff_hz,
             current_lag: self.current_lag_ms.map(|milliseconds| milliseconds * MILLISECOND),
+            psec_shift: self.psec_shift.unwrap_or_default(),
+            trace_filter: self.trace_filter_hz,
         }
     }
 }
@@ -102,14 +122,37 @@ pub fn read(
     let (raw, mut findings) = read_recording(path, axis, options)?;
     let (signals, more) = condition(&raw, axis, periods, &reading.conditioning())?;
     findings.extend(more);
+    let mut feedforward = feedforward;
     if let (None, Some(missing)) = (feedforward, missing_feedforward(&signals)) {
-        return Err(format!(
-            "{}: has no {missing}; give the active feedforward with {option} off, velocity or both",
-            signals.name
-        )
-        .into());
+        let Some((inferred, finding)) = infer_feedforward(&signals, axis) else {
+            return Err(format!(
+                "{}: has no {missing}, and the motion does not show the active feedforward: neither a constant lag nor the \
+                 first-order lag of the position loop fits clearly better; give it with {option} off, velocity or both",
+                signals.name
+            )
+            .into());
+        };
+        feedforward = Some(inferred);
+        findings.push(finding);
     }
     Ok(ConditionedRecording { signals, feedforward, findings })
+}
+
+/// Infers the active feedforward from the motion, and whether it includes the torque from the machine file.
+fn infer_feedforward(signals: &Signals, axis: &AxisConfig) -> Option<(FeedforwardMode, Finding)> {
+    let (mode, reason) = match infer_velocity_feedforward(signals)? {
+        false => (FeedforwardMode::Off, "the position follows with the first-order lag of the position loop"),
+        true if axis.feedforward.torque != 0.0 => (
+            FeedforwardMode::Both,
+            "the position follows with a constant lag, and the machine file has a torque feedforward",
+        ),
+        true => (
+            FeedforwardMode::Velocity,
+            "the position follows with a constant lag, and the torque feedforward of the machine file is 0",
+        ),
+    };
+    let what = format!("{}: feedforward {} is assumed: {reason}", signals.name, mode.name());
+    Some((mode, Finding::note("feedforward-inferred", what)))
 }
 
 /// Returns the name of the feedforward signal that is missing to determine the active feedforward.

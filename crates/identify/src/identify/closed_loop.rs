@@ -7,7 +7,9 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::feedforward_mode::FeedforwardMode;
-use super::setpoints::SetpointGrid;
+use super::low_pass::LowPassFilter;
+use super::setpoints::{SetpointGrid, stride};
+use super::trace_experiments::trace_experiments;
 use crate::recording::{SignalSpan, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig, Periods};
 use virtual_axes_core::machine::{Machine, MachineError, MachineParameters};
@@ -31,10 +33,12 @@ pub struct Experiment {
     /// Active feedforward.
     pub mode: FeedforwardMode,
     /// PSEC from the first position cycle on, m or rad.
-    psec: Vec<f64>,
+    pub(super) psec: Vec<f64>,
     /// Time of the first sample after the first position cycle, s.
-    first: f64,
-    period: f64,
+    pub(super) first: f64,
+    pub(super) period: f64,
+    /// Half-power frequency, Hz, of the low-pass filter of the control.
+    pub(super) trace_filter: Option<f64>,
     /// Time of the first sample in the recording, s.
     pub start: f64,
     /// Recorded position, m or rad.
@@ -84,8 +88,11 @@ pub fn find_experiments(
     periods: &Periods,
     mode: FeedforwardMode,
 ) -> Vec<Experiment> {
-    let mut found = Vec::new();
     let tsp = seconds(periods.position);
+    if stride(signals.period, tsp).is_none() {
+        return trace_experiments(signals, recording, periods, mode, 0.0);
+    }
+    let mut found = Vec::new();
     let resting = match axis.kind() {
         AxisKind::Linear => RESTING,
         AxisKind::Rotary => RESTING_ANGLE,
@@ -116,6 +123,7 @@ pub fn find_experiments(
                 psec: setpoints.values[begin..end].to_vec(),
                 first: sample as f64 * signals.period - time,
                 period: signals.period,
+                trace_filter: signals.trace_filter,
                 start: span.start + sample as f64 * signals.period,
                 position: of(&span.position),
                 velocity: of(span.recorded_velocity.as_ref().unwrap_or(&span.velocity)),
@@ -215,10 +223,21 @@ pub fn simulate(
     let time_of = |i: usize| (experiment.first + i as f64 * experiment.period) / tick;
     let mut due = time_of(0);
     let mut now = 0_u64;
+    // A current recorded more coarsely than the position cycle is a mean; that of an instant has the ripple of the cycle.
+    let is_mean = experiment.period > seconds(periods.position);
+    let mut sums = vec![0.0];
+    let mut filters = experiment
+        .trace_filter
+        .map(|cutoff| [*first, 0.0, 0.0].map(|start| LowPassFilter::new(cutoff, tick, start)));
     for psec in &experiment.psec {
         machine.advance_with(&[*psec], &[], |machine| {
             let s = machine.axis(0).sample();
-            let here = [s.position, s.velocity, s.current];
+            let mut here = [s.position, s.velocity, s.current];
+            if let Some(filters) = &mut filters {
+                for (value, filter) in here.iter_mut().zip(filters) {
+                    *value = filter.next(*value);
+                }
+            }
             while next < count && due <= now as f64 + 1e-6 {
                 let part = (now as f64 - due).clamp(0.0, 1.0);
                 let at = |k: usize| here[k] + (before[k] - here[k]) * if part < 1e-6 { 0.0 } else { part };
@@ -228,9 +247,22 @@ pub fn simulate(
                 next += 1;
                 due = time_of(next);
             }
+            if is_mean {
+                sums.push(sums.last().copied().unwrap_or(0.0) + here[2]);
+            }
             before = here;
             now += 1;
         });
+    }
+    if is_mean {
+        let half = 0.5 * seconds(periods.position) / tick;
+        for (i, current) in simulated.current.iter_mut().enumerate() {
+            let (from, to) = ((time_of(i) - half).max(0.0) as usize, (time_of(i) + half) as usize);
+            let to = to.min(sums.len() - 1);
+            if to > from {
+                *current = (sums[to] - sums[from]) / (to - from) as f64;
+            }
+        }
     }
     Ok(simulated)
 }

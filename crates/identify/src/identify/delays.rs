@@ -20,6 +20,8 @@ const LONGEST: Nanoseconds = 100 * MILLISECOND_NS;
 const COARSE: Nanoseconds = 2 * MILLISECOND_NS;
 /// Significant change of the sum of squares, in units of the residual variance: three standard deviations.
 const NOISE: f64 = 9.0;
+/// Residual of the delay of the machine file, relative to the least one, up to which it is kept.
+const KEPT: f64 = 1.1;
 /// Delays evaluated in parallel while the interval is extended.
 const BLOCK: i64 = 8;
 /// Longest lag of the residual autocorrelation, samples.
@@ -96,6 +98,8 @@ pub struct DelayFit {
     pub is_at_end: bool,
     /// True if the value of the machine file was kept.
     pub is_unchanged: bool,
+    /// True if the delay was identified jointly with gains and weights, with feedforward active.
+    pub is_joint: bool,
     /// Evaluated delays, ns, and RMS position residual, m or rad.
     pub profile: Vec<(Nanoseconds, f64)>,
 }
@@ -183,7 +187,13 @@ pub(super) fn fit_delay(
     };
     let (low, high) = (reach(-1), reach(1));
     let interval = (if low == 0 { -1 } else { (low - 1) * grid }, high * grid);
-    let left = own > interval.0 && own <= interval.1;
+    // A delay whose residual is clearly above the best one of the profile is not kept, whatever other parameters could
+    // explain.
+    let own_part = (own + grid - 1) / grid;
+    let own_squares =
+        tried.iter().find(|(m, _)| *m == own_part).map_or(f64::INFINITY, |(_, r)| r.norm_squared());
+    let is_close = own_squares <= KEPT * KEPT * at_minimum.norm_squared() + count * f64::EPSILON;
+    let left = own > interval.0 && own <= interval.1 && is_close;
     let mut profile: Vec<(Nanoseconds, f64)> =
         tried.iter().map(|(m, r)| (middle(*m), (r.norm_squared() / count).sqrt())).collect();
     profile.sort_by_key(|(delay, _)| *delay);
@@ -193,6 +203,7 @@ pub(super) fn fit_delay(
         value: if left { own } else { middle(at_best) },
         is_at_end: high == longest,
         is_unchanged: left,
+        is_joint: false,
         profile,
     })
 }

@@ -14,8 +14,6 @@ use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::statistics::median;
 use virtual_axes_core::units::DEGREE;
 
-/// R² of the current below which the model does not describe the recording.
-const LEAST_DETERMINATION: f64 = 0.9;
 /// Largest relative difference between refined and measured friction.
 const DISAGREEING: f64 = 0.05;
 /// Largest position residual of a valid model, twice that of the paper, m and rad.
@@ -115,15 +113,6 @@ pub(super) fn report_result(inputs: &[IdentificationInput<'_>], tsp: f64, found:
     report_positions(inputs, found);
     report_inertia(inputs, tsp, found);
     report_friction(found);
-    for (input, agreement) in inputs.iter().zip(&found.agreements) {
-        if let Some(r2) = agreement.current_r_squared().filter(|r2| *r2 < LEAST_DETERMINATION) {
-            found.findings.push(Finding::warning(
-                "poor-current",
-                format!("{}: the model explains {:.1} % of the current", input.signals.name, 100.0 * r2),
-                "check units, torque constant and transmission; record without cutting forces",
-            ));
-        }
-    }
     let Some(refinement) = &found.refinement else { return };
     for refined in refinement.parameters.iter().filter(|p| p.is_at_bound) {
         found.findings.push(Finding::warning(

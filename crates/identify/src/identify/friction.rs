@@ -92,6 +92,17 @@ pub(super) fn speed_unit_name(axis: &AxisConfig) -> &'static str {
 }
 
 impl LawFit {
+    /// Creates a law with the standard errors and the covariance of a, b, c, d.
+    pub(super) fn new(
+        law: FrictionLaw,
+        config: FrictionConfig,
+        errors: [f64; 4],
+        r_squared: f64,
+        covariance: DMatrix<f64>,
+    ) -> Self {
+        LawFit { law, config, errors, r_squared, covariance }
+    }
+
     /// Returns the friction current at V (m/min or rev/min), A, with the sign of V.
     pub fn at(&self, v: f64) -> f64 {
         friction_current(&self.config, v)

@@ -8,7 +8,7 @@ use super::inertia::InertiaFit;
 use super::refine::Refinement;
 use super::validate::Agreement;
 use crate::recording::Finding;
-use virtual_axes_core::config::AxisConfig;
+use virtual_axes_core::config::{AxisConfig, Periods};
 
 /// Result of an identification.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +38,8 @@ pub struct Identification {
     pub refinement: Option<Refinement>,
     /// Agreement of the identified axis with each recording.
     pub agreements: Vec<Agreement>,
+    /// Periods, if the recordings require another position cycle than that of the machine file.
+    pub periods: Option<Periods>,
     /// Findings.
     pub findings: Vec<Finding>,
 }

@@ -11,6 +11,7 @@ pub mod summary;
 mod closed_loop;
 mod delays;
 mod feedforward;
+mod feedforward_inference;
 mod feedforward_mode;
 mod findings;
 mod fit;
@@ -18,17 +19,25 @@ mod friction;
 mod gravity;
 mod identification;
 mod inertia;
+mod loop_fit;
+mod low_pass;
 mod options;
+mod plant_regression;
+mod production;
 mod refine;
+mod resample;
+mod sanity;
 mod segments;
 mod setpoints;
 mod steps;
+mod trace_experiments;
 mod validate;
 mod values;
 
 pub use closed_loop::{Experiment, SimulatedExperiment, find_experiments, simulate, simulate_all};
 pub use delays::{DelayFit, DelayParameter};
 pub use feedforward::{FeedforwardFit, FeedforwardRegression, fit_feedforward};
+pub use feedforward_inference::infer_velocity_feedforward;
 pub use feedforward_mode::FeedforwardMode;
 pub use friction::{Breakaway, FrictionFit, FrictionLaw, LawFit, fit_friction};
 pub use gravity::{
@@ -38,7 +47,10 @@ pub use identification::Identification;
 pub use inertia::{InertiaFit, fit_inertia};
 pub use options::{IdentificationInput, IdentificationOptions, RefinementScope};
 pub use refine::{RefinedParameter, RefinedValue, Refinement, refine};
+pub(crate) use resample::CubicSpline;
 pub use segments::{MotionSegment, SegmentKind, find_segments};
 pub use steps::identify;
-pub use validate::{Agreement, ExperimentComparison, InverseDynamics, ResidualStatistics, validate};
+pub use validate::{
+    Agreement, Baseline, ExperimentComparison, InverseDynamics, ResidualStatistics, validate,
+};
 pub use values::{IdentifiedValue, update_parameters};

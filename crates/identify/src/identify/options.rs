@@ -33,15 +33,17 @@ pub struct RefinementScope {
     pub gravity: bool,
     /// VFFW and TFFW, if their setpoints were not recorded.
     pub feedforward: bool,
+    /// Position-loop gain Kp, from recordings that are coarser than the position cycle.
+    pub gain: bool,
 }
 
 impl RefinementScope {
     /// All parameters.
     pub const ALL: RefinementScope =
-        RefinementScope { inertia: true, friction: true, gravity: true, feedforward: true };
+        RefinementScope { inertia: true, friction: true, gravity: true, feedforward: true, gain: true };
     /// No refinement, only the steps of the paper.
     pub const NONE: RefinementScope =
-        RefinementScope { inertia: false, friction: false, gravity: false, feedforward: false };
+        RefinementScope { inertia: false, friction: false, gravity: false, feedforward: false, gain: false };
 }
 
 impl Default for IdentificationOptions {

@@ -49,6 +49,12 @@ pub enum RefinedParameter {
     VelocityFeedforward,
     /// Torque feedforward weight TFFW, kg·m² (kg).
     TorqueFeedforward,
+    /// Position-loop gain Kp, s⁻¹.
+    PositionGain,
+    /// Velocity-loop gain Kv, N·m/(rad/s).
+    VelocityGain,
+    /// Integral time Tv of the velocity loop, s.
+    VelocityIntegralTime,
 }
 
 impl fmt::Display for RefinedParameter {
@@ -67,6 +73,9 @@ impl fmt::Display for RefinedParameter {
             RefinedParameter::TiltCosine => "gravity k sin φ",
             RefinedParameter::VelocityFeedforward => "feedforward.velocity",
             RefinedParameter::TorqueFeedforward => "feedforward.torque",
+            RefinedParameter::PositionGain => "position_loop.gain",
+            RefinedParameter::VelocityGain => "velocity_loop.gain",
+            RefinedParameter::VelocityIntegralTime => "velocity_loop.integral_time",
         })
     }
 }
@@ -116,6 +125,9 @@ impl RefinedParameter {
             RefinedParameter::TiltCosine => g.tilt * g.phase.sin(),
             RefinedParameter::VelocityFeedforward => axis.feedforward.velocity,
             RefinedParameter::TorqueFeedforward => axis.feedforward.torque,
+            RefinedParameter::PositionGain => axis.position_loop.gain,
+            RefinedParameter::VelocityGain => axis.velocity_loop.gain,
+            RefinedParameter::VelocityIntegralTime => axis.velocity_loop.integral_time,
         }
     }
 
@@ -136,6 +148,9 @@ impl RefinedParameter {
                 force * friction
             }
             RefinedParameter::VelocityFeedforward => 1.0,
+            RefinedParameter::PositionGain
+            | RefinedParameter::VelocityGain
+            | RefinedParameter::VelocityIntegralTime => self.get(axis),
         }
     }
 
@@ -183,6 +198,9 @@ pub(super) fn with_parameters(
             RefinedParameter::TiltCosine => tilt = Some((tilt.unwrap_or(tilted(&axis)).0, value)),
             RefinedParameter::VelocityFeedforward => axis.feedforward.velocity = value,
             RefinedParameter::TorqueFeedforward => axis.feedforward.torque = value,
+            RefinedParameter::PositionGain => axis.position_loop.gain = value,
+            RefinedParameter::VelocityGain => axis.velocity_loop.gain = value,
+            RefinedParameter::VelocityIntegralTime => axis.velocity_loop.integral_time = value,
         }
     }
     if let Some((level, slope)) = line {

@@ -12,7 +12,9 @@ use super::gravity::{GravityCurrent, SteadyMeasurements, fit_gravity};
 use super::identification::Identification;
 use super::inertia::fit_inertia;
 use super::options::{IdentificationInput, IdentificationOptions, RefinementScope};
+use super::production::{are_production_traces, identify_production};
 use super::refine::{RefinedParameter, refine, with_parameters};
+use super::sanity::report_invalid;
 use super::segments::{MotionSegment, SegmentKind, find_segments};
 use super::setpoints::stride;
 use super::validate::compute_agreement;
@@ -34,9 +36,14 @@ pub fn identify(
     options: &IdentificationOptions,
 ) -> Identification {
     let mut steps = IdentificationSteps::new(inputs, axis, periods, options);
-    steps.fit_plant();
-    steps.fit_feedforward_weights();
-    steps.fit_closed_loop();
+    if are_production_traces(inputs, &steps.found.axis, periods) {
+        identify_production(inputs, periods, options.refine, &mut steps.found);
+        steps.find_production_experiments();
+    } else {
+        steps.fit_plant();
+        steps.fit_feedforward_weights();
+        steps.fit_closed_loop();
+    }
     steps.finish()
 }
 
@@ -87,6 +94,7 @@ impl<'a> IdentificationSteps<'a> {
                 delays: Vec::new(),
                 refinement: None,
                 agreements: Vec::new(),
+                periods: None,
                 findings,
             },
         }
@@ -230,6 +238,21 @@ impl<'a> IdentificationSteps<'a> {
         report_delays(&self.experiments, &mut self.found);
     }
 
+    /// Prepares the comparison of the identified axis with production traces.
+    fn find_production_experiments(&mut self) {
+        let (axis, periods) = (&self.found.axis, self.found.periods.unwrap_or(*self.periods));
+        let of = |(k, input): (usize, &IdentificationInput<'_>)| {
+            find_experiments(
+                input.signals,
+                k,
+                axis,
+                &periods,
+                input.feedforward.unwrap_or(FeedforwardMode::Both),
+            )
+        };
+        self.experiments = self.inputs.iter().enumerate().flat_map(of).collect();
+    }
+
     /// Returns the plant parameters of the closed-loop refinement.
     fn plant_parameters(&self, wanted: RefinementScope) -> Vec<RefinedParameter> {
         let found = &self.found;
@@ -343,8 +366,8 @@ impl<'a> IdentificationSteps<'a> {
             let segments = self.segments.get(number).cloned().unwrap_or_default();
             let of_it = |e: &&Experiment| e.recording == number;
             let experiments = self.experiments.iter().filter(of_it).cloned().collect();
-            let found =
-                compute_agreement(input.signals, segments, experiments, &self.found.axis, self.periods);
+            let periods = self.found.periods.as_ref().unwrap_or(self.periods);
+            let found = compute_agreement(input.signals, segments, experiments, &self.found.axis, periods);
             // An axis that was simulated before can be simulated here.
             self.found.agreements.extend(found.ok());
         }
@@ -362,6 +385,7 @@ impl<'a> IdentificationSteps<'a> {
         let replayed = inertia_of_simulation(self.inputs, &self.found);
         self.found.replayed_inertia = replayed;
         report_result(self.inputs, seconds(self.periods.position), &mut self.found);
+        report_invalid(self.inputs, &mut self.found);
         self.found
     }
 }

@@ -8,11 +8,16 @@ use super::feedforward_mode::FeedforwardMode;
 use super::fit::r_squared;
 use super::friction::{friction_current, speed_unit};
 use super::options::IdentificationInput;
+use super::plant_regression::moving_current;
+use super::resample::CubicSpline;
 use super::segments::{MotionSegment, SegmentKind, find_segments};
+use super::setpoints::stride;
 use crate::recording::Signals;
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::drive::Gravity;
 use virtual_axes_core::machine::MachineError;
+use virtual_axes_core::statistics::rms;
+use virtual_axes_core::units::seconds;
 
 /// Largest and RMS residual.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -49,6 +54,19 @@ pub struct InverseDynamics {
     pub modeled: Vec<(usize, Vec<f64>)>,
 }
 
+/// RMS differences of simple predictions of the position from PSEC, to which a model is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Baseline {
+    /// Difference from PSEC itself, m or rad.
+    pub command: f64,
+    /// Constant lag that fits best, s.
+    pub lag: f64,
+    /// Difference from PSEC delayed by this lag, m or rad.
+    pub delayed: f64,
+    /// Difference from the simulation of the model, m or rad.
+    pub model: f64,
+}
+
 /// Agreement of an axis model with a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
@@ -62,6 +80,8 @@ pub struct Agreement {
     pub comparisons: Vec<ExperimentComparison>,
     /// Comparison by inverse dynamics; none without current.
     pub inverse: Option<InverseDynamics>,
+    /// Simple predictions of the position; none without simulation.
+    pub baseline: Option<Baseline>,
 }
 
 impl Agreement {
@@ -97,8 +117,81 @@ pub(super) fn compute_agreement(
 ) -> Result<Agreement, MachineError> {
     let simulated = simulate_all(axis, periods, &experiments)?;
     let comparisons = experiments.iter().zip(&simulated).map(|(e, s)| compare(e, s, &segments)).collect();
-    let inverse = inverse_dynamics(signals, &segments, axis);
-    Ok(Agreement { segments, experiments, simulated, comparisons, inverse })
+    let is_coarse = stride(signals.period, seconds(periods.position)).is_none();
+    let filtered = if is_coarse { filtered_inverse_dynamics(signals, axis) } else { None };
+    let inverse = filtered.or_else(|| inverse_dynamics(signals, &segments, axis));
+    let baseline = baseline(signals, &experiments, &simulated);
+    Ok(Agreement { segments, experiments, simulated, comparisons, inverse, baseline })
+}
+
+/// Compares the filtered currents in motion, for recordings that are too coarse for a friction that changes its sign within
+/// a sample; none without motion.
+fn filtered_inverse_dynamics(signals: &Signals, axis: &AxisConfig) -> Option<InverseDynamics> {
+    let moving = moving_current(signals, axis);
+    let current = residual_statistics(moving.iter().map(|m| m.modeled - m.recorded))?;
+    let mut modeled: Vec<(usize, Vec<f64>)> = Vec::new();
+    for (number, span) in signals.spans.iter().enumerate() {
+        let mut values = span.smooth_current.clone()?;
+        for m in moving.iter().filter(|m| m.span == number) {
+            if let Some(value) = values.get_mut(m.index) {
+                *value = m.modeled;
+            }
+        }
+        modeled.push((number, values));
+    }
+    let r_squared = r_squared(moving.iter().map(|m| (m.recorded, m.modeled)));
+    Some(InverseDynamics { r_squared, current, modeled })
+}
+
+/// Computes the differences of simple predictions; none without simulation.
+fn baseline(
+    signals: &Signals,
+    experiments: &[Experiment],
+    simulated: &[SimulatedExperiment],
+) -> Option<Baseline> {
+    let pairs = experiments.iter().zip(simulated);
+    let model = rms(pairs.flat_map(|(e, s)| e.position.iter().zip(&s.position).map(|(a, b)| a - b)))?;
+    let spans = || signals.spans.iter().filter_map(|span| Some((span.psec.as_ref()?, &span.position)));
+    let command = rms(spans().flat_map(|(psec, position)| psec.iter().zip(position).map(|(a, b)| a - b)))?;
+    let (lag, delayed) = constant_lag(signals)?;
+    Some(Baseline { command, lag, delayed, model })
+}
+
+/// Returns the constant lag, s, with which the delayed PSEC fits the position best, and the RMS difference, m or rad;
+/// none without PSEC.
+pub(super) fn constant_lag(signals: &Signals) -> Option<(f64, f64)> {
+    /// Largest number of compared samples per span.
+    const SAMPLES: usize = 5000;
+    /// Steps of the search, s, and longest lag in first steps.
+    const STEPS: [f64; 3] = [2e-3, 2e-4, 2e-5];
+    const LONGEST: i32 = 75;
+    let spans: Vec<(CubicSpline, &[f64])> = signals
+        .spans
+        .iter()
+        .filter_map(|span| {
+            Some((CubicSpline::new(span.psec.as_ref()?, signals.period), span.position.as_slice()))
+        })
+        .collect();
+    let rms_at = |lag: f64| {
+        let differences = spans.iter().flat_map(|(psec, position)| {
+            let step = position.len().div_ceil(SAMPLES).max(1);
+            let first = (lag / signals.period).ceil() as usize;
+            let at = move |i: usize| psec.at(i as f64 * signals.period - lag)[0] - position[i];
+            (first..position.len()).step_by(step).map(at)
+        });
+        rms(differences)
+    };
+    let mut best = (0.0, rms_at(0.0)?);
+    for step in STEPS {
+        let (center, reach) = (best.0, if step == STEPS[0] { LONGEST } else { 10 });
+        for k in -reach..=reach {
+            let lag = center + f64::from(k) * step;
+            if let Some(found) = rms_at(lag.max(0.0)).filter(|found| lag >= 0.0 && *found < best.1) {
+                best = (lag, found);
+            }
+        }
+    }
+    Some(best)
 }
 
 fn residual_statistics(differences: impl Iterator<Item = f64>) -> Option<ResidualStatistics> {

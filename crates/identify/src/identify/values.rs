@@ -8,7 +8,7 @@ use super::gravity::{GravityCurrent, GravitySource};
 use super::identification::Identification;
 use super::refine::{RefinedParameter, RefinedValue};
 use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Value, ValueSource};
-use virtual_axes_core::units::{DEGREE, MILLISECOND_NS};
+use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS, POSITION_GAIN};
 
 /// Digits of a value beyond the first digit of its standard error.
 const GUARD_DIGITS: i32 = 2;
@@ -97,6 +97,7 @@ impl Identification {
         };
         self.push_plant(&mut put);
         self.push_control(&mut put);
+        self.push_position_cycle(parameters, &mut out);
         out
     }
 
@@ -225,10 +226,23 @@ impl Identification {
             let keys = ["feedforward.torque_kg_m2", "feedforward.torque_kg"];
             put(&keys, 0.0, None, None, "TFFWS is always 0".to_owned());
         }
+        for (parameter, keys, unit) in [
+            (RefinedParameter::PositionGain, ["position_loop.gain"; 1], POSITION_GAIN),
+            (RefinedParameter::VelocityGain, ["velocity_loop.gain"], 1.0),
+            (RefinedParameter::VelocityIntegralTime, ["velocity_loop.integral_time_ms"], MILLISECOND),
+        ] {
+            if let Some(found) = self.refined(parameter) {
+                let source = "jointly from positions".to_owned();
+                put(&keys, found.value / unit, Some(found.error / unit), None, source);
+            }
+        }
         let ms = |delay: i64| delay as f64 / MILLISECOND_NS as f64;
         for fit in &self.delays {
             let left = if fit.is_unchanged { "; unchanged" } else { "" };
-            let source = format!("feedforward {}{left}", fit.delay.feedforward_mode().name());
+            let source = match fit.is_joint {
+                true => "jointly from positions, with feedforward".to_owned(),
+                false => format!("feedforward {}{left}", fit.delay.feedforward_mode().name()),
+            };
             let key = match fit.delay {
                 DelayParameter::Alpha => "delays.alpha_ms",
                 DelayParameter::Beta => "delays.beta_ms",
@@ -236,6 +250,27 @@ impl Identification {
             };
             let interval = Some([ms(fit.interval.0), ms(fit.interval.1)]);
             put(&[key], ms(fit.delay.of(&self.axis.delays)), None, interval, source);
+        }
+    }
+
+    /// Adds the position cycle if it differs from that of the machine file.
+    fn push_position_cycle(&self, parameters: &Parameters, out: &mut Vec<IdentifiedValue>) {
+        let key = "periods.position_ms";
+        let (Some(periods), Some(Value::Double(before))) = (self.periods, parameters.get(key)) else {
+            return;
+        };
+        let value = periods.position as f64 / MILLISECOND_NS as f64;
+        if value != before {
+            let source = "divides the lag at constant velocity".to_owned();
+            out.push(IdentifiedValue {
+                key: key.to_owned(),
+                value,
+                unit: "ms",
+                before,
+                error: None,
+                interval: None,
+                source,
+            });
         }
     }
 

@@ -5,10 +5,12 @@ use super::filter::{GaussianFilter, MAX_CUTOFF_PERIOD, default_cutoff, deviation
 use super::filtered_section::FilteredSection;
 use super::ordering::{drop_copies, sort_samples};
 use super::spans::{
-    CHANNELS, CURRENT, NAMES, POSITION, channels, extract_sections, is_smoother_over_stamps, usable_columns,
+    CHANNELS, CURRENT, NAMES, POSITION, PSEC, channels, extract_sections, is_smoother_over_stamps,
+    usable_columns,
 };
 use super::uniform_grid::{UniformGrid, assign_to_grid};
 use super::{ConditioningError, Finding, RawRecording, SignalSpan, Signals, plausibility};
+use crate::identify::CubicSpline;
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::{Rounded, seconds};
 
@@ -18,6 +20,8 @@ const SHORTEST_SPAN: usize = 16;
 const SPAN_DEVIATIONS: f64 = 20.0;
 /// Longest sampling period that can show a lag of the current, relative to the position cycle.
 const COARSEST: f64 = 0.5;
+/// Allowed half-power frequencies of the low-pass filter of a control, Hz.
+const TRACE_FILTERS: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 /// Relative rounding tolerance of a given cut-off frequency.
 const ROUNDING: f64 = 1e-9;
 
@@ -30,6 +34,23 @@ pub struct Conditioning {
     /// Lag of the current behind the motion, s, −0.010 … 0.020; compensated as given. Without a value the lag
     /// is estimated, and compensated only if it is significant.
     pub current_lag: Option<f64>,
+    /// Correction of a setpoint that the recording delays.
+    pub psec_shift: PsecShift,
+    /// Low-pass filter (second-order Butterworth, half power, Hz) of the control, which all recorded signals but PSEC
+    /// have passed; simulated signals pass it too.
+    pub trace_filter: Option<f64>,
+}
+
+/// Correction of a setpoint that the recording delays.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum PsecShift {
+    /// No correction; a PSEC that lags behind the position is rejected.
+    #[default]
+    None,
+    /// PSEC is moved such that it does not lag behind the position.
+    Auto,
+    /// PSEC is moved forward by this time, s.
+    By(f64),
 }
 
 /// Conditions a recording of `axis`: checks it, resamples it to a uniform time grid and filters it without
@@ -74,7 +95,15 @@ pub fn condition(
     }
     let mut parts: Vec<FilteredSection> =
         pieces.into_iter().map(|section| FilteredSection::new(section, &filter)).collect();
-    plausibility::check(&raw.name, &parts, axis, period, deviation(cutoff))?;
+    shift_psec(&raw.name, &mut parts, options.psec_shift, period, &mut findings);
+    if let Some(friction) = plausibility::check(&raw.name, &parts, axis, period, deviation(cutoff))? {
+        let what = format!(
+            "{}: the current opposes the motion (friction {:.2} A in positive direction): its sign is inverted",
+            raw.name, friction
+        );
+        findings.push(Finding::note("current-inverted", what));
+        parts.iter_mut().for_each(FilteredSection::invert_current);
+    }
     let current_lag =
         select_current_lag(&raw.name, &parts, axis, periods, (period, cutoff), options, &mut findings)?;
     if current_lag != 0.0 {
@@ -86,7 +115,31 @@ pub fn condition(
     }
     let mut spans: Vec<SignalSpan> = parts.into_iter().map(FilteredSection::into_span).collect();
     separate_spans(&mut spans, period);
-    Ok((Signals { name: raw.name.clone(), period, cutoff, current_lag, spans }, findings))
+    let trace_filter = select_trace_filter(&raw.name, options)?;
+    Ok((Signals { name: raw.name.clone(), period, cutoff, trace_filter, current_lag, spans }, findings))
+}
+
+/// Moves PSEC forward in time and reports by how much.
+fn shift_psec(
+    name: &str,
+    parts: &mut [FilteredSection],
+    shift: PsecShift,
+    period: f64,
+    findings: &mut Vec<Finding>,
+) {
+    let by = match shift {
+        PsecShift::None => return,
+        PsecShift::By(time) => time,
+        PsecShift::Auto => (-plausibility::psec_lead(parts)).max(0.0),
+    };
+    for part in parts {
+        if let Some(psec) = &mut part.section.columns[PSEC] {
+            let spline = CubicSpline::new(psec, period);
+            *psec = (0..psec.len()).map(|i| spline.at(i as f64 * period + by)[0]).collect();
+        }
+    }
+    let what = format!("{name}: PSEC is moved forward by {:.2} ms; α is counted from there", by * 1e3);
+    findings.push(Finding::note("psec-shifted", what));
 }
 
 fn check_lengths(raw: &RawRecording) -> Result<(), ConditioningError> {
@@ -146,6 +199,18 @@ fn select_cutoff(name: &str, options: &Conditioning, placed: &UniformGrid) -> Re
         return Ok(found);
     }
     Err(ConditioningError::Cutoff { name: name.to_owned(), found, lowest, highest, period })
+}
+
+fn select_trace_filter(name: &str, options: &Conditioning) -> Result<Option<f64>, ConditioningError> {
+    match options.trace_filter {
+        Some(found) if !TRACE_FILTERS.contains(&found) => Err(ConditioningError::TraceFilter {
+            name: name.to_owned(),
+            found,
+            lowest: *TRACE_FILTERS.start(),
+            highest: *TRACE_FILTERS.end(),
+        }),
+        given => Ok(given),
+    }
 }
 
 /// Returns the current lag to compensate, s.

@@ -183,7 +183,8 @@ pub enum ConditioningError {
     },
     /// PSEC that lags behind the position.
     #[error(
-        "{name}: PSEC lags behind the position by {} ms; the two columns are likely swapped",
+        "{name}: PSEC lags behind the position by {} ms: the recording delays the setpoint, or the two columns are swapped; \
+         --psec-shift auto moves PSEC by this lag, --psec-shift MS by a known one",
         Rounded(lag * 1e3)
     )]
     PsecBehind {
@@ -191,6 +192,18 @@ pub enum ConditioningError {
         name: String,
         /// Lag, s.
         lag: f64,
+    },
+    /// Low-pass filter of the control out of range.
+    #[error("{name}: trace filter {} Hz, must lie in {lowest} … {highest} Hz", Rounded(*found))]
+    TraceFilter {
+        /// Name of the recording.
+        name: String,
+        /// Frequency given, Hz.
+        found: f64,
+        /// Lowest allowed frequency, Hz.
+        lowest: f64,
+        /// Highest allowed frequency, Hz.
+        highest: f64,
     },
     /// Current beyond the limit of the motor.
     #[error(
@@ -206,18 +219,6 @@ pub enum ConditioningError {
         limit: f64,
         /// Likely cause.
         looks_like: String,
-    },
-    /// Current with inverted sign.
-    #[error(
-        "{name}: the current opposes the motion (friction {} A in positive direction, must be positive); \
-         invert its sign with current=COLUMN[-1 A]",
-        Rounded(*friction)
-    )]
-    CurrentSign {
-        /// Name of the recording.
-        name: String,
-        /// Friction current in the direction of motion, A.
-        friction: f64,
     },
     /// Current that is a multiple of a motion signal.
     #[error(

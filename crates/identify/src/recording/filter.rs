@@ -12,7 +12,7 @@ const REACH: f64 = 5.0;
 
 /// Returns the standard deviation, s, of the Gaussian that passes half the power at `cutoff` (Hz): |H(f)|² =
 /// exp(−(2π f σ)²) = 1/2.
-pub(super) fn deviation(cutoff: f64) -> f64 {
+pub(crate) fn deviation(cutoff: f64) -> f64 {
     LN_2.sqrt() / (TAU * cutoff)
 }
 

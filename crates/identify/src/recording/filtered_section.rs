@@ -23,6 +23,12 @@ impl<'a> FilteredSection<'a> {
         FilteredSection { filter, section, motion, smooth_current }
     }
 
+    /// Inverts the sign of the current.
+    pub fn invert_current(&mut self) {
+        let raw = self.section.columns[CURRENT].iter_mut().flatten();
+        raw.chain(self.smooth_current.iter_mut().flatten()).for_each(|current| *current = -*current);
+    }
+
     /// Keeps the samples of `range`.
     pub fn cut(&mut self, range: std::ops::Range<usize>, period: f64) {
         let motion = &mut self.motion;

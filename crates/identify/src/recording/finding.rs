@@ -14,6 +14,8 @@ pub enum Severity {
     Warning,
     /// Parameter that was not identified because data are missing.
     Missing,
+    /// Result that must not be used.
+    Invalid,
 }
 
 /// Message about a recording or result, with the remedy.
@@ -44,6 +46,11 @@ impl Finding {
     /// Creates a finding about a parameter that was not identified.
     pub fn missing(code: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Finding { severity: Severity::Missing, code, what: what.into(), remedy: remedy.into() }
+    }
+
+    /// Creates a finding about a result that must not be used.
+    pub fn invalid(code: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Finding { severity: Severity::Invalid, code, what: what.into(), remedy: remedy.into() }
     }
 }
 

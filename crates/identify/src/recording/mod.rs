@@ -18,8 +18,9 @@ mod signals;
 mod spans;
 mod uniform_grid;
 
-pub use condition::{Conditioning, condition};
+pub use condition::{Conditioning, PsecShift, condition};
 pub use error::ConditioningError;
+pub(crate) use filter::deviation;
 pub use filter::{FilteredSignal, GaussianFilter};
 pub use finding::{Finding, Severity};
 pub use signals::{RawRecording, SignalSpan, Signals};

@@ -34,6 +34,10 @@ const UNITY: std::ops::Range<f64> = 0.75..1.35;
 const NEAR: f64 = 0.04;
 /// Smallest contribution to R² of a significant effect.
 const EFFECT: f64 = 0.05;
+/// Smallest contribution of the acceleration to R² that determines the sign of the current.
+const INERTIAL: f64 = 0.01;
+/// Fewest samples in motion that determine the sign of the current.
+const FEWEST_MOVING: usize = 30;
 /// R² below which the current is unrelated to the motion.
 const EXPLAINED: f64 = 0.5;
 /// Smallest share of moving samples in each direction that separates friction from gravity.
@@ -42,14 +46,14 @@ const BOTH_WAYS: f64 = 0.05;
 const BEHIND: f64 = 5e-3;
 
 /// Rejects a recording that is not plausible for `axis`. `deviation` is the standard deviation of the filter,
-/// s.
+/// s. Returns the friction current, A, if the sign of the current is inverted.
 pub(super) fn check(
     name: &str,
     parts: &[FilteredSection],
     axis: &AxisConfig,
     period: f64,
     deviation: f64,
-) -> Result<(), ConditioningError> {
+) -> Result<Option<f64>, ConditioningError> {
     let look = PlausibilityCheck::new(name, parts, axis, deviation);
     if look.is_moving {
         look.check_velocity_correlation()?;
@@ -67,9 +71,8 @@ pub(super) fn check(
     look.check_current_magnitude()?;
     if look.is_moving {
         look.check_current_column()?;
-        look.check_current_sign(parts)?;
     }
-    Ok(())
+    Ok(look.inverted_current(parts))
 }
 
 /// Concatenated signals of all sections and the checks on them.
@@ -317,10 +320,7 @@ impl<'a> PlausibilityCheck<'a> {
     /// negative.
     fn check_psec_lead(&self, period: f64) -> Result<(), ConditioningError> {
         let Some(psec) = self.columns[PSEC].as_deref() else { return Ok(()) };
-        let position = self.column(POSITION);
-        let columns = vec![self.velocity.clone()];
-        let distances: Vec<f64> = psec.iter().zip(position).map(|(psec, position)| psec - position).collect();
-        let lead = LeastSquares::new(columns).fit(&distances).coefficients[0];
+        let lead = lead(psec, self.column(POSITION), &self.velocity);
         if lead >= -BEHIND.max(2.0 * period) {
             return Ok(());
         }
@@ -360,15 +360,16 @@ impl<'a> PlausibilityCheck<'a> {
         Ok(())
     }
 
-    /// Rejects a current whose friction and inertia parts have the wrong sign; gravity does not matter.
-    fn check_current_sign(&self, parts: &[FilteredSection]) -> Result<(), ConditioningError> {
-        if self.smooth_current.is_none() {
-            return Ok(());
-        }
+    /// Returns the friction current, A, if its sign and that of the inertia part are wrong; gravity does not matter.
+    fn inverted_current(&self, parts: &[FilteredSection]) -> Option<f64> {
+        self.smooth_current.as_ref()?;
         let moving = MovingSamples::new(parts, self.axis.kind, 0, 0);
         let currents: Option<Vec<f64>> =
             moving.indices.iter().map(|&(p, n)| Some(parts[p].smooth_current.as_ref()?[n])).collect();
         let currents = currents.unwrap_or_default();
+        if currents.len() < FEWEST_MOVING {
+            return None;
+        }
         let whole = LeastSquares::new(moving.columns.clone()).fit(&currents);
         let without = |left_out: &[usize]| {
             let kept = (0..moving.columns.len()).filter(|n| !left_out.contains(n));
@@ -384,13 +385,27 @@ impl<'a> PlausibilityCheck<'a> {
         } else {
             0.0
         };
-        let inertia_sign = if believed(&[0]) { whole.coefficients[0].signum() } else { 0.0 };
+        let is_inertial = whole.r2 - without(&[0]) > INERTIAL;
+        let inertia_sign = if is_inertial { whole.coefficients[0].signum() } else { 0.0 };
         let turned = friction_sign + inertia_sign < 0.0;
-        if turned && whole.r2 > EXPLAINED {
-            return Err(ConditioningError::CurrentSign { name: self.name(), friction });
-        }
-        Ok(())
+        (turned && whole.r2 > EXPLAINED).then_some(friction)
     }
+}
+
+/// Returns the time, s, by which PSEC leads the position, from all sections; 0 without PSEC.
+pub(super) fn psec_lead(parts: &[FilteredSection]) -> f64 {
+    let of = |channel: usize| -> Vec<f64> {
+        parts.iter().flat_map(|part| part.section.columns[channel].iter().flatten().copied()).collect()
+    };
+    let velocity: Vec<f64> = parts.iter().flat_map(|part| part.motion.first.iter().copied()).collect();
+    let (psec, position) = (of(PSEC), of(POSITION));
+    if psec.len() == position.len() { lead(&psec, &position, &velocity) } else { 0.0 }
+}
+
+/// Returns the regression of the following error on the velocity, s.
+fn lead(psec: &[f64], position: &[f64], velocity: &[f64]) -> f64 {
+    let distances: Vec<f64> = psec.iter().zip(position).map(|(psec, position)| psec - position).collect();
+    LeastSquares::new(vec![velocity.to_vec()]).fit(&distances).coefficients.first().copied().unwrap_or(0.0)
 }
 
 /// Returns the likely cause of a scale factor; empty if no known factor is close.

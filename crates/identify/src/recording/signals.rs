@@ -32,6 +32,8 @@ pub struct Signals {
     pub period: f64,
     /// Cut-off frequency (half power) of the filter of velocity, acceleration and smoothed current, Hz.
     pub cutoff: f64,
+    /// Half-power frequency, Hz, of the low-pass filter of the control that all signals but PSEC have passed.
+    pub trace_filter: Option<f64>,
     /// Compensated lag of the recorded current behind the motion, s.
     pub current_lag: f64,
     /// Sections between gaps, in order of time.

@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use super::super::chart::{Band, Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
 use super::super::document::Section;
-use super::super::table::Table;
+use super::super::table::{Table, TableColumn};
+use super::super::text::number;
 use super::super::unit::DisplayUnit;
-use super::format::{columns, format_r_squared, optional, with_unit};
+use super::format::{columns, digits, format_r_squared, optional, with_unit};
 use super::recordings::{bands, over_time, single_recording};
 use super::{IdentificationPage, Step, ValidationRecording};
 use virtual_axes_core::units::{MILLIMETER, seconds};
@@ -73,6 +74,22 @@ fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&Identificat
     let rows: Vec<Vec<String>> = pairs.iter().flat_map(|(input, a)| rows(page, input, a)).collect();
     if !rows.is_empty() {
         section.tables.push(table(page, rows));
+    }
+    let baselines: Vec<Vec<String>> =
+        pairs.iter().filter_map(|(input, a)| baseline_row(page, input, a)).collect();
+    if !baselines.is_empty() {
+        let unit = page.error_unit();
+        section.tables.push(Table {
+            caption: "Position from simple predictions and from the model, RMS".to_owned(),
+            columns: vec![
+                TableColumn::new("recording", ""),
+                TableColumn::new("PSEC", unit.symbol),
+                TableColumn::new("best constant lag", "ms"),
+                TableColumn::new("PSEC delayed by it", unit.symbol),
+                TableColumn::new("identified model", unit.symbol),
+            ],
+            rows: baselines,
+        });
     }
     let inverse: Vec<Vec<String>> = pairs.iter().filter_map(|(input, a)| inverse_row(input, a)).collect();
     if !inverse.is_empty() {
@@ -153,6 +170,22 @@ fn table(page: &IdentificationPage, rows: Vec<Vec<String>>) -> Table {
         ("R² of the current", ""),
     ];
     Table { caption: "Simulated minus measured".to_owned(), columns: columns(heads), rows }
+}
+
+fn baseline_row(
+    page: &IdentificationPage,
+    input: &IdentificationInput,
+    agreement: &Agreement,
+) -> Option<Vec<String>> {
+    let baseline = agreement.baseline?;
+    let of = |value: f64| digits(value / page.error_unit().size, 4);
+    Some(vec![
+        input.signals.name.clone(),
+        of(baseline.command),
+        number(baseline.lag * 1e3, 2),
+        of(baseline.delayed),
+        of(baseline.model),
+    ])
 }
 
 fn inverse_row(input: &IdentificationInput, agreement: &Agreement) -> Option<Vec<String>> {

@@ -47,7 +47,7 @@ pub(super) fn notice(finding: &Finding) -> Notice {
     let level = match finding.severity {
         Severity::Note => NoticeLevel::Note,
         Severity::Warning => NoticeLevel::Warning,
-        Severity::Missing => NoticeLevel::Missing,
+        Severity::Missing | Severity::Invalid => NoticeLevel::Missing,
     };
     Notice::new(level, finding.to_string())
 }

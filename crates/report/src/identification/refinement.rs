@@ -84,6 +84,9 @@ fn row(page: &IdentificationPage, refined: &RefinedValue) -> Vec<String> {
         RefinedParameter::Weight => "N".to_owned(),
         RefinedParameter::TiltSine | RefinedParameter::TiltCosine => "N·m".to_owned(),
         RefinedParameter::VelocityFeedforward => String::new(),
+        RefinedParameter::PositionGain => "1/s".to_owned(),
+        RefinedParameter::VelocityGain => "N·m·s".to_owned(),
+        RefinedParameter::VelocityIntegralTime => "s".to_owned(),
     };
     vec![
         refined.parameter.to_string(),

@@ -39,6 +39,7 @@ mod hidden_machine;
 mod machine_file;
 mod program;
 mod recorder;
+mod study;
 
 pub use butterworth::ButterworthFilter;
 pub use csv::write_csv;
@@ -49,3 +50,4 @@ pub use hidden_machine::HiddenMachine;
 pub use machine_file::{machine_file, truth_file};
 pub use program::ProductionProgram;
 pub use recorder::{CurrentSampling, TraceRecorder};
+pub use study::{StudyCase, StudyFigures, TraceStudy};

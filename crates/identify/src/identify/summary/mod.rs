@@ -216,6 +216,21 @@ pub struct ResidualSummary {
     pub parts: Vec<PartSummary>,
     /// Residuals by inverse dynamics; none without current.
     pub inverse_dynamics: Option<InverseSummary>,
+    /// RMS differences of simple predictions and of the model; none without simulation.
+    pub baseline: Option<BaselineSummary>,
+}
+
+/// RMS differences of the position from simple predictions and from the model, in the unit of position residuals.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BaselineSummary {
+    /// From PSEC.
+    pub command: f64,
+    /// Best constant lag, ms.
+    pub lag_ms: f64,
+    /// From PSEC delayed by this lag.
+    pub delayed: f64,
+    /// From the model.
+    pub model: f64,
 }
 
 impl ResidualSummary {
@@ -237,6 +252,12 @@ impl ResidualSummary {
             inverse_dynamics: agreement.inverse.as_ref().map(|inverse| InverseSummary {
                 current_a: inverse.current,
                 current_r_squared: inverse.r_squared,
+            }),
+            baseline: agreement.baseline.map(|baseline| BaselineSummary {
+                command: baseline.command / position,
+                lag_ms: baseline.lag / MILLISECOND,
+                delayed: baseline.delayed / position,
+                model: baseline.model / position,
             }),
         }
     }

@@ -1,0 +1,416 @@
+//! Delays, gains and feedforward weights from the positions of a production trace, jointly by least squares.
+//!
+//! With full velocity feedforward the lag at constant velocity is α, and β shows in accelerations. A shift of the
+//! commanded position makes α continuous during the search; it vanishes if the position cycle of the machine file divides
+//! the lag, otherwise a shorter cycle is chosen.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::closed_loop::{Experiment, position_residuals};
+use super::feedforward_mode::FeedforwardMode;
+use super::fit::{BoundedParameter, Effort, clustered_covariance, descend};
+use super::trace_experiments::trace_experiments;
+use crate::recording::Signals;
+use virtual_axes_core::config::{AxisConfig, Periods};
+use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, POSITION_GAIN, SECOND_NS, seconds};
+
+/// Longest delay, s.
+const LONGEST: f64 = 0.1;
+/// Start values of β and γ relative to the lag.
+const DELAY_STARTS: [f64; 4] = [0.2, 0.45, 0.7, 0.95];
+/// Start values of the position-loop gain, (m/min)/mm.
+const GAIN_STARTS: [f64; 3] = [1.4, 2.2, 3.3];
+/// Start values of the ratio of velocity-loop gain to inertia, s⁻¹.
+const BANDWIDTH_STARTS: [f64; 2] = [180.0, 300.0];
+/// Starts of each gain that are followed to their minimum.
+const FOLLOWED: usize = 1;
+/// Longest difference of the lag from a whole number of position cycles, s.
+const GRID_TOLERANCE: f64 = 0.15e-3;
+/// Position cycles that are tried if that of the machine file does not divide the lag, ns.
+const CYCLES: [Nanoseconds; 2] = [2 * MILLISECOND_NS, MILLISECOND_NS];
+/// Residual of one standard deviation of the prior, m or rad: a few encoder increments.
+const PRIOR: f64 = 5e-6;
+/// Usual ratio of velocity-loop gain to inertia, s⁻¹.
+const BANDWIDTH: f64 = 240.0;
+/// Duration of a cluster of correlated residuals, s.
+const CLUSTER: f64 = 0.5;
+
+/// Parameter of the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LoopParameter {
+    /// Lag of the position at constant velocity, s: shift of the commanded position.
+    Lag,
+    /// β, s.
+    Beta,
+    /// γ, s.
+    Gamma,
+    /// Position-loop gain, s⁻¹.
+    Gain,
+    /// Velocity-loop gain divided by Jeq, s⁻¹.
+    Bandwidth,
+    /// Integral time of the velocity loop, s.
+    IntegralTime,
+    /// TFFW divided by Jeq.
+    TorqueRatio,
+}
+
+/// Fitted value with its clustered standard error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LoopValue {
+    pub parameter: LoopParameter,
+    pub value: f64,
+    pub error: f64,
+}
+
+/// Result of the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LoopFit {
+    /// Axis with fitted delays, gains and weights.
+    pub axis: AxisConfig,
+    /// Periods with the position cycle that divides the lag.
+    pub periods: Periods,
+    pub values: Vec<LoopValue>,
+    /// RMS position residual, m or rad.
+    pub rms: f64,
+    /// RMS position residual with the gain of the machine file, if the gain was fitted.
+    pub rms_with_given_gain: Option<f64>,
+    /// VFFW and lag (s) at both ends of the valley in which the residual hardly changes.
+    pub valley: Option<[(f64, f64); 2]>,
+}
+
+/// Recordings and options of the fit.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LoopProblem<'a> {
+    pub recordings: &'a [(&'a Signals, FeedforwardMode)],
+    /// True if the position-loop gain is fitted.
+    pub fits_gain: bool,
+    /// Position-loop gain of the machine file, s⁻¹.
+    pub given_gain: f64,
+}
+
+/// Candidate of the search: parameters and their values.
+#[derive(Debug, Clone)]
+struct Candidate {
+    values: Vec<f64>,
+    cost: f64,
+}
+
+impl LoopProblem<'_> {
+    fn experiments(&self, periods: &Periods, shift: f64) -> Vec<Experiment> {
+        let all = self.recordings.iter().enumerate();
+        all.flat_map(|(k, (signals, mode))| trace_experiments(signals, k, periods, *mode, shift)).collect()
+    }
+
+    fn parameters(&self, axis: &AxisConfig) -> Vec<LoopParameter> {
+        let has = |mode| self.recordings.iter().any(|(_, active)| *active >= mode);
+        let mut parameters = vec![LoopParameter::Lag];
+        if has(FeedforwardMode::Velocity) && axis.feedforward.velocity != 0.0 {
+            parameters.push(LoopParameter::Beta);
+        }
+        if has(FeedforwardMode::Both) && axis.feedforward.torque != 0.0 {
+            parameters.extend([LoopParameter::Gamma, LoopParameter::TorqueRatio]);
+        }
+        if self.fits_gain {
+            parameters.push(LoopParameter::Gain);
+        }
+        parameters.extend([LoopParameter::Bandwidth, LoopParameter::IntegralTime]);
+        parameters
+    }
+
+    /// Returns the axis with `values`, and the shift of the commanded position, s.
+    fn apply(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        values: &[f64],
+    ) -> (AxisConfig, f64) {
+        let mut axis = axis.clone();
+        let inertia = axis.motor.inertia;
+        let mut shift = 0.0;
+        let lag = parameters.iter().zip(values).find(|(p, _)| **p == LoopParameter::Lag);
+        if let Some((_, lag)) = lag {
+            let tsp = seconds(periods.position);
+            let cycles = (lag / tsp).round().max(0.0);
+            axis.delays.alpha = nanoseconds(((cycles - 0.5) * tsp).max(0.0));
+            shift = lag - cycles * tsp;
+        }
+        for (parameter, &value) in parameters.iter().zip(values) {
+            match parameter {
+                LoopParameter::Lag => {}
+                // The shift delays the feedforward too.
+                LoopParameter::Beta => axis.delays.beta = nanoseconds((value - shift).max(0.0)),
+                LoopParameter::Gamma => axis.delays.gamma = nanoseconds((value - shift).max(0.0)),
+                LoopParameter::Gain => axis.position_loop.gain = value,
+                LoopParameter::Bandwidth => axis.velocity_loop.gain = value * inertia,
+                LoopParameter::IntegralTime => axis.velocity_loop.integral_time = value,
+                LoopParameter::TorqueRatio => axis.feedforward.torque = value * inertia,
+            }
+        }
+        (axis, shift)
+    }
+
+    fn residuals(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        values: &[f64],
+    ) -> Option<DVector<f64>> {
+        let (moved, shift) = self.apply(axis, periods, parameters, values);
+        let left = position_residuals(&moved, periods, &self.experiments(periods, shift))?;
+        let prior = prior(parameters, values, self.given_gain);
+        Some(DVector::from_iterator(left.len() + prior.len(), left.iter().copied().chain(prior)))
+    }
+
+    fn bounded(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        values: &[f64],
+    ) -> Vec<BoundedParameter> {
+        let tsv = seconds(periods.velocity);
+        let of = |(parameter, &start): (&LoopParameter, &f64)| {
+            let (low, high, step) = match parameter {
+                LoopParameter::Lag => ((start - 0.01).max(0.0), start + 0.01, 5e-5),
+                LoopParameter::Beta | LoopParameter::Gamma => {
+                    (0.0, LONGEST.min(start + 0.02), (2.0 * tsv).max(5e-4))
+                }
+                LoopParameter::Gain => (0.3 * POSITION_GAIN, 10.0 * POSITION_GAIN, 0.02 * start),
+                LoopParameter::Bandwidth => (30.0, 2000.0, 0.03 * start),
+                LoopParameter::IntegralTime => (5e-4, 0.1, 0.05 * start),
+                LoopParameter::TorqueRatio => (0.0, 2.0, 0.03),
+            };
+            BoundedParameter { start: start.clamp(low, high), low, high, step }
+        };
+        let _ = axis;
+        parameters.iter().zip(values).map(of).collect()
+    }
+
+    /// Returns the values from which the search starts with a position-loop gain, best first.
+    fn starts(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        lag: f64,
+    ) -> Vec<Candidate> {
+        let mut all = Vec::new();
+        for beta in DELAY_STARTS {
+            for bandwidth in BANDWIDTH_STARTS {
+                let value = |parameter: &LoopParameter| match parameter {
+                    LoopParameter::Lag => lag,
+                    LoopParameter::Beta | LoopParameter::Gamma => beta * lag,
+                    LoopParameter::Gain => axis.position_loop.gain,
+                    LoopParameter::Bandwidth => bandwidth,
+                    LoopParameter::IntegralTime => 1.5 / bandwidth,
+                    LoopParameter::TorqueRatio => 1.0,
+                };
+                all.push(parameters.iter().map(value).collect::<Vec<f64>>());
+            }
+        }
+        let tried = all.into_par_iter().filter_map(|values| {
+            let cost = self.residuals(axis, periods, parameters, &values)?.norm_squared();
+            Some(Candidate { values, cost })
+        });
+        let mut tried: Vec<Candidate> = tried.collect();
+        tried.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        tried
+    }
+
+    /// Follows a start to its minimum.
+    fn follow(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        from: &[f64],
+    ) -> Option<Candidate> {
+        let bounded = self.bounded(axis, periods, parameters, from);
+        let (values, cost) = descend(&bounded, Effort::Simulation, |values| {
+            self.residuals(axis, periods, parameters, values)
+        })?;
+        Some(Candidate { values, cost })
+    }
+
+    /// Returns the least minimum: first with some gains held, since a search over all parameters ends in local minima, then
+    /// with a free gain.
+    fn best(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        lag: f64,
+    ) -> Option<Candidate> {
+        let held: Vec<LoopParameter> =
+            parameters.iter().copied().filter(|p| *p != LoopParameter::Gain).collect();
+        let gains: Vec<f64> = match self.fits_gain {
+            true => GAIN_STARTS.iter().map(|gain| gain * POSITION_GAIN).chain([self.given_gain]).collect(),
+            false => vec![self.given_gain],
+        };
+        let mut best: Option<(f64, Candidate)> = None;
+        for gain in gains {
+            let mut with_gain = axis.clone();
+            with_gain.position_loop.gain = gain;
+            for start in self.starts(&with_gain, periods, &held, lag).iter().take(FOLLOWED) {
+                let Some(found) = self.follow(&with_gain, periods, &held, &start.values) else { continue };
+                if best.as_ref().is_none_or(|(_, known)| found.cost < known.cost) {
+                    best = Some((gain, found));
+                }
+            }
+        }
+        let (gain, found) = best?;
+        let mut values = found.values.into_iter();
+        let from =
+            parameters.iter().map(|p| if *p == LoopParameter::Gain { Some(gain) } else { values.next() });
+        self.follow(axis, periods, parameters, &from.collect::<Option<Vec<f64>>>()?)
+    }
+
+    /// Fits delays, gains and weights; `lag` is the best constant lag between commanded and actual position, s.
+    pub fn fit(&self, axis: &AxisConfig, given: &Periods, lag: f64) -> Option<LoopFit> {
+        let parameters = self.parameters(axis);
+        let first = self.best(axis, given, &parameters, lag)?;
+        let found_lag = first.values[0];
+        let periods = Periods { position: position_cycle(given, found_lag), ..*given };
+        // The velocity feedforward is a difference over the position cycle: β + Tsp is what the motion shows.
+        let change = seconds(given.position) - seconds(periods.position);
+        let from: Vec<f64> = parameters
+            .iter()
+            .zip(&first.values)
+            .map(|(parameter, value)| match parameter {
+                LoopParameter::Beta | LoopParameter::Gamma => value + change,
+                _ => *value,
+            })
+            .collect();
+        let free = self.follow(axis, &periods, &parameters, &from).unwrap_or(first);
+        // The delay of the machine file is a whole number of position cycles.
+        let tsp = seconds(periods.position);
+        let cycles = (free.values[0] / tsp).round().max(0.0);
+        let (fixed, _) = self.apply(axis, &periods, &[LoopParameter::Lag], &[cycles * tsp]);
+        let others = &parameters[1..];
+        let last = self.follow(&fixed, &periods, others, &free.values[1..])?;
+        let (found, _) = self.apply(&fixed, &periods, others, &last.values);
+        let errors = self.errors(axis, &periods, &parameters, &free.values)?;
+        let count = self.residuals(&fixed, &periods, others, &last.values)?.len().max(1) as f64;
+        let values = parameters.iter().enumerate().map(|(k, &parameter)| LoopValue {
+            parameter,
+            value: if k == 0 { free.values[0] } else { last.values[k - 1] },
+            error: errors[(k, k)].max(0.0).sqrt(),
+        });
+        let rms_with_given_gain =
+            self.fits_gain.then(|| self.cost_with_gain(axis, &periods, &parameters, &free)).flatten();
+        Some(LoopFit {
+            values: values.collect(),
+            rms: (last.cost / count).sqrt(),
+            rms_with_given_gain: rms_with_given_gain.map(|cost| (cost / count).sqrt()),
+            valley: self.valley(&found, &periods, &errors, &parameters, free.values[0]),
+            axis: found,
+            periods,
+        })
+    }
+
+    fn cost_with_gain(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        free: &Candidate,
+    ) -> Option<f64> {
+        let kept = |k: &usize| parameters[*k] != LoopParameter::Gain;
+        let others: Vec<LoopParameter> = (0..parameters.len()).filter(kept).map(|k| parameters[k]).collect();
+        let values: Vec<f64> = (0..parameters.len()).filter(kept).map(|k| free.values[k]).collect();
+        Some(self.follow(axis, periods, &others, &values)?.cost)
+    }
+
+    fn errors(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        values: &[f64],
+    ) -> Option<DMatrix<f64>> {
+        let mut clusters = Vec::new();
+        let mut offset = 0;
+        for experiment in self.experiments(periods, 0.0) {
+            let length = (CLUSTER / experiment.period()).ceil().max(1.0) as usize;
+            let count = experiment.position.len();
+            clusters.extend((0..count).map(|i| Some(offset + i / length)));
+            offset += count / length + 1;
+        }
+        let bounded = self.bounded(axis, periods, parameters, values);
+        clustered_covariance(&bounded, values, |x| self.residuals(axis, periods, parameters, x), &clusters)
+    }
+
+    /// Returns VFFW and lag at two standard errors from the fit, with VFFW as a further parameter.
+    ///
+    /// The lag at constant velocity is α + (1 − VFFW) / Kp, so both compensate each other.
+    fn valley(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        _errors: &DMatrix<f64>,
+        parameters: &[LoopParameter],
+        lag: f64,
+    ) -> Option<[(f64, f64); 2]> {
+        let weight = axis.feedforward.velocity;
+        if weight == 0.0 {
+            return None;
+        }
+        let lags = |x: &[f64]| {
+            let mut moved = axis.clone();
+            moved.feedforward.velocity = x[1];
+            self.residuals(&moved, periods, &[LoopParameter::Lag], &x[..1])
+        };
+        let _ = parameters;
+        let bounded = [
+            BoundedParameter { start: lag, low: 0.0, high: LONGEST, step: 5e-5 },
+            BoundedParameter { start: weight, low: 0.0, high: 2.0, step: 2e-3 },
+        ];
+        let mut clusters = Vec::new();
+        for (k, experiment) in self.experiments(periods, 0.0).iter().enumerate() {
+            let length = (CLUSTER / experiment.period()).ceil().max(1.0) as usize;
+            clusters.extend((0..experiment.position.len()).map(|i| Some(1000 * k + i / length)));
+        }
+        let covariance = clustered_covariance(&bounded, &[lag, weight], lags, &clusters)?;
+        let half = 2.0 * covariance[(1, 1)].max(0.0).sqrt();
+        let slope = covariance[(0, 1)] / covariance[(1, 1)];
+        Some([-half, half].map(|change| (weight + change, lag + slope * change)))
+    }
+}
+
+/// Returns the residuals of a weak prior, m or rad. Production traces do not determine all parameters of the velocity loop
+/// and of the torque feedforward; the prior keeps them at usual values.
+fn prior(parameters: &[LoopParameter], values: &[f64], given_gain: f64) -> Vec<f64> {
+    let of = |parameter: LoopParameter| {
+        parameters.iter().position(|p| *p == parameter).and_then(|k| values.get(k)).copied()
+    };
+    let bandwidth = of(LoopParameter::Bandwidth).unwrap_or(BANDWIDTH);
+    let distance = |(parameter, &value): (&LoopParameter, &f64)| match parameter {
+        LoopParameter::Lag | LoopParameter::Beta => 0.0,
+        LoopParameter::Gamma => (value - of(LoopParameter::Beta).unwrap_or(value)) / 5e-3,
+        LoopParameter::Gain => (value / given_gain).ln() / 0.4,
+        LoopParameter::Bandwidth => (value / BANDWIDTH).ln() / 0.4,
+        LoopParameter::IntegralTime => (value * bandwidth / 1.5).ln() / 0.4,
+        LoopParameter::TorqueRatio => (value - 1.0) / 0.1,
+    };
+    parameters.iter().zip(values).map(|pair| PRIOR * distance(pair)).collect()
+}
+
+/// Returns the position cycle of the machine file if it divides the lag, else a shorter one.
+fn position_cycle(periods: &Periods, lag: f64) -> Nanoseconds {
+    let shorter =
+        CYCLES.iter().copied().filter(|cycle| *cycle < periods.position && *cycle % periods.velocity == 0);
+    let all: Vec<Nanoseconds> = std::iter::once(periods.position).chain(shorter).collect();
+    let divides = |cycle: &Nanoseconds| {
+        let tsp = seconds(*cycle);
+        (lag - (lag / tsp).round() * tsp).abs() <= GRID_TOLERANCE
+    };
+    let found = all.iter().copied().find(divides);
+    found.or(all.last().copied()).unwrap_or(periods.position)
+}
+
+fn nanoseconds(time: f64) -> Nanoseconds {
+    (time * SECOND_NS as f64).round() as Nanoseconds
+}

@@ -1,0 +1,113 @@
+//! Results that must not be used: implausibly far from the machine file, or worse than a constant lag.
+
+use super::delays::DelayParameter;
+use super::identification::Identification;
+use super::options::IdentificationInput;
+use crate::recording::Finding;
+use virtual_axes_core::config::AxisKind;
+use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, POSITION_GAIN, Rounded};
+
+/// Largest factor between an identified value and that of the machine file.
+const LARGEST_FACTOR: f64 = 3.0;
+/// Smallest R² of the current.
+const LEAST_DETERMINATION: f64 = 0.9;
+/// Position residual, m and rad, that is good enough whatever a constant lag leaves.
+const GOOD: f64 = 5e-6;
+const GOOD_ANGLE: f64 = 5e-3 * DEGREE;
+
+/// Adds findings of severity invalid.
+pub(super) fn report_invalid(inputs: &[IdentificationInput<'_>], found: &mut Identification) {
+    let (before, after) = (&found.initial, &found.axis);
+    let milliseconds = |delay: i64| delay as f64 / MILLISECOND_NS as f64;
+    let mut invalid = Vec::new();
+    let changes = [
+        (
+            "motor inertia",
+            before.motor.inertia,
+            after.motor.inertia,
+            "check torque constant, lead and units of the current",
+        ),
+        (
+            "position_loop.gain",
+            before.position_loop.gain / POSITION_GAIN,
+            after.position_loop.gain / POSITION_GAIN,
+            "check the servo gain and its unit, (m/min)/mm",
+        ),
+    ];
+    for (name, given, value, remedy) in changes {
+        if is_far(given, value) {
+            invalid.push(far(name, given, value, "", remedy));
+        }
+    }
+    for fit in &found.delays {
+        let (given, value) = (milliseconds(fit.delay.of(&before.delays)), milliseconds(fit.value));
+        let (name, remedy) =
+            (fit.delay.name(), "check that the recorded setpoint is that at the position controller");
+        if !is_far(given, value) || given == 0.0 {
+            continue;
+        }
+        // β and γ can be short, and a machine file often has values of another machine.
+        match fit.delay {
+            DelayParameter::Alpha => invalid.push(far(name, given, value, " ms", remedy)),
+            _ => invalid.push(Finding {
+                severity: crate::recording::Severity::Warning,
+                ..far(name, given, value, " ms", remedy)
+            }),
+        }
+    }
+    let good = match after.kind() {
+        AxisKind::Linear => GOOD,
+        AxisKind::Rotary => GOOD_ANGLE,
+    };
+    for (input, agreement) in inputs.iter().zip(&found.agreements) {
+        let name = &input.signals.name;
+        if let Some(baseline) = agreement.baseline.filter(|b| b.model > b.delayed && b.model > good) {
+            invalid.push(Finding::invalid(
+                "worse-than-lag",
+                format!(
+                    "{name}: the simulated position deviates by {} RMS, PSEC delayed by {:.2} ms by {} only",
+                    Rounded(baseline.model),
+                    baseline.lag * 1e3,
+                    Rounded(baseline.delayed)
+                ),
+                "check lead, gains and periods of the machine file, and the active feedforward",
+            ));
+        }
+        let inverse = agreement.inverse.as_ref().map(|inverse| inverse.r_squared);
+        let best = inverse.into_iter().chain(agreement.current_r_squared()).reduce(f64::max);
+        if let Some(r2) = best.filter(|r2| *r2 < LEAST_DETERMINATION) {
+            invalid.push(Finding::invalid(
+                "poor-current",
+                format!("{name}: the model explains {} of the current", explained(r2)),
+                "check units, torque constant and transmission; record without cutting forces",
+            ));
+        }
+    }
+    found.findings.extend(invalid);
+}
+
+fn is_far(given: f64, value: f64) -> bool {
+    let factor = value / given;
+    !(1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&factor)
+}
+
+fn far(name: &str, given: f64, value: f64, unit: &str, remedy: &str) -> Finding {
+    Finding::invalid(
+        "implausible",
+        format!(
+            "{name}: {}{unit} of the machine file became {}{unit}, by more than a factor of {LARGEST_FACTOR}",
+            Rounded(given),
+            Rounded(value)
+        ),
+        remedy,
+    )
+}
+
+/// Returns the explained part of a variance in words; a model worse than the mean explains nothing.
+pub(super) fn explained(r_squared: f64) -> String {
+    if r_squared > 0.0 {
+        format!("{:.1} %", 100.0 * r_squared)
+    } else {
+        "nothing (R² is negative)".to_owned()
+    }
+}

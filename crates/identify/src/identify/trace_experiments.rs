@@ -1,0 +1,71 @@
+//! Experiments from recordings that are sampled more coarsely than the position cycle.
+
+use super::closed_loop::Experiment;
+use super::feedforward_mode::FeedforwardMode;
+use super::resample::CubicSpline;
+use crate::recording::Signals;
+use virtual_axes_core::config::Periods;
+use virtual_axes_core::units::seconds;
+
+/// Duration of the acceleration from rest to the velocity at the first sample, s.
+const RUN_UP: f64 = 0.5;
+/// Rest before the run-up, s.
+const REST: f64 = 0.1;
+/// Time after the first sample until the simulation has settled, s.
+const SETTLING: f64 = 0.3;
+/// Shortest span that is simulated, s.
+const SHORTEST: f64 = 1.0;
+
+/// Returns the spans of a recording as experiments with PSEC interpolated at the position cycles, `shift` s later than
+/// recorded.
+///
+/// A span can begin in motion, after a gap for instance: the simulation accelerates from rest to its first velocity, and
+/// the samples until it has settled are left out.
+pub(super) fn trace_experiments(
+    signals: &Signals,
+    recording: usize,
+    periods: &Periods,
+    mode: FeedforwardMode,
+    shift: f64,
+) -> Vec<Experiment> {
+    let (tsp, period) = (seconds(periods.position), signals.period);
+    let skipped = (SETTLING / period).ceil() as usize;
+    let before = ((RUN_UP + REST) / tsp).ceil() * tsp;
+    let mut found = Vec::new();
+    for (number, span) in signals.spans.iter().enumerate() {
+        let Some(recorded) = &span.psec else { continue };
+        if (span.position.len() as f64) * period < SHORTEST {
+            continue;
+        }
+        let spline = CubicSpline::new(recorded, period);
+        let [start, velocity, _] = spline.at(0.0);
+        let end = before + (recorded.len() - 1) as f64 * period;
+        let cycles = (end / tsp).ceil() as usize + 1;
+        let setpoint = |k: usize| {
+            let t = k as f64 * tsp - before - shift;
+            if t >= 0.0 { spline.at(t)[0] } else { start - velocity * RUN_UP * run_up(t / RUN_UP + 1.0) }
+        };
+        let of = |channel: &[f64]| channel.get(skipped..).unwrap_or_default().to_vec();
+        found.push(Experiment {
+            recording,
+            span: number,
+            sample: skipped,
+            mode,
+            psec: (0..cycles).map(setpoint).collect(),
+            first: before + skipped as f64 * period,
+            period,
+            trace_filter: signals.trace_filter,
+            start: span.start + skipped as f64 * period,
+            position: of(&span.position),
+            velocity: of(span.recorded_velocity.as_ref().unwrap_or(&span.velocity)),
+            current: span.current.as_deref().map(of),
+        });
+    }
+    found
+}
+
+/// Returns the distance to the end of a run-up of duration 1 to velocity 1, whose velocity is 3u² − 2u³.
+fn run_up(u: f64) -> f64 {
+    let u = u.max(0.0);
+    0.5 - u.powi(3) + 0.5 * u.powi(4)
+}

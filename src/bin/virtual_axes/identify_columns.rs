@@ -1,0 +1,168 @@
+//! Columns of recordings: what `virtual_axes identify` finds without an axis.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::text::escaped;
+use virtual_axes_io::files::{Channel, RecordingColumns, RecordingFormat, inspect_recording};
+use virtual_axes_report::{Table, TableColumn};
+
+use crate::recordings::RecordingArguments;
+use crate::text_table;
+
+/// Returns the columns of the recordings, what they are taken for, what is missing, and the next command.
+pub fn listing(
+    recordings: &[PathBuf],
+    reading: &RecordingArguments,
+    config: &MachineConfig,
+    machine: &str,
+) -> Result<String, Box<dyn Error>> {
+    let options = reading.options()?;
+    let mut text = String::new();
+    let mut axes: Vec<usize> = Vec::new();
+    for path in recordings {
+        let found = inspect_recording(path, &options)?;
+        text += &format!("{}: {}\n\n", escaped(&path.display().to_string()), found.format);
+        text += &text_table::aligned(&table(&found), &[0, 1, 2, 3, 4]);
+        text.push('\n');
+        for line in missing(&found) {
+            text += &text_table::wrapped_line(&line);
+        }
+        axes.extend(axes_of(&found, config));
+    }
+    axes.sort_unstable();
+    axes.dedup();
+    let names: Vec<&str> =
+        axes.iter().filter_map(|index| config.axes().get(*index)).map(|axis| axis.name()).collect();
+    let assumed = "assumed without other information: all values of the machine file, recordings without cutting, and the \
+                   feedforward that the lag of the position shows";
+    text += &text_table::wrapped_line(assumed);
+    let files: Vec<String> = recordings.iter().map(|path| path.display().to_string()).collect();
+    let name = match names.as_slice() {
+        [] => "NAME".to_owned(),
+        [one] => (*one).to_owned(),
+        _ => "all".to_owned(),
+    };
+    if names.is_empty() {
+        let known: Vec<&str> = config.axes().iter().map(|axis| axis.name()).collect();
+        text += &text_table::wrapped_line(&format!(
+            "no column belongs to an axis of the machine ({}): name the axis with --axis, and its columns in the file with \
+             --joint or --column",
+            known.join(", ")
+        ));
+    }
+    text += &format!(
+        "next: virtual_axes identify {} --axis {name} --machine {machine} --out identified.yaml\n",
+        escaped(&files.join(" "))
+    );
+    if names.len() > 1 {
+        text += &format!("or one axis: --axis {}\n", names.join(", --axis "));
+    }
+    Ok(text)
+}
+
+/// Returns the axes of the machine that the recordings contain.
+///
+/// # Errors
+/// Returns an error if a recording cannot be read, or contains no axis of the machine.
+pub fn recorded_axes(
+    recordings: &[PathBuf],
+    reading: &RecordingArguments,
+    config: &MachineConfig,
+) -> Result<Vec<usize>, Box<dyn Error>> {
+    let options = reading.options()?;
+    let mut common: Option<Vec<usize>> = None;
+    for path in recordings {
+        let found = inspect_recording(path, &options)?;
+        if found.format == RecordingFormat::Mcap {
+            return Err(format!(
+                "{}: --axis all requires columns; give the name of the axis",
+                path.display()
+            )
+            .into());
+        }
+        let axes = axes_of(&found, config);
+        if axes.is_empty() {
+            let known: Vec<&str> = config.axes().iter().map(|axis| axis.name()).collect();
+            let present = found.readable_axes().join(", ");
+            return Err(format!(
+                "{}: --axis all: no axis of the machine ({}) among those of the file ({present})",
+                path.display(),
+                known.join(", ")
+            )
+            .into());
+        }
+        common = Some(match common {
+            Some(known) => known.into_iter().filter(|axis| axes.contains(axis)).collect(),
+            None => axes,
+        });
+    }
+    Ok(common.unwrap_or_default())
+}
+
+/// Returns the indices of the axes of the machine whose position the file has.
+fn axes_of(found: &RecordingColumns, config: &MachineConfig) -> Vec<usize> {
+    let readable = found.readable_axes();
+    let is_readable =
+        |name: &str| found.axis_of(name).is_some_and(|axis| readable.iter().any(|known| known == axis));
+    config
+        .axes()
+        .iter()
+        .enumerate()
+        .filter(|(_, axis)| is_readable(axis.name()))
+        .map(|(index, _)| index)
+        .collect()
+}
+
+/// Returns what a recording lacks, one line each.
+fn missing(found: &RecordingColumns) -> Vec<String> {
+    let has = |channel: Channel| found.columns.iter().any(|column| column.channel == Some(channel));
+    let mut lines = Vec::new();
+    if found.format == RecordingFormat::Mcap {
+        return vec!["the messages are read with the name of the axis".to_owned()];
+    }
+    if !found.has_time() {
+        lines.push("missing: time; give the sampling rate with --rate-hz".to_owned());
+    }
+    for (channel, name, effect) in [
+        (Channel::Position, "actual position", "without it nothing is identified"),
+        (
+            Channel::Psec,
+            "commanded position",
+            "without it there are no delays, gains and feedforward weights",
+        ),
+        (Channel::Current, "motor current", "without it there are no friction, gravity and inertia"),
+    ] {
+        if !has(channel) {
+            lines.push(format!("missing: {name}; {effect}; name its column with --column"));
+        }
+    }
+    let assumed =
+        found.columns.iter().filter(|column| column.unit.as_ref().is_some_and(|unit| unit.is_assumed()));
+    let assumed: Vec<&str> = assumed.map(|column| column.header.as_str()).collect();
+    if !assumed.is_empty() {
+        lines.push(format!("without a unit, SI is assumed: {}", escaped(&assumed.join(", "))));
+    }
+    if let Some(line) = found.header_line {
+        lines.push(format!(
+            "the header is in line {line}: give --column skip_lines={}",
+            line.saturating_sub(1)
+        ));
+    }
+    lines
+}
+
+fn table(found: &RecordingColumns) -> Table {
+    let columns = ["column", "taken for", "axis", "unit", "because"].map(|name| TableColumn::new(name, ""));
+    let rows = found.columns.iter().map(|column| {
+        vec![
+            format!("#{} {}", column.number, escaped(&column.header)),
+            column.channel.map_or("–".to_owned(), |channel| channel.name().to_owned()),
+            escaped(column.axis.as_deref().unwrap_or("")),
+            column.unit.as_ref().map_or(String::new(), ToString::to_string),
+            escaped(&column.reason),
+        ]
+    });
+    Table { columns: columns.to_vec(), rows: rows.collect(), ..Table::default() }
+}
