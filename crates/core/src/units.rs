@@ -57,6 +57,28 @@ impl fmt::Display for Rounded {
     }
 }
 
+/// Returns a position for messages, in SI units and in those of a machine file: `0.36 m (360 mm)`, `1 rad (57.2958°)`.
+/// `unit` is m or rad.
+pub fn position_text(value: f64, unit: &str) -> String {
+    match unit {
+        "m" => format!("{} m ({} mm)", Rounded(value), Rounded(value / MILLIMETER)),
+        _ => format!("{} {unit} ({}°)", Rounded(value), Rounded(value / DEGREE)),
+    }
+}
+
+/// Returns a speed for messages, in SI units and in those of a machine file: `0.5 m/s (30 m/min)`. `unit` is m or rad.
+pub fn speed_text(value: f64, unit: &str) -> String {
+    match unit {
+        "m" => format!("{} m/s ({} m/min)", Rounded(value), Rounded(value / METER_PER_MINUTE)),
+        _ => format!("{} {unit}/s ({} rpm)", Rounded(value), Rounded(value / RPM)),
+    }
+}
+
+/// Returns the key of the velocity limit of an axis with positions in `unit`, m or rad.
+pub fn velocity_limit_key(unit: &str) -> &'static str {
+    if unit == "m" { "limits.velocity_m_min" } else { "limits.velocity_rpm" }
+}
+
 /// Converts nanoseconds to seconds.
 pub fn seconds(ns: Nanoseconds) -> f64 {
     ns as f64 / SECOND_NS as f64

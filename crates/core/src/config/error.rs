@@ -97,7 +97,7 @@ pub enum ConfigError {
         reason: String,
     },
     /// Assignment without `=`.
-    #[error("{at}: expected KEY=VALUE, found {text}")]
+    #[error("{at}: expected KEY=VALUE, found {text}{}", part_hint(.text))]
     NotAnAssignment {
         /// Position.
         at: ValueSource,
@@ -145,7 +145,7 @@ pub enum ConfigError {
         wanted: String,
     },
     /// Value of the wrong type.
-    #[error("{at}: {key}: found {found}, expected {wanted}")]
+    #[error("{at}: {key}: found {found}, expected {wanted}{}", number_hint(.found, .wanted, .at))]
     WrongType {
         /// Position.
         at: ValueSource,
@@ -168,4 +168,27 @@ pub enum ConfigError {
         /// Requirement, a verb phrase after "must".
         allowed: String,
     },
+}
+
+/// Returns the remedy for a text in place of a number: several parameters in one option, or a decimal comma.
+fn number_hint(found: &str, wanted: &str, at: &ValueSource) -> String {
+    let text = found.trim_start_matches("text ").trim_matches('"');
+    match text.split_once(',') {
+        Some((_, rest)) if wanted == "number" && rest.contains('=') => {
+            format!("; repeat {at} for each parameter")
+        }
+        Some((whole, decimals)) if wanted == "number" && is_number(whole) && is_number(decimals) => {
+            "; the decimal separator is a point".to_owned()
+        }
+        _ => String::new(),
+    }
+}
+
+/// Returns the remedy for a number in place of an assignment: the decimals after a comma.
+fn part_hint(text: &str) -> &'static str {
+    if is_number(text) { "; the decimal separator is a point" } else { "" }
+}
+
+fn is_number(text: &str) -> bool {
+    text.trim().parse::<f64>().is_ok()
 }

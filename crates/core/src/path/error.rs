@@ -4,7 +4,7 @@ use std::fmt;
 
 use thiserror::Error;
 
-use crate::units::Rounded;
+use crate::units::{Rounded, speed_text, velocity_limit_key};
 
 /// A derivative of the setpoint with a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -192,9 +192,10 @@ pub enum PlanError {
     },
     /// Move with a cosine profile, which is not adapted, that exceeds Vmax of a joint.
     #[error(
-        "move {index}: {joint} reaches {} {unit}/s; its largest speed is {} {unit}/s",
-        Rounded(*found),
-        Rounded(*allowed)
+        "move {index}: {joint} reaches {}; {} is {}; reduce the feed",
+        speed_text(*found, unit),
+        velocity_limit_key(unit),
+        speed_text(*allowed, unit)
     )]
     TooFast {
         /// Move, counted from 1.

@@ -147,16 +147,18 @@ fn check_cosines(path: &Path, moves: &[MoveParameters], limits: &[JointLimits]) 
             continue;
         }
         let samples = sample_block(&mut JointCurve::new(path, block));
-        for row in samples.all().chunks_exact(limits.len()) {
-            for (slopes, joint) in row.iter().zip(limits) {
-                let (found, allowed) = (slopes[0] * parameters.feed, joint.limits.velocity);
-                // The comparison treats NaN as too fast.
-                let within = found <= allowed * (1.0 + SPEED_TOLERANCE);
-                if !within {
-                    let (unit, joint) = (joint.unit(), joint.name.clone());
-                    return Err(PlanError::TooFast { index: block + 1, joint, unit, found, allowed });
-                }
-            }
+        let rows = samples.all().chunks_exact(limits.len());
+        let speeds = rows.flat_map(|row| row.iter().zip(limits)).map(|(slopes, joint)| {
+            let (found, allowed) = (slopes[0] * parameters.feed, joint.limits.velocity);
+            (found / allowed, found, joint)
+        });
+        // In this order, and in the comparison, NaN is the largest ratio.
+        let Some((ratio, found, joint)) = speeds.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+        let within = ratio <= 1.0 + SPEED_TOLERANCE;
+        if !within {
+            let (unit, allowed) = (joint.unit(), joint.limits.velocity);
+            let joint = joint.name.clone();
+            return Err(PlanError::TooFast { index: block + 1, joint, unit, found, allowed });
         }
     }
     Ok(())

@@ -213,7 +213,7 @@ impl ProgramBuilder<'_> {
         // The order of the coordinates is that of the machine, not that of the file.
         center.sort_by_key(|&(index, _)| index);
         let [(first, u), (second, v)] = center[..] else {
-            let reason = format!("center has {} coordinates, must have two", center.len());
+            let reason = format!("center must have two coordinates, found {}", center.len());
             return Err(ScenarioError::Move { at: at.to_owned(), reason });
         };
         if let Some(&index) = [first, second].iter().find(|&&index| self.kinds[index] == AxisKind::Rotary) {

@@ -9,7 +9,7 @@ use crate::units::Rounded;
 #[non_exhaustive]
 pub enum ScenarioError {
     /// Neither a built-in scenario nor a readable file.
-    #[error("{name}: {reason}{}; built-in scenarios: {known}", nearest_hint(.nearest))]
+    #[error("{name}: {reason}{}{}", nearest_hint(.nearest), known_hint(.known))]
     Unknown {
         /// Requested name or path.
         name: String,
@@ -17,7 +17,7 @@ pub enum ScenarioError {
         reason: String,
         /// Most similar built-in scenario.
         nearest: Option<String>,
-        /// Names of the built-in scenarios, separated by commas.
+        /// Names of the built-in scenarios, separated by commas; empty for the name of a file.
         known: String,
     },
     /// Invalid YAML, an unknown key, or a value of the wrong type.
@@ -84,4 +84,9 @@ pub enum ScenarioError {
         /// Reason.
         error: PlanError,
     },
+}
+
+/// Returns the list of built-in scenarios for a message; empty if `known` is.
+fn known_hint(known: &str) -> String {
+    if known.is_empty() { String::new() } else { format!("; built-in scenarios: {known}") }
 }

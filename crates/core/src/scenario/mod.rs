@@ -152,11 +152,29 @@ fn neighbors(name: &str) -> Vec<String> {
     files.map(|entry| parent.join(entry.file_name()).to_string_lossy().into_owned()).collect()
 }
 
+/// Returns true if a name has the extension of a file, as no built-in name has.
+pub fn is_file_name(name: &str) -> bool {
+    FilePath::new(name).extension().is_some()
+}
+
+/// Returns the file beside `name` that differs only in its extension, or the most similar name among these files and
+/// `builtin`.
+pub fn nearest_input<'a>(name: &str, builtin: impl Iterator<Item = &'a str>) -> Option<String> {
+    let files = neighbors(name);
+    let stem = FilePath::new(name).file_stem();
+    let same = files.iter().find(|file| FilePath::new(file).file_stem() == stem);
+    same.cloned().or_else(|| nearest_name(name, builtin.map(str::to_owned).chain(files.iter().cloned())))
+}
+
 fn unknown(name: &str, reason: &str) -> ScenarioError {
     ScenarioError::Unknown {
         name: name.to_owned(),
         reason: reason.to_owned(),
-        nearest: nearest_name(name, Scenario::builtin_names().map(str::to_owned).chain(neighbors(name))),
-        known: Scenario::builtin_names().collect::<Vec<_>>().join(", "),
+        nearest: nearest_input(name, Scenario::builtin_names()),
+        known: if is_file_name(name) {
+            String::new()
+        } else {
+            Scenario::builtin_names().collect::<Vec<_>>().join(", ")
+        },
     }
 }

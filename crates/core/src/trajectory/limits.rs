@@ -2,7 +2,7 @@
 
 use super::rejection::{Rejection, RejectionCode};
 use crate::config::{AxisConfig, AxisKind, LimitsConfig};
-use crate::units::Rounded;
+use crate::units::{Rounded, position_text, speed_text, velocity_limit_key};
 
 /// Relative tolerance of speed checks, for the rounding of setpoints exactly at the limit.
 pub const SPEED_TOLERANCE: f64 = 1e-9;
@@ -53,11 +53,11 @@ impl JointLimits {
         Err(Rejection::new(
             RejectionCode::OutsideTravelLimits,
             format!(
-                "{}, point {index}: position {} {unit} is outside the travel limits [{}, {}] {unit}",
+                "{}, point {index}: position {} is outside the travel limits, {} to {}",
                 self.name,
-                Rounded(position),
-                Rounded(min),
-                Rounded(max)
+                position_text(position, unit),
+                position_text(min, unit),
+                position_text(max, unit)
             ),
         )
         .joint(&self.name)
@@ -91,10 +91,11 @@ impl JointLimits {
         Err(Rejection::new(
             RejectionCode::Speed,
             format!(
-                "{}, point {index}: {what} {} {unit}/s exceeds the limit {} {unit}/s",
+                "{}, point {index}: {what} {} exceeds {}, {}",
                 self.name,
-                Rounded(speed),
-                Rounded(limit)
+                speed_text(speed, unit),
+                velocity_limit_key(unit),
+                speed_text(limit, unit)
             ),
         )
         .joint(&self.name)

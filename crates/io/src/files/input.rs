@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::lines::fields;
-use super::psec_error::TIME;
+use super::psec_error::{TIME, header_unit_hint};
 use virtual_axes_core::text::shortened;
 use virtual_axes_core::yaml;
 
@@ -64,12 +64,14 @@ pub enum InputError {
         found: String,
     },
     /// The content is not valid YAML.
-    #[error("{at}: not YAML: {reason}; {KNOWN}")]
+    #[error("{at}: not YAML: {reason}{}", if *.is_first_line { format!("; {KNOWN}") } else { String::new() })]
     Syntax {
         /// File and line.
         at: String,
         /// Error message of the YAML parser.
         reason: String,
+        /// True if not even the first line is YAML, or the line is unknown.
+        is_first_line: bool,
     },
 }
 
@@ -156,8 +158,11 @@ fn kind_from_yaml(bytes: &[u8], name: &str) -> Result<FileKind, InputError> {
     let Ok(text) = str::from_utf8(bytes) else {
         return Err(unknown("the file is not UTF-8 text".to_owned()));
     };
-    let documents: Vec<YamlOutline> = yaml::documents(text)
-        .map_err(|error| InputError::Syntax { at: error.position(name), reason: error.reason })?;
+    let documents: Vec<YamlOutline> = yaml::documents(text).map_err(|error| InputError::Syntax {
+        at: error.position(name),
+        is_first_line: error.line <= 1,
+        reason: error.reason,
+    })?;
     let first = documents.first();
     if let Some(kind) = first.and_then(YamlOutline::kind) {
         return Ok(kind);
@@ -170,18 +175,26 @@ fn kind_from_yaml(bytes: &[u8], name: &str) -> Result<FileKind, InputError> {
         }
         Some(YamlOutline::Other) => {
             let line = first_line(text);
-            format!("the first line is \"{}\"{}", shortened(line), separator_hint(line))
+            format!("the first line is \"{}\"{}", shortened(line), header_hint(line))
         }
     }))
 }
 
-/// Returns the cause of a header whose columns are separated by another character than a comma; else an empty text.
-fn separator_hint(line: &str) -> String {
+/// Returns the cause of a header with units, in capital letters, or whose columns are separated by another character
+/// than a comma; else an empty text.
+fn header_hint(line: &str) -> String {
+    let first = fields(line).next().unwrap_or_default();
+    if line.contains(',') && first.eq_ignore_ascii_case(TIME) {
+        return "; names are in lower case, as in `time,x`".to_owned();
+    }
+    if line.contains(',') && first.to_ascii_lowercase().starts_with(TIME) {
+        return header_unit_hint(first).to_owned();
+    }
     let Some(separator) = line.strip_prefix(TIME).and_then(|rest| rest.chars().next()) else {
         return String::new();
     };
     match separator {
-        ';' => "; columns must be separated by commas, not by semicolons".to_owned(),
+        _ if line.contains(';') => "; columns must be separated by commas, not by semicolons".to_owned(),
         '\t' | ' ' => "; columns must be separated by commas, not by tabs or spaces".to_owned(),
         _ => String::new(),
     }

@@ -301,7 +301,11 @@ impl<R: Read> PsecCsvReader<R> {
                     at,
                     found: super::shortened(column),
                     known: names.clone().collect::<Vec<_>>().join(", "),
-                    nearest: nearest_name(column, names),
+                    nearest: names
+                        .clone()
+                        .find(|name| name.eq_ignore_ascii_case(column))
+                        .map(str::to_owned)
+                        .or_else(|| nearest_name(column, names)),
                 });
             };
             if self.joint_indices.contains(&index) {
@@ -329,7 +333,7 @@ impl<R: Read> PsecCsvReader<R> {
         after.positions.extend(values.by_ref().take(columns.len()));
         let found = 1 + after.positions.len() + values.count();
         if found != wanted {
-            return Err(PsecError::Columns { at: at(), found, wanted });
+            return Err(PsecError::Columns { at: at(), found, wanted, has_semicolon: text.contains(';') });
         }
         let number_error = |column: usize| {
             let name = column.checked_sub(1).and_then(|column| columns.get(column));

@@ -29,7 +29,7 @@ pub enum PsecError {
         found: String,
     },
     /// A column header is not a joint name.
-    #[error("{at}: there is no joint \"{found}\"; there are {known}{}", nearest_hint(.nearest))]
+    #[error("{at}: there is no joint \"{found}\"; there are {known}{}{}", nearest_hint(.nearest), header_unit_hint(.found))]
     UnknownJoint {
         /// File and line.
         at: String,
@@ -49,7 +49,7 @@ pub enum PsecError {
         joint: String,
     },
     /// A line has too many or too few values.
-    #[error("{at}: {found} values, the header names {wanted} columns")]
+    #[error("{at}: {found} values, the header names {wanted} columns{}", separator_hint(*.found, *.wanted, *.has_semicolon))]
     Columns {
         /// File and line.
         at: String,
@@ -57,6 +57,8 @@ pub enum PsecError {
         found: usize,
         /// Number of columns in the header.
         wanted: usize,
+        /// True if the line contains a semicolon.
+        has_semicolon: bool,
     },
     /// A field is not a number.
     #[error("{at}: {column} is \"{found}\", must be a finite number")]
@@ -112,6 +114,26 @@ fn unit_hint(rejection: &Rejection) -> &'static str {
     );
     if is_limit && rejection.value.abs() > DOUBTFUL_RATIO * rejection.limit.abs() {
         "; positions are in m or rad: are these in mm or degrees?"
+    } else {
+        ""
+    }
+}
+
+/// Returns the remedy for a unit in the header of a column.
+pub(super) fn header_unit_hint(header: &str) -> &'static str {
+    if header.contains(['[', '(']) {
+        "; the header has no units: the time is in s, positions are in m or rad"
+    } else {
+        ""
+    }
+}
+
+/// Returns the probable cause of a wrong number of values: another separator, or decimal commas.
+fn separator_hint(found: usize, wanted: usize, has_semicolon: bool) -> &'static str {
+    if has_semicolon {
+        "; columns must be separated by commas, not by semicolons, and decimals by a point"
+    } else if 2 * found >= 3 * wanted {
+        "; decimals must be separated by a point, not by a comma"
     } else {
         ""
     }

@@ -188,7 +188,10 @@ fn errors_name_file_line_and_column() {
     assert_eq!(error("time,x\n0,0\n0.006,\n"), "p.csv:3: x is \"\", must be a finite number");
     assert_eq!(error("time,x\n0,0\nnow,0\n"), "p.csv:3: time is \"now\", must be a finite number");
     assert_eq!(error("time,x,y\n0,0,0\n\n0.006,0\n"), "p.csv:4: 2 values, the header names 3 columns");
-    assert_eq!(error("time,x\n0,0\n0,006,0\n"), "p.csv:3: 3 values, the header names 2 columns");
+    assert_eq!(
+        error("time,x\n0,0\n0,006,0\n"),
+        "p.csv:3: 3 values, the header names 2 columns; decimals must be separated by a point, not by a comma"
+    );
     assert_eq!(error("time,x\n-0.1,0\n"), "p.csv:2: time is -0.1 s, must lie in 0 … 100000000 s");
     assert_eq!(error("time,x\n0,0\n2e8,1\n"), "p.csv:3: time is 200000000 s, must lie in 0 … 100000000 s");
     assert_eq!(
@@ -197,7 +200,7 @@ fn errors_name_file_line_and_column() {
     );
     assert_eq!(
         error("time,x\n0,0\n1,0.36\n"),
-        "p.csv:3: x, point 1: position 0.36 m is outside the travel limits [-0.355, 0.355] m"
+        "p.csv:3: x, point 1: position 0.36 m (360 mm) is outside the travel limits, -0.355 m (-355 mm) to 0.355 m (355 mm)"
     );
 }
 
@@ -215,7 +218,7 @@ fn a_speed_error_names_the_row_at_the_end_of_the_segment() {
     // Vmax is 0.5 m/s, 3 mm in a period.
     let message = error("time,x\n0,0\n0.006,0.001\n0.012,0.005\n0.018,0.005\n");
     assert!(message.starts_with("p.csv:4: x, point 2: speed 0.66"), "{message}");
-    assert!(message.ends_with("m/s exceeds the limit 0.5 m/s"), "{message}");
+    assert!(message.ends_with(" exceeds limits.velocity_m_min, 0.5 m/s (30 m/min)"), "{message}");
     let message = error("time,x\n0,0\n0.003,0.001\n0.011,0.009\n0.1,0.005\n");
     assert!(message.starts_with("p.csv:4: x, point 2: speed "), "{message}");
     let message = error("time,x\n0.012,0.1\n");
