@@ -5,6 +5,7 @@ mod command_campaign;
 mod command_common;
 mod command_design;
 mod files_output;
+mod hints;
 mod identify_command;
 mod ingress_properties;
 mod interface;

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
 use virtual_axes_core::machine::MachineParameters;
-use virtual_axes_core::scenario::Scenario;
-use virtual_axes_core::text::{escaped, nearest_hint, nearest_name};
+use virtual_axes_core::scenario::{Scenario, is_file_name, nearest_input};
+use virtual_axes_core::text::{escaped, nearest_hint};
 use virtual_axes_core::trial::{Tick, Trial};
 use virtual_axes_io::files::{self, FileKind};
 
@@ -88,12 +88,18 @@ fn is_shipped_machine(name: &str) -> Result<bool, String> {
     let machine = machines.contains(&name);
     match machine || scenarios.contains(&name) {
         true => Ok(machine),
-        false => Err(format!(
-            "{name}: no such file, no built-in machine ({}) and no built-in scenario ({}){}",
-            machines.join(", "),
-            scenarios.join(", "),
-            nearest_hint(&nearest_name(name, machines.iter().chain(&scenarios)))
-        )),
+        false => {
+            let known = match is_file_name(name) {
+                true => String::new(),
+                false => format!(
+                    ", no built-in machine ({}) and no built-in scenario ({})",
+                    machines.join(", "),
+                    scenarios.join(", ")
+                ),
+            };
+            let nearest = nearest_input(name, machines.into_iter().chain(scenarios));
+            Err(format!("{name}: no such file{known}{}", nearest_hint(&nearest)))
+        }
     }
 }
 

@@ -14,12 +14,17 @@ use crate::input::CommandInput;
 use crate::variant::VariantRun;
 use crate::{table, verdict};
 
-/// Rejects a file name with an extension other than `.html` or `.htm`. Devices and pipes have no extension.
+/// Rejects a file name with another extension than `.html` or `.htm`. Devices and pipes have no extension.
 pub fn check_name(path: &Path) -> Result<(), String> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let is_stream = || {
+        path.starts_with("/dev")
+            || std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+    };
     match extension.as_deref() {
-        None | Some("html" | "htm") => Ok(()),
-        Some(_) => Err(format!("{}: a report is HTML; its extension must be .html or .htm", path.display())),
+        Some("html" | "htm") => Ok(()),
+        None if is_stream() => Ok(()),
+        _ => Err(format!("{}: a report is HTML; its extension must be .html or .htm", path.display())),
     }
 }
 

@@ -49,7 +49,7 @@ pub fn columns(first: &str, cost: &Cost, figures: &Figures) -> Vec<TableColumn> 
         ("phase margin", "°"),
         ("peak current", "of limit"),
         ("activity", "A"),
-        ("saturated", "s"),
+        ("time at a limit", "s"),
     ];
     columns.map(|(name, unit)| TableColumn::new(name, unit)).to_vec()
 }

@@ -40,7 +40,7 @@ pub fn axes(figures: &Figures) -> Table {
         ("delay-compensated max", ""),
         ("RMS", ""),
         ("peak current of limit", "A"),
-        ("saturated", "s"),
+        ("time at a limit", "s"),
         ("activity", "A"),
     ];
     let mut table = table("Axes", &columns);

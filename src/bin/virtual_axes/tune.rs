@@ -286,7 +286,10 @@ fn record(
         let outcome = problem.record_on(workload, tuning)?;
         Ok(VariantRun {
             controller,
-            changes: vec![tuning.to_string()],
+            changes: vec![match tuning {
+                Tuning::Present => "initial".to_owned(),
+                tuning => tuning.to_string(),
+            }],
             shared_changes: 0,
             machine: tuning.apply(problem.parameters(), problem.joints())?.machine_config()?,
             input_warnings: Vec::new(),

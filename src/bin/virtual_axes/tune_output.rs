@@ -113,10 +113,11 @@ pub fn text(problem: &TuningProblem<'_>, found: &TuningResult, warning: Option<&
 
 /// Creates the table of tuned parameters with initial and tuned values.
 fn values(problem: &TuningProblem<'_>, tuning: &Tuning) -> Table {
-    let columns = ["parameter", "initial", "tuned"].map(|name| TableColumn::new(name, ""));
+    let columns = ["parameter", "initial", "tuned", "unit"].map(|name| TableColumn::new(name, ""));
     let row = |(key, value): (String, virtual_axes_core::config::Value)| {
         let before = problem.parameters().get(&key).map_or("–".to_owned(), |value| value.to_string());
-        vec![key, before, value.to_string()]
+        let unit = problem.parameters().definition(&key).map_or("", |definition| definition.unit);
+        vec![key, before, value.to_string(), unit.to_owned()]
     };
     let values = tuning.values(problem.joints(), problem.parameters());
     Table { columns: columns.to_vec(), rows: values.into_iter().map(row).collect(), ..Table::default() }
@@ -153,13 +154,13 @@ fn elsewhere(problem: &TuningProblem<'_>, found: &TuningResult) -> Table {
             std::cmp::Ordering::Equal => "equal",
             std::cmp::Ordering::Greater => "worse",
         };
-        let saturates = if tuned.is_saturated { ", saturates" } else { "" };
+        let at_limit = if tuned.is_saturated { ", reaches a limit" } else { "" };
         vec![
             name.to_owned(),
             format!("{:.2}", present.cost),
             format!("{:.2}", tuned.cost),
             problem.cost().unit(&present.figures).to_owned(),
-            format!("{verdict}{saturates}"),
+            format!("{verdict}{at_limit}"),
         ]
     };
     let first = row(problem.workload().name(), problem.present(), &found.best);
