@@ -62,7 +62,7 @@ fn a_syntax_error_of_yaml_has_no_list_of_formats() {
     let file = folder.file("a.yaml", "moves:\n- {x: 1}\nmoves: 2\n");
     let output = run(&["check", file.to_str().expect("UTF-8")]);
     let message = String::from_utf8_lossy(&output.stderr);
-    assert!(message.ends_with("a.yaml:3: not YAML: duplicate key moves\n"), "{message}");
+    assert!(message.ends_with("a.yaml:3: invalid YAML: duplicate key moves\n"), "{message}");
 }
 
 #[test]

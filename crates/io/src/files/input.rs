@@ -64,7 +64,7 @@ pub enum InputError {
         found: String,
     },
     /// The content is not valid YAML.
-    #[error("{at}: not YAML: {reason}{}", if *.is_first_line { format!("; {KNOWN}") } else { String::new() })]
+    #[error("{at}: invalid YAML: {reason}{}", if *.is_first_line { format!("; {KNOWN}") } else { String::new() })]
     Syntax {
         /// File and line.
         at: String,

@@ -183,7 +183,7 @@ fn errors_of_unknown_files_list_the_supported_kinds() {
         (b"foo: 1\nbar: [2]\n", "f: the file is a mapping with keys foo, bar; supported are"),
         (b"- 1\n", "f: the first line is \"- 1\"; supported are"),
         (b"\x89PNG\r\n\x1a\n\0\0\0", "f: the file is not UTF-8 text; supported are"),
-        (b"moves: {x: 1\n", "f:1: not YAML: "),
+        (b"moves: {x: 1\n", "f:1: invalid YAML: "),
     ] {
         let path = folder.file("f", bytes);
         let message = Input::open(&path).expect_err("must be rejected").to_string();
@@ -193,7 +193,7 @@ fn errors_of_unknown_files_list_the_supported_kinds() {
     }
     let path = folder.file("f", b"moves:\n- {x: 1\n- y\n");
     let message = Input::open(&path).expect_err("must be rejected").to_string();
-    assert!(message.contains("f:2: not YAML: ") && !message.contains("supported"), "{message}");
+    assert!(message.contains("f:2: invalid YAML: ") && !message.contains("supported"), "{message}");
     let message = Input::open("no/such".as_ref()).expect_err("must be rejected").to_string();
     assert!(message.starts_with("no/such: "), "{message}");
     let message = Input::open("/".as_ref()).expect_err("must be rejected").to_string();
