@@ -290,7 +290,8 @@ fn identify(
     let updated = identified.machine_config()?;
 
     spinner.set_activity(format!("validating {}", axis.name()))?;
-    let validations = others.into_iter().map(|recorded| {
+    let validations = others.into_iter().map(|mut recorded| {
+        recorded.feedforward = recorded.feedforward.or(identification.inferred_feedforward);
         let agreement = virtual_axes_identify::identify::validate(
             &recorded.input(),
             &updated.axes()[index],

@@ -237,13 +237,14 @@ fn friction(friction: &FrictionSummary, speed_unit: &str) -> String {
         row.push(format!("{:.4}", at.law));
         table.rows.push(row);
     }
-    text + &text_table::text(&table)
+    if table.rows.is_empty() { text } else { text + &text_table::text(&table) }
 }
 
 fn gravity(gravity: &GravitySummary) -> String {
     let source = match gravity.source {
         GravitySource::Motion => "constant velocities in both directions",
         GravitySource::Rest => "standstills",
+        GravitySource::Regression => "regression of the current",
     };
     let part = |value: f64, error: f64| format!("{} ± {} A", digits(value, 4), digits(error, 2));
     let (current, error) = (&gravity.current, &gravity.error);
@@ -258,10 +259,25 @@ fn gravity(gravity: &GravitySummary) -> String {
     if gravity.model == GravityCurrent::default() {
         text.push_str("; not significant, set to zero");
     }
+    if let Some(rest) = &gravity.at_rest {
+        let [center, half] = [rest.current.constant, rest.error.constant];
+        text.push_str(&format!(
+            "; standstills permit {} … {} A",
+            digits(center - half, 3),
+            digits(center + half, 3)
+        ));
+    }
     text
 }
 
 fn inertia(inertia: &InertiaSummary) -> String {
+    if inertia.spread.is_nan() {
+        let [value, error] = [digits(inertia.eq5, 5), digits(inertia.error, 2)];
+        return format!(
+            "inertia: {value} ± {error} by regression of the current over {} moves",
+            inertia.accelerations
+        );
+    }
     let mut text = format!(
         "inertia: {} ± {} by Prévost eq. 5 from {} accelerations (standard deviation of single samples {})",
         digits(inertia.eq5, 5),

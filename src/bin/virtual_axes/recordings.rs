@@ -5,11 +5,16 @@ use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::MILLISECOND;
-use virtual_axes_identify::identify::{FeedforwardMode, IdentificationInput, infer_velocity_feedforward};
+use virtual_axes_identify::identify::{
+    FeedforwardMode, IdentificationInput, are_production_traces, constant_lag,
+};
 use virtual_axes_identify::recording::{Conditioning, Finding, PsecShift, Signals, condition};
 use virtual_axes_io::files::{Columns, RecordingFormat, RecordingOptions, read_recording};
 
 use crate::campaign::FeedforwardName;
+
+/// Lag of the position, relative to 1 / Kp, below which velocity feedforward must be active.
+const SHORT: f64 = 0.7;
 
 /// Options for reading all recordings.
 #[derive(Debug, clap::Args)]
@@ -122,37 +127,36 @@ pub fn read(
     let (raw, mut findings) = read_recording(path, axis, options)?;
     let (signals, more) = condition(&raw, axis, periods, &reading.conditioning())?;
     findings.extend(more);
+    let input = IdentificationInput { signals: &signals, feedforward };
+    let is_inferred = are_production_traces(&[input], axis, periods);
     let mut feedforward = feedforward;
-    if let (None, Some(missing)) = (feedforward, missing_feedforward(&signals)) {
-        let Some((inferred, finding)) = infer_feedforward(&signals, axis) else {
+    if let (None, Some(missing), false) = (feedforward, missing_feedforward(&signals), is_inferred) {
+        let lag = constant_lag(&signals).map(|(lag, _)| lag);
+        let without = 1.0 / axis.position_loop.gain;
+        if !lag.is_some_and(|lag| lag < SHORT * without) {
             return Err(format!(
-                "{}: has no {missing}, and the motion does not show the active feedforward: neither a constant lag nor the \
-                 first-order lag of the position loop fits clearly better; give it with {option} off, velocity or both",
-                signals.name
+                "{}: has no {missing}, and the lag of the position ({:.1} ms) does not tell whether feedforward was active: \
+                 without it the lag is at least 1 / Kp, {:.1} ms; give {option} off, velocity or both",
+                signals.name,
+                lag.unwrap_or(f64::NAN) / MILLISECOND,
+                without / MILLISECOND
             )
             .into());
-        };
-        feedforward = Some(inferred);
-        findings.push(finding);
+        }
+        let mode =
+            if axis.feedforward.torque != 0.0 { FeedforwardMode::Both } else { FeedforwardMode::Velocity };
+        feedforward = Some(mode);
+        let what = format!(
+            "{}: feedforward {} is assumed: the position lags by {:.1} ms, without feedforward it would by at least 1 / Kp, \
+             {:.1} ms",
+            signals.name,
+            mode.name(),
+            lag.unwrap_or(f64::NAN) / MILLISECOND,
+            without / MILLISECOND
+        );
+        findings.push(Finding::note("feedforward-inferred", what));
     }
     Ok(ConditionedRecording { signals, feedforward, findings })
-}
-
-/// Infers the active feedforward from the motion, and whether it includes the torque from the machine file.
-fn infer_feedforward(signals: &Signals, axis: &AxisConfig) -> Option<(FeedforwardMode, Finding)> {
-    let (mode, reason) = match infer_velocity_feedforward(signals)? {
-        false => (FeedforwardMode::Off, "the position follows with the first-order lag of the position loop"),
-        true if axis.feedforward.torque != 0.0 => (
-            FeedforwardMode::Both,
-            "the position follows with a constant lag, and the machine file has a torque feedforward",
-        ),
-        true => (
-            FeedforwardMode::Velocity,
-            "the position follows with a constant lag, and the torque feedforward of the machine file is 0",
-        ),
-    };
-    let what = format!("{}: feedforward {} is assumed: {reason}", signals.name, mode.name());
-    Some((mode, Finding::note("feedforward-inferred", what)))
 }
 
 /// Returns the name of the feedforward signal that is missing to determine the active feedforward.

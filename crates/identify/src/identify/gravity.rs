@@ -77,6 +77,8 @@ pub enum GravitySource {
     Motion,
     /// Standstills.
     Rest,
+    /// Regression over all motion.
+    Regression,
 }
 
 /// Identified gravity of an axis with standard errors.

@@ -2,6 +2,7 @@
 
 use super::delays::DelayFit;
 use super::feedforward::FeedforwardFit;
+use super::feedforward_mode::FeedforwardMode;
 use super::friction::FrictionFit;
 use super::gravity::{GravityFit, SteadyMeasurements};
 use super::inertia::InertiaFit;
@@ -40,6 +41,8 @@ pub struct Identification {
     pub agreements: Vec<Agreement>,
     /// Periods, if the recordings require another position cycle than that of the machine file.
     pub periods: Option<Periods>,
+    /// Feedforward of recordings whose feedforward was not given.
+    pub inferred_feedforward: Option<FeedforwardMode>,
     /// Findings.
     pub findings: Vec<Finding>,
 }

@@ -24,12 +24,19 @@ pub struct InertiaFit {
     pub value: f64,
     /// Standard error, from the scatter between accelerations.
     pub error: f64,
-    /// Robust standard deviation of single samples.
+    /// Robust standard deviation of single samples; NaN for a regression.
     pub spread: f64,
     /// Samples: index of the recording among those with current, time in s, inertia by eq. 5.
     pub instants: Vec<(usize, f64, f64)>,
     /// Number of accelerations.
     pub accelerations: usize,
+}
+
+impl InertiaFit {
+    /// Returns true if the value is a coefficient of a regression over all motion, which has no single samples.
+    pub fn is_regression(&self) -> bool {
+        self.spread.is_nan()
+    }
 }
 
 /// Evaluates `Jeq = (Kt i − C_friction − C_gravity) / (dω/dt)` (Prévost eq. 5) at each accelerating sample

@@ -23,6 +23,8 @@ const DELAY_STARTS: [f64; 4] = [0.2, 0.45, 0.7, 0.95];
 const GAIN_STARTS: [f64; 3] = [1.4, 2.2, 3.3];
 /// Start values of the ratio of velocity-loop gain to inertia, s⁻¹.
 const BANDWIDTH_STARTS: [f64; 2] = [180.0, 300.0];
+/// Residual with the gain of the machine file, relative to the least one, up to which it is kept.
+const KEPT: f64 = 1.1;
 /// Starts of each gain that are followed to their minimum.
 const FOLLOWED: usize = 1;
 /// Longest difference of the lag from a whole number of position cycles, s.
@@ -285,6 +287,12 @@ impl LoopProblem<'_> {
             })
             .collect();
         let free = self.follow(axis, &periods, &parameters, &from).unwrap_or(first);
+        let with_given = self.with_given_gain(axis, &periods, &parameters, &free);
+        let given_cost = with_given.as_ref().map(|(_, found)| found.cost);
+        // A gain that the motion hardly shows stays that of the machine file.
+        let kept = with_given.filter(|(_, found)| found.cost <= KEPT * KEPT * free.cost);
+        let is_kept = kept.is_some();
+        let (parameters, free) = kept.unwrap_or((parameters, free));
         // The delay of the machine file is a whole number of position cycles.
         let tsp = seconds(periods.position);
         let cycles = (free.values[0] / tsp).round().max(0.0);
@@ -299,8 +307,7 @@ impl LoopProblem<'_> {
             value: if k == 0 { free.values[0] } else { last.values[k - 1] },
             error: errors[(k, k)].max(0.0).sqrt(),
         });
-        let rms_with_given_gain =
-            self.fits_gain.then(|| self.cost_with_gain(axis, &periods, &parameters, &free)).flatten();
+        let rms_with_given_gain = given_cost.filter(|_| !is_kept);
         Some(LoopFit {
             values: values.collect(),
             rms: (last.cost / count).sqrt(),
@@ -311,17 +318,20 @@ impl LoopProblem<'_> {
         })
     }
 
-    fn cost_with_gain(
+    /// Returns the minimum with the gain of the machine file, and its parameters; none if the gain is not fitted.
+    fn with_given_gain(
         &self,
         axis: &AxisConfig,
         periods: &Periods,
         parameters: &[LoopParameter],
         free: &Candidate,
-    ) -> Option<f64> {
-        let kept = |k: &usize| parameters[*k] != LoopParameter::Gain;
-        let others: Vec<LoopParameter> = (0..parameters.len()).filter(kept).map(|k| parameters[k]).collect();
-        let values: Vec<f64> = (0..parameters.len()).filter(kept).map(|k| free.values[k]).collect();
-        Some(self.follow(axis, periods, &others, &values)?.cost)
+    ) -> Option<(Vec<LoopParameter>, Candidate)> {
+        parameters.iter().find(|parameter| **parameter == LoopParameter::Gain)?;
+        let pairs =
+            parameters.iter().zip(&free.values).filter(|(parameter, _)| **parameter != LoopParameter::Gain);
+        let (others, values): (Vec<LoopParameter>, Vec<f64>) = pairs.map(|(p, v)| (*p, *v)).unzip();
+        let found = self.follow(axis, periods, &others, &values)?;
+        Some((others, found))
     }
 
     fn errors(

@@ -8,10 +8,10 @@
 pub mod campaign;
 pub mod summary;
 
+mod backlash;
 mod closed_loop;
 mod delays;
 mod feedforward;
-mod feedforward_inference;
 mod feedforward_mode;
 mod findings;
 mod fit;
@@ -37,7 +37,6 @@ mod values;
 pub use closed_loop::{Experiment, SimulatedExperiment, find_experiments, simulate, simulate_all};
 pub use delays::{DelayFit, DelayParameter};
 pub use feedforward::{FeedforwardFit, FeedforwardRegression, fit_feedforward};
-pub use feedforward_inference::infer_velocity_feedforward;
 pub use feedforward_mode::FeedforwardMode;
 pub use friction::{Breakaway, FrictionFit, FrictionLaw, LawFit, fit_friction};
 pub use gravity::{
@@ -46,11 +45,12 @@ pub use gravity::{
 pub use identification::Identification;
 pub use inertia::{InertiaFit, fit_inertia};
 pub use options::{IdentificationInput, IdentificationOptions, RefinementScope};
+pub use production::are_production_traces;
 pub use refine::{RefinedParameter, RefinedValue, Refinement, refine};
 pub(crate) use resample::CubicSpline;
 pub use segments::{MotionSegment, SegmentKind, find_segments};
 pub use steps::identify;
 pub use validate::{
-    Agreement, Baseline, ExperimentComparison, InverseDynamics, ResidualStatistics, validate,
+    Agreement, Baseline, ExperimentComparison, InverseDynamics, ResidualStatistics, constant_lag, validate,
 };
 pub use values::{IdentifiedValue, update_parameters};

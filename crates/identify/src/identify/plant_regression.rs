@@ -19,6 +19,10 @@ use virtual_axes_core::units::MILLIMETER;
 const FINE: f64 = 2e-3;
 /// Speed below which the direction of the friction is uncertain, m/s or rad/s.
 const SLOWEST: f64 = 2.0 * MILLIMETER;
+/// Speed at standstill relative to that: less than the steps of an encoder.
+const STANDING: f64 = 0.1;
+/// Fewest samples at standstill.
+const FEWEST_STILL: usize = 10;
 /// Standard deviations of the filter within which the axis must be faster than that.
 const REACH: f64 = 3.0;
 /// Fewest samples and moves.
@@ -73,11 +77,19 @@ struct MovingData {
     /// Weights of a filter window, from its first fine sample on.
     weights: Vec<f64>,
     moves: usize,
+    /// Filtered currents at standstill, A.
+    still: Vec<f64>,
 }
 
 impl MovingData {
     fn new(recordings: &[&Signals], axis: &AxisConfig) -> Option<Self> {
-        let mut data = MovingData { samples: Vec::new(), speeds: Vec::new(), weights: Vec::new(), moves: 0 };
+        let mut data = MovingData {
+            samples: Vec::new(),
+            speeds: Vec::new(),
+            weights: Vec::new(),
+            moves: 0,
+            still: Vec::new(),
+        };
         let first = recordings.first()?;
         let steps = (first.period / FINE).ceil().max(1.0) as usize;
         let fine = first.period / steps as f64;
@@ -116,6 +128,11 @@ impl MovingData {
                 self.moves += 1;
             }
             moving = direction;
+            let stands =
+                window.is_some_and(|(_, speeds)| speeds.iter().all(|v| v.abs() < STANDING * slowest));
+            if stands && current[i].is_finite() {
+                self.still.push(current[i]);
+            }
             let is_known = current[i].is_finite() && raw[i].is_finite() && raw[i].abs() < limit;
             if let (Some((from, _)), true) = (window.filter(|_| direction != 0.0), is_known) {
                 self.samples.push(Sample {
@@ -225,6 +242,18 @@ pub(super) fn fit_plant_by_regression(recordings: &[&Signals], axis: &AxisConfig
     Some(result(&data, &measured, axis, &fit.values, covariance))
 }
 
+/// Returns center and half width of the gravity currents that the standstills permit, A: friction holds the axis with any
+/// current within ±i0.
+fn gravity_at_rest(still: &[f64], i0: f64) -> Option<(GravityCurrent, GravityCurrent)> {
+    if still.len() < FEWEST_STILL {
+        return None;
+    }
+    let (low, high) =
+        still.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), i| (l.min(*i), h.max(*i)));
+    let only = |constant| GravityCurrent { constant, ..GravityCurrent::default() };
+    Some((only(0.5 * (low + high)), only((i0 - 0.5 * (high - low)).max(0.0))))
+}
+
 /// Converts the fitted values into results of the identification.
 fn result(
     data: &MovingData,
@@ -278,8 +307,8 @@ fn result(
             weight: Some((x[1] * force, error(1) * force)),
             tilt: None,
             phase: None,
-            source: GravitySource::Motion,
-            at_rest: None,
+            source: GravitySource::Regression,
+            at_rest: gravity_at_rest(&data.still, law.i0),
         },
         r_squared,
         collinear,

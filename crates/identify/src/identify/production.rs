@@ -18,6 +18,7 @@ use super::setpoints::stride;
 use super::validate::constant_lag;
 use crate::recording::{Finding, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, Periods, PositionControllerConfig};
+use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::{MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, SECOND_NS, seconds};
 
 /// Standard errors of a significant gravity.
@@ -27,12 +28,14 @@ const RELEVANT: f64 = 0.02;
 /// Relative change of the gain, and of the residual with it, from which the gain of the machine file does not fit.
 const GAIN_CHANGE: f64 = 0.15;
 const GAIN_RESIDUAL: f64 = 1.5;
+/// Ratio of the residuals with and without feedforward from which the smaller one is certain.
+const CLEAR: f64 = 1.5;
 /// Standard errors of a delay within its interval.
 const INTERVAL: f64 = 2.0;
 
 /// Returns true if the recordings can be identified as production traces only: with PSEC, but at a sampling period that
 /// is no integer fraction of the position cycle.
-pub(super) fn are_production_traces(
+pub fn are_production_traces(
     inputs: &[IdentificationInput<'_>],
     axis: &AxisConfig,
     periods: &Periods,
@@ -65,34 +68,77 @@ pub(super) fn identify_production(
     if scope == RefinementScope::NONE {
         return;
     }
-    let recordings: Vec<(&Signals, FeedforwardMode)> = inputs
-        .iter()
-        .map(|input| (input.signals, input.feedforward.unwrap_or(FeedforwardMode::Both)))
-        .collect();
-    let problem = LoopProblem {
-        recordings: &recordings,
-        fits_gain: scope.gain,
-        given_gain: found.axis.position_loop.gain,
+    let given = |mode: FeedforwardMode| -> Vec<(&Signals, FeedforwardMode)> {
+        inputs.iter().map(|input| (input.signals, input.feedforward.unwrap_or(mode))).collect()
     };
-    let start = recordings.iter().filter_map(|(signals, mode)| {
-        let (lag, _) = constant_lag(signals)?;
-        // Without feedforward the axis lags by 1 / Kp in addition.
-        Some(if *mode == FeedforwardMode::Off {
-            (lag - 1.0 / found.axis.position_loop.gain).max(0.0)
-        } else {
-            lag
-        })
-    });
-    let starts: Vec<f64> = start.collect();
-    let lag = starts.iter().sum::<f64>() / starts.len().max(1) as f64;
-    match problem.fit(&found.axis, periods, lag) {
-        Some(fit) => apply_loop(&fit, found),
+    let active = match found.axis.feedforward.torque != 0.0 {
+        true => FeedforwardMode::Both,
+        false => FeedforwardMode::Velocity,
+    };
+    let mut best = fit_loop(&given(active), periods, scope, &found.axis).map(|fit| (active, fit));
+    if inputs.iter().any(|input| input.feedforward.is_none()) {
+        let without = fit_loop(&given(FeedforwardMode::Off), periods, scope, &found.axis);
+        best = infer_feedforward(best, without.map(|fit| (FeedforwardMode::Off, fit)), found);
+    }
+    match best {
+        Some((mode, fit)) => {
+            found.inferred_feedforward = Some(mode);
+            apply_loop(&fit, found);
+        }
         None => found.findings.push(Finding::missing(
             "no-loop",
             "no delays and gains: the closed loop cannot be simulated near the recorded motion",
             "check lead, gains and periods of the machine file; inertia, friction and gravity are those of the current alone",
         )),
     }
+}
+
+/// Fits the loop, starting from the mean constant lag.
+fn fit_loop(
+    recordings: &[(&Signals, FeedforwardMode)],
+    periods: &Periods,
+    scope: RefinementScope,
+    axis: &AxisConfig,
+) -> Option<LoopFit> {
+    let starts = recordings.iter().filter_map(|(signals, mode)| {
+        let (lag, _) = constant_lag(signals)?;
+        // Without feedforward the axis lags by 1 / Kp in addition.
+        let off = *mode == FeedforwardMode::Off;
+        Some(if off { (lag - 1.0 / axis.position_loop.gain).max(0.0) } else { lag })
+    });
+    let lag = mean(&starts.collect::<Vec<f64>>())?;
+    LoopProblem { recordings, fits_gain: scope.gain, given_gain: axis.position_loop.gain }
+        .fit(axis, periods, lag)
+}
+
+/// Returns the fit with or without feedforward, whichever leaves the smaller residual, and reports it.
+fn infer_feedforward(
+    with: Option<(FeedforwardMode, LoopFit)>,
+    without: Option<(FeedforwardMode, LoopFit)>,
+    found: &mut Identification,
+) -> Option<(FeedforwardMode, LoopFit)> {
+    let (Some((mode, with)), Some((off, without))) = (with.clone(), without.clone()) else {
+        return with.or(without);
+    };
+    let (unit, name) = position_unit(&found.axis);
+    let residuals = format!(
+        "{:.1} {name} RMS with feedforward, {:.1} {name} without",
+        with.rms / unit,
+        without.rms / unit
+    );
+    if with.rms.max(without.rms) < CLEAR * with.rms.min(without.rms) {
+        found.findings.push(Finding::invalid(
+            "feedforward-unknown",
+            format!("the motion does not show whether feedforward was active: {residuals}"),
+            "give --feedforward off, velocity or both",
+        ));
+    }
+    let (mode, fit) = if with.rms <= without.rms { (mode, with) } else { (off, without) };
+    found.findings.push(Finding::note(
+        "feedforward-inferred",
+        format!("feedforward {} is assumed: {residuals}", mode.name()),
+    ));
+    Some((mode, fit))
 }
 
 /// Reports the error of the interpolated setpoints.

@@ -43,7 +43,8 @@ pub(super) fn report_invalid(inputs: &[IdentificationInput<'_>], found: &mut Ide
         let (given, value) = (milliseconds(fit.delay.of(&before.delays)), milliseconds(fit.value));
         let (name, remedy) =
             (fit.delay.name(), "check that the recorded setpoint is that at the position controller");
-        if !is_far(given, value) || given == 0.0 {
+        let [low, high] = [fit.interval.0, fit.interval.1].map(milliseconds);
+        if !is_far(given, value) || given == 0.0 || (low..=high).contains(&given) {
             continue;
         }
         // β and γ can be short, and a machine file often has values of another machine.

@@ -95,6 +95,7 @@ impl<'a> IdentificationSteps<'a> {
                 refinement: None,
                 agreements: Vec::new(),
                 periods: None,
+                inferred_feedforward: None,
                 findings,
             },
         }
@@ -241,14 +242,9 @@ impl<'a> IdentificationSteps<'a> {
     /// Prepares the comparison of the identified axis with production traces.
     fn find_production_experiments(&mut self) {
         let (axis, periods) = (&self.found.axis, self.found.periods.unwrap_or(*self.periods));
+        let inferred = self.found.inferred_feedforward.unwrap_or(FeedforwardMode::Both);
         let of = |(k, input): (usize, &IdentificationInput<'_>)| {
-            find_experiments(
-                input.signals,
-                k,
-                axis,
-                &periods,
-                input.feedforward.unwrap_or(FeedforwardMode::Both),
-            )
+            find_experiments(input.signals, k, axis, &periods, input.feedforward.unwrap_or(inferred))
         };
         self.experiments = self.inputs.iter().enumerate().flat_map(of).collect();
     }

@@ -159,7 +159,7 @@ fn baseline(
 
 /// Returns the constant lag, s, with which the delayed PSEC fits the position best, and the RMS difference, m or rad;
 /// none without PSEC.
-pub(super) fn constant_lag(signals: &Signals) -> Option<(f64, f64)> {
+pub fn constant_lag(signals: &Signals) -> Option<(f64, f64)> {
     /// Largest number of compared samples per span.
     const SAMPLES: usize = 5000;
     /// Steps of the search, s, and longest lag in first steps.

@@ -12,6 +12,8 @@ use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS, POSITION_GAI
 
 /// Digits of a value beyond the first digit of its standard error.
 const GUARD_DIGITS: i32 = 2;
+/// Standard errors of the half interval that contains 95 % of the values.
+const INTERVAL: f64 = 1.96;
 /// Digits of a value without standard error.
 const MOST_DIGITS: i32 = 9;
 
@@ -106,6 +108,9 @@ impl Identification {
         if let Some((error, source)) =
             self.error_and_source(RefinedParameter::Inertia, self.inertia.as_ref().map(|i| i.error), || {
                 match &self.inertia {
+                    Some(found) if found.is_regression() => {
+                        format!("regression of the current ({} moves)", found.accelerations)
+                    }
                     Some(found) => format!("Prévost eq. 5 ({} accelerations)", found.accelerations),
                     None => "positions".to_owned(),
                 }
@@ -174,14 +179,22 @@ impl Identification {
         let Some(gravity) = &self.gravity else { return };
         let nothing = if gravity.model == GravityCurrent::default() { ": not significant" } else { "" };
         let source = || match gravity.source {
+            GravitySource::Regression => format!("regression of the current{nothing}"),
             GravitySource::Motion => format!("constant velocities in both directions{nothing}"),
             GravitySource::Rest => format!("standstills{nothing}"),
         };
-        if let Some((_, error)) = gravity.weight
-            && let Some((error, source)) =
+        if let Some((weight, error)) = gravity.weight
+            && let Some((refined, source)) =
                 self.error_and_source(RefinedParameter::Weight, Some(error), source)
         {
-            put(&["gravity.weight_n"], self.axis.gravity.weight, error, None, source);
+            // A weight that the data cannot tell from zero is an interval.
+            let is_zero =
+                gravity.source == GravitySource::Regression && gravity.model == GravityCurrent::default();
+            let interval = is_zero.then(|| {
+                let half = INTERVAL * error;
+                [(weight - half).min(0.0), (weight + half).max(0.0)]
+            });
+            put(&["gravity.weight_n"], self.axis.gravity.weight, refined, interval, source);
         }
         if let Some((_, error)) = gravity.tilt
             && let Some((error, source)) =

@@ -37,7 +37,7 @@ const EFFECT: f64 = 0.05;
 /// Smallest contribution of the acceleration to R² that determines the sign of the current.
 const INERTIAL: f64 = 0.01;
 /// Fewest samples in motion that determine the sign of the current.
-const FEWEST_MOVING: usize = 30;
+const FEWEST_MOVING: usize = 15;
 /// R² below which the current is unrelated to the motion.
 const EXPLAINED: f64 = 0.5;
 /// Smallest share of moving samples in each direction that separates friction from gravity.

@@ -27,6 +27,8 @@ const ABOUT: usize = 10;
 /// Smallest jump of the position behind a frozen run, in usual steps: in total, and per frozen sample.
 const LEAP: f64 = 2.5;
 const LEAP_PER_SAMPLE: f64 = 0.5;
+/// Jump, in smallest steps of the position, up to which the axis creeps by single increments of its encoder.
+const CREEPING: f64 = 3.0;
 /// Number of zero steps in a row that form a frozen run.
 const FROZEN: usize = 2;
 /// Share of frozen samples above which a remedy is suggested.
@@ -272,12 +274,14 @@ fn interpolate(nodes: &[(f64, f64)], at: usize, time: f64, period: f64, smooth: 
 fn remove_frozen(dense: &mut ChannelColumns, start: f64, period: f64) -> Vec<(f64, f64)> {
     let Some(position) = &dense[POSITION] else { return Vec::new() };
     let steps: Vec<f64> = position.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let sizes = steps.iter().map(|step| step.abs()).filter(|size| *size > 0.0);
+    let resolution = sizes.reduce(f64::min).unwrap_or(0.0);
     let mut frozen = Vec::new();
     let mut n = 0;
     while n < steps.len() {
         let run = steps[n..].iter().take_while(|step| **step == 0.0).count();
         let end = n + run;
-        if run >= FROZEN && end < steps.len() && is_frozen(&steps, n, end) {
+        if run >= FROZEN && end < steps.len() && is_frozen(&steps, n, end, resolution) {
             frozen.push(n + 1..end + 1);
         }
         n = end + 1;
@@ -290,8 +294,9 @@ fn remove_frozen(dense: &mut ChannelColumns, start: f64, period: f64) -> Vec<(f6
     frozen.iter().map(|run| (start + run.start as f64 * period, run.len() as f64 * period)).collect()
 }
 
-/// Returns true if the zero steps `n..end` are a frozen signal, judged by the motion before and behind them.
-fn is_frozen(steps: &[f64], n: usize, end: usize) -> bool {
+/// Returns true if the zero steps `n..end` are a frozen signal, judged by the motion before and behind them. A jump of few
+/// increments of the encoder is a slow motion.
+fn is_frozen(steps: &[f64], n: usize, end: usize, resolution: f64) -> bool {
     let common = |steps: &[f64]| {
         median(&mut steps.iter().copied().filter(|s| !s.is_nan()).collect::<Vec<_>>()).unwrap_or(0.0)
     };
@@ -299,7 +304,8 @@ fn is_frozen(steps: &[f64], n: usize, end: usize) -> bool {
     let after = common(&steps[end + 1..(end + 1 + ABOUT).min(steps.len())]);
     let step = 0.5 * (before + after);
     let leap = steps[end] / step;
-    before * after > 0.0 && leap >= LEAP && leap >= LEAP_PER_SAMPLE * (end - n + 1) as f64
+    let is_creeping = steps[end].abs() <= CREEPING * resolution;
+    !is_creeping && before * after > 0.0 && leap >= LEAP && leap >= LEAP_PER_SAMPLE * (end - n + 1) as f64
 }
 
 /// Interpolates runs of at most [`MAX_BRIDGED`] missing values. Returns the number of interpolated values.

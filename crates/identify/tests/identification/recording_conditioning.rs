@@ -458,7 +458,7 @@ fn a_recording_of_a_standstill_is_accepted() {
 #[test]
 fn wrong_units_are_reported() {
     type Spoil = fn(&mut RawRecording);
-    let cases: [(Spoil, &str); 15] = [
+    let cases: [(Spoil, &str); 14] = [
         (|r| r.time.iter_mut().for_each(|t| *t *= 1e3), "time=COLUMN[ms]"),
         (|r| r.time.iter_mut().for_each(|t| *t *= 1e6), "time=COLUMN[us]"),
         (|r| r.time.iter_mut().for_each(|t| *t *= 1e9), "time=COLUMN[ns]"),
@@ -632,4 +632,14 @@ proptest! {
             assert_even(&signals);
         }
     }
+}
+
+#[test]
+fn an_inverted_current_is_turned() {
+    let mut raw = recording();
+    let reference = run(&raw).0;
+    scale(&mut raw.current, -1.0);
+    let (turned, findings) = run(&raw);
+    assert!(findings.iter().any(|finding| finding.code == "current-inverted"));
+    assert_eq!(turned.spans, reference.spans);
 }

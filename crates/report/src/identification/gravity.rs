@@ -27,6 +27,9 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         return section;
     };
     let from = match gravity.source {
+        GravitySource::Regression => {
+            "a regression of the current over all samples in motion, together with inertia and friction"
+        }
         GravitySource::Motion => {
             "constant velocities in both directions, at which friction changes its sign and gravity does not"
         }
@@ -123,7 +126,9 @@ fn table(kind: AxisKind, gravity: &GravitySummary) -> Table {
         };
         let own = Some((&gravity.current, &gravity.error));
         let (motion, rest) = match gravity.source {
-            GravitySource::Motion => (own, gravity.at_rest.as_ref().map(|rest| (&rest.current, &rest.error))),
+            GravitySource::Motion | GravitySource::Regression => {
+                (own, gravity.at_rest.as_ref().map(|rest| (&rest.current, &rest.error)))
+            }
             GravitySource::Rest => (None, own),
         };
         let mut row = vec![name.to_owned()];

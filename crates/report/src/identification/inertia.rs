@@ -28,6 +28,16 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         });
         return section;
     };
+    if inertia.is_regression() {
+        section.paragraphs.push(format!(
+            "The current of all samples in motion ({}) is fitted by Jeq a / (Kt r), friction and gravity together. This \
+             gives {} ± {}; the standard error counts moves, not samples.",
+            counted(inertia.accelerations, "move"),
+            with_unit(page, inertia.value),
+            digits(inertia.error, 2),
+        ));
+        return section;
+    }
     section.paragraphs.push(format!(
         "Jeq = (Kt i − C_friction − C_gravity) / (dω/dt) (Prévost eq. 5) at {} of {} gives {} ± {}, the mean \
          without outliers. The standard deviation of single samples is {}.",

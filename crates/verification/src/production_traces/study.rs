@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use virtual_axes_core::config::{AxisConfig, Periods};
+use virtual_axes_core::config::AxisConfig;
 use virtual_axes_core::statistics::quantile;
 use virtual_axes_core::units::{MILLISECOND_NS, seconds};
 use virtual_axes_identify::identify::{
@@ -41,6 +41,8 @@ pub struct StudyFigures {
     pub r_squared: f64,
     /// Codes of findings about invalid results.
     pub invalid: Vec<&'static str>,
+    /// True if backlash was found.
+    pub has_backlash: bool,
 }
 
 /// Study over many axes.
@@ -91,7 +93,7 @@ fn study(hidden: &HiddenAxis, seed: u64, duration: f64) -> Result<StudyFigures, 
     let agreement = validate(&input(&unseen), found.axis(), &periods).map_err(|error| error.to_string())?;
     let baseline = agreement.baseline.ok_or("no simulation of the unseen program")?;
     let inverse = agreement.inverse.ok_or("no current of the unseen program")?;
-    let figures = figures(hidden, (&guess.config, guess.is_period_known), &found, &periods);
+    let figures = figures(hidden, &guess.config, &found);
     let (inertia, alpha, beta, weight) = figures.ok_or_else(|| reasons(&found))?;
     Ok(StudyFigures {
         inertia,
@@ -101,6 +103,7 @@ fn study(hidden: &HiddenAxis, seed: u64, duration: f64) -> Result<StudyFigures, 
         weight,
         unseen: [baseline.model, baseline.delayed],
         r_squared: inverse.r_squared,
+        has_backlash: found.findings.iter().any(|finding| finding.code == "backlash"),
         invalid: found.findings.iter().filter(|f| f.severity == Severity::Invalid).map(|f| f.code).collect(),
     })
 }
@@ -118,12 +121,7 @@ fn reasons(found: &Identification) -> String {
 type Errors = ([f64; 2], f64, [f64; 2], [f64; 2]);
 
 /// Returns the errors of inertia, α, β and weight; none if one of them was not identified.
-fn figures(
-    hidden: &HiddenAxis,
-    (guess, _): (&AxisConfig, bool),
-    found: &Identification,
-    periods: &Periods,
-) -> Option<Errors> {
+fn figures(hidden: &HiddenAxis, guess: &AxisConfig, found: &Identification) -> Option<Errors> {
     let (truth, kt) = (&hidden.config, guess.motor.torque_constant);
     let per_current = truth.motor.inertia / truth.motor.torque_constant;
     let inertia = found.inertia.as_ref()?;
@@ -139,7 +137,6 @@ fn figures(
     let beta_error = seconds(found.axis().delays.beta) - seconds(truth.delays.beta);
     let beta_sigma = seconds(beta.interval.1 - beta.value) / 2.0;
     let relative = if weight_truth == 0.0 { gravity_error } else { gravity_error / weight_truth };
-    let _ = periods;
     Some((
         [inertia.value / kt / per_current - 1.0, (inertia.value / kt - per_current) / (inertia.error / kt)],
         alpha_error,
@@ -202,6 +199,8 @@ impl fmt::Display for TraceStudy {
         within("95 % interval contains the truth: Jeq / Kt", f, &|x| x.inertia[1])?;
         within("95 % interval contains the truth: W / Kt", f, &|x| x.weight[1])?;
         let invalid = all.iter().filter(|x| !x.invalid.is_empty()).count();
-        writeln!(f, "{:44} {invalid:7}", "results rejected as invalid")
+        writeln!(f, "{:44} {invalid:7}", "results rejected as invalid")?;
+        let backlash = all.iter().filter(|x| x.has_backlash).count();
+        writeln!(f, "{:44} {backlash:7}", "axes with a finding of backlash")
     }
 }
