@@ -13,7 +13,7 @@ use super::fit::{BoundedParameter, Effort, clustered_covariance, descend};
 use super::trace_experiments::trace_experiments;
 use crate::recording::Signals;
 use virtual_axes_core::config::{AxisConfig, Periods};
-use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, POSITION_GAIN, SECOND_NS, seconds};
+use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, POSITION_GAIN, seconds};
 
 /// Longest delay, s.
 const LONGEST: f64 = 0.1;
@@ -422,5 +422,6 @@ fn position_cycle(periods: &Periods, lag: f64) -> Nanoseconds {
 }
 
 fn nanoseconds(time: f64) -> Nanoseconds {
-    (time * SECOND_NS as f64).round() as Nanoseconds
+    // A microsecond is less than the uncertainty of any delay.
+    (time * 1e6).round() as Nanoseconds * MICROSECOND_NS
 }

@@ -19,7 +19,7 @@ use super::validate::constant_lag;
 use crate::recording::{Finding, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, Periods, PositionControllerConfig};
 use virtual_axes_core::statistics::mean;
-use virtual_axes_core::units::{MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, SECOND_NS, seconds};
+use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds};
 
 /// Standard errors of a significant gravity.
 const SIGNIFICANT: f64 = 3.0;
@@ -266,7 +266,8 @@ fn delay(delay: DelayParameter, low: f64, high: f64, fit: &LoopFit) -> DelayFit 
 }
 
 fn nanoseconds(time: f64) -> Nanoseconds {
-    (time * SECOND_NS as f64).round() as Nanoseconds
+    // A microsecond is less than the uncertainty of any delay.
+    (time * 1e6).round() as Nanoseconds * MICROSECOND_NS
 }
 
 /// Reports the position cycle, the valley of VFFW and α, and a gain that does not fit.
