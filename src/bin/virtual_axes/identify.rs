@@ -188,7 +188,8 @@ fn joined(
             serde_json::to_string_pretty(one)? + "\n"
         }
         (OutputFormat::Json, all) => serde_json::to_string_pretty(all)? + "\n",
-        _ => texts.join("\n"),
+        (OutputFormat::Text, _) => texts.join("\n"),
+        _ => texts.concat(),
     })
 }
 
@@ -285,7 +286,15 @@ fn identify(
         return Err(no_result_message(axis.name(), &findings).into());
     }
     let mut identified = parameters.clone();
-    virtual_axes_identify::identify::update_parameters(&mut identified, axis.name(), &values)?;
+    let updated = virtual_axes_identify::identify::update_parameters(&mut identified, axis.name(), &values);
+    if let Err(error) = updated.and_then(|()| identified.machine_config().map(drop)) {
+        // The values are shown, with the reason why they cannot be used.
+        findings.insert(
+            0,
+            Finding::invalid("rejected", error.to_string(), "check the recordings and the machine file"),
+        );
+        identified = parameters.clone();
+    }
     // Values rounded to the digits of the machine file.
     let updated = identified.machine_config()?;
 

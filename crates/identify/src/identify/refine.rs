@@ -206,6 +206,8 @@ pub(super) fn with_parameters(
     if let Some((level, slope)) = line {
         axis.friction = FrictionConfig { i0: axis.friction.i0, ..super::friction::linear_law(level, slope) };
     }
+    // The friction at standstill a + c is not negative; the bounds of b and d keep their order.
+    axis.friction.c = axis.friction.c.max(-axis.friction.a);
     if let Some((sine, cosine)) = tilt {
         (axis.gravity.tilt, axis.gravity.phase) = (sine.hypot(cosine), cosine.atan2(sine));
     }
