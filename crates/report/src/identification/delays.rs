@@ -18,6 +18,16 @@ const ENLARGED_MARGIN: f64 = 2.0;
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let fits = &page.identification.delays;
     let mut section = page.step("Delays", Step::Delays);
+    if fits.iter().any(|fit| fit.is_joint) {
+        section.paragraphs.push(
+            "α, β and γ are fitted jointly with gains and torque feedforward, by least squares of simulated minus recorded \
+             positions on the closed loop with its feedforward. The interval of α is a position cycle, in which all delays \
+             give the same motion; those of β and γ are two standard errors wide on each side."
+                .to_owned(),
+        );
+        section.tables.push(table(page, fits));
+        return section;
+    }
     section.paragraphs.push(
         "α is identified without feedforward, β with velocity feedforward, γ with both, by least squares of \
          simulated minus recorded positions (Prévost section 3.5)."
@@ -107,13 +117,18 @@ fn table(page: &IdentificationPage, fits: &[DelayFit]) -> Table {
         let least = fit.profile.iter().map(|(_, rms)| *rms).fold(f64::INFINITY, f64::min);
         vec![
             letter(fit.delay).to_owned(),
-            fit.delay.feedforward_mode().name().to_owned(),
+            if fit.is_joint { "active" } else { fit.delay.feedforward_mode().name() }.to_owned(),
             ms(fit.interval.0),
             ms(fit.interval.1),
             ms(fit.value),
             ms(old),
             digits(least / page.error_unit().size, 3),
-            if fit.is_unchanged { "unchanged" } else { "middle of the interval" }.to_owned(),
+            match (fit.is_unchanged, fit.is_joint) {
+                (true, _) => "unchanged",
+                (false, true) => "least squares",
+                (false, false) => "middle of the interval",
+            }
+            .to_owned(),
         ]
     };
     let heads = [

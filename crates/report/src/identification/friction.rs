@@ -38,6 +38,10 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         let law = describe(page, &page.axis().friction);
         section.paragraphs.push(format!("The refinement in closed loop changes it to {law}."));
     }
+    if found.steady.levels.is_empty() {
+        // A regression over all motion has no measured levels.
+        return section;
+    }
     section.tables.push(table(page, friction, &found.steady.levels));
     section.charts.push(chart(page, friction, refined.as_ref(), &found.steady.levels));
     section

@@ -52,7 +52,7 @@ fn row(value: &IdentifiedValue) -> Vec<String> {
         full(value.value),
         uncertainty,
         value.unit.to_owned(),
-        full(value.before),
+        exact(value.before),
         value.source.clone(),
     ]
 }
