@@ -20,9 +20,9 @@ const DISAGREEING: f64 = 0.05;
 /// Largest position residual of a valid model, twice that of the paper, m and rad.
 const DEVIATING: f64 = 20e-6;
 const DEVIATING_ANGLE: f64 = 20e-3 * DEGREE;
-/// Smallest lost motion that is reported, m and rad.
-const BACKLASH: f64 = 1.5e-6;
-const BACKLASH_ANGLE: f64 = 1.5e-3 * DEGREE;
+/// Smallest lost motion that is reported, m and rad: errors of the fitted loop look like up to 2 µm.
+const BACKLASH: f64 = 2.5e-6;
+const BACKLASH_ANGLE: f64 = 2.5e-3 * DEGREE;
 /// Sampling period, relative to the position cycle, above which the current between setpoints is not
 /// resolved.
 const COARSE: f64 = 0.34;

@@ -10,10 +10,11 @@ use rayon::prelude::*;
 use super::closed_loop::{Experiment, position_residuals};
 use super::feedforward_mode::FeedforwardMode;
 use super::fit::{BoundedParameter, Effort, clustered_covariance, descend};
+use super::loop_parameter::{LoopParameter, apply, prior};
 use super::trace_experiments::trace_experiments;
 use crate::recording::Signals;
 use virtual_axes_core::config::{AxisConfig, Periods};
-use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, POSITION_GAIN, seconds};
+use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, POSITION_GAIN, seconds};
 
 /// Longest delay, s.
 const LONGEST: f64 = 0.1;
@@ -27,35 +28,14 @@ const BANDWIDTH_STARTS: [f64; 2] = [180.0, 300.0];
 const KEPT: f64 = 1.1;
 /// Starts of each gain that are followed to their minimum.
 const FOLLOWED: usize = 1;
+/// Gains whose minimum is followed with a free gain; the best one can be a local minimum.
+const FREED: usize = 2;
 /// Longest difference of the lag from a whole number of position cycles, s.
 const GRID_TOLERANCE: f64 = 0.15e-3;
 /// Position cycles that are tried if that of the machine file does not divide the lag, ns.
 const CYCLES: [Nanoseconds; 2] = [2 * MILLISECOND_NS, MILLISECOND_NS];
-/// Residual of one standard deviation of the prior, m or rad: a few encoder increments.
-const PRIOR: f64 = 5e-6;
-/// Usual ratio of velocity-loop gain to inertia, s⁻¹.
-const BANDWIDTH: f64 = 240.0;
 /// Duration of a cluster of correlated residuals, s.
 const CLUSTER: f64 = 0.5;
-
-/// Parameter of the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum LoopParameter {
-    /// Lag of the position at constant velocity, s: shift of the commanded position.
-    Lag,
-    /// β, s.
-    Beta,
-    /// γ, s.
-    Gamma,
-    /// Position-loop gain, s⁻¹.
-    Gain,
-    /// Velocity-loop gain divided by Jeq, s⁻¹.
-    Bandwidth,
-    /// Integral time of the velocity loop, s.
-    IntegralTime,
-    /// TFFW divided by Jeq.
-    TorqueRatio,
-}
 
 /// Fitted value with its clustered standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,39 +100,6 @@ impl LoopProblem<'_> {
         parameters
     }
 
-    /// Returns the axis with `values`, and the shift of the commanded position, s.
-    fn apply(
-        &self,
-        axis: &AxisConfig,
-        periods: &Periods,
-        parameters: &[LoopParameter],
-        values: &[f64],
-    ) -> (AxisConfig, f64) {
-        let mut axis = axis.clone();
-        let inertia = axis.motor.inertia;
-        let mut shift = 0.0;
-        let lag = parameters.iter().zip(values).find(|(p, _)| **p == LoopParameter::Lag);
-        if let Some((_, lag)) = lag {
-            let tsp = seconds(periods.position);
-            let cycles = (lag / tsp).round().max(0.0);
-            axis.delays.alpha = nanoseconds(((cycles - 0.5) * tsp).max(0.0));
-            shift = lag - cycles * tsp;
-        }
-        for (parameter, &value) in parameters.iter().zip(values) {
-            match parameter {
-                LoopParameter::Lag => {}
-                // The shift delays the feedforward too.
-                LoopParameter::Beta => axis.delays.beta = nanoseconds((value - shift).max(0.0)),
-                LoopParameter::Gamma => axis.delays.gamma = nanoseconds((value - shift).max(0.0)),
-                LoopParameter::Gain => axis.position_loop.gain = value,
-                LoopParameter::Bandwidth => axis.velocity_loop.gain = value * inertia,
-                LoopParameter::IntegralTime => axis.velocity_loop.integral_time = value,
-                LoopParameter::TorqueRatio => axis.feedforward.torque = value * inertia,
-            }
-        }
-        (axis, shift)
-    }
-
     fn residuals(
         &self,
         axis: &AxisConfig,
@@ -160,7 +107,7 @@ impl LoopProblem<'_> {
         parameters: &[LoopParameter],
         values: &[f64],
     ) -> Option<DVector<f64>> {
-        let (moved, shift) = self.apply(axis, periods, parameters, values);
+        let (moved, shift) = apply(axis, periods, parameters, values);
         let left = position_residuals(&moved, periods, &self.experiments(periods, shift))?;
         let prior = prior(parameters, values, self.given_gain);
         Some(DVector::from_iterator(left.len() + prior.len(), left.iter().copied().chain(prior)))
@@ -252,22 +199,23 @@ impl LoopProblem<'_> {
             true => GAIN_STARTS.iter().map(|gain| gain * POSITION_GAIN).chain([self.given_gain]).collect(),
             false => vec![self.given_gain],
         };
-        let mut best: Option<(f64, Candidate)> = None;
+        let mut minima: Vec<(f64, Candidate)> = Vec::new();
         for gain in gains {
             let mut with_gain = axis.clone();
             with_gain.position_loop.gain = gain;
             for start in self.starts(&with_gain, periods, &held, lag).iter().take(FOLLOWED) {
-                let Some(found) = self.follow(&with_gain, periods, &held, &start.values) else { continue };
-                if best.as_ref().is_none_or(|(_, known)| found.cost < known.cost) {
-                    best = Some((gain, found));
-                }
+                let found = self.follow(&with_gain, periods, &held, &start.values);
+                minima.extend(found.map(|found| (gain, found)));
             }
         }
-        let (gain, found) = best?;
-        let mut values = found.values.into_iter();
-        let from =
-            parameters.iter().map(|p| if *p == LoopParameter::Gain { Some(gain) } else { values.next() });
-        self.follow(axis, periods, parameters, &from.collect::<Option<Vec<f64>>>()?)
+        minima.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        let freed = minima.into_iter().take(FREED).filter_map(|(gain, found)| {
+            let mut values = found.values.into_iter();
+            let from =
+                parameters.iter().map(|p| if *p == LoopParameter::Gain { Some(gain) } else { values.next() });
+            self.follow(axis, periods, parameters, &from.collect::<Option<Vec<f64>>>()?)
+        });
+        freed.min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     /// Fits delays, gains and weights; `lag` is the best constant lag between commanded and actual position, s.
@@ -296,10 +244,10 @@ impl LoopProblem<'_> {
         // The delay of the machine file is a whole number of position cycles.
         let tsp = seconds(periods.position);
         let cycles = (free.values[0] / tsp).round().max(0.0);
-        let (fixed, _) = self.apply(axis, &periods, &[LoopParameter::Lag], &[cycles * tsp]);
+        let (fixed, _) = apply(axis, &periods, &[LoopParameter::Lag], &[cycles * tsp]);
         let others = &parameters[1..];
         let last = self.follow(&fixed, &periods, others, &free.values[1..])?;
-        let (found, _) = self.apply(&fixed, &periods, others, &last.values);
+        let (found, _) = apply(&fixed, &periods, others, &last.values);
         let errors = self.errors(axis, &periods, &parameters, &free.values)?;
         let count = self.residuals(&fixed, &periods, others, &last.values)?.len().max(1) as f64;
         let values = parameters.iter().enumerate().map(|(k, &parameter)| LoopValue {
@@ -390,24 +338,6 @@ impl LoopProblem<'_> {
     }
 }
 
-/// Returns the residuals of a weak prior, m or rad. Production traces do not determine all parameters of the velocity loop
-/// and of the torque feedforward; the prior keeps them at usual values.
-fn prior(parameters: &[LoopParameter], values: &[f64], given_gain: f64) -> Vec<f64> {
-    let of = |parameter: LoopParameter| {
-        parameters.iter().position(|p| *p == parameter).and_then(|k| values.get(k)).copied()
-    };
-    let bandwidth = of(LoopParameter::Bandwidth).unwrap_or(BANDWIDTH);
-    let distance = |(parameter, &value): (&LoopParameter, &f64)| match parameter {
-        LoopParameter::Lag | LoopParameter::Beta => 0.0,
-        LoopParameter::Gamma => (value - of(LoopParameter::Beta).unwrap_or(value)) / 5e-3,
-        LoopParameter::Gain => (value / given_gain).ln() / 0.4,
-        LoopParameter::Bandwidth => (value / BANDWIDTH).ln() / 0.4,
-        LoopParameter::IntegralTime => (value * bandwidth / 1.5).ln() / 0.4,
-        LoopParameter::TorqueRatio => (value - 1.0) / 0.1,
-    };
-    parameters.iter().zip(values).map(|pair| PRIOR * distance(pair)).collect()
-}
-
 /// Returns the position cycle of the machine file if it divides the lag, else a shorter one.
 fn position_cycle(periods: &Periods, lag: f64) -> Nanoseconds {
     let shorter =
@@ -419,9 +349,4 @@ fn position_cycle(periods: &Periods, lag: f64) -> Nanoseconds {
     };
     let found = all.iter().copied().find(divides);
     found.or(all.last().copied()).unwrap_or(periods.position)
-}
-
-fn nanoseconds(time: f64) -> Nanoseconds {
-    // A microsecond is less than the uncertainty of any delay.
-    (time * 1e6).round() as Nanoseconds * MICROSECOND_NS
 }

@@ -20,6 +20,7 @@ mod gravity;
 mod identification;
 mod inertia;
 mod loop_fit;
+mod loop_parameter;
 mod low_pass;
 mod options;
 mod plant_regression;

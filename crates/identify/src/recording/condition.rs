@@ -22,6 +22,9 @@ const SPAN_DEVIATIONS: f64 = 20.0;
 const COARSEST: f64 = 0.5;
 /// Allowed half-power frequencies of the low-pass filter of a control, Hz.
 const TRACE_FILTERS: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
+/// Largest number of corrections of a delayed PSEC, and lag at which they end, s.
+const SHIFTS: usize = 20;
+const SHIFTED: f64 = 1e-5;
 /// Relative rounding tolerance of a given cut-off frequency.
 const ROUNDING: f64 = 1e-9;
 
@@ -127,16 +130,31 @@ fn shift_psec(
     period: f64,
     findings: &mut Vec<Finding>,
 ) {
-    let by = match shift {
+    let recorded: Vec<Option<CubicSpline>> = parts
+        .iter()
+        .map(|part| part.section.columns[PSEC].as_ref().map(|psec| CubicSpline::new(psec, period)))
+        .collect();
+    let move_by = |parts: &mut [FilteredSection], by: f64| {
+        for (part, spline) in parts.iter_mut().zip(&recorded) {
+            if let (Some(psec), Some(spline)) = (&mut part.section.columns[PSEC], spline) {
+                *psec = (0..psec.len()).map(|i| spline.at(i as f64 * period + by)[0]).collect();
+            }
+        }
+    };
+    let mut by = match shift {
         PsecShift::None => return,
         PsecShift::By(time) => time,
-        PsecShift::Auto => (-plausibility::psec_lead(parts)).max(0.0),
+        PsecShift::Auto => 0.0,
     };
-    for part in parts {
-        if let Some(psec) = &mut part.section.columns[PSEC] {
-            let spline = CubicSpline::new(psec, period);
-            *psec = (0..psec.len()).map(|i| spline.at(i as f64 * period + by)[0]).collect();
+    move_by(parts, by);
+    // The regression underestimates a lag that is long compared with the accelerations.
+    for _ in 0..if shift == PsecShift::Auto { SHIFTS } else { 0 } {
+        let lag = -plausibility::psec_lead(parts);
+        if lag < SHIFTED {
+            break;
         }
+        by += lag;
+        move_by(parts, by);
     }
     let what = format!("{name}: PSEC is moved forward by {:.2} ms; α is counted from there", by * 1e3);
     findings.push(Finding::note("psec-shifted", what));

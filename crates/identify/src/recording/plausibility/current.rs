@@ -1,0 +1,89 @@
+//! Plausibility of the current: magnitude, column and sign.
+
+use super::super::ConditioningError;
+use super::super::current_lag::MovingSamples;
+use super::super::filtered_section::FilteredSection;
+use super::super::regression::{LeastSquares, correlation};
+use super::super::spans::{CURRENT, POSITION, VELOCITY};
+use super::{PlausibilityCheck, SAME};
+use virtual_axes_core::statistics::{median, quantile};
+
+/// Largest permitted current relative to the current limit of the motor; recordings can contain peak instead
+/// of RMS values.
+const CURRENTS: f64 = 5.0;
+/// Smallest contribution to R² of a significant effect.
+const EFFECT: f64 = 0.05;
+/// Smallest contribution of the acceleration to R² that determines the sign of the current.
+const INERTIAL: f64 = 0.01;
+/// Fewest samples in motion that determine the sign of the current.
+const FEWEST_MOVING: usize = 15;
+/// R² below which the current is unrelated to the motion.
+const EXPLAINED: f64 = 0.5;
+/// Smallest share of moving samples in each direction that separates friction from gravity.
+const BOTH_WAYS: f64 = 0.05;
+
+impl PlausibilityCheck<'_> {
+    pub(super) fn check_current_magnitude(&self) -> Result<(), ConditioningError> {
+        let Some(current) = self.columns[CURRENT].as_deref() else { return Ok(()) };
+        let largest = quantile(&mut current.iter().map(|i| i.abs()).collect::<Vec<_>>(), 0.99).unwrap_or(0.0);
+        let limit = self.axis.motor.max_current;
+        if largest <= CURRENTS * limit {
+            return Ok(());
+        }
+        let looks_like = if largest * 1e-3 <= CURRENTS * limit {
+            "it is likely in mA; give current=COLUMN[mA]"
+        } else {
+            ""
+        };
+        let looks_like = looks_like.to_owned();
+        Err(ConditioningError::CurrentTooLarge { name: self.name(), current: largest, limit, looks_like })
+    }
+
+    pub(super) fn check_current_column(&self) -> Result<(), ConditioningError> {
+        let (Some(current), Some(smooth)) = (self.columns[CURRENT].as_deref(), &self.smooth_current) else {
+            return Ok(());
+        };
+        let recorded = self.columns[VELOCITY].as_deref().map(|v| ("velocity", correlation(current, v)));
+        let candidates = [
+            ("position", correlation(current, self.column(POSITION))),
+            ("velocity", correlation(smooth, &self.velocity)),
+        ];
+        for (signal, correlation) in candidates.into_iter().chain(recorded) {
+            if correlation.abs() > SAME {
+                return Err(ConditioningError::CurrentIsMotion { name: self.name(), signal, correlation });
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the friction current, A, if its sign and that of the inertia part are wrong; gravity does not matter.
+    pub(super) fn inverted_current(&self, parts: &[FilteredSection]) -> Option<f64> {
+        self.smooth_current.as_ref()?;
+        let moving = MovingSamples::new(parts, self.axis.kind, 0, 0);
+        let currents: Option<Vec<f64>> =
+            moving.indices.iter().map(|&(p, n)| Some(parts[p].smooth_current.as_ref()?[n])).collect();
+        let currents = currents.unwrap_or_default();
+        if currents.len() < FEWEST_MOVING {
+            return None;
+        }
+        let whole = LeastSquares::new(moving.columns.clone()).fit(&currents);
+        let without = |left_out: &[usize]| {
+            let kept = (0..moving.columns.len()).filter(|n| !left_out.contains(n));
+            LeastSquares::new(kept.map(|n| moving.columns[n].clone()).collect()).fit(&currents).r2
+        };
+        let speeds = &moving.columns[1];
+        let forward = speeds.iter().filter(|v| **v > 0.0).count() as f64 / speeds.len().max(1) as f64;
+        let common = median(&mut speeds.iter().map(|v| v.abs()).collect::<Vec<_>>()).unwrap_or(0.0);
+        let friction = whole.coefficients[1] * common + whole.coefficients[2];
+        let believed = |left_out: &[usize]| whole.r2 - without(left_out) > EFFECT;
+        let friction_sign = if (BOTH_WAYS..=1.0 - BOTH_WAYS).contains(&forward) && believed(&[1, 2]) {
+            friction.signum()
+        } else {
+            0.0
+        };
+        let is_inertial = whole.r2 - without(&[0]) > INERTIAL;
+        let inertia_sign = if is_inertial { whole.coefficients[0].signum() } else { 0.0 };
+        let turned = friction_sign + inertia_sign < 0.0;
+        (turned && whole.r2 > EXPLAINED).then_some(friction)
+    }
+}
