@@ -216,6 +216,16 @@ fn recordings_without_information_on_the_axis_are_rejected() {
 }
 
 #[test]
+fn active_feedforward_is_inferred_from_a_short_lag() {
+    let found = json(&["identify", &RECORDINGS.both, "--axis", "x", "--no-refine", "--json"]);
+    assert_eq!(found["recordings"][0]["feedforward"], serde_json::json!(["both"]));
+    let mut findings = found["findings"].as_array().into_iter().flatten();
+    let note = findings.find(|finding| finding["code"] == "feedforward-inferred").expect("a finding");
+    let text = note["text"].as_str().expect("a text");
+    assert!(text.contains("feedforward both is assumed") && text.contains("1 / Kp, 40.0 ms"), "{text}");
+}
+
+#[test]
 fn invalid_input_is_rejected_with_its_name() {
     let folder = TestFolder::new("identify_bad");
     let file = |name: &str, text: &str| folder.file(name, text).to_string_lossy().into_owned();
@@ -234,13 +244,16 @@ fn invalid_input_is_rejected_with_its_name() {
         let arguments = of(more);
         assert_rejected(&arguments.iter().map(String::as_str).collect::<Vec<_>>(), parts);
     };
-    assert_rejected(&["identify", &recordings.off], &["--axis"]);
     assert_rejected(&["identify", "--axis", "x"], &["RECORDING"]);
     assert_rejected(
         &["identify", &recordings.off, "--axis", "X1"],
         &["--axis X1", "x, y, z, a, c", "nearest is x"],
     );
-    assert_rejected(&["identify", &recordings.off, "--axis", "x"], &["off.csv: has no", "--feedforward off"]);
+    // 1 / Kp of 1.5 (m/min)/mm.
+    assert_rejected(
+        &["identify", &recordings.off, "--axis", "x"],
+        &["off.csv: has no", "the lag of the position (", "1 / Kp, 40.0 ms", "--feedforward off"],
+    );
     let missing = out("missing.csv");
     assert_rejected(&["identify", &missing, "--axis", "x"], &["missing.csv: "]);
     assert_rejected(&["identify", &empty, "--axis", "x"], &["empty.csv: the file is empty"]);

@@ -7,6 +7,7 @@ mod command_design;
 mod files_output;
 mod hints;
 mod identify_command;
+mod identify_traces;
 mod ingress_properties;
 mod interface;
 mod output_form;

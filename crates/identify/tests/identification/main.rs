@@ -1,4 +1,4 @@
-//! TODO
+//! Tests of conditioning and identification.
 
 mod identify_campaign;
 mod identify_criterion;

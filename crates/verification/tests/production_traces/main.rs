@@ -1,4 +1,5 @@
 //! Tests of the production traces.
 
 mod hidden_axes;
+mod identification;
 mod traces;

@@ -1,0 +1,116 @@
+//! The command `virtual_axes identify` on production traces.
+
+use std::sync::LazyLock;
+
+use virtual_axes_core::config::AxisConfig;
+use virtual_axes_verification::fixtures::folder::TestFolder;
+use virtual_axes_verification::production_traces::{
+    AxisGuess, HiddenMachine, TraceRecorder, machine_file, write_csv,
+};
+
+use crate::command_common::{json, printed, run};
+
+/// Seed of the machine.
+const SEED: u64 = 6000;
+/// Parameter groups without the position-loop gain, of which several start values take longer.
+const REFINE: [&str; 2] = ["--refine", "inertia,friction,gravity,feedforward"];
+
+/// Files of a machine with the axes X and Z.
+struct Files {
+    trace: String,
+    machine: String,
+    guesses: Vec<AxisGuess>,
+}
+
+/// Trace and machine file, written once.
+static FILES: LazyLock<Files> = LazyLock::new(|| {
+    // A static is never dropped: the folder remains until the next test run.
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("identify_traces");
+    std::fs::create_dir_all(&folder).expect("a folder can be made");
+    let path = |name: &str| folder.join(name).to_string_lossy().into_owned();
+    let mut hidden = HiddenMachine::draw(SEED);
+    hidden.axes.retain(|axis| axis.config.name != "y");
+    let program = hidden.program(1, 8.0).expect("a program");
+    let recordings = hidden.record(&program, &TraceRecorder::default(), 1).expect("recordings");
+    let files = Files {
+        trace: path("trace.csv"),
+        machine: path("guess.yaml"),
+        guesses: hidden.axes.iter().map(|axis| axis.guess(SEED)).collect(),
+    };
+    write_csv(files.trace.as_ref(), &recordings).expect("a trace");
+    let axes: Vec<&AxisConfig> = files.guesses.iter().map(|guess| &guess.config).collect();
+    let text = machine_file("Guess.", &axes, files.guesses[0].periods).expect("in range");
+    std::fs::write(&files.machine, text).expect("a machine file");
+    files
+});
+
+#[test]
+fn without_axis_the_columns_and_the_next_command_are_listed() {
+    let files = &*FILES;
+    let text = printed(&["identify", &files.trace, "--machine", &files.machine]);
+    let row = |header: &str| {
+        let line = text.lines().find(|line| line.contains(header));
+        line.unwrap_or_else(|| panic!("{header} in {text}")).split_whitespace().collect::<Vec<_>>()
+    };
+    for (axis, name) in [("X", "x"), ("Z", "z")] {
+        for (signal, channel) in [
+            ("commanded position [mm]", "psec"),
+            ("actual position [mm]", "position"),
+            ("actual velocity [mm/s]", "velocity"),
+            ("current [A]", "current"),
+        ] {
+            let cells = row(&format!("{axis} {signal}"));
+            assert!(cells.contains(&channel), "{cells:?}");
+            assert!(cells.iter().any(|cell| cell.eq_ignore_ascii_case(name)), "{cells:?}");
+        }
+    }
+    let next = format!(
+        "next: virtual_axes identify {} --axis all --machine {} --out identified.yaml\n",
+        files.trace, files.machine
+    );
+    assert!(text.contains(&next), "{text}");
+    assert!(text.contains("--axis x, --axis z\n"), "{text}");
+}
+
+#[test]
+fn all_axes_are_identified_into_one_machine_file() {
+    let (files, folder) = (&*FILES, TestFolder::new("identify_all"));
+    let out = folder.0.join("identified.yaml").to_string_lossy().into_owned();
+    let arguments = ["identify", &files.trace, "--axis", "all", "--machine", &files.machine];
+    let found = json(&[arguments.as_slice(), &REFINE, &["--json", "--out", &out]].concat());
+    let found = found.as_array().expect("a list");
+    let names: Vec<&str> = found.iter().filter_map(|axis| axis["axis"].as_str()).collect();
+    assert_eq!(names, ["x", "z"]);
+    for axis in found {
+        let baseline = &axis["agreement"][0]["baseline"];
+        let [command, lag, delayed, model] =
+            ["command", "lag_ms", "delayed", "model"].map(|key| baseline[key].as_f64().expect("a number"));
+        assert!(model < delayed && delayed < command && lag > 0.0, "{baseline}");
+    }
+    assert!(printed(&["check", &out]).ends_with("valid\n"));
+    let machine = std::fs::read_to_string(&out).expect("it is there");
+    let values: usize = found.iter().filter_map(|axis| axis["values"].as_array().map(Vec::len)).sum();
+    assert_eq!(machine.matches("# identified: ").count(), values);
+    let one = ["identify", &files.trace, "--axis", "x", "--machine", &files.machine];
+    let text = printed(&[one.as_slice(), &REFINE].concat());
+    assert!(text.contains("position RMS from PSEC "), "{text}");
+}
+
+#[test]
+fn an_invalid_result_is_printed_but_not_written() {
+    let (files, folder) = (&*FILES, TestFolder::new("identify_invalid"));
+    let out = folder.0.join("identified.yaml").to_string_lossy().into_owned();
+    let constant = 10.0 * files.guesses[0].config.motor.torque_constant;
+    let set = format!("x.motor.torque_constant_nm_a={constant}");
+    let one = ["identify", &files.trace, "--axis", "x", "--machine", &files.machine];
+    let output = run(&[one.as_slice(), &REFINE, &["--set", &set, "--out", &out]].concat());
+    let [stdout, stderr] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+    assert_eq!(output.status.code(), Some(3), "{stderr}");
+    assert!(stdout.contains("x.motor.inertia_kg_m2 ") && stdout.contains("\ninvalid: "), "{stdout}");
+    assert!(
+        stderr.starts_with("invalid result, no machine file is written:\nx: motor inertia: "),
+        "{stderr}"
+    );
+    assert!(stderr.contains("; check torque constant"), "{stderr}");
+    assert!(folder.names().is_empty());
+}
