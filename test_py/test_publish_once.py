@@ -1,7 +1,7 @@
 """Publishers that publish at the match, and end soon after, as `ros2 topic pub --once` does.
 
-The publishers stay for 1 s. Without the request of the node they would repeat a missed sample after 3 s only. The losses
-with the 0.1 s of `ros2 topic pub --once` depend on the load of the machine: tools/measure_publish_once.py.
+The publishers stay for 1 s. Without the request of the node they would repeat a missed sample after 3 s only. The
+losses with the 0.1 s of `ros2 topic pub --once` depend on the load of the machine: tools/measure_publish_once.py.
 """
 
 from __future__ import annotations
