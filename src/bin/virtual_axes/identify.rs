@@ -102,19 +102,29 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     let Some(name) = &arguments.axis else {
         return columns::listing(&arguments.recordings, &arguments.reading, &config, &arguments.machine);
     };
-    let indices = if name == ALL {
+    let is_all = name == ALL;
+    let indices = if is_all {
         columns::recorded_axes(&arguments.recordings, &arguments.reading, &config)?
     } else {
         vec![axis::index(&config, name)?]
     };
-    if let (Some(page), true) = (&arguments.report, indices.len() > 1) {
-        return Err(format!("{}: a report has one axis; give --axis", page.display()).into());
+    if let (Some(page), true) = (&arguments.report, is_all) {
+        return Err(
+            format!("{}: --axis all writes no report; give the name of one axis", page.display()).into()
+        );
     }
+    let mut failures = Vec::new();
     let spinner = Spinner::new();
     let (mut texts, mut summaries, mut present) = (Vec::new(), Vec::new(), parameters);
     for index in indices {
         let config = present.machine_config()?;
-        let (found, identified) = identify(arguments, &present, &config, index, &spinner)?;
+        let (found, identified) = match identify(arguments, &present, &config, index, &spinner) {
+            Err(error) if is_all => {
+                failures.push(format!("{}: {error}", config.axes()[index].name()));
+                continue;
+            }
+            found => found?,
+        };
         spinner.set_activity("writing")?;
         if let Some(page) = &arguments.report {
             write_report(page, &found, config.periods())?;
@@ -123,7 +133,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
         summaries.push(found.summary);
         present = identified;
     }
-    if let Some(invalid) = invalid_result(&summaries) {
+    if let Some(invalid) = invalid_result(&summaries, &failures) {
         drop(spinner);
         return Err(Box::new(InvalidResult {
             text: joined(arguments, &summaries, &texts)?,
@@ -157,12 +167,12 @@ impl std::fmt::Display for InvalidResult {
 impl Error for InvalidResult {}
 
 /// Returns the reasons why results must not be used; none if they can be.
-fn invalid_result(summaries: &[IdentificationSummary]) -> Option<String> {
+fn invalid_result(summaries: &[IdentificationSummary], failures: &[String]) -> Option<String> {
     let invalid = summaries.iter().flat_map(|summary| {
         let findings = summary.findings.iter().filter(|finding| finding.severity == Severity::Invalid);
         findings.map(|finding| format!("{}: {finding}", summary.axis))
     });
-    let reasons: Vec<String> = invalid.collect();
+    let reasons: Vec<String> = failures.iter().cloned().chain(invalid).collect();
     (!reasons.is_empty())
         .then(|| format!("invalid result, no machine file is written:\n{}", reasons.join("\n")))
 }
@@ -309,6 +319,15 @@ fn identify(
         Ok(AxisValidation { recorded, agreement })
     });
     let validations: Vec<AxisValidation> = validations.collect::<Result<_, Box<dyn Error>>>()?;
+    for AxisValidation { recorded, agreement } in &validations {
+        let kind = axis.kind();
+        findings.extend(virtual_axes_identify::identify::invalid_agreement(
+            &recorded.signals.name,
+            agreement,
+            kind,
+        ));
+    }
+    findings.sort_by_key(|finding| Reverse(finding.severity));
     let validated: Vec<(IdentificationInput<'_>, &Agreement)> =
         validations.iter().map(|v| (v.recorded.input(), &v.agreement)).collect();
     let summary =

@@ -193,7 +193,11 @@ fn friction(friction: &FrictionSummary, speed_unit: &str) -> String {
         FrictionLaw::DoubleExponential => "a e^(bV) + c e^(dV) (Prévost eq. 3)",
         FrictionLaw::Linear => "Coulomb level and viscous slope",
     };
-    let mut text = format!("friction: {name}, {} speeds, R² {:.5}", friction.speeds.len(), law.r_squared);
+    let from = match friction.speeds.len() {
+        0 => "regression of the current".to_owned(),
+        count => format!("{count} speeds"),
+    };
+    let mut text = format!("friction: {name}, {from}, R² {:.5}", law.r_squared);
     if friction.asymmetry.is_finite() {
         text.push_str(&format!("; directions differ by up to {:.1} %", 100.0 * friction.asymmetry));
     }

@@ -222,19 +222,7 @@ impl LoopProblem<'_> {
     pub fn fit(&self, axis: &AxisConfig, given: &Periods, lag: f64) -> Option<LoopFit> {
         let parameters = self.parameters(axis);
         let first = self.best(axis, given, &parameters, lag)?;
-        let found_lag = first.values[0];
-        let periods = Periods { position: position_cycle(given, found_lag), ..*given };
-        // The velocity feedforward is a difference over the position cycle: β + Tsp is what the motion shows.
-        let change = seconds(given.position) - seconds(periods.position);
-        let from: Vec<f64> = parameters
-            .iter()
-            .zip(&first.values)
-            .map(|(parameter, value)| match parameter {
-                LoopParameter::Beta | LoopParameter::Gamma => value + change,
-                _ => *value,
-            })
-            .collect();
-        let free = self.follow(axis, &periods, &parameters, &from).unwrap_or(first);
+        let (periods, free) = self.with_dividing_cycle(axis, given, &parameters, first);
         let with_given = self.with_given_gain(axis, &periods, &parameters, &free);
         let given_cost = with_given.as_ref().map(|(_, found)| found.cost);
         // A gain that the motion hardly shows stays that of the machine file.
@@ -264,6 +252,35 @@ impl LoopProblem<'_> {
             axis: found,
             periods,
         })
+    }
+
+    /// Returns the minimum with the longest position cycle that divides its lag: that of the machine file or a shorter one;
+    /// the shortest if none does. A wrong cycle shifts the lag, so it is found anew with each.
+    fn with_dividing_cycle(
+        &self,
+        axis: &AxisConfig,
+        given: &Periods,
+        parameters: &[LoopParameter],
+        first: Candidate,
+    ) -> (Periods, Candidate) {
+        let mut best = (*given, first);
+        for cycle in CYCLES.iter().filter(|cycle| **cycle < given.position && **cycle % given.velocity == 0) {
+            let (before, candidate) = &best;
+            if divides(before.position, candidate.values[0]) {
+                break;
+            }
+            let periods = Periods { position: *cycle, ..*given };
+            // The velocity feedforward is a difference over the position cycle: β + Tsp is what the motion shows.
+            let change = seconds(before.position) - seconds(*cycle);
+            let from = parameters.iter().zip(&candidate.values).map(|(parameter, value)| match parameter {
+                LoopParameter::Beta | LoopParameter::Gamma => value + change,
+                _ => *value,
+            });
+            let from: Vec<f64> = from.collect();
+            let Some(found) = self.follow(axis, &periods, parameters, &from) else { continue };
+            best = (periods, found);
+        }
+        best
     }
 
     /// Returns the minimum with the gain of the machine file, and its parameters; none if the gain is not fitted.
@@ -338,15 +355,8 @@ impl LoopProblem<'_> {
     }
 }
 
-/// Returns the position cycle of the machine file if it divides the lag, else a shorter one.
-fn position_cycle(periods: &Periods, lag: f64) -> Nanoseconds {
-    let shorter =
-        CYCLES.iter().copied().filter(|cycle| *cycle < periods.position && *cycle % periods.velocity == 0);
-    let all: Vec<Nanoseconds> = std::iter::once(periods.position).chain(shorter).collect();
-    let divides = |cycle: &Nanoseconds| {
-        let tsp = seconds(*cycle);
-        (lag - (lag / tsp).round() * tsp).abs() <= GRID_TOLERANCE
-    };
-    let found = all.iter().copied().find(divides);
-    found.or(all.last().copied()).unwrap_or(periods.position)
+/// Returns true if the lag, s, is a whole number of cycles.
+fn divides(cycle: Nanoseconds, lag: f64) -> bool {
+    let tsp = seconds(cycle);
+    (lag - (lag / tsp).round() * tsp).abs() <= GRID_TOLERANCE
 }

@@ -49,6 +49,7 @@ pub use options::{IdentificationInput, IdentificationOptions, RefinementScope};
 pub use production::are_production_traces;
 pub use refine::{RefinedParameter, RefinedValue, Refinement, refine};
 pub(crate) use resample::CubicSpline;
+pub use sanity::invalid_agreement;
 pub use segments::{MotionSegment, SegmentKind, find_segments};
 pub use steps::identify;
 pub use validate::{

@@ -13,6 +13,7 @@ use super::resample::CubicSpline;
 use crate::recording::{SignalSpan, Signals};
 use virtual_axes_core::config::{AxisConfig, FrictionConfig};
 use virtual_axes_core::drive::Gravity;
+use virtual_axes_core::statistics::quantile;
 use virtual_axes_core::units::MILLIMETER;
 
 /// Longest step of the friction current before it is filtered like the current, s.
@@ -248,10 +249,11 @@ fn gravity_at_rest(still: &[f64], i0: f64) -> Option<(GravityCurrent, GravityCur
     if still.len() < FEWEST_STILL {
         return None;
     }
-    let (low, high) =
-        still.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), i| (l.min(*i), h.max(*i)));
+    let mut still = still.to_vec();
+    let (low, high) = (quantile(&mut still, 0.05)?, quantile(&mut still, 0.95)?);
     let only = |constant| GravityCurrent { constant, ..GravityCurrent::default() };
-    Some((only(0.5 * (low + high)), only((i0 - 0.5 * (high - low)).max(0.0))))
+    let half = i0 - 0.5 * (high - low);
+    (half > 0.0).then(|| (only(0.5 * (low + high)), only(half)))
 }
 
 /// Converts the fitted values into results of the identification.

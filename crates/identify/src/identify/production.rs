@@ -22,13 +22,14 @@ use virtual_axes_core::config::{AxisConfig, AxisKind, Periods, PositionControlle
 use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds};
 
+/// Travel of an axis that moves, m or rad.
+const SHORTEST_TRAVEL: f64 = 1e-3;
 /// Standard errors of a significant gravity.
 const SIGNIFICANT: f64 = 3.0;
 /// Gravity relative to friction below which it is neglected.
 const RELEVANT: f64 = 0.02;
-/// Relative change of the gain, and of the residual with it, from which the gain of the machine file does not fit.
+/// Relative change of the gain from which that of the machine file does not fit.
 const GAIN_CHANGE: f64 = 0.15;
-const GAIN_RESIDUAL: f64 = 1.5;
 /// Ratio of the residuals with and without feedforward from which the smaller one is certain.
 const CLEAR: f64 = 1.5;
 /// Standard errors of a delay within its interval.
@@ -56,13 +57,24 @@ pub(super) fn identify_production(
     scope: RefinementScope,
     found: &mut Identification,
 ) {
+    if !inputs.iter().any(|input| moves(input.signals)) {
+        found.findings.push(Finding::missing(
+            "no-motion",
+            "the axis does not move in these recordings",
+            "record a program with moves in both directions",
+        ));
+        return;
+    }
     report_interpolation(inputs, found);
     let signals: Vec<&Signals> = inputs.iter().map(|input| input.signals).collect();
     match fit_plant_by_regression(&signals, &found.axis) {
-        Some(plant) => apply_plant(plant, scope, found),
+        Some(plant) => apply_plant(plant, found),
         None => found.findings.push(Finding::missing(
             "few-moves",
-            "no inertia, friction and gravity: the recordings have less than four moves with current",
+            match signals.iter().any(|signals| signals.spans.iter().any(|span| span.current.is_some())) {
+                true => "no inertia, friction and gravity: the recordings have less than four moves with current",
+                false => "no inertia, friction and gravity: no recording has a current; those of the machine file are used",
+            },
             "record the current of a program with moves in both directions",
         )),
     }
@@ -142,6 +154,13 @@ fn infer_feedforward(
     Some((mode, fit))
 }
 
+/// Returns true if the position covers more than some encoder increments.
+fn moves(signals: &Signals) -> bool {
+    let positions = signals.spans.iter().flat_map(|span| span.position.iter().copied());
+    let (low, high) = positions.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    high - low > SHORTEST_TRAVEL
+}
+
 /// Reports the error of the interpolated setpoints.
 fn report_interpolation(inputs: &[IdentificationInput<'_>], found: &mut Identification) {
     let (unit, name) = position_unit(&found.axis);
@@ -168,7 +187,7 @@ fn position_unit(axis: &AxisConfig) -> (f64, &'static str) {
 }
 
 /// Sets inertia, friction and gravity by the regression.
-fn apply_plant(plant: PlantRegression, scope: RefinementScope, found: &mut Identification) {
+fn apply_plant(plant: PlantRegression, found: &mut Identification) {
     for (a, b, rho) in &plant.collinear {
         found.findings.push(Finding::note(
             "correlated",
@@ -178,9 +197,7 @@ fn apply_plant(plant: PlantRegression, scope: RefinementScope, found: &mut Ident
         ));
     }
     let axis = &mut found.axis;
-    if scope == RefinementScope::NONE || scope.inertia {
-        axis.motor.inertia = plant.inertia.value;
-    }
+    axis.motor.inertia = plant.inertia.value;
     axis.friction = plant.friction.law.config;
     let gravity = significant_gravity(plant.gravity, &plant.friction.law.config);
     if let (Some((weight, _)), AxisKind::Linear) = (gravity.weight, axis.kind()) {
@@ -298,18 +315,21 @@ fn report_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
     }
     let Some(with_given) = fit.rms_with_given_gain else { return };
     let (given, gain) = (before.position_loop.gain, fit.axis.position_loop.gain);
-    if (gain / given - 1.0).abs() > GAIN_CHANGE && with_given > GAIN_RESIDUAL * fit.rms {
-        let (unit, name) = position_unit(&fit.axis);
-        found.findings.push(Finding::warning(
+    let (unit, name) = position_unit(&fit.axis);
+    let what = format!(
+        "position_loop.gain {:.3} of the machine file leaves {:.1} {name} RMS, {:.3} leaves {:.1} {name}",
+        given / POSITION_GAIN,
+        with_given / unit,
+        gain / POSITION_GAIN,
+        fit.rms / unit
+    );
+    found.findings.push(if (gain / given - 1.0).abs() > GAIN_CHANGE {
+        Finding::warning(
             "gain-does-not-fit",
-            format!(
-                "position_loop.gain {:.3} of the machine file leaves {:.1} {name} RMS, {:.3} leaves {:.1} {name}",
-                given / POSITION_GAIN,
-                with_given / unit,
-                gain / POSITION_GAIN,
-                fit.rms / unit
-            ),
+            what,
             "compare with the servo gain in the machine data of the control; --refine without gain keeps that of the file",
-        ));
-    }
+        )
+    } else {
+        Finding::note("gain-does-not-fit", what)
+    });
 }

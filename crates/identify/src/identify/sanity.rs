@@ -3,14 +3,17 @@
 use super::delays::DelayParameter;
 use super::identification::Identification;
 use super::options::IdentificationInput;
-use crate::recording::Finding;
-use virtual_axes_core::config::AxisKind;
-use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, POSITION_GAIN, Rounded};
+use super::validate::Agreement;
+use crate::recording::{Finding, Signals};
+use virtual_axes_core::config::{AxisConfig, AxisKind};
+use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, POSITION_GAIN, RPM, Rounded};
 
 /// Largest factor between an identified value and that of the machine file.
 const LARGEST_FACTOR: f64 = 3.0;
 /// Smallest R² of the current.
 const LEAST_DETERMINATION: f64 = 0.9;
+/// Recorded speed relative to the limit of the motor from which the transmission cannot be right.
+const FASTEST: f64 = 1.1;
 /// Position residual, m and rad, that is good enough whatever a constant lag leaves.
 const GOOD: f64 = 5e-6;
 const GOOD_ANGLE: f64 = 5e-3 * DEGREE;
@@ -56,35 +59,61 @@ pub(super) fn report_invalid(inputs: &[IdentificationInput<'_>], found: &mut Ide
             }),
         }
     }
-    let good = match after.kind() {
-        AxisKind::Linear => GOOD,
-        AxisKind::Rotary => GOOD_ANGLE,
-    };
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
-        let name = &input.signals.name;
-        if let Some(baseline) = agreement.baseline.filter(|b| b.model > b.delayed && b.model > good) {
-            invalid.push(Finding::invalid(
-                "worse-than-lag",
-                format!(
-                    "{name}: the simulated position deviates by {} RMS, PSEC delayed by {:.2} ms by {} only",
-                    Rounded(baseline.model),
-                    baseline.lag * 1e3,
-                    Rounded(baseline.delayed)
-                ),
-                "check lead, gains and periods of the machine file, and the active feedforward",
-            ));
-        }
-        let inverse = agreement.inverse.as_ref().map(|inverse| inverse.r_squared);
-        let best = inverse.into_iter().chain(agreement.current_r_squared()).reduce(f64::max);
-        if let Some(r2) = best.filter(|r2| *r2 < LEAST_DETERMINATION) {
-            invalid.push(Finding::invalid(
-                "poor-current",
-                format!("{name}: the model explains {} of the current", explained(r2)),
-                "check units, torque constant and transmission; record without cutting forces",
-            ));
-        }
+        invalid.extend(invalid_agreement(&input.signals.name, agreement, after.kind()));
+        invalid.extend(too_fast(input.signals, after));
     }
     found.findings.extend(invalid);
+}
+
+/// Returns findings on an agreement that is no result: a position worse than a constant lag, or an unexplained current.
+pub fn invalid_agreement(name: &str, agreement: &Agreement, kind: AxisKind) -> Vec<Finding> {
+    let (good, unit, symbol) = match kind {
+        AxisKind::Linear => (GOOD, 1e-6, "µm"),
+        AxisKind::Rotary => (GOOD_ANGLE, 1e-3 * DEGREE, "mdeg"),
+    };
+    let mut invalid = Vec::new();
+    if let Some(baseline) = agreement.baseline.filter(|b| b.model > b.delayed && b.model > good) {
+        invalid.push(Finding::invalid(
+            "worse-than-lag",
+            format!(
+                "{name}: the simulated position deviates by {:.1} {symbol} RMS, PSEC delayed by {:.2} ms by {:.1} {symbol} only",
+                baseline.model / unit,
+                baseline.lag * 1e3,
+                baseline.delayed / unit
+            ),
+            "check lead, gains and periods of the machine file, and the active feedforward",
+        ));
+    }
+    let inverse = agreement.inverse.as_ref().map(|inverse| inverse.r_squared);
+    let best = inverse.into_iter().chain(agreement.current_r_squared()).reduce(f64::max);
+    if let Some(r2) = best.filter(|r2| *r2 < LEAST_DETERMINATION) {
+        invalid.push(Finding::invalid(
+            "poor-current",
+            format!("{name}: the model explains {} of the current", explained(r2)),
+            "check units, torque constant and transmission; record without cutting forces",
+        ));
+    }
+    invalid
+}
+
+/// Returns a finding if the recorded speed is beyond that of the motor: the lead of the machine file is too small.
+fn too_fast(signals: &Signals, axis: &AxisConfig) -> Option<Finding> {
+    let speeds = signals.spans.iter().flat_map(|span| span.velocity.iter().map(|v| v.abs()));
+    let fastest = speeds.fold(0.0, f64::max) / axis.transmission_ratio.abs();
+    let limit = axis.motor.max_speed;
+    (fastest > FASTEST * limit).then(|| {
+        Finding::invalid(
+            "too-fast",
+            format!(
+                "{}: with the transmission of the machine file the motor turns at {:.0} rpm, faster than its limit of {:.0} rpm",
+                signals.name,
+                fastest / RPM,
+                limit / RPM
+            ),
+            "check screw lead or gear ratio, and motor.max_speed_rpm",
+        )
+    })
 }
 
 fn is_far(given: f64, value: f64) -> bool {

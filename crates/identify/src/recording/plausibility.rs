@@ -178,7 +178,7 @@ impl<'a> PlausibilityCheck<'a> {
             let fits = travel * size <= MAX_TRAVEL * range;
             let key = if channel == POSITION { "position" } else { "psec" };
             let looks_like = if fits {
-                format!("it is likely in {large}; give {key}=COLUMN[{large}]")
+                format!("it is likely in {large}; give --column {key}=COLUMN[{large}]")
             } else {
                 String::new()
             };
@@ -204,11 +204,11 @@ impl<'a> PlausibilityCheck<'a> {
             String::new()
         } else if self.velocity_relation().is_some_and(|(factor, _)| UNITY.contains(&factor)) {
             format!(
-                "position and velocity are likely in {large} and {large}/s; give position=COLUMN[{large}]"
+                "position and velocity are likely in {large} and {large}/s; give --column position=COLUMN[{large}]"
             )
         } else {
             format!(
-                "the position is likely in {large}; give position=COLUMN[{large}], or time=COLUMN[s] if the time is in s"
+                "the position is likely in {large}; give --column position=COLUMN[{large}], or time=COLUMN[s] if the time is in s"
             )
         };
         Err(ConditioningError::TooFast {
@@ -234,20 +234,21 @@ impl<'a> PlausibilityCheck<'a> {
                 "the velocity is likely that of the motor in rpm; record that of the axis".to_owned(),
             ),
         ];
-        let velocity = |unit: &str| format!("the velocity is likely in {unit}; give velocity=COLUMN[{unit}]");
+        let velocity =
+            |unit: &str| format!("the velocity is likely in {unit}; give --column velocity=COLUMN[{unit}]");
         match self.axis.kind {
             AxisKind::Linear => known.extend([
                 (1.0 / MILLIMETER, velocity("mm/s")),
                 (MINUTE, velocity("m/min")),
                 (MINUTE / MILLIMETER, velocity("mm/min")),
-                (MILLIMETER, "the position is likely in mm; give position=COLUMN[mm]".to_owned()),
+                (MILLIMETER, "the position is likely in mm; give --column position=COLUMN[mm]".to_owned()),
                 (MILLIMETER * MINUTE, "the position is likely in mm, the velocity in m/min".to_owned()),
             ]),
             AxisKind::Rotary => known.extend([
                 (1.0 / DEGREE, velocity("deg/s")),
                 (1.0 / RPM, velocity("rpm")),
                 (MINUTE / DEGREE, velocity("deg/min")),
-                (DEGREE, "the position is likely in deg; give position=COLUMN[deg]".to_owned()),
+                (DEGREE, "the position is likely in deg; give --column position=COLUMN[deg]".to_owned()),
                 (DEGREE / RPM, "the position is likely in deg, the velocity in rpm".to_owned()),
             ]),
         }
@@ -274,9 +275,13 @@ impl<'a> PlausibilityCheck<'a> {
         let (large, size) = self.large_unit();
         let motor = 1.0 / self.axis.transmission_ratio.abs();
         let known = vec![
-            (1.0, "only the sign of PSEC is wrong; give psec=COLUMN with -1 before the unit".to_owned()),
-            (1.0 / size, format!("PSEC is likely in {large}; give psec=COLUMN[{large}]")),
-            (size, format!("the position is likely in {large}; give position=COLUMN[{large}]")),
+            (
+                1.0,
+                "only the sign of PSEC is wrong; give --column psec=COLUMN with -1 before the unit"
+                    .to_owned(),
+            ),
+            (1.0 / size, format!("PSEC is likely in {large}; give --column psec=COLUMN[{large}]")),
+            (size, format!("the position is likely in {large}; give --column position=COLUMN[{large}]")),
             (motor, "PSEC is likely the angle of the motor; record that of the axis".to_owned()),
             (
                 1.0 / motor,

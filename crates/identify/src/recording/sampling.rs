@@ -25,13 +25,13 @@ pub(super) fn check_period(name: &str, period: f64, periods: &Periods) -> Result
     }
     let fits = |factor: f64| (shortest..=LONGEST_PERIOD).contains(&(period * factor));
     let looks_like = if fits(1e-3) {
-        "the time is likely in ms; give time=COLUMN[ms]"
+        "the time is likely in ms; give --column time=COLUMN[ms]"
     } else if fits(1e-6) {
-        "the time is likely in us; give time=COLUMN[us]"
+        "the time is likely in us; give --column time=COLUMN[us]"
     } else if fits(1e-9) {
-        "the time is likely in ns; give time=COLUMN[ns]"
+        "the time is likely in ns; give --column time=COLUMN[ns]"
     } else if fits(1e3) || fits(1e6) || fits(1e9) {
-        "the time is likely in s; give time=COLUMN[s]"
+        "the time is likely in s; give --column time=COLUMN[s]"
     } else {
         ""
     };

@@ -31,7 +31,7 @@ impl PlausibilityCheck<'_> {
             return Ok(());
         }
         let looks_like = if largest * 1e-3 <= CURRENTS * limit {
-            "it is likely in mA; give current=COLUMN[mA]"
+            "it is likely in mA; give --column current=COLUMN[mA]"
         } else {
             ""
         };

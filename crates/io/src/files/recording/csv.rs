@@ -113,7 +113,7 @@ impl Layout {
         if let Some((column, index, field)) = wrong {
             let hint = match self.decimal_comma {
                 false if field.contains(',') && parse_number(field, true).is_some() => {
-                    "; set decimal_comma=true for decimal commas"
+                    "; set --column decimal_comma=true for decimal commas"
                 }
                 true if field.contains('.') && parse_number(field, false).is_some() => {
                     "; decimal_comma=true requires decimal commas"

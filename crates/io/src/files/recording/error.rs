@@ -68,7 +68,7 @@ pub enum AxisRecordingError {
     /// A required or selected column does not exist.
     #[error(
         "{at}: there is no column {wanted} for {channel}; there are {found}{}; time and position are required: \
-         select a column by CHANNEL=COLUMN[UNIT]{hint}",
+         select a column by --column CHANNEL=COLUMN[UNIT]{hint}",
         nearest_hint(.nearest)
     )]
     NoColumn {
