@@ -382,8 +382,8 @@ fn machine_text(
         }
     }
     let comment = |key: &str| {
-        let values = found.iter().flat_map(|summary| &summary.values);
-        values.filter(|value| value.key == key).last().map(IdentifiedValue::comment)
+        let mut values = found.iter().flat_map(|summary| &summary.values);
+        values.rfind(|value| value.key == key).map(IdentifiedValue::comment)
     };
     identified.to_yaml(&head, comment)
 }

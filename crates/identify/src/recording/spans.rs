@@ -27,8 +27,9 @@ const ABOUT: usize = 10;
 /// Smallest jump of the position behind a frozen run, in usual steps: in total, and per frozen sample.
 const LEAP: f64 = 2.5;
 const LEAP_PER_SAMPLE: f64 = 0.5;
-/// Jump, in smallest steps of the position, up to which the axis creeps by single increments of its encoder.
-const CREEPING: f64 = 3.0;
+/// Jump, in smallest steps of the position, up to which the axis creeps by single increments of its encoder: three, with
+/// rounding.
+const CREEPING: f64 = 3.5;
 /// Number of zero steps in a row that form a frozen run.
 const FROZEN: usize = 2;
 /// Share of frozen samples above which a remedy is suggested.

@@ -266,6 +266,28 @@ fn a_slow_quantized_motion_and_a_stop_are_not_frozen() {
 }
 
 #[test]
+fn single_increments_of_a_creeping_axis_are_not_frozen() {
+    // 1 µm per sample; every 50 samples two without increment and a jump.
+    let creeping = |jump: u32| {
+        let mut raw = recording();
+        let mut increments = 0;
+        let next = |n: usize| {
+            increments += match n % 50 {
+                20 | 21 => 0,
+                22 => jump,
+                _ => 1,
+            };
+            f64::from(increments) * 1e-6
+        };
+        raw.position = Some((0..SAMPLES).map(next).collect());
+        (raw.psec, raw.velocity, raw.current) = (None, None, None);
+        raw
+    };
+    assert_eq!(run(&creeping(3)).1, []);
+    assert!(codes(&run(&creeping(9)).1).contains(&"frozen"));
+}
+
+#[test]
 fn long_gaps_split_the_recording_and_short_ones_are_interpolated() {
     let mut raw = recording();
     remove(&mut raw, 6000..6500);
