@@ -78,8 +78,9 @@ pub fn verdict(found: &IdentificationSummary) -> String {
         || "not refined".to_owned(),
         |fit| format!("position residual {} {unit} RMS", digits(fit.position_rms.after, 3)),
     );
+    let invalid = if count(Severity::Invalid) > 0 { "; invalid" } else { "" };
     format!(
-        "{}: {} parameters identified, {residual}, {} missing, {} warnings\n",
+        "{}: {} parameters identified, {residual}, {} missing, {} warnings{invalid}\n",
         found.axis,
         found.values.len(),
         count(Severity::Missing),

@@ -188,7 +188,7 @@ impl fmt::Display for TraceStudy {
         let known = || all.iter().filter(|x| x.is_period_known);
         row("β, error, ms, position cycle known", known().map(|x| 1e3 * x.beta[0].abs()).collect())?;
         row("β, error, ms, all", all.iter().map(|x| 1e3 * x.beta[0].abs()).collect())?;
-        row("W / Kt, error, % (A without weight)", all.iter().map(|x| x.weight[0].abs()).collect())?;
+        row("W / Kt, error (part; A without weight)", all.iter().map(|x| x.weight[0].abs()).collect())?;
         row("unseen program, position RMS, µm", all.iter().map(|x| 1e6 * x.unseen[0]).collect())?;
         row("– relative to the best constant lag", all.iter().map(|x| x.unseen[0] / x.unseen[1]).collect())?;
         row("unseen program, 1 − R² of the current", all.iter().map(|x| 1.0 - x.r_squared).collect())?;
