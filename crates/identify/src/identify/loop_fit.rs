@@ -232,7 +232,14 @@ impl LoopProblem<'_> {
         // The delay of the machine file is a whole number of position cycles.
         let tsp = seconds(periods.position);
         let cycles = (free.values[0] / tsp).round().max(0.0);
-        let (fixed, _) = apply(axis, &periods, &[LoopParameter::Lag], &[cycles * tsp]);
+        let mut between = axis.clone();
+        if !divides(periods.position, free.values[0]) && axis.feedforward.velocity != 0.0 {
+            // The lag is α + (1 − VFFW) / Kp: VFFW represents what is left of it between two cycles.
+            let gain = parameters.iter().zip(&free.values).find(|(p, _)| **p == LoopParameter::Gain);
+            let gain = gain.map_or(self.given_gain, |(_, value)| *value);
+            between.feedforward.velocity -= (free.values[0] - cycles * tsp) * gain;
+        }
+        let (fixed, _) = apply(&between, &periods, &[LoopParameter::Lag], &[cycles * tsp]);
         let others = &parameters[1..];
         let last = self.follow(&fixed, &periods, others, &free.values[1..])?;
         let (found, _) = apply(&fixed, &periods, others, &last.values);

@@ -245,6 +245,29 @@ fn apply_loop(fit: &LoopFit, found: &mut Identification) {
         (LoopParameter::IntegralTime, RefinedParameter::VelocityIntegralTime, 1.0),
         (LoopParameter::TorqueRatio, RefinedParameter::TorqueFeedforward, inertia),
     ];
+    let weight = RefinedParameter::VelocityFeedforward;
+    let changed = of(LoopParameter::Lag).filter(|_| weight.get(&before) != weight.get(&fit.axis));
+    let changed = changed.map(|lag| RefinedValue {
+        parameter: weight,
+        before: weight.get(&before),
+        value: weight.get(&fit.axis),
+        error: lag.error * fit.axis.position_loop.gain,
+        is_at_bound: false,
+    });
+    if let Some(value) = changed {
+        found.findings.push(Finding::warning(
+            "lag-between-cycles",
+            format!(
+                "the lag of {:.2} ms at constant velocity is no whole number of position cycles of {} ms: feedforward.velocity \
+                 {:.4} in place of {} represents the rest",
+                of(LoopParameter::Lag).map_or(f64::NAN, |lag| lag.value / MILLISECOND),
+                Rounded(tsp / MILLISECOND),
+                value.value,
+                Rounded(value.before)
+            ),
+            "check periods.position_ms, and the weight in the machine data of the control",
+        ));
+    }
     let parameters: Vec<RefinedValue> = refined
         .into_iter()
         .filter_map(|(parameter, refined, scale)| {
@@ -257,6 +280,7 @@ fn apply_loop(fit: &LoopFit, found: &mut Identification) {
                 is_at_bound: false,
             })
         })
+        .chain(changed)
         .collect();
     let identity = |j: usize| (0..parameters.len()).map(|k| f64::from(u8::from(j == k))).collect();
     found.refinement = Some(Refinement {

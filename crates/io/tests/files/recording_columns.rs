@@ -288,7 +288,7 @@ fn a_sampling_rate_replaces_a_column_of_time() {
     assert_eq!(
         Recorded::new("rate", text).error("x"),
         "r:1: there is no column \"time\" for time; there are position [mm], current; time and position are \
-         required: select a column by CHANNEL=COLUMN[UNIT], or give the sampling rate by --rate-hz"
+         required: select a column by --column CHANNEL=COLUMN[UNIT], or give the sampling rate by --rate-hz"
     );
     // Lost samples are visible in the sample number.
     let counted = "sample,position [mm]\n7,1\n8,2\n11,3\n";

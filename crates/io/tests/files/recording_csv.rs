@@ -365,7 +365,7 @@ fn an_error_of_a_missing_column_lists_the_columns() {
     assert_eq!(
         error("time,Positon,i\n0,0,0\n", &[]),
         "r.csv:1: there is no column \"x.position\" or \"position\" for position; there are time, Positon, i; \
-         the nearest is Positon; time and position are required: select a column by CHANNEL=COLUMN[UNIT]"
+         the nearest is Positon; time and position are required: select a column by --column CHANNEL=COLUMN[UNIT]"
     );
     assert_eq!(
         error("time,y.position,y.current\n0,0,0\n", &[]),
@@ -438,7 +438,7 @@ fn errors_name_their_lines() {
     );
     assert_eq!(
         error("time;position\n0;0\n0,5;1\n", &[]),
-        "r.csv:3: time is \"0,5\", must be a finite number; set decimal_comma=true for decimal commas"
+        "r.csv:3: time is \"0,5\", must be a finite number; set --column decimal_comma=true for decimal commas"
     );
     assert_eq!(
         error("time;position\n0;1.234,5\n", &["decimal_comma=true"]),
