@@ -5,6 +5,7 @@ use super::super::table::Table;
 use super::super::text::capital;
 use super::format::{columns, counted, digits, exact, full};
 use super::{IdentificationPage, Step, notices};
+use virtual_axes_core::units::Rounded;
 use virtual_axes_identify::identify::IdentifiedValue;
 use virtual_axes_identify::recording::Severity;
 
@@ -52,7 +53,7 @@ fn row(value: &IdentifiedValue) -> Vec<String> {
         full(value.value),
         uncertainty,
         value.unit.to_owned(),
-        exact(value.before),
+        Rounded(value.before).to_string(),
         value.source.clone(),
     ]
 }
