@@ -17,7 +17,7 @@ use virtual_axes_report::{IdentificationPage, ValidationRecording};
 
 use crate::campaign::FeedforwardName;
 use crate::identify_columns as columns;
-use crate::identify_result::{AxisValidation, IdentificationResult};
+use crate::identify_result::{AxisValidation, IdentificationResult, InvalidResult};
 use crate::input::must_not_replace;
 use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::progress::Spinner;
@@ -133,12 +133,9 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
         summaries.push(found.summary);
         present = identified;
     }
-    if let Some(invalid) = invalid_result(&summaries, &failures) {
+    if let Some(reason) = InvalidResult::reason(&summaries, &failures) {
         drop(spinner);
-        return Err(Box::new(InvalidResult {
-            text: joined(arguments, &summaries, &texts)?,
-            reason: invalid,
-        }));
+        return Err(Box::new(InvalidResult { text: joined(arguments, &summaries, &texts)?, reason }));
     }
     if let Some(out) = &arguments.out {
         machine_file::write(out, &machine_text(arguments, &summaries, &present))?;
@@ -149,33 +146,6 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
 
 /// Value of `--axis` for all recorded axes.
 const ALL: &str = "all";
-
-/// Results that must not be used, with the output and the reason.
-#[derive(Debug)]
-pub struct InvalidResult {
-    /// Output of the command.
-    pub text: String,
-    reason: String,
-}
-
-impl std::fmt::Display for InvalidResult {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.reason)
-    }
-}
-
-impl Error for InvalidResult {}
-
-/// Returns the reasons why results must not be used; none if they can be.
-fn invalid_result(summaries: &[IdentificationSummary], failures: &[String]) -> Option<String> {
-    let invalid = summaries.iter().flat_map(|summary| {
-        let findings = summary.findings.iter().filter(|finding| finding.severity == Severity::Invalid);
-        findings.map(|finding| format!("{}: {finding}", summary.axis))
-    });
-    let reasons: Vec<String> = failures.iter().cloned().chain(invalid).collect();
-    (!reasons.is_empty())
-        .then(|| format!("invalid result, no machine file is written:\n{}", reasons.join("\n")))
-}
 
 /// Returns the output for one axis, without JSON.
 fn output(arguments: &IdentifyArguments, summary: &IdentificationSummary) -> String {

@@ -1,7 +1,11 @@
 //! Result of `virtual_axes identify`.
 
+use std::error::Error;
+use std::fmt;
+
 use virtual_axes_identify::identify::summary::IdentificationSummary;
 use virtual_axes_identify::identify::{Agreement, Identification};
+use virtual_axes_identify::recording::Severity;
 
 use crate::recordings::ConditionedRecording;
 
@@ -26,3 +30,33 @@ pub struct IdentificationResult {
     /// Figures of the output.
     pub summary: IdentificationSummary,
 }
+
+/// Results that must not be used, with the output and the reason.
+#[derive(Debug)]
+pub struct InvalidResult {
+    /// Output of the command.
+    pub text: String,
+    /// Reasons, one per line.
+    pub reason: String,
+}
+
+impl InvalidResult {
+    /// Returns the reasons why results must not be used; none if they can be. `failures` are axes without a result.
+    pub fn reason(summaries: &[IdentificationSummary], failures: &[String]) -> Option<String> {
+        let invalid = summaries.iter().flat_map(|summary| {
+            let findings = summary.findings.iter().filter(|finding| finding.severity == Severity::Invalid);
+            findings.map(|finding| format!("{}: {finding}", summary.axis))
+        });
+        let reasons: Vec<String> = failures.iter().cloned().chain(invalid).collect();
+        (!reasons.is_empty())
+            .then(|| format!("invalid result, no machine file is written:\n{}", reasons.join("\n")))
+    }
+}
+
+impl fmt::Display for InvalidResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.reason)
+    }
+}
+
+impl Error for InvalidResult {}

@@ -132,7 +132,7 @@ fn main() -> ExitCode {
     let text = match run_command(&command_line().command) {
         Ok(text) => text,
         Err(error) => {
-            if let Some(invalid) = error.downcast_ref::<identify::InvalidResult>() {
+            if let Some(invalid) = error.downcast_ref::<identify_result::InvalidResult>() {
                 // The results are shown, with the reason why they must not be used.
                 let _ = io::stdout().write_all(invalid.text.as_bytes());
                 print_error(invalid);
