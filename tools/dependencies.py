@@ -32,6 +32,7 @@ FILES_AND_NETWORK = {"clap", "mcap", "rustdds", "ros2-client", "tokio"}
 LAYERS: dict[str, set[str]] = {
     "virtual_axes_core": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml", "serde_json"},
     "virtual_axes_identify": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml"},
+    "virtual_axes_nc": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml", "serde_json"},
     "virtual_axes_io": FILES_AND_NETWORK - {"mcap"},
     "virtual_axes_report": FILES_AND_NETWORK,
 }

@@ -1,0 +1,13 @@
+//! Error of a part program.
+
+/// Rejection of a part program. The text is one line that begins with the file and the line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{name} line {line}: {reason}")]
+pub struct ProgramError {
+    /// File.
+    pub name: String,
+    /// Source line, from 1.
+    pub line: usize,
+    /// Word or text of the line, what is wrong and what is supported.
+    pub reason: String,
+}
