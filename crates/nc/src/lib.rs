@@ -4,7 +4,7 @@
 //! - [`interpret`] reads a program (RS-274/NGC) and returns its [`motion`]s one by one, in constant memory.
 //! - `plan` computes the feed along these motions within the limits of the axes.
 //!
-//! ```no_run
+//! ```
 //! use std::io::Cursor;
 //!
 //! use virtual_axes_nc::interpret::{InterpreterOptions, Interpreter};

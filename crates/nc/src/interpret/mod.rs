@@ -1,38 +1,91 @@
 //! Interpreter of part programs: RS-274/NGC text to motions of the axes.
+//!
+//! Syntax and meaning of the words are those of LinuxCNC, with tool center point control (G43.4) and subprograms by
+//! number (M98, M99) as on other controls; docs/reference/part-programs.md has the list. A program is read line by
+//! line, loops and subprograms by jumps in the source: memory does not depend on the length of the program. Depth of
+//! calls and expressions, length of lines and number of repeated lines are bounded.
 
+mod arcs;
+mod codes;
 mod error;
+mod execute;
+mod expression;
+mod flow;
+mod limits;
+mod line_words;
+mod moves;
+mod o_words;
+mod offsets;
+mod options;
+mod parameters;
+mod source;
+mod spline;
+mod state;
+mod text;
 
 use std::io::{BufRead, Seek};
 
 pub use error::ProgramError;
+pub use options::{InterpreterOptions, TipTransform, WORK_OFFSET_COUNT};
 
-use crate::motion::{AXIS_COUNT, Coordinates, ProgramStep};
-
-/// Options of the interpreter.
-#[derive(Debug, Clone, Default)]
-pub struct InterpreterOptions {
-    /// Axis positions at the program start, m and rad.
-    pub start: Coordinates,
-    /// Work offsets G54 to G59.3, m and rad.
-    pub work_offsets: [[f64; AXIS_COUNT]; 9],
-    /// M codes that are accepted without effect.
-    pub ignored_m_codes: Vec<u32>,
-}
+use self::error::Outcome;
+use self::flow::Flow;
+use self::line_words::LineWords;
+use self::o_words::is_o_word;
+use self::source::LineSource;
+use self::state::State;
+use self::text::LineText;
+use crate::motion::ProgramStep;
 
 /// Interpreter of one program: an iterator over its steps, in memory independent of the program's length.
 ///
-/// The first error ends the iteration.
+/// The last step is [`End`](crate::motion::ProgramEvent::End). The first error ends the iteration.
 #[derive(Debug)]
 pub struct Interpreter<R> {
-    source: R,
     name: String,
-    options: InterpreterOptions,
+    source: LineSource<R>,
+    line: LineText,
+    block: LineWords,
+    state: State,
+    flow: Flow,
 }
 
 impl<R: BufRead + Seek> Interpreter<R> {
-    /// Creates the interpreter of the program in `source`; `name` is the file in messages.
+    /// Creates the interpreter of the program in `source`, from its start; `name` is the file in messages.
     pub fn new(source: R, name: &str, options: InterpreterOptions) -> Self {
-        Self { source, name: name.to_owned(), options }
+        Self {
+            name: name.to_owned(),
+            source: LineSource::new(source, options.repeated_lines),
+            line: LineText::default(),
+            block: LineWords::default(),
+            state: State::new(options),
+            flow: Flow::default(),
+        }
+    }
+
+    /// Executes the next line.
+    fn execute_line(&mut self) -> Outcome<()> {
+        let place = self.source.place();
+        let is_line = self.source.read(&mut self.line.raw);
+        self.state.line = self.source.line();
+        if !is_line? {
+            self.require_closed()?;
+            self.state.end();
+            return Ok(());
+        }
+        self.line.compact()?;
+        if self.line.is_optional && self.state.options.skips_optional_lines {
+            return Ok(());
+        }
+        if let Some(message) = self.line.message.take() {
+            self.state.push_event(crate::motion::ProgramEvent::Message(message));
+        }
+        if is_o_word(&self.line.text) {
+            return self.execute_o_word(place);
+        }
+        self.block.read(&self.line.text, &self.state, &self.state.options.ignored_m_codes)?;
+        self.state.execute(&mut self.block)?;
+        self.execute_jump()
     }
 }
 
@@ -40,8 +93,18 @@ impl<R: BufRead + Seek> Iterator for Interpreter<R> {
     type Item = Result<ProgramStep, ProgramError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let _ = (&mut self.source, &self.options);
-        let reason = "not supported yet".to_owned();
-        Some(Err(ProgramError { name: self.name.clone(), line: 1, reason }))
+        loop {
+            if let Some(step) = self.state.steps.pop_front() {
+                return Some(Ok(step));
+            }
+            if self.state.has_ended {
+                return None;
+            }
+            if let Err(reason) = self.execute_line() {
+                self.state.steps.clear();
+                self.state.has_ended = true;
+                return Some(Err(ProgramError { name: self.name.clone(), line: self.state.line, reason }));
+            }
+        }
     }
 }

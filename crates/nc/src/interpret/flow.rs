@@ -1,0 +1,381 @@
+//! Program flow: subprograms, loops and conditions.
+
+use std::collections::HashMap;
+use std::io::{BufRead, Seek};
+
+use super::Interpreter;
+use super::error::Outcome;
+use super::expression::Scanner;
+use super::limits::{MAX_BLOCKS, MAX_CALLS, MAX_SUBPROGRAMS};
+use super::o_words::{Keyword, Statement, is_o_word};
+use super::parameters::{CallerScope, LOCALS, integer};
+use super::source::Place;
+use super::state::Jump;
+use super::text::LineText;
+
+/// Calls, loops and conditions that are open.
+#[derive(Debug, Default)]
+pub(super) struct Flow {
+    calls: Vec<Call>,
+    /// Loops and conditions of the main program.
+    blocks: Vec<OpenBlock>,
+    /// First line of each subprogram, once a call has required them.
+    subprograms: Option<HashMap<String, Place>>,
+}
+
+/// Subprogram that runs.
+#[derive(Debug)]
+struct Call {
+    label: String,
+    entry: Place,
+    return_to: Place,
+    /// Parameters of the caller; `None` after M98, which shares them.
+    scope: Option<CallerScope>,
+    /// Number of further runs (M98 L).
+    runs_left: u32,
+    blocks: Vec<OpenBlock>,
+}
+
+/// Loop or condition that is open.
+#[derive(Debug)]
+struct OpenBlock {
+    label: String,
+    kind: BlockKind,
+}
+
+/// Kind of an open block.
+#[derive(Debug, Clone, Copy)]
+enum BlockKind {
+    If,
+    /// Loop from its `while`.
+    While(Place),
+    /// Loop from the line after its `do`.
+    Do(Place),
+    /// Loop from the line after its `repeat`, with the number of further runs.
+    Repeat(Place, u32),
+}
+
+impl<R: BufRead + Seek> Interpreter<R> {
+    /// Executes the O-word of the line at `place`.
+    pub(super) fn execute_o_word(&mut self, place: Place) -> Outcome<()> {
+        let mut scanner = Scanner::new(&self.line.text, &self.state);
+        let Statement { label, keyword } = scanner.statement()?;
+        let (arguments, count) =
+            scanner.arguments().map_err(|reason| format!("O{label} {}: {reason}", keyword.name()))?;
+        let expected = match keyword {
+            Keyword::While | Keyword::If | Keyword::ElseIf | Keyword::Repeat => 1..=1,
+            Keyword::Call => 0..=LOCALS,
+            Keyword::Return | Keyword::EndSub => 0..=1,
+            _ => 0..=0,
+        };
+        if !expected.contains(&count) {
+            return Err(format!(
+                "O{label} {}: {count} expressions in brackets, expected {}",
+                keyword.name(),
+                expected.end()
+            ));
+        }
+        let is_true = arguments[0] != 0.0;
+        match keyword {
+            Keyword::Program => Ok(()),
+            Keyword::Sub if self.flow.calls.is_empty() => {
+                self.skip_to(&label, keyword, &[Keyword::EndSub]).map(drop)
+            }
+            Keyword::Sub => Err(format!("O{label} sub within a subprogram")),
+            Keyword::Call => self.call(&label, Some(arguments), 1),
+            Keyword::EndSub | Keyword::Return => {
+                self.state.returned = (count == 1).then_some(arguments[0]);
+                self.end_call(&label, keyword)
+            }
+            Keyword::If => self.begin_if(label, is_true),
+            Keyword::ElseIf | Keyword::Else => {
+                self.require_block(&label, keyword, |kind| matches!(kind, BlockKind::If))?;
+                self.skip_to(&label, keyword, &[Keyword::EndIf])?;
+                self.close();
+                Ok(())
+            }
+            Keyword::EndIf => {
+                self.require_block(&label, keyword, |kind| matches!(kind, BlockKind::If))?;
+                self.close();
+                Ok(())
+            }
+            Keyword::Do => self.open(label, BlockKind::Do(self.source.place())),
+            Keyword::While => self.while_line(label, place, is_true),
+            Keyword::EndWhile => self.end_while(&label),
+            Keyword::Repeat => self.begin_repeat(label, arguments[0]),
+            Keyword::EndRepeat => self.end_repeat(&label),
+            Keyword::Break | Keyword::Continue => self.leave(&label, keyword),
+        }
+    }
+
+    /// Executes the jump that a line has requested.
+    pub(super) fn execute_jump(&mut self) -> Outcome<()> {
+        match self.state.jump.take() {
+            None | Some(Jump::Call { times: 0, .. }) => Ok(()),
+            Some(Jump::Call { program, times }) => self.call(&program.to_string(), None, times),
+            Some(Jump::Return) => match self.flow.calls.last() {
+                Some(call) if call.scope.is_none() => self.finish_call(),
+                _ => Err("M99 outside of a subprogram that M98 has called".to_owned()),
+            },
+        }
+    }
+
+    /// Returns an error if loops, conditions or calls are open at the end of the file.
+    pub(super) fn require_closed(&self) -> Outcome<()> {
+        if let Some(call) = self.flow.calls.last() {
+            let end = if call.scope.is_some() { "endsub" } else { "M99" };
+            return Err(format!("subprogram O{} without {end}", call.label));
+        }
+        match self.flow.blocks.last() {
+            Some(block) => Err(format!("O{}: loop or condition without end", block.label)),
+            None if self.state.spline.is_some() => Err("G5.2 without G5.3".to_owned()),
+            None => Ok(()),
+        }
+    }
+
+    fn blocks(&mut self) -> &mut Vec<OpenBlock> {
+        match self.flow.calls.last_mut() {
+            Some(call) => &mut call.blocks,
+            None => &mut self.flow.blocks,
+        }
+    }
+
+    fn open(&mut self, label: String, kind: BlockKind) -> Outcome<()> {
+        let blocks = self.blocks();
+        if blocks.len() >= MAX_BLOCKS {
+            return Err(format!("O{label}: loops and conditions nested more than {MAX_BLOCKS} levels deep"));
+        }
+        blocks.push(OpenBlock { label, kind });
+        Ok(())
+    }
+
+    fn close(&mut self) {
+        self.blocks().pop();
+    }
+
+    /// Returns the kind of the innermost block, which must have the label and satisfy `is_expected`.
+    fn require_block(
+        &mut self,
+        label: &str,
+        keyword: Keyword,
+        is_expected: fn(BlockKind) -> bool,
+    ) -> Outcome<BlockKind> {
+        match self.blocks().last() {
+            Some(block) if block.label == label && is_expected(block.kind) => Ok(block.kind),
+            Some(block) => {
+                Err(format!("O{label} {} within O{}, which has to end first", keyword.name(), block.label))
+            }
+            None => Err(format!("O{label} {} without beginning", keyword.name())),
+        }
+    }
+
+    fn begin_if(&mut self, label: String, is_true: bool) -> Outcome<()> {
+        let mut is_true = is_true;
+        while !is_true {
+            let found =
+                self.skip_to(&label, Keyword::If, &[Keyword::ElseIf, Keyword::Else, Keyword::EndIf])?;
+            match found {
+                Keyword::EndIf => return Ok(()),
+                Keyword::Else => break,
+                _ => {
+                    let mut scanner = Scanner::new(&self.line.text, &self.state);
+                    scanner.statement()?;
+                    is_true = scanner.bracket()? != 0.0;
+                }
+            }
+        }
+        self.open(label, BlockKind::If)
+    }
+
+    /// Executes `while`: the start of a loop, or the end of one that began with `do`.
+    fn while_line(&mut self, label: String, place: Place, is_true: bool) -> Outcome<()> {
+        let innermost = self.blocks().last().filter(|block| block.label == label).map(|block| block.kind);
+        match innermost {
+            Some(BlockKind::Do(start)) if is_true => self.source.jump(start),
+            Some(BlockKind::Do(_)) => {
+                self.close();
+                Ok(())
+            }
+            // The loop returns to its first line.
+            Some(BlockKind::While(start)) if start == place && is_true => Ok(()),
+            Some(BlockKind::While(start)) if start == place => {
+                self.close();
+                self.skip_to(&label, Keyword::While, &[Keyword::EndWhile]).map(drop)
+            }
+            _ if is_true => self.open(label, BlockKind::While(place)),
+            _ => self.skip_to(&label, Keyword::While, &[Keyword::EndWhile]).map(drop),
+        }
+    }
+
+    fn end_while(&mut self, label: &str) -> Outcome<()> {
+        match self.require_block(label, Keyword::EndWhile, |kind| matches!(kind, BlockKind::While(_)))? {
+            BlockKind::While(start) => self.source.jump(start),
+            _ => Ok(()),
+        }
+    }
+
+    fn begin_repeat(&mut self, label: String, count: f64) -> Outcome<()> {
+        let count = integer(count.round().max(0.0))
+            .ok_or_else(|| format!("O{label} repeat: {count} runs are too many"))?;
+        match count.checked_sub(1) {
+            Some(left) => self.open(label, BlockKind::Repeat(self.source.place(), left)),
+            None => self.skip_to(&label, Keyword::Repeat, &[Keyword::EndRepeat]).map(drop),
+        }
+    }
+
+    fn end_repeat(&mut self, label: &str) -> Outcome<()> {
+        self.require_block(label, Keyword::EndRepeat, |kind| matches!(kind, BlockKind::Repeat(..)))?;
+        let Some(OpenBlock { kind: BlockKind::Repeat(start, left), .. }) = self.blocks().last_mut() else {
+            return Ok(());
+        };
+        let start = *start;
+        match left.checked_sub(1) {
+            Some(next) => {
+                *left = next;
+                self.source.jump(start)
+            }
+            None => {
+                self.close();
+                Ok(())
+            }
+        }
+    }
+
+    /// Executes `break` or `continue` of the loop with the label.
+    fn leave(&mut self, label: &str, keyword: Keyword) -> Outcome<()> {
+        let position = self.blocks().iter().rposition(|block| block.label == label);
+        let position = position.ok_or_else(|| format!("O{label} {} outside of this loop", keyword.name()))?;
+        self.blocks().truncate(position + 1);
+        let kind = self.blocks()[position].kind;
+        let end = match kind {
+            BlockKind::If => return Err(format!("O{label} {}: not a loop", keyword.name())),
+            BlockKind::While(start) if keyword == Keyword::Continue => return self.source.jump(start),
+            BlockKind::While(_) => Keyword::EndWhile,
+            BlockKind::Repeat(..) => Keyword::EndRepeat,
+            BlockKind::Do(_) => Keyword::While,
+        };
+        self.skip_to(label, keyword, &[end])?;
+        if keyword == Keyword::Break {
+            self.close();
+            return Ok(());
+        }
+        match kind {
+            BlockKind::Repeat(..) => self.end_repeat(label),
+            _ => {
+                let mut scanner = Scanner::new(&self.line.text, &self.state);
+                scanner.statement()?;
+                let is_true = scanner.bracket()? != 0.0;
+                self.while_line(label.to_owned(), self.source.place(), is_true)
+            }
+        }
+    }
+
+    /// Reads lines up to an O-word with the label and one of the keywords, and returns its keyword.
+    ///
+    /// # Errors
+    ///
+    /// The end of the program, or of the subprogram, at the line where the search began.
+    fn skip_to(&mut self, label: &str, from: Keyword, ends: &[Keyword]) -> Outcome<Keyword> {
+        let missing = || {
+            let names: Vec<_> = ends.iter().map(|end| end.name()).collect();
+            format!("O{label} {} without {}", from.name(), names.join(" or "))
+        };
+        loop {
+            let line = self.state.line;
+            if !self.source.read(&mut self.line.raw)? {
+                return Err(missing());
+            }
+            // Other lines are not executed, and may be incomplete.
+            if self.line.compact().is_err() || !is_o_word(&self.line.text) {
+                continue;
+            }
+            let Ok(statement) = Scanner::new(&self.line.text, &self.state).statement() else { continue };
+            if statement.label == label && ends.contains(&statement.keyword) {
+                self.state.line = self.source.line();
+                return Ok(statement.keyword);
+            }
+            if matches!(statement.keyword, Keyword::Sub | Keyword::EndSub) {
+                self.state.line = line;
+                return Err(missing());
+            }
+        }
+    }
+
+    /// Calls a subprogram with its own local parameters, or by M98 with those of the caller.
+    fn call(&mut self, label: &str, arguments: Option<[f64; LOCALS]>, times: u32) -> Outcome<()> {
+        if self.flow.calls.len() >= MAX_CALLS {
+            return Err(format!("O{label}: subprograms call each other more than {MAX_CALLS} levels deep"));
+        }
+        let entry = self.subprogram(label)?;
+        let call = Call {
+            label: label.to_owned(),
+            entry,
+            return_to: self.source.place(),
+            scope: arguments.map(|arguments| self.state.parameters.enter(&arguments)),
+            runs_left: times - 1,
+            blocks: Vec::new(),
+        };
+        self.flow.calls.push(call);
+        self.state.calls = self.flow.calls.len();
+        self.state.returned = None;
+        self.source.jump(entry)
+    }
+
+    /// Ends the subprogram with the label, if that is the one that runs.
+    fn end_call(&mut self, label: &str, keyword: Keyword) -> Outcome<()> {
+        match self.flow.calls.last() {
+            Some(call) if call.label == label => self.finish_call(),
+            Some(call) => Err(format!("O{label} {} within subprogram O{}", keyword.name(), call.label)),
+            None => Err(format!("O{label} {} outside of a subprogram", keyword.name())),
+        }
+    }
+
+    /// Runs the subprogram again, or returns to its caller.
+    fn finish_call(&mut self) -> Outcome<()> {
+        let Some(call) = self.flow.calls.last_mut() else { return Ok(()) };
+        call.blocks.clear();
+        if let Some(left) = call.runs_left.checked_sub(1) {
+            call.runs_left = left;
+            let entry = call.entry;
+            return self.source.jump(entry);
+        }
+        let return_to = call.return_to;
+        if let Some(scope) = self.flow.calls.pop().and_then(|call| call.scope) {
+            self.state.parameters.leave(scope);
+        }
+        self.state.calls = self.flow.calls.len();
+        self.source.jump(return_to)
+    }
+
+    /// Returns the first line of a subprogram. The first call reads the whole file once.
+    fn subprogram(&mut self, label: &str) -> Outcome<Place> {
+        if self.flow.subprograms.is_none() {
+            self.flow.subprograms = Some(self.find_subprograms()?);
+        }
+        let place = self.flow.subprograms.as_ref().and_then(|subprograms| subprograms.get(label)).copied();
+        place.ok_or_else(|| format!("O{label}: no such subprogram in this file"))
+    }
+
+    fn find_subprograms(&mut self) -> Outcome<HashMap<String, Place>> {
+        let here = self.source.place();
+        let mut found = HashMap::new();
+        let mut line = LineText::default();
+        self.source.rewind()?;
+        while self.source.read_raw(&mut line.raw)? {
+            let has_o = line.raw.iter().any(|byte| byte.eq_ignore_ascii_case(&b'o'));
+            if !has_o || line.compact().is_err() || !is_o_word(&line.text) {
+                continue;
+            }
+            let Ok(statement) = Scanner::new(&line.text, &self.state).statement() else { continue };
+            if !matches!(statement.keyword, Keyword::Sub | Keyword::Program) {
+                continue;
+            }
+            if found.len() >= MAX_SUBPROGRAMS {
+                return Err(format!("the file has more than {MAX_SUBPROGRAMS} subprograms"));
+            }
+            found.entry(statement.label).or_insert(self.source.place());
+        }
+        self.source.jump(here)?;
+        Ok(found)
+    }
+}

@@ -1,0 +1,30 @@
+//! Bounds on everything that a program can make large or endless.
+
+/// Longest line, bytes.
+pub(super) const MAX_LINE: usize = 4096;
+/// Deepest nesting of values in an expression.
+pub(super) const MAX_NESTING: usize = 32;
+/// Deepest nesting of subprogram calls.
+pub(super) const MAX_CALLS: usize = 50;
+/// Deepest nesting of loops and conditions in one subprogram.
+pub(super) const MAX_BLOCKS: usize = 50;
+/// Largest number of named parameters, local ones of all calls included.
+pub(super) const MAX_NAMED: usize = 10_000;
+/// Largest number of subprograms in a file.
+pub(super) const MAX_SUBPROGRAMS: usize = 10_000;
+/// Largest number of G codes, M codes and parameter settings of a line, each.
+pub(super) const MAX_CODES: usize = 32;
+/// Largest number of control points of a spline.
+pub(super) const MAX_CONTROL_POINTS: usize = 10_000;
+/// Highest order of a spline.
+pub(super) const MAX_ORDER: usize = 16;
+/// Largest number of turns of a helix.
+pub(super) const MAX_TURNS: f64 = 10_000.0;
+/// Largest coordinate of a linear axis, m.
+pub(super) const MAX_LENGTH: f64 = 1e4;
+/// Largest coordinate of a rotary axis, rad.
+pub(super) const MAX_ANGLE: f64 = 1e6;
+/// Largest feed, spindle speed and dwell, in the units of the program.
+pub(super) const MAX_RATE: f64 = 1e9;
+/// Lines that jumps may repeat, unless the options have another number.
+pub(super) const REPEATED_LINES: u64 = 50_000_000;

@@ -1,0 +1,4 @@
+//! Tests of the interpreter.
+
+mod canonical;
+mod rs274;

@@ -1,0 +1,66 @@
+#!/usr/bin/env python3
+"""Interprets the programs in crates/nc/tests/rs274 with rs274 of LinuxCNC, the independent interpreter of the tests.
+
+    apt-get install linuxcnc-uspace       # Debian 12: LinuxCNC 2.9.0~pre1
+    tools/golden_rs274.py --write         writes NAME.canon, the canonical commands, beside each NAME.ngc
+    tools/golden_rs274.py                 fails if a file differs from the output of rs274
+
+`--rs274` is the program, if it is not in PATH. It starts in an empty directory, without a file of parameters: all
+offsets are 0, the unit is the millimeter, and tools.tbl is its tool table, with lengths in inches. Tests compare the
+commands with the steps of our interpreter: `cargo test -p virtual_axes_nc --test interpret rs274`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import options
+
+FOLDER = Path(__file__).resolve().parent.parent / "crates" / "nc" / "tests" / "rs274"
+TIMEOUT_S = 20.0
+
+
+def arguments() -> argparse.Namespace:
+    """Reads the command line."""
+    parser = options.parser(__doc__)
+    parser.add_argument("--write", action="store_true", help="writes the files")
+    parser.add_argument("--rs274", default="rs274", help="interpreter of LinuxCNC")
+    return parser.parse_args()
+
+
+def canonical_commands(interpreter: str, program: Path) -> str:
+    """Returns the output of rs274 for a program: one command in each line."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "out"
+        command = [interpreter, "-g", "-t", FOLDER / "tools.tbl", program, out]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT_S)
+        if done.returncode:
+            raise SystemExit(f"golden_rs274: {program.name}: {done.stderr.strip()}")
+        return re.sub(r"^ *\d+ N.{5} ", "", out.read_text(), flags=re.MULTILINE)
+
+
+def main() -> int:
+    """Writes or compares all files."""
+    args = arguments()
+    differing = []
+    programs = sorted(FOLDER.glob("*.ngc"))
+    for program in programs:
+        canon = program.with_suffix(".canon")
+        text = canonical_commands(args.rs274, program)
+        if args.write:
+            canon.write_text(text)
+        elif not canon.exists() or canon.read_text() != text:
+            differing.append(canon.name)
+    for name in differing:
+        print(f"golden_rs274: {name} differs", file=sys.stderr)
+    print(f"{len(programs)} programs, {len(differing)} differ" if not args.write else f"{len(programs)} files written")
+    return 1 if differing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
