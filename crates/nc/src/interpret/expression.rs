@@ -1,7 +1,7 @@
 //! Values of words: numbers, parameters, expressions and functions, in degrees and the units of the program.
 
 use super::error::Outcome;
-use super::limits::MAX_NESTING;
+use super::limits::{MAX_NAME, MAX_NESTING};
 use super::parameters::{Variables, parameter_number};
 
 /// Difference below which EQ and NE regard two values as equal, as LinuxCNC does.
@@ -96,7 +96,7 @@ impl<'a, V: Variables> Scanner<'a, V> {
     }
 
     /// Returns the text that is left for a message, or that the line ends.
-    fn found(&self) -> String {
+    pub(super) fn found(&self) -> String {
         let rest = self.rest();
         if rest.is_empty() { "end of the line".to_owned() } else { rest }
     }
@@ -176,6 +176,9 @@ impl<'a, V: Variables> Scanner<'a, V> {
         let end = rest.iter().position(|byte| *byte == b'>');
         let name = end.and_then(|end| str::from_utf8(&rest[..end]).ok()).filter(|name| !name.is_empty());
         let name = name.ok_or_else(|| format!("{}: a name in angle brackets is required", self.found()))?;
+        if name.len() > MAX_NAME {
+            return Err(format!("<{}…>: a name has at most {MAX_NAME} characters", &name[..MAX_NAME]));
+        }
         self.at += name.len() + 2;
         Ok(name)
     }

@@ -2,6 +2,8 @@
 
 /// Longest line, bytes.
 pub(super) const MAX_LINE: usize = 4096;
+/// Longest name of a parameter or subprogram, bytes.
+pub(super) const MAX_NAME: usize = 100;
 /// Deepest nesting of values in an expression.
 pub(super) const MAX_NESTING: usize = 32;
 /// Deepest nesting of subprogram calls.

@@ -60,7 +60,7 @@ impl LineWords {
             Target::Name(name) => Setting::Name(name.to_owned()),
         };
         if !scanner.skip("=") {
-            return Err(format!("{}: a parameter setting requires =", scanner.rest()));
+            return Err(format!("{}: a parameter setting requires =", scanner.found()));
         }
         let value = scanner.value()?;
         require_count(self.settings.len(), "parameter settings")?;

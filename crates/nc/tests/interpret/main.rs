@@ -1,4 +1,11 @@
 //! Tests of the interpreter.
 
+mod arcs;
 mod canonical;
+mod common;
+mod extensions;
+mod memory;
+mod properties;
+mod rejections;
 mod rs274;
+mod tool_center_point;

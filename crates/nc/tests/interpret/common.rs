@@ -1,0 +1,39 @@
+//! Programs as texts.
+
+use std::io::Cursor;
+
+use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions, ProgramError};
+use virtual_axes_nc::motion::{ProgramEvent, ProgramMotion, ProgramStep};
+
+/// Returns the steps of a program.
+pub fn steps(text: &str, options: InterpreterOptions) -> Result<Vec<ProgramStep>, ProgramError> {
+    Interpreter::new(Cursor::new(text), "part.nc", options).collect()
+}
+
+/// Returns the motions of a valid program.
+pub fn motions(text: &str, options: InterpreterOptions) -> Vec<ProgramMotion> {
+    let steps = steps(text, options).unwrap_or_else(|error| panic!("{error}"));
+    let motion = |step| match step {
+        ProgramStep::Motion(motion) => Some(motion),
+        ProgramStep::Event { .. } => None,
+    };
+    steps.into_iter().filter_map(motion).collect()
+}
+
+/// Returns the events of a valid program with their lines.
+pub fn events(text: &str, options: InterpreterOptions) -> Vec<(usize, ProgramEvent)> {
+    let steps = steps(text, options).unwrap_or_else(|error| panic!("{error}"));
+    let event = |step| match step {
+        ProgramStep::Event { line, event } => Some((line, event)),
+        ProgramStep::Motion(_) => None,
+    };
+    steps.into_iter().filter_map(event).collect()
+}
+
+/// Returns the error of an invalid program, by default options.
+pub fn error(text: &str) -> String {
+    match steps(text, InterpreterOptions::default()) {
+        Ok(steps) => panic!("{text:?} gives {} steps", steps.len()),
+        Err(error) => error.to_string(),
+    }
+}
