@@ -101,6 +101,7 @@ python_tests() (
 stage "format" bash -c "cargo fmt --all --check && cargo fmt --check --manifest-path fuzz/Cargo.toml" || finish 1
 stage "style" tools/check_style.py || finish 1
 background set_up
+stage "part programs" tools/part_programs.py || finish 1
 stage "dependencies" tools/dependencies.py || finish 1
 # As users build: the documentation test finds it compiled. Before the workspace, whose features differ: both put
 # their programs in the same place.

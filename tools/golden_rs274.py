@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Interprets the programs in crates/nc/tests/rs274 with rs274 of LinuxCNC, the independent interpreter of the tests.
+"""Interprets programs with rs274 of LinuxCNC, the independent interpreter of the tests.
+
+The programs are those in crates/nc/tests/rs274, and two of config/programs.
 
     apt-get install linuxcnc-uspace       # Debian 12: LinuxCNC 2.9.0~pre1
-    tools/golden_rs274.py --write         writes NAME.canon, the canonical commands, beside each NAME.ngc
+    tools/golden_rs274.py --write         writes NAME.canon, the canonical commands, of each program
     tools/golden_rs274.py                 fails if a file differs from the output of rs274
 
 `--rs274` is the program, if it is not in PATH. It starts in an empty directory, without a file of parameters: all
@@ -21,7 +23,9 @@ from pathlib import Path
 
 import options
 
-FOLDER = Path(__file__).resolve().parent.parent / "crates" / "nc" / "tests" / "rs274"
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "crates" / "nc" / "tests" / "rs274"
+SHIPPED = ["circle-diamond-square", "pocket"]
 TIMEOUT_S = 20.0
 
 
@@ -48,9 +52,9 @@ def main() -> int:
     """Writes or compares all files."""
     args = arguments()
     differing = []
-    programs = sorted(FOLDER.glob("*.ngc"))
+    programs = sorted(FOLDER.glob("*.ngc")) + [ROOT / "config" / "programs" / f"{name}.nc" for name in SHIPPED]
     for program in programs:
-        canon = program.with_suffix(".canon")
+        canon = FOLDER / f"{program.stem}.canon"
         text = canonical_commands(args.rs274, program)
         if args.write:
             canon.write_text(text)

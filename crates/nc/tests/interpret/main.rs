@@ -5,6 +5,7 @@ mod canonical;
 mod common;
 mod extensions;
 mod memory;
+mod programs;
 mod properties;
 mod rejections;
 mod rs274;
