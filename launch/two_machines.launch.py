@@ -2,8 +2,8 @@
 
 ros2 launch virtual_axes two_machines.launch.py right_controller:=gpc rviz:=true
 
-Give both the same setpoints, on /left/psec and /right/psec. With time:=fast the second follows the
-clock of the first.
+Give both the same setpoints, on /left/psec and /right/psec. With time:=fast one of them publishes
+the clock that both follow.
 """
 
 from pathlib import Path
@@ -14,7 +14,6 @@ from launch.actions import (
     GroupAction,
     IncludeLaunchDescription,
     OpaqueFunction,
-    TimerAction,
 )
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
@@ -37,11 +36,6 @@ ARGUMENTS = [
     ("log_level", "info", None, "Log level of the nodes"),
 ]
 SIDES = ["left", "right"]
-APART_S = 2.0
-"""Delay between their starts, s: a participant that starts with both at once may miss topics.
-
-See docs/internals/middleware.md.
-"""
 
 
 def require_rviz(context: LaunchContext) -> None:
@@ -75,7 +69,7 @@ def start(context: LaunchContext) -> list[object]:
         }
         # In a group: the arguments of one must not reach the other.
         include = IncludeLaunchDescription(PythonLaunchDescriptionSource(source), launch_arguments=of_side.items())
-        actions.append(TimerAction(period=APART_S * index, actions=[GroupAction([include])]))
+        actions.append(GroupAction([include]))
         if argument["robot_state_publisher"] == "true":
             x = float(argument["distance"]) * index
             actions.append(

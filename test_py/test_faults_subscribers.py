@@ -18,6 +18,11 @@ LEASE_S = 60
 SHALLOW, DEEP = 10, 20_000
 FAST_S = 300.0
 """Machine time of the motion in `fast`, s."""
+SHORT_LEASE_S = 3
+SILENT_S = 9.0
+"""Time for which a process is stopped until its lease has expired and the node has removed it, s."""
+RETURN_S = 30.0
+"""Timeout for the samples after the return of a participant, s: 5 s to settle, and the announcement period."""
 GROWTH_MB = 24.0
 """Maximum memory of 20 s of unread samples of a topic, MB, including discovery data."""
 
@@ -65,6 +70,32 @@ def test_killed_and_stopped_subscribers_do_not_affect_others(real: Drive, tmp_pa
         assert set(np.diff(stamps["deep"])) == {TSP_NS}, "its history depth is sufficient"
         assert np.all(np.diff(stamps["shallow"]) > 0)
         assert real.end(accepted.sequence_number, 10).status == 2
+
+
+def test_a_subscriber_that_was_silent_beyond_its_lease_is_matched_again(start: Callable[..., Drive], tmp_path: Path):
+    """It receives each sample after the match, of the old writer and the next one, and so does another subscriber."""
+    drive = start()
+    assert drive.process is not None
+    with Participant(
+        drive.process.domain_id, "listen", "/joint_states", DEEP, lease=SHORT_LEASE_S, folder=tmp_path
+    ) as participant:
+        drive.wait_for(lambda: len(participant.stamps()) > 0, 20, "samples before the silence")
+        participant.stop()
+        stopped = drive.now()
+        drive.wait_until(stopped + round(SILENT_S * NANOSECONDS), SILENT_S + 30)
+        participant.resume()
+        resumed = drive.now()
+
+        def continues() -> bool:
+            return bool(participant.stamps()[-1] > resumed + 12 * NANOSECONDS)
+
+        drive.wait_for(continues, RETURN_S, "samples after the silence")
+        stamps = participant.stamps()
+        assert np.all(np.diff(stamps) > 0)
+        [gap] = np.flatnonzero(np.diff(stamps) != TSP_NS)
+        assert stamps[gap] < resumed, "only the silence is missing"
+        assert stamps[gap + 1] < resumed + 10 * NANOSECONDS
+        assert set(np.diff(drive.record(stopped, int(stamps[-1])).joints.stamp)) == {TSP_NS}
 
 
 def test_shallow_subscribers_do_not_stall_fast_axes(start: Callable[..., Drive]):

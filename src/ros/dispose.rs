@@ -34,12 +34,12 @@ const DISCOVERY_MULTICAST: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 const PARTICIPANTS_PER_HOST: u32 = 120;
 
 /// Built-in writer of participant announcements (RTPS 2.5, 9.3.1.3).
-const SPDP_WRITER: EntityId = [0x00, 0x01, 0x00, 0xc2];
+pub(super) const SPDP_WRITER: EntityId = [0x00, 0x01, 0x00, 0xc2];
 /// Built-in writer of writer announcements (RTPS 2.5, 9.3.1.3).
 const SEDP_PUBLICATIONS_WRITER: EntityId = [0x00, 0x00, 0x03, 0xc2];
 const PID_KEY_HASH: u16 = 0x0070;
-const PID_STATUS_INFO: u16 = 0x0071;
-const DISPOSED_AND_UNREGISTERED: [u8; 4] = [0, 0, 0, 3];
+pub(super) const PID_STATUS_INFO: u16 = 0x0071;
+pub(super) const DISPOSED_AND_UNREGISTERED: [u8; 4] = [0, 0, 0, 3];
 
 /// Sequence number of the participant's dispose message. Readers accept only numbers above the last announcement;
 /// announcements count up from 1, one every few seconds.
@@ -130,6 +130,12 @@ impl DisposeMessage {
             }
         }
     }
+}
+
+/// Returns the port at which a participant of this host receives unicast discovery messages, if it exists.
+pub(super) fn discovery_port(domain_id: u16, participant_id: u16) -> Option<u16> {
+    let first = PORT_BASE + PORTS_PER_DOMAIN * u32::from(domain_id) + DISCOVERY_UNICAST_OFFSET;
+    u16::try_from(first + PORTS_PER_PARTICIPANT * u32::from(participant_id)).ok()
 }
 
 /// Returns the datagram that disposes of the participant or endpoint `guid`, as sample `sequence_number` of the

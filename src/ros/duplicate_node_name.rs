@@ -4,8 +4,9 @@
 //! participant announces its nodes on `ros_discovery_info`.
 
 use futures::StreamExt;
+use rustdds::dds::CreateResult;
 use rustdds::policy::{Durability, History, Reliability};
-use rustdds::{DomainParticipant, QosPolicyBuilder, RTPSEntity, TopicKind};
+use rustdds::{DomainParticipant, QosPolicyBuilder, RTPSEntity, TopicKind, no_key};
 use serde::Deserialize;
 use tracing::{debug, warn};
 
@@ -45,37 +46,41 @@ impl ParticipantEntitiesInfo {
     }
 }
 
-/// Logs one warning when another participant announces a node with the name of `node`.
-pub(super) async fn watch(participant: DomainParticipant, node: NodeFqn) {
+/// Subscribes to `ros_discovery_info`. The returned task logs one warning when another participant announces a node with
+/// the name of `node`.
+pub(super) fn watch(participant: &DomainParticipant, node: NodeFqn) -> impl Future<Output = ()> + use<> {
+    let reader = subscribe(participant)
+        .inspect_err(|error| {
+            debug!("duplicate node names are not detected: cannot subscribe to {TOPIC}: {error}");
+        })
+        .ok();
+    let own = participant.guid().to_bytes();
+    async move {
+        let Some(reader) = reader else { return };
+        let mut samples = reader.async_sample_stream();
+        while let Some(sample) = samples.next().await {
+            // Samples that cannot be decoded are ignored.
+            if sample.is_ok_and(|sample| sample.value().is_duplicate(own, &node)) {
+                warn!(
+                    "duplicate node name: another node in this domain is named {node}; rename one of them \
+                     (-r __node:=NAME)"
+                );
+                return;
+            }
+        }
+    }
+}
+
+fn subscribe(
+    participant: &DomainParticipant,
+) -> CreateResult<no_key::DataReaderCdr<ParticipantEntitiesInfo>> {
     let qos = QosPolicyBuilder::new()
         .durability(Durability::TransientLocal)
         .reliability(Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })
         .history(History::KeepLast { depth: DEPTH })
         .build();
-    let reader = participant
-        .create_topic(TOPIC.to_owned(), TYPE.to_owned(), &qos, TopicKind::NoKey)
-        .and_then(|topic| {
-            let subscriber = participant.create_subscriber(&qos)?;
-            subscriber.create_datareader_no_key_cdr::<ParticipantEntitiesInfo>(&topic, None)
-        });
-    let reader = match reader {
-        Ok(reader) => reader,
-        Err(error) => {
-            debug!("duplicate node names are not detected: cannot subscribe to {TOPIC}: {error}");
-            return;
-        }
-    };
-    let own = participant.guid().to_bytes();
-    let mut samples = reader.async_sample_stream();
-    while let Some(sample) = samples.next().await {
-        // Samples that cannot be decoded are ignored.
-        if sample.is_ok_and(|sample| sample.value().is_duplicate(own, &node)) {
-            warn!(
-                "duplicate node name: another node in this domain is named {node}; rename one of them (-r __node:=NAME)"
-            );
-            return;
-        }
-    }
+    let topic = participant.create_topic(TOPIC.to_owned(), TYPE.to_owned(), &qos, TopicKind::NoKey)?;
+    participant.create_subscriber(&qos)?.create_datareader_no_key_cdr(&topic, None)
 }
 
 #[cfg(test)]

@@ -3,13 +3,17 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use futures::StreamExt;
-use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, RTPSEntity, StatusEvented};
+use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, LostReason, RTPSEntity, StatusEvented};
 
+use tracing::debug;
+
+use super::announcement_eviction::AnnouncementEviction;
 use super::first_sample_nack::FirstSampleNack;
 use super::remote_endpoints::{DiscoveredEndpoints, RemoteEndpoints};
+use super::remote_participants::RemoteParticipants;
 
 /// Period at which topics without readers are detected. A new reader is reported by an event at once.
 const POLL_PERIOD: Duration = Duration::from_secs(1);
@@ -73,15 +77,17 @@ impl MatchedSubscriptionTracker {
 }
 
 /// Handles the status events of the participant until the task is aborted: updates the matched subscriptions,
-/// requests the first sample of matched writers, and counts discovered endpoints.
+/// requests the first sample of matched writers, counts discovered endpoints, and records the participants.
 ///
 /// A participant delivers each event to one listener only, so this task handles all of them.
 pub(super) async fn run(
     participant: DomainParticipant,
     tracker: MatchedSubscriptionTracker,
     discovered: DiscoveredEndpoints,
+    participants: RemoteParticipants,
 ) {
     let first_sample = FirstSampleNack::open();
+    let mut eviction = AnnouncementEviction::default();
     let mut remote = RemoteEndpoints::new(participant.guid(), discovered);
     let status = participant.status_listener();
     let mut events = status.as_async_status_stream();
@@ -100,12 +106,26 @@ pub(super) async fn run(
                         nack.request_first_sample(&participant, local_reader, remote_writer);
                     }
                 }
-                Some(event) => remote.update(&event),
+                Some(event) => {
+                    remote.update(&event);
+                    participants.update(&event, Instant::now());
+                    if is_expired(&event)
+                        && let Err(error) = eviction.evict(&participant)
+                    {
+                        debug!("a participant that returns may stay undiscovered: {error}");
+                    }
+                }
                 None => return,
             },
             _ = timer.tick() => tracker.poll(&participant),
         }
     }
+}
+
+/// Returns true if the lease of a participant has expired.
+fn is_expired(event: &DomainParticipantStatusEvent) -> bool {
+    use DomainParticipantStatusEvent::ParticipantLost;
+    matches!(event, ParticipantLost { reason: LostReason::Timeout { .. }, .. })
 }
 
 #[cfg(test)]

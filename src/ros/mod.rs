@@ -12,15 +12,19 @@
 //! | `stalled_readers` | GAP | unblocks a writer stalled by a reader whose ACKNACKs acknowledge nothing |
 //! | `dispose` | DATA with PID_KEY_HASH | disposes of the participant or a writer |
 //! | `large_response` | DATA, GAP | delivers service responses longer than the path's MTU |
-//! | `writer_rotation` | – | bounds the memory of a volatile writer |
+//! | `announcement_eviction` | DATA with key | discovers a participant again that returns after its lease has expired |
+//! | `discovery_gate` | – | delays discovery until all endpoints exist |
+//! | `writer_rotation` | – | bounds the memory of a volatile writer; matches the readers of a returned participant |
 
 mod action;
 mod announced_writers;
+mod announcement_eviction;
 mod arc_pool;
 mod axes_interface;
 mod clock;
 mod convert;
 mod diagnostics;
+pub mod discovery_gate;
 mod dispose;
 mod duplicate_node_name;
 mod endpoints;
@@ -44,6 +48,7 @@ mod process_memory;
 mod readers;
 mod recorder;
 mod remote_endpoints;
+mod remote_participants;
 mod response_limiter;
 mod results;
 pub mod rosout;

@@ -21,6 +21,7 @@ const SUBMESSAGE_DATA: u8 = 0x15;
 const FLAG_LITTLE_ENDIAN: u8 = 0x01;
 const FLAG_INLINE_QOS: u8 = 0x02;
 const FLAG_DATA: u8 = 0x04;
+const FLAG_KEY: u8 = 0x08;
 /// Octets from this field to the inline QoS: reader id, writer id, sequence number (9.4.5.3).
 const OCTETS_TO_INLINE_QOS: u16 = 16;
 /// End of a parameter list (9.4.2.11).
@@ -28,6 +29,9 @@ const PID_SENTINEL: u16 = 0x0001;
 
 /// Encapsulation header CDR_LE with options 0 (10.2).
 pub(super) const CDR_LE: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
+
+/// Encapsulation header PL_CDR_LE with options 0 (10.2).
+pub(super) const PL_CDR_LE: [u8; 4] = [0x00, 0x03, 0x00, 0x00];
 
 const HEADER: usize = 20;
 const SUBMESSAGE_HEADER: usize = 4;
@@ -167,9 +171,18 @@ impl Message {
     /// Appends a DATA as last submessage and returns the octets.
     ///
     /// The length field is valid up to 65 535 octets, more than a datagram holds.
-    pub(super) fn data(mut self, data: &Data<'_>) -> Vec<u8> {
+    pub(super) fn data(self, data: &Data<'_>) -> Vec<u8> {
+        self.data_or_key(data, FLAG_DATA)
+    }
+
+    /// Appends a DATA whose payload is the key of the sample, as last submessage, and returns the octets.
+    pub(super) fn key(self, data: &Data<'_>) -> Vec<u8> {
+        self.data_or_key(data, FLAG_KEY)
+    }
+
+    fn data_or_key(mut self, data: &Data<'_>, payload_flag: u8) -> Vec<u8> {
         let octets = &mut self.0;
-        let flags = FLAG_INLINE_QOS | data.payload.map_or(0, |_| FLAG_DATA);
+        let flags = FLAG_INLINE_QOS | data.payload.map_or(0, |_| payload_flag);
         octets.extend([SUBMESSAGE_DATA, FLAG_LITTLE_ENDIAN | flags]);
         let length_at = octets.len();
         octets.extend([0, 0]);

@@ -5,7 +5,11 @@
 //! built in the thread that sends everything. It lives until the reader acknowledges, or until a best-effort reader
 //! leaves. A topic therefore gets a new writer, numbered from 1, after [`MAX_SAMPLES`] samples, and the previous
 //! writer is disposed of.
+//!
+//! The creation of a writer also makes RustDDS match the discovered readers of the topic. Therefore the topics of a
+//! participant that returns after its lease has expired get new writers ([`super::remote_participants`]).
 
+use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -17,6 +21,7 @@ use tracing::warn;
 use super::announced_writers::dispose_sequence_number;
 use super::dispose::DisposeMessage;
 use super::environment::DiscoveryRange;
+use super::remote_participants::RemoteParticipants;
 use super::rtps::{Guid, is_secured};
 use super::stalled_readers::StalledReaders;
 
@@ -135,6 +140,8 @@ pub struct RotationContext {
     pub context: Context,
     /// Network range in which the node is announced.
     pub range: DiscoveryRange,
+    /// Other participants.
+    pub participants: RemoteParticipants,
 }
 
 /// Number of writers that ros2-client does not list: the response writers of `send_goal` and `get_result`
@@ -143,8 +150,8 @@ const WRITERS_OUTSIDE_NODES: usize = 2;
 
 /// Rotated topic of any message type.
 trait RotatedTopic: Send {
-    /// Creates the next writer if the current one has written [`MAX_SAMPLES`].
-    fn prepare_next(&self, node: &mut Node, now: Instant) -> Result<(), String>;
+    /// Creates the next writer if the current one has written at least `min_samples`. Returns true if it does.
+    fn prepare_next(&self, node: &mut Node, min_samples: i64, now: Instant) -> Result<bool, String>;
     /// Drops the previous writer when its retention time has passed, after a call of `dispose` with its GUID.
     fn retire(&self, now: Instant, dispose: &mut dyn FnMut(Guid));
     /// Returns the name of the topic in DDS.
@@ -159,13 +166,14 @@ struct TypedTopic<M: Serialize> {
 }
 
 impl<M: Serialize + Send + Sync + 'static> RotatedTopic for TypedTopic<M> {
-    fn prepare_next(&self, node: &mut Node, now: Instant) -> Result<(), String> {
-        if self.writers.is_single() && self.writers.current().readers.written() >= MAX_SAMPLES {
+    fn prepare_next(&self, node: &mut Node, min_samples: i64, now: Instant) -> Result<bool, String> {
+        let is_due = self.writers.is_single() && self.writers.current().readers.written() >= min_samples;
+        if is_due {
             let network = node.create_publisher(&self.topic, None).map_err(|e| e.to_string())?;
             let writer = Writer::new(network, &self.topic, self.max_unacknowledged, &self.participant);
             self.writers.prepare(writer, now);
         }
-        Ok(())
+        Ok(is_due)
     }
 
     fn retire(&self, now: Instant, dispose: &mut dyn FnMut(Guid)) {
@@ -195,6 +203,7 @@ impl RotatedTopics {
     pub async fn run(self, mut owner: RotationContext) {
         let mut timer = tokio::time::interval(POLL_PERIOD);
         let mut disposed = 0;
+        let mut returned = HashSet::new();
         loop {
             timer.tick().await;
             let now = Instant::now();
@@ -207,12 +216,48 @@ impl RotatedTopics {
                     }
                     disposed += 1;
                 });
-                if let Err(reason) = topic.prepare_next(&mut owner.node, now) {
-                    let name = topic.name();
-                    warn!("cannot create a new writer for {}: {reason}", name.trim_start_matches("rt"));
+            }
+            let is_settled = owner.participants.is_settled(now);
+            if is_settled {
+                returned.extend(owner.topics_of_returned());
+            }
+            for topic in &self.0 {
+                let name = topic.name();
+                let min_samples = if returned.contains(&name) { 0 } else { min_samples(is_settled) };
+                match topic.prepare_next(&mut owner.node, min_samples, now) {
+                    Ok(true) => drop(returned.remove(&name)),
+                    Ok(false) => {}
+                    Err(reason) => {
+                        warn!("cannot create a new writer for {}: {reason}", name.trim_start_matches("rt"));
+                    }
                 }
             }
+            // Only a rotation in progress delays the next one.
+            returned.retain(|name| self.0.iter().any(|topic| topic.name() == *name));
         }
+    }
+}
+
+/// Returns the number of samples after which a writer is replaced.
+///
+/// A Fast DDS participant that is just being discovered should not receive a new announcement before the older ones, so
+/// the replacement waits until discovery is settled, but not for ever.
+fn min_samples(is_settled: bool) -> i64 {
+    if is_settled { MAX_SAMPLES } else { 2 * MAX_SAMPLES }
+}
+
+impl RotationContext {
+    /// Returns the topics (names in DDS) read by participants that have returned after their lease had expired.
+    fn topics_of_returned(&self) -> HashSet<String> {
+        let returned = self.participants.take_returned();
+        if returned.is_empty() {
+            return HashSet::new();
+        }
+        let readers = self.context.domain_participant().discovered_readers();
+        let of_returned = readers.iter().filter(|reader| {
+            returned.iter().any(|guid| guid.prefix == reader.reader_proxy.remote_reader_guid.prefix)
+        });
+        of_returned.map(|reader| reader.subscription_topic_data.topic_name().clone()).collect()
     }
 }
 

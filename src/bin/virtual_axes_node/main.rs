@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
 #[cfg(target_os = "linux")]
-mod epoll_eintr;
+mod epoll_wait;
 
 use std::ffi::OsString;
 use std::io::Write;

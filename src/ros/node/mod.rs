@@ -21,12 +21,14 @@ use tokio::task::JoinSet;
 
 use super::args::RosArgs;
 use super::clock::ClockState;
+use super::discovery_gate::ClosedGate;
 use super::environment::Environment;
 use super::health::Health;
 use super::log::LogRecord;
 use super::parameter_host::LiveNodeParameters;
 use super::participant::Participant;
 use super::recorder::{TopicRecorder, TopicRecording};
+use super::remote_participants::RemoteParticipants;
 use super::security::Security;
 use super::service;
 use super::topics::Topics;
@@ -57,18 +59,21 @@ pub fn run(
         .enable_all()
         .build()
         .map_err(|source| NodeError::System { what: "start the runtime", source })?;
+    let gate = ClosedGate::new();
     let participant = Participant::open_with(environment, security)?;
-    let result = runtime.block_on(serve(args, &participant, parameters, log));
+    let result = runtime.block_on(serve(args, &participant, gate, parameters, log));
     // Tasks and endpoints have ended; remaining blocking threads are not waited for.
     runtime.shutdown_timeout(Duration::from_millis(50));
     participant.shutdown();
     result
 }
 
-/// Creates the node, runs it until a signal, and shuts it down.
+/// Creates the node, runs it until a signal, and shuts it down. Other participants discover it with all its endpoints,
+/// when `gate` opens.
 async fn serve(
     args: &RosArgs,
     participant: &Participant,
+    gate: ClosedGate,
     parameters: Parameters,
     log: mpsc::Receiver<LogRecord>,
 ) -> Result<(), NodeError> {
@@ -108,7 +113,8 @@ async fn serve(
     };
     tasks.spawn_log_output(rosout, log);
     let recording = recorder.start()?;
-    let rotation = RotationContext { node, context: context.clone(), range: participant.range() };
+    let (range, participants) = (participant.range(), RemoteParticipants::default());
+    let rotation = RotationContext { node, context: context.clone(), range, participants };
     let discovered = tasks.spawn_discovery(tracker, rotated, rotation);
     tasks.spawn_clock_input(subscriptions.clock, clock_out);
     let action = tasks.spawn_trajectory_inputs(action, action_outputs, subscriptions.psec);
@@ -120,6 +126,7 @@ async fn serve(
     let pace = tasks.pace(inputs, fan_out.run(frames).boxed(), clock);
     names.print(args, setup.config.name(), setup.mode);
     let thread_ended = axes_thread.spawn(pace)?;
+    drop(gate);
 
     signals.wait().await;
     let NodeTasks { commands, tasks, .. } = tasks;

@@ -65,7 +65,7 @@ impl NodeTasks<'_> {
         if let Some(publisher) = rosout {
             self.tasks.spawn(rosout::publish(publisher, log));
         }
-        self.tasks.spawn(duplicate_node_name::watch(self.participant.clone(), self.args.node().clone()));
+        self.tasks.spawn(duplicate_node_name::watch(&self.participant, self.args.node().clone()));
     }
 
     /// Starts the tracking of matched subscriptions and the rotation of writers. Returns the count of discovered
@@ -77,7 +77,9 @@ impl NodeTasks<'_> {
         rotation: RotationContext,
     ) -> DiscoveredEndpoints {
         let discovered = DiscoveredEndpoints::default();
-        self.tasks.spawn(matched_subscriptions::run(self.participant.clone(), tracker, discovered.clone()));
+        let participants = rotation.participants.clone();
+        let participant = self.participant.clone();
+        self.tasks.spawn(matched_subscriptions::run(participant, tracker, discovered.clone(), participants));
         self.tasks.spawn(rotated.run(rotation));
         discovered
     }

@@ -102,19 +102,6 @@ class GroupAction(Action):
         return [*self.actions, *after]
 
 
-class TimerAction(Action):
-    """Actions after a delay, which the stand-in does not wait for."""
-
-    def __init__(self, *, period: float, actions: Iterable[Action], **kwargs: object) -> None:
-        """Keeps the actions, and the delay in s."""
-        super().__init__(**kwargs)
-        self.period, self.actions = period, list(actions)
-
-    def execute(self, context: LaunchContext) -> list[Action]:
-        """Returns the actions."""
-        return self.actions
-
-
 __all__ = [
     "DeclareLaunchArgument",
     "GroupAction",
@@ -122,5 +109,4 @@ __all__ = [
     "LaunchDescription",
     "LogInfo",
     "OpaqueFunction",
-    "TimerAction",
 ]
