@@ -2,7 +2,7 @@
 //!
 //! Two modules, each usable on its own:
 //! - [`interpret`] reads a program (RS-274/NGC) and returns its [`motion`]s one by one, in constant memory.
-//! - `plan` computes the feed along these motions within the limits of the axes.
+//! - [`plan`] computes the feed along these motions within the limits of the axes.
 //!
 //! ```
 //! use std::io::Cursor;
@@ -28,3 +28,4 @@
 
 pub mod interpret;
 pub mod motion;
+pub mod plan;

@@ -1,0 +1,33 @@
+//! Look-ahead and feed planning: position setpoints along the motions of a part program, in constant memory.
+//!
+//! 1. Geometry: motions become pieces with a continuous second derivative. With exact stop, a piece is the programmed curve.
+//!    Blended motions become one cubic spline within their tolerances, whose control points lie on the programmed curve:
+//!    corners, arcs and micro-segments alike. With exact path, the feed continues where tangent and curvature do.
+//! 2. Look-ahead: pieces ahead are divided into intervals, and the time along them is minimized within the velocity,
+//!    acceleration and jerk limits of all joints, through the kinematics, and within the programmed feed. The plan always
+//!    ends at a standstill, so that the motion can stop within the window; it is renewed before its last part is reached.
+//!    Straight lines between standstills have the closed form of seven phases.
+//! 3. Feed override: the planned time passes more slowly, within the limits of the axes and on the path.
+//!
+//! Limits hold for the continuous motion, so that differences of setpoints at any position period keep them.
+
+mod band;
+mod element;
+mod error;
+mod feed_override;
+mod look_ahead;
+mod nurbs;
+mod piece;
+mod pieces;
+mod planned;
+mod planner;
+mod run;
+mod segment;
+mod source;
+mod speed;
+mod stations;
+mod vector;
+mod window;
+
+pub use error::{FeedPlanError, StepError};
+pub use planner::{PartProgramPlanner, PlanOptions, PlannedSetpoint};

@@ -1,0 +1,80 @@
+//! Smooth pieces of the path that the feed is planned along.
+
+use super::element::{Element, FeedCap};
+use super::vector::{Jet, JointVector, MAX_JOINTS};
+
+/// Curve of a piece.
+#[derive(Debug, Clone)]
+pub(super) enum PieceCurve {
+    /// Cubic polynomials: value and derivatives at the start.
+    Cubic(Jet),
+    /// Exact curve of a motion.
+    Exact(Element),
+}
+
+/// Smooth piece of the path.
+#[derive(Debug, Clone)]
+pub(super) struct Piece {
+    pub curve: PieceCurve,
+    pub length: f64,
+    /// Path parameter at the start, from the start of the program.
+    pub start: f64,
+    pub caps: Vec<FeedCap>,
+    pub line: usize,
+    /// True if adjacent pieces differ in length.
+    pub is_graded: bool,
+    pub tcp_length: Option<f64>,
+    /// Distance to the next stop, if it is known.
+    pub to_stop: Option<f64>,
+    /// Exact coordinates at a stop at the end.
+    pub end: Option<JointVector>,
+    /// Duration of a standstill at the end, s; `None` without a stop.
+    pub stop: Option<f64>,
+}
+
+impl Piece {
+    /// Returns the coordinates at `u` from the start of the piece.
+    pub fn point(&self, u: f64) -> JointVector {
+        if let Some(end) = self.end
+            && u >= self.length
+        {
+            return end;
+        }
+        match &self.curve {
+            PieceCurve::Exact(element) => element.point(u),
+            PieceCurve::Cubic([p, d1, d2, d3]) => {
+                std::array::from_fn(|i| p[i] + u * (d1[i] + u * (0.5 * d2[i] + u * d3[i] / 6.0)))
+            }
+        }
+    }
+
+    /// Returns the coordinates and their derivatives at `u` from the start of the piece.
+    pub fn jet(&self, u: f64) -> Jet {
+        match &self.curve {
+            PieceCurve::Exact(element) => element.jet(u),
+            PieceCurve::Cubic([_, d1, d2, d3]) => {
+                let mut jet = [self.point(u), [0.0; MAX_JOINTS], [0.0; MAX_JOINTS], *d3];
+                for i in 0..MAX_JOINTS {
+                    jet[1][i] = d1[i] + u * (d2[i] + 0.5 * u * d3[i]);
+                    jet[2][i] = d2[i] + u * d3[i];
+                }
+                jet
+            }
+        }
+    }
+
+    /// Multiplies the programmed feeds by `factor`.
+    pub fn scale_feed(&mut self, factor: f64) {
+        for cap in &mut self.caps {
+            match cap {
+                FeedCap::Rapid => {}
+                FeedCap::Speed { value, .. } | FeedCap::Rate(value) => *value *= factor,
+            }
+        }
+    }
+
+    /// Returns the largest rate of the path parameter at a point with the first derivative `first`.
+    pub fn cap(&self, first: &JointVector) -> f64 {
+        self.caps.iter().map(|cap| cap.rate(first)).fold(f64::INFINITY, f64::min)
+    }
+}

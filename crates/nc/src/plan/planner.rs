@@ -1,0 +1,370 @@
+//! Planner of part programs: setpoints of all joints at each position cycle.
+
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::kinematics::{AxisRole, Kinematics};
+use virtual_axes_core::trajectory::JointLimits;
+use virtual_axes_core::trial::{GridSource, SourceError};
+use virtual_axes_core::units::{Nanoseconds, seconds};
+
+use super::error::{FeedPlanError, StepError};
+use super::feed_override::StepControl;
+use super::look_ahead::LookAhead;
+use super::pieces::PieceSource;
+use super::planned::{Ahead, ORIGIN};
+use super::segment::Law;
+use super::source::{PartSource, ProgramAxes};
+use super::stations::MachineModel;
+use super::vector::{JointVector, MAX_JOINTS, TipToJoints};
+use super::window::JointBounds;
+use crate::motion::ProgramStep;
+
+/// Options of look-ahead and feed planning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanOptions {
+    /// Deviation of linear axes where the program blends without a tolerance (G64 without P), m.
+    pub blend_tolerance: f64,
+    /// Deviation of rotary axes where the program blends without a tolerance, rad.
+    pub rotary_tolerance: f64,
+    /// Largest distance of the knots of a blended path, m: a longer distance smooths more, within the tolerance.
+    pub knot_distance: f64,
+    /// Largest centripetal acceleration of the tool path, m/s²; infinite for no limit besides those of the axes.
+    pub centripetal_acceleration: f64,
+    /// Largest chord error of the setpoints as a polyline, m; infinite for no limit.
+    pub chord_error: f64,
+}
+
+impl Default for PlanOptions {
+    fn default() -> Self {
+        Self {
+            blend_tolerance: 20e-6,
+            rotary_tolerance: 0.02_f64.to_radians(),
+            knot_distance: 2e-3,
+            centripetal_acceleration: f64::INFINITY,
+            chord_error: f64::INFINITY,
+        }
+    }
+}
+
+/// Setpoints of one position cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlannedSetpoint {
+    psec: JointVector,
+    /// Source line of the motion.
+    pub line: usize,
+    /// Programmed feed, m/s or rad/s; infinite at rapid traverse.
+    pub programmed_feed: f64,
+    /// Path position from the start of the program, m: the length of the programmed path of the linear axes, with 0.1 m for
+    /// one radian of the rotary axes in the root of the sum of squares.
+    pub path_position: f64,
+    /// Rate of the path position, m/s.
+    pub path_rate: f64,
+    joints: usize,
+}
+
+impl PlannedSetpoint {
+    /// Returns the position setpoint (PSEC) of each joint, m or rad.
+    pub fn psec(&self) -> &[f64] {
+        &self.psec[..self.joints]
+    }
+}
+
+/// Streaming planner of a part program, in constant memory.
+///
+/// ```
+/// use std::io::Cursor;
+///
+/// use virtual_axes_core::config::Parameters;
+/// use virtual_axes_nc::motion::{Coordinates, Feed, MotionKind, PathControl, ProgramMotion, ProgramStep};
+/// use virtual_axes_nc::plan::{PartProgramPlanner, PlanOptions};
+///
+/// let machine = Parameters::embedded_default()?.machine_config()?;
+/// let mut end: Coordinates = [0.0; 9];
+/// end[0] = 0.1;
+/// // 100 mm along X at 12 m/min, with 2.5 m/s² and 50 m/s³: 0.5 s and the ramps.
+/// let motion = ProgramMotion {
+///     line: 1,
+///     kind: MotionKind::Line,
+///     start: [0.0; 9],
+///     end,
+///     feed: Feed::Linear(0.2),
+///     path_control: PathControl::ExactStop,
+///     tcp_length: None,
+/// };
+/// let steps = [Ok::<_, std::io::Error>(ProgramStep::Motion(motion))];
+/// let mut planner = PartProgramPlanner::new(steps.into_iter(), &machine, PlanOptions::default())?;
+/// let mut last = None;
+/// while let Some(setpoint) = planner.next_setpoint(1.0)? {
+///     last = Some(setpoint);
+/// }
+/// assert_eq!(last.map(|setpoint| setpoint.psec()[0]), Some(0.1));
+/// let ramps = 0.2 / 2.5 + 2.5 / 50.0;
+/// assert!((planner.path_time() - (0.5 + ramps)).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct PartProgramPlanner<I> {
+    ahead: LookAhead<I>,
+    limits: Vec<JointLimits>,
+    joints: Vec<usize>,
+    period: f64,
+    reserve: f64,
+    /// Time in the first interval of the window, s.
+    local: f64,
+    /// Duration of the intervals passed, s.
+    passed: f64,
+    control: Option<StepControl>,
+    is_finished: bool,
+    last: PlannedSetpoint,
+}
+
+fn positive(axis: &JointLimits) -> Result<(), FeedPlanError> {
+    let limits = &axis.limits;
+    let values =
+        [("velocity", limits.velocity), ("acceleration", limits.acceleration), ("jerk", limits.jerk)];
+    for (quantity, value) in values {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(FeedPlanError::InvalidLimit { axis: axis.name.clone(), quantity, value });
+        }
+    }
+    Ok(())
+}
+
+impl<I, E> PartProgramPlanner<I>
+where
+    I: Iterator<Item = Result<ProgramStep, E>>,
+    E: Into<StepError>,
+{
+    /// Creates a planner for the steps of a program on a machine.
+    ///
+    /// # Errors
+    /// Returns [`FeedPlanError`] if a limit of the machine or an option is invalid, or if the first motion is.
+    pub fn new(steps: I, machine: &MachineConfig, options: PlanOptions) -> Result<Self, FeedPlanError> {
+        let limits: Vec<JointLimits> = machine.axes().iter().map(JointLimits::from_axis).collect();
+        if limits.len() > MAX_JOINTS {
+            return Err(FeedPlanError::TooManyAxes { found: limits.len(), allowed: MAX_JOINTS });
+        }
+        limits.iter().try_for_each(positive)?;
+        let nanoseconds: Nanoseconds = machine.periods().position;
+        if nanoseconds <= 0 {
+            return Err(FeedPlanError::InvalidPeriod { found: nanoseconds });
+        }
+        check_options(&options)?;
+        let axes = ProgramAxes::new(&limits);
+        let kinematics = Kinematics::new(machine);
+        let tip = match AxisRole::LINEAR.map(|role| kinematics.role(role)) {
+            [Some(x), Some(y), Some(z)] => Some(TipToJoints::new(
+                *machine.kinematics(),
+                [x, y, z],
+                [kinematics.role(AxisRole::A), kinematics.role(AxisRole::C)],
+            )),
+            _ => None,
+        };
+        let joints: Vec<JointBounds> = limits
+            .iter()
+            .map(|joint| JointBounds {
+                velocity: joint.limits.velocity,
+                acceleration: joint.limits.acceleration,
+                jerk: joint.limits.jerk,
+            })
+            .collect();
+        let period = seconds(nanoseconds);
+        let chord = 8.0 * options.chord_error / (period * period);
+        let centripetal = options.centripetal_acceleration.min(chord);
+        let slowest = joints.iter().map(|j| j.acceleration / j.jerk).fold(0.0, f64::max);
+        let model = MachineModel { joints, kinds: axes.kinds.clone(), tip, centripetal };
+        let parts = PartSource::new(steps, axes, [options.blend_tolerance, options.rotary_tolerance]);
+        let ahead = LookAhead::new(PieceSource::new(parts, options.knot_distance), model);
+        let joints: Vec<usize> = (0..limits.len()).collect();
+        let last = PlannedSetpoint {
+            psec: ORIGIN,
+            line: 0,
+            programmed_feed: f64::INFINITY,
+            path_position: 0.0,
+            path_rate: 0.0,
+            joints: joints.len(),
+        };
+        Ok(Self {
+            ahead,
+            limits,
+            joints,
+            period,
+            reserve: 2.0 * slowest + 4.0 * period,
+            local: 0.0,
+            passed: 0.0,
+            control: None,
+            is_finished: false,
+            last,
+        })
+    }
+
+    /// Returns the time passed along the path, s: at a feed override of 100 % the time since the start, at the end of the
+    /// program its duration.
+    pub fn path_time(&self) -> f64 {
+        self.passed + self.local
+    }
+
+    /// Returns the number of look-ahead windows planned.
+    pub fn window_count(&self) -> usize {
+        self.ahead.plans
+    }
+
+    /// Returns the setpoints of the next position cycle, or `None` after the end of the program.
+    ///
+    /// `feed_override` is 0 to 2 (200 %). Up to 1 it scales the speed along the path, 0 is a feed hold; changes take effect
+    /// at once, within the limits of the axes, and the setpoints stay on the path. Above 1 it scales the programmed feeds of
+    /// the path beyond the look-ahead window, within the limits of the axes.
+    ///
+    /// # Errors
+    /// Returns [`FeedPlanError`] with the source line.
+    pub fn next_setpoint(&mut self, feed_override: f64) -> Result<Option<PlannedSetpoint>, FeedPlanError> {
+        if !(0.0..=2.0).contains(&feed_override) {
+            return Err(FeedPlanError::InvalidOverride { found: feed_override });
+        }
+        if self.is_finished {
+            return Ok(None);
+        }
+        let result = self.cycle(feed_override);
+        self.is_finished |= result.is_err();
+        result
+    }
+
+    fn cycle(&mut self, feed_override: f64) -> Result<Option<PlannedSetpoint>, FeedPlanError> {
+        self.ahead.feed_factor = feed_override.max(1.0);
+        let Some(mut control) = self.control.take() else {
+            match self.ahead.start()? {
+                None => {
+                    self.is_finished = true;
+                    return Ok(None);
+                }
+                Some(start) => self.last.psec = start,
+            }
+            let mut control = StepControl::new(self.period, self.last.psec);
+            control.start_at(feed_override.min(1.0));
+            self.control = Some(control);
+            self.check_travel_limits()?;
+            return Ok(Some(self.last));
+        };
+        self.ahead.renew(self.local + self.reserve)?;
+        let factor = self.ahead.entries.front().map_or(1.0, |entry| entry.feed_factor);
+        let motion = Ahead { model: &self.ahead.model, entries: &self.ahead.entries, local: self.local };
+        control.advance((feed_override / factor).min(1.0), &motion, &self.ahead.model.joints);
+        let result = self.pass(control.rate());
+        control.record(self.last.psec);
+        self.control = Some(control);
+        result?;
+        self.check_travel_limits()?;
+        Ok(Some(self.last))
+    }
+
+    /// Advances by one position period at the fraction `rate` of the planned speed.
+    fn pass(&mut self, rate: f64) -> Result<(), FeedPlanError> {
+        // Real time left in the cycle: a standstill takes its time at any rate.
+        let mut left = self.period;
+        loop {
+            self.ahead.renew(self.local + self.reserve)?;
+            let Some(entry) = self.ahead.entries.front() else {
+                self.local = 0.0;
+                self.is_finished = true;
+                self.last.path_rate = 0.0;
+                return Ok(());
+            };
+            let Some(segment) = entry.segment else { return Ok(()) };
+            let pace = if segment.law == Law::Dwell { 1.0 } else { rate };
+            if self.local + left * pace < segment.duration {
+                self.local += left * pace;
+                self.set_state(self.local, rate);
+                return Ok(());
+            }
+            if self.ahead.entries.len() == 1 {
+                self.set_state(segment.duration, rate);
+            }
+            if pace > 0.0 {
+                left -= (segment.duration - self.local) / pace;
+            }
+            self.local = 0.0;
+            self.passed += segment.duration;
+            self.ahead.entries.pop_front();
+        }
+    }
+
+    /// Sets the setpoints at `local` seconds after the start of the first interval, at the fraction `pace` of its speed.
+    fn set_state(&mut self, local: f64, pace: f64) {
+        let Some(entry) = self.ahead.entries.front() else { return };
+        let (Some(segment), Some(piece)) = (entry.segment, entry.piece.clone()) else {
+            self.last.path_rate = 0.0;
+            return;
+        };
+        let mut state = segment.at(local);
+        let mut u = (entry.from + state.u).min(piece.length);
+        if local >= segment.duration {
+            state.rate = 0.0;
+            u = piece.length;
+        }
+        self.last.psec = self.ahead.model.joints(&piece, u)[0];
+        self.last.path_position = piece.start + u;
+        self.last.path_rate = pace * state.rate;
+        let position = self.last.path_position;
+        let marks = self.ahead.marks();
+        while marks.len() > 1 && marks[0].end < position {
+            marks.pop_front();
+        }
+        if let Some(mark) = marks.front() {
+            self.last.line = mark.line;
+            self.last.programmed_feed = mark.feed;
+        }
+    }
+
+    fn check_travel_limits(&self) -> Result<(), FeedPlanError> {
+        for (joint, &position) in self.limits.iter().zip(&self.last.psec) {
+            if joint.check_travel_limits(0, position).is_err() {
+                return Err(FeedPlanError::OutsideTravelLimits {
+                    line: self.last.line,
+                    axis: joint.name.clone(),
+                    unit: joint.unit(),
+                    position,
+                    min: joint.limits.travel_min,
+                    max: joint.limits.travel_max,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_options(options: &PlanOptions) -> Result<(), FeedPlanError> {
+    let finite = [
+        ("blend_tolerance", options.blend_tolerance),
+        ("rotary_tolerance", options.rotary_tolerance),
+        ("knot_distance", options.knot_distance),
+    ];
+    for (name, value) in finite {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(FeedPlanError::InvalidOption { name, value, allowed: "a positive finite number" });
+        }
+    }
+    let positive = [
+        ("centripetal_acceleration", options.centripetal_acceleration),
+        ("chord_error", options.chord_error),
+    ];
+    for (name, value) in positive {
+        if value.is_nan() || value <= 0.0 {
+            return Err(FeedPlanError::InvalidOption { name, value, allowed: "a positive number" });
+        }
+    }
+    Ok(())
+}
+
+impl<I, E> GridSource for PartProgramPlanner<I>
+where
+    I: Iterator<Item = Result<ProgramStep, E>>,
+    E: Into<StepError>,
+{
+    fn joints(&self) -> &[usize] {
+        &self.joints
+    }
+
+    fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
+        let Some(setpoint) = self.next_setpoint(1.0)? else { return Ok(false) };
+        row.copy_from_slice(setpoint.psec());
+        Ok(true)
+    }
+}

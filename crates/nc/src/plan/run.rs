@@ -1,0 +1,345 @@
+//! Blended part of the path: a cubic spline within the tolerances of the programmed curves.
+//!
+//! The spline is Schoenberg's: its control points lie on the programmed curve p(u) at the averages of three consecutive
+//! knots. It reproduces straight lines exactly, has a continuous second derivative, and needs a few neighboring curves
+//! only. With knots of distance h it deviates by h |ΔT| / 6 at a corner with the tangent change ΔT at a knot, by 13 h |ΔT|
+//! / 48 at a corner between two knots, and by h² κ / 6 on an arc of curvature κ. Distances are divided until the deviation
+//! is within the tolerance, less a reserve for the unequal distances of adjacent knots, which differ by a factor of two at
+//! most.
+
+use std::collections::VecDeque;
+
+use super::element::{Element, FeedCap, JointKinds};
+use super::piece::{Piece, PieceCurve};
+use super::source::BlendTolerance;
+use super::vector::{Jet, JointVector, norm};
+
+/// Deviation on arcs, m: the tolerance is for corners.
+const ARC_DEVIATION: f64 = 0.5e-6;
+/// Fraction of the tolerance used for knots of equal distance.
+const USED: f64 = 0.9;
+/// Number of equal parts of an interval at whose ends the deviation is computed.
+const SAMPLES: usize = 4;
+/// Rounds of halving of a block, and knot distance that is not halved further, m.
+const MAX_SETTLING: usize = 40;
+const MIN_DISTANCE: f64 = 1e-9;
+/// Smallest knot distance as a fraction of the largest one.
+const MAX_HALVINGS: u32 = 14;
+/// Knot distance at the ends of a run, as a fraction of the largest one.
+const END_FRACTION: f64 = 1.0 / 256.0;
+/// Number of vertices inside an interval at which the deviation is computed.
+const MAX_VERTICES: usize = 16;
+
+struct Member {
+    start: f64,
+    element: Element,
+    tolerance: BlendTolerance,
+}
+
+/// Blended curves between two stops.
+pub(super) struct Run {
+    members: VecDeque<Member>,
+    /// Path parameter at the start of the run, from the start of the program.
+    origin: f64,
+    /// Length of the curves added.
+    length: f64,
+    /// Duration of the standstill at the end, after the last curve.
+    stop: Option<f64>,
+    knots: VecDeque<f64>,
+    /// Intervals between knots that may still be halved.
+    block: Vec<f64>,
+    planned: f64,
+    largest: f64,
+}
+
+/// Returns the weights of four control points at the fraction `x` between the second and the third, for knots of equal
+/// distance.
+fn uniform_weights(x: f64) -> [f64; 4] {
+    let y = 1.0 - x;
+    let (cube, other) = (x * x * x, y * y * y);
+    [other / 6.0, 2.0 / 3.0 - x * x * (1.0 - 0.5 * x), 2.0 / 3.0 - y * y * (1.0 - 0.5 * y), cube / 6.0]
+}
+
+impl Run {
+    /// Creates a run that starts at `origin`, with a largest knot distance.
+    pub fn new(origin: f64, largest: f64) -> Self {
+        let knots = VecDeque::from([0.0; 3]);
+        let (members, block) = (VecDeque::new(), vec![]);
+        Self { members, origin, length: 0.0, stop: None, knots, block, planned: 0.0, largest }
+    }
+
+    /// Appends a curve with the tolerance that applies at its end.
+    pub fn push(&mut self, element: Element, tolerance: Option<BlendTolerance>) {
+        let before = self.members.back().map_or([f64::INFINITY; 2], |member| member.tolerance);
+        let start = self.length;
+        self.length += element.length;
+        self.members.push_back(Member { start, element, tolerance: tolerance.unwrap_or(before) });
+    }
+
+    /// Ends the run with a standstill.
+    pub fn close(&mut self, dwell: f64) {
+        self.stop = Some(dwell);
+    }
+
+    /// Returns the tool length of tool center point control.
+    pub fn tcp_length(&self) -> Option<f64> {
+        self.members.back().and_then(|member| member.element.tcp_length)
+    }
+
+    pub fn is_closed(&self) -> bool {
+        self.stop.is_some()
+    }
+
+    /// Returns true if the next piece can be computed.
+    pub fn is_ready(&self) -> bool {
+        self.is_closed() || self.length >= self.planned + 4.0 * self.largest
+    }
+
+    /// Returns the next piece; `None` after the last one. The run must be ready.
+    pub fn next(&mut self, kinds: &JointKinds) -> Option<Piece> {
+        while self.knots.len() < 6 {
+            if self.planned >= self.length {
+                self.settle_block(&[], kinds);
+                let end = self.length;
+                // The last knot is already there once.
+                self.knots.extend([end; 2]);
+                self.planned = f64::INFINITY;
+                break;
+            }
+            let block = self.plan_block(kinds);
+            self.settle_block(&block, kinds);
+            self.block = block;
+        }
+        let (from, to) = (*self.knots.get(2)?, *self.knots.get(3)?);
+        if to <= from || self.knots.len() < 6 {
+            return None;
+        }
+        let piece = self.piece(from, to);
+        self.knots.pop_front();
+        let keep = self.knots[0] - 2.0 * self.largest;
+        while self.members.len() > 1 && self.members[1].start < keep {
+            self.members.pop_front();
+        }
+        Some(piece)
+    }
+
+    fn index_at(&self, u: f64) -> usize {
+        self.members.partition_point(|member| member.start <= u).saturating_sub(1)
+    }
+
+    /// Returns the programmed point at `u`, continued beyond both ends by point reflection.
+    fn point(&self, u: f64) -> JointVector {
+        let reflected = |end: f64| {
+            let (center, mirror) = (self.point(end), self.point((2.0 * end - u).clamp(0.0, self.length)));
+            std::array::from_fn(|i| 2.0 * center[i] - mirror[i])
+        };
+        if u < 0.0 {
+            return reflected(0.0);
+        }
+        if u > self.length {
+            return reflected(self.length);
+        }
+        if let Some(last) = self.members.back()
+            && u == self.length
+        {
+            return last.element.to;
+        }
+        let member = &self.members[self.index_at(u)];
+        member.element.point((u - member.start).min(member.element.length))
+    }
+
+    /// Returns true if knots of distance `h` keep the tolerance between `from` and `from + h`.
+    fn is_within_tolerance(&self, from: f64, h: f64, kinds: &JointKinds) -> bool {
+        let to_end = if self.is_closed() { self.length - from } else { f64::INFINITY };
+        let nearest = to_end.min(from + h);
+        if h > (self.largest * END_FRACTION).max(0.6 * nearest) {
+            return false;
+        }
+        let control: [JointVector; 4] = std::array::from_fn(|i| self.point(from + (i as f64 - 1.0) * h));
+        let ends = [from - h, from + 2.0 * h].map(|u| self.index_at(u.clamp(0.0, self.length)));
+        let mut allowed = self.tolerance(from - h, from + 2.0 * h).map(|tolerance| USED * tolerance);
+        if ends[0] == ends[1] && !self.members[ends[0]].element.is_line() {
+            allowed[0] = allowed[0].min(ARC_DEVIATION);
+        }
+        self.samples(from, h).all(|u| {
+            let weights = uniform_weights((u - from) / h);
+            let here = self.point(u);
+            let deviation: JointVector = std::array::from_fn(|i| {
+                control.iter().zip(weights).map(|(point, weight)| weight * (point[i] - here[i])).sum()
+            });
+            norm(&deviation, &kinds.linear) <= allowed[0] && norm(&deviation, &kinds.rotary) <= allowed[1]
+        })
+    }
+
+    /// Returns the knot distances of the next block.
+    fn plan_block(&mut self, kinds: &JointKinds) -> Vec<f64> {
+        let left = self.length - self.planned;
+        let size =
+            if left < 2.0 * self.largest && self.is_closed() { left.min(self.largest) } else { self.largest };
+        // A short rest is not left over.
+        let size = if self.is_closed() && left - size < 1e-3 * self.largest { left } else { size };
+        let mut block = Vec::new();
+        let mut stack = vec![(self.planned, size, 0)];
+        while let Some((from, h, depth)) = stack.pop() {
+            if depth >= MAX_HALVINGS || self.is_within_tolerance(from, h, kinds) {
+                block.push(h);
+                continue;
+            }
+            // Thirds where halves do not suffice: less of the tolerance remains unused.
+            let fits = |parts: i32| {
+                let part = h / f64::from(parts);
+                (0..parts).all(|i| self.is_within_tolerance(from + f64::from(i) * part, part, kinds))
+            };
+            let parts = if !fits(2) && fits(3) { 3 } else { 2 };
+            let part = h / f64::from(parts);
+            stack.extend((0..parts).rev().map(|i| (from + f64::from(i) * part, part, depth + 1)));
+        }
+        self.planned = if size == left { self.length } else { self.planned + size };
+        block
+    }
+
+    /// Halves the pending intervals until adjacent ones differ by a factor of two at most and the spline is within the
+    /// tolerance, and appends their knots.
+    fn settle_block(&mut self, after: &[f64], kinds: &JointKinds) {
+        let mut block = std::mem::take(&mut self.block);
+        if block.is_empty() {
+            return;
+        }
+        let before = match (self.knots.get(self.knots.len() - 2), self.knots.back()) {
+            (Some(a), Some(b)) if b > a => b - a,
+            _ => f64::INFINITY,
+        };
+        let next = after.first().copied().unwrap_or(f64::INFINITY);
+        for _ in 0..MAX_SETTLING {
+            let mut balanced = Vec::with_capacity(block.len());
+            for (i, &h) in block.iter().enumerate() {
+                let left = if i > 0 { block[i - 1] } else { before };
+                let right = block.get(i + 1).copied().unwrap_or(next);
+                if h > 2.01 * left.min(right) {
+                    balanced.extend([0.5 * h; 2]);
+                } else {
+                    balanced.push(h);
+                }
+            }
+            let mut is_settled = balanced.len() == block.len();
+            block = balanced;
+            if is_settled {
+                let deviating = self.deviating(&block, after, kinds);
+                is_settled = deviating.is_empty();
+                for i in deviating.into_iter().rev() {
+                    let half = 0.5 * block[i];
+                    block.splice(i..=i, [half; 2]);
+                }
+            }
+            if is_settled {
+                break;
+            }
+        }
+        let mut at = self.knots.back().copied().unwrap_or(0.0);
+        for h in &block {
+            at += h;
+            self.knots.push_back(at);
+        }
+        if after.is_empty()
+            && let Some(last) = self.knots.back_mut()
+        {
+            *last = self.length;
+        }
+    }
+
+    /// Returns value and derivatives of the spline at the third of six consecutive knots.
+    fn cubic(&self, knots: &[f64; 6]) -> Jet {
+        let [a, b, c, d, e, f] = *knots;
+        let control = [[a, b, c], [b, c, d], [c, d, e], [d, e, f]].map(|k| {
+            let u = (k[0] + k[1] + k[2]) / 3.0;
+            // Exact at both ends of the run.
+            if k[0] == k[2] { self.point(k[0]) } else { self.point(u) }
+        });
+        let slope = |i: usize, width: f64| -> JointVector {
+            std::array::from_fn(|j| 3.0 * (control[i + 1][j] - control[i][j]) / width)
+        };
+        let (e0, e1, e2) = (slope(0, d - a), slope(1, e - b), slope(2, f - c));
+        let (w0, w2) = ((d - c) * (d - c) / ((d - a) * (d - b)), (c - b) * (c - b) / ((e - b) * (d - b)));
+        let first = (d - c) / (d - b);
+        let mut jet = [[0.0; super::vector::MAX_JOINTS]; 4];
+        for j in 0..jet[0].len() {
+            let [p0, p1, p2, _] = control.map(|point| point[j]);
+            jet[0][j] = p1 + w0 * (p0 - p1) + w2 * (p2 - p1);
+            jet[1][j] = e0[j] * first + e1[j] * (1.0 - first);
+            let (f0, f1) = (2.0 * (e1[j] - e0[j]) / (d - b), 2.0 * (e2[j] - e1[j]) / (e - c));
+            jet[2][j] = f0;
+            jet[3][j] = (f1 - f0) / (d - c);
+        }
+        jet
+    }
+
+    /// Returns the intervals of `block` in which the spline exceeds the tolerance.
+    fn deviating(&self, block: &[f64], after: &[f64], kinds: &JointKinds) -> Vec<usize> {
+        let mut knots: Vec<f64> = self.knots.iter().skip(self.knots.len() - 3).copied().collect();
+        for h in block.iter().chain(after.iter().take(2)) {
+            knots.push(knots[knots.len() - 1] + h);
+        }
+        while knots.len() < block.len() + 5 {
+            let last = knots[knots.len() - 1];
+            let h = after.last().copied().unwrap_or(0.0);
+            knots.push(last + h);
+        }
+        let exceeds = |i: &usize| {
+            let window: [f64; 6] = std::array::from_fn(|k| knots[i + k].min(self.length));
+            let (from, h) = (window[2], window[3] - window[2]);
+            let jet = self.cubic(&window);
+            let allowed = self.tolerance(window[0], window[5]);
+            !self.samples(from, h).all(|u| {
+                let (here, x) = (self.point(u), u - from);
+                let deviation: JointVector = std::array::from_fn(|j| {
+                    jet[0][j] - here[j] + x * (jet[1][j] + x * (0.5 * jet[2][j] + x * jet[3][j] / 6.0))
+                });
+                norm(&deviation, &kinds.linear) <= allowed[0] && norm(&deviation, &kinds.rotary) <= allowed[1]
+            })
+        };
+        (0..block.len()).filter(|i| block[*i] > MIN_DISTANCE && exceeds(i)).collect()
+    }
+
+    /// Returns places between two knots where the deviation is computed: equal parts and the corners.
+    fn samples(&self, from: f64, h: f64) -> impl Iterator<Item = f64> + '_ {
+        let (first, last) = (self.index_at(from), self.index_at(from + h));
+        let stride = (last - first).div_ceil(MAX_VERTICES).max(1);
+        let vertices = (first + 1..=last).step_by(stride).map(|i| self.members[i].start);
+        let parts = (0..=SAMPLES).map(move |i| from + h * (i as f64 / SAMPLES as f64));
+        parts.chain(vertices)
+    }
+
+    /// Returns the tolerance between two places.
+    fn tolerance(&self, from: f64, to: f64) -> BlendTolerance {
+        let [first, last] = [from, to].map(|u| self.index_at(u.clamp(0.0, self.length)));
+        let (low, high) = (&self.members[first], &self.members[last]);
+        std::array::from_fn(|i| low.tolerance[i].min(high.tolerance[i]))
+    }
+
+    /// Returns the piece between two knots, from the knots around it.
+    fn piece(&self, from: f64, to: f64) -> Piece {
+        let jet = self.cubic(&std::array::from_fn(|i| self.knots[i]));
+        let (first, last) = (self.index_at(from), self.index_at(to));
+        let mut caps: Vec<FeedCap> = Vec::new();
+        for member in self.members.range(first..=last) {
+            if caps.last() != Some(&member.element.cap) && !caps.contains(&member.element.cap) {
+                caps.push(member.element.cap);
+            }
+        }
+        let member = &self.members[first];
+        let is_last = self.is_closed() && to >= self.length;
+        Piece {
+            curve: PieceCurve::Cubic(jet),
+            length: to - from,
+            start: self.origin + from,
+            caps,
+            line: member.element.line,
+            is_graded: (0..5)
+                .any(|i| (self.knots[i + 1] - self.knots[i] - (to - from)).abs() > 0.01 * (to - from)),
+            tcp_length: member.element.tcp_length,
+            to_stop: self.is_closed().then(|| (self.length - to).max(0.0)),
+            end: is_last.then(|| self.point(self.length)),
+            stop: if is_last { self.stop } else { None },
+        }
+    }
+}

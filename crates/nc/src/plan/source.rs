@@ -1,0 +1,269 @@
+//! Curves of the motions of a program, one after the other.
+
+use std::collections::VecDeque;
+
+use virtual_axes_core::trajectory::JointLimits;
+
+use super::element::{Arc, Element, FeedCap, FeedJoints, JointKinds, Shape};
+use super::error::{FeedPlanError, StepError};
+use super::vector::{JointVector, MAX_JOINTS};
+use crate::motion::{
+    AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, MotionKind, Nurbs, PathControl, PlanarArc, ProgramEvent,
+    ProgramMotion, ProgramStep,
+};
+
+/// Largest gap between two motions, m or rad.
+const GAP_TOLERANCE: f64 = 1e-9;
+/// Number of lines per knot interval of a NURBS curve.
+const LINES_PER_KNOT: usize = 64;
+
+/// Tolerances of blending at the end of an element: linear axes (m) and rotary axes (rad).
+pub(super) type BlendTolerance = [f64; 2];
+
+/// Next part of a program.
+#[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "nearly all parts are curves")]
+pub(super) enum Part {
+    /// Curve; `None` is a stop at its end, otherwise the tolerances of blending; the flag is true for an exact path.
+    Curve { element: Element, blend: Option<BlendTolerance>, is_exact_path: bool },
+    /// Standstill of a duration, s.
+    Stop(f64),
+}
+
+/// ProgramAxes of the machine and their programmed letters.
+#[derive(Debug, Clone)]
+pub(super) struct ProgramAxes {
+    /// Joint of each programmed axis.
+    pub joint_of: [Option<usize>; AXIS_COUNT],
+    pub kinds: JointKinds,
+}
+
+impl ProgramAxes {
+    pub fn new(limits: &[JointLimits]) -> Self {
+        let joint_of = AXIS_LETTERS.map(|letter| {
+            limits.iter().position(|joint| joint.name.eq_ignore_ascii_case(&letter.to_string()))
+        });
+        let of = |kind: &str| (0..limits.len()).filter(|&i| limits[i].unit() == kind).collect();
+        Self { joint_of, kinds: JointKinds { linear: of("m"), rotary: of("rad") } }
+    }
+
+    fn set(&self, axes: [usize; 3]) -> FeedJoints {
+        FeedJoints { indices: axes.map(|axis| self.joint_of[axis]) }
+    }
+
+    fn vector(&self, coordinates: &Coordinates) -> JointVector {
+        let mut vector = [0.0; MAX_JOINTS];
+        for (joint, value) in self.joint_of.iter().zip(coordinates) {
+            if let Some(joint) = joint {
+                vector[*joint] = *value;
+            }
+        }
+        vector
+    }
+}
+
+/// Source of the curves of a program.
+pub(super) struct PartSource<I> {
+    steps: I,
+    axes: ProgramAxes,
+    default_tolerance: BlendTolerance,
+    end: Option<Coordinates>,
+    /// Tool length of the last motion.
+    tcp_length: Option<f64>,
+    pending: VecDeque<Part>,
+    is_finished: bool,
+}
+
+impl<I, E> PartSource<I>
+where
+    I: Iterator<Item = Result<ProgramStep, E>>,
+    E: Into<StepError>,
+{
+    pub fn new(steps: I, axes: ProgramAxes, default_tolerance: BlendTolerance) -> Self {
+        let pending = VecDeque::new();
+        Self { steps, axes, default_tolerance, end: None, tcp_length: None, pending, is_finished: false }
+    }
+
+    /// Returns the joints by kind of movement.
+    pub fn kinds(&self) -> &JointKinds {
+        &self.axes.kinds
+    }
+
+    /// Returns the next curve or stop, or `None` at the end of the program.
+    pub fn next(&mut self) -> Result<Option<Part>, FeedPlanError> {
+        loop {
+            if let Some(part) = self.pending.pop_front() {
+                return Ok(Some(part));
+            }
+            if self.is_finished {
+                return Ok(None);
+            }
+            match self.steps.next() {
+                None => self.is_finished = true,
+                Some(Err(error)) => {
+                    self.is_finished = true;
+                    return Err(FeedPlanError::Step(error.into()));
+                }
+                Some(Ok(ProgramStep::Motion(motion))) => self.add(&motion)?,
+                Some(Ok(ProgramStep::Event { line, event })) => self.add_event(line, &event)?,
+            }
+        }
+    }
+
+    fn add_event(&mut self, line: usize, event: &ProgramEvent) -> Result<(), FeedPlanError> {
+        match event {
+            ProgramEvent::Dwell(time) if !(time.is_finite() && *time >= 0.0) => {
+                return Err(FeedPlanError::NotFinite { line, what: "dwell", value: *time });
+            }
+            ProgramEvent::Dwell(time) => self.pending.push_back(Part::Stop(*time)),
+            ProgramEvent::Stop | ProgramEvent::OptionalStop | ProgramEvent::ToolChange(_) => {
+                self.pending.push_back(Part::Stop(0.0));
+            }
+            ProgramEvent::End => self.is_finished = true,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, motion: &ProgramMotion) -> Result<(), FeedPlanError> {
+        self.check(motion)?;
+        (self.end, self.tcp_length) = (Some(motion.end), motion.tcp_length);
+        let (from, to) = (self.axes.vector(&motion.start), self.axes.vector(&motion.end));
+        match &motion.kind {
+            MotionKind::Rapid | MotionKind::Line => self.push(motion, Shape::Line, from, to, 1.0),
+            MotionKind::Arc(arc) => {
+                let shape = self.arc(arc, &from, &to, motion.line)?;
+                self.push(motion, shape, from, to, 1.0);
+            }
+            MotionKind::Nurbs(nurbs) => self.push_nurbs(motion, nurbs, from, to)?,
+        }
+        Ok(())
+    }
+
+    fn check(&self, motion: &ProgramMotion) -> Result<(), FeedPlanError> {
+        let line = motion.line;
+        for value in motion.start.iter().chain(&motion.end) {
+            if !value.is_finite() {
+                return Err(FeedPlanError::NotFinite { line, what: "coordinate", value: *value });
+            }
+        }
+        if let Feed::Linear(value) | Feed::Rotary(value) | Feed::Duration(value) = motion.feed
+            && !(value > 0.0 && value.is_finite())
+        {
+            return Err(FeedPlanError::InvalidFeed { line, value });
+        }
+        for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
+            if self.axes.joint_of[axis].is_none() && motion.start[axis] != motion.end[axis] {
+                return Err(FeedPlanError::MissingAxis { line, axis: letter });
+            }
+        }
+        if let Some(length) = motion.tcp_length {
+            if (0..3).any(|axis| self.axes.joint_of[axis].is_none()) {
+                return Err(FeedPlanError::NoToolCenterPoint { line });
+            }
+            if !length.is_finite() {
+                return Err(FeedPlanError::NotFinite { line, what: "tool length", value: length });
+            }
+        }
+        // Coordinates change their meaning where tool center point control begins or ends.
+        let before = self.end.filter(|_| self.tcp_length == motion.tcp_length).unwrap_or(motion.start);
+        let gap = before.iter().zip(&motion.start).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        if gap > GAP_TOLERANCE { Err(FeedPlanError::Gap { line, gap }) } else { Ok(()) }
+    }
+
+    fn arc(
+        &self,
+        arc: &PlanarArc,
+        from: &JointVector,
+        to: &JointVector,
+        line: usize,
+    ) -> Result<Shape, FeedPlanError> {
+        let [first, second, _] = arc.plane.axes();
+        let missing = |axis: usize| FeedPlanError::MissingAxis { line, axis: AXIS_LETTERS[axis] };
+        let x = self.axes.joint_of[first].ok_or_else(|| missing(first))?;
+        let y = self.axes.joint_of[second].ok_or_else(|| missing(second))?;
+        for value in arc.center.into_iter().chain([arc.sweep]) {
+            if !value.is_finite() {
+                return Err(FeedPlanError::NotFinite { line, what: "arc center or sweep", value });
+            }
+        }
+        let radius = |point: &JointVector| (point[x] - arc.center[0]).hypot(point[y] - arc.center[1]);
+        let phase = (from[y] - arc.center[1]).atan2(from[x] - arc.center[0]);
+        let radii = [radius(from), radius(to)];
+        Ok(Shape::Arc(Arc { plane: [x, y], center: arc.center, radii, phase, sweep: arc.sweep }))
+    }
+
+    /// Appends a curve that is the fraction `share` of the motion.
+    fn push(&mut self, motion: &ProgramMotion, shape: Shape, from: JointVector, to: JointVector, share: f64) {
+        let length = Element::measure(&shape, &from, &to, &self.axes.kinds);
+        if length <= 0.0 {
+            return;
+        }
+        let xyz = self.axes.set([0, 1, 2]);
+        let has_arc = matches!(shape, Shape::Arc(_));
+        let moves_xyz = has_arc || xyz.norm(&std::array::from_fn(|i| to[i] - from[i])) > 0.0;
+        let (cap, feed) = match motion.feed {
+            Feed::Rapid => (FeedCap::Rapid, f64::INFINITY),
+            Feed::Linear(value) => {
+                let joints = if moves_xyz { xyz } else { self.axes.set([6, 7, 8]) };
+                (FeedCap::Speed { value, joints }, value)
+            }
+            Feed::Rotary(value) => (FeedCap::Speed { value, joints: self.axes.set([3, 4, 5]) }, value),
+            Feed::Duration(time) => (FeedCap::Rate(length / (time * share)), length / (time * share)),
+        };
+        let blend = match motion.path_control {
+            PathControl::Blend(blend) => Some([
+                blend.tolerance.unwrap_or(self.default_tolerance[0]),
+                blend.rotary_tolerance.unwrap_or(self.default_tolerance[1]),
+            ]),
+            _ => None,
+        };
+        let is_exact_path = motion.path_control == PathControl::ExactPath;
+        let element =
+            Element { shape, from, to, length, line: motion.line, feed, cap, tcp_length: motion.tcp_length };
+        self.pending.push_back(Part::Curve { element, blend, is_exact_path });
+    }
+
+    /// Appends the lines of a NURBS curve, blended within the default tolerance inside the curve.
+    fn push_nurbs(
+        &mut self,
+        motion: &ProgramMotion,
+        nurbs: &Nurbs,
+        from: JointVector,
+        to: JointVector,
+    ) -> Result<(), FeedPlanError> {
+        let [first, second, _] = nurbs.plane.axes();
+        let (Some(x), Some(y)) = (self.axes.joint_of[first], self.axes.joint_of[second]) else {
+            return Err(FeedPlanError::MissingAxis { line: motion.line, axis: AXIS_LETTERS[first] });
+        };
+        let knots = nurbs.control.len().saturating_sub(nurbs.order.max(2)) + 1;
+        let count = knots * LINES_PER_KNOT;
+        let mut before = from;
+        for i in 1..=count {
+            let t = i as f64 / count as f64;
+            let mut point = super::vector::mix(&from, &to, t);
+            if i < count {
+                let [px, py] = super::nurbs::point(nurbs, t);
+                if !(px.is_finite() && py.is_finite()) {
+                    return Err(FeedPlanError::NotFinite {
+                        line: motion.line,
+                        what: "NURBS point",
+                        value: px + py,
+                    });
+                }
+                (point[x], point[y]) = (px, py);
+            }
+            self.push(motion, Shape::Line, before, point, 1.0 / count as f64);
+            before = point;
+        }
+        let inside = Some(self.default_tolerance);
+        let last = self.pending.len().saturating_sub(1);
+        for part in self.pending.iter_mut().take(last) {
+            if let Part::Curve { blend, is_exact_path, .. } = part {
+                *blend = blend.or(inside);
+                *is_exact_path = false;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,206 @@
+//! Window of the path for the speed solver: intervals, and the constraints of the joints on the spline's coefficients.
+
+use super::vector::JointVector;
+
+/// Speed, acceleration and jerk limit of a joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct JointBounds {
+    pub velocity: f64,
+    pub acceleration: f64,
+    pub jerk: f64,
+}
+
+/// First three derivatives of the joints at one end of an interval.
+pub(super) type Node = [JointVector; 3];
+
+/// Interval of the path between two stations.
+#[derive(Debug, Clone)]
+pub(super) struct Interval {
+    pub length: f64,
+    pub ends: [Node; 2],
+    /// Largest rate of the path parameter, 1/s.
+    pub cap: f64,
+    /// Usable fraction of the acceleration and jerk limits.
+    pub share: f64,
+}
+
+/// State at the start of a window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum WindowStart {
+    /// Standstill: the first interval has constant jerk.
+    Rest,
+    /// b = u̇² and b′.
+    Moving { b: f64, slope: f64 },
+}
+
+/// Solution over the intervals between the rest intervals: b and b′ at each station.
+pub(super) type Stations = Vec<(f64, f64)>;
+
+/// Constraint g ≤ 0 on three consecutive coefficients.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ConstraintRow {
+    pub first: usize,
+    pub gradient: [f64; 3],
+    pub value: f64,
+}
+
+/// Linear form in three consecutive coefficients.
+pub(super) type Form = [f64; 3];
+
+/// b, b′ at start, end and middle, and b″ of an interval, as linear forms. In the middle, b is the coefficient that bounds
+/// it.
+pub(super) struct IntervalForms {
+    pub b: [Form; 3],
+    pub slope: [Form; 3],
+    pub curvature: Form,
+}
+
+fn scaled(form: &Form, by: f64) -> Form {
+    form.map(|x| x * by)
+}
+
+fn sum(a: &Form, b: &Form) -> Form {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+pub(super) fn dot(a: &Form, c: &[f64]) -> f64 {
+    a[0] * c[0] + a[1] * c[1] + a[2] * c[2]
+}
+
+/// Description of a window for the solver.
+pub(super) struct Window<'a> {
+    pub intervals: &'a [Interval],
+    pub start: WindowStart,
+    /// Lengths of the rest intervals: 0 for a moving start.
+    pub rest: [f64; 2],
+    pub joints: &'a [JointBounds],
+}
+
+impl Window<'_> {
+    /// Returns the intervals without the rest intervals.
+    pub fn inner(&self) -> &[Interval] {
+        let from = usize::from(self.start == WindowStart::Rest);
+        &self.intervals[from..self.intervals.len() - 1]
+    }
+
+    pub fn shape(&self, k: usize) -> IntervalForms {
+        let inner = self.inner();
+        let h = inner[k].length;
+        let before = if k > 0 { inner[k - 1].length } else { 0.0 };
+        let after = if k + 1 < inner.len() { inner[k + 1].length } else { 0.0 };
+        let slope =
+            [[-2.0 / (before + h), 2.0 / (before + h), 0.0], [0.0, -2.0 / (h + after), 2.0 / (h + after)]];
+        let curvature = scaled(&sum(&slope[1], &scaled(&slope[0], -1.0)), 1.0 / h);
+        let middle = scaled(&sum(&slope[0], &slope[1]), 0.5);
+        IntervalForms {
+            b: [
+                [h / (before + h), before / (before + h), 0.0],
+                [0.0, after / (h + after), h / (h + after)],
+                [0.0, 1.0, 0.0],
+            ],
+            slope: [slope[0], slope[1], middle],
+            curvature,
+        }
+    }
+
+    /// Returns the first coefficient divided by the second for constant jerk from rest.
+    pub fn ties(&self) -> [f64; 2] {
+        let inner = self.inner();
+        let tie = |rest: f64, h: f64| 1.0 / (1.0 + 2.0 / 3.0 * h / rest);
+        let first = if self.start == WindowStart::Rest { tie(self.rest[0], inner[0].length) } else { 0.0 };
+        [first, tie(self.rest[1], inner[inner.len() - 1].length)]
+    }
+
+    /// Returns the weight of 1/√c in the time, with the rest intervals.
+    pub fn weight(&self, k: usize) -> f64 {
+        let (inner, ties) = (self.inner(), self.ties());
+        let mut weight = inner[k].length;
+        if k == 0 && self.start == WindowStart::Rest {
+            weight += 3.0 * self.rest[0] / ties[0].sqrt();
+        }
+        if k + 1 == inner.len() {
+            weight += 3.0 * self.rest[1] / ties[1].sqrt();
+        }
+        weight
+    }
+
+    /// Returns the largest b at the inner end of a rest interval: jerk 2/9 (b / h^(4/3))^(3/2), with a share for the
+    /// curvature.
+    pub fn rest_bound(&self, end: usize) -> f64 {
+        let interval = if end == 0 { &self.intervals[0] } else { &self.intervals[self.intervals.len() - 1] };
+        let h = interval.length;
+        let mut jerk = f64::INFINITY;
+        for (j, bounds) in self.joints.iter().enumerate() {
+            // j (q′ + 9 q″ u + 9/2 q‴ u²) at distance u from the standstill.
+            let size = interval
+                .ends
+                .iter()
+                .map(|node| node[0][j].abs() + 9.0 * node[1][j].abs() * h + 4.5 * node[2][j].abs() * h * h);
+            jerk = jerk.min(interval.share * bounds.jerk / size.fold(0.0, f64::max));
+        }
+        (4.5 * jerk).powf(2.0 / 3.0) * h.powf(4.0 / 3.0)
+    }
+}
+
+/// Adds `form · c ≤ bound`.
+pub(super) fn push_upper(rows: &mut Vec<ConstraintRow>, first: usize, form: &Form, c: &[f64], bound: f64) {
+    if bound.is_finite() {
+        rows.push(ConstraintRow {
+            first,
+            gradient: scaled(form, 1.0 / bound),
+            value: dot(form, c) / bound - 1.0,
+        });
+    }
+}
+
+/// Adds the bounds on the speed.
+pub(super) fn push_bounds(
+    rows: &mut Vec<ConstraintRow>,
+    k: usize,
+    interval: &Interval,
+    shape: &IntervalForms,
+    c: &[f64],
+) {
+    let bound = interval.cap * interval.cap;
+    push_upper(rows, k, &shape.b[0], c, bound);
+    push_upper(rows, k, &[0.0, 1.0, 0.0], c, bound);
+    push_upper(rows, k, &shape.b[1], c, bound);
+}
+
+/// Adds the bounds of the joints' acceleration and jerk at the start (0), the end (1) or in the middle (2) of an interval.
+pub(super) fn push_joint_rows(
+    rows: &mut Vec<ConstraintRow>,
+    k: usize,
+    interval: &Interval,
+    shape: &IntervalForms,
+    c: &[f64],
+    end: usize,
+    joints: &[JointBounds],
+) {
+    let (b, slope) = (&shape.b[end], &shape.slope[end]);
+    let speed = dot(b, c).max(f64::MIN_POSITIVE).sqrt();
+    let value = |order: usize, j: usize| match end {
+        2 => 0.5 * (interval.ends[0][order][j] + interval.ends[1][order][j]),
+        _ => interval.ends[end][order][j],
+    };
+    for (j, bounds) in joints.iter().enumerate() {
+        let (q1, q2, q3) = (value(0, j), value(1, j), value(2, j));
+        if q1 == 0.0 && q2 == 0.0 && q3 == 0.0 {
+            continue;
+        }
+        let mut push = |gradient: Form, value: f64| {
+            rows.push(ConstraintRow { first: k, gradient, value: value - 1.0 });
+            rows.push(ConstraintRow { first: k, gradient: gradient.map(|x| -x), value: -value - 1.0 });
+        };
+        if end == 0 {
+            let scale = 1.0 / (interval.share * bounds.acceleration);
+            let form = sum(&scaled(slope, 0.5 * q1 * scale), &scaled(b, q2 * scale));
+            push(form, dot(&form, c));
+        }
+        let scale = 1.0 / (interval.share * bounds.jerk);
+        let form = sum(&scaled(b, q3), &sum(&scaled(slope, 1.5 * q2), &scaled(&shape.curvature, 0.5 * q1)));
+        let value = dot(&form, c);
+        let gradient = sum(&scaled(&form, speed * scale), &scaled(b, 0.5 * value / speed * scale));
+        push(gradient, value * speed * scale);
+    }
+}

@@ -1,0 +1,10 @@
+//! Look-ahead and feed planning of part programs.
+
+mod deviation;
+mod feed_override;
+mod five_axis;
+mod limits;
+mod optimum;
+mod profile;
+mod programs;
+mod random;

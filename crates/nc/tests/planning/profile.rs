@@ -1,0 +1,103 @@
+//! Cycle time and feed: closed forms, micro-segments.
+
+use std::f64::consts::TAU;
+
+use proptest::prelude::*;
+use virtual_axes_nc::motion::PathControl;
+
+use crate::limits::{machine, plan};
+use crate::programs::{Program, blend, raster};
+
+/// Returns the shortest time from standstill to standstill over `length` with limits of speed, acceleration and jerk.
+fn closed_form(length: f64, v: f64, a: f64, j: f64) -> f64 {
+    // Ramp to the speed w: time t(w), length w t(w).
+    let ramp = |w: f64| if w * j >= a * a { w / a + a / j } else { 2.0 * (w / j).sqrt() };
+    if v * ramp(v) <= length {
+        return length / v + ramp(v);
+    }
+    // The peak speed of the two ramps without constant speed.
+    let by_jerk = (length * length * j / 4.0).cbrt();
+    if by_jerk * j < a * a {
+        return 2.0 * ramp(by_jerk);
+    }
+    let w = a / 2.0 * ((a * a / (j * j) + 4.0 * length / a).sqrt() - a / j);
+    2.0 * ramp(w)
+}
+
+proptest! {
+    #[test]
+    fn a_straight_line_takes_the_closed_form(
+        exponent in -5.0..-0.6f64, direction in -3.2..3.2f64, tilt in -1.0..1.0f64, feed in -3.0..0.0f64,
+    ) {
+        let length = 10f64.powf(exponent);
+        let (s, c) = direction.sin_cos();
+        let step = [c, s, tilt];
+        let norm = step.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let unit = step.map(|x| x / norm);
+        let mut program = Program::new(10f64.powf(feed), PathControl::ExactStop);
+        program.line(length * unit[0], length * unit[1], length * unit[2]);
+        let machine = machine();
+        let least = |of: fn(&virtual_axes_core::config::LimitsConfig) -> f64| {
+            let axes = machine.axes().iter().zip(unit);
+            axes.map(|(axis, slope)| of(axis.limits()) / slope.abs()).fold(f64::INFINITY, f64::min)
+        };
+        let v = least(|l| l.velocity).min(program.feed);
+        let expected = closed_form(length, v, least(|l| l.acceleration), least(|l| l.jerk));
+        let outcome = plan(&program);
+        outcome.audit.assert_kept();
+        prop_assert!((outcome.path_time - expected).abs() <= 1e-9, "{} {expected}", outcome.path_time);
+    }
+}
+
+#[test]
+fn exact_stops_add_up() {
+    let mut program = Program::new(0.1, PathControl::ExactStop);
+    program.line(0.05, 0.0, 0.0).dwell(0.25).line(0.05, 0.05, 0.0).line(0.02, 0.05, 0.0);
+    let machine = machine();
+    let [x, y] = [0, 1].map(|i| *machine.axes()[i].limits());
+    let expected = closed_form(0.05, 0.1, x.acceleration, x.jerk)
+        + closed_form(0.05, 0.1, y.acceleration, y.jerk)
+        + closed_form(0.03, 0.1, x.acceleration, x.jerk)
+        + 0.25;
+    let outcome = plan(&program);
+    outcome.audit.assert_kept();
+    assert!((outcome.path_time - expected).abs() < 1e-9, "{} {expected}", outcome.path_time);
+}
+
+/// Returns the share of cycles with at least `fraction` of the programmed feed, between the ramps at both ends.
+fn mean_feed(program: &Program) -> f64 {
+    let outcome = plan(program);
+    outcome.audit.assert_kept();
+    let ramp = 30;
+    let inner = &outcome.setpoints[ramp..outcome.setpoints.len() - ramp];
+    let covered = inner[inner.len() - 1].path_position - inner[0].path_position;
+    covered / ((inner.len() - 1) as f64 * 0.006)
+}
+
+#[test]
+fn micro_segments_run_at_the_programmed_feed() {
+    // 20 µm segments around a helix, which the limits allow at the programmed feed.
+    for rounding in [0.0, 1e-6] {
+        let mut program = Program::new(0.05, blend(10e-6));
+        let (radius, pitch) = (10e-3, 1e-3);
+        program.at[0] = radius;
+        let round = |x: f64| if rounding > 0.0 { (x / rounding).round() * rounding } else { x };
+        let count = (4.0 * TAU * radius / 20e-6) as usize;
+        for i in 1..=count {
+            let turn = 4.0 * TAU * i as f64 / count as f64;
+            program.line(round(radius * turn.cos()), round(radius * turn.sin()), round(pitch * turn / TAU));
+        }
+        let mean = mean_feed(&program);
+        println!("rounding {rounding}: {count} segments, {mean} m/s of 0.05 m/s");
+        assert!(mean >= 0.9 * 0.05, "rounding {rounding}: {mean}");
+    }
+}
+
+#[test]
+fn a_raster_runs_near_the_feed_that_the_limits_allow() {
+    for rounding in [0.0, 1e-7, 1e-6] {
+        let program = raster(4, 0.04, 20e-6, rounding, 0.05, 10e-6);
+        let mean = mean_feed(&program);
+        println!("rounding {rounding}: {} segments, {mean} m/s of 0.05 m/s", program.steps.len());
+    }
+}
