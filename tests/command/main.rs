@@ -11,6 +11,7 @@ mod identify_traces;
 mod ingress_properties;
 mod interface;
 mod output_form;
+mod part_programs;
 mod reference;
 mod tune_command;
 mod warnings;

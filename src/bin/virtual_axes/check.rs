@@ -1,4 +1,4 @@
-//! `virtual_axes check`: validation of machine files, scenarios and setpoints.
+//! `virtual_axes check`: validation of machine files, scenarios, setpoints and part programs.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -12,22 +12,29 @@ use virtual_axes_io::files::{self, FileKind};
 
 use crate::input::CommandInput;
 use crate::setpoint_summary::SetpointSummary;
-use crate::{axis_warnings, interrupt, print_error, program_text};
+use crate::{axis_warnings, interrupt, part_program, print_error, program_text};
 
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArguments {
-    /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML), or name of a built-in
-    /// machine or scenario.
+    /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML), part program (.nc, .ngc,
+    /// .tap, .cnc, .mpf, .gcode, .iso, .eia), or name of a built-in machine or scenario.
     file: PathBuf,
-    /// Machine for a scenario or setpoints: built-in machine or machine file.
+    /// Machine for a scenario, setpoints or a part program: built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
+    /// M codes that a part program may contain without effect: 100,M110.
+    #[arg(long, value_name = "M_CODES", value_delimiter = ',', value_parser = part_program::m_code)]
+    ignore: Vec<u32>,
 }
 
 /// Validates the file and returns its kind and contents.
 pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     let name = arguments.file.to_string_lossy();
+    if part_program::is_part_program(&arguments.file) {
+        let config = Parameters::load(&arguments.machine)?.machine_config()?;
+        return part_program::check(&arguments.file, &config, &arguments.ignore);
+    }
     let is_machine = match arguments.file.exists() {
         true => files::Input::open(&arguments.file)?.kind() == FileKind::Machine,
         false => is_shipped_machine(&name)?,

@@ -23,6 +23,7 @@ mod list;
 mod machine_file;
 mod output_arguments;
 mod parameters;
+mod part_program;
 mod period;
 mod pose;
 mod program_text;
@@ -81,7 +82,7 @@ enum Command {
     Robustness(Box<robustness::RobustnessArguments>),
     /// Identify the parameters of an axis from recordings and write a machine file.
     Identify(Box<identify::IdentifyArguments>),
-    /// Validate a machine file, a scenario, or setpoints.
+    /// Validate a machine file, a scenario, setpoints, or a part program.
     Check(check::CheckArguments),
     /// Print the URDF of a machine, for robot_state_publisher and RViz.
     Urdf(urdf::UrdfArguments),

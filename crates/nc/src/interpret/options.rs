@@ -97,6 +97,16 @@ impl TipTransform {
         Self { kinematics: Kinematics::new(machine), geometry: *machine.kinematics(), joints }
     }
 
+    /// Computes the joint positions of the machine, in its order, at a position of a motion. `tcp_length` is
+    /// [`ProgramMotion::tcp_length`](crate::motion::ProgramMotion::tcp_length).
+    pub fn joints(&self, position: &Coordinates, tcp_length: Option<f64>) -> Vec<f64> {
+        let mut position = *position;
+        if let Some(length) = tcp_length {
+            self.axis_positions(&mut position, length);
+        }
+        self.joints.iter().map(|axis| axis.map_or(0.0, |axis| position[axis])).collect()
+    }
+
     /// Converts axis positions to the tip of a tool, in machine coordinates with the tables at 0.
     pub(super) fn tip(&self, position: &mut Coordinates, tool_length: f64) {
         position[2] += self.geometry.tool_length - tool_length;
