@@ -9,9 +9,9 @@
 //! | `ROS_AUTOMATIC_DISCOVERY_RANGE` | `OFF`, `LOCALHOST`, `SUBNET`, `SYSTEM_DEFAULT` | `SUBNET` |
 //! | `ROS_STATIC_PEERS` | hosts, separated by semicolons | none |
 //!
-//! RustDDS announces itself by multicast and to this host, and to no other host by name, so a node cannot discover
-//! its static peers. It does respond to a host that discovers it: with `SUBNET`, an entry for this host in the
-//! `ROS_STATIC_PEERS` of the others is enough. A warning reports this.
+//! RustDDS announces itself by multicast and to this host; `static_peers` forwards the announcements to other hosts. It
+//! also responds to a host that discovers it. With `SUBNET`, an entry in the `ROS_STATIC_PEERS` of one side is
+//! therefore enough.
 
 use std::net::{IpAddr, Ipv4Addr};
 
@@ -72,6 +72,7 @@ pub struct EnvironmentError {
 pub struct Environment {
     domain_id: u16,
     range: DiscoveryRange,
+    static_peers: Vec<String>,
     warnings: Vec<String>,
 }
 
@@ -111,7 +112,7 @@ impl Environment {
         };
 
         let mut warnings = Vec::new();
-        let peers: Vec<String> = get("ROS_STATIC_PEERS")
+        let mut static_peers: Vec<String> = get("ROS_STATIC_PEERS")
             .iter()
             .flat_map(|list| list.split(';'))
             .map(|peer| peer.trim().to_owned())
@@ -136,13 +137,15 @@ impl Environment {
                     DiscoveryRange::Localhost
                 }),
             };
-            if let Some(warning) = static_peers_warning(range, &peers) {
+            if let Some(warning) = static_peers_warning(range, &static_peers) {
                 warnings.push(warning);
             }
             range
         };
-
-        Ok(Self { domain_id, range, warnings })
+        if matches!(range, DiscoveryRange::Off | DiscoveryRange::Localhost) {
+            static_peers.clear();
+        }
+        Ok(Self { domain_id, range, static_peers, warnings })
     }
 
     /// Returns the DDS domain id, 0 to 232.
@@ -155,6 +158,12 @@ impl Environment {
     #[must_use]
     pub fn range(&self) -> DiscoveryRange {
         self.range
+    }
+
+    /// Returns the hosts to which the participant is announced by name.
+    #[must_use]
+    pub fn static_peers(&self) -> &[String] {
+        &self.static_peers
     }
 
     /// Returns warnings for the log about ignored or unsupported variables.
@@ -193,19 +202,16 @@ fn static_peers_warning(range: DiscoveryRange, peers: &[String]) -> Option<Strin
         return None;
     }
     let list = peers.join(", ");
-    Some(match range {
-        DiscoveryRange::Off => {
-            format!("ROS_STATIC_PEERS ({list}) is ignored, because ROS_AUTOMATIC_DISCOVERY_RANGE is OFF")
-        }
-        DiscoveryRange::Localhost => format!(
-            "ROS_STATIC_PEERS ({list}) is not supported by this node's middleware, and LOCALHOST restricts discovery \
-             to this host; use SUBNET, and add this host to the ROS_STATIC_PEERS of the others"
-        ),
-        _ => format!(
-            "ROS_STATIC_PEERS ({list}) is not supported by this node's middleware; add this host to the \
-             ROS_STATIC_PEERS of the others instead"
-        ),
-    })
+    match range {
+        DiscoveryRange::Off => Some(format!(
+            "ROS_STATIC_PEERS ({list}) is ignored, because ROS_AUTOMATIC_DISCOVERY_RANGE is OFF"
+        )),
+        DiscoveryRange::Localhost => Some(format!(
+            "ROS_STATIC_PEERS ({list}) is ignored, because LOCALHOST restricts discovery to this host; use \
+             ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET"
+        )),
+        DiscoveryRange::Subnet | DiscoveryRange::SystemDefault => None,
+    }
 }
 
 #[cfg(test)]
@@ -285,12 +291,13 @@ mod tests {
     }
 
     #[test]
-    fn static_peers_cause_a_warning() {
+    fn static_peers_are_used_beyond_this_host_and_cause_a_warning_otherwise() {
         let environment = read(&[("ROS_STATIC_PEERS", " 192.168.0.1 ;;robot.local; ")]).unwrap();
-        assert_eq!(environment.warnings().len(), 1);
-        assert!(environment.warnings()[0].contains("(192.168.0.1, robot.local)"));
+        assert!(environment.warnings().is_empty());
+        assert_eq!(environment.static_peers(), ["192.168.0.1", "robot.local"]);
         let local = [("ROS_STATIC_PEERS", "a"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")];
-        assert!(read(&local).unwrap().warnings()[0].contains("use SUBNET"));
+        assert!(read(&local).unwrap().static_peers().is_empty());
+        assert!(read(&local).unwrap().warnings()[0].contains("SUBNET"));
         let off = [("ROS_STATIC_PEERS", "a"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")];
         assert!(read(&off).unwrap().warnings()[0].contains("OFF"));
         assert!(read(&[("ROS_STATIC_PEERS", ";")]).unwrap().warnings().is_empty());

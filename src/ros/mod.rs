@@ -13,6 +13,7 @@
 //! | `dispose` | DATA with PID_KEY_HASH | disposes of the participant or a writer |
 //! | `large_response` | DATA, GAP | delivers service responses longer than the path's MTU |
 //! | `announcement_eviction` | DATA with key | discovers a participant again that returns after its lease has expired |
+//! | `static_peers` | those of RustDDS | announces the participant to other hosts without multicast |
 //! | `discovery_gate` | – | delays discovery until all endpoints exist |
 //! | `writer_rotation` | – | bounds the memory of a volatile writer; matches the readers of a returned participant |
 
@@ -57,6 +58,7 @@ pub mod security;
 mod service;
 mod setpoints;
 mod stalled_readers;
+mod static_peers;
 mod stream;
 mod throttle;
 mod tool;

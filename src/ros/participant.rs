@@ -102,6 +102,11 @@ impl Participant {
         self.environment.range()
     }
 
+    /// Returns the hosts to which the participant is announced by name.
+    pub fn static_peers(&self) -> &[String] {
+        self.environment.static_peers()
+    }
+
     /// Disposes of the participant and sends the dispose message to all participants that may know it. Returns the time
     /// taken, about 40 ms.
     pub fn shutdown(mut self) -> Duration {

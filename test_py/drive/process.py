@@ -100,15 +100,16 @@ class Node:
         env: Mapping[str, str] | None = None,
         binary: Path | None = None,
         stderr: int | None = None,
+        prefix: Sequence[str] = (),
     ):
         """Sets what to start; `ros_args` follow --ros-args, `name` is the resulting full name.
 
-        `stderr` is a file descriptor for it instead of `output()`.
+        `stderr` is a file descriptor for it instead of `output()`; `prefix` is a command that executes the program.
         """
         self.name = name
         self._own_domain = DomainId() if domain_id is None else None
         self.domain_id = self._own_domain.value if self._own_domain else domain_id
-        self._command = [str(binary or node_binary()), *(["--ros-args", *ros_args] if ros_args else [])]
+        self._command = [*prefix, str(binary or node_binary()), *(["--ros-args", *ros_args] if ros_args else [])]
         self._env = {
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             **os.environ,

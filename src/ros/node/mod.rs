@@ -31,6 +31,7 @@ use super::recorder::{TopicRecorder, TopicRecording};
 use super::remote_participants::RemoteParticipants;
 use super::security::Security;
 use super::service;
+use super::static_peers;
 use super::topics::Topics;
 use super::writer_rotation::RotationContext;
 use crate::interface::SERVICES;
@@ -112,6 +113,7 @@ async fn serve(
         tasks,
     };
     tasks.spawn_log_output(rosout, log);
+    static_peers::announce(&dds, participant.static_peers());
     let recording = recorder.start()?;
     let (range, participants) = (participant.range(), RemoteParticipants::default());
     let rotation = RotationContext { node, context: context.clone(), range, participants };

@@ -1,0 +1,79 @@
+"""The node and an rclpy process on two hosts, with lost datagrams, without multicast, and with a link that is down."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from drive import DomainId, Node
+from two_hosts import CLIENT_ADDRESS, NODE_ADDRESS, Link, reason_to_skip
+
+SKIP = reason_to_skip()
+pytestmark = pytest.mark.skipif(SKIP is not None, reason=f"two hosts need network namespaces: {SKIP}")
+
+POINTS = 100_000
+WATCH_S = 5.0
+
+
+@contextmanager
+def node_behind(link: Link, **env: str) -> Iterator[Node]:
+    """Yields a node on the first host."""
+    domain = DomainId()
+    try:
+        env = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", **env}
+        with Node(domain_id=domain.value, env=env, prefix=link.node_prefix) as node:
+            yield node
+    finally:
+        domain.release()
+
+
+def steps(link: Link, count: int, *words: object, node_env: dict[str, str] | None = None, **env: str) -> list[Any]:
+    """Runs a client on the second host; returns the results of its steps."""
+    with node_behind(link, **(node_env or {})) as node:
+        with link.client(node.domain_id, node.name, *words, env=env) as client:
+            results = [client.read() for _ in range(count)]
+        print(f"\nloss {link.loss:.0%}: {results}")
+        return results
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.05, 0.2])
+def test_trajectories_arrive_and_no_sample_is_missing(loss: float):
+    """A short trajectory is executed; one of 100 000 points arrives in fragments and is accepted."""
+    with Link(loss=loss) as link:
+        _, short, long = steps(link, 3, "move", POINTS)
+        assert short == {"position": pytest.approx(0.01, abs=1e-4), "gaps": 0}
+        assert long["seconds"] > 0
+        _, watched = steps(link, 2, "watch", WATCH_S)
+        assert watched["missing"] == 0 and watched["received"] > 100
+
+
+@pytest.mark.parametrize("side", ["node", "client"])
+def test_a_static_peer_of_one_side_replaces_multicast(side: str):
+    """An entry in the ROS_STATIC_PEERS of one side is sufficient."""
+    peers = {"node": CLIENT_ADDRESS, "client": NODE_ADDRESS}
+    env = {name: {"ROS_STATIC_PEERS": peers[name]} if name == side else {} for name in peers}
+    with Link(multicast=False) as link:
+        _, watched = steps(link, 2, "watch", WATCH_S, node_env=env["node"], **env["client"])
+        assert watched["missing"] == 0 and watched["received"] > 100
+
+
+def test_samples_arrive_again_after_the_link_was_down():
+    """The link is down for 30 s, longer than the lease of Fast DDS."""
+    with (
+        Link() as link,
+        node_behind(link) as node,
+        link.client(node.domain_id, node.name, "silence", WATCH_S) as client,
+    ):
+        client.read()
+        assert client.read()["missing"] == 0
+        link.set_up(False)
+        time.sleep(30.0)
+        link.set_up(True)
+        client.proceed()
+        after = client.read()
+        print(f"\n{after}")
+        assert after["missing"] == 0 and after["received"] > 100

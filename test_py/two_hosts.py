@@ -1,0 +1,204 @@
+"""Two hosts: network namespaces with a link between them, the node in one and rclpy in the other.
+
+`Link` creates and removes both. The rclpy side is this file as a program, in the second namespace:
+
+    python test_py/two_hosts.py NODE COMMAND
+
+    watch SECONDS      receives joint_states
+    move POINTS        executes a trajectory of a second, then submits one of POINTS points, which is accepted
+    silence SECONDS    receives joint_states, waits for a line on standard input, and receives them again
+
+It writes one line of JSON for each step. Needs root, iproute2 and iptables.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from drive import NANOSECONDS, TSP_NS, Drive, die_with_parent, joint_trajectory  # noqa: E402
+
+NODE_ADDRESS, CLIENT_ADDRESS = "10.79.0.1", "10.79.0.2"
+PATIENCE_S = 150.0
+"""Timeout for a line of the client, s."""
+DISCOVERY_S = 60.0
+"""Timeout for discovery, s: with 20 % of the datagrams lost it takes several announcements."""
+ACCEPTANCE_S = 120.0
+"""Timeout for the acceptance of a long trajectory, s."""
+
+
+def run(*words: object) -> None:
+    """Runs a command; raises CalledProcessError with its output."""
+    subprocess.run([str(word) for word in words], check=True, capture_output=True, text=True)
+
+
+def reason_to_skip() -> str | None:
+    """Returns the reason for which namespaces cannot be created, or None."""
+    missing = [program for program in ("ip", "iptables") if shutil.which(program) is None]
+    if missing:
+        return f"not installed: {', '.join(missing)}"
+    name = f"va{os.getpid()}t"
+    try:
+        run("ip", "netns", "add", name)
+    except subprocess.CalledProcessError as error:
+        return f"ip netns add: {error.stderr.strip()}"
+    run("ip", "netns", "delete", name)
+    return None
+
+
+class Link:
+    """Two namespaces, connected by a veth pair."""
+
+    def __init__(self, loss: float = 0.0, multicast: bool = True):
+        """Sets the share of datagrams that each side drops, and if multicast passes."""
+        self.loss, self.multicast = loss, multicast
+        self.names = (f"va{os.getpid()}a", f"va{os.getpid()}b")
+
+    def __enter__(self) -> Link:
+        """Creates the namespaces."""
+        first, second = self.names
+        for name in self.names:
+            run("ip", "netns", "add", name)
+        run("ip", "link", "add", first, "netns", first, "type", "veth", "peer", "name", second, "netns", second)
+        for name, address in zip(self.names, (NODE_ADDRESS, CLIENT_ADDRESS)):
+            self._ip(name, "address", "add", f"{address}/24", "dev", name)
+            self._ip(name, "link", "set", "lo", "up")
+            self._ip(name, "link", "set", name, "up")
+            self._ip(name, "route", "add", "224.0.0.0/4", "dev", name)
+            if not self.multicast:
+                self._drop(name, "-d", "224.0.0.0/4")
+            if self.loss:
+                # In INPUT, fragments of a datagram have been joined: whole datagrams are dropped.
+                self._drop(name, "-m", "statistic", "--mode", "random", "--probability", self.loss)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Deletes the namespaces, with the link."""
+        for name in self.names:
+            subprocess.run(["ip", "netns", "delete", name], check=False, capture_output=True)
+
+    @property
+    def node_prefix(self) -> list[str]:
+        """Returns the command that executes a program on the first host."""
+        return ["ip", "netns", "exec", self.names[0]]
+
+    def set_up(self, is_up: bool) -> None:
+        """Takes the link down or up again."""
+        self._ip(self.names[0], "link", "set", self.names[0], "up" if is_up else "down")
+        if is_up:
+            # The kernel has removed it with the link.
+            self._ip(self.names[0], "route", "replace", "224.0.0.0/4", "dev", self.names[0])
+
+    def client(self, domain_id: int, node: str, *words: object, env: dict[str, str] | None = None) -> Client:
+        """Returns the rclpy process on the second host."""
+        prefix = ["ip", "netns", "exec", self.names[1]]
+        return Client(prefix, [node, *map(str, words)], {"ROS_DOMAIN_ID": str(domain_id), **(env or {})})
+
+    def _ip(self, name: str, *words: object) -> None:
+        run("ip", "-n", name, *words)
+
+    def _drop(self, name: str, *match: object) -> None:
+        run("ip", "netns", "exec", name, "iptables", "-A", "INPUT", "-i", name, *match, "-j", "DROP")
+
+
+class Client:
+    """Process of the rclpy side."""
+
+    def __init__(self, prefix: Sequence[str], words: Sequence[str], env: dict[str, str]):
+        """Sets what to start."""
+        self._command = [*prefix, sys.executable, __file__, *words]
+        self._env = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", **env}
+
+    def __enter__(self) -> Client:
+        """Starts the process."""
+        self._process = subprocess.Popen(
+            self._command,
+            env=self._env,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            preexec_fn=die_with_parent,
+        )
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Kills the process."""
+        self._process.kill()
+        self._process.communicate()
+
+    def read(self) -> dict[str, Any]:
+        """Returns the result of the next step."""
+        assert self._process.stdout is not None
+        if not select.select([self._process.stdout], [], [], PATIENCE_S)[0]:
+            raise TimeoutError("no output of the client")
+        line = self._process.stdout.readline()
+        if not line:
+            raise ChildProcessError(f"the client ended with status {self._process.wait(PATIENCE_S)}")
+        return dict(json.loads(line))
+
+    def proceed(self) -> None:
+        """Lets the client begin its next step."""
+        assert self._process.stdin is not None
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+
+
+# ----------------------------------------------------------------------------------------------------- the client
+
+
+def write(**result: object) -> None:
+    """Writes the result of a step."""
+    print(json.dumps(result), flush=True)
+
+
+def watch(drive: Drive, seconds: float) -> dict[str, int]:
+    """Receives samples for `seconds`; returns their number and that of the missing ones."""
+    start = drive.now()
+    end = start + round(seconds * NANOSECONDS)
+    drive.wait_until(end, seconds + PATIENCE_S / 2)
+    stamps = drive.record(start, end).joints.stamp
+    return {"received": len(stamps), "missing": round((stamps[-1] - stamps[0]) / TSP_NS) + 1 - len(stamps)}
+
+
+def move(drive: Drive, points: int) -> None:
+    """Executes a short trajectory; then submits one of `points` points, at 0.5 s each, and stops it."""
+    recording = drive.run(joint_trajectory(["x"], [0.0, 1.0], [[0.0], [0.01]]), settle=0.5)
+    gaps = [gap for gap in recording.joints.stamp[1:] - recording.joints.stamp[:-1] if gap != TSP_NS]
+    write(position=drive.latest()["x"], gaps=len(gaps))
+    began = time.monotonic()
+    times = [0.5 * index for index in range(points)]
+    drive.accept(joint_trajectory(["y"], times, [[0.0]] * points), ACCEPTANCE_S)
+    seconds = time.monotonic() - began
+    drive.stop(30.0)
+    write(seconds=seconds)
+
+
+def main() -> None:
+    """Runs the command."""
+    node, command, value = sys.argv[1:]
+    began = time.monotonic()
+    with Drive(node, timeout=DISCOVERY_S) as drive:
+        write(discovered_s=time.monotonic() - began)
+        if command == "watch":
+            write(**watch(drive, float(value)))
+        elif command == "move":
+            move(drive, int(value))
+        elif command == "silence":
+            write(**watch(drive, float(value)))
+            sys.stdin.readline()
+            drive.wait_until(drive.now() + NANOSECONDS, PATIENCE_S)
+            write(**watch(drive, float(value)))
+
+
+if __name__ == "__main__":
+    main()
