@@ -113,7 +113,8 @@ fn require_radii(from: [f64; 2], to: [f64; 2]) -> Outcome<()> {
     ))
 }
 
-/// Returns the swept angle of at most one turn, rad; positive counterclockwise. `from` and `to` are relative to the center.
+/// Returns the swept angle of at most one turn, rad; positive counterclockwise. `from` and `to` are relative to the
+/// center.
 fn sweep(from: [f64; 2], to: [f64; 2], is_clockwise: bool) -> f64 {
     let direction = if is_clockwise { -1.0 } else { 1.0 };
     if (from[0] - to[0]).hypot(from[1] - to[1]) < POINT {

@@ -28,7 +28,7 @@ const GROUPS: usize = Group::SpindleMode as usize + 1;
 
 /// Supported G codes in tenths, with their groups.
 const G_CODES: [(Group, &[u16]); GROUPS] = [
-    (Group::Motion, &[0, 10, 20, 30, 50, 51, 52, 800]),
+    (Group::Motion, &[0, 10, 20, 30, 50, 51, 52, 730, 800, 810, 820, 830, 850, 890]),
     (Group::NonModal, &[40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923]),
     (Group::Plane, &[170, 180, 190]),
     (Group::Distance, &[900, 910]),

@@ -146,6 +146,9 @@ impl State {
         if let Some(code) = codes.g(Group::ArcDistance) {
             self.modal.has_absolute_centers = code == 901;
         }
+        if let Some(code) = codes.g(Group::Retract) {
+            self.modal.retracts_to_initial = code == 980;
+        }
     }
 
     /// Executes the code that uses the axis words: a motion, a reference, an offset.
@@ -168,6 +171,9 @@ impl State {
         }
         let is_machine = codes.g(Group::NonModal) == Some(530);
         if let Some(motion) = motion {
+            if self.modal.motion != Some(motion) {
+                self.modal.cycle = None;
+            }
             self.modal.motion = (motion != 800).then_some(motion);
         }
         if of_axes.is_some() { Ok(()) } else { self.move_by(block, motion, is_machine) }

@@ -286,7 +286,8 @@ impl<R: BufRead + Seek> Interpreter<R> {
                 return Err(missing());
             }
             // Other lines are not executed, and may be incomplete.
-            if self.line.compact().is_err() || !is_o_word(&self.line.text) {
+            let is_executed = self.line.compact().is_ok() && !self.is_skipped(&self.line);
+            if !is_executed || !is_o_word(&self.line.text) {
                 continue;
             }
             let Ok(statement) = Scanner::new(&self.line.text, &self.state).statement() else { continue };
@@ -363,7 +364,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
         self.source.rewind()?;
         while self.source.read_raw(&mut line.raw)? {
             let has_o = line.raw.iter().any(|byte| byte.eq_ignore_ascii_case(&b'o'));
-            if !has_o || line.compact().is_err() || !is_o_word(&line.text) {
+            if !has_o || line.compact().is_err() || self.is_skipped(&line) || !is_o_word(&line.text) {
                 continue;
             }
             let Ok(statement) = Scanner::new(&line.text, &self.state).statement() else { continue };

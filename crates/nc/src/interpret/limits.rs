@@ -22,6 +22,8 @@ pub(super) const MAX_CONTROL_POINTS: usize = 10_000;
 pub(super) const MAX_ORDER: usize = 16;
 /// Largest number of turns of a helix.
 pub(super) const MAX_TURNS: f64 = 10_000.0;
+/// Largest number of pecks in one line of a canned cycle.
+pub(super) const MAX_PECKS: f64 = 10_000.0;
 /// Largest coordinate of a linear axis, m.
 pub(super) const MAX_LENGTH: f64 = 1e4;
 /// Largest coordinate of a rotary axis, rad.

@@ -7,6 +7,7 @@
 
 mod arcs;
 mod codes;
+mod cycles;
 mod error;
 mod execute;
 mod expression;
@@ -63,6 +64,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
         }
     }
 
+    /// Returns true for an optional line that the options skip.
+    fn is_skipped(&self, line: &LineText) -> bool {
+        line.is_optional && self.state.options.skips_optional_lines
+    }
+
     /// Executes the next line.
     fn execute_line(&mut self) -> Outcome<()> {
         let place = self.source.place();
@@ -74,7 +80,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
             return Ok(());
         }
         self.line.compact()?;
-        if self.line.is_optional && self.state.options.skips_optional_lines {
+        if self.is_skipped(&self.line) {
             return Ok(());
         }
         if let Some(message) = self.line.message.take() {

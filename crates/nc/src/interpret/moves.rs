@@ -45,6 +45,7 @@ impl State {
                 if code == 0 { self.push_rapid(end) } else { self.push_feed(MotionKind::Line, end) }
             }
             20 | 30 if has_words => self.arc(block, code == 20),
+            730..=890 if has_words => self.cycle(block, code),
             50..=52 if has_words || code == 52 => self.start_spline(block, code),
             _ => Ok(()),
         }

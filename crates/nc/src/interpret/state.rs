@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
+use super::cycles::Cycle;
 use super::error::Outcome;
 use super::options::InterpreterOptions;
 use super::parameters::{FIRST_OF_CONTROL, ParameterValues, Variables};
@@ -63,6 +64,10 @@ pub(super) struct Modal {
     /// G code of the motion mode, in tenths.
     pub motion: Option<u16>,
     pub plane: Plane,
+    /// Canned cycle of the motion mode.
+    pub cycle: Option<Cycle>,
+    /// True if canned cycles retract to the initial position (G98), false for the plane R (G99).
+    pub retracts_to_initial: bool,
     /// Length unit, m.
     pub length: f64,
     pub is_incremental: bool,
@@ -101,6 +106,8 @@ impl State {
         let modal = Modal {
             motion: None,
             plane: Plane::Xy,
+            cycle: None,
+            retracts_to_initial: true,
             length: MILLIMETER,
             is_incremental: false,
             has_absolute_centers: false,

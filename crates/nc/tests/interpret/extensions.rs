@@ -18,7 +18,10 @@ fn optional_lines_can_be_skipped() {
     let text = "/G0 X1\n/ N2 G0 X2\nG0 X3\n/M2\nG0 X4\n";
     assert_eq!(x_of(text), [1000, 2000, 3000]);
     let options = InterpreterOptions { skips_optional_lines: true, ..InterpreterOptions::default() };
-    assert_eq!(motions(text, options).len(), 2);
+    assert_eq!(motions(text, options.clone()).len(), 2);
+    // Neither branch nor subprogram begins or ends in a line that is skipped.
+    let text = "o1 if [0]\nG0 X1\n/o1 else\nG0 X2\no1 endif\nG0 X3\n";
+    assert_eq!((x_of(text), motions(text, options).len()), (vec![2000, 3000], 1));
 }
 
 #[test]

@@ -99,6 +99,26 @@ fn invalid_arcs_and_splines_are_rejected() {
 }
 
 #[test]
+fn invalid_canned_cycles_are_rejected() {
+    for (line, expected) in [
+        ("G81 X1 Z-1", "G81 requires R, the plane of retraction"),
+        ("G81 X1 R1", "G81 requires Z, the depth"),
+        ("G81 X1 Z3 R2", "G81: the plane R is below the depth Z"),
+        ("G82 X1 Z-1 R1", "G82 requires P, the dwell in s"),
+        ("G83 X1 Z-1 R1", "G83 requires Q above 0, the depth of a peck"),
+        ("G83 X1 Z-1 R1 Q0.0001", "G83: more than 10000 pecks in one line, or L0"),
+        ("G81 X1 Z-1 R1 L0", "G81: more than 10000 pecks in one line, or L0"),
+        ("G81 X1 Z-1 R1 A5", "word A: G81 moves X, Y and Z only"),
+        ("G93 F1 G81 X1 Z-1 R1", "G81 requires G94 or G95"),
+        ("G81 X1 Z-1 R1\nG82 X2 P1", "G82 requires R, the plane of retraction"),
+        ("G84 X1 Z-1 R1", "G84 is not supported; supported: "),
+    ] {
+        let message = error(&format!("F100 G0 Z5\n{line}"));
+        assert!(message.contains(&format!(": {expected}")), "{line}: {message}");
+    }
+}
+
+#[test]
 fn invalid_expressions_are_rejected() {
     for (word, expected) in [
         ("X[1/0]", "word X: division by zero"),
