@@ -107,7 +107,9 @@ impl State {
                 FeedMode::InverseTime => {
                     "feed missing: G93 requires F in each line with G1, G2 or G3".to_owned()
                 }
-                _ => "feed missing: program F above 0 in this mode of the feed".to_owned(),
+                _ => {
+                    "feed missing: program F above 0, also after a change between G93, G94 and G95".to_owned()
+                }
             });
         };
         let per_second = match mode {

@@ -31,7 +31,7 @@ fn invalid_words_are_rejected_with_their_line() {
         ("G0 Xµ", "part.nc:1: invalid character 'µ' outside of a comment"),
         ("G0 (a (b) X1", "part.nc:1: comment within a comment: remove the inner parenthesis"),
         ("G0 (a", "part.nc:1: comment without closing parenthesis"),
-        ("G1 X1", "part.nc:1: feed missing: program F above 0 in this mode of the feed"),
+        ("G1 X1", "part.nc:1: feed missing: program F above 0, also after a change between G93, G94 and G95"),
         ("F0 G1 X1", "part.nc:1: feed missing: program F above 0"),
         ("G93 F1 G1 X1\nX2", "part.nc:2: feed missing: G93 requires F in each line with G1, G2 or G3"),
         (
