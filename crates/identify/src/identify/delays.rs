@@ -227,3 +227,79 @@ fn correlation_inflation(residuals: &[f64]) -> f64 {
     let correlations = (1..CORRELATION.min(residuals.len())).map(|lag| covariance(lag) / variance);
     1.0 + 2.0 * correlations.take_while(|rho| *rho > 0.0).sum::<f64>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::closed_loop::simulate;
+    use virtual_axes_core::config::Parameters;
+    use virtual_axes_core::units::seconds;
+
+    /// Returns 2 s of moves there and back, sampled every position cycle, on `axis`; the positions have an error of 5 µm.
+    fn recorded(axis: &AxisConfig, periods: &Periods) -> Experiment {
+        let tsp = seconds(periods.position);
+        let count = (2.0 / tsp) as usize;
+        let psec = |k: usize| 0.05 * (1.0 - (std::f64::consts::TAU * (k as f64 * tsp - 0.2).max(0.0)).cos());
+        let mut experiment = Experiment {
+            recording: 0,
+            span: 0,
+            sample: 0,
+            mode: FeedforwardMode::Both,
+            psec: (0..count).map(psec).collect(),
+            first: 0.0,
+            period: tsp,
+            trace_filter: None,
+            start: 0.0,
+            position: vec![0.0; count],
+            velocity: vec![0.0; count],
+            current: None,
+        };
+        let simulated = simulate(axis, periods, &experiment).expect("a simulation");
+        let noise = |i: usize| 5e-6 * (i as f64 * 2.4).sin();
+        experiment.position = simulated.position.iter().enumerate().map(|(i, x)| x + noise(i)).collect();
+        experiment
+    }
+
+    #[test]
+    fn a_delay_far_above_the_least_residual_is_not_kept_although_other_parameters_could_explain_it() {
+        let machine = Parameters::embedded_default().and_then(|all| all.machine_config()).expect("a machine");
+        let (periods, mut axis) = (machine.periods(), machine.axes()[0].clone());
+        axis.delays.beta = 4 * MILLISECOND_NS;
+        let experiments = [recorded(&axis, &periods)];
+        let own = 7 * MILLISECOND_NS / 2;
+        axis.delays.beta = own;
+        let changed = |change: fn(&mut AxisConfig)| {
+            let mut axis = axis.clone();
+            change(&mut axis);
+            axis
+        };
+        // Changes that move the axis like β.
+        let nuisance = [
+            changed(|axis| axis.feedforward.torque *= 1.5),
+            changed(|axis| axis.feedforward.velocity *= 1.01),
+            changed(|axis| axis.velocity_loop.gain *= 1.05),
+            changed(|axis| axis.velocity_loop.integral_time *= 1.05),
+            changed(|axis| axis.position_loop.gain *= 1.05),
+            changed(|axis| axis.delays.alpha += 6 * MILLISECOND_NS),
+        ];
+        let fit = |nuisance: &[AxisConfig]| {
+            fit_delay(DelayParameter::Beta, &axis, &periods, &experiments, nuisance, own, false)
+                .expect("a fit")
+        };
+        let found = fit(&nuisance);
+        let rms = |delay: Nanoseconds| {
+            let nearest = found.profile.iter().min_by_key(|(tried, _)| (tried - delay).abs());
+            nearest.map(|(_, rms)| *rms).expect("a profile")
+        };
+        assert!(
+            found.interval.0 <= own && own <= found.interval.1,
+            "explained by others: {:?}",
+            found.interval
+        );
+        assert!(rms(own) > KEPT * rms(found.value), "{} {}", rms(own), rms(found.value));
+        assert!(
+            !found.is_unchanged && (found.value - 4 * MILLISECOND_NS).abs() <= periods.velocity,
+            "{found:?}"
+        );
+    }
+}

@@ -36,7 +36,7 @@ impl Effort {
 }
 
 /// Relative size of singular values that are treated as zero.
-const RANK: f64 = 1e-10;
+pub(super) const RANK: f64 = 1e-10;
 /// Iteration limit of the singular value decomposition of a matrix of about ten rows.
 const SVD_ITERATIONS: usize = 1000;
 
@@ -234,55 +234,6 @@ pub(super) fn fit_linear(rows: impl Iterator<Item = (Vec<f64>, f64, f64)>) -> Op
     let left = (squares - values.dot(&right)).max(0.0);
     let variance = left / count.saturating_sub(size).max(1) as f64;
     Some(LinearFit { values: values.iter().copied().collect(), covariance: inverse * variance })
-}
-
-/// Returns the covariance of fitted values from the sums of the residuals over clusters, which are independent although
-/// the residuals within a cluster are not (sandwich estimator). Rows without cluster, such as priors, have no noise.
-pub(super) fn clustered_covariance(
-    parameters: &[BoundedParameter],
-    values: &[f64],
-    residuals: impl Fn(&[f64]) -> Option<DVector<f64>> + Sync,
-    clusters: &[Option<usize>],
-) -> Option<DMatrix<f64>> {
-    let here = residuals(values)?;
-    let column = |k: usize| {
-        let at = |x: f64| {
-            let mut moved = values.to_vec();
-            *moved.get_mut(k)? = x;
-            residuals(&moved)
-        };
-        let (x, step) = (*values.get(k)?, parameters.get(k)?.step);
-        Some((at(x + step)? - at(x - step)?) / (2.0 * step))
-    };
-    let columns: Option<Vec<DVector<f64>>> = (0..values.len()).into_par_iter().map(column).collect();
-    let mut jacobian = DMatrix::from_columns(&columns?);
-    // A scaling by the column norms; parameters without effect have no error.
-    let scale: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
-    for (mut column, norm) in jacobian.column_iter_mut().zip(&scale) {
-        column /= norm.max(f64::MIN_POSITIVE);
-    }
-    let bread = (jacobian.transpose() * &jacobian).pseudo_inverse(RANK).ok()?;
-    let count = clusters.iter().flatten().max().map_or(0, |last| last + 1);
-    let mut scores = vec![DVector::zeros(values.len()); count];
-    for (row, cluster) in clusters.iter().enumerate().take(here.len()) {
-        if let Some(score) = cluster.and_then(|cluster| scores.get_mut(cluster)) {
-            *score += jacobian.row(row).transpose() * here[row];
-        }
-    }
-    let used: Vec<&DVector<f64>> = scores.iter().filter(|score| score.norm() > 0.0).collect();
-    let mut meat = DMatrix::zeros(values.len(), values.len());
-    for score in &used {
-        meat += *score * score.transpose();
-    }
-    // Few clusters underestimate the variance.
-    let freedom = used.len().saturating_sub(values.len()).max(1);
-    let mut covariance = &bread * meat * &bread * (used.len() as f64 / freedom as f64);
-    for j in 0..scale.len() {
-        for k in 0..scale.len() {
-            covariance[(j, k)] /= scale[j] * scale[k];
-        }
-    }
-    Some(covariance)
 }
 
 /// Returns the inverse of a symmetric matrix after scaling of its diagonal, or none if it is rank-deficient.

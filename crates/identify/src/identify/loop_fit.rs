@@ -8,8 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::closed_loop::{Experiment, position_residuals};
+use super::covariance::systematic_covariance;
 use super::feedforward_mode::FeedforwardMode;
-use super::fit::{BoundedParameter, Effort, clustered_covariance, descend};
+use super::fit::{BoundedParameter, Effort, descend};
 use super::loop_parameter::{LoopParameter, apply, prior};
 use super::trace_experiments::trace_experiments;
 use crate::recording::Signals;
@@ -29,15 +30,17 @@ const KEPT: f64 = 1.1;
 /// Starts of each gain that are followed to their minimum.
 const FOLLOWED: usize = 1;
 /// Gains whose minimum is followed with a free gain; the best one can be a local minimum.
-const FREED: usize = 2;
+const FREED: usize = 4;
 /// Longest difference of the lag from a whole number of position cycles, s.
 const GRID_TOLERANCE: f64 = 0.15e-3;
 /// Position cycles that are tried if that of the machine file does not divide the lag, ns.
 const CYCLES: [Nanoseconds; 2] = [2 * MILLISECOND_NS, MILLISECOND_NS];
-/// Duration of a cluster of correlated residuals, s.
-const CLUSTER: f64 = 0.5;
+/// Residual with a shorter position cycle, relative to that with a cycle that divides the lag, from which on it is taken.
+const SHORTER: f64 = 0.7;
+/// Value of β from which on it is certainly not limited by 0, s.
+const FREE_DELAY: f64 = 1.5e-3;
 
-/// Fitted value with its clustered standard error.
+/// Fitted value with an upper bound of its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LoopValue {
     pub parameter: LoopParameter,
@@ -115,7 +118,6 @@ impl LoopProblem<'_> {
 
     fn bounded(
         &self,
-        axis: &AxisConfig,
         periods: &Periods,
         parameters: &[LoopParameter],
         values: &[f64],
@@ -134,7 +136,6 @@ impl LoopProblem<'_> {
             };
             BoundedParameter { start: start.clamp(low, high), low, high, step }
         };
-        let _ = axis;
         parameters.iter().zip(values).map(of).collect()
     }
 
@@ -147,11 +148,13 @@ impl LoopProblem<'_> {
         lag: f64,
     ) -> Vec<Candidate> {
         let mut all = Vec::new();
-        for beta in DELAY_STARTS {
-            for bandwidth in BANDWIDTH_STARTS {
+        let pairs = || DELAY_STARTS.iter().flat_map(|beta| DELAY_STARTS.map(|gamma| (*beta, gamma)));
+        for bandwidth in BANDWIDTH_STARTS {
+            for (beta, gamma) in pairs() {
                 let value = |parameter: &LoopParameter| match parameter {
                     LoopParameter::Lag => lag,
-                    LoopParameter::Beta | LoopParameter::Gamma => beta * lag,
+                    LoopParameter::Beta => beta * lag,
+                    LoopParameter::Gamma => gamma * lag,
                     LoopParameter::Gain => axis.position_loop.gain,
                     LoopParameter::Bandwidth => bandwidth,
                     LoopParameter::IntegralTime => 1.5 / bandwidth,
@@ -177,7 +180,7 @@ impl LoopProblem<'_> {
         parameters: &[LoopParameter],
         from: &[f64],
     ) -> Option<Candidate> {
-        let bounded = self.bounded(axis, periods, parameters, from);
+        let bounded = self.bounded(periods, parameters, from);
         let (values, cost) = descend(&bounded, Effort::Simulation, |values| {
             self.residuals(axis, periods, parameters, values)
         })?;
@@ -255,7 +258,7 @@ impl LoopProblem<'_> {
             values: values.collect(),
             rms: (last.cost / count).sqrt(),
             rms_with_given_gain: rms_with_given_gain.map(|cost| (cost / count).sqrt()),
-            valley: self.valley(&found, &periods, &errors, &parameters, free.values[0]),
+            valley: self.valley(&found, &periods, free.values[0]),
             axis: found,
             periods,
         })
@@ -263,6 +266,9 @@ impl LoopProblem<'_> {
 
     /// Returns the minimum with the longest position cycle that divides its lag: that of the machine file or a shorter one;
     /// the shortest if none does. A wrong cycle shifts the lag, so it is found anew with each.
+    ///
+    /// Since a motion shows β + Tsp, β at 0 can mean that the cycle is too long: then a shorter one is taken if it leaves a
+    /// clearly smaller residual.
     fn with_dividing_cycle(
         &self,
         axis: &AxisConfig,
@@ -273,7 +279,8 @@ impl LoopProblem<'_> {
         let mut best = (*given, first);
         for cycle in CYCLES.iter().filter(|cycle| **cycle < given.position && **cycle % given.velocity == 0) {
             let (before, candidate) = &best;
-            if divides(before.position, candidate.values[0]) {
+            let is_dividing = divides(before.position, candidate.values[0]);
+            if is_dividing && !is_at_least_delay(parameters, &candidate.values) {
                 break;
             }
             let periods = Periods { position: *cycle, ..*given };
@@ -284,8 +291,15 @@ impl LoopProblem<'_> {
                 _ => *value,
             });
             let from: Vec<f64> = from.collect();
-            let Some(found) = self.follow(axis, &periods, parameters, &from) else { continue };
-            best = (periods, found);
+            let followed = if is_dividing {
+                self.best(axis, &periods, parameters, candidate.values[0])
+            } else {
+                self.follow(axis, &periods, parameters, &from)
+            };
+            let Some(found) = followed else { continue };
+            if !is_dividing || found.cost < SHORTER * SHORTER * candidate.cost {
+                best = (periods, found);
+            }
         }
         best
     }
@@ -313,29 +327,14 @@ impl LoopProblem<'_> {
         parameters: &[LoopParameter],
         values: &[f64],
     ) -> Option<DMatrix<f64>> {
-        let mut clusters = Vec::new();
-        let mut offset = 0;
-        for experiment in self.experiments(periods, 0.0) {
-            let length = (CLUSTER / experiment.period()).ceil().max(1.0) as usize;
-            let count = experiment.position.len();
-            clusters.extend((0..count).map(|i| Some(offset + i / length)));
-            offset += count / length + 1;
-        }
-        let bounded = self.bounded(axis, periods, parameters, values);
-        clustered_covariance(&bounded, values, |x| self.residuals(axis, periods, parameters, x), &clusters)
+        let bounded = self.bounded(periods, parameters, values);
+        systematic_covariance(&bounded, values, |x| self.residuals(axis, periods, parameters, x))
     }
 
     /// Returns VFFW and lag at two standard errors from the fit, with VFFW as a further parameter.
     ///
     /// The lag at constant velocity is α + (1 − VFFW) / Kp, so both compensate each other.
-    fn valley(
-        &self,
-        axis: &AxisConfig,
-        periods: &Periods,
-        _errors: &DMatrix<f64>,
-        parameters: &[LoopParameter],
-        lag: f64,
-    ) -> Option<[(f64, f64); 2]> {
+    fn valley(&self, axis: &AxisConfig, periods: &Periods, lag: f64) -> Option<[(f64, f64); 2]> {
         let weight = axis.feedforward.velocity;
         if weight == 0.0 {
             return None;
@@ -345,21 +344,20 @@ impl LoopProblem<'_> {
             moved.feedforward.velocity = x[1];
             self.residuals(&moved, periods, &[LoopParameter::Lag], &x[..1])
         };
-        let _ = parameters;
         let bounded = [
             BoundedParameter { start: lag, low: 0.0, high: LONGEST, step: 5e-5 },
             BoundedParameter { start: weight, low: 0.0, high: 2.0, step: 2e-3 },
         ];
-        let mut clusters = Vec::new();
-        for (k, experiment) in self.experiments(periods, 0.0).iter().enumerate() {
-            let length = (CLUSTER / experiment.period()).ceil().max(1.0) as usize;
-            clusters.extend((0..experiment.position.len()).map(|i| Some(1000 * k + i / length)));
-        }
-        let covariance = clustered_covariance(&bounded, &[lag, weight], lags, &clusters)?;
+        let covariance = systematic_covariance(&bounded, &[lag, weight], lags)?;
         let half = 2.0 * covariance[(1, 1)].max(0.0).sqrt();
         let slope = covariance[(0, 1)] / covariance[(1, 1)];
         Some([-half, half].map(|change| (weight + change, lag + slope * change)))
     }
+}
+
+/// Returns true if β is at its lower bound.
+fn is_at_least_delay(parameters: &[LoopParameter], values: &[f64]) -> bool {
+    parameters.iter().zip(values).any(|(p, value)| *p == LoopParameter::Beta && *value < FREE_DELAY)
 }
 
 /// Returns true if the lag, s, is a whole number of cycles.

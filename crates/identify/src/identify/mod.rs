@@ -10,6 +10,7 @@ pub mod summary;
 
 mod backlash;
 mod closed_loop;
+mod covariance;
 mod delays;
 mod feedforward;
 mod feedforward_mode;
@@ -48,7 +49,7 @@ pub use inertia::{InertiaFit, fit_inertia};
 pub use options::{IdentificationInput, IdentificationOptions, RefinementScope};
 pub use production::are_production_traces;
 pub use refine::{RefinedParameter, RefinedValue, Refinement, refine};
-pub(crate) use resample::CubicSpline;
+pub(crate) use resample::BandLimitedSpline;
 pub use sanity::invalid_agreement;
 pub use segments::{MotionSegment, SegmentKind, find_segments};
 pub use steps::identify;

@@ -5,7 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::fit::{BoundedParameter, Effort, clustered_covariance, minimize, r_squared};
+use super::covariance::clustered_covariance;
+use super::fit::{BoundedParameter, Effort, minimize, r_squared};
 use super::friction::{FrictionFit, FrictionLaw, LawFit, friction_current, speed_unit};
 use super::gravity::{GravityCurrent, GravityFit, GravitySource};
 use super::inertia::InertiaFit;

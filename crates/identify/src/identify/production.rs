@@ -170,7 +170,7 @@ fn report_interpolation(inputs: &[IdentificationInput<'_>], found: &mut Identifi
         found.findings.push(Finding::note(
             "resampled",
             format!(
-                "{}: sampled every {} ms, PSEC is interpolated at the position cycles, with an error of about {:.1} {name} RMS",
+                "{}: sampled every {} ms, PSEC is interpolated at the position cycles, with an error of at most about {:.1} {name} RMS",
                 input.signals.name,
                 Rounded(input.signals.period / MILLISECOND),
                 error / unit

@@ -2,7 +2,7 @@
 
 use super::closed_loop::Experiment;
 use super::feedforward_mode::FeedforwardMode;
-use super::resample::CubicSpline;
+use super::resample::BandLimitedSpline;
 use crate::recording::Signals;
 use virtual_axes_core::config::Periods;
 use virtual_axes_core::units::seconds;
@@ -13,6 +13,9 @@ const RUN_UP: f64 = 0.5;
 const REST: f64 = 0.1;
 /// Time after the first sample until the simulation has settled, s.
 const SETTLING: f64 = 0.3;
+/// Samples before the end of a span that are left out: if it ends in motion, the interpolation errs there by the
+/// unknown curvature, half as much with each sample from the end.
+const ENDING: usize = 6;
 /// Shortest span that is simulated, s.
 const SHORTEST: f64 = 1.0;
 
@@ -37,15 +40,16 @@ pub(super) fn trace_experiments(
         if (span.position.len() as f64) * period < SHORTEST {
             continue;
         }
-        let spline = CubicSpline::new(recorded, period);
-        let [start, velocity, _] = spline.at(0.0);
+        let spline = BandLimitedSpline::new(recorded, period);
+        let [start, velocity] = spline.at(0.0);
         let end = before + (recorded.len() - 1) as f64 * period;
         let cycles = (end / tsp).ceil() as usize + 1;
         let setpoint = |k: usize| {
             let t = k as f64 * tsp - before - shift;
             if t >= 0.0 { spline.at(t)[0] } else { start - velocity * RUN_UP * run_up(t / RUN_UP + 1.0) }
         };
-        let of = |channel: &[f64]| channel.get(skipped..).unwrap_or_default().to_vec();
+        let kept = skipped..span.position.len().saturating_sub(ENDING);
+        let of = |channel: &[f64]| channel.get(kept.clone()).unwrap_or_default().to_vec();
         found.push(Experiment {
             recording,
             span: number,

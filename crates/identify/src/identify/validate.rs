@@ -9,7 +9,7 @@ use super::fit::r_squared;
 use super::friction::{friction_current, speed_unit};
 use super::options::IdentificationInput;
 use super::plant_regression::moving_current;
-use super::resample::CubicSpline;
+use super::resample::BandLimitedSpline;
 use super::segments::{MotionSegment, SegmentKind, find_segments};
 use super::setpoints::stride;
 use crate::recording::Signals;
@@ -165,11 +165,11 @@ pub fn constant_lag(signals: &Signals) -> Option<(f64, f64)> {
     /// Steps of the search, s, and longest lag in first steps.
     const STEPS: [f64; 3] = [2e-3, 2e-4, 2e-5];
     const LONGEST: i32 = 75;
-    let spans: Vec<(CubicSpline, &[f64])> = signals
+    let spans: Vec<(BandLimitedSpline, &[f64])> = signals
         .spans
         .iter()
         .filter_map(|span| {
-            Some((CubicSpline::new(span.psec.as_ref()?, signals.period), span.position.as_slice()))
+            Some((BandLimitedSpline::new(span.psec.as_ref()?, signals.period), span.position.as_slice()))
         })
         .collect();
     let rms_at = |lag: f64| {

@@ -10,7 +10,7 @@ use super::spans::{
 };
 use super::uniform_grid::{UniformGrid, assign_to_grid};
 use super::{ConditioningError, Finding, RawRecording, SignalSpan, Signals, plausibility};
-use crate::identify::CubicSpline;
+use crate::identify::BandLimitedSpline;
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::{Rounded, seconds};
 
@@ -130,9 +130,9 @@ fn shift_psec(
     period: f64,
     findings: &mut Vec<Finding>,
 ) {
-    let recorded: Vec<Option<CubicSpline>> = parts
+    let recorded: Vec<Option<BandLimitedSpline>> = parts
         .iter()
-        .map(|part| part.section.columns[PSEC].as_ref().map(|psec| CubicSpline::new(psec, period)))
+        .map(|part| part.section.columns[PSEC].as_ref().map(|psec| BandLimitedSpline::new(psec, period)))
         .collect();
     let move_by = |parts: &mut [FilteredSection], by: f64| {
         for (part, spline) in parts.iter_mut().zip(&recorded) {

@@ -35,8 +35,12 @@ pub struct StudyFigures {
     pub is_period_known: bool,
     /// Error of W / Kt: relative (absolute in A without weight), and in standard errors.
     pub weight: [f64; 2],
+    /// True if the hidden axis has a weight.
+    pub has_weight: bool,
     /// RMS position residual of the unseen program, m, and that of the best constant lag.
     pub unseen: [f64; 2],
+    /// RMS position residual of the unseen program with the hidden parameters, m: what the trace itself allows.
+    pub hidden: f64,
     /// R² of the current of the unseen program, by inverse dynamics.
     pub r_squared: f64,
     /// Codes of findings about invalid results.
@@ -93,6 +97,9 @@ fn study(hidden: &HiddenAxis, seed: u64, duration: f64) -> Result<StudyFigures, 
     let agreement = validate(&input(&unseen), found.axis(), &periods).map_err(|error| error.to_string())?;
     let baseline = agreement.baseline.ok_or("no simulation of the unseen program")?;
     let inverse = agreement.inverse.ok_or("no current of the unseen program")?;
+    let truth =
+        validate(&input(&unseen), &hidden.config, &hidden.periods).map_err(|error| error.to_string())?;
+    let truth = truth.baseline.ok_or("no simulation of the hidden axis")?;
     let figures = figures(hidden, &guess.config, &found);
     let (inertia, alpha, beta, weight) = figures.ok_or_else(|| reasons(&found))?;
     Ok(StudyFigures {
@@ -101,7 +108,9 @@ fn study(hidden: &HiddenAxis, seed: u64, duration: f64) -> Result<StudyFigures, 
         beta,
         is_period_known: guess.is_period_known,
         weight,
+        has_weight: hidden.config.gravity.weight != 0.0,
         unseen: [baseline.model, baseline.delayed],
+        hidden: truth.model,
         r_squared: inverse.r_squared,
         has_backlash: found.findings.iter().any(|finding| finding.code == "backlash"),
         invalid: found.findings.iter().filter(|f| f.severity == Severity::Invalid).map(|f| f.code).collect(),
@@ -188,16 +197,21 @@ impl fmt::Display for TraceStudy {
         let known = || all.iter().filter(|x| x.is_period_known);
         row("β, error, ms, position cycle known", known().map(|x| 1e3 * x.beta[0].abs()).collect())?;
         row("β, error, ms, all", all.iter().map(|x| 1e3 * x.beta[0].abs()).collect())?;
-        row("W / Kt, error (part; A without weight)", all.iter().map(|x| x.weight[0].abs()).collect())?;
+        let heavy = |is_heavy: bool| all.iter().filter(move |x| x.has_weight == is_heavy);
+        row("W / Kt, error, %, vertical axes", heavy(true).map(|x| 100.0 * x.weight[0].abs()).collect())?;
+        row("W / Kt, error, A, horizontal axes", heavy(false).map(|x| x.weight[0].abs()).collect())?;
         row("unseen program, position RMS, µm", all.iter().map(|x| 1e6 * x.unseen[0]).collect())?;
         row("– relative to the best constant lag", all.iter().map(|x| x.unseen[0] / x.unseen[1]).collect())?;
+        row("– the same for the hidden parameters", all.iter().map(|x| x.hidden / x.unseen[1]).collect())?;
         row("unseen program, 1 − R² of the current", all.iter().map(|x| 1.0 - x.r_squared).collect())?;
-        let within = |name: &str, f: &mut fmt::Formatter<'_>, of: &dyn Fn(&StudyFigures) -> f64| {
-            let inside = all.iter().filter(|x| of(x).abs() <= 1.96).count();
-            writeln!(f, "{name:44} {:7.1} %", 100.0 * inside as f64 / all.len().max(1) as f64)
+        let within = |name: &str, f: &mut fmt::Formatter<'_>, of: &dyn Fn(&StudyFigures) -> Option<f64>| {
+            let errors: Vec<f64> = all.iter().filter_map(|x| of(x)).collect();
+            let inside = errors.iter().filter(|error| error.abs() <= 1.96).count();
+            writeln!(f, "{name:44} {:7.1} %", 100.0 * inside as f64 / errors.len().max(1) as f64)
         };
-        within("95 % interval contains the truth: Jeq / Kt", f, &|x| x.inertia[1])?;
-        within("95 % interval contains the truth: W / Kt", f, &|x| x.weight[1])?;
+        within("95 % interval contains the truth: Jeq / Kt", f, &|x| Some(x.inertia[1]))?;
+        within("95 % interval contains the truth: W / Kt", f, &|x| Some(x.weight[1]))?;
+        within("– and β, position cycle known", f, &|x| x.is_period_known.then_some(x.beta[1]))?;
         let invalid = all.iter().filter(|x| !x.invalid.is_empty()).count();
         writeln!(f, "{:44} {invalid:7}", "results rejected as invalid")?;
         let backlash = all.iter().filter(|x| x.has_backlash).count();

@@ -158,3 +158,28 @@ fn a_lag_between_two_position_cycles_is_represented() {
     assert!(residual(&found) <= 12e-6, "{} m", residual(&found));
     assert!(found.findings.iter().any(|finding| finding.code == "lag-between-cycles"));
 }
+
+#[test]
+fn a_position_cycle_that_is_longer_than_the_motion_allows_is_replaced() {
+    // β + Tsp of the hidden axis is less than the position cycle of the machine file, which divides the lag.
+    let millisecond = 1_000_000;
+    let is_suitable = |seed: &u64| {
+        let axis = HiddenAxis::draw(*seed, AxisOrientation::Horizontal);
+        let (guess, lag) = (axis.guess(*seed), (axis.lag() * 1e3).round() as i64);
+        let file = guess.periods.position;
+        let seen = axis.config.delays.beta + axis.periods.position;
+        !guess.is_period_known
+            && axis.periods.position < file
+            && seen < file - millisecond
+            && lag % (file / millisecond) == 0
+    };
+    let seed = (6000..7000).find(is_suitable).expect("a suitable axis");
+    let axis = HiddenAxis::draw(seed, AxisOrientation::Horizontal);
+    let guess = axis.guess(seed);
+    let signals =
+        conditioned(&recorded(&axis, &TraceRecorder::default(), 1), &guess, &Conditioning::default());
+    let found = identified(&signals, &guess, RefinementScope::ALL);
+    let periods = found.periods.expect("periods");
+    assert!(periods.position < guess.periods.position, "seed {seed}: {periods:?}");
+    assert!(residual(&found) <= 3e-6, "seed {seed}: {} m", residual(&found));
+}
