@@ -30,5 +30,7 @@ pub(super) const MAX_LENGTH: f64 = 1e4;
 pub(super) const MAX_ANGLE: f64 = 1e6;
 /// Largest feed, spindle speed and dwell, in the units of the program.
 pub(super) const MAX_RATE: f64 = 1e9;
+/// Lines that jumps may repeat without a step of the program.
+pub(super) const MAX_IDLE_LINES: u64 = 2_000_000;
 /// Lines that jumps may repeat, unless the options have another number.
 pub(super) const REPEATED_LINES: u64 = 50_000_000;

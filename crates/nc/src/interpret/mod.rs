@@ -101,6 +101,7 @@ impl<R: BufRead + Seek> Iterator for Interpreter<R> {
     fn next(&mut self) -> Option<Self::Item> {
         loop {
             if let Some(step) = self.state.steps.pop_front() {
+                self.source.reset_idle_lines();
                 return Some(Ok(step));
             }
             if self.state.has_ended {

@@ -3,7 +3,7 @@
 use std::io::{BufRead, Read, Seek, SeekFrom};
 
 use super::error::Outcome;
-use super::limits::MAX_LINE;
+use super::limits::{MAX_IDLE_LINES, MAX_LINE};
 
 /// Start of a line in the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +23,8 @@ pub(super) struct LineSource<R> {
     farthest: u64,
     /// Number of lines that jumps may still repeat.
     repeats_left: u64,
+    /// Number of lines repeated since the last step of the program.
+    idle_lines: u64,
     /// True after the first line with text.
     has_text: bool,
 }
@@ -30,7 +32,7 @@ pub(super) struct LineSource<R> {
 impl<R: BufRead + Seek> LineSource<R> {
     pub(super) fn new(reader: R, repeats: u64) -> Self {
         let next = Place { offset: 0, lines: 0 };
-        Self { reader, next, farthest: 0, repeats_left: repeats, has_text: false }
+        Self { reader, next, farthest: 0, repeats_left: repeats, idle_lines: 0, has_text: false }
     }
 
     /// Returns the number of the line that was read last, from 1.
@@ -67,14 +69,24 @@ impl<R: BufRead + Seek> LineSource<R> {
         }
         if self.next.offset > self.farthest {
             self.farthest = self.next.offset;
-        } else if self.repeats_left > 0 {
-            self.repeats_left -= 1;
-        } else {
+            return Ok(true);
+        }
+        self.idle_lines += 1;
+        if self.idle_lines > MAX_IDLE_LINES {
+            return Err(format!("endless loop: {MAX_IDLE_LINES} repeated lines without motion or event"));
+        }
+        if self.repeats_left == 0 {
             return Err(
                 "the loops of the program repeat too many lines: end the loop or raise the limit".to_owned()
             );
         }
+        self.repeats_left -= 1;
         Ok(true)
+    }
+
+    /// Counts the repeated lines without a step from 0.
+    pub(super) fn reset_idle_lines(&mut self) {
+        self.idle_lines = 0;
     }
 
     /// Reads the next line without counting repetitions; returns false at the end of the program.

@@ -203,6 +203,10 @@ fn endless_and_huge_programs_are_rejected() {
             )
         );
     }
+    let idle = "G0 X1\no1 while [1]\n#1=[#1+1]\no1 endwhile";
+    let expected = ": endless loop: 2000000 repeated lines without motion or event";
+    let found = steps(idle, InterpreterOptions::default()).expect_err("no end").to_string();
+    assert!(found.ends_with(expected), "{found}");
     let repeated = "o1 repeat [400]\nG91 G0 X1\no1 endrepeat";
     assert_eq!(motions(repeated, options).len(), 400, "800 lines are repeated");
 }
