@@ -319,6 +319,17 @@ impl Machine {
         self.parameters.axes[axis].loops.plant.position(self.bank.motor(axis, tick).angle)
     }
 
+    /// Returns position, velocity (m, m/s or rad, rad/s) and current (A) of an axis at a tick of the last position
+    /// cycle.
+    ///
+    /// # Panics
+    /// Panics if the axis or the tick is out of range.
+    #[inline]
+    pub fn motion_at(&self, axis: usize, tick: usize) -> [f64; 3] {
+        let (plant, motor) = (&self.parameters.axes[axis].loops.plant, self.bank.motor(axis, tick));
+        [plant.position(motor.angle), plant.velocity(motor.speed), motor.current]
+    }
+
     /// Writes the positions of an axis at the ticks of the last position cycle to `positions`, m or rad, up to its
     /// length.
     ///

@@ -230,9 +230,9 @@ pub fn simulate(
         .trace_filter
         .map(|cutoff| [*first, 0.0, 0.0].map(|start| LowPassFilter::new(cutoff, tick, start)));
     for psec in &experiment.psec {
-        machine.advance_with(&[*psec], &[], |machine| {
-            let s = machine.axis(0).sample();
-            let mut here = [s.position, s.velocity, s.current];
+        machine.advance(&[*psec], &[]);
+        for tick in 0..machine.ticks_per_period() {
+            let mut here = machine.motion_at(0, tick);
             if let Some(filters) = &mut filters {
                 for (value, filter) in here.iter_mut().zip(filters) {
                     *value = filter.next(*value);
@@ -252,7 +252,7 @@ pub fn simulate(
             }
             before = here;
             now += 1;
-        });
+        }
     }
     if is_mean {
         let half = 0.5 * seconds(periods.position) / tick;
