@@ -4,6 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Vector3};
 
+mod series;
+
+use series::{ScaledPoints, Sector};
+
 /// Number of bins of the polar angle: a tenth of a degree each.
 const BINS: usize = 3600;
 /// Number of sectors, each of which contains a point in a full circle.
@@ -55,6 +59,9 @@ pub struct CircleAssessor {
     /// Least and largest radial deviation, m.
     range: [f64; 2],
     bins: Box<[Bin]>,
+    /// Bin of the last point of a series.
+    sector: Sector,
+    scaled: ScaledPoints,
 }
 
 /// Figures of a circular path in one direction, m; see [`CircleAssessor`].
@@ -103,6 +110,8 @@ impl CircleAssessor {
             sums: Sums::default(),
             range: [f64::INFINITY, f64::NEG_INFINITY],
             bins: vec![Bin::default(); BINS].into_boxed_slice(),
+            sector: Sector::of(0),
+            scaled: ScaledPoints::default(),
         }
     }
 
@@ -122,10 +131,27 @@ impl CircleAssessor {
         let deviation = (x * x + y * y).sqrt() - self.radius;
         self.sums.add(x / self.radius, y / self.radius, deviation / self.radius);
         self.range = [self.range[0].min(deviation), self.range[1].max(deviation)];
-        // The conversion to an index truncates; the angle π belongs to the last bin.
-        let bin = ((y.atan2(x) + PI) / TAU * BINS as f64) as usize;
-        self.bins[bin.min(BINS - 1)].add([x, y], deviation);
+        self.bins[bin_of(x, y)].add([x, y], deviation);
         deviation
+    }
+
+    /// Adds points of the path, m, as [`push`](Self::push) does one by one.
+    pub fn push_all(&mut self, xs: &[f64], ys: &[f64]) {
+        let (center, radius) = (self.center, self.radius);
+        self.scaled.compute(xs, ys, center, radius);
+        let points = xs.iter().zip(ys).zip(&self.scaled.points);
+        let (mut sums, [mut least, mut largest], mut sector) = (self.sums, self.range, self.sector);
+        for ((x, y), [u, v, scaled, deviation]) in points {
+            let (x, y) = (x - center[0], y - center[1]);
+            sums.add(*u, *v, *scaled);
+            least = least.min(*deviation);
+            largest = largest.max(*deviation);
+            if !sector.contains(x, y) {
+                sector = Sector::of(bin_of(x, y));
+            }
+            self.bins[sector.bin].add([x, y], *deviation);
+        }
+        (self.sums, self.range, self.sector) = (sums, [least, largest], sector);
     }
 
     /// Returns the figures so far, `None` without a point.
@@ -187,6 +213,13 @@ pub fn bidirectional(
         circular_deviation: range[0].with(range[1].min).with(range[1].max).width(),
         mean_radial_deviation: fit.radius_deviation * clockwise.radius,
     })
+}
+
+/// Returns the bin of the polar angle of a point relative to the nominal center.
+fn bin_of(x: f64, y: f64) -> usize {
+    // The conversion to an index truncates; the angle π belongs to the last bin.
+    let bin = ((y.atan2(x) + PI) / TAU * BINS as f64) as usize;
+    bin.min(BINS - 1)
 }
 
 /// A point relative to the nominal center, m.

@@ -1,8 +1,14 @@
 //! Contour error of the linear axes against the polyline through the setpoints. Offline runs along a continuous path
 //! use `path_tracker` instead.
 
+mod batch;
+
+pub(super) use batch::{COLUMNS, FootPoints};
+
 /// Number of stored setpoints: the largest lag of the axes before the oldest setpoint is overwritten.
 pub(super) const CAPACITY: usize = 512;
+/// Number of setpoints by which the stored ones are moved at once.
+const SPARE: usize = 128;
 /// Segments searched before the last nearest one, in which a point may move backwards.
 const LOOK_BACK: u64 = 8;
 
@@ -14,8 +20,12 @@ const LOOK_BACK: u64 = 8;
 #[derive(Debug, Clone)]
 pub struct ContourTracker {
     dimension: usize,
-    /// Ring buffer of points, `dimension` numbers each.
-    ring: Box<[f64]>,
+    /// Coordinates of the last points, a column per axis and at least [`COLUMNS`] columns, zero in further ones.
+    columns: Box<[Box<[f64]>]>,
+    /// Reciprocals of the squared length of the segment after each point, 1/m²; 0 for a segment of length 0.
+    reciprocals: Box<[f64]>,
+    /// Index of the first point in the columns.
+    first: u64,
     count: u64,
     nearest: u64,
     /// Index of the first setpoint equal to the newest one.
@@ -25,9 +35,12 @@ pub struct ContourTracker {
 impl ContourTracker {
     /// Creates a tracker for `dimension` linear axes.
     pub fn new(dimension: usize) -> Self {
+        let column = vec![0.0; CAPACITY + SPARE].into_boxed_slice();
         ContourTracker {
             dimension,
-            ring: vec![0.0; dimension * CAPACITY].into_boxed_slice(),
+            columns: vec![column.clone(); dimension.max(COLUMNS)].into_boxed_slice(),
+            reciprocals: column,
+            first: 0,
             count: 0,
             nearest: 0,
             last_change: 0,
@@ -36,24 +49,40 @@ impl ContourTracker {
 
     /// Adds a setpoint, m per axis.
     pub fn push(&mut self, point: impl Iterator<Item = f64>) {
-        let start = (self.count % CAPACITY as u64) as usize * self.dimension;
-        for (coordinate, value) in self.ring[start..start + self.dimension].iter_mut().zip(point) {
-            *coordinate = value;
+        if self.column_index(self.count) == CAPACITY + SPARE {
+            self.columns.iter_mut().for_each(|column| column.copy_within(SPARE.., 0));
+            self.reciprocals.copy_within(SPARE.., 0);
+            self.first += SPARE as u64;
         }
-        if self.count > 0 && self.point(self.count) != self.point(self.count - 1) {
+        let index = self.column_index(self.count);
+        let before = index.saturating_sub(1);
+        let mut square = 0.0;
+        for (column, value) in self.columns[..self.dimension].iter_mut().zip(point) {
+            let step = if self.count > 0 { value - column[before] } else { 0.0 };
+            square += step * step;
+            column[index] = value;
+        }
+        self.reciprocals[before] = if square > 0.0 { 1.0 / square } else { 0.0 };
+        let changes = self.columns[..self.dimension].iter().any(|column| column[index] != column[before]);
+        if self.count > 0 && changes {
             self.last_change = self.count;
         }
         self.count += 1;
     }
 
-    fn point(&self, k: u64) -> &[f64] {
-        let start = (k % CAPACITY as u64) as usize * self.dimension;
-        &self.ring[start..start + self.dimension]
-    }
-
     /// Returns the number of setpoints added.
     pub(super) fn count(&self) -> u64 {
         self.count
+    }
+
+    /// Returns true if the segment `k` ends at the position of the newest setpoint.
+    pub(super) fn is_last(&self, k: u64) -> bool {
+        k + 1 >= self.last_change
+    }
+
+    /// Returns true if the point at position `along` of the segment `k` is the position of the newest setpoint.
+    pub(super) fn is_newest(&self, k: u64, along: f64) -> bool {
+        k >= self.last_change || self.is_last(k) && along == 1.0
     }
 
     /// Returns the distance of `position` from the path, m; 0 without a setpoint.
@@ -64,22 +93,60 @@ impl ContourTracker {
     /// Returns the nearest segment, by the index of its first setpoint, and the foot point on it; `None`
     /// without a setpoint.
     pub(super) fn nearest(&mut self, position: &[f64]) -> Option<(u64, FootPoint)> {
+        self.nearest_from(|axis| position[axis])
+    }
+
+    /// Returns the nearest segment and its foot point as [`nearest`](Self::nearest); `position` returns the
+    /// coordinate of an axis.
+    fn nearest_from(&mut self, position: impl Fn(usize) -> f64) -> Option<(u64, FootPoint)> {
         if self.count == 0 {
             return None;
         }
-        let oldest = self.count.saturating_sub(CAPACITY as u64);
-        let from = self.nearest.saturating_sub(LOOK_BACK).max(oldest);
-        let mut best = foot_point_on_segment(position, self.point(from), self.point(from));
+        let from = self.nearest.saturating_sub(LOOK_BACK).max(self.oldest());
+        let mut best = self.foot_point(&position, from, from);
         self.nearest = from;
-        // After the first segment of length 0, further ones are no closer.
-        for k in from..(self.count - 1).min(self.last_change + 1) {
-            let foot = foot_point_on_segment(position, self.point(k), self.point(k + 1));
+        for k in from..self.end_of_search() {
+            let foot = self.foot_point(&position, k, k + 1);
             if foot.square_distance < best.square_distance {
                 best = foot;
                 self.nearest = k;
             }
         }
         Some((self.nearest, best))
+    }
+
+    /// Returns the index of point `k` in the columns.
+    fn column_index(&self, k: u64) -> usize {
+        (k - self.first) as usize
+    }
+
+    /// Returns the index of the oldest stored setpoint.
+    fn oldest(&self) -> u64 {
+        self.count.saturating_sub(CAPACITY as u64)
+    }
+
+    /// Returns the end of the segments that are searched. After the first segment of length 0, further ones are no
+    /// closer.
+    fn end_of_search(&self) -> u64 {
+        self.count.saturating_sub(1).min(self.last_change + 1)
+    }
+
+    /// Returns the point of the segment from setpoint `from` to setpoint `to` closest to a position.
+    fn foot_point(&self, position: impl Fn(usize) -> f64, from: u64, to: u64) -> FootPoint {
+        let (from, to) = (self.column_index(from), self.column_index(to));
+        let axes = || self.columns[..self.dimension].iter().enumerate();
+        let mut along = 0.0;
+        for (axis, column) in axes() {
+            let (p, a, b) = (position(axis), column[from], column[to]);
+            along += (p - a) * (b - a);
+        }
+        let t = if from < to { (along * self.reciprocals[from]).clamp(0.0, 1.0) } else { 0.0 };
+        let square = |axis: usize| {
+            let column = &self.columns[axis];
+            let (p, a, b) = (position(axis), column[from], column[to]);
+            (p - a - t * (b - a)).powi(2)
+        };
+        FootPoint { square_distance: (0..self.dimension).map(square).sum(), along: t }
     }
 }
 
@@ -89,18 +156,6 @@ pub(super) struct FootPoint {
     pub square_distance: f64,
     /// Position on the segment, from 0 at its start to 1 at its end.
     pub along: f64,
-}
-
-/// Returns the point of the segment from `a` to `b` closest to `p`.
-fn foot_point_on_segment(p: &[f64], a: &[f64], b: &[f64]) -> FootPoint {
-    let (mut along, mut length) = (0.0, 0.0);
-    for ((p, a), b) in p.iter().zip(a).zip(b) {
-        along += (p - a) * (b - a);
-        length += (b - a) * (b - a);
-    }
-    let t = if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 };
-    let square_distance = p.iter().zip(a).zip(b).map(|((p, a), b)| (p - a - t * (b - a)).powi(2)).sum();
-    FootPoint { square_distance, along: t }
 }
 
 #[cfg(test)]

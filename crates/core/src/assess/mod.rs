@@ -4,11 +4,13 @@
 mod axis;
 mod circle;
 mod contour;
+mod curve_cells;
 mod motion;
 mod path_shape;
 mod path_tracker;
 mod recording;
 mod setpoint_tracker;
+mod tool_angle;
 
 pub use axis::{AxisAssessor, AxisReport};
 pub use circle::{BidirectionalReport, CircleAssessor, CircleReport, FullCircle, bidirectional};

@@ -1,11 +1,12 @@
 //! Figures of one motion: following errors of the axes and contour error.
 
-use crate::config::AxisKind;
+use crate::config::{AxisKind, Periods};
 use crate::machine::Machine;
 use crate::statistics::rms_of_sum;
+use crate::units::seconds;
 
-use super::ContourTracker;
 use super::axis::{AxisAssessor, AxisReport};
+use super::contour::{COLUMNS, ContourTracker, FootPoints};
 
 /// Figures of a motion.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,7 +31,9 @@ pub struct MotionAssessor {
     /// Length of the preview of the path beyond the current setpoint, position cycles.
     horizon: u32,
     has_preview: bool,
-    position: Vec<f64>,
+    /// Positions of the linear axes at the ticks of a position cycle, m, for at least three axes.
+    positions: Vec<Vec<f64>>,
+    feet: FootPoints,
     sum_contour_squared: f64,
     max_contour: f64,
     ticks: u64,
@@ -38,11 +41,12 @@ pub struct MotionAssessor {
 }
 
 impl MotionAssessor {
-    /// Creates an assessor of the axes at `indices` of a machine whose axes are of `kinds`, with ticks of
-    /// `tick` seconds.
+    /// Creates an assessor of the axes at `indices` of a machine whose axes are of `kinds`, with the current cycle
+    /// of `periods`.
     ///
     /// The path is known `horizon` position cycles beyond the current setpoint.
-    pub fn new(indices: &[usize], kinds: &[AxisKind], tick: f64, horizon: u32) -> Self {
+    pub fn new(indices: &[usize], kinds: &[AxisKind], periods: &Periods, horizon: u32) -> Self {
+        let ticks = periods.ticks_per_position() as usize;
         let linear: Vec<usize> =
             indices.iter().copied().filter(|&p| kinds.get(p) == Some(&AxisKind::Linear)).collect();
         MotionAssessor {
@@ -50,12 +54,13 @@ impl MotionAssessor {
             contour: ContourTracker::new(linear.len()),
             horizon,
             has_preview: false,
-            position: vec![0.0; linear.len()],
+            positions: vec![vec![0.0; ticks]; linear.len().max(COLUMNS)],
+            feet: FootPoints::new(ticks),
             linear,
             sum_contour_squared: 0.0,
             max_contour: 0.0,
             ticks: 0,
-            tick,
+            tick: seconds(periods.current),
         }
     }
 
@@ -79,16 +84,25 @@ impl MotionAssessor {
         }
         let ticks = machine.ticks_per_period();
         if !self.linear.is_empty() {
-            for tick in 0..ticks {
-                for (value, &index) in self.position.iter_mut().zip(&self.linear) {
-                    *value = machine.position(index, tick);
-                }
-                let distance = self.contour.distance(&self.position);
-                self.max_contour = self.max_contour.max(distance);
-                self.sum_contour_squared += distance * distance;
-            }
+            self.observe_contour(machine);
         }
         self.ticks += ticks as u64;
+    }
+
+    fn observe_contour(&mut self, machine: &Machine) {
+        for (&index, positions) in self.linear.iter().zip(&mut self.positions) {
+            machine.positions(index, positions);
+        }
+        if let [x, y, z] = &self.positions[..] {
+            self.contour.nearest_all([x, y, z], &mut self.feet);
+        } else {
+            self.contour.nearest_one_by_one(&self.positions, &mut self.feet);
+        }
+        for square in &self.feet.square_distance {
+            let distance = square.sqrt();
+            self.max_contour = self.max_contour.max(distance);
+            self.sum_contour_squared += distance * distance;
+        }
     }
 
     /// Returns the figures so far.

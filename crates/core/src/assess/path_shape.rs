@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::curve_cells::CurveCells;
 use crate::kinematics::{AxisRole, ToolPose};
 use crate::path::{Derivatives, Frame, Path};
 
@@ -35,8 +36,8 @@ pub(super) enum TipCurve {
         axis: Vector3<f64>,
     },
     /// Other curve: tip samples at equal distances of s, and the linear map from coordinates if the rotary
-    /// tables are fixed.
-    Sampled { samples: Vec<Vector3<f64>>, map: Option<LinearMap> },
+    /// tables are fixed. Polynomials replace the curve where it is smooth.
+    Sampled { samples: Vec<Vector3<f64>>, map: Option<LinearMap>, cells: Option<CurveCells> },
     /// Reorientation with a fixed tip: tool axes at equal distances of s.
     Reorientation { samples: Vec<Vector3<f64>> },
     /// Fixed tip and tool axis.
@@ -104,8 +105,13 @@ impl TipCurve {
         let intervals = intervals(path, block);
         let mut tips = Vec::with_capacity(intervals + 1);
         let mut axes = Vec::with_capacity(intervals + 1);
+        let cells = CurveCells::new(path, block, scratch);
         for i in 0..=intervals {
-            let pose = pose(path, block, length * (i as f64 / intervals as f64), scratch);
+            let s = length * (i as f64 / intervals as f64);
+            let pose = match &cells {
+                Some(cells) => ToolPose { tip: cells.tip(s), axis: cells.axis(s) },
+                None => pose(path, block, s, scratch),
+            };
             tips.push(pose.tip);
             axes.push(pose.axis);
         }
@@ -113,7 +119,7 @@ impl TipCurve {
             samples.iter().all(|sample| (sample - samples[0]).norm() <= bound)
         };
         match (stays(&tips, FIXED_TIP_TOLERANCE), stays(&axes, FIXED_AXIS_TOLERANCE)) {
-            (false, _) => Self::Sampled { samples: tips, map },
+            (false, _) => Self::Sampled { samples: tips, map, cells },
             (true, false) => Self::Reorientation { samples: axes },
             (true, true) => Self::Fixed,
         }
@@ -124,11 +130,17 @@ impl TipCurve {
         !matches!(self, Self::Reorientation { .. } | Self::Fixed)
     }
 
+    /// Returns true if polynomials replace the curve.
+    pub fn has_cells(&self) -> bool {
+        matches!(self, Self::Sampled { cells: Some(_), .. })
+    }
+
     /// Returns the tool axis at `s`.
     pub fn axis(&self, path: &Path, block: usize, s: f64, scratch: &mut Scratch) -> Vector3<f64> {
         match self {
             Self::Segment { axis, .. } | Self::Circle { axis, .. } => *axis,
             Self::Sampled { map: Some(map), .. } => map.axis,
+            Self::Sampled { cells: Some(cells), .. } => cells.axis(s),
             _ => pose(path, block, s, scratch).axis,
         }
     }
@@ -161,6 +173,9 @@ impl TipCurve {
         s: f64,
         scratch: &mut Scratch,
     ) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
+        if let Self::Sampled { cells: Some(cells), .. } = self {
+            return cells.tip_derivatives(s);
+        }
         let turn = !self.is_tip_moving();
         let mut at = |s: f64| curve_point(path, block, s, turn, scratch);
         if let Self::Sampled { map: Some(map), .. } = self {
@@ -179,7 +194,10 @@ impl TipCurve {
 
     /// Returns the point of the evaluated curve at `s`.
     pub fn point(&self, path: &Path, block: usize, s: f64, scratch: &mut Scratch) -> Vector3<f64> {
-        curve_point(path, block, s, !self.is_tip_moving(), scratch)
+        match self {
+            Self::Sampled { cells: Some(cells), .. } => cells.tip(s),
+            _ => curve_point(path, block, s, !self.is_tip_moving(), scratch),
+        }
     }
 }
 

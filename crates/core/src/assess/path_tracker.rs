@@ -1,5 +1,6 @@
 //! Contour error against a geometric path: nearest point on the continuous curve.
 
+mod curve;
 mod follow;
 
 use std::f64::consts::TAU;
@@ -8,6 +9,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::path_shape::{Scratch, TipCurve, circle_coordinates, distance_to_circle, line_parameter, pose};
+use super::tool_angle::{ToolAngles, tool_angle};
 use crate::kinematics::ToolPose;
 use crate::path::Path;
 
@@ -100,6 +102,7 @@ pub struct PathTracker {
     last: Option<CachedQuery>,
     /// Buffers for the foot points of poses.
     feet: [Vec<f64>; 2],
+    angles: ToolAngles,
     scratch: Scratch,
 }
 
@@ -139,6 +142,7 @@ impl PathTracker {
             s: 0.0,
             last: None,
             feet: [Vec::new(), Vec::new()],
+            angles: ToolAngles::default(),
             scratch,
         }
     }
@@ -170,7 +174,7 @@ impl PathTracker {
             axis,
             distance: best.distance,
             within_ends: self.within_ends(&best, pose),
-            orientation: angle(&axis, &pose.axis),
+            orientation: tool_angle(&axis, &pose.axis),
         };
         let stays = before == (self.furthest, self.block, self.s);
         self.last = stays.then_some(CachedQuery { pose: *pose, until, nearest });
@@ -265,7 +269,7 @@ impl PathTracker {
     fn cost(&mut self, pose: &ToolPose, candidate: &Candidate) -> f64 {
         let Candidate { block, s, distance, .. } = *candidate;
         let axis = self.shapes[block].axis(&self.path, block, s, &mut self.scratch);
-        distance.hypot(ORIENTATION_ARM * angle(&axis, &pose.axis))
+        distance.hypot(ORIENTATION_ARM * tool_angle(&axis, &pose.axis))
     }
 
     fn candidate(&self, block: usize, s: f64, point: Vector3<f64>, distance: f64) -> Candidate {
@@ -350,7 +354,9 @@ impl PathTracker {
     fn refine(&mut self, pose: &ToolPose, block: usize, s: f64, low: f64, high: f64) -> Candidate {
         let shape = &self.shapes[block];
         let target = if shape.is_tip_moving() { pose.tip } else { pose.axis };
-        let reach = QUADRATIC_REACH * self.path.blocks()[block].length();
+        // The derivatives of polynomials are cheap.
+        let reach =
+            if shape.has_cells() { 0.0 } else { QUADRATIC_REACH * self.path.blocks()[block].length() };
         let mut s = s.clamp(low, high);
         let mut expansion = (s, shape.local_derivatives(&self.path, block, s, &mut self.scratch));
         let mut point = expansion.1.0;
@@ -389,10 +395,4 @@ fn select_passage(s: f64, period: f64, low: f64, high: f64, ahead: f64) -> Optio
     let next = first_from(low.max(ahead));
     let index = if next <= high { next } else { s + ((high - s) / period).floor() * period };
     (low..=high).contains(&index).then_some(index)
-}
-
-/// Returns the angle between two unit vectors, rad; exact for small angles.
-fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
-    // Equal on all paths with fixed rotary tables.
-    if a == b { 0.0 } else { a.cross(b).norm().atan2(a.dot(b)) }
 }

@@ -2,10 +2,12 @@
 
 use nalgebra::Vector3;
 
-use crate::kinematics::ToolPose;
+use crate::kinematics::{Poses, ToolPose};
+use crate::simd::{SliceOperation, vectorize};
 
-use super::contour::{CAPACITY, ContourTracker};
-use super::path_tracker::NearestPoint;
+use super::contour::{CAPACITY, ContourTracker, FootPoint, FootPoints};
+use super::path_tracker::{NearestPoint, PathDeviations};
+use super::tool_angle::{ToolAngles, tool_angle};
 
 /// Length below which two setpoints do not define a direction, m.
 const MIN_STEP: f64 = 1e-12;
@@ -18,8 +20,11 @@ const MIN_STEP: f64 = 1e-12;
 pub struct SetpointTracker {
     contour: ContourTracker,
     poses: Box<[ToolPose]>,
-    /// Directions of the first and the last segment of nonzero length.
-    end_directions: Option<[Vector3<f64>; 2]>,
+    /// First and last difference of setpoints of nonzero length, m.
+    end_steps: Option<[Vector3<f64>; 2]>,
+    /// Buffers of [`follow`](Self::follow).
+    feet: FootPoints,
+    angles: ToolAngles,
 }
 
 impl SetpointTracker {
@@ -28,14 +33,12 @@ impl SetpointTracker {
         let mut tracker = SetpointTracker {
             contour: ContourTracker::new(3),
             poses: vec![start; CAPACITY].into_boxed_slice(),
-            end_directions: None,
+            end_steps: None,
+            feet: FootPoints::default(),
+            angles: ToolAngles::default(),
         };
         tracker.push(start);
         tracker
-    }
-
-    fn ring_index(k: u64) -> usize {
-        (k % CAPACITY as u64) as usize
     }
 
     fn newest(&self) -> u64 {
@@ -44,42 +47,162 @@ impl SetpointTracker {
 
     /// Adds the tool pose of a setpoint.
     pub fn push(&mut self, pose: ToolPose) {
-        let step = pose.tip - self.poses[Self::ring_index(self.newest())].tip;
-        if step.norm() > MIN_STEP {
-            let direction = step.normalize();
-            let first = self.end_directions.map_or(direction, |[first, _]| first);
-            self.end_directions = Some([first, direction]);
+        let step = pose.tip - self.poses[ring_index(self.newest())].tip;
+        if step.norm_squared() > MIN_STEP * MIN_STEP {
+            let first = self.end_steps.map_or(step, |[first, _]| first);
+            self.end_steps = Some([first, step]);
         }
         self.contour.push(pose.tip.iter().copied());
-        self.poses[Self::ring_index(self.newest())] = pose;
+        self.poses[ring_index(self.newest())] = pose;
     }
 
     /// Returns the point of the polyline closest to `pose`.
     pub fn nearest(&mut self, pose: &ToolPose) -> NearestPoint {
-        let (k, along) = match self.contour.nearest(pose.tip.as_slice()) {
-            Some((k, foot)) => (k, foot.along),
-            None => (0, 0.0),
-        };
-        let from = &self.poses[Self::ring_index(k)];
-        let to = &self.poses[Self::ring_index((k + 1).min(self.newest()))];
+        let none = (0, FootPoint { square_distance: 0.0, along: 0.0 });
+        let (k, foot) = self.contour.nearest(pose.tip.as_slice()).unwrap_or(none);
+        self.nearest_at(pose, k, foot)
+    }
+
+    /// Returns the poses at both ends of segment `k`.
+    fn ends_of(&self, k: u64) -> [&ToolPose; 2] {
+        [k, (k + 1).min(self.newest())].map(|k| &self.poses[ring_index(k)])
+    }
+
+    /// Returns the foot point `foot` on segment `k` as the nearest point to `pose`.
+    fn nearest_at(&self, pose: &ToolPose, k: u64, foot: FootPoint) -> NearestPoint {
+        let [from, to] = self.ends_of(k);
+        let along = foot.along;
         let point = from.tip + along * (to.tip - from.tip);
         let axis = (from.axis + along * (to.axis - from.axis)).normalize();
-        let offset = pose.tip - point;
-        let overshoot = self.end_directions.map_or(0.0, |[first, last]| {
-            let at_start = k == 0 && along == 0.0;
-            let at_end = point == self.poses[Self::ring_index(self.newest())].tip;
-            let before = if at_start { (-offset.dot(&first)).max(0.0) } else { 0.0 };
-            let behind = if at_end { offset.dot(&last).max(0.0) } else { 0.0 };
-            before.max(behind)
-        });
-        let distance = offset.norm();
+        let overshoot = self.overshoot(k, along, pose.tip - point);
+        let distance = foot.square_distance.sqrt();
         NearestPoint {
             progress: k as f64 + along,
             point,
             axis,
             distance,
-            within_ends: (distance * distance - overshoot * overshoot).max(0.0).sqrt(),
-            orientation: pose.axis.cross(&axis).norm().atan2(pose.axis.dot(&axis)),
+            within_ends: within_ends(distance, overshoot),
+            orientation: tool_angle(&axis, &pose.axis),
+        }
+    }
+
+    /// Returns the overshoot beyond the ends of the path, m, for a position with the vector `offset` from its nearest
+    /// point, m.
+    fn overshoot(&self, k: u64, along: f64, offset: Vector3<f64>) -> f64 {
+        self.end_steps.map_or(0.0, |steps| {
+            let [first, last] = steps.map(|step| step.normalize());
+            let is_at_start = k == 0 && along == 0.0;
+            let before = if is_at_start { (-offset.dot(&first)).max(0.0) } else { 0.0 };
+            let behind = if self.contour.is_newest(k, along) { offset.dot(&last).max(0.0) } else { 0.0 };
+            before.max(behind)
+        })
+    }
+
+    /// Computes the deviations of `poses` as [`nearest`](Self::nearest) does for each of them in order, and
+    /// replaces the contents of `found` by them.
+    ///
+    /// Returns the nearest point to the first pose, `None` without a pose. Distances are bit-identical to those of
+    /// [`nearest`](Self::nearest), orientations within 10⁻¹⁵ rad.
+    pub fn follow(&mut self, poses: &Poses, found: &mut PathDeviations) -> Option<NearestPoint> {
+        found.resize(poses.len());
+        self.angles.resize(poses.len());
+        if poses.is_empty() {
+            return None;
+        }
+        self.contour.nearest_all(poses.tips(), &mut self.feet);
+        let segments = self.feet.segment.iter();
+        let (low, high) =
+            segments.fold((u64::MAX, 0), |(low, high), &segment| (low.min(segment), high.max(segment)));
+        for segment in low..=high {
+            if high == low || self.feet.segment.contains(&segment) {
+                let axes = self.ends_of(segment).map(|pose| pose.axis.into());
+                let (feet, angles) = (&self.feet, &mut self.angles);
+                vectorize(SegmentAngles { segment, axes, poses, feet, angles });
+            }
+        }
+        self.angles.write_angles(&mut found.orientation);
+        vectorize(Distances { squares: &self.feet.square_distance, found });
+        if low == 0 || self.contour.is_last(high) {
+            self.exclude_overshoot(poses, found);
+        }
+        Some(self.nearest_at(&poses.get(0), self.feet.segment[0], self.feet.get(0)))
+    }
+
+    /// Excludes the overshoot beyond the ends of the path.
+    fn exclude_overshoot(&self, poses: &Poses, found: &mut PathDeviations) {
+        for (index, within) in found.within_ends.iter_mut().enumerate() {
+            let (k, along) = (self.feet.segment[index], self.feet.along[index]);
+            if k == 0 || self.contour.is_last(k) {
+                let [from, to] = self.ends_of(k);
+                let point = from.tip + along * (to.tip - from.tip);
+                *within =
+                    within_ends(found.distance[index], self.overshoot(k, along, poses.tip(index) - point));
+            }
+        }
+    }
+}
+
+/// Returns the index of setpoint `k` in the ring buffer.
+fn ring_index(k: u64) -> usize {
+    (k % CAPACITY as u64) as usize
+}
+
+/// Returns the distance from the path extended straight beyond its ends, m.
+fn within_ends(distance: f64, overshoot: f64) -> f64 {
+    (distance * distance - overshoot * overshoot).max(0.0).sqrt()
+}
+
+/// Computation of the distances from their squares, m.
+struct Distances<'a> {
+    squares: &'a [f64],
+    found: &'a mut PathDeviations,
+}
+
+impl SliceOperation for Distances<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let count = self.squares.len();
+        let distances = &mut self.found.distance[..count];
+        let within_ends = &mut self.found.within_ends[..count];
+        for index in 0..count {
+            let distance = self.squares[index].sqrt();
+            distances[index] = distance;
+            within_ends[index] = distance;
+        }
+    }
+}
+
+/// Comparison of the tool axes of the poses whose nearest point lies on a segment.
+struct SegmentAngles<'a> {
+    segment: u64,
+    /// Tool axes at both ends.
+    axes: [[f64; 3]; 2],
+    poses: &'a Poses,
+    feet: &'a FootPoints,
+    angles: &'a mut ToolAngles,
+}
+
+impl SliceOperation for SegmentAngles<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let count = self.feet.segment.len();
+        let (segments, alongs) = (&self.feet.segment[..count], &self.feet.along[..count]);
+        let [us, vs, ws] = self.poses.axes().map(|values| &values[..count]);
+        let [square_sines, cosines] = self.angles.columns(count);
+        let [from, to] = self.axes;
+        let turn = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
+        for index in 0..count {
+            let t = alongs[index];
+            let nominal = [from[0] + t * turn[0], from[1] + t * turn[1], from[2] + t * turn[2]];
+            let axis = [us[index], vs[index], ws[index]];
+            let [square, cosine] = ToolAngles::square_sine_and_cosine(axis, nominal);
+            let is_here = segments[index] == self.segment;
+            square_sines[index] = if is_here { square } else { square_sines[index] };
+            cosines[index] = if is_here { cosine } else { cosines[index] };
         }
     }
 }

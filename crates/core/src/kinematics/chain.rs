@@ -220,6 +220,7 @@ impl Kinematics {
 }
 
 /// Returns the vector from the tip to the point moved by X, Y and Z, machine frame, m.
+#[inline(always)]
 fn tool_vector(geometry: &KinematicsConfig) -> Vector3<f64> {
     Vector3::new(0.0, 0.0, geometry.tool_length)
 }
@@ -259,16 +260,27 @@ pub(super) struct Tables<'a> {
     c: (f64, f64),
 }
 
-impl Tables<'_> {
+impl<'a> Tables<'a> {
+    /// Returns sine and cosine of a and c.
+    pub(super) fn sin_cos(&self) -> [(f64, f64); 2] {
+        [self.a, self.c]
+    }
+
+    /// Returns the tables at other sines and cosines of a and c.
+    #[inline(always)]
+    pub(super) fn with_sin_cos(&self, a: (f64, f64), c: (f64, f64)) -> Tables<'a> {
+        Tables { geometry: self.geometry, a, c }
+    }
+
     /// Returns the tool axis u = (sin a sin c, −sin a cos c, cos a). Each component has full relative accuracy.
-    #[inline]
+    #[inline(always)]
     pub(super) fn tool_axis(&self) -> Vector3<f64> {
         let ((sin_a, cos_a), (sin_c, cos_c)) = (self.a, self.c);
         Vector3::new(sin_a * sin_c, -sin_a * cos_c, cos_a)
     }
 
     /// Returns the tip in the workpiece frame for X, Y and Z at `linear`, m.
-    #[inline]
+    #[inline(always)]
     pub(super) fn tip(&self, linear: Vector3<f64>) -> Vector3<f64> {
         let ([pivot_a, pivot_c, workpiece], (sin_a, cos_a), (sin_c, cos_c)) = (self.points(), self.a, self.c);
         let p = linear - tool_vector(self.geometry) - pivot_a;
@@ -286,6 +298,7 @@ impl Tables<'_> {
     }
 
     /// Returns Pa, Pc and W, m.
+    #[inline(always)]
     fn points(&self) -> [Vector3<f64>; 3] {
         let KinematicsConfig { pivot_a, pivot_c, workpiece, .. } = *self.geometry;
         [

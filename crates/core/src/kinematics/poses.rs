@@ -2,15 +2,23 @@
 
 use nalgebra::Vector3;
 
-use super::chain::{AxisRole, Kinematics, TableAngles, ToolPose};
+use super::chain::{AxisRole, Kinematics, TableAngles, Tables, ToolPose};
+use crate::simd::{SliceOperation, vectorize};
+
+/// Largest distance of an angle from the middle one, rad, up to which sines and cosines are computed by power series.
+const SERIES_LIMIT: f64 = 0.0625;
 
 /// Tool poses at consecutive instants, as structure of arrays.
 #[derive(Debug, Clone, Default)]
 pub struct Poses {
     /// X, Y and Z of the tips, m, workpiece frame.
     tips: [Vec<f64>; 3],
-    /// Tool axes; a single one if the tables do not move.
-    axes: Vec<Vector3<f64>>,
+    /// Components of the tool axes.
+    axes: [Vec<f64>; 3],
+    /// True if the tables do not move.
+    has_constant_axis: bool,
+    /// Sines and cosines of A and C at each instant.
+    angles: [[Vec<f64>; 2]; 2],
 }
 
 /// Returns true if all values are bit-identical.
@@ -34,6 +42,11 @@ impl Poses {
         self.tips.each_ref().map(Vec::as_slice)
     }
 
+    /// Returns the components of the tool axes in the workpiece frame.
+    pub fn axes(&self) -> [&[f64]; 3] {
+        self.axes.each_ref().map(Vec::as_slice)
+    }
+
     /// Returns the tip at `instant`, m, workpiece frame.
     ///
     /// # Panics
@@ -48,24 +61,35 @@ impl Poses {
     /// # Panics
     /// If `instant` is not below [`len`](Self::len).
     pub fn get(&self, instant: usize) -> ToolPose {
-        ToolPose { tip: self.tip(instant), axis: self.axes[instant.min(self.axes.len() - 1)] }
+        let axis = Vector3::new(self.axes[0][instant], self.axes[1][instant], self.axes[2][instant]);
+        ToolPose { tip: self.tip(instant), axis }
     }
 
     /// Returns the common tool axis if the tables do not move.
     pub fn constant_axis(&self) -> Option<Vector3<f64>> {
-        if let [axis] = self.axes[..] { Some(axis) } else { None }
+        (self.has_constant_axis && !self.is_empty()).then(|| self.get(0).axis)
     }
 
     /// Returns true if all poses are bit-identical.
     pub fn is_constant(&self) -> bool {
-        self.axes.len() <= 1 && self.tips().into_iter().all(are_equal)
+        self.has_constant_axis && self.tips().into_iter().all(are_equal)
+    }
+
+    /// Sets the number of poses; their values are undetermined.
+    fn resize(&mut self, instants: usize) {
+        let angles = self.angles.iter_mut().flatten();
+        for values in self.tips.iter_mut().chain(&mut self.axes).chain(angles) {
+            values.resize(instants, 0.0);
+        }
     }
 }
 
 impl Kinematics {
-    /// Computes the tool poses at `instants` consecutive instants, bit-identical to
-    /// [`forward_cached`](Self::forward_cached). `joints` contains the values of the first joint at all instants, then those
-    /// of the next joint, m or rad.
+    /// Computes the tool poses at `instants` consecutive instants. `joints` contains the values of the first joint at all
+    /// instants, then those of the next joint, m or rad.
+    ///
+    /// Sines and cosines of the tables are within 2·10⁻¹⁶ of those of [`forward_cached`](Self::forward_cached), so the
+    /// tip is within 10⁻¹⁵ of it relative to the size of the machine. While a table does not move, they are identical.
     pub fn forward_batch(
         &self,
         table_angles: &mut TableAngles,
@@ -78,30 +102,135 @@ impl Kinematics {
             let index = self.role(role)?;
             joints.get(index * instants..(index + 1) * instants)
         };
+        poses.resize(instants);
+        if instants == 0 {
+            return;
+        }
         for (tips, role) in poses.tips.iter_mut().zip(AxisRole::LINEAR) {
-            tips.clear();
             match of(role) {
-                Some(values) => tips.extend_from_slice(values),
-                None => tips.resize(instants, 0.0),
+                Some(values) => tips.copy_from_slice(values),
+                None => tips.fill(0.0),
             }
         }
-        poses.axes.clear();
         let tables = [of(AxisRole::A), of(AxisRole::C)];
-        let angles = |instant: usize| tables.map(|values| values.map_or(0.0, |values| values[instant]));
-        let [xs, ys, zs] = &mut poses.tips;
-        let linear = xs.iter_mut().zip(ys.iter_mut()).zip(zs.iter_mut());
-        if instants > 0 && tables.into_iter().flatten().all(are_equal) {
-            let tables = self.tables_cached(table_angles, angles(0));
-            poses.axes.push(tables.tool_axis());
-            for ((x, y), z) in linear {
-                [*x, *y, *z] = tables.tip(Vector3::new(*x, *y, *z)).into();
-            }
-        } else {
-            for (instant, ((x, y), z)) in linear.enumerate() {
-                let tables = self.tables_cached(table_angles, angles(instant));
-                poses.axes.push(tables.tool_axis());
-                [*x, *y, *z] = tables.tip(Vector3::new(*x, *y, *z)).into();
-            }
+        poses.has_constant_axis = tables.into_iter().flatten().all(are_equal);
+        let middle = tables.map(|values| values.map_or(0.0, |values| values[instants / 2]));
+        let center = self.tables_cached(table_angles, middle);
+        if poses.has_constant_axis {
+            vectorize(FixedTables { tables: center, poses });
+            return;
+        }
+        for (((values, sin_cos), middle), angles) in
+            tables.into_iter().zip(center.sin_cos()).zip(middle).zip(&mut poses.angles)
+        {
+            write_sines(values, middle, sin_cos, angles);
+        }
+        vectorize(MovingTables { center, poses });
+    }
+}
+
+/// Writes sines and cosines of the angles `values`, rad; `sin_cos` are those of the angle `middle`.
+fn write_sines(
+    values: Option<&[f64]>,
+    middle: f64,
+    sin_cos: (f64, f64),
+    [sines, cosines]: &mut [Vec<f64>; 2],
+) {
+    let is_series = values.is_some_and(|values| {
+        vectorize(SineSeries { values, middle, sin_cos, sines: &mut *sines, cosines: &mut *cosines })
+    });
+    if !is_series {
+        for (index, (sine, cosine)) in sines.iter_mut().zip(cosines).enumerate() {
+            (*sine, *cosine) = values.map_or(sin_cos, |values| values[index].sin_cos());
+        }
+    }
+}
+
+/// Computation of sines and cosines by power series about the angle `middle`.
+///
+/// The first omitted terms are below 10⁻¹⁶ of the sine and 10⁻¹⁸ of the cosine of the distance from it.
+struct SineSeries<'a> {
+    values: &'a [f64],
+    middle: f64,
+    sin_cos: (f64, f64),
+    sines: &'a mut [f64],
+    cosines: &'a mut [f64],
+}
+
+impl SliceOperation for SineSeries<'_> {
+    type Output = bool;
+
+    /// Writes sines and cosines; returns false if an angle is too far from the middle one.
+    #[inline(always)]
+    fn run(self) -> bool {
+        let SineSeries { values, middle, sin_cos: (sine, cosine), sines, cosines } = self;
+        let count = values.len();
+        let (sines, cosines) = (&mut sines[..count], &mut cosines[..count]);
+        let mut is_near = true;
+        for index in 0..count {
+            let x = values[index] - middle;
+            is_near &= x.abs() <= SERIES_LIMIT;
+            let y = x * x;
+            let quotient = -1.0 / 6.0 + y * (1.0 / 120.0 + y * (-1.0 / 5040.0 + y * (1.0 / 362_880.0)));
+            let sine_of_x = x + x * y * quotient;
+            let versine = y * (0.5 + y * (-1.0 / 24.0 + y * (1.0 / 720.0 + y * (-1.0 / 40_320.0))));
+            sines[index] = sine + (cosine * sine_of_x - sine * versine);
+            cosines[index] = cosine - (sine * sine_of_x + cosine * versine);
+        }
+        is_near
+    }
+}
+
+/// Computation of poses with fixed tables.
+struct FixedTables<'a> {
+    tables: Tables<'a>,
+    /// Poses whose tips contain X, Y and Z.
+    poses: &'a mut Poses,
+}
+
+impl SliceOperation for FixedTables<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let FixedTables { tables, poses } = self;
+        let axis = tables.tool_axis();
+        for (values, component) in poses.axes.iter_mut().zip(&axis) {
+            values.fill(*component);
+        }
+        let count = poses.len();
+        let [xs, ys, zs] = poses.tips.each_mut().map(|values| &mut values[..count]);
+        for index in 0..count {
+            let tip = tables.tip(Vector3::new(xs[index], ys[index], zs[index]));
+            (xs[index], ys[index], zs[index]) = (tip.x, tip.y, tip.z);
+        }
+    }
+}
+
+/// Computation of poses at the sines and cosines of each instant.
+struct MovingTables<'a> {
+    center: Tables<'a>,
+    /// Poses whose tips contain X, Y and Z.
+    poses: &'a mut Poses,
+}
+
+impl SliceOperation for MovingTables<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let MovingTables { center, poses } = self;
+        let count = poses.len();
+        let [xs, ys, zs] = poses.tips.each_mut().map(|values| &mut values[..count]);
+        let [us, vs, ws] = poses.axes.each_mut().map(|values| &mut values[..count]);
+        let [[sin_a, cos_a], [sin_c, cos_c]] =
+            poses.angles.each_ref().map(|pair| pair.each_ref().map(|values| &values[..count]));
+        for index in 0..count {
+            let tables = center.with_sin_cos((sin_a[index], cos_a[index]), (sin_c[index], cos_c[index]));
+            let tip = tables.tip(Vector3::new(xs[index], ys[index], zs[index]));
+            (xs[index], ys[index], zs[index]) = (tip.x, tip.y, tip.z);
+            let axis = tables.tool_axis();
+            (us[index], vs[index], ws[index]) = (axis.x, axis.y, axis.z);
         }
     }
 }

@@ -201,7 +201,7 @@ impl Block {
     }
 
     /// Returns the arc lengths, from 0 to the length, between which all derivatives are continuous.
-    pub(super) fn knots(&self) -> Vec<f64> {
+    pub(crate) fn knots(&self) -> Vec<f64> {
         match &self.shape {
             Shape::Spline(spline) => spline.knots(),
             _ => vec![0.0, self.length],

@@ -5,6 +5,7 @@
 //! `Motor<[f64; L]>` holds `L` axes in memory, `Motor<Vector<S>>` holds the lanes of one SIMD register. Each
 //! operation gives bit-identical results in all three.
 
+mod dispatch;
 mod soa;
 mod unroll;
 mod vector;
@@ -12,6 +13,7 @@ mod vector;
 use std::fmt::Debug;
 use std::ops::{Add, Mul, Neg, Sub};
 
+pub use dispatch::{SliceOperation, vectorize};
 pub(crate) use soa::soa_struct;
 pub use unroll::Unroll2;
 pub use vector::{SimdLoad, Vector};

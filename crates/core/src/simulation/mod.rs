@@ -15,10 +15,10 @@ pub use tolerance::{Quantity, Tolerance, ToleranceViolation, Tolerances};
 
 use std::sync::Arc;
 
-use crate::config::{AxisKind, MachineConfig, Periods};
+use crate::config::{AxisKind, MachineConfig};
 use crate::machine::{AxisSample, Machine, MachineError, MachineParameters, SimdWidth};
 use crate::trajectory::{JointLimits, Timeline, TimelineError, TimelineEvent};
-use crate::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
+use crate::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS};
 
 use loads::AxisLoads;
 use motions::{ActiveMotions, PositionGrid};
@@ -88,13 +88,14 @@ impl Simulation {
         let kinds: Vec<AxisKind> = axes.iter().map(|a| a.kind()).collect();
         let home = vec![0.0; axes.len()];
         let samples = machine.axes().iter().map(|a| *a.sample()).collect();
-        let Periods { position: period, current: tick, .. } = config.periods();
+        let periods = config.periods();
+        let period = periods.position;
         let mut timeline = Timeline::new(joints, period, &home)?;
         timeline.set_stream_delay(stream_delay(&machine));
         Ok(Simulation {
             timeline,
             loads: AxisLoads::new(axes.len()),
-            motions: ActiveMotions::new(kinds, seconds(tick), contour_preview_cycles(period)),
+            motions: ActiveMotions::new(kinds, periods, contour_preview_cycles(period)),
             saturated: vec![false; axes.len()],
             preview: Vec::with_capacity(machine.preview_length() * axes.len()),
             machine,

@@ -1,7 +1,7 @@
 //! Accepted motions: start, completion, preemption, cancellation, tolerances and figures.
 
 use crate::assess::{MotionAssessor, MotionReport};
-use crate::config::AxisKind;
+use crate::config::{AxisKind, Periods};
 use crate::machine::Machine;
 use crate::trajectory::{MotionId, Timeline};
 use crate::units::Nanoseconds;
@@ -123,8 +123,7 @@ impl ActiveMotion {
 #[derive(Debug, Clone)]
 pub(super) struct ActiveMotions {
     kinds: Vec<AxisKind>,
-    /// Tsi, s.
-    tick: f64,
+    periods: Periods,
     /// Preview of the contour error, position cycles.
     preview_cycles: u32,
     is_assessing: bool,
@@ -132,9 +131,9 @@ pub(super) struct ActiveMotions {
 }
 
 impl ActiveMotions {
-    /// Creates an empty list for axes of `kinds`; `tick` is Tsi in s.
-    pub(super) fn new(kinds: Vec<AxisKind>, tick: f64, preview_cycles: u32) -> Self {
-        ActiveMotions { kinds, tick, preview_cycles, is_assessing: true, list: Vec::new() }
+    /// Creates an empty list for axes of `kinds`.
+    pub(super) fn new(kinds: Vec<AxisKind>, periods: Periods, preview_cycles: u32) -> Self {
+        ActiveMotions { kinds, periods, preview_cycles, is_assessing: true, list: Vec::new() }
     }
 
     /// Adds an accepted motion.
@@ -144,7 +143,7 @@ impl ActiveMotions {
             axis_indices: axis_indices.to_vec(),
             assessor: self
                 .is_assessing
-                .then(|| MotionAssessor::new(axis_indices, &self.kinds, self.tick, self.preview_cycles)),
+                .then(|| MotionAssessor::new(axis_indices, &self.kinds, &self.periods, self.preview_cycles)),
             is_running: false,
             finish_k: None,
             tolerances,

@@ -130,12 +130,19 @@ impl Trajectory {
             self.times.get(i).is_some_and(|&t| t <= time) && self.times.get(i + 1).is_none_or(|&t| time < t)
         };
         if holds(hint) {
-            hint
-        } else if holds(hint + 1) {
-            hint + 1
-        } else {
-            self.times.partition_point(|&t| t <= time).saturating_sub(1)
+            return hint;
         }
+        if holds(hint + 1) {
+            return hint + 1;
+        }
+        let guess = self.equidistant_index(time, hint).filter(|&index| holds(index));
+        guess.unwrap_or_else(|| self.times.partition_point(|&t| t <= time).saturating_sub(1))
+    }
+
+    /// Returns the index of the last point at or before `time` if the points after `hint` are equidistant.
+    fn equidistant_index(&self, time: Nanoseconds, hint: usize) -> Option<usize> {
+        let (from, to) = (*self.times.get(hint)?, *self.times.get(hint + 1)?);
+        Some(hint + usize::try_from(time.checked_sub(from)? / (to - from)).ok()?)
     }
 
     /// Returns the state of `column` at local `time`, ns, clamped to the first and last point.
@@ -150,10 +157,19 @@ impl Trajectory {
         self.segment(column, index).state(time - self.times[index])
     }
 
+    /// Returns the position of [`state_near`](Self::state_near).
+    pub(super) fn position_near(&self, column: usize, time: Nanoseconds, hint: usize) -> f64 {
+        let index = self.locate(time, hint);
+        if index >= self.segments() || time <= self.times[index] {
+            return self.positions[index * self.joints.len() + column];
+        }
+        self.segment(column, index).position(time - self.times[index])
+    }
+
     /// Returns the position of `column` at local `time`, ns, clamped to the first and last point; `None`
     /// for a stop or an unknown column.
     pub fn position(&self, column: usize, time: Nanoseconds) -> Option<f64> {
-        (!self.is_stop() && column < self.joints.len()).then(|| self.state_near(column, time, 0).position)
+        (!self.is_stop() && column < self.joints.len()).then(|| self.position_near(column, time, 0))
     }
 
     fn plan_final_stops(&mut self, machine: &[JointLimits]) {

@@ -43,14 +43,21 @@ impl JointLimits {
     ///
     /// # Errors
     /// [`RejectionCode::OutsideTravelLimits`], also for NaN.
+    #[inline]
     pub fn check_travel_limits(&self, index: usize, position: f64) -> Result<(), Rejection> {
         let (min, max) = (self.limits.travel_min, self.limits.travel_max);
         if position >= min - TRAVEL_TOLERANCE && position <= max + TRAVEL_TOLERANCE {
             return Ok(());
         }
+        Err(self.travel_rejection(index, position))
+    }
+
+    #[cold]
+    fn travel_rejection(&self, index: usize, position: f64) -> Rejection {
+        let (min, max) = (self.limits.travel_min, self.limits.travel_max);
         let limit = if position < min { min } else { max };
         let unit = self.unit();
-        Err(Rejection::new(
+        Rejection::new(
             RejectionCode::OutsideTravelLimits,
             format!(
                 "{}, point {index}: position {} is outside the travel limits, {} to {}",
@@ -62,7 +69,7 @@ impl JointLimits {
         )
         .joint(&self.name)
         .index(index)
-        .numbers(position, limit))
+        .numbers(position, limit)
     }
 
     /// Rejects a position that is NaN or infinite.
@@ -81,14 +88,20 @@ impl JointLimits {
     ///
     /// # Errors
     /// [`RejectionCode::Speed`], also for NaN.
+    #[inline]
     pub fn check_speed(&self, index: usize, velocity: f64, what: &str) -> Result<(), Rejection> {
         let speed = velocity.abs();
         if speed <= self.speed_bound() {
             return Ok(());
         }
+        Err(self.speed_rejection(index, speed, what))
+    }
+
+    #[cold]
+    fn speed_rejection(&self, index: usize, speed: f64, what: &str) -> Rejection {
         let limit = self.limits.velocity;
         let unit = self.unit();
-        Err(Rejection::new(
+        Rejection::new(
             RejectionCode::Speed,
             format!(
                 "{}, point {index}: {what} {} exceeds {}, {}",
@@ -100,7 +113,7 @@ impl JointLimits {
         )
         .joint(&self.name)
         .index(index)
-        .numbers(speed, limit))
+        .numbers(speed, limit)
     }
 
     /// Rejects a first setpoint that is more than Vmax·Tsp away from the previous one.

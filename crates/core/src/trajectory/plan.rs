@@ -60,6 +60,16 @@ impl TrajectoryColumn {
             _ => self.trajectory.state_near(self.column, time, self.cursor),
         }
     }
+
+    /// Returns the position at local `time`, ns, m or rad.
+    pub fn position(&self, time: Nanoseconds) -> f64 {
+        let trajectory = &self.trajectory;
+        let is_on_points = self.approach.is_none() || time >= trajectory.first_time();
+        if is_on_points && (time < trajectory.duration() || trajectory.final_stop(self.column).is_none()) {
+            return trajectory.position_near(self.column, time, self.cursor);
+        }
+        self.state(time).position
+    }
 }
 
 impl JointPlan {
@@ -81,6 +91,14 @@ impl JointPlan {
             PlanKind::Hold(position) => KinematicState::at_rest(*position),
             PlanKind::Stop { from_k, stop } => stop.state(seconds(elapsed(*from_k, k, period))),
             PlanKind::Trajectory(path) => path.state(elapsed(path.start_k, k, period)),
+        }
+    }
+
+    /// Returns the position at instant `k`, at the earliest `join_k`, m or rad.
+    pub fn position(&self, k: i64, period: Nanoseconds) -> f64 {
+        match &self.kind {
+            PlanKind::Trajectory(path) => path.position(elapsed(path.start_k, k, period)),
+            _ => self.state(k, period).position,
         }
     }
 

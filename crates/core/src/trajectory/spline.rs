@@ -88,6 +88,10 @@ impl Segment {
     pub fn state(&self, elapsed: Nanoseconds) -> KinematicState {
         let h = seconds(self.duration);
         let [c1, c2, c3, c4, c5] = self.coefficients;
+        if self.degree == SplineDegree::Linear {
+            let position = self.position(elapsed);
+            return KinematicState { position, velocity: c1 / h, acceleration: 0.0 };
+        }
         let s = elapsed.clamp(0, self.duration) as f64 / self.duration as f64;
         let dp = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)));
         let ddp = 2.0 * c2 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5));

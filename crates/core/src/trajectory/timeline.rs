@@ -189,25 +189,31 @@ impl Timeline {
     /// The preview contains everything accepted up to now; beyond its end the last setpoint is held.
     /// Returns `None` for an unknown joint.
     pub fn psec_ahead(&self, joint: usize, cycles: u32) -> Option<f64> {
-        (joint < self.queues.len()).then(|| {
-            let k = (self.next_k - 1).saturating_add(i64::from(cycles));
-            self.predicted(joint, k).position
+        let queue = self.queues.get(joint)?;
+        let k = (self.next_k - 1).saturating_add(i64::from(cycles));
+        Some(match self.plan_at(joint, k) {
+            Some(plan) if !matches!(plan.kind, PlanKind::Hold(_)) => plan.position(k, self.period),
+            Some(_) => self.predicted(joint, k).position,
+            None => queue.state.position,
         })
+    }
+
+    /// Returns the plan that commands `joint` at instant `k`, `None` up to the last instant.
+    fn plan_at(&self, joint: usize, k: i64) -> Option<&JointPlan> {
+        let plans = &self.queues[joint].plans;
+        let after = plans.partition_point(|plan| plan.join_k <= k);
+        plans.get(after.saturating_sub(1)).filter(|_| k >= self.next_k)
     }
 
     /// Returns the state commanded to `joint` at instant `k`, at the earliest the last instant.
     pub(super) fn predicted(&self, joint: usize, k: i64) -> KinematicState {
-        let queue = &self.queues[joint];
-        if k < self.next_k {
-            return queue.state;
-        }
-        let after = queue.plans.partition_point(|plan| plan.join_k <= k);
-        match queue.plans.get(after.saturating_sub(1)) {
+        let state = self.queues[joint].state;
+        match self.plan_at(joint, k) {
             Some(JointPlan { kind: PlanKind::Hold(newest), .. }) => {
-                self.stream.state_after(joint, k - self.next_k, *newest, queue.state.position)
+                self.stream.state_after(joint, k - self.next_k, *newest, state.position)
             }
             Some(plan) => plan.state(k, self.period),
-            None => queue.state,
+            None => state,
         }
     }
 

@@ -153,6 +153,10 @@ impl ColumnCheck<'_> {
             if first > last {
                 continue;
             }
+            if first == last && last * self.period == end {
+                self.step(index + 1, &mut previous, self.trajectory.point(self.column, index + 1).position)?;
+                continue;
+            }
             let segment = self.trajectory.segment(self.column, index);
             let at = |k: i64| segment.position(k * self.period - begin);
             let point = index + 1;

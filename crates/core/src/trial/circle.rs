@@ -7,6 +7,7 @@ use crate::assess::{CircleAssessor, CircleTrace, bidirectional};
 use crate::config::{AxisKind, MachineConfig};
 use crate::path::{Circle, Program};
 
+use super::cycle::TickTimes;
 use super::figures::{BidirectionalFigures, CircleFigures};
 use super::path_features::steady_window;
 
@@ -74,19 +75,28 @@ impl Circles {
     /// these times.
     pub(super) fn observe<'m>(
         &mut self,
-        times: &[f64],
+        times: TickTimes,
         coordinates: impl Fn(usize) -> &'m [f64],
         record: bool,
     ) {
-        let Some(last) = times.last() else { return };
-        for (tick, time) in times.iter().enumerate() {
-            while self.list.get(self.next).is_some_and(|steady| *time >= steady.window.end) {
+        let last = times.last();
+        if !record && let Some(steady) = self.list.get_mut(self.next) {
+            let window = &steady.window;
+            if window.contains(&times.at(0)) && window.contains(&last) {
+                let [u, v] = steady.circle.plane.map(&coordinates);
+                steady.assessor.push_all(u, v);
+                return;
+            }
+        }
+        for tick in 0..times.count() {
+            let time = times.at(tick);
+            while self.list.get(self.next).is_some_and(|steady| time >= steady.window.end) {
                 self.next += 1;
             }
-            let Some(steady) = self.list.get_mut(self.next).filter(|s| *last >= s.window.start) else {
+            let Some(steady) = self.list.get_mut(self.next).filter(|s| last >= s.window.start) else {
                 return;
             };
-            if steady.window.contains(time) {
+            if steady.window.contains(&time) {
                 let [u, v] = steady.circle.plane.map(|index| coordinates(index)[tick]);
                 steady.push(u, v, record && self.next < MAX_TRACES);
             }

@@ -4,6 +4,7 @@ use crate::config::MachineConfig;
 use crate::path::Program;
 use crate::units::seconds;
 
+use super::cycle::TickTimes;
 use super::figures::CornerFigures;
 use super::path_features::turn;
 
@@ -43,13 +44,14 @@ impl Corners {
     }
 
     /// Adds contour errors at `times`, s, without overshoot beyond the path's ends, m.
-    pub(super) fn observe(&mut self, times: &[f64], within_ends: &[f64]) {
-        let Some(last) = times.last() else { return };
-        for (&time, &distance) in times.iter().zip(within_ends) {
+    pub(super) fn observe(&mut self, times: TickTimes, within_ends: &[f64]) {
+        let last = times.last();
+        for (tick, &distance) in within_ends.iter().enumerate() {
+            let time = times.at(tick);
             while self.list.get(self.next).is_some_and(|(corner, _)| time > corner + WINDOW) {
                 self.next += 1;
             }
-            if self.list.get(self.next).is_none_or(|(corner, _)| *last < corner - WINDOW) {
+            if self.list.get(self.next).is_none_or(|(corner, _)| last < corner - WINDOW) {
                 return;
             }
             let open = self.list.iter_mut().skip(self.next).take_while(|(corner, _)| time >= corner - WINDOW);

@@ -28,7 +28,8 @@ struct ErrorStatistics {
 
 impl ErrorStatistics {
     fn push(&mut self, value: f64) {
-        self.max = self.max.max(value);
+        // NaN is not larger.
+        self.max = if value > self.max { value } else { self.max };
         self.sum_of_squares += value * value;
         self.count += 1;
     }
@@ -152,10 +153,10 @@ impl<'a> Observer<'a> {
                 contour_error: largest(&self.deviations.distance),
                 orientation_error: largest(&self.deviations.orientation),
             });
-            recorder.push(cycle.times[0], axes, tool);
+            recorder.push(cycle.times.at(0), axes, tool);
         }
         self.observe_circles(cycle);
-        self.end = cycle.end;
+        self.end = cycle.times.at(cycle.ticks());
     }
 
     /// Adds the tool poses; returns the nearest point at the first tick.
@@ -165,26 +166,20 @@ impl<'a> Observer<'a> {
             (Tracker::Path(tracker), Some(program)) => {
                 tracker.follow(poses, |tick| cycle.until(program, tick), deviations)?.first
             }
-            (Tracker::Setpoints(tracker), _) => {
-                deviations.clear();
-                let mut at = |tick| {
-                    let nearest = tracker.nearest(&poses.get(tick));
-                    deviations.push(&nearest);
-                    nearest
-                };
-                let first = at(0);
-                (1..poses.len()).for_each(|tick| _ = at(tick));
-                first
-            }
+            (Tracker::Setpoints(tracker), _) => tracker.follow(poses, deviations)?,
             (Tracker::Path(_), None) => return None,
         };
+        // Local copies stay in registers.
+        let (mut contour, mut within_ends, mut orientation) =
+            (self.contour, self.within_ends, self.orientation);
         let each = deviations.distance.iter().zip(&deviations.within_ends).zip(&deviations.orientation);
-        for ((&distance, &within_ends), &orientation) in each {
-            self.contour.push(distance);
-            self.within_ends.push(within_ends);
-            self.orientation.push(orientation);
+        for ((&distance, &within), &angle) in each {
+            contour.push(distance);
+            within_ends.push(within);
+            orientation.push(angle);
         }
-        self.corners.observe(&cycle.times, &deviations.within_ends);
+        (self.contour, self.within_ends, self.orientation) = (contour, within_ends, orientation);
+        self.corners.observe(cycle.times, &deviations.within_ends);
         Some(first)
     }
 
@@ -196,7 +191,7 @@ impl<'a> Observer<'a> {
             let tip = tips.clone().find(|(joint, _)| workpiece && *joint == Some(index));
             tip.map_or(&cycle.positions[index * ticks..][..ticks], |(_, values)| values)
         };
-        self.circles.observe(&cycle.times, coordinates, self.recorder.is_some());
+        self.circles.observe(cycle.times, coordinates, self.recorder.is_some());
     }
 
     /// Returns the figures so far, without a recording.

@@ -9,3 +9,4 @@ mod path_tracker;
 mod reference_numbers;
 mod scenario_properties;
 mod scenarios;
+mod setpoint_tracker;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::path_common::*;
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use virtual_axes_core::assess::{NearestPoint, PathTracker};
-use virtual_axes_core::kinematics::ToolPose;
+use virtual_axes_core::assess::{NearestPoint, PathDeviations, PathTracker};
+use virtual_axes_core::kinematics::{Poses, TableAngles, ToolPose};
 use virtual_axes_core::path::{Block, Frame, Path};
 use virtual_axes_core::units::DEGREE;
 
@@ -301,4 +301,92 @@ fn nan_and_huge_inputs_are_tolerated() {
     assert!(nearest.distance.is_finite());
     let nearest = tracker.nearest(&ToolPose { tip, axis: Vector3::z() }, 1e300);
     assert!((nearest.distance - 1e-5).abs() < 1e-15);
+}
+
+/// Follows a path of five axes cycle by cycle; `progress_of` returns the progress of the tip at a time, position
+/// cycles. Compares each tick with the search for single poses, and some with brute force.
+fn follow_cycles(path: &Arc<Path>, cycles: usize, error: f64, progress_of: impl Fn(f64) -> f64) {
+    const TICKS: usize = 48;
+    let kinematics = kinematics(&[]);
+    let mut tracker = PathTracker::new(Arc::clone(path));
+    let mut single = tracker.clone();
+    let (mut angles, mut poses, mut found) =
+        (TableAngles::default(), Poses::default(), PathDeviations::default());
+    let mut joints = vec![0.0; 5];
+    let mut furthest = 0.0_f64;
+    for cycle in 0..cycles {
+        let mut columns = vec![0.0; 5 * TICKS];
+        for tick in 0..TICKS {
+            let time = cycle as f64 + tick as f64 / TICKS as f64;
+            path.joints(progress_of(time).clamp(0.0, path.length()), &mut joints);
+            for (joint, value) in joints.iter().enumerate() {
+                columns[joint * TICKS + tick] = value + error * (0.9 * time + joint as f64).sin();
+            }
+        }
+        kinematics.forward_batch(&mut angles, &columns, TICKS, &mut poses);
+        let until = |tick: usize| {
+            (0..=cycle * TICKS + tick)
+                .step_by(TICKS / 2)
+                .fold(0.0, |most, tick| f64::max(most, progress_of(tick as f64 / TICKS as f64)))
+                + 0.015
+        };
+        let untils: Vec<f64> = (0..TICKS).map(until).collect();
+        tracker.follow(&poses, |tick| untils[tick], &mut found);
+        for (tick, &until) in untils.iter().enumerate() {
+            let pose = poses.get(tick);
+            let one = single.nearest(&pose, until);
+            let at = format!("cycle {cycle}, tick {tick}: {} m at {} m", one.distance, one.progress);
+            assert!((found.distance[tick] - one.distance).abs() <= 1e-12, "{at}: {}", found.distance[tick]);
+            assert!((found.within_ends[tick] - one.within_ends).abs() <= 1e-12, "{at}");
+            assert!((found.orientation[tick] - one.orientation).abs() <= 1e-11, "{at}");
+            furthest = furthest.max(one.progress);
+            if (cycle * TICKS + tick).is_multiple_of(211) {
+                let wanted =
+                    brute_force(path, (furthest - 5e-3).max(0.0), until.min(path.length()), &pose.tip);
+                assert!((found.distance[tick] - wanted).abs() <= 1e-12, "{at}: {wanted}");
+            }
+        }
+    }
+}
+
+/// Two splines of five axes joined by a corner; the first one bends by its own width.
+fn curved_path(frame: Frame) -> Arc<Path> {
+    let points = [
+        [0.02, 0.03, 0.0, 0.1, 0.0],
+        [0.05, -0.01, 0.01, 0.3, 0.5],
+        [0.052, 0.03, 0.01, 0.35, 0.7],
+        [0.054, -0.01, 0.01, 0.4, 0.9],
+        [0.12, 0.02, 0.0, 0.2, 1.2],
+    ];
+    let more = [
+        [0.13, 0.05, 0.0, 0.2, 1.0],
+        [0.1, 0.08, 0.01, 0.3, 0.8],
+        [0.05, 0.09, 0.0, 0.1, 0.4],
+        [0.0, 0.1, 0.0, 0.0, 0.0],
+    ];
+    path(frame, vec![spline(HOME, &points), spline(points[4], &more)])
+}
+
+#[test]
+fn cycles_along_splines_of_five_axes_match_brute_force() {
+    for frame in [Frame::Workpiece, Frame::Joints] {
+        let path = curved_path(frame);
+        for (feed, error) in [(5e-4, 2e-6), (5e-4, 3e-5), (1e-4, 0.0), (3e-3, 1e-4)] {
+            let cycles = ((path.length() + 0.02) / feed) as usize;
+            follow_cycles(&path, cycles.min(600), error, |time| feed * time - 0.004);
+        }
+    }
+}
+
+#[test]
+fn reversals_standstill_and_jumps_on_a_spline_match_brute_force() {
+    let path = curved_path(Frame::Workpiece);
+    // Back and forth by 2 mm while advancing, with a standstill and jumps by 3 mm.
+    let progress = |time: f64| {
+        let time = if (40.0..60.0).contains(&time) { 40.0 } else { time };
+        let jump = if time as usize % 17 == 9 { -3e-3 } else { 0.0 };
+        3e-4 * time + 2e-3 * (0.2 * time).sin() + jump
+    };
+    follow_cycles(&path, 400, 1e-5, progress);
+    follow_cycles(&path, 400, 4e-4, progress);
 }

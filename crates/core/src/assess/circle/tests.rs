@@ -248,3 +248,24 @@ fn reversal_spikes_are_those_of_the_four_quadrants() {
         assert_near("spike", spike, 20e-6 + height - mean, 1e-9);
     }
 }
+
+#[test]
+fn a_series_of_points_has_the_report_of_single_points() {
+    for (turns, steps, off) in [(2.0, 20_000, 3e-5), (-1.5, 500, 2e-3), (0.3, 7, 0.0)] {
+        let (center, radius) = ([0.02, -0.01], 0.15);
+        let mut single = CircleAssessor::new(center, radius);
+        let mut series = single.clone();
+        let at = |i: usize| {
+            let angle = turns * TAU * i as f64 / steps as f64;
+            let r = radius + off * (7.0 * angle).sin();
+            [center[0] + r * angle.cos(), center[1] + r * angle.sin()]
+        };
+        let points: Vec<[f64; 2]> = (0..steps).map(at).collect();
+        points.iter().for_each(|[x, y]| _ = single.push(*x, *y));
+        for part in points.chunks(48) {
+            let column = |i: usize| part.iter().map(|point| point[i]).collect::<Vec<_>>();
+            series.push_all(&column(0), &column(1));
+        }
+        assert_eq!(series.report(), single.report(), "{turns} turns");
+    }
+}

@@ -36,6 +36,13 @@ impl PathDeviations {
         self.orientation.clear();
     }
 
+    /// Sets the number of poses; the values of further ones are 0.
+    pub(in crate::assess) fn resize(&mut self, count: usize) {
+        self.distance.resize(count, 0.0);
+        self.within_ends.resize(count, 0.0);
+        self.orientation.resize(count, 0.0);
+    }
+
     /// Adds the deviations of one pose.
     pub fn push(&mut self, nearest: &NearestPoint) {
         self.distance.push(nearest.distance);
@@ -87,6 +94,12 @@ impl PathTracker {
         let last = poses.len().checked_sub(1)?;
         let before = self.furthest;
         let begin = until(0);
+        if self.shapes[self.block].has_cells()
+            && let Some(first) = self.follow_curve(poses, [begin, until(last)], found)
+        {
+            return Some(FollowResult { first, closed_form: false });
+        }
+        found.clear();
         let first = self.nearest(&poses.get(0), begin);
         found.push(&first);
         // The query before left the state unchanged, and so would all of these.
