@@ -13,5 +13,6 @@ mod interface;
 mod output_form;
 mod part_programs;
 mod reference;
+mod run_part_program;
 mod tune_command;
 mod warnings;

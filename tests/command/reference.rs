@@ -74,6 +74,7 @@ const DOCUMENTED: [(&str, &[&[&str]]); 9] = [
             &["run", "ballbar-both", "--compare", "x.velocity_loop.gain=4.5"],
             &["run", "corner-90"],
             &["run", "five-axis"],
+            &["run", "config/programs/finishing-raster.nc"],
         ],
     ),
     (

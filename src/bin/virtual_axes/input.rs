@@ -1,4 +1,4 @@
-//! Input of a command: a scenario or a file with setpoints.
+//! Input of a command: a scenario, a part program or a file with setpoints.
 
 use std::cell::{Cell, RefCell};
 use std::error::Error;
@@ -7,6 +7,8 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::part_program::is_part_program;
+use crate::part_program_source::{OverrideSchedule, PartProgramSource, ProgramTrack};
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::Scenario;
@@ -16,18 +18,22 @@ use virtual_axes_core::trial::{GridSource, ProgramSource, SetpointSource, Source
 use virtual_axes_core::units::Rounded;
 use virtual_axes_io::files::{self, FileKind, McapTrajectories, PsecCsvReader, TimeGap, read_psec_yaml};
 
-/// Scenario or file with setpoints.
+/// Scenario, part program or file with setpoints.
 #[derive(Debug)]
 pub struct CommandInput {
     name: String,
     content: Content,
     /// Gap in the rows of a CSV file that was read.
     gap: Cell<Option<TimeGap>>,
+    /// Feed override of a part program.
+    schedule: OverrideSchedule,
+    track: RefCell<ProgramTrack>,
 }
 
 #[derive(Debug)]
 enum Content {
     Scenario(Box<Scenario>),
+    PartProgram,
     /// Opened file, which the first run consumes, so that a pipe is possible; later runs reopen it.
     Csv(RefCell<Option<files::Input>>),
     Yaml(Vec<TrajectoryRequest>),
@@ -48,13 +54,47 @@ impl CommandInput {
         let content = if is_builtin || !Path::new(name).exists() {
             // The error of an unknown name lists the built-in scenarios.
             Content::Scenario(Box::new(Scenario::load(name)?))
+        } else if is_part_program(Path::new(name)) {
+            Content::PartProgram
         } else {
             content_of(files::Input::open(Path::new(name))?, topic)?
         };
         if topic.is_some() && !matches!(content, Content::Mcap { .. }) {
             return Err(format!("{name}: --topic requires an MCAP recording").into());
         }
-        Ok(CommandInput { name: name.to_owned(), content, gap: Cell::new(None) })
+        Ok(CommandInput {
+            name: name.to_owned(),
+            content,
+            gap: Cell::new(None),
+            schedule: OverrideSchedule::default(),
+            track: RefCell::default(),
+        })
+    }
+
+    /// Sets the feed override of a part program.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the text is invalid, or if the input is not a part program.
+    pub fn with_override(mut self, text: Option<&str>) -> Result<Self, Box<dyn Error>> {
+        if let Some(text) = text {
+            if !self.is_part_program() {
+                return Err(format!("{}: --override requires a part program", self.name).into());
+            }
+            self.schedule =
+                OverrideSchedule::parse(text).map_err(|error| format!("--override {text}: {error}"))?;
+        }
+        Ok(self)
+    }
+
+    /// Returns true if the input is a part program.
+    pub fn is_part_program(&self) -> bool {
+        matches!(self.content, Content::PartProgram)
+    }
+
+    /// Returns lines and times of the setpoints of a part program that were read.
+    pub fn track(&self) -> &RefCell<ProgramTrack> {
+        &self.track
     }
 
     /// Returns the name of the scenario or file.
@@ -121,6 +161,10 @@ impl CommandInput {
         }
         match &self.content {
             Content::Scenario(_) => Err(format!("{}: a scenario without its program", self.name).into()),
+            Content::PartProgram => {
+                let source = PartProgramSource::open(&self.name, machine, &self.schedule, &self.track)?;
+                Ok(SetpointSource::Grid(Box::new(source)))
+            }
             Content::Csv(opened) => {
                 let file = match opened.take() {
                     Some(file) => file,

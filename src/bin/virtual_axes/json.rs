@@ -27,6 +27,9 @@ fn run(run: &VariantRun) -> Value {
     object.insert("controller".to_owned(), json!(run.controller));
     object.insert("changes".to_owned(), json!(run.changes));
     object.extend(figures(&run.outcome.figures));
+    if let Some(program) = &run.part_program {
+        object.insert("part_program".to_owned(), program.json());
+    }
     Value::Object(object)
 }
 

@@ -24,6 +24,7 @@ mod machine_file;
 mod output_arguments;
 mod parameters;
 mod part_program;
+mod part_program_source;
 mod period;
 mod pose;
 mod program_text;
@@ -44,6 +45,7 @@ mod tune_result;
 mod urdf;
 mod variant;
 mod verdict;
+mod worst_lines;
 
 use std::error::Error;
 use std::fmt::Display;

@@ -31,7 +31,7 @@ enum PsecKind {
 /// Arguments of `virtual_axes psec` for a scenario.
 #[derive(Debug, clap::Args)]
 struct ScenarioPsecArguments {
-    /// Built-in scenario or scenario file.
+    /// Built-in scenario, scenario file or part program (`.nc`, `.ngc`, …).
     scenario: String,
     /// Output file: CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory on `/psec`, or YAML for
     /// `ros2 topic pub`.
@@ -46,6 +46,9 @@ struct ScenarioPsecArguments {
     /// Override the feed of the scenario, m/min (rpm for a scenario of rotary moves).
     #[arg(long, allow_negative_numbers = true)]
     feed: Option<f64>,
+    /// Feed override of a part program, 0 to 200 %: constant, or from times on, as in `0:100,2.5:0,4:120`.
+    #[arg(long = "override", value_name = "PERCENT|S:PERCENT,…", allow_hyphen_values = true)]
+    feed_override: Option<String>,
 }
 
 /// Writes the setpoints of a scenario or of a campaign.
@@ -61,12 +64,17 @@ pub fn run(arguments: &PsecArguments) -> Result<String, Box<dyn Error>> {
 fn write_scenario(arguments: &ScenarioPsecArguments) -> Result<String, Box<dyn Error>> {
     let machine = Parameters::load(&arguments.machine)?;
     let config = variant::parameters(&machine, None, &arguments.set, &[])?.machine_config()?;
-    let input = CommandInput::open(&arguments.scenario, None)?;
+    let input =
+        CommandInput::open(&arguments.scenario, None)?.with_override(arguments.feed_override.as_deref())?;
     input.must_not_be(&arguments.out)?;
     must_not_replace(&arguments.out, Path::new(&arguments.machine))?;
     let program = input.program(&config, arguments.feed)?;
     let SetpointSource::Grid(mut source) = input.setpoints(&config, program.as_ref())? else {
-        return Err(format!("{}: contains trajectories; psec requires a scenario", arguments.scenario).into());
+        return Err(format!(
+            "{}: contains trajectories; psec requires a scenario or a part program",
+            arguments.scenario
+        )
+        .into());
     };
     let limits = joint_limits(&config, "");
     let names: Vec<String> = source

@@ -20,6 +20,7 @@ use crate::report::ReportMachine;
 use crate::setpoint_summary::SetpointSummary;
 use crate::trial_arguments::TrialArguments;
 use crate::variant::{self, ControllerName, VariantRun};
+use crate::worst_lines::{LineErrors, ProgramFigures};
 use crate::{figure, interrupt, json, program_text, report, table, text_table, verdict};
 
 /// Arguments of `virtual_axes run`.
@@ -81,7 +82,8 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
     for (parameters, changes) in variants {
         let config = variant::checked(&parameters, &machine, &arguments.trial.machine)?;
         let program = input.program(&config, arguments.trial.feed)?;
-        let (outcome, setpoints) = trial(arguments, &input, program.as_ref(), &parameters, &config)?;
+        let (outcome, setpoints, part_program) =
+            trial(arguments, &input, program.as_ref(), &parameters, &config)?;
         let feed =
             program.as_deref().and_then(|program| program_text::unreached_feed(program, config.axes()));
         let slow = setpoints.slow_warning(config.axes()).filter(|_| program.is_none());
@@ -93,6 +95,7 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
             input_warnings: feed.into_iter().chain(slow).collect(),
             input_notes: input_notes.collect(),
             machine: config,
+            part_program,
             outcome,
         });
     }
@@ -114,14 +117,14 @@ fn controllers(given: &[ControllerName]) -> Vec<Option<ControllerName>> {
     if given.is_empty() { vec![None] } else { given.iter().copied().map(Some).collect() }
 }
 
-/// Simulates a run; returns its outcome and a summary of its setpoints.
+/// Simulates a run; returns its outcome, a summary of its setpoints, and the figures of a part program.
 fn trial(
     arguments: &RunArguments,
     input: &CommandInput,
     program: Option<&Arc<Program>>,
     parameters: &Parameters,
     config: &MachineConfig,
-) -> Result<(TrialOutcome, SetpointSummary), Box<dyn Error>> {
+) -> Result<(TrialOutcome, SetpointSummary, Option<ProgramFigures>), Box<dyn Error>> {
     let trial = Trial {
         machine: config,
         program: program.cloned(),
@@ -137,8 +140,12 @@ fn trial(
     };
     let is_subsampled = trace.as_ref().is_some_and(|t| t.period % config.periods().position != 0);
     let mut summary = SetpointSummary::default();
+    let mut lines = input.is_part_program().then(|| LineErrors::new(config));
     let on_tick = |tick: Tick<'_>| {
         summary.add(&tick);
+        if let Some(lines) = &mut lines {
+            lines.add(&tick, &mut input.track().borrow_mut());
+        }
         if tick.position_instant {
             interrupt::check()?;
             progress.set_time(seconds(tick.time));
@@ -155,7 +162,18 @@ fn trial(
     if let Some(trace) = trace {
         trace.finish()?;
     }
-    Ok((outcome, summary))
+    let part_program = match lines {
+        Some(lines) => {
+            let track = input.track().borrow();
+            Some(ProgramFigures {
+                cycle_time: track.cycle_time,
+                programmed_time: track.programmed_time,
+                worst_lines: lines.finish(input.name())?,
+            })
+        }
+        None => None,
+    };
+    Ok((outcome, summary, part_program))
 }
 
 /// Writer of signals at the trace period.
@@ -214,7 +232,8 @@ fn single(run: &VariantRun) -> Vec<String> {
     axes.extend(remarks.map(|remark| text_table::wrapped_line(&remark)));
     let path = table::path(figures);
     let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
-    std::iter::once(axes).chain(path).collect()
+    let program = run.part_program.as_ref().map(ProgramFigures::text);
+    std::iter::once(axes).chain(path).chain(program).collect()
 }
 
 fn several(runs: &[VariantRun]) -> Vec<String> {

@@ -39,8 +39,8 @@ impl MachineArguments {
 /// Setpoints, machine and parameters.
 #[derive(Debug, clap::Args)]
 pub struct TrialArguments {
-    /// Built-in scenario, scenario file, or file with setpoints: CSV (`time,x,y,…` in s, m, rad), MCAP with a
-    /// JointTrajectory, or YAML for `ros2 topic pub`.
+    /// Built-in scenario, scenario file, part program (`.nc`, `.ngc`, …), or file with setpoints: CSV (`time,x,y,…` in s,
+    /// m, rad), MCAP with a JointTrajectory, or YAML for `ros2 topic pub`.
     #[arg(value_name = "SCENARIO|FILE")]
     input: String,
     /// Built-in machine or machine file.
@@ -52,6 +52,9 @@ pub struct TrialArguments {
     /// Override the feed of the scenario, m/min (rpm for a scenario of rotary moves).
     #[arg(long, allow_negative_numbers = true)]
     pub feed: Option<f64>,
+    /// Feed override of a part program, 0 to 200 %: constant, or from times on, as in `0:100,2.5:0,4:120`.
+    #[arg(long = "override", value_name = "PERCENT|S:PERCENT,…", allow_hyphen_values = true)]
+    feed_override: Option<String>,
     /// Topic to run, if a recording has several topics with a JointTrajectory.
     #[arg(long)]
     topic: Option<String>,
@@ -68,8 +71,8 @@ impl TrialArguments {
         must_not_replace(output, Path::new(&self.machine))
     }
 
-    /// Opens the scenario or the file with setpoints.
+    /// Opens the scenario, the part program or the file with setpoints.
     pub fn input(&self) -> Result<CommandInput, Box<dyn Error>> {
-        CommandInput::open(&self.input, self.topic.as_deref())
+        CommandInput::open(&self.input, self.topic.as_deref())?.with_override(self.feed_override.as_deref())
     }
 }

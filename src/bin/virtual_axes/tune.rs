@@ -294,6 +294,7 @@ fn record(
             machine: tuning.apply(problem.parameters(), problem.joints())?.machine_config()?,
             input_warnings: Vec::new(),
             input_notes: Vec::new(),
+            part_program: None,
             outcome,
         })
     };

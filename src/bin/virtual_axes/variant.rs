@@ -2,6 +2,7 @@
 
 use std::error::Error;
 
+use crate::worst_lines::ProgramFigures;
 use virtual_axes_core::config::{
     Assignment, ConfigError, MachineConfig, Parameters, Value, ValueSource, parse_assignment,
 };
@@ -141,6 +142,8 @@ pub struct VariantRun {
     pub input_warnings: Vec<String>,
     /// Notes on the input, such as a limit without effect.
     pub input_notes: Vec<String>,
+    /// Times and worst lines of a part program.
+    pub part_program: Option<ProgramFigures>,
     /// Result of the run.
     pub outcome: TrialOutcome,
 }

@@ -132,6 +132,11 @@ impl Element {
         jet
     }
 
+    /// Returns the duration at the programmed feed, s; 0 at rapid traverse.
+    pub fn programmed_time(&self) -> f64 {
+        self.length / self.cap.rate(&self.jet(0.0)[1])
+    }
+
     /// Returns true if the coordinates are linear in the path parameter.
     pub fn is_line(&self) -> bool {
         matches!(self.shape, Shape::Line)

@@ -89,6 +89,11 @@ where
         Ok(piece.map(|piece| self.model.joints(piece, 0.0)[0]))
     }
 
+    /// Returns the duration of the motions read at their programmed feed, s.
+    pub fn programmed_time(&self) -> f64 {
+        self.source.programmed_time()
+    }
+
     /// Returns lines and feeds of the motions read.
     pub fn marks(&mut self) -> &mut VecDeque<Mark> {
         self.source.marks()

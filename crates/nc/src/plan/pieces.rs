@@ -32,6 +32,7 @@ pub(super) struct PieceSource<I> {
     end: f64,
     largest: f64,
     marks: VecDeque<Mark>,
+    programmed_time: f64,
 }
 
 impl<I, E> PieceSource<I>
@@ -40,7 +41,20 @@ where
     E: Into<StepError>,
 {
     pub fn new(parts: PartSource<I>, largest: f64) -> Self {
-        Self { parts, ahead: None, run: None, end: 0.0, largest, marks: VecDeque::new() }
+        Self {
+            parts,
+            ahead: None,
+            run: None,
+            end: 0.0,
+            largest,
+            marks: VecDeque::new(),
+            programmed_time: 0.0,
+        }
+    }
+
+    /// Returns the duration of the motions read at their programmed feed, s.
+    pub fn programmed_time(&self) -> f64 {
+        self.programmed_time
     }
 
     /// Returns lines and feeds of the motions read.
@@ -102,6 +116,7 @@ where
 
     fn mark(&mut self, element: &Element) {
         self.end += element.length;
+        self.programmed_time += element.programmed_time();
         self.marks.push_back(Mark { end: self.end, line: element.line, feed: element.feed });
     }
 

@@ -202,6 +202,12 @@ where
         self.passed + self.local
     }
 
+    /// Returns the duration of the motions read at their programmed feeds, s, without ramps, rapid traverse and dwells; at
+    /// the end of the program that of all motions.
+    pub fn programmed_time(&self) -> f64 {
+        self.ahead.programmed_time()
+    }
+
     /// Returns the number of look-ahead windows planned.
     pub fn window_count(&self) -> usize {
         self.ahead.plans

@@ -1,0 +1,134 @@
+//! Setpoints of a part program, with the source line of each.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::error::Error;
+use std::fs::File;
+use std::io::BufReader;
+
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::trial::{GridSource, SourceError};
+use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
+use virtual_axes_nc::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
+
+/// Feed override over time: percent from a time on, s.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OverrideSchedule(Vec<(f64, f64)>);
+
+impl OverrideSchedule {
+    /// Parses `PERCENT` or `TIME:PERCENT,TIME:PERCENT…` with increasing times, s.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a number is invalid or outside 0 to 200 %, or if times do not increase.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for part in text.split(',') {
+            let (time, percent) = part.split_once(':').unwrap_or(("0", part));
+            let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+            let (Some(time), Some(percent)) = (number(time), number(percent)) else {
+                return Err(format!("{part}: must be PERCENT or SECONDS:PERCENT"));
+            };
+            if !(0.0..=200.0).contains(&percent) {
+                return Err(format!("{percent} %: must be 0 to 200 %"));
+            }
+            if time < 0.0 || points.last().is_some_and(|(before, _)| time <= *before) {
+                return Err(format!("{time} s: times must be 0 or more and increase"));
+            }
+            points.push((time, percent / 100.0));
+        }
+        if points.last().is_some_and(|(_, last)| *last == 0.0) {
+            return Err("the last value is 0 %: the program would not end".to_owned());
+        }
+        Ok(Self(points))
+    }
+
+    fn at(&self, time: f64) -> f64 {
+        let OverrideSchedule(points) = self;
+        points.iter().take_while(|(from, _)| *from <= time).last().map_or(1.0, |(_, value)| *value)
+    }
+}
+
+/// Lines of the setpoints that are not simulated yet, and the times of the program.
+#[derive(Debug, Clone, Default)]
+pub struct ProgramTrack {
+    /// Source line of each setpoint, in order.
+    pub lines: VecDeque<usize>,
+    /// Time from the first to the last setpoint, s.
+    pub cycle_time: f64,
+    /// Duration of all motions at their programmed feed, s.
+    pub programmed_time: f64,
+}
+
+/// Source of the setpoints of a part program.
+pub struct PartProgramSource<'a> {
+    planner: PartProgramPlanner<Interpreter<BufReader<File>>>,
+    name: &'a str,
+    schedule: &'a OverrideSchedule,
+    track: &'a RefCell<ProgramTrack>,
+    period: Nanoseconds,
+    cycle: i64,
+}
+
+impl<'a> PartProgramSource<'a> {
+    /// Opens the part program `name` for a machine; `track` receives its lines and times.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the file cannot be opened or the machine has invalid limits.
+    pub fn open(
+        name: &'a str,
+        machine: &MachineConfig,
+        schedule: &'a OverrideSchedule,
+        track: &'a RefCell<ProgramTrack>,
+    ) -> Result<Self, Box<dyn Error>> {
+        let file = File::open(name).map_err(|error| format!("{name}: {error}"))?;
+        let options = InterpreterOptions::for_machine(machine);
+        let steps = Interpreter::new(BufReader::new(file), name, options);
+        let planner = PartProgramPlanner::new(steps, machine, PlanOptions::default())
+            .map_err(|error| format!("{name}: {error}"))?;
+        track.replace(ProgramTrack::default());
+        Ok(Self { planner, name, schedule, track, period: machine.periods().position, cycle: 0 })
+    }
+}
+
+impl GridSource for PartProgramSource<'_> {
+    fn joints(&self) -> &[usize] {
+        self.planner.joints()
+    }
+
+    fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
+        let time = seconds(self.cycle * self.period);
+        let setpoint = self.planner.next_setpoint(self.schedule.at(time)).map_err(|error| match error {
+            // The interpreter's error names the file.
+            FeedPlanError::Step(error) => error,
+            error => format!("{}: {error}", self.name).into(),
+        })?;
+        let mut track = self.track.borrow_mut();
+        track.programmed_time = self.planner.programmed_time();
+        let Some(setpoint) = setpoint else { return Ok(false) };
+        row.copy_from_slice(setpoint.psec());
+        track.lines.push_back(setpoint.line);
+        track.cycle_time = time;
+        self.cycle += 1;
+        Ok(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_schedule_holds_each_value_until_the_next() {
+        let schedule = OverrideSchedule::parse("0:100,2.5:0,4:120").unwrap();
+        let values = [0.0, 2.4, 2.5, 3.9, 4.0, 100.0].map(|time| schedule.at(time));
+        assert_eq!(values, [1.0, 1.0, 0.0, 0.0, 1.2, 1.2]);
+        assert_eq!(OverrideSchedule::parse("50").unwrap().at(7.0), 0.5);
+        assert_eq!(OverrideSchedule::default().at(7.0), 1.0);
+        for text in ["", "x", "201", "-1", "1:50,1:60", "0:100,5:0", "nan", "1:2:3"] {
+            assert!(OverrideSchedule::parse(text).is_err(), "{text}");
+        }
+    }
+}

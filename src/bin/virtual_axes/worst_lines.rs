@@ -1,0 +1,303 @@
+//! Lines of a part program with the largest contour errors.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
+
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::kinematics::Kinematics;
+use virtual_axes_core::text::escaped;
+use virtual_axes_core::trial::Tick;
+use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_report::{Table, TableColumn};
+
+use crate::part_program_source::ProgramTrack;
+use crate::text_table;
+
+/// Number of lines reported.
+const COUNT: usize = 10;
+/// Position cycles that the position may lag behind its setpoint.
+const WINDOW: usize = 112;
+/// Position cycles before and after the nearest setpoint that explain an error.
+const BEFORE: usize = 16;
+const AFTER: usize = 16;
+/// Smallest step of a setpoint that counts as motion, m or rad.
+const RESOLUTION: f64 = 1e-8;
+/// Change of direction in one step that is a reversal of the path, rad.
+const REVERSAL_TURN: f64 = 2.6;
+/// Smallest turn, rad, and largest radius, m, of a corner.
+const CORNER_TURN: f64 = 0.2;
+const CORNER_RADIUS: f64 = 2e-3;
+/// Smallest turn that is a curved path, rad.
+const SMALLEST_TURN: f64 = 5e-3;
+/// Longest text of a line that is shown, characters.
+const TEXT: usize = 60;
+
+/// Cause of an error, by the setpoints around it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Cause {
+    /// Change of direction.
+    Corner,
+    /// Change of sign of the speed of the named axis.
+    Reversal(String),
+    /// Curved path.
+    Curvature,
+    /// Standstill at the end of the motion.
+    Stop,
+    /// Straight path: feed and its changes.
+    Feed,
+}
+
+impl Cause {
+    /// Returns the cause as a text.
+    pub fn text(&self) -> String {
+        match self {
+            Cause::Corner => "corner".to_owned(),
+            Cause::Reversal(axis) => format!("reversal of {axis}"),
+            Cause::Curvature => "curvature".to_owned(),
+            Cause::Stop => "stop".to_owned(),
+            Cause::Feed => "feed".to_owned(),
+        }
+    }
+}
+
+/// Largest contour error of a line.
+#[derive(Debug, Clone)]
+pub struct WorstLine {
+    /// Source line, from 1.
+    pub line: usize,
+    /// Text of the line.
+    pub text: String,
+    /// Contour error, m.
+    pub error: f64,
+    /// Time of the error, s.
+    pub time: f64,
+    /// Cause of the error.
+    pub cause: Cause,
+}
+
+/// Times and worst lines of a part program.
+#[derive(Debug, Clone)]
+pub struct ProgramFigures {
+    /// Time from the first to the last setpoint, s.
+    pub cycle_time: f64,
+    /// Duration of all motions at their programmed feed, s.
+    pub programmed_time: f64,
+    /// Lines with the largest contour errors.
+    pub worst_lines: Vec<WorstLine>,
+}
+
+impl ProgramFigures {
+    /// Returns the times and a table of the worst lines.
+    pub fn text(&self) -> String {
+        let times = format!(
+            "cycle time {:.2} s; motions at programmed feed alone {:.2} s",
+            self.cycle_time, self.programmed_time
+        );
+        let column =
+            |name: &str, unit: &str| TableColumn { name: name.to_owned(), unit: unit.to_owned(), run: None };
+        let row = |worst: &WorstLine| {
+            vec![
+                worst.line.to_string(),
+                escaped(&worst.text),
+                worst.cause.text(),
+                format!("{:.2}", worst.error * 1e6),
+                format!("{:.3}", worst.time),
+            ]
+        };
+        let table = Table {
+            caption: String::new(),
+            columns: vec![
+                column("line", ""),
+                column("text", ""),
+                column("cause", ""),
+                column("contour error", "µm"),
+                column("time", "s"),
+            ],
+            rows: self.worst_lines.iter().map(row).collect(),
+        };
+        text_table::wrapped_line(&times) + &text_table::aligned(&table, &[1, 2])
+    }
+
+    /// Returns all figures as JSON.
+    pub fn json(&self) -> Value {
+        let line = |worst: &WorstLine| {
+            json!({
+                "line": worst.line,
+                "text": worst.text,
+                "cause": worst.cause.text(),
+                "contour_error_um": worst.error * 1e6,
+                "time_s": worst.time,
+            })
+        };
+        json!({
+            "cycle_time_s": self.cycle_time,
+            "programmed_time_s": self.programmed_time,
+            "worst_lines": self.worst_lines.iter().map(line).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// Setpoint with its line.
+struct TrackedSetpoint {
+    tip: Vector3<f64>,
+    joints: Vec<f64>,
+    line: usize,
+}
+
+/// Contour errors by source line: distance of the simulated tool tip from the polyline of the setpoints' tips, at each
+/// position cycle.
+pub struct LineErrors {
+    kinematics: Kinematics,
+    names: Vec<String>,
+    window: VecDeque<TrackedSetpoint>,
+    /// Simulated tool tips with their times, ns, that wait for later setpoints.
+    tips: VecDeque<(Vector3<f64>, Nanoseconds)>,
+    /// Number of setpoints before the window.
+    passed: usize,
+    /// Worst lines with the number of their nearest setpoint until the cause is known.
+    worst: Vec<(WorstLine, Option<usize>)>,
+}
+
+impl LineErrors {
+    /// Creates the errors of a run on `machine`.
+    pub fn new(machine: &MachineConfig) -> Self {
+        let names = machine.axes().iter().map(|axis| axis.name().to_owned()).collect();
+        Self {
+            kinematics: Kinematics::new(machine),
+            names,
+            window: VecDeque::new(),
+            tips: VecDeque::new(),
+            passed: 0,
+            worst: Vec::new(),
+        }
+    }
+
+    /// Adds a position cycle; other ticks are ignored.
+    pub fn add(&mut self, tick: &Tick<'_>, track: &mut ProgramTrack) {
+        if !tick.position_instant {
+            return;
+        }
+        let samples = || tick.machine.axes().iter().map(|axis| axis.sample());
+        let joints: Vec<f64> = samples().map(|sample| sample.psec).collect();
+        let line = track.lines.pop_front().or(self.window.back().map(|last| last.line)).unwrap_or(0);
+        let tip = self.kinematics.forward(&joints).tip;
+        self.window.push_back(TrackedSetpoint { tip, joints, line });
+        if self.window.len() > WINDOW {
+            self.window.pop_front();
+            self.passed += 1;
+        }
+        self.explain(AFTER);
+        let positions: Vec<f64> = samples().map(|sample| sample.position).collect();
+        self.tips.push_back((self.kinematics.forward(&positions).tip, tick.time));
+        if self.tips.len() > AFTER {
+            self.evaluate();
+        }
+    }
+
+    /// Evaluates the first waiting tool tip.
+    fn evaluate(&mut self) {
+        let Some((actual, time)) = self.tips.pop_front() else { return };
+        let (mut error, mut nearest) = (f64::INFINITY, 0);
+        for (i, pair) in self.window.iter().zip(self.window.iter().skip(1)).enumerate() {
+            let distance = distance(&actual, &pair.0.tip, &pair.1.tip);
+            if distance < error {
+                (error, nearest) = (distance, i + 1);
+            }
+        }
+        if error.is_finite() {
+            self.record(error, nearest, time);
+        }
+    }
+
+    fn record(&mut self, error: f64, index: usize, time: Nanoseconds) {
+        let line = self.window[index].line;
+        let known = self.worst.iter().position(|(worst, _)| worst.line == line);
+        let least = self.worst.last().map_or(0.0, |(worst, _)| worst.error);
+        let is_new =
+            known.map_or(self.worst.len() < COUNT || error > least, |i| error > self.worst[i].0.error);
+        if !is_new {
+            return;
+        }
+        if let Some(index) = known {
+            self.worst.remove(index);
+        }
+        let entry = WorstLine { line, text: String::new(), error, time: seconds(time), cause: Cause::Feed };
+        let place = self.worst.partition_point(|(worst, _)| worst.error >= error);
+        self.worst.insert(place, (entry, Some(self.passed + index)));
+        self.worst.truncate(COUNT);
+    }
+
+    /// Determines the causes of errors with `after` later setpoints.
+    fn explain(&mut self, after: usize) {
+        let end = self.passed + self.window.len();
+        for i in 0..self.worst.len() {
+            if let Some(number) = self.worst[i].1.take_if(|number| *number + after <= end) {
+                self.worst[i].0.cause = self.cause(number.saturating_sub(self.passed));
+            }
+        }
+    }
+
+    fn cause(&self, index: usize) -> Cause {
+        let range = index.saturating_sub(BEFORE)..(index + AFTER).min(self.window.len());
+        let (mut turn, mut sharpest, mut curvature, mut is_stop) = (0.0, 0.0_f64, 0.0_f64, false);
+        let mut direction: Option<Vector3<f64>> = None;
+        let mut reversed = None;
+        let mut speeds = vec![0.0; self.names.len()];
+        for i in range.start + 1..range.end {
+            let (from, to) = (&self.window[i - 1], &self.window[i]);
+            let step = to.tip - from.tip;
+            if step.norm() > RESOLUTION {
+                let angle = direction.map_or(0.0, |before| Kinematics::orientation_error(&before, &step));
+                (turn, sharpest) = (turn + angle, sharpest.max(angle));
+                curvature = curvature.max(angle / step.norm());
+                direction = Some(step);
+            }
+            is_stop = direction.is_some() && step.norm() <= RESOLUTION;
+            for (j, before) in speeds.iter_mut().enumerate() {
+                let speed = to.joints[j] - from.joints[j];
+                if speed.abs() > RESOLUTION {
+                    reversed = reversed.or((speed * *before < 0.0).then_some(j));
+                    *before = speed;
+                }
+            }
+        }
+        match reversed.and_then(|joint| self.names.get(joint)) {
+            Some(axis) if sharpest > REVERSAL_TURN => Cause::Reversal(axis.clone()),
+            _ if turn > CORNER_TURN && curvature * CORNER_RADIUS > 1.0 => Cause::Corner,
+            _ if is_stop => Cause::Stop,
+            Some(axis) => Cause::Reversal(axis.clone()),
+            _ if turn > SMALLEST_TURN => Cause::Curvature,
+            _ => Cause::Feed,
+        }
+    }
+
+    /// Returns the worst lines with their texts from the file `name`, the largest error first.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the file cannot be read.
+    pub fn finish(mut self, name: &str) -> io::Result<Vec<WorstLine>> {
+        (0..self.tips.len()).for_each(|_| self.evaluate());
+        self.explain(0);
+        let mut worst: Vec<WorstLine> = self.worst.into_iter().map(|(worst, _)| worst).collect();
+        let last = worst.iter().map(|worst| worst.line).max().unwrap_or(0);
+        for (i, text) in BufReader::new(File::open(name)?).split(b'\n').take(last).enumerate() {
+            let text = text?;
+            for worst in worst.iter_mut().filter(|worst| worst.line == i + 1) {
+                worst.text = String::from_utf8_lossy(&text).trim().chars().take(TEXT).collect();
+            }
+        }
+        Ok(worst)
+    }
+}
+
+/// Returns the distance of a point from the line between two points.
+fn distance(point: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
+    let step = to - from;
+    let squared = step.norm_squared();
+    let along = if squared > 0.0 { ((point - from).dot(&step) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    (point - from - step * along).norm()
+}
