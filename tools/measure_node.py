@@ -3,11 +3,17 @@
 
     cargo build --release && source .build/env.sh
     tools/measure_node.py --seconds 20 --minutes 10
+    cargo build --release --example minimal_publisher
+    tools/measure_node.py --seconds 20 --minutes 0 --compare
 
 The CPU share is user and system time of all threads of the process over wall-clock time, of one core: at rest and in
 motion, alone and with subscribers (rclpy, reliable, raw). The number of wake-ups of its threads per position cycle
 depends less on the machine and its load than the share does. Each span is checked: the node still runs at its end, its
 diagnostics report no missed cycle, and all subscribers have received all samples.
+
+With --compare, only the node with a subscriber of joint_states is measured, and at the same time, in another domain, a
+program that publishes the same messages and does nothing else (examples/minimal_publisher.rs), also with a subscriber:
+the ratio of the two does not depend on the speed of the machine.
 
 Memory: resident set and open files during successive trajectories and a subscription to joint_states, for --minutes
 (0: skipped). First, as many trajectories are sent as the middleware stores for psec (64), so that bounded histories
@@ -51,6 +57,7 @@ from drive import (  # noqa: E402
     Node,
     ballbar,
     joint_trajectory,
+    node_binary,
     stamp_of,
     status_of,
 )
@@ -77,8 +84,8 @@ TICKS = os.sysconf("SC_CLK_TCK")
 class Client:
     """Client node that subscribes and can send setpoints."""
 
-    def __init__(self, process: Node, topics: dict[str, Any]):
-        """Subscribes to `topics`."""
+    def __init__(self, process: Node, topics: dict[str, Any], sends: bool = True):
+        """Subscribes to `topics`; if `sends`, waits for the subscription of setpoints."""
         self.process = process
         self.stamps: list[int] = []
         self._context = Context()
@@ -95,7 +102,7 @@ class Client:
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
-        self._wait_for(lambda: self.stamps and self.psec.get_subscription_count(), "joint_states")
+        self._wait_for(lambda: self.stamps and (not sends or self.psec.get_subscription_count()), "joint_states")
         time.sleep(SETTLE_S)
 
     def _spin(self) -> None:
@@ -211,6 +218,32 @@ def share(process: Node, client: Client | None, seconds: float) -> str:
     return f"{used / took:6.2%}{slept * TSP_NS / 1e9 / took:6.1f} wake-ups per cycle"
 
 
+def compare(seconds: float) -> None:
+    """Prints the shares of the node and of a minimal publisher over the same spans, and their ratio."""
+    minimal = node_binary().parent / "examples" / "minimal_publisher"
+    if not minimal.exists():
+        raise SystemExit(f"no program {minimal}: cargo build --release --example minimal_publisher")
+    with Node(["-p", "time:=real"]) as process, Node(binary=minimal, name="/minimal_publisher") as publisher:
+        time.sleep(STARTED_S)
+        clients = Client(process, JOINTS), Client(publisher, JOINTS, sends=False)
+        both = process, publisher
+        print(f"share of one core, and ratio to a minimal publisher at the same time, spans of {seconds:g} s:")
+        for kind in ("rest", "trajectory", "stream"):
+            with Motion(clients[0], kind):
+                first = [len(client.stamps) for client in clients]
+                before, start = [cpu_seconds(one.pid) for one in both], time.monotonic()
+                time.sleep(seconds)
+                took = time.monotonic() - start
+                used = [(cpu_seconds(one.pid) - at) / took for one, at in zip(both, before)]
+                for one, client, count in zip(both, clients, first):
+                    check(one, client.stamps[count:], took)
+            print(
+                f"  {kind:<12}node {used[0]:6.2%}  publisher {used[1]:6.2%}  ratio {used[0] / used[1]:.2f}", flush=True
+            )
+        for client in clients:
+            client.close()
+
+
 def memory(process: Node, client: Client, minutes: float) -> None:
     """Prints memory and open files while the axes move."""
     looks: list[tuple[float, int, int]] = []
@@ -241,7 +274,11 @@ def main() -> int:
     parser.add_argument(
         "--minutes", type=options.from_zero, default=10, help="duration of the memory measurement, min (10)"
     )
+    parser.add_argument("--compare", action="store_true", help="compare with a minimal publisher")
     args = parser.parse_args()
+    if args.compare:
+        compare(args.seconds)
+        return 0
     with Node(["-p", "time:=real"]) as process:
         time.sleep(STARTED_S)
         print(f"share of one core in real time, position cycle {TSP_NS / 1e6:g} ms, spans of {args.seconds:g} s:")
