@@ -13,6 +13,11 @@ pub fn machine() -> MachineConfig {
     Parameters::embedded_default().unwrap().machine_config().unwrap()
 }
 
+/// Returns the machine with linear motors and position cycles of 1 ms.
+pub fn linear_motor_machine() -> MachineConfig {
+    Parameters::builtin("linear_motor_center").unwrap().machine_config().unwrap()
+}
+
 /// Returns the default machine with position cycles of 1 ms.
 pub fn fine_machine() -> MachineConfig {
     let mut parameters = Parameters::embedded_default().unwrap();

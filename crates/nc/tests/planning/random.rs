@@ -2,9 +2,10 @@
 
 use proptest::prelude::*;
 use virtual_axes_nc::motion::PathControl;
+use virtual_axes_nc::plan::PlanOptions;
 
 use crate::deviation::to_program;
-use crate::limits::plan;
+use crate::limits::{linear_motor_machine, machine, plan_on};
 use crate::programs::{Program, blend};
 
 /// A motion: kind, direction, length, curvature, angle.
@@ -65,10 +66,11 @@ proptest! {
 
     #[test]
     fn limits_and_tolerance_are_kept(
-        draws in draws(30), feed in -2.5..-0.5f64, control in controls(),
+        draws in draws(30), feed in -2.5..-0.5f64, control in controls(), is_linear in any::<bool>(),
     ) {
         let program = program(&draws, 10f64.powf(feed), control);
-        let outcome = plan(&program);
+        let machine = if is_linear { linear_motor_machine() } else { machine() };
+        let outcome = plan_on(&machine, &program, PlanOptions::default(), |_| 1.0).unwrap();
         outcome.audit.assert_kept();
         let motions: Vec<_> = program.motions().collect();
         let mut worst = 0.0_f64;
