@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 mod series;
 
@@ -271,8 +271,10 @@ impl Range {
 #[derive(Debug, Clone, Copy)]
 struct Sums {
     count: f64,
-    /// Sum of (u, v, 1)(u, v, 1)ᵀ.
-    normal: Matrix3<f64>,
+    /// Sums of u², u v and v².
+    products: Vector3<f64>,
+    /// Sums of u and v.
+    first: Vector2<f64>,
     /// Sum of (u, v, 1) q.
     right: Vector3<f64>,
     /// Sum of q².
@@ -283,7 +285,14 @@ struct Sums {
 
 impl Default for Sums {
     fn default() -> Self {
-        Self { count: 0.0, normal: Matrix3::zeros(), right: Vector3::zeros(), square: 0.0, deviation: 0.0 }
+        Self {
+            count: 0.0,
+            products: Vector3::zeros(),
+            first: Vector2::zeros(),
+            right: Vector3::zeros(),
+            square: 0.0,
+            deviation: 0.0,
+        }
     }
 }
 
@@ -291,10 +300,10 @@ impl Sums {
     fn add(&mut self, u: f64, v: f64, deviation: f64) {
         // (r² − 1)/2 without cancellation.
         let q = deviation + deviation * deviation / 2.0;
-        let row = Vector3::new(u, v, 1.0);
         self.count += 1.0;
-        self.normal += row * row.transpose();
-        self.right += row * q;
+        self.products += Vector3::new(u * u, u * v, v * v);
+        self.first += Vector2::new(u, v);
+        self.right += Vector3::new(u * q, v * q, q);
         self.square += q * q;
         self.deviation += deviation;
     }
@@ -302,11 +311,18 @@ impl Sums {
     fn plus(&self, other: &Self) -> Self {
         Self {
             count: self.count + other.count,
-            normal: self.normal + other.normal,
+            products: self.products + other.products,
+            first: self.first + other.first,
             right: self.right + other.right,
             square: self.square + other.square,
             deviation: self.deviation + other.deviation,
         }
+    }
+
+    /// Returns the sum of (u, v, 1)(u, v, 1)ᵀ.
+    fn normal(&self) -> Matrix3<f64> {
+        let ([uu, uv, vv], [u, v]) = (self.products.into(), self.first.into());
+        Matrix3::new(uu, uv, u, uv, vv, v, u, v, self.count)
     }
 
     /// Returns the sums divided by the number of points, `None` without a point.
@@ -314,7 +330,8 @@ impl Sums {
         let n = self.count;
         (n > 0.0).then(|| Self {
             count: 1.0,
-            normal: self.normal / n,
+            products: self.products / n,
+            first: self.first / n,
             right: self.right / n,
             square: self.square / n,
             deviation: self.deviation / n,
@@ -330,7 +347,7 @@ struct Fit {
 
 impl Fit {
     fn new(means: &Sums) -> Option<Self> {
-        let solution = means.normal.cholesky()?.solve(&means.right);
+        let solution = means.normal().cholesky()?.solve(&means.right);
         let [x, y, k] = solution.into();
         // ρ² − 1, and ρ − 1 without cancellation.
         let excess = 2.0 * k + x * x + y * y;

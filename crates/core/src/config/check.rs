@@ -41,7 +41,8 @@ pub(super) fn check(
             check_entry(&layout, key, entry)?;
         }
     }
-    for (key, entry) in entries.iter_mut() {
+    let checked: HashSet<&String> = changed.iter().collect();
+    for (key, entry) in entries.iter_mut().filter(|(key, _)| !checked.contains(key)) {
         check_entry(&layout, key, entry)?;
     }
     for (key, definition) in layout.definitions() {

@@ -45,24 +45,26 @@ impl ParameterLayout {
         if let Some(definition) = plain_definition(key) {
             return Ok(definition);
         }
-        self.check_name(key, at)?;
+        let candidates = |suffix| axis_definitions().filter(move |definition| definition.key == suffix);
         let found = key.split_once('.').and_then(|(name, suffix)| {
             let joint = self.joints.iter().find(|joint| joint.name == name)?;
             Some((joint, suffix))
         });
-        let Some((joint, suffix)) = found else {
-            return Err(self.unknown(key, at));
-        };
-        let candidates = || axis_definitions().filter(|definition| definition.key == suffix);
-        candidates().find(|definition| definition.applies_to(joint.axis, joint.motor)).ok_or_else(|| {
-            match candidates().next() {
-                Some(definition) => ConfigError::NotApplicable {
-                    at: at.clone(),
-                    key: key.to_owned(),
-                    reason: joint.exclusion_reason(definition),
-                },
-                None => self.unknown(key, at),
-            }
+        if let Some((joint, suffix)) = found
+            && let Some(definition) =
+                candidates(suffix).find(|definition| definition.applies_to(joint.axis, joint.motor))
+        {
+            return Ok(definition);
+        }
+        self.check_name(key, at)?;
+        let excluded = found.and_then(|(joint, suffix)| Some((joint, candidates(suffix).next()?)));
+        Err(match excluded {
+            Some((joint, definition)) => ConfigError::NotApplicable {
+                at: at.clone(),
+                key: key.to_owned(),
+                reason: joint.exclusion_reason(definition),
+            },
+            None => self.unknown(key, at),
         })
     }
 

@@ -69,10 +69,10 @@ pub(super) fn fastest_limits(
         };
     }
     let usable = 1.0 - MARGIN;
-    let by_curvature = min_bound(rows, joints, |limits, row| {
-        (usable * limits.acceleration / row[1]).sqrt().min((usable * limits.jerk / row[2]).cbrt())
-    });
-    let speed = speed.min(by_curvature);
+    // Both roots are monotonic: the root of the minimum is the minimum of the roots.
+    let by_acceleration = min_bound(rows, joints, |limits, row| usable * limits.acceleration / row[1]).sqrt();
+    let by_jerk = min_bound(rows, joints, |limits, row| usable * limits.jerk / row[2]).cbrt();
+    let speed = speed.min(by_acceleration).min(by_jerk);
     let mut best = (f64::INFINITY, FeedLimits { velocity: 0.0, acceleration: 0.0, jerk: 0.0 });
     for part in SPEED_FRACTIONS {
         let v = part * speed;
@@ -84,12 +84,17 @@ pub(super) fn fastest_limits(
         });
         for part in ACCELERATION_FRACTIONS {
             let acceleration = part * max_acceleration.min(cap.acceleration);
+            // Without the time for changes of the acceleration. The comparison skips NaN too.
+            let least_time = length / v + v / acceleration;
+            if !(acceleration > 0.0 && least_time < best.0) {
+                continue;
+            }
             let jerk = min_bound(rows, joints, |limits, row| {
                 (usable * limits.jerk - 3.0 * row[1] * v * acceleration - row[2] * v * v * v) / row[0]
             });
             let jerk = jerk.min(cap.jerk);
-            let time = length / v + v / acceleration + acceleration / jerk;
-            if acceleration > 0.0 && jerk > 0.0 && time < best.0 {
+            let time = least_time + acceleration / jerk;
+            if jerk > 0.0 && time < best.0 {
                 best = (time, FeedLimits { velocity: v, acceleration, jerk });
             }
         }

@@ -174,12 +174,21 @@ impl Program {
     /// Returns the time range of `block`, counted from 0, s, without the dwell after it; empty beyond the
     /// last block.
     pub fn time_range(&self, block: usize) -> Range<f64> {
-        let index = |i: usize| self.first_span.get(i).copied().unwrap_or(self.spans.len());
-        let spans = &self.spans[index(block)..index(block.saturating_add(1))];
+        let spans = self.spans_of(block);
         match (spans.first(), spans.last()) {
             (Some(first), Some(last)) => first.start..last.end,
             _ => self.duration..self.duration,
         }
+    }
+
+    /// Returns the highest feed that is reached in `block`, counted from 0, m/s or rad/s; 0 beyond the last block.
+    pub fn highest_feed_of(&self, block: usize) -> f64 {
+        self.spans_of(block).iter().map(|span| span.profile.highest_speed().0).fold(0.0, f64::max)
+    }
+
+    fn spans_of(&self, block: usize) -> &[TimedSpan] {
+        let index = |i: usize| self.first_span.get(i).copied().unwrap_or(self.spans.len());
+        &self.spans[index(block)..index(block.saturating_add(1))]
     }
 
     /// Returns the index of the last span that starts at or before `t`, or 0.

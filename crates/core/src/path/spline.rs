@@ -77,17 +77,26 @@ impl Spline {
 
     /// Returns ds/du.
     fn speed(&self, piece: usize, u: f64) -> f64 {
+        self.speeds(piece, [u])[0]
+    }
+
+    /// Returns ds/du at several parameters, which the compiler computes in vectors.
+    #[inline]
+    fn speeds<const N: usize>(&self, piece: usize, parameters: [f64; N]) -> [f64; N] {
         let coefficients = self.piece(piece);
-        let square = |index: &usize| {
-            let c = &coefficients[*index];
-            let d = c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]);
-            d * d
-        };
-        self.measured.iter().map(square).sum::<f64>().sqrt()
+        let mut squares = [0.0; N];
+        for &index in &self.measured {
+            let c = &coefficients[index];
+            for (square, u) in squares.iter_mut().zip(parameters) {
+                let d = c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]);
+                *square += d * d;
+            }
+        }
+        squares.map(f64::sqrt)
     }
 
     fn arc_length(&self, piece: usize, from: f64, to: f64) -> f64 {
-        integrate(from, to, |u| self.speed(piece, u))
+        integrate(from, to, |parameters| self.speeds(piece, parameters))
     }
 
     /// Computes the arc-length table.

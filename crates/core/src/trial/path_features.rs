@@ -32,10 +32,10 @@ pub(super) fn steady_window(program: &Program, index: usize) -> Option<Range<f64
         (program.progress(behind) - program.progress(before)) / (behind - before)
     };
     let time = |i: usize| span.start + step * i as f64;
-    let feeds: Vec<f64> = (0..=FEED_SAMPLES).map(|i| feed(time(i))).collect();
-    let top = feeds.iter().copied().fold(0.0, f64::max);
-    let steady = |feed: &f64| *feed >= top * (1.0 - STEADY);
-    let (first, last) = (time(feeds.iter().position(steady)?), time(feeds.iter().rposition(steady)?));
+    let top = program.highest_feed_of(index);
+    let is_steady = |i: &usize| feed(time(*i)) >= top * (1.0 - STEADY);
+    let (first, last) = ((0..=FEED_SAMPLES).find(is_steady)?, (0..=FEED_SAMPLES).rev().find(is_steady)?);
+    let (first, last) = (time(first), time(last));
     let turn = TAU * circle.radius / top;
     let spare = last - first - turn;
     if spare < -TURN_TOLERANCE * turn {
