@@ -22,7 +22,7 @@ def main() -> int:
     if program is None:
         print("no Chromium found: no screenshot")
         return 0
-    with tempfile.TemporaryDirectory() as folder, Browser(program, Path(folder)) as browser:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, Browser(program, Path(folder)) as browser:
         browser.show_as()
         browser.open(page.as_uri())
         browser.screenshot(picture)

@@ -69,16 +69,27 @@ pub(super) struct MovingSamples {
 impl MovingSamples {
     /// Selects the moving samples of `parts`, at least `before` and `behind` samples away from the ends.
     pub fn new(parts: &[FilteredSection], kind: AxisKind, before: usize, behind: usize) -> Self {
+        Self::select(parts, kind, |part| [before + part.filter.radius(), behind + part.filter.radius()])
+    }
+
+    /// Selects all moving samples of `parts`, also those whose filter reaches beyond the move.
+    pub fn with_ends(parts: &[FilteredSection], kind: AxisKind) -> Self {
+        Self::select(parts, kind, |_| [0, 0])
+    }
+
+    fn select(
+        parts: &[FilteredSection],
+        kind: AxisKind,
+        margins: impl Fn(&FilteredSection) -> [usize; 2],
+    ) -> Self {
         let mut speeds: Vec<f64> =
             parts.iter().flat_map(|p| p.motion.first.iter().map(|v| v.abs())).collect();
         let threshold = MOVING * quantile(&mut speeds, 0.99).unwrap_or(0.0);
         let mut indices = Vec::new();
         for (p, part) in parts.iter().enumerate() {
-            let reach = part.filter.radius();
+            let [before, behind] = margins(part);
             let runs = runs(&part.motion.first, threshold);
-            let inside = runs
-                .into_iter()
-                .map(|run| run.start + before + reach..run.end.saturating_sub(behind + reach));
+            let inside = runs.into_iter().map(|run| run.start + before..run.end.saturating_sub(behind));
             indices.extend(inside.flatten().map(|n| (p, n)));
         }
         let stride = indices.len().div_ceil(MOST_SAMPLES).max(1);

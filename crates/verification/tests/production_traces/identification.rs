@@ -183,3 +183,19 @@ fn a_position_cycle_that_is_longer_than_the_motion_allows_is_replaced() {
     assert!(periods.position < guess.periods.position, "seed {seed}: {periods:?}");
     assert!(residual(&found) <= 3e-6, "seed {seed}: {} m", residual(&found));
 }
+
+#[test]
+fn the_sign_of_the_current_is_found_also_from_moves_that_are_shorter_than_the_filter() {
+    // The first two have hardly any samples in motion that the filter leaves apart from standstill.
+    let others = (6100..6115).map(|seed| (seed, 2 * seed + 1));
+    for (seed, program) in [(5096, 10_193), (5022, 10_046)].into_iter().chain(others) {
+        let axis = HiddenAxis::draw(seed, AxisOrientation::Horizontal);
+        let guess = axis.guess(seed);
+        let program = axis.program(program, 20.0).expect("a program");
+        let raw = axis.record(&program, &TraceRecorder::default(), 7 * seed + 1).expect("a recording");
+        let (_, findings) =
+            condition(&raw, &guess.config, &guess.periods, &Conditioning::default()).expect("plausible");
+        let is_inverted = findings.iter().any(|finding| finding.code == "current-inverted");
+        assert_eq!(is_inverted, axis.is_current_inverted, "seed {seed}");
+    }
+}

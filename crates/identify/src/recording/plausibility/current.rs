@@ -59,7 +59,11 @@ impl PlausibilityCheck<'_> {
     /// Returns the friction current, A, if its sign and that of the inertia part are wrong; gravity does not matter.
     pub(super) fn inverted_current(&self, parts: &[FilteredSection]) -> Option<f64> {
         self.smooth_current.as_ref()?;
-        let moving = MovingSamples::new(parts, self.axis.kind, 0, 0);
+        let mut moving = MovingSamples::new(parts, self.axis.kind, 0, 0);
+        if moving.indices.len() < FEWEST_MOVING {
+            // Moves that are shorter than the filter: blurred, but the signs remain.
+            moving = MovingSamples::with_ends(parts, self.axis.kind);
+        }
         let currents: Option<Vec<f64>> =
             moving.indices.iter().map(|&(p, n)| Some(parts[p].smooth_current.as_ref()?[n])).collect();
         let currents = currents.unwrap_or_default();
