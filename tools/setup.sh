@@ -5,7 +5,7 @@
 #
 #     tools/setup.sh [--browser] && source .build/env.sh
 #
-# With --browser, apt-get also installs Chromium for the tests of the report, where that is possible.
+# With --browser, apt-get also installs Chromium and iptables for tests that need them, where that is possible.
 # Another run repeats only stages with changed inputs: each stage ends by writing a stamp with the
 # hash of its inputs, so an aborted stage starts again from the beginning.
 set -euo pipefail
@@ -88,6 +88,12 @@ install_browser() {
     echo "setup: no Chromium (Debian: apt-get install chromium): the test of the report will fail" >&2
 }
 
+# Installs what the tests of two hosts need; without it, they are skipped.
+install_network_tools() {
+  command -v iptables >/dev/null && command -v ip >/dev/null || try_apt iptables iproute2 ||
+    echo "setup: no iptables or ip (Debian: apt-get install iptables iproute2): the tests of two hosts are skipped" >&2
+}
+
 # The CMake files of the wheels contain directories of their build machine.
 fix_cmake_paths() {
   local include numpy
@@ -166,4 +172,4 @@ if ! is_done "$messages_stamp" "$messages_hash"; then
   step "messages into .build" messages make_messages
   echo "$messages_hash" >"$messages_stamp"
 fi
-if $browser; then install_browser; fi
+if $browser; then install_browser; install_network_tools; fi
