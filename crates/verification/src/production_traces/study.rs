@@ -11,6 +11,7 @@ use virtual_axes_identify::identify::{
 use virtual_axes_identify::recording::{Conditioning, Severity, Signals, condition};
 
 use super::hidden_axis::{AxisOrientation, HiddenAxis};
+use super::position_error::PositionError;
 use super::recorder::TraceRecorder;
 
 /// Result of the identification of one hidden axis from one trace, and of its check with an unseen program.
@@ -41,6 +42,8 @@ pub struct StudyFigures {
     pub unseen: [f64; 2],
     /// RMS position residual of the unseen program with the hidden parameters, m: what the trace itself allows.
     pub hidden: f64,
+    /// Position error on the unseen program with exact setpoints, without a trace in between.
+    pub exact: PositionError,
     /// R² of the current of the unseen program, by inverse dynamics.
     pub r_squared: f64,
     /// Codes of findings about invalid results.
@@ -100,6 +103,8 @@ fn study(hidden: &HiddenAxis, seed: u64, duration: f64) -> Result<StudyFigures, 
     let truth =
         validate(&input(&unseen), &hidden.config, &hidden.periods).map_err(|error| error.to_string())?;
     let truth = truth.baseline.ok_or("no simulation of the hidden axis")?;
+    let program = hidden.program(2 * seed + 2, duration).map_err(|error| error.to_string())?;
+    let exact = PositionError::compute(hidden, found.axis(), periods, &program).map_err(|e| e.to_string())?;
     let figures = figures(hidden, &guess.config, &found);
     let (inertia, alpha, beta, weight) = figures.ok_or_else(|| reasons(&found))?;
     Ok(StudyFigures {
@@ -111,6 +116,7 @@ fn study(hidden: &HiddenAxis, seed: u64, duration: f64) -> Result<StudyFigures, 
         has_weight: hidden.config.gravity.weight != 0.0,
         unseen: [baseline.model, baseline.delayed],
         hidden: truth.model,
+        exact,
         r_squared: inverse.r_squared,
         has_backlash: found.findings.iter().any(|finding| finding.code == "backlash"),
         invalid: found.findings.iter().filter(|f| f.severity == Severity::Invalid).map(|f| f.code).collect(),
@@ -161,7 +167,7 @@ impl fmt::Display for StudyCase {
             Ok(x) => write!(
                 f,
                 "{}: J {:+.2} % ({:+.1} σ), α {:.2} cycles, β {:+.2} ms ({:+.1} σ{}), W {:+.3} ({:+.1} σ), unseen {:.1} µm \
-                 of {:.1} µm, R² {:.4} {}",
+                 of {:.1} µm, exact {:.1} µm of {:.1} µm, R² {:.4} {}",
                 self.name,
                 100.0 * x.inertia[0],
                 x.inertia[1],
@@ -173,6 +179,8 @@ impl fmt::Display for StudyCase {
                 x.weight[1],
                 1e6 * x.unseen[0],
                 1e6 * x.unseen[1],
+                1e6 * x.exact.model,
+                1e6 * x.exact.delayed,
                 x.r_squared,
                 x.invalid.join(" ")
             ),
@@ -203,6 +211,11 @@ impl fmt::Display for TraceStudy {
         row("unseen program, position RMS, µm", all.iter().map(|x| 1e6 * x.unseen[0]).collect())?;
         row("– relative to the best constant lag", all.iter().map(|x| x.unseen[0] / x.unseen[1]).collect())?;
         row("– the same for the hidden parameters", all.iter().map(|x| x.hidden / x.unseen[1]).collect())?;
+        row("– with exact setpoints, RMS, µm", all.iter().map(|x| 1e6 * x.exact.model).collect())?;
+        row(
+            "– relative to the best constant lag",
+            all.iter().map(|x| x.exact.model / x.exact.delayed).collect(),
+        )?;
         row("unseen program, 1 − R² of the current", all.iter().map(|x| 1.0 - x.r_squared).collect())?;
         let within = |name: &str, f: &mut fmt::Formatter<'_>, of: &dyn Fn(&StudyFigures) -> Option<f64>| {
             let errors: Vec<f64> = all.iter().filter_map(|x| of(x)).collect();
