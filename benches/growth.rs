@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use virtual_axes_core::assess::AxisAssessor;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::machine::{Machine, MachineParameters};
-use virtual_axes_core::trial::{self, Figures, GridSource, SetpointSource, SourceError, Trial};
+use virtual_axes_core::trial::{self, Figures, GridSource, Measures, SetpointSource, SourceError, Trial};
 use virtual_axes_core::units::seconds;
 use virtual_axes_verification::fixtures::machines::{AXES, parameters, program, setpoints};
 
@@ -113,7 +113,13 @@ fn cycle() -> Arc<Vec<[f64; AXES]>> {
 /// Measures the length of the setpoints: computed on demand, with figures of tool and axes, without a trace.
 fn length(config: &MachineConfig) {
     let rows = cycle();
-    let trial = Trial { machine: config, program: None, allow_nonzero_end_velocity: false, record: false };
+    let trial = Trial {
+        machine: config,
+        program: None,
+        allow_nonzero_end_velocity: false,
+        record: false,
+        measures: Measures::ALL,
+    };
     let run = |count: usize| {
         let source = Cycle { joints: [0, 1, 2, 3, 4], rows: Arc::clone(&rows), next: 0, count: count + 1 };
         black_box(trial::run(&trial, SetpointSource::Grid(Box::new(source)), |_| Ok(())).expect("a run"));
@@ -183,8 +189,13 @@ fn sweep(trial: &Trial<'_>, variants: &[MachineConfig], own: &[usize]) -> Vec<Fi
 fn machines(config: &MachineConfig, counts: &[usize], cores: &[usize]) {
     let program = program("ballbar", config);
     let (duration, own) = (program.duration(), [0, 1]);
-    let trial =
-        Trial { machine: config, program: Some(program), allow_nonzero_end_velocity: false, record: false };
+    let trial = Trial {
+        machine: config,
+        program: Some(program),
+        allow_nonzero_end_velocity: false,
+        record: false,
+        measures: Measures::ALL,
+    };
     let most = counts.iter().copied().max().unwrap_or(0);
     let all = variants(most);
     let rows = |cores: usize| {

@@ -11,7 +11,7 @@ use virtual_axes_core::config::Parameters;
 use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters};
 use virtual_axes_core::scenario::Scenario;
 use virtual_axes_core::trajectory::{Start, TrajectoryPoint, TrajectoryRequest};
-use virtual_axes_core::trial::{self, Trial};
+use virtual_axes_core::trial::{self, Measures, Trial};
 use virtual_axes_io::files::encode_cdr;
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 use virtual_axes_io::messages::trajectory_msgs::msg::JointTrajectory;
@@ -97,6 +97,7 @@ fn report(criterion: &mut Criterion) {
             program: Some(Arc::clone(&program)),
             allow_nonzero_end_velocity: false,
             record: true,
+            measures: Measures::ALL,
         };
         let outcome = trial::run(&trial, setpoints("ballbar", program, &config), |_| Ok(()));
         let recording = outcome.expect("a run").recording.expect("recording is enabled");

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use criterion::Criterion;
 use virtual_axes_core::config::{MachineConfig, Parameters};
-use virtual_axes_core::trial::{self, Trial};
+use virtual_axes_core::trial::{self, Measures, Trial};
 use virtual_axes_core::units::seconds;
 use virtual_axes_identify::identify::campaign::{Campaign, CampaignOptions};
 use virtual_axes_identify::identify::{
@@ -39,7 +39,13 @@ pub fn all(criterion: &mut Criterion) {
 }
 
 fn trial_of<'a>(name: &str, machine: &'a MachineConfig, record: bool) -> Trial<'a> {
-    Trial { machine, program: Some(program(name, machine)), allow_nonzero_end_velocity: false, record }
+    Trial {
+        machine,
+        program: Some(program(name, machine)),
+        allow_nonzero_end_velocity: false,
+        record,
+        measures: Measures::ALL,
+    }
 }
 
 fn trial(criterion: &mut Criterion) {

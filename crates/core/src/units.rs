@@ -8,6 +8,8 @@ use std::fmt;
 
 /// Meters in a millimeter.
 pub const MILLIMETER: f64 = 1e-3;
+/// Meters in a micrometer.
+pub const MICROMETER: f64 = 1e-6;
 /// Seconds in a millisecond.
 pub const MILLISECOND: f64 = 1e-3;
 /// Henries in a millihenry.
@@ -20,6 +22,8 @@ pub const RPM: f64 = TAU / MINUTE;
 pub const REVOLUTION: f64 = TAU;
 /// Radians in a degree.
 pub const DEGREE: f64 = PI / 180.0;
+/// Radians in a millidegree.
+pub const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 /// Meters per second in a meter per minute.
 pub const METER_PER_MINUTE: f64 = 1.0 / MINUTE;
 /// Position-loop gain of one (m/min)/mm or one (1000 °/min)/°, s⁻¹: both are 1000/60 s⁻¹.

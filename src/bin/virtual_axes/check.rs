@@ -7,7 +7,7 @@ use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parame
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::scenario::{Scenario, is_file_name, nearest_input};
 use virtual_axes_core::text::{escaped, nearest_hint};
-use virtual_axes_core::trial::{Tick, Trial};
+use virtual_axes_core::trial::{Measures, Tick, Trial};
 use virtual_axes_io::files::{self, FileKind};
 
 use crate::input::CommandInput;
@@ -64,6 +64,7 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
         program: program.clone(),
         allow_nonzero_end_velocity: false,
         record: false,
+        measures: Measures::ALL,
     };
     // The setpoints are validated by a simulation.
     let setpoints = input.setpoints(&config, program.as_ref())?;

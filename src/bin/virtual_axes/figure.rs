@@ -1,9 +1,9 @@
 //! Figures of a run as a list: subject, quantity, unit and value. Tables, CSV and comparisons are made of it.
 
 use virtual_axes_core::trial::{AxisFigures, CircleFigures, Figures, Reference};
-use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER};
+use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MICROMETER, MILLIDEGREE, MILLIMETER};
 
-use crate::table::{MICROMETER, MILLIDEGREE, scale};
+use crate::table::scale;
 
 /// One figure of a run.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,15 +1,9 @@
 //! JSON output of `virtual_axes run`.
-//!
-//! Keys contain units; the unit of an axis's errors is in its `unit`: um or mdeg.
 
 use serde_json::{Map, Value, json};
-use virtual_axes_core::trial::{
-    AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
-};
-use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER};
+use virtual_axes_io::files::figures_json;
 
 use crate::input::CommandInput;
-use crate::table::{MICROMETER, MILLIDEGREE, scale};
 use crate::variant::VariantRun;
 
 /// Returns the runs of a command as a JSON object.
@@ -26,106 +20,9 @@ fn run(run: &VariantRun) -> Value {
     let mut object = Map::new();
     object.insert("controller".to_owned(), json!(run.controller));
     object.insert("changes".to_owned(), json!(run.changes));
-    object.extend(figures(&run.outcome.figures));
+    object.extend(figures_json(&run.outcome.figures));
     if let Some(program) = &run.part_program {
         object.insert("part_program".to_owned(), program.json());
     }
     Value::Object(object)
-}
-
-/// Returns all figures of a run.
-pub fn figures(figures: &Figures) -> Map<String, Value> {
-    let mut object = Map::new();
-    object.insert("duration_s".to_owned(), json!(figures.duration));
-    let axes = figures.axes.iter().map(|axis| (axis.name.clone(), self::axis(axis)));
-    object.insert("axes".to_owned(), Value::Object(axes.collect()));
-    object.insert("contour_error_um".to_owned(), contour(figures));
-    object.insert("orientation_error_mdeg".to_owned(), orientation(figures));
-    object.insert("circles".to_owned(), figures.circles.iter().map(circle).collect());
-    object.insert("more_circles".to_owned(), json!(figures.more_circles));
-    object.insert("bidirectional".to_owned(), figures.bidirectional.iter().map(bidirectional).collect());
-    object.insert("corners".to_owned(), figures.corners.iter().map(corner).collect());
-    object.insert("more_corners".to_owned(), json!(figures.more_corners));
-    object
-}
-
-fn axis(axis: &AxisFigures) -> Value {
-    let (_, unit, scale) = scale(axis.kind);
-    let report = &axis.report;
-    json!({
-        "unit": unit,
-        "moves": axis.moves,
-        "following_error": {
-            "max": report.max_following_error / scale,
-            "rms": report.rms_following_error / scale,
-        },
-        "delay_compensated_following_error": {
-            "max": report.max_delay_compensated_following_error / scale,
-            "rms": report.rms_delay_compensated_following_error / scale,
-        },
-        "peak_current_a": report.peak_current,
-        "saturation_s": report.saturation_time,
-        "control_activity_a": report.control_activity,
-        "outside_travel_limits_s": axis.outside_travel_limits_time,
-        "friction_extrapolated": axis.friction_extrapolated,
-    })
-}
-
-fn contour(figures: &Figures) -> Value {
-    figures.contour.map_or(Value::Null, |contour| {
-        json!({
-            "reference": match contour.reference {
-                Reference::Path => "path",
-                Reference::Setpoints => "setpoints",
-            },
-            "max": contour.max / MICROMETER,
-            "rms": contour.rms / MICROMETER,
-            "max_within_ends": contour.max_within_ends / MICROMETER,
-            "rms_within_ends": contour.rms_within_ends / MICROMETER,
-        })
-    })
-}
-
-fn orientation(figures: &Figures) -> Value {
-    figures.orientation.map_or(
-        Value::Null,
-        |orientation| json!({ "max": orientation.max / MILLIDEGREE, "rms": orientation.rms / MILLIDEGREE }),
-    )
-}
-
-fn circle(circle: &CircleFigures) -> Value {
-    json!({
-        "move": circle.index,
-        "plane": circle.plane,
-        "direction": if circle.counterclockwise { "counterclockwise" } else { "clockwise" },
-        "radius_mm": circle.radius / MILLIMETER,
-        "feed_m_min": circle.feed / METER_PER_MINUTE,
-        "radial_deviation_um": {
-            "mean": circle.mean / MICROMETER,
-            "min": circle.min / MICROMETER,
-            "max": circle.max / MICROMETER,
-        },
-        "circular_deviation_um": circle.circular_deviation.map(|g| g / MICROMETER),
-        "reversal_spikes_um": circle.reversal_spikes.map(|spikes| {
-            let names = ["plus_first", "plus_second", "minus_first", "minus_second"];
-            let spikes = names.iter().zip(spikes).map(|(name, spike)| ((*name).to_owned(), json!(spike / MICROMETER)));
-            Value::Object(spikes.collect())
-        }),
-    })
-}
-
-fn bidirectional(pair: &BidirectionalFigures) -> Value {
-    json!({
-        "moves": pair.moves,
-        "circular_deviation_um": pair.circular_deviation / MICROMETER,
-        "mean_radial_deviation_um": pair.mean_radial_deviation / MICROMETER,
-    })
-}
-
-fn corner(corner: &CornerFigures) -> Value {
-    json!({
-        "move": corner.index,
-        "turn_deg": corner.turn / DEGREE,
-        "max_contour_error_um": corner.max_contour_error / MICROMETER,
-    })
 }

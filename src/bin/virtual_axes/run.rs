@@ -8,7 +8,7 @@ use std::sync::Arc;
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::path::Program;
-use virtual_axes_core::trial::{Tick, Trial, TrialOutcome};
+use virtual_axes_core::trial::{Measures, Tick, Trial, TrialOutcome};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::files::{TraceWriter, trace_writer};
 
@@ -130,6 +130,7 @@ fn trial(
         program: program.cloned(),
         allow_nonzero_end_velocity: parameters.node_config().allow_nonzero_velocity_at_trajectory_end,
         record: arguments.report.is_some(),
+        measures: Measures::ALL,
     };
     let setpoints = input.setpoints(config, program)?;
     let mut progress =

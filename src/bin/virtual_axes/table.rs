@@ -2,16 +2,11 @@
 
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::trial::{AxisFigures, Figures};
-use virtual_axes_core::units::{DEGREE, Rounded};
+use virtual_axes_core::units::{MICROMETER, MILLIDEGREE, Rounded};
 use virtual_axes_report::{Table, TableColumn};
 
 use crate::figure::{self, Figure};
 use crate::variant::VariantRun;
-
-/// Micrometer, m.
-pub const MICROMETER: f64 = 1e-6;
-/// Millidegree, rad.
-pub const MILLIDEGREE: f64 = 1e-3 * DEGREE;
 
 /// Reason for a missing contour error.
 pub const NO_CONTOUR: &str = "no linear joint is named x, y or z";

@@ -6,12 +6,13 @@ use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::tune::{
     CostTerm, MarginLimits, Tuning, TuningCandidate, TuningProblem, pareto_front,
 };
+use virtual_axes_io::files::figures_json;
 use virtual_axes_report::{PointGroup, PointStyle, Scatter, Table, TableColumn};
 
 use crate::input::CommandInput;
 use crate::search::{candidate, columns, row};
+use crate::text_table;
 use crate::tune_result::{TunableController, TuningResult};
-use crate::{json, text_table};
 
 /// Maximum number of rows of a table of tunings; the JSON output contains all.
 const ROWS: usize = 6;
@@ -183,7 +184,7 @@ pub fn object(
 ) -> Value {
     let with_figures = |one: &TuningCandidate| {
         let mut object = candidate(one, problem.config());
-        object.insert("figures".to_owned(), json::figures(&one.figures).into());
+        object.insert("figures".to_owned(), figures_json(&one.figures).into());
         Value::Object(object)
     };
     let plain = |one: &TuningCandidate| Value::Object(candidate(one, problem.config()));

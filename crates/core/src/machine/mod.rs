@@ -330,6 +330,16 @@ impl Machine {
         [plant.position(motor.angle), plant.velocity(motor.speed), motor.current]
     }
 
+    /// Returns position, velocity (m, m/s or rad, rad/s) and current (A) of an axis at the end of the last position cycle,
+    /// the instant of the next setpoint.
+    ///
+    /// # Panics
+    /// Panics if the axis is out of range.
+    pub fn motion_at_end(&self, axis: usize) -> [f64; 3] {
+        let (plant, motor) = (&self.parameters.axes[axis].loops.plant, self.bank.state(axis).motor);
+        [plant.position(motor.angle), plant.velocity(motor.speed), motor.current]
+    }
+
     /// Writes the positions of an axis at the ticks of the last position cycle to `positions`, m or rad, up to its
     /// length.
     ///

@@ -49,7 +49,7 @@ pub enum SimulationError {
 /// Position cycle k is at `origin + k·Tsp`; the first one is k = 0. Until the first trajectory starts, a
 /// stream first moves a joint or the first load acts, the machine is exactly at rest at its start position.
 /// Therefore the result of a trajectory does not depend on the waiting time before it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Simulation {
     machine: Machine,
     timeline: Timeline,

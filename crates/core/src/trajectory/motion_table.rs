@@ -12,7 +12,7 @@ pub(super) enum Release {
 }
 
 /// Accepted motions that still have joints, in slots that are reused.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct MotionTable {
     slots: Vec<Option<MotionEntry>>,
     free: Vec<usize>,
@@ -20,7 +20,7 @@ pub(super) struct MotionTable {
     touched: Vec<usize>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct MotionEntry {
     id: MotionId,
     /// Number of joints not released yet.

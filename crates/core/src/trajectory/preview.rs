@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 ///
 /// Its length is the stream delay in position cycles. The setpoint that enters at each position cycle
 /// approaches the newest accepted setpoint by at most `reach` = Vmax·Tsp.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub(super) struct PreviewBuffer {
     buffer: VecDeque<f64>,
     /// Last entry before the newest setpoint was accepted, m or rad.

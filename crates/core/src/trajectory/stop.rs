@@ -72,7 +72,7 @@ impl Stop {
 }
 
 /// Planner of controlled stops with preallocated working memory.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct StopPlanner {
     ruckig: Ruckig<1, ThrowErrorHandler>,
     input: InputParameter<1>,

@@ -46,7 +46,7 @@ pub enum StreamEnd {
 }
 
 /// Streamed setpoints of all joints: acceptance, preview buffers with one common delay, counters.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct SetpointStream {
     /// Tsp, ns.
     period: Nanoseconds,
@@ -77,7 +77,7 @@ pub(super) struct StreamedSetpoint {
     pub sent: Option<Nanoseconds>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct StreamedJoint {
     /// Vmax·Tsp, m or rad.
     reach: f64,

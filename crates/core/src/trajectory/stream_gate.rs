@@ -20,7 +20,7 @@ pub(super) fn pause_cycles(period: Nanoseconds) -> i64 {
 }
 
 /// Acceptance state of the streamed setpoints of one joint.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub(super) struct StreamGate {
     /// Last accepted setpoint while the stream commands the joint.
     accepted: Option<AcceptedSetpoint>,

@@ -25,7 +25,7 @@ pub const MAX_WAITING: usize = 1024;
 ///
 /// [`Timeline::submit`] implements the rules for a received `JointTrajectory`, with replacement and
 /// preemption; [`Timeline::submit_setpoint`] those for a stream of setpoints.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Timeline {
     pub(super) joints: Vec<JointLimits>,
     /// Tsp, ns.
@@ -43,7 +43,7 @@ pub struct Timeline {
 }
 
 /// Plan queue and last commanded state of one joint.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct JointQueue {
     /// Plans of the joint; the first one commands it.
     pub plans: VecDeque<JointPlan>,

@@ -26,6 +26,36 @@ pub struct Trial<'a> {
     pub allow_nonzero_end_velocity: bool,
     /// True if a [`SignalRecording`] is kept.
     pub record: bool,
+    /// Figures beyond those of the axes.
+    pub measures: Measures,
+}
+
+/// Choice of the figures that a trial computes beyond those of the axes.
+///
+/// Figures of the axes need one sample per position cycle and little time. The others need the tool pose at every tick:
+/// with all of them a trial takes several times as long as the machine alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Measures {
+    /// Contour and orientation error, and the errors at corners.
+    pub contour: bool,
+    /// Circularity of circles (ISO 230-4).
+    pub circles: bool,
+}
+
+impl Measures {
+    /// All figures.
+    pub const ALL: Measures = Measures { contour: true, circles: true };
+    /// Figures of the axes only.
+    pub const AXES: Measures = Measures { contour: false, circles: false };
+    /// All figures but those of circles, each of which needs more time and memory than the rest.
+    pub const WITHOUT_CIRCLES: Measures = Measures { contour: true, circles: false };
+}
+
+impl Default for Measures {
+    /// Returns [`Measures::ALL`].
+    fn default() -> Self {
+        Measures::ALL
+    }
 }
 
 /// Outcome of a trial.

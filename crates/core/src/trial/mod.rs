@@ -16,11 +16,13 @@ mod setpoints;
 mod submitter;
 mod variants;
 
-pub use definition::{Tick, Trial, TrialError, TrialOutcome};
+pub use definition::{Measures, Tick, Trial, TrialError, TrialOutcome};
 pub use figures::{
     AxisFigures, BidirectionalFigures, CircleFigures, ContourFigures, CornerFigures, Figures,
     OrientationFigures, Reference,
 };
 pub use run::{run, trace};
-pub use setpoints::{GridSource, ProgramSource, Requests, SetpointSource, SourceError, UnreachableError};
+pub use setpoints::{
+    GridRows, GridSource, ProgramSource, Requests, SetpointSource, SourceError, UnreachableError,
+};
 pub use variants::run_variants;

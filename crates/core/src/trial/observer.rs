@@ -14,7 +14,7 @@ use crate::units::seconds;
 use super::circle::Circles;
 use super::corner::Corners;
 use super::cycle::PositionCycle;
-use super::definition::{Trial, TrialOutcome};
+use super::definition::{Measures, Trial, TrialOutcome};
 use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, Reference};
 use super::recorder::{SignalRecorder, ToolSample};
 
@@ -37,14 +37,6 @@ impl ErrorStatistics {
     fn rms(&self) -> f64 {
         rms_of_sum(self.sum_of_squares, self.count).unwrap_or(0.0)
     }
-}
-
-/// Scope of the evaluation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum MeasurementScope {
-    All,
-    /// All figures but the circles, each of which needs more time and memory than the rest.
-    WithoutCircles,
 }
 
 /// Reference of the tool's contour error.
@@ -84,17 +76,18 @@ pub(super) struct Observer<'a> {
 }
 
 impl<'a> Observer<'a> {
-    pub(super) fn new(trial: &'a Trial<'a>, start: &[f64], scope: MeasurementScope) -> Self {
+    pub(super) fn new(trial: &'a Trial<'a>, start: &[f64]) -> Self {
         let machine: &MachineConfig = trial.machine;
         let count = machine.axes().len();
         let kinematics = Kinematics::new(machine);
-        let has_tool = kinematics.has_linear_axis();
+        let measures = trial.measures;
+        let has_tool = measures.contour && kinematics.has_linear_axis();
         let tracker = has_tool.then(|| match &trial.program {
             Some(program) => Tracker::Path(Box::new(PathTracker::new(Arc::clone(program.path())))),
             None => Tracker::Setpoints(Box::new(SetpointTracker::new(kinematics.forward(start)))),
         });
         let program = trial.program.as_deref();
-        let circles = program.filter(|_| scope == MeasurementScope::All);
+        let circles = program.filter(|_| measures.circles);
         Observer {
             trial,
             tracker,
@@ -121,6 +114,11 @@ impl<'a> Observer<'a> {
         }
     }
 
+    /// Returns true if the figures need the positions at every tick.
+    pub(super) fn needs_positions(&self) -> bool {
+        self.trial.measures != Measures::AXES
+    }
+
     /// Adds a position cycle; `axis` returns the machine of an axis and its index there.
     pub(super) fn observe<'m>(
         &mut self,
@@ -138,7 +136,14 @@ impl<'a> Observer<'a> {
                 self.axes[index].observe(sample, &activity);
             }
         }
-        self.kinematics.forward_batch(&mut self.rotated, &cycle.positions, cycle.ticks(), &mut self.poses);
+        if self.needs_positions() {
+            self.kinematics.forward_batch(
+                &mut self.rotated,
+                &cycle.positions,
+                cycle.ticks(),
+                &mut self.poses,
+            );
+        }
         let first = self.follow(cycle);
         if let Some(recorder) = &mut self.recorder {
             let axes = (0..self.axes.len()).map(|index| {
@@ -155,7 +160,9 @@ impl<'a> Observer<'a> {
             });
             recorder.push(cycle.times.at(0), axes, tool);
         }
-        self.observe_circles(cycle);
+        if self.trial.measures.circles {
+            self.observe_circles(cycle);
+        }
         self.end = cycle.times.at(cycle.ticks());
     }
 

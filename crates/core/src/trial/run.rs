@@ -6,14 +6,15 @@ use crate::simulation::{Simulation, joint_limits};
 
 use super::cycle::PositionCycle;
 use super::definition::{Tick, Trial, TrialError, TrialOutcome};
-use super::observer::{MeasurementScope, Observer};
+use super::observer::Observer;
 use super::setpoints::SetpointSource;
 use super::submitter::TrajectorySubmitter;
 
 /// Runs `setpoints` until the axes have settled and calls `callback` at every position cycle.
 ///
 /// The machine starts at rest at the first setpoint. If the first point of a trajectory is later than 0, the machine
-/// approaches it from the home position.
+/// approaches it from the home position. After the last setpoint the setpoints hold, and the run ends with the first
+/// position cycle that is 1 s later: N setpoints with Tsp = 6 ms give N + 167 cycles.
 ///
 /// # Errors
 /// Returns [`TrialError`] if setpoints are invalid or rejected, the machine cannot be simulated, or `callback` fails.
@@ -60,7 +61,7 @@ fn run_with(
     mut step: impl FnMut(&mut Simulation) -> io::Result<bool>,
 ) -> Result<TrialOutcome, TrialError> {
     let (mut simulation, mut submitter, start) = start(trial, setpoints)?;
-    let mut observer = Observer::new(trial, &start, MeasurementScope::All);
+    let mut observer = Observer::new(trial, &start);
     let mut cycle = PositionCycle::new(trial.machine.periods(), start.len());
     loop {
         submitter.submit_due(&mut simulation)?;
@@ -73,7 +74,9 @@ fn run_with(
         if step(&mut simulation).map_err(TrialError::Callback)? {
             let machine = simulation.machine();
             cycle.begin(time, is_moving);
-            (0..start.len()).for_each(|index| cycle.store_positions(index, machine, index));
+            if observer.needs_positions() {
+                (0..start.len()).for_each(|index| cycle.store_positions(index, machine, index));
+            }
             observer.observe(|index| (machine, index), &mut cycle);
         }
     }

@@ -23,6 +23,35 @@ pub trait GridSource {
     fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError>;
 }
 
+/// Setpoints in memory, row by row.
+#[derive(Debug, Clone, Copy)]
+pub struct GridRows<'a> {
+    joints: &'a [usize],
+    rows: &'a [f64],
+}
+
+impl<'a> GridRows<'a> {
+    /// Creates the source of `rows`, m or rad, one value per joint in the order of `joints` (machine indices), row after
+    /// row; an incomplete last row is ignored.
+    pub fn new(joints: &'a [usize], rows: &'a [f64]) -> Self {
+        GridRows { joints, rows }
+    }
+}
+
+impl GridSource for GridRows<'_> {
+    fn joints(&self) -> &[usize] {
+        self.joints
+    }
+
+    fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
+        let Some((first, rest)) = self.rows.split_at_checked(row.len()) else { return Ok(false) };
+        row.copy_from_slice(first);
+        self.rows = rest;
+        // A row without joints would never end.
+        Ok(!row.is_empty())
+    }
+}
+
 /// Trajectories with their arrival times, ns, in order.
 pub type Requests<'a> = dyn Iterator<Item = Result<(Nanoseconds, TrajectoryRequest), SourceError>> + 'a;
 

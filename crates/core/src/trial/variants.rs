@@ -10,7 +10,7 @@ use crate::simulation::{Simulation, SimulationError};
 use super::cycle::PositionCycle;
 use super::definition::{Trial, TrialError};
 use super::figures::Figures;
-use super::observer::{MeasurementScope, Observer};
+use super::observer::Observer;
 use super::run::start;
 use super::setpoints::SetpointSource;
 
@@ -68,8 +68,7 @@ impl<'a> VariantBatch<'a> {
 /// Runs `setpoints` on each of `variants` and returns their figures.
 ///
 /// The variants differ from the trial's machine only in the axes at `own`, not in periods or delays. The
-/// figures of each are those of [`run`](super::run), without circles, which would dominate the computing
-/// time. `callback` is called at every position cycle.
+/// figures of each are those of [`run`](super::run). `callback` is called at every position cycle.
 ///
 /// # Errors
 /// Returns [`TrialError`] if one of the variants cannot be run.
@@ -82,7 +81,7 @@ pub fn run_variants(
 ) -> Result<Vec<Figures>, TrialError> {
     let (mut base, mut submitter, start) = start(trial, setpoints)?;
     let Some(mut batch) = VariantBatch::new(trial, variants, own, &start)? else { return Ok(Vec::new()) };
-    let mut observers = vec![Observer::new(trial, &start, MeasurementScope::WithoutCircles); variants.len()];
+    let mut observers = vec![Observer::new(trial, &start); variants.len()];
     let mut cycle = PositionCycle::new(trial.machine.periods(), start.len());
     loop {
         submitter.submit_due(&mut base)?;
@@ -99,10 +98,13 @@ pub fn run_variants(
         if base.step() {
             batch.advance(variants.len());
             cycle.begin(time, is_moving);
-            (0..start.len()).for_each(|axis| cycle.store_positions(axis, base.machine(), axis));
+            let needs_positions = observers.iter().any(Observer::needs_positions);
+            if needs_positions {
+                (0..start.len()).for_each(|axis| cycle.store_positions(axis, base.machine(), axis));
+            }
             for (variant, observer) in observers.iter_mut().enumerate() {
                 let locate = |axis| batch.locate(&base, variant, axis);
-                for &axis in own {
+                for &axis in own.iter().filter(|_| needs_positions) {
                     let (machine, at) = locate(axis);
                     cycle.store_positions(axis, machine, at);
                 }

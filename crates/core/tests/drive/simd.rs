@@ -6,7 +6,7 @@ use virtual_axes_core::assess::{PathDeviations, PathTracker};
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters, SimdWidth};
-use virtual_axes_core::trial::{Figures, Trial, run, run_variants, trace};
+use virtual_axes_core::trial::{Figures, Measures, Trial, run, run_variants, trace};
 use virtual_axes_core::units::seconds;
 use virtual_axes_verification::fixtures::machines::{
     AXES, TSP, configured, configured_with, program, setpoints, trace_scenario,
@@ -168,6 +168,7 @@ fn variants_in_one_machine_have_the_figures_of_separate_runs() {
             program: Some(Arc::clone(&program)),
             allow_nonzero_end_velocity: false,
             record: false,
+            measures: Measures::ALL,
         };
         let setpoints = |machine| setpoints(scenario, Arc::clone(&program), machine);
         let together =

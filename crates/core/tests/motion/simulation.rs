@@ -33,6 +33,24 @@ fn a_trajectory_is_bit_identical_for_any_waiting_time() {
 }
 
 #[test]
+fn a_copy_amid_motion_continues_with_the_same_bits() {
+    let mut original = SimulationFixture::new(NONE, 0);
+    original.simulation.submit(MotionId(1), original.ballbar(Start::Now)).expect("accepted");
+    for _ in 0..300 {
+        original.simulation.step();
+    }
+    assert!(original.simulation.is_in_motion());
+    let mut copy = original.simulation.clone();
+    for cycle in 0..500 {
+        // At the end of a position cycle the machine is where the next one starts.
+        let end = original.simulation.machine().motion_at_end(X)[0];
+        assert_eq!(original.simulation.step(), copy.step());
+        assert_eq!(original.simulation.samples(), copy.samples(), "cycle {cycle}");
+        assert_eq!(original.simulation.samples()[X].position, end, "cycle {cycle}");
+    }
+}
+
+#[test]
 fn the_ballbar_report_matches_the_reference_values() {
     let mut fixture = SimulationFixture::new(NONE, 0);
     fixture.simulation.submit(MotionId(1), fixture.ballbar(Start::Now)).expect("accepted");

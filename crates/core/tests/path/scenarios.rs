@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::scenario::Scenario;
-use virtual_axes_core::trial::{Figures, Tick, Trial, run as run_trial};
+use virtual_axes_core::trial::{Figures, Measures, Tick, Trial, run as run_trial};
 use virtual_axes_core::units::{DEGREE, REVOLUTION, RPM};
 use virtual_axes_verification::fixtures::machines::*;
 
@@ -119,6 +119,7 @@ fn every_builtin_scenario_runs_on_every_builtin_machine() {
                 program: Some(Arc::clone(&program)),
                 allow_nonzero_end_velocity: false,
                 record: true,
+                measures: Measures::ALL,
             };
             let outcome = run_trial(&trial, setpoints(name, program, &config), |_| Ok(()));
             // The circle exceeds the travel limits of the smaller machine.
@@ -257,6 +258,7 @@ fn recorded_signals_have_the_maxima_of_the_figures() {
             program: Some(Arc::clone(&program)),
             allow_nonzero_end_velocity: false,
             record: true,
+            measures: Measures::ALL,
         };
         let outcome = run_trial(&trial, setpoints(name, program, &config), |_| Ok(())).expect("a run");
         let (figures, recording) = (outcome.figures, outcome.recording.expect("recording is enabled"));
@@ -275,6 +277,31 @@ fn recorded_signals_have_the_maxima_of_the_figures() {
     }
 }
 
+#[test]
+fn a_choice_of_figures_leaves_the_others_as_they_are() {
+    let config = config(&[]);
+    let program = program("ballbar", &config);
+    let figures = |measures| {
+        let trial = Trial {
+            machine: &config,
+            program: Some(Arc::clone(&program)),
+            allow_nonzero_end_velocity: false,
+            record: false,
+            measures,
+        };
+        let setpoints = setpoints("ballbar", Arc::clone(&program), &config);
+        run_trial(&trial, setpoints, |_| Ok(())).expect("a run").figures
+    };
+    let all = figures(Measures::ALL);
+    assert!(all.contour.is_some() && !all.circles.is_empty());
+    let without_circles = Figures { circles: Vec::new(), bidirectional: Vec::new(), ..all.clone() };
+    assert_eq!(figures(Measures::WITHOUT_CIRCLES), without_circles);
+    let circles = Figures { contour: None, orientation: None, corners: Vec::new(), ..all };
+    assert_eq!(figures(Measures { contour: false, circles: true }), circles);
+    let axes = Figures { circles: Vec::new(), bidirectional: Vec::new(), ..circles };
+    assert_eq!(figures(Measures::AXES), axes);
+}
+
 /// The peak current of a reversal occurs between two position cycles.
 #[test]
 fn a_peak_between_two_position_cycles_is_recorded() {
@@ -291,6 +318,7 @@ fn a_peak_between_two_position_cycles_is_recorded() {
         program: Some(Arc::clone(&program)),
         allow_nonzero_end_velocity: false,
         record: true,
+        measures: Measures::ALL,
     };
     let outcome = run_trial(&trial, setpoints("x-there-and-back", program, &config), |_| Ok(()));
     let recording = outcome.expect("a run").recording.expect("recording is enabled");

@@ -7,7 +7,7 @@ use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::path::Program;
 use virtual_axes_core::trajectory::TrajectoryRequest;
 use virtual_axes_core::trial::{
-    self, Figures, GridSource, SetpointSource, SourceError, Tick, Trial, TrialError, TrialOutcome,
+    self, Figures, GridRows, Measures, SetpointSource, SourceError, Tick, Trial, TrialError, TrialOutcome,
 };
 use virtual_axes_core::units::Nanoseconds;
 
@@ -72,7 +72,8 @@ impl Workload {
         observe: impl FnMut(Tick<'_>) -> io::Result<()>,
     ) -> Result<TrialOutcome, TrialError> {
         let program = self.program.clone();
-        let trial = Trial { machine, program, allow_nonzero_end_velocity, record };
+        let measures = Measures::ALL;
+        let trial = Trial { machine, program, allow_nonzero_end_velocity, record, measures };
         trial::run(&trial, self.setpoints(), observe)
     }
 
@@ -90,36 +91,17 @@ impl Workload {
         go_on: impl Fn() -> io::Result<()>,
     ) -> Result<Vec<Figures>, TrialError> {
         let program = self.program.clone();
-        let trial = Trial { machine, program, allow_nonzero_end_velocity, record: false };
+        let measures = Measures::WITHOUT_CIRCLES;
+        let trial = Trial { machine, program, allow_nonzero_end_velocity, record: false, measures };
         trial::run_variants(&trial, self.setpoints(), variants, own, go_on)
     }
 
     fn setpoints(&self) -> SetpointSource<'_> {
         match &self.content {
-            Content::Rows { joints, rows } => SetpointSource::Grid(Box::new(Rows { joints, rows })),
+            Content::Rows { joints, rows } => SetpointSource::Grid(Box::new(GridRows::new(joints, rows))),
             Content::Requests(requests) => {
                 SetpointSource::Requests(Box::new(requests.iter().map(|request| Ok(request.clone()))))
             }
         }
-    }
-}
-
-/// Remaining rows.
-struct Rows<'a> {
-    joints: &'a [usize],
-    rows: &'a [f64],
-}
-
-impl GridSource for Rows<'_> {
-    fn joints(&self) -> &[usize] {
-        self.joints
-    }
-
-    fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
-        let Some((first, rest)) = self.rows.split_at_checked(row.len()) else { return Ok(false) };
-        row.copy_from_slice(first);
-        self.rows = rest;
-        // A row without joints would never end.
-        Ok(!row.is_empty())
     }
 }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use virtual_axes_core::config::{MachineConfig, Parameters, Value, ValueSource};
 use virtual_axes_core::design::{ControlWeight, GpcTuning, gpc, margins};
 use virtual_axes_core::machine::prediction_model;
-use virtual_axes_core::trial::{self, Trial};
+use virtual_axes_core::trial::{self, Measures, Trial};
 use virtual_axes_identify::tune::{
     Cost, CostTerm, MarginLimits, NoProgress, Progress, SearchResult, TuneError, Tuning, TuningCandidate,
     TuningProblem, find_contrasts, pareto_front, tune_cascade, tune_gpc,
@@ -49,6 +49,7 @@ fn following_error(config: &MachineConfig, scenario: &str) -> Option<f64> {
         program: Some(Arc::clone(&program)),
         allow_nonzero_end_velocity: false,
         record: false,
+        measures: Measures::ALL,
     };
     let outcome = trial::run(&trial, setpoints(&program, config), |_| Ok(())).expect("a run");
     let report = outcome.figures.axes[0].report;

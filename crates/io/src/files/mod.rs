@@ -4,11 +4,12 @@
 //! Position setpoints are read from CSV ([`PsecCsvReader`], streaming), YAML ([`read_psec_yaml`]) and MCAP
 //! ([`McapTrajectories`]), measured axis data from CSV, MCAP and exports of controls ([`read_recording`],
 //! [`inspect_recording`]). Traces ([`TraceWriter`]) and setpoints ([`PsecWriter`]) are written atomically
-//! ([`OutputFile`]); recordings of the node ([`BoundedRecording`]) are readable up to the last complete chunk.
+//! ([`OutputFile`]), figures of trials as JSON ([`figures_json`]); recordings of the node ([`BoundedRecording`]) are readable up to the last complete chunk.
 
 mod bounded_recording;
 mod cdr;
 mod decimal;
+mod figures_json;
 mod input;
 mod lines;
 mod mcap_messages;
@@ -27,6 +28,7 @@ mod trace_mcap;
 
 pub use bounded_recording::{BoundedRecording, RecordedTopic};
 pub use cdr::encode_cdr;
+pub use figures_json::figures_json;
 pub use input::{FileKind, Input, InputError};
 pub use mcap_reader::McapFileError;
 pub use output::OutputFile;
