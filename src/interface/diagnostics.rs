@@ -35,7 +35,8 @@ macro_rules! keys {
 
 keys! {
     NODE_KEYS, "Keys of the status of the node.":
-    STATE = "state", "", "running, streaming, settling, holding; paused, or waiting for `/clock` or a slow subscriber";
+    STATE = "state", "", "running, streaming, settling, holding, feed hold; paused, or waiting for `/clock` or a slow subscriber";
+    FEED_OVERRIDE = "feed_override", "", "feed override in effect, 1 at the planned speed";
     TIME = "time", "", "time mode: real, fast, sim";
     CLOCK = "clock", "", "source of the clock: none, wall, own, followed";
     CLOCK_JUMPS = "clock_jumps", "", "jumps of `/clock`: back by a position cycle or more, ahead by more than 10 s";

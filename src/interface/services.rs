@@ -17,6 +17,12 @@ pub const RESET: NodeService = trigger("reset", "resets all axes to rest at home
 /// Service that stops the axes within their limits.
 pub const STOP: NodeService = trigger("stop", "controlled stop of every axis within its limits");
 
+/// Service that stops the trajectories on their path.
+pub const FEED_HOLD: NodeService =
+    trigger("feed_hold", "feed hold: trajectories stop on their path within the limits of the axes");
+/// Service that continues the trajectories after a feed hold.
+pub const CYCLE_START: NodeService = trigger("cycle_start", "continues the trajectories after a feed hold");
+
 /// Service that lists the parameters.
 pub const LIST_PARAMETERS: NodeService =
     parameters("list_parameters", "ListParameters", "names of all parameters");
@@ -45,6 +51,8 @@ pub const SET_PARAMETERS_ATOMICALLY: NodeService = parameters(
 pub const SERVICES: &[NodeService] = &[
     RESET,
     STOP,
+    FEED_HOLD,
+    CYCLE_START,
     LIST_PARAMETERS,
     DESCRIBE_PARAMETERS,
     GET_PARAMETER_TYPES,

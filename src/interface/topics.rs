@@ -48,6 +48,16 @@ pub const PSEC_STREAM: Topic = topic(
     "any; of several in one position cycle the last counts",
 );
 
+/// Feed override of trajectories.
+pub const SPEED_SCALING_INPUT: Topic = topic(
+    In,
+    "~/speed_scaling_input",
+    (CONTROL_PACKAGE, "SpeedScalingFactor"),
+    "feed override of trajectories, 0 to 2 (200 %), within the limits of the axes and on the path; another value is \
+     ignored with a warning",
+    "any; the last one counts",
+);
+
 /// External loads.
 pub const LOAD: Topic = topic(
     In,
@@ -105,7 +115,8 @@ pub const CONTROLLER_STATE: Topic = topic(
     Out,
     "~/controller_state",
     (CONTROL_PACKAGE, "JointTrajectoryControllerState"),
-    "reference (setpoints delayed by α), feedback, error, output, as of joint_trajectory_controller",
+    "reference (setpoints delayed by α), feedback, error, output, as of joint_trajectory_controller; \
+     `speed_scaling_factor`: feed override in effect",
     CYCLE_RATE,
 );
 
@@ -189,6 +200,7 @@ pub const PARAMETER_EVENTS: Topic = Topic {
 pub const TOPICS: &[Topic] = &[
     PSEC,
     PSEC_STREAM,
+    SPEED_SCALING_INPUT,
     LOAD,
     CLOCK_INPUT,
     JOINT_STATES,

@@ -29,6 +29,10 @@ pub enum Command {
     Stop(MotionId, Arc<Trajectory>),
     /// Cancels a motion, and returns true if it was active or waiting.
     Cancel(MotionId, oneshot::Sender<bool>),
+    /// Sets the feed override, 0 to 2.
+    SetFeedOverride(f64),
+    /// Begins or ends a feed hold.
+    SetFeedHold(bool),
     /// Applies external loads for a limited time.
     Load {
         /// Index of the axis, and load, N or N·m.
@@ -75,6 +79,8 @@ pub struct SampleFrame {
     pub time: Nanoseconds,
     /// Sample of each axis.
     pub samples: Vec<AxisSample>,
+    /// Feed override in effect.
+    pub feed_rate: f64,
     /// Number of resets before the instant.
     pub resets: u64,
     /// Accepted motions that had not ended before the instant, with their start times, ns.

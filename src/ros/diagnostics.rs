@@ -9,7 +9,7 @@ use super::health::{AxisHealth, ClockSource, Health};
 use super::process_memory::private_memory_mb;
 use super::remote_endpoints::DiscoveredEndpoints;
 use crate::interface::diagnostics::{self as keys, DiagnosticKey};
-use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds};
+use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, Rounded};
 
 /// Constant contents of the diagnostics, and the source of the discovery count.
 #[derive(Debug, Clone)]
@@ -78,6 +78,7 @@ impl Diagnostics {
         let state = node_state(periods, now);
         let values = vec![
             value(keys::STATE, state),
+            value(keys::FEED_OVERRIDE, Rounded(now.feed_rate)),
             value(keys::TIME, self.time_mode),
             value(keys::CLOCK, now.clock.source.name()),
             value(keys::CLOCK_JUMPS, now.clock.jumps),
@@ -149,6 +150,8 @@ fn node_state(periods: u64, now: &Health) -> &'static str {
         "waiting for a slow subscriber"
     } else if is_paused {
         "paused"
+    } else if now.is_feed_hold {
+        "feed hold"
     } else if now.is_moving {
         "running"
     } else if now.stream.is_active {

@@ -4,15 +4,17 @@ use std::collections::HashMap;
 
 use futures::{Stream, StreamExt, stream};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
-use ros2_client::{Message, MessageInfo, MessageTypeName, Node, ReadResult};
+use ros2_client::{MessageInfo, MessageTypeName, Node, ReadResult};
 
 use rustdds::policy::ResourceLimits;
 use rustdds::{DomainParticipant, QosPolicies, QosPolicyBuilder, Topic, TopicKind};
 
 use super::args::RosArgs;
 use super::recorder::{Direction, Tap, TopicRecorder};
+use super::service::Wire;
 use crate::interface::{self, TopicQos};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use virtual_axes_core::config::{Parameters, QosConfig, TimeMode};
 use virtual_axes_io::messages::Recorded;
@@ -44,19 +46,18 @@ pub(super) fn dds_topic_name(name: &str) -> String {
 }
 
 /// Subscription with its tap for the recording.
-pub struct Subscription<M> {
-    network: ros2_client::Subscription<M>,
+pub struct Subscription<M: Serialize + DeserializeOwned + 'static> {
+    network: ros2_client::Subscription<Wire<M>>,
     tap: Tap<M>,
 }
 
-impl<M: Message + Recorded + Send + Sync + 'static> Subscription<M> {
+impl<M: Recorded + DeserializeOwned + Send + Sync + 'static> Subscription<M> {
     /// Returns the messages in order of reception and records them.
     pub fn async_stream(&self) -> impl Stream<Item = ReadResult<(M, MessageInfo)>> + '_ {
         in_reception_order(self.network.async_stream()).then(async |received| {
-            if let Ok((message, _)) = &received {
-                self.tap.record(message).await;
-            }
-            received
+            let (Wire(message), info) = received?;
+            self.tap.record(&message).await;
+            Ok((message, info))
         })
     }
 }
@@ -247,7 +248,7 @@ impl<'a> Endpoints<'a> {
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
-    pub fn subscription<M: Message + Recorded + 'static>(
+    pub fn subscription<M: Recorded + DeserializeOwned + 'static>(
         &mut self,
         description: &interface::Topic,
     ) -> Result<(Subscription<M>, String), EndpointError> {

@@ -15,6 +15,10 @@ pub struct Health {
     pub is_moving: bool,
     /// True while commands are active, or the axes settle or move.
     pub is_busy: bool,
+    /// True during a feed hold.
+    pub is_feed_hold: bool,
+    /// Feed override in effect.
+    pub feed_rate: f64,
     /// Number of position cycles.
     pub periods: u64,
     /// Number of position cycles that were released later than the next one was due.
@@ -92,6 +96,8 @@ impl Health {
         self.time = simulation.time_of(simulation.next_instant() - 1);
         self.is_moving = simulation.is_moving();
         self.is_busy = simulation.is_busy() || simulation.is_in_motion();
+        self.is_feed_hold = simulation.is_feed_hold();
+        self.feed_rate = simulation.feed_rate();
         self.periods += 1;
         self.missed += u64::from(is_missed);
         self.dropped += u64::from(is_dropped);

@@ -1,4 +1,4 @@
-//! Subscriptions `psec`, `psec_stream` and `load`: validation and submission to the simulation.
+//! Subscriptions `psec`, `psec_stream`, `~/speed_scaling_input` and `load`: validation and submission to the simulation.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -20,8 +20,9 @@ use super::results::{Origin, TrajectoryResults};
 use super::stream::{ReorderFilter, StreamSetpoints};
 use super::throttle::Throttle;
 pub use crate::ingress::TrajectoryValidator;
-use virtual_axes_core::trajectory::MotionId;
+use virtual_axes_core::trajectory::{MotionId, check_feed_override};
 use virtual_axes_core::units::Nanoseconds;
+use virtual_axes_io::messages::SpeedScalingFactor;
 
 /// Input `psec`: validates trajectories and submits them to the simulation.
 pub struct PsecInput {
@@ -91,6 +92,32 @@ pub async fn receive_stream(
                 let _ = commands.send(Command::Stream(pool.acquire(|last| *last = setpoints))).await;
             }
             Err(error) => warn!("psec_stream: invalid message: {error:?}"),
+        }
+    }
+}
+
+/// Processes feed overrides until the node shuts down.
+pub async fn receive_feed_overrides(
+    subscription: Subscription<SpeedScalingFactor>,
+    commands: mpsc::Sender<Command>,
+) {
+    let mut messages = std::pin::pin!(subscription.async_stream());
+    let (mut throttle, started) = (Throttle::default(), Instant::now());
+    while let Some(received) = messages.next().await {
+        let checked =
+            received.map_err(|e| format!("{e:?}")).and_then(|(SpeedScalingFactor { factor }, _)| {
+                check_feed_override(factor).map(|()| factor).map_err(|e| e.to_string())
+            });
+        match checked {
+            Ok(factor) => {
+                let _ = commands.send(Command::SetFeedOverride(factor)).await;
+            }
+            Err(reason) => {
+                let now = Nanoseconds::try_from(started.elapsed().as_nanos()).unwrap_or(Nanoseconds::MAX);
+                if throttle.is_due((), now) {
+                    warn!("speed_scaling_input message ignored: {reason}");
+                }
+            }
         }
     }
 }

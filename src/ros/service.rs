@@ -101,7 +101,7 @@ pub fn profile(depth: usize) -> QosProfile {
 /// Wrapper that implements the message trait of ros2-client for a type of another crate.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(transparent)]
-struct Wire<M>(M);
+pub(super) struct Wire<M>(pub(super) M);
 
 impl<M: Serialize + DeserializeOwned> Message for Wire<M> {}
 

@@ -82,7 +82,7 @@ pub fn controller_state(
         feedback: actual,
         error,
         output: JointTrajectoryPoint { effort, ..JointTrajectoryPoint::default() },
-        speed_scaling_factor: 1.0,
+        speed_scaling_factor: frame.feed_rate,
         ..JointTrajectoryControllerState::default()
     }
 }
@@ -97,7 +97,7 @@ mod tests {
         let sample =
             AxisSample { delayed_psec: setpoint, position: 0.25, velocity: 1.0, ..Default::default() };
         let samples = vec![AxisSample::default(), sample];
-        SampleFrame { instant, time: instant * MILLISECOND_NS, samples, resets: 0, motions: Vec::new() }
+        SampleFrame { instant, time: instant * MILLISECOND_NS, samples, ..SampleFrame::default() }
     }
 
     #[test]

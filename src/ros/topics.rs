@@ -12,7 +12,7 @@ use super::endpoints::{EndpointError, Endpoints, Publisher, Subscription};
 use crate::interface;
 use virtual_axes_core::config::TimeMode;
 use virtual_axes_io::messages::{
-    DriveStates, JointTrajectoryControllerState, MotorCurrents, TrajectoryResult,
+    DriveStates, JointTrajectoryControllerState, MotorCurrents, SpeedScalingFactor, TrajectoryResult,
 };
 
 /// Publishers and subscriptions of the node.
@@ -31,6 +31,8 @@ pub struct TopicSubscriptions {
     pub psec: Subscription<JointTrajectory>,
     /// Subscription `psec_stream`.
     pub psec_stream: Subscription<JointState>,
+    /// Subscription `~/speed_scaling_input`.
+    pub feed_override: Subscription<SpeedScalingFactor>,
     /// Subscription `load`.
     pub load: Subscription<JointState>,
     /// Subscription `/clock` and its resolved name, in `fast` and with `use_sim_time`.
@@ -76,6 +78,7 @@ impl Topics {
     ) -> Result<Self, EndpointError> {
         let (psec, psec_name) = endpoints.subscription(&interface::PSEC)?;
         let (psec_stream, stream_name) = endpoints.subscription(&interface::PSEC_STREAM)?;
+        let (feed_override, override_name) = endpoints.subscription(&interface::SPEED_SCALING_INPUT)?;
         let (load, load_name) = endpoints.subscription(&interface::LOAD)?;
         let (joint_states, joint_states_name) = endpoints.publisher(&interface::JOINT_STATES)?;
         let (motor_currents, currents_name) = endpoints.publisher(&interface::MOTOR_CURRENTS)?;
@@ -92,7 +95,7 @@ impl Topics {
             TimeMode::Real => None,
         };
         let names = GraphNames {
-            subscribed: [psec_name, stream_name, load_name]
+            subscribed: [psec_name, stream_name, override_name, load_name]
                 .into_iter()
                 .chain(clock_input.iter().map(|(_, name)| name.clone()))
                 .collect(),
@@ -107,13 +110,13 @@ impl Topics {
             .into_iter()
             .chain(clock.iter().map(|(_, name)| name.clone()))
             .collect(),
-            services: [interface::RESET, interface::STOP]
+            services: [interface::RESET, interface::STOP, interface::FEED_HOLD, interface::CYCLE_START]
                 .iter()
                 .filter_map(|service| args.resolve_service(&service.name()).ok())
                 .collect(),
             actions: Vec::new(),
         };
-        let subscriptions = TopicSubscriptions { psec, psec_stream, load, clock: clock_input };
+        let subscriptions = TopicSubscriptions { psec, psec_stream, feed_override, load, clock: clock_input };
         let publishers = TopicPublishers {
             joint_states,
             motor_currents,

@@ -1,4 +1,4 @@
-//! Services `~/stop` and `~/reset`.
+//! Services of type `std_srvs/Trigger`.
 
 use futures::StreamExt;
 use futures::future::BoxFuture;

@@ -6,7 +6,7 @@ use rustdds::DomainParticipant;
 
 use super::NodeError;
 use super::setup::NodeSetup;
-use crate::interface::{RESET, STOP};
+use crate::interface::{CYCLE_START, FEED_HOLD, RESET, STOP};
 use crate::ros::action::{ActionServer, ActionTopics};
 use crate::ros::args::RosArgs;
 use crate::ros::endpoints::{Endpoints, Publisher};
@@ -34,6 +34,8 @@ pub(super) struct NodeEndpoints {
 pub(super) struct NodeServices {
     pub(super) reset: TriggerService,
     pub(super) stop: TriggerService,
+    pub(super) feed_hold: TriggerService,
+    pub(super) cycle_start: TriggerService,
     pub(super) parameters: ParameterServices,
 }
 
@@ -60,8 +62,10 @@ impl NodeEndpoints {
         topics.names.actions.push(action_topics.name.clone());
         let reset = TriggerService::new(&mut node, context, args, &RESET)?;
         let stop = TriggerService::new(&mut node, context, args, &STOP)?;
+        let feed_hold = TriggerService::new(&mut node, context, args, &FEED_HOLD)?;
+        let cycle_start = TriggerService::new(&mut node, context, args, &CYCLE_START)?;
         let parameters = ParameterServices::new(&mut node, context, args)?;
-        let services = NodeServices { reset, stop, parameters };
+        let services = NodeServices { reset, stop, feed_hold, cycle_start, parameters };
         Ok(NodeEndpoints { node, rosout, topics, tool, action, action_topics, services })
     }
 }

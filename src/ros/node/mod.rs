@@ -121,6 +121,7 @@ async fn serve(
     tasks.spawn_clock_input(subscriptions.clock, clock_out);
     let action = tasks.spawn_trajectory_inputs(action, action_outputs, subscriptions.psec);
     let inputs = tasks.stream_and_load_inputs(subscriptions.psec_stream, subscriptions.load);
+    tasks.spawn_feed_override_input(subscriptions.feed_override);
     tasks.spawn_services(services, parameters);
     let recording_status = recording.as_ref().map(TopicRecording::status);
     tasks.spawn_diagnostics(diagnostics, discovered, dropped, recording_status);

@@ -1,4 +1,4 @@
-//! Execution of the requests `~/stop` and `~/reset`.
+//! Execution of the requests `~/stop`, `~/reset`, `~/feed_hold` and `~/cycle_start`.
 
 use std::sync::Arc;
 
@@ -32,6 +32,14 @@ pub(super) async fn reset_axes(commands: mpsc::Sender<Command>) -> Result<String
     commands.send(Command::Reset(done)).await.map_err(shutting_down)?;
     is_done.await.map_err(shutting_down)?;
     Ok("at rest at home".to_owned())
+}
+
+/// Executes the requests `~/feed_hold` and `~/cycle_start`.
+pub(super) async fn set_feed_hold(commands: mpsc::Sender<Command>, is_held: bool) -> Result<String, String> {
+    commands.send(Command::SetFeedHold(is_held)).await.map_err(shutting_down)?;
+    let message =
+        if is_held { "feed hold: trajectories stop on their path" } else { "trajectories continue" };
+    Ok(message.to_owned())
 }
 
 /// Creates the controlled stop of every joint; `None` if the machine has no joint.

@@ -18,7 +18,7 @@ use tokio::task::JoinSet;
 
 use super::endpoints::NodeServices;
 use super::outputs::ActionOutputs;
-use super::requests::{reset_axes, stop_axes, stop_of_all_joints};
+use super::requests::{reset_axes, set_feed_hold, stop_axes, stop_of_all_joints};
 use super::setup::NodeSetup;
 use crate::ros::action::{ActionChannels, ActionServer, GoalValidator, ServerContext, ShutdownHandle};
 use crate::ros::args::RosArgs;
@@ -28,7 +28,9 @@ use crate::ros::diagnostics::Diagnostics;
 use crate::ros::endpoints::{Publisher, Subscription};
 use crate::ros::fan_out::publish_diagnostics;
 use crate::ros::health::Health;
-use crate::ros::inputs::{PsecInput, TrajectoryValidator, next_motion_id, receive_loads, receive_stream};
+use crate::ros::inputs::{
+    PsecInput, TrajectoryValidator, next_motion_id, receive_feed_overrides, receive_loads, receive_stream,
+};
 use crate::ros::log::LogRecord;
 use crate::ros::matched_subscriptions::MatchedSubscriptionTracker;
 use crate::ros::outputs::Output;
@@ -40,6 +42,7 @@ use crate::ros::results::TrajectoryResults;
 use crate::ros::writer_rotation::{RotatedTopics, RotationContext};
 use crate::ros::{convert, duplicate_node_name, matched_subscriptions, rosout};
 use virtual_axes_core::config::{Parameters, TimeMode};
+use virtual_axes_io::messages::SpeedScalingFactor;
 
 /// Tasks of the node, with their shared state.
 pub(super) struct NodeTasks<'a> {
@@ -131,7 +134,12 @@ impl NodeTasks<'_> {
         handle
     }
 
-    /// Starts the parameter services, `~/stop` and `~/reset`.
+    /// Starts the input `~/speed_scaling_input`.
+    pub(super) fn spawn_feed_override_input(&mut self, input: Subscription<SpeedScalingFactor>) {
+        self.tasks.spawn(receive_feed_overrides(input, self.commands.clone()));
+    }
+
+    /// Starts the parameter services, `~/stop`, `~/reset`, `~/feed_hold` and `~/cycle_start`.
     pub(super) fn spawn_services(&mut self, services: NodeServices, parameters: Parameters) {
         let health = self.health.clone();
         let now = move || convert::stamp(health.borrow().time);
@@ -144,6 +152,10 @@ impl NodeTasks<'_> {
         self.tasks.spawn(services.stop.serve(act));
         let commands = self.commands.clone();
         self.tasks.spawn(services.reset.serve(move || reset_axes(commands.clone())));
+        for (service, is_held) in [(services.feed_hold, true), (services.cycle_start, false)] {
+            let commands = self.commands.clone();
+            self.tasks.spawn(service.serve(move || set_feed_hold(commands.clone(), is_held)));
+        }
     }
 
     /// Starts the publication of the diagnostics.

@@ -66,6 +66,7 @@ impl Axes {
             frame.time = simulation.time_of(instant);
             frame.samples.clear();
             frame.samples.extend_from_slice(simulation.samples());
+            frame.feed_rate = simulation.feed_rate();
             frame.resets = *resets;
             frame.motions.clone_from(motions);
         })
@@ -160,6 +161,12 @@ impl Axes {
             Command::Cancel(id, done) => {
                 let _ = done.send(simulation.cancel(id));
             }
+            Command::SetFeedOverride(factor) => {
+                if let Err(error) = simulation.set_feed_override(factor) {
+                    warn!("{error}");
+                }
+            }
+            Command::SetFeedHold(is_held) => simulation.set_feed_hold(is_held),
             Command::Load { loads, hold } => {
                 for &(axis, load) in loads.iter() {
                     simulation.set_load(axis, load, hold);

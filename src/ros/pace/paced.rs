@@ -157,7 +157,10 @@ impl PacedAxes {
                 self.axes.apply(command);
                 self.axes.report_ends();
             }
-            Command::UpdateParameters(_) | Command::Shutdown => self.axes.apply(command),
+            Command::SetFeedOverride(_)
+            | Command::SetFeedHold(_)
+            | Command::UpdateParameters(_)
+            | Command::Shutdown => self.axes.apply(command),
         }
     }
 

@@ -8,7 +8,8 @@ use super::tolerance::{ErrorHistory, Tolerances};
 use super::{Simulation, stream_delay};
 use crate::machine::{MachineError, MachineParameters};
 use crate::trajectory::{
-    Admission, CancelOutcome, JointSet, MotionId, Rejection, StreamCounts, StreamEnd, Trajectory,
+    Admission, CancelOutcome, InvalidFeedOverride, JointSet, MotionId, Rejection, StreamCounts, StreamEnd,
+    Trajectory,
 };
 use crate::units::Nanoseconds;
 
@@ -133,6 +134,31 @@ impl Simulation {
     /// [`is_streaming`](crate::trajectory::Timeline::is_streaming).
     pub fn is_streaming(&self) -> bool {
         self.timeline.is_streaming()
+    }
+
+    /// Sets the feed override, 0 to 2 (200 %), from the next position cycle on; see
+    /// [`Timeline::set_feed_override`](crate::trajectory::Timeline::set_feed_override).
+    ///
+    /// # Errors
+    /// [`InvalidFeedOverride`]; the feed override is unchanged then.
+    pub fn set_feed_override(&mut self, factor: f64) -> Result<(), InvalidFeedOverride> {
+        self.timeline.set_feed_override(factor)
+    }
+
+    /// Begins or ends a feed hold from the next position cycle on: trajectories stop on their path and continue there.
+    /// A reset ends it.
+    pub fn set_feed_hold(&mut self, is_held: bool) {
+        self.timeline.set_feed_hold(is_held);
+    }
+
+    /// Returns true during a feed hold.
+    pub fn is_feed_hold(&self) -> bool {
+        self.timeline.is_feed_hold()
+    }
+
+    /// Returns the feed override in effect at the last position cycle, the fraction of the planned speed.
+    pub fn feed_rate(&self) -> f64 {
+        self.timeline.feed_rate()
     }
 
     /// Sets the external force or torque on an axis, N or N·m, positive in positive direction, from the

@@ -271,12 +271,11 @@ impl Simulation {
     /// Returns true if a trajectory waits, runs or has not finished, or a load acts.
     ///
     /// A stream does not count: its setpoints arrive at the rate of the sender, so the simulation must not
-    /// run faster than it.
+    /// run faster than it. Trajectories that a feed hold has stopped do not count either.
     pub fn has_active_commands(&self) -> bool {
-        !self.motions.is_empty()
-            || self.timeline.is_moving()
-            || self.timeline.is_waiting()
-            || self.loads.is_any_active()
+        let has_trajectories =
+            !self.motions.is_empty() || self.timeline.is_moving() || self.timeline.is_waiting();
+        has_trajectories && !self.timeline.is_feed_stopped() || self.loads.is_any_active()
     }
 
     /// Returns true if commands are active or the axes are settling.

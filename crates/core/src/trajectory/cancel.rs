@@ -65,19 +65,21 @@ impl Timeline {
     /// Plans a controlled stop of a joint from the next instant on in place of all waiting plans, and
     /// returns the first instant at rest.
     pub(super) fn brake(&mut self, joint: usize, slot: Option<usize>) -> i64 {
-        let join_k = self.next_k;
+        let join_k = self.clock.next_instant(self.period);
         let queue = &mut self.queues[joint];
         let stop = self.planner.plan(queue.state, &self.joints[joint].limits);
         let cycles = (stop.duration() / seconds(self.period)).ceil() as i64;
-        let end_k = (join_k - 1).saturating_add(cycles).max(join_k);
+        let from_k = self.next_k - 1;
+        let end_k = from_k.saturating_add(cycles).max(self.next_k);
+        let path_end = join_k.saturating_add(end_k - self.next_k);
         queue.plans.truncate(1);
         queue.plans.push_back(JointPlan {
             slot,
             join_k,
             end_k,
             nominal_start: i128::from(join_k) * i128::from(self.period),
-            nominal_end: i128::from(end_k) * i128::from(self.period),
-            kind: PlanKind::Stop { from_k: join_k - 1, stop },
+            nominal_end: i128::from(path_end) * i128::from(self.period),
+            kind: PlanKind::Stop { from_k, stop },
         });
         end_k
     }

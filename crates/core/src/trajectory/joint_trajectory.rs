@@ -1,6 +1,7 @@
 //! Validated trajectory: points, segments between them and the stop after a last point in motion.
 
 use super::limits::JointLimits;
+use super::path_time::PathTime;
 use super::request::{Start, TrajectoryRequest};
 use super::spline::{KinematicState, Segment, SplineDegree};
 use super::stop::{Stop, StopPlanner};
@@ -145,31 +146,31 @@ impl Trajectory {
         Some(hint + usize::try_from(time.checked_sub(from)? / (to - from)).ok()?)
     }
 
-    /// Returns the state of `column` at local `time`, ns, clamped to the first and last point.
+    /// Returns the state of `column` at local `time`, clamped to the first and last point.
     ///
     /// At the time of a point the position is exactly that of the point, and the derivatives are those
     /// of the following segment. From the last point on the state is at rest.
-    pub(super) fn state_near(&self, column: usize, time: Nanoseconds, hint: usize) -> KinematicState {
-        let index = self.locate(time, hint);
+    pub(super) fn state_near(&self, column: usize, time: PathTime, hint: usize) -> KinematicState {
+        let index = self.locate(time.ns, hint);
         if index >= self.segments() {
             return KinematicState::at_rest(self.point(column, index).position);
         }
-        self.segment(column, index).state(time - self.times[index])
+        self.segment(column, index).state_at(time.since(self.times[index]))
     }
 
     /// Returns the position of [`state_near`](Self::state_near).
-    pub(super) fn position_near(&self, column: usize, time: Nanoseconds, hint: usize) -> f64 {
-        let index = self.locate(time, hint);
-        if index >= self.segments() || time <= self.times[index] {
+    pub(super) fn position_near(&self, column: usize, time: PathTime, hint: usize) -> f64 {
+        let index = self.locate(time.ns, hint);
+        if index >= self.segments() || time.since(self.times[index]) <= 0.0 {
             return self.positions[index * self.joints.len() + column];
         }
-        self.segment(column, index).position(time - self.times[index])
+        self.segment(column, index).position_at(time.since(self.times[index]))
     }
 
     /// Returns the position of `column` at local `time`, ns, clamped to the first and last point; `None`
     /// for a stop or an unknown column.
     pub fn position(&self, column: usize, time: Nanoseconds) -> Option<f64> {
-        (!self.is_stop() && column < self.joints.len()).then(|| self.position_near(column, time, 0))
+        (!self.is_stop() && column < self.joints.len()).then(|| self.position_near(column, time.into(), 0))
     }
 
     fn plan_final_stops(&mut self, machine: &[JointLimits]) {

@@ -19,13 +19,15 @@
 //! | `request` | requested points |
 //! | `joint_trajectory` | validated trajectory |
 //! | `validation` | validation of a request |
+//! | `feed_override`, `path_time` | control of the feed override, path time |
 //! | `plan` | plan of one joint |
 //! | `motion_table` | accepted motions |
 //! | `preview`, `stream_gate`, `stream` | streamed setpoints |
-//! | `timeline` | queues and setpoints of all joints |
+//! | `path_clock`, `timeline` | path time, queues and setpoints of all joints |
 //! | `cancel`, `submit` | cancellation and acceptance |
 
 pub mod event;
+pub mod feed_override;
 pub mod limits;
 pub mod rejection;
 pub mod request;
@@ -37,6 +39,8 @@ pub mod timeline;
 mod cancel;
 mod joint_trajectory;
 mod motion_table;
+mod path_clock;
+mod path_time;
 mod plan;
 mod preview;
 mod stream_gate;
@@ -45,6 +49,7 @@ mod validation;
 
 pub use cancel::CancelOutcome;
 pub use event::{JointSet, MotionId, TimelineEvent};
+pub use feed_override::{InvalidFeedOverride, MAX_FEED_OVERRIDE, check_feed_override};
 pub use joint_trajectory::Trajectory;
 pub use limits::JointLimits;
 pub use rejection::{Rejection, RejectionCode};

@@ -38,8 +38,8 @@ impl MotionTable {
         Self {
             slots: Vec::new(),
             free: Vec::new(),
-            // At one instant a joint can leave one motion for the next and complete that one too.
-            touched: Vec::with_capacity(2 * joints),
+            // At one instant a joint can leave two motions for the next, at a feed override of 200 %, and complete that one.
+            touched: Vec::with_capacity(3 * joints),
         }
     }
 

@@ -1,9 +1,10 @@
-//! Plan of one joint from an instant on: a pure function of the position cycle.
+//! Plan of one joint from an instant on: a pure function of the position cycle, or of the path time for a trajectory.
 
 use super::joint_trajectory::Trajectory;
+use super::path_time::{PathTime, PlanInstant};
 use super::spline::{KinematicState, Segment};
 use super::stop::Stop;
-use crate::units::{Nanoseconds, seconds};
+use crate::units::{Nanoseconds, SECOND_NS, seconds};
 use std::sync::Arc;
 
 /// Entry of the plan queue of a joint.
@@ -11,13 +12,13 @@ use std::sync::Arc;
 pub(super) struct JointPlan {
     /// Slot of its motion in the motion table; `None` after the end of the motion.
     pub slot: Option<usize>,
-    /// First commanded instant.
+    /// First commanded instant, of the path time.
     pub join_k: i64,
-    /// Instant of the last setpoint.
+    /// Instant of the last setpoint: of the path time for a trajectory, a position cycle for a stop.
     pub end_k: i64,
-    /// Requested start in ns of the position grid (k·Tsp), not rounded to an instant.
+    /// Requested start as a path time, ns, not rounded to an instant.
     pub nominal_start: i128,
-    /// Requested end in ns of the position grid (k·Tsp), not rounded to an instant.
+    /// Requested end as a path time, ns, not rounded to an instant.
     pub nominal_end: i128,
     pub kind: PlanKind,
 }
@@ -26,7 +27,7 @@ pub(super) struct JointPlan {
 pub(super) enum PlanKind {
     /// Hold at, or approach to, the newest setpoint, m or rad.
     Hold(f64),
-    /// Controlled stop; `from_k` is the instant of its initial state.
+    /// Controlled stop; `from_k` is the position cycle of its initial state.
     Stop { from_k: i64, stop: Stop },
     /// Column of a trajectory.
     Trajectory(TrajectoryColumn),
@@ -37,7 +38,7 @@ pub(super) enum PlanKind {
 pub(super) struct TrajectoryColumn {
     pub trajectory: Arc<Trajectory>,
     pub column: usize,
-    /// Instant of local time 0.
+    /// Instant of the path time at local time 0.
     pub start_k: i64,
     /// Index of the last evaluated segment.
     pub cursor: usize,
@@ -46,26 +47,31 @@ pub(super) struct TrajectoryColumn {
 }
 
 impl TrajectoryColumn {
-    /// Returns the state at local `time`, ns.
-    pub fn state(&self, time: Nanoseconds) -> KinematicState {
+    /// Returns the local time at `path`.
+    pub fn local_time(&self, path: PathTime, period: Nanoseconds) -> PathTime {
+        path.relative_to(self.start_k.saturating_mul(period))
+    }
+
+    /// Returns the state at local `time`.
+    pub fn state(&self, time: PathTime) -> KinematicState {
         if let Some((begin, segment)) = &self.approach
-            && time < self.trajectory.first_time()
+            && time.ns < self.trajectory.first_time()
         {
-            return segment.state(time - begin);
+            return segment.state_at(time.since(*begin));
         }
         match self.trajectory.final_stop(self.column) {
-            Some(stop) if time >= self.trajectory.duration() => {
-                stop.state(seconds(time - self.trajectory.duration()))
+            Some(stop) if time.ns >= self.trajectory.duration() => {
+                stop.state(time.since(self.trajectory.duration()) / SECOND_NS as f64)
             }
             _ => self.trajectory.state_near(self.column, time, self.cursor),
         }
     }
 
-    /// Returns the position at local `time`, ns, m or rad.
-    pub fn position(&self, time: Nanoseconds) -> f64 {
+    /// Returns the position at local `time`, m or rad.
+    pub fn position(&self, time: PathTime) -> f64 {
         let trajectory = &self.trajectory;
-        let is_on_points = self.approach.is_none() || time >= trajectory.first_time();
-        if is_on_points && (time < trajectory.duration() || trajectory.final_stop(self.column).is_none()) {
+        let is_on_points = self.approach.is_none() || time.ns >= trajectory.first_time();
+        if is_on_points && (time.ns < trajectory.duration() || trajectory.final_stop(self.column).is_none()) {
             return trajectory.position_near(self.column, time, self.cursor);
         }
         self.state(time).position
@@ -85,41 +91,61 @@ impl JointPlan {
         }
     }
 
-    /// Returns the state at instant `k`, at the earliest `join_k`.
-    pub fn state(&self, k: i64, period: Nanoseconds) -> KinematicState {
+    /// Returns the state at `instant`, at the earliest `join_k`. The derivatives of a trajectory are those with respect
+    /// to the path time.
+    pub fn state(&self, instant: PlanInstant, period: Nanoseconds) -> KinematicState {
         match &self.kind {
             PlanKind::Hold(position) => KinematicState::at_rest(*position),
-            PlanKind::Stop { from_k, stop } => stop.state(seconds(elapsed(*from_k, k, period))),
-            PlanKind::Trajectory(path) => path.state(elapsed(path.start_k, k, period)),
+            PlanKind::Stop { from_k, stop } => stop.state(seconds(elapsed(*from_k, instant.k, period))),
+            PlanKind::Trajectory(path) => path.state(path.local_time(instant.path, period)),
         }
     }
 
-    /// Returns the position at instant `k`, at the earliest `join_k`, m or rad.
-    pub fn position(&self, k: i64, period: Nanoseconds) -> f64 {
+    /// Returns the position at `instant`, at the earliest `join_k`, m or rad.
+    pub fn position(&self, instant: PlanInstant, period: Nanoseconds) -> f64 {
         match &self.kind {
-            PlanKind::Trajectory(path) => path.position(elapsed(path.start_k, k, period)),
-            _ => self.state(k, period).position,
+            PlanKind::Trajectory(path) => path.position(path.local_time(instant.path, period)),
+            _ => self.state(instant, period).position,
         }
     }
 
-    /// Moves the cursor to instant `k`, for the next evaluations.
-    pub fn advance(&mut self, k: i64, period: Nanoseconds) {
+    /// Moves the cursor to `instant`, for the next evaluations.
+    pub fn advance(&mut self, instant: PlanInstant, period: Nanoseconds) {
         if let PlanKind::Trajectory(path) = &mut self.kind {
-            let time = elapsed(path.start_k, k, period);
-            path.cursor = path.trajectory.locate(time, path.cursor);
+            let time = path.local_time(instant.path, period);
+            path.cursor = path.trajectory.locate(time.ns, path.cursor);
         }
     }
 
-    /// Returns true if the joint moves at or after instant `k`.
-    pub fn is_moving(&self, k: i64, period: Nanoseconds) -> bool {
+    /// Returns true if the plan commands the joint from an instant of the path time at or before `path_k`. A stop
+    /// commands it from the next position cycle on.
+    pub fn has_joined(&self, path_k: i64) -> bool {
+        self.join_k <= path_k || matches!(self.kind, PlanKind::Stop { .. })
+    }
+
+    /// Returns true if the last setpoint is commanded at or before `instant`.
+    pub fn has_ended(&self, instant: PlanInstant, period: Nanoseconds) -> bool {
+        match &self.kind {
+            PlanKind::Trajectory(_) => instant.path.instant(period) >= self.end_k,
+            _ => instant.k >= self.end_k,
+        }
+    }
+
+    /// Returns true if the plan follows the path time.
+    pub fn is_trajectory(&self) -> bool {
+        matches!(self.kind, PlanKind::Trajectory(_))
+    }
+
+    /// Returns true if the joint moves at or after `instant`.
+    pub fn is_moving(&self, instant: PlanInstant, period: Nanoseconds) -> bool {
         match &self.kind {
             PlanKind::Hold(_) => false,
-            PlanKind::Stop { .. } => k < self.end_k,
+            PlanKind::Stop { .. } => !self.has_ended(instant, period),
             PlanKind::Trajectory(path) => {
-                k < self.end_k
+                !self.has_ended(instant, period)
                     || path.trajectory.final_stop(path.column).is_some_and(|stop| {
-                        let time = elapsed(path.start_k, k, period) - path.trajectory.duration();
-                        seconds(time) < stop.duration()
+                        let time = path.local_time(instant.path, period);
+                        time.since(path.trajectory.duration()) / (SECOND_NS as f64) < stop.duration()
                     })
             }
         }

@@ -72,30 +72,40 @@ impl Segment {
 
     /// Returns the position `elapsed` ns after the start, clamped to the segment, m or rad.
     pub fn position(&self, elapsed: Nanoseconds) -> f64 {
-        if elapsed <= 0 {
+        self.position_at(elapsed as f64)
+    }
+
+    /// Returns the position `elapsed` ns after the start, with fractions of 1 ns, clamped to the segment, m or rad.
+    pub fn position_at(&self, elapsed: f64) -> f64 {
+        if elapsed <= 0.0 {
             return self.ends.0;
         }
-        if elapsed >= self.duration {
+        if elapsed >= self.duration as f64 {
             return self.ends.1;
         }
         let [c1, c2, c3, c4, c5] = self.coefficients;
-        let s = elapsed as f64 / self.duration as f64;
+        let s = elapsed / self.duration as f64;
         self.ends.0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
     }
 
     /// Returns the state `elapsed` ns after the start, clamped to the segment. The derivatives are those
     /// of the polynomial; a linear segment has zero acceleration.
     pub fn state(&self, elapsed: Nanoseconds) -> KinematicState {
+        self.state_at(elapsed as f64)
+    }
+
+    /// Returns the state `elapsed` ns after the start, with fractions of 1 ns, as [`state`](Self::state).
+    pub fn state_at(&self, elapsed: f64) -> KinematicState {
         let h = seconds(self.duration);
         let [c1, c2, c3, c4, c5] = self.coefficients;
         if self.degree == SplineDegree::Linear {
-            let position = self.position(elapsed);
+            let position = self.position_at(elapsed);
             return KinematicState { position, velocity: c1 / h, acceleration: 0.0 };
         }
-        let s = elapsed.clamp(0, self.duration) as f64 / self.duration as f64;
+        let s = elapsed.clamp(0.0, self.duration as f64) / self.duration as f64;
         let dp = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)));
         let ddp = 2.0 * c2 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5));
-        KinematicState { position: self.position(elapsed), velocity: dp / h, acceleration: ddp / (h * h) }
+        KinematicState { position: self.position_at(elapsed), velocity: dp / h, acceleration: ddp / (h * h) }
     }
 }
 

@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// bounds the error to 10⁻³ of its largest speed: see [`Trajectory::new`].
 const APPROACH_SAMPLES: i64 = 256;
 
-/// Position cycles of an accepted trajectory.
+/// Position cycles of an accepted trajectory, with the feed override 1 from its acceptance on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Admission {
     /// Position cycle of the start: the first one at or after its stamp.
@@ -87,19 +87,27 @@ impl Timeline {
         let end = if trajectory.is_stop() { StreamEnd::Stopped } else { StreamEnd::Preempted };
         self.end_stream(trajectory.joints().iter().copied(), end(id));
         self.reserve_events();
-        Ok(admission)
+        // From the path time to position cycles; 0 while the feed override has been 1.
+        let shift = self.next_k - self.clock.next_instant(self.period);
+        Ok(Admission {
+            start_k: admission.start_k.saturating_add(shift),
+            join_k: admission.join_k.saturating_add(shift),
+            end_k: admission.end_k.saturating_add(shift),
+            ..admission
+        })
     }
 
     fn submit_stop(&mut self, id: MotionId, trajectory: &Trajectory) -> Admission {
-        let join_k = self.next_k;
+        let join_k = self.clock.next_instant(self.period);
         let slot = self.motions.open(id, trajectory.joints().len());
-        let mut last_k = join_k;
+        let mut last_k = self.next_k;
         for &joint in trajectory.joints() {
             self.stop_all(joint, Some(id));
             last_k = last_k.max(self.brake(joint, Some(slot)));
         }
         self.motions.settle(&mut self.pending);
-        Admission { start_k: join_k, join_k, end_k: last_k, is_late: false }
+        let end_k = join_k.saturating_add(last_k - self.next_k);
+        Admission { start_k: join_k, join_k, end_k, is_late: false }
     }
 
     fn submit_path(
@@ -138,8 +146,9 @@ impl Timeline {
 
     fn schedule(&self, trajectory: &Trajectory, origin: Nanoseconds) -> Result<Schedule, Rejection> {
         let period = i128::from(self.period);
+        let next_k = self.clock.next_instant(self.period);
         let nominal_start = match trajectory.start() {
-            Start::Now => i128::from(self.next_k) * period,
+            Start::Now => i128::from(next_k) * period,
             Start::At(stamp) => i128::from(stamp) - i128::from(origin),
         };
         let duration = i128::from(trajectory.duration());
@@ -152,8 +161,8 @@ impl Timeline {
                 "the start is too far from the present time to be counted in position cycles",
             ));
         };
-        if end_k < self.next_k {
-            let ago = i128::from(self.next_k) * period - nominal_end;
+        if end_k < next_k {
+            let ago = i128::from(next_k) * period - nominal_end;
             let ago = ago as f64 / SECOND_NS as f64;
             return Err(Rejection::new(
                 RejectionCode::EndedInThePast,
@@ -161,7 +170,7 @@ impl Timeline {
             )
             .numbers(ago, 0.0));
         }
-        let join_k = start_k.max(self.next_k);
+        let join_k = start_k.max(next_k);
         let is_late = join_k > start_k;
         Ok(Schedule {
             admission: Admission { start_k, join_k, end_k, is_late },
@@ -210,7 +219,7 @@ impl Timeline {
             self.check_approach(joint, &path, begin, &segment)?;
         } else {
             let before = self.predicted(joint, join_k - 1).position;
-            let first = path.state(begin).position;
+            let first = path.state(begin.into()).position;
             let index = trajectory.locate(begin, 0);
             limits.check_jump(index, before, first, seconds(self.period))?;
         }
@@ -227,7 +236,7 @@ impl Timeline {
         segment: &Segment,
     ) -> Result<(), Rejection> {
         let (limits, period) = (&self.joints[joint], self.period);
-        let at = |k: i64| path.state(k.saturating_mul(period)).position;
+        let at = |k: i64| path.state(k.saturating_mul(period).into()).position;
         let step = |k: i64| {
             let (before, position) = (at(k - 1), at(k));
             limits.check_travel_limits(0, position)?;

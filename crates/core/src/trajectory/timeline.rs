@@ -3,6 +3,8 @@
 use super::event::{JointSet, MotionId, TimelineEvent};
 use super::limits::JointLimits;
 use super::motion_table::{MotionTable, Release};
+use super::path_clock::PathClock;
+use super::path_time::PlanInstant;
 use super::plan::{JointPlan, PlanKind};
 use super::rejection::{Rejection, RejectionCode};
 use super::spline::KinematicState;
@@ -35,7 +37,8 @@ pub struct Timeline {
     pub(super) queues: Vec<JointQueue>,
     pub(super) motions: MotionTable,
     pub(super) planner: StopPlanner,
-    stream: SetpointStream,
+    pub(super) stream: SetpointStream,
+    pub(super) clock: PathClock,
     psec: Vec<f64>,
     events: Vec<TimelineEvent>,
     /// Events since the last instant, reported at the next one.
@@ -99,6 +102,7 @@ impl Timeline {
             motions: MotionTable::new(joints.len()),
             planner: StopPlanner::default(),
             stream: SetpointStream::new(&joints, period, positions),
+            clock: PathClock::new(&joints, period, positions),
             psec: positions.to_vec(),
             events: Vec::new(),
             pending: Vec::new(),
@@ -117,8 +121,10 @@ impl Timeline {
         self.events.clear();
         self.events.append(&mut self.pending);
         self.stream.begin_instant(k, &self.psec);
+        let instant = self.clock.advance(k, period, &self.queues);
+        let path_k = instant.path.instant(period);
         for (joint, queue) in self.queues.iter_mut().enumerate() {
-            if queue.plans.get(1).is_some_and(|plan| plan.join_k <= k) {
+            while queue.plans.get(1).is_some_and(|plan| plan.has_joined(path_k)) {
                 let old = queue.plans.pop_front();
                 let new = queue.plans.front();
                 if let (Some(old), Some(new)) = (old, new) {
@@ -129,18 +135,18 @@ impl Timeline {
             let Some(plan) = queue.plans.front_mut() else {
                 continue;
             };
-            plan.advance(k, period);
+            plan.advance(instant, period);
             queue.state = match plan.kind {
                 PlanKind::Hold(newest) => self.stream.next_state(joint, k, newest, queue.state.position),
-                _ => plan.state(k, period),
+                _ => Self::state_of(&self.clock, plan, instant, period),
             };
             self.psec[joint] = queue.state.position;
-            if k >= plan.end_k
+            if plan.has_ended(instant, period)
                 && let Some(slot) = plan.slot.take()
             {
                 self.motions.release(slot, joint, Release::Completed);
             }
-            let is_over = plan.slot.is_none() && !plan.is_moving(k, period);
+            let is_over = plan.slot.is_none() && !plan.is_moving(instant, period);
             if is_over && !matches!(plan.kind, PlanKind::Hold(_)) {
                 plan.kind = PlanKind::Hold(queue.state.position);
                 self.stream.flush(joint, queue.state.position);
@@ -148,6 +154,7 @@ impl Timeline {
         }
         self.motions.settle(&mut self.events);
         self.stream.finish_instant(k);
+        self.clock.record(k, &self.psec, &self.queues, period);
         self.next_k += 1;
         k
     }
@@ -183,48 +190,14 @@ impl Timeline {
         self.queues.get(joint).map(|queue| queue.state)
     }
 
-    /// Returns the previewed setpoint of `joint`, `cycles` position cycles after the last commanded
-    /// instant, m or rad.
-    ///
-    /// The preview contains everything accepted up to now; beyond its end the last setpoint is held.
-    /// Returns `None` for an unknown joint.
-    pub fn psec_ahead(&self, joint: usize, cycles: u32) -> Option<f64> {
-        let queue = self.queues.get(joint)?;
-        let k = (self.next_k - 1).saturating_add(i64::from(cycles));
-        Some(match self.plan_at(joint, k) {
-            Some(plan) if !matches!(plan.kind, PlanKind::Hold(_)) => plan.position(k, self.period),
-            Some(_) => self.predicted(joint, k).position,
-            None => queue.state.position,
-        })
-    }
-
-    /// Returns the plan that commands `joint` at instant `k`, `None` up to the last instant.
-    fn plan_at(&self, joint: usize, k: i64) -> Option<&JointPlan> {
-        let plans = &self.queues[joint].plans;
-        let after = plans.partition_point(|plan| plan.join_k <= k);
-        plans.get(after.saturating_sub(1)).filter(|_| k >= self.next_k)
-    }
-
-    /// Returns the state commanded to `joint` at instant `k`, at the earliest the last instant.
-    pub(super) fn predicted(&self, joint: usize, k: i64) -> KinematicState {
-        let state = self.queues[joint].state;
-        match self.plan_at(joint, k) {
-            Some(JointPlan { kind: PlanKind::Hold(newest), .. }) => {
-                self.stream.state_after(joint, k - self.next_k, *newest, state.position)
-            }
-            Some(plan) => plan.state(k, self.period),
-            None => state,
-        }
-    }
-
     /// Returns true if a started trajectory or stop commands motion of a joint after the last instant.
     /// Motion by streamed setpoints: [`Timeline::is_stream_moving`].
     pub fn is_moving(&self) -> bool {
-        let k = self.next_k - 1;
+        let instant = PlanInstant { k: self.next_k - 1, path: self.clock.time };
         self.queues
             .iter()
             .filter_map(|queue| queue.plans.front())
-            .any(|plan| plan.slot.is_some() || plan.is_moving(k, self.period))
+            .any(|plan| plan.slot.is_some() || plan.is_moving(instant, self.period))
     }
 
     /// Returns true if an accepted trajectory or stop has not started.
@@ -260,6 +233,8 @@ impl Timeline {
             self.stream.flush(joint, position);
             self.psec[joint] = position;
         }
+        self.clock.is_held = false;
+        self.clock.rest(self.next_k - 1, self.period);
         self.stream.clear_activity();
         self.stream.apply_delay(self.next_k, &self.psec);
         self.motions.settle(&mut self.pending);

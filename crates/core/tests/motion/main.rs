@@ -1,6 +1,7 @@
 //! Tests of trajectory execution, streamed setpoints and the simulation.
 
 mod allocation;
+mod feed_override;
 mod goals;
 mod simulation;
 mod simulation_common;

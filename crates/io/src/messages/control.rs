@@ -138,6 +138,13 @@ pub struct JointTrajectoryControllerState {
     pub speed_scaling_factor: f64,
 }
 
+/// Feed override of trajectories.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct SpeedScalingFactor {
+    /// Feed override factor: 1 is the planned speed, 0 a full stop on the path.
+    pub factor: f64,
+}
+
 /// Request of the service `_action/send_goal`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SendGoalRequest {

@@ -13,7 +13,7 @@ mod trajectory;
 pub use control::{
     CONTROL_PACKAGE, ErrorCode, FeedbackMessage, FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult, GetResultRequest, GetResultResponse, JointComponentTolerance,
-    JointTolerance, JointTrajectoryControllerState, SendGoalRequest, SendGoalResponse,
+    JointTolerance, JointTrajectoryControllerState, SendGoalRequest, SendGoalResponse, SpeedScalingFactor,
 };
 pub use own::{DriveStates, MotorCurrents, PACKAGE, Source, Status, TrajectoryResult};
 pub use pose::{path, pose_stamped};

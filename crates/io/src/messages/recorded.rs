@@ -9,7 +9,7 @@ use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 use serde::Serialize;
 
-use super::control::JointTrajectoryControllerState;
+use super::control::{JointTrajectoryControllerState, SpeedScalingFactor};
 use super::own::{DriveStates, MotorCurrents, TrajectoryResult};
 use super::schema::Schema;
 use super::time::nanoseconds;
@@ -48,6 +48,16 @@ with_header! {
     PoseStamped => pose_stamped,
     Path => path,
     JointTrajectoryControllerState => controller_state,
+}
+
+impl Recorded for SpeedScalingFactor {
+    fn schema() -> Schema {
+        Schema::speed_scaling_factor()
+    }
+
+    fn time(&self) -> Nanoseconds {
+        0
+    }
 }
 
 impl Recorded for Clock {

@@ -172,6 +172,11 @@ impl Schema {
         Self::new("nav_msgs", "Path", own, &nested)
     }
 
+    /// Returns the schema of `control_msgs/msg/SpeedScalingFactor`.
+    pub fn speed_scaling_factor() -> Self {
+        Self::new("control_msgs", "SpeedScalingFactor", "float64 factor\n", &[])
+    }
+
     /// Returns the schema of `control_msgs/msg/JointTrajectoryControllerState`.
     pub fn controller_state() -> Self {
         let nested = [

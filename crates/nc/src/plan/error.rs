@@ -1,6 +1,7 @@
 //! Errors of look-ahead and feed planning.
 
 use thiserror::Error;
+use virtual_axes_core::trajectory::InvalidFeedOverride;
 use virtual_axes_core::units::Rounded;
 
 /// Error of a program's source, such as a syntax error.
@@ -119,9 +120,6 @@ pub enum FeedPlanError {
         interval: f64,
     },
     /// Feed override outside 0 to 200 %.
-    #[error("feed override {found} must be a number from 0 to 2 (200 %)")]
-    InvalidOverride {
-        /// Value found.
-        found: f64,
-    },
+    #[error(transparent)]
+    InvalidOverride(#[from] InvalidFeedOverride),
 }

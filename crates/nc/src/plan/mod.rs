@@ -14,7 +14,6 @@
 mod band;
 mod element;
 mod error;
-mod feed_override;
 mod look_ahead;
 mod nurbs;
 mod piece;

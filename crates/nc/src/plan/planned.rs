@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use super::feed_override::PlannedMotion;
+use virtual_axes_core::trajectory::feed_override::PlannedMotion;
+
 use super::look_ahead::Entry;
 use super::segment::PathSegment;
 use super::stations::MachineModel;
@@ -31,9 +32,18 @@ pub(super) struct Ahead<'a> {
     pub model: &'a MachineModel,
     pub entries: &'a VecDeque<Entry>,
     pub local: f64,
+    /// Position period, s.
+    pub period: f64,
 }
 
 impl PlannedMotion for Ahead<'_> {
+    fn positions_after(&self, steps: f64, joints: &mut [f64]) {
+        let planned = self.joints_after(steps * self.period);
+        joints.iter_mut().zip(planned).for_each(|(joint, planned)| *joint = planned);
+    }
+}
+
+impl Ahead<'_> {
     fn joints_after(&self, time: f64) -> JointVector {
         let mut local = self.local + time;
         let last = self.entries.len().saturating_sub(1);

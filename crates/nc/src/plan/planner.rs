@@ -3,11 +3,11 @@
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::{AxisRole, Kinematics};
 use virtual_axes_core::trajectory::JointLimits;
+use virtual_axes_core::trajectory::feed_override::{FeedControl, check_feed_override};
 use virtual_axes_core::trial::{GridSource, SourceError};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
 use super::error::{FeedPlanError, StepError};
-use super::feed_override::StepControl;
 use super::look_ahead::LookAhead;
 use super::pieces::PieceSource;
 use super::planned::{Ahead, ORIGIN};
@@ -111,7 +111,8 @@ pub struct PartProgramPlanner<I> {
     local: f64,
     /// Duration of the intervals passed, s.
     passed: f64,
-    control: Option<StepControl>,
+    control: FeedControl,
+    is_started: bool,
     is_finished: bool,
     last: PlannedSetpoint,
 }
@@ -182,15 +183,17 @@ where
             path_rate: 0.0,
             joints: joints.len(),
         };
+        let control = FeedControl::new(&limits, nanoseconds, &ORIGIN[..joints.len()], 1.0);
         Ok(Self {
             ahead,
-            limits,
             joints,
             period,
             reserve: 2.0 * slowest + 4.0 * period,
             local: 0.0,
             passed: 0.0,
-            control: None,
+            control,
+            is_started: false,
+            limits,
             is_finished: false,
             last,
         })
@@ -222,9 +225,7 @@ where
     /// # Errors
     /// Returns [`FeedPlanError`] with the source line.
     pub fn next_setpoint(&mut self, feed_override: f64) -> Result<Option<PlannedSetpoint>, FeedPlanError> {
-        if !(0.0..=2.0).contains(&feed_override) {
-            return Err(FeedPlanError::InvalidOverride { found: feed_override });
-        }
+        check_feed_override(feed_override)?;
         if self.is_finished {
             return Ok(None);
         }
@@ -235,7 +236,7 @@ where
 
     fn cycle(&mut self, feed_override: f64) -> Result<Option<PlannedSetpoint>, FeedPlanError> {
         self.ahead.feed_factor = feed_override.max(1.0);
-        let Some(mut control) = self.control.take() else {
+        if !self.is_started {
             match self.ahead.start()? {
                 None => {
                     self.is_finished = true;
@@ -243,20 +244,25 @@ where
                 }
                 Some(start) => self.last.psec = start,
             }
-            let mut control = StepControl::new(self.period, self.last.psec);
-            control.start_at(feed_override.min(1.0));
-            self.control = Some(control);
+            self.is_started = true;
+            self.control.start_at(feed_override);
+            for (joint, &position) in self.last.psec().iter().enumerate() {
+                self.control.exclude(joint, position);
+            }
             self.check_travel_limits()?;
             return Ok(Some(self.last));
-        };
+        }
         self.ahead.renew(self.local + self.reserve)?;
         let factor = self.ahead.entries.front().map_or(1.0, |entry| entry.feed_factor);
-        let motion = Ahead { model: &self.ahead.model, entries: &self.ahead.entries, local: self.local };
-        control.advance((feed_override / factor).min(1.0), &motion, &self.ahead.model.joints);
-        let result = self.pass(control.rate());
-        control.record(self.last.psec);
-        self.control = Some(control);
-        result?;
+        let motion = Ahead {
+            model: &self.ahead.model,
+            entries: &self.ahead.entries,
+            local: self.local,
+            period: self.period,
+        };
+        let rate = self.control.advance(feed_override / factor, &motion);
+        self.pass(rate)?;
+        self.control.record(self.last.psec());
         self.check_travel_limits()?;
         Ok(Some(self.last))
     }

@@ -90,6 +90,6 @@ fn an_override_outside_its_range_is_an_error() {
     let program = square(PathControl::ExactStop);
     for value in [-0.1, 2.1, f64::NAN] {
         let result = plan_with(&program, PlanOptions::default(), |_| value);
-        assert!(matches!(result, Err(FeedPlanError::InvalidOverride { .. })));
+        assert!(matches!(result, Err(FeedPlanError::InvalidOverride(_))));
     }
 }
