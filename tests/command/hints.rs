@@ -14,11 +14,16 @@ fn assert_file_rejected(name: &str, content: &str, words: &[&str]) {
 
 #[test]
 fn limits_are_given_in_the_units_and_with_the_keys_of_a_machine_file() {
+    // `check` reports such setpoints in its limit audit.
+    let assert_run_rejected = |name: &str, content: &str, words: &[&str]| {
+        let folder = TestFolder::new(&format!("hints_{name}"));
+        assert_rejected(&["run", folder.file(name, content).to_str().expect("UTF-8")], words);
+    };
     let speed = "x, point 1: speed 3 m/s (180 m/min) exceeds limits.velocity_m_min, 0.5 m/s (30 m/min)";
-    assert_file_rejected("speed.csv", "time,x\n0,0\n0.1,0.3\n", &[speed]);
+    assert_run_rejected("speed.csv", "time,x\n0,0\n0.1,0.3\n", &[speed]);
     let travel =
         "position 2.5 m (2500 mm) is outside the travel limits, -0.355 m (-355 mm) to 0.355 m (355 mm)";
-    assert_file_rejected("travel.csv", "time,x\n0,0\n10,2.5\n", &[travel]);
+    assert_run_rejected("travel.csv", "time,x\n0,0\n10,2.5\n", &[travel]);
 }
 
 #[test]

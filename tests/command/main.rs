@@ -10,6 +10,7 @@ mod identify_command;
 mod identify_traces;
 mod ingress_properties;
 mod interface;
+mod limit_audit;
 mod output_form;
 mod part_programs;
 mod reference;

@@ -69,6 +69,10 @@ fn words_and_positions_beyond_the_machine_are_rejected_with_their_line() {
         assert!(error.starts_with(expected), "{text:?}: {error}");
         assert_eq!(error.lines().count(), 1, "{error}");
     }
+    for axis in ["B", "U", "V", "W"] {
+        let expected = format!(":1: word {axis}: the machine has no axis {axis}; axes: X Y Z A C\n");
+        assert_eq!(checked(&format!("G1 F100 X1 {axis}0\n"), &[]), Err(expected));
+    }
     assert!(checked("M100 P1\nm110\nG0 X1\n", &["--ignore", "100,M110"]).is_ok());
     assert!(checked("G0 X300\n", &[]).is_ok());
     assert!(checked("G0 X300\n", &["--machine", "linear_motor_center"]).is_err());

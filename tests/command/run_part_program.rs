@@ -4,7 +4,7 @@ use std::fs;
 
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
-use crate::command_common::{assert_rejected, json, printed};
+use crate::command_common::{assert_rejected, json, printed, run};
 
 /// Writes a program and returns its path.
 fn program(folder: &TestFolder, text: &str) -> String {
@@ -60,4 +60,97 @@ fn errors_name_file_and_line() {
     assert_rejected(&["run", &name], &["part.nc:3:"]);
     assert_rejected(&["run", "ballbar", "--override", "50"], &["--override requires a part program"]);
     assert_rejected(&["run", &name, "--override", "300"], &["300 %: must be 0 to 200 %"]);
+}
+
+/// Returns the setpoints of x and y, m, of a program with options.
+fn path(folder: &TestFolder, text: &str, options: &[&str]) -> Vec<[f64; 2]> {
+    let out = folder.file("path.csv", "");
+    let out = out.to_str().expect("UTF-8");
+    printed(&[&["psec", program(folder, text).as_str(), "--out", out], options].concat());
+    let number = |text: &str| text.parse::<f64>().expect("a number");
+    let row = |row: &str| row.split(',').skip(1).map(number).collect::<Vec<_>>();
+    let text = fs::read_to_string(out).expect("setpoints");
+    text.lines().skip(1).map(row).map(|row| [row[0], row[1]]).collect()
+}
+
+#[test]
+fn ignored_m_codes_are_noted_by_each_command() {
+    let folder = TestFolder::new("part_program_ignored");
+    let name = program(&folder, "M50 P1\nG1 X1 F3000\nM7\nM110 Q2\nX2\nM50\nM2\n");
+    let out = folder.file("out.csv", "");
+    let out = out.to_str().expect("UTF-8");
+    let commands: [&[&str]; 4] = [
+        &["run", &name, "--quiet"],
+        &["psec", &name, "--out", out],
+        &["check", &name],
+        &["robustness", &name],
+    ];
+    for command in commands {
+        let rejection =
+            "part.nc:1: M50 is not supported and not in the list of ignored M codes; supported: M0 M1 ";
+        assert_rejected(command, &[rejection]);
+        assert_rejected(&[command, &["--ignore", "M50"]].concat(), &["part.nc:4: M110 is not supported"]);
+        let output = run(&[command, &["--ignore", "M50,7,m110"]].concat());
+        let notes = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{notes}");
+        let expected = [
+            format!("note: {name}:1: M50 is ignored, 2 in all\n"),
+            format!("note: {name}:3: M7 is ignored, 1 in all\n"),
+            format!("note: {name}:4: M110 is ignored, 1 in all\n"),
+        ];
+        assert_eq!(notes, expected.concat(), "{command:?}");
+    }
+    assert_rejected(&["run", "ballbar", "--ignore", "7"], &["--ignore requires a part program"]);
+    assert_eq!(run(&["run", &name, "--ignore", "G41"]).status.code(), Some(2));
+}
+
+#[test]
+fn chord_error_and_centripetal_acceleration_have_their_bounds() {
+    let folder = TestFolder::new("part_program_chord");
+    let circle = "G61 G1 X10 F6000\nG3 I-10 F6000\nM2\n";
+    let (radius, period) = (0.01_f64, 0.006);
+    let fastest = |options: &[&str]| {
+        let path = path(&folder, circle, options);
+        let on_circle = |point: &&[f64; 2]| (point[0].hypot(point[1]) - radius).abs() < 1e-9;
+        let points: Vec<_> = path.iter().filter(on_circle).collect();
+        let steps = points.windows(2).map(|pair| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]));
+        let chord = steps.fold(0.0, f64::max);
+        (
+            2.0 * radius / period * (0.5 * chord / radius).asin(),
+            radius - (radius.powi(2) - 0.25 * chord.powi(2)).sqrt(),
+        )
+    };
+    let (speed, free_error) = fastest(&[]);
+    assert!((speed - 0.1).abs() < 1e-4, "{speed}");
+    let (_, error) = fastest(&["--chord-error-um", "2"]);
+    assert!(error <= 2.001e-6 && error > 1.9e-6 && free_error > 4e-6, "{error} {free_error}");
+    let (speed, _) = fastest(&["--centripetal-m-s2", "0.25"]);
+    assert!((speed * speed / radius - 0.25).abs() < 0.0025, "{speed}");
+    for value in ["0", "-1", "nan", "inf"] {
+        let output = run(&["psec", "part.nc", "--out", "x.csv", "--chord-error-um", value]);
+        assert_eq!(output.status.code(), Some(2), "{value}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("must be a positive number"));
+    }
+    assert_rejected(
+        &["run", "ballbar", "--chord-error-um", "1"],
+        &["--chord-error-um requires a part program"],
+    );
+}
+
+#[test]
+fn words_without_effect_are_noted() {
+    let folder = TestFolder::new("part_program_notes");
+    let notes = |text: &str| {
+        let name = program(&folder, text);
+        let output = run(&["check", &name]);
+        let text = String::from_utf8_lossy(&output.stderr).replace(&name, "part.nc");
+        assert!(output.status.success(), "{text}");
+        text
+    };
+    let stop = "M0 and M1 stop the axes and do not wait\n";
+    assert_eq!(notes("G1 X1 F3000\nM0\nX2\nM1\nM2\n"), format!("note: part.nc:2: {stop}"));
+    assert_eq!(notes("G1 X1 F3000\nM1\nX2\nM2\n"), format!("note: part.nc:2: {stop}"));
+    let merging = "G64 Q has no effect: short lines are joined within P\n";
+    assert_eq!(notes("G64 P0.01 Q0.02\nG1 X1 F3000\nX2\nM2\n"), format!("note: part.nc:2: {merging}"));
+    assert_eq!(notes("G64 P0.01\nG1 X1 F3000\nX2\nM2\n"), "");
 }

@@ -2,17 +2,25 @@
 
 use std::error::Error;
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use serde_json::json;
 use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
 use virtual_axes_core::machine::MachineParameters;
+use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::{Scenario, is_file_name, nearest_input};
 use virtual_axes_core::text::{escaped, nearest_hint};
-use virtual_axes_core::trial::{Measures, Tick, Trial};
+use virtual_axes_core::trial::{self, Measures, SetpointSource, Tick, Trial};
+use virtual_axes_core::units::seconds;
 use virtual_axes_io::files::{self, FileKind};
 
 use crate::input::CommandInput;
+use crate::limit_audit::{LimitAudit, LimitExcess};
+use crate::part_program_arguments::PartProgramArguments;
+use crate::progress::TrialProgress;
+use crate::row_audit::RowAudit;
 use crate::setpoint_summary::SetpointSummary;
-use crate::{axis_warnings, interrupt, part_program, print_error, program_text};
+use crate::{axis_warnings, interrupt, limit_audit_output, part_program, print_error, program_text};
 
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
@@ -23,9 +31,11 @@ pub struct CheckArguments {
     /// Machine for a scenario, setpoints or a part program: built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
-    /// M codes that a part program may contain without effect: 100,M110.
-    #[arg(long, value_name = "M_CODES", value_delimiter = ',', value_parser = part_program::m_code)]
-    ignore: Vec<u32>,
+    #[command(flatten)]
+    part_program: PartProgramArguments,
+    /// Print the limit audit of setpoints or of a part program as one JSON object.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Validates the file and returns its kind and contents.
@@ -33,13 +43,20 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     let name = arguments.file.to_string_lossy();
     if part_program::is_part_program(&arguments.file) {
         let config = Parameters::load(&arguments.machine)?.machine_config()?;
-        return part_program::check(&arguments.file, &config, &arguments.ignore);
+        return part_program(arguments, &name, &config);
     }
     let is_machine = match arguments.file.exists() {
         true => files::Input::open(&arguments.file)?.kind() == FileKind::Machine,
         false => is_shipped_machine(&name)?,
     };
+    let no_audit = || format!("{name}: --json requires setpoints or a part program");
     if is_machine {
+        if let Some(option) = arguments.part_program.given() {
+            return Err(format!("{name}: {option} requires a part program").into());
+        }
+        if arguments.json {
+            return Err(no_audit().into());
+        }
         let config = Parameters::load(&name)?.machine_config()?;
         MachineParameters::new(&config).map_err(|error| format!("{name}: {error}"))?;
         if let Some(key) = foreign_node_key(arguments)? {
@@ -56,37 +73,154 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
         return Ok(machine(&config));
     }
     let config = Parameters::load(&arguments.machine)?.machine_config()?;
-    let input = CommandInput::open(&name, None)?;
-    let program = input.program(&config, None)?;
-    let kind = if program.is_some() { "scenario" } else { "setpoints" };
+    let input = CommandInput::open(&name, None)?.with_part_program(&arguments.part_program)?.with_kept_rows();
+    match input.program(&config, None)? {
+        Some(_) if arguments.json => Err(no_audit().into()),
+        Some(program) => scenario(&input, &config, &program),
+        None => setpoints(arguments, &input, &config),
+    }
+}
+
+/// Validates a scenario by a simulation.
+fn scenario(
+    input: &CommandInput,
+    machine: &MachineConfig,
+    program: &Arc<Program>,
+) -> Result<String, Box<dyn Error>> {
     let trial = Trial {
-        machine: &config,
-        program: program.clone(),
+        machine,
+        program: Some(Arc::clone(program)),
         allow_nonzero_end_velocity: false,
         record: false,
-        measures: Measures::ALL,
+        measures: Measures::AXES,
     };
-    // The setpoints are validated by a simulation.
-    let setpoints = input.setpoints(&config, program.as_ref())?;
+    let setpoints = input.setpoints(machine, Some(program))?;
+    let outcome = trial::run(&trial, setpoints, |_| interrupt::check());
+    let duration = outcome.map_err(|error| input.name_error(error))?.figures.duration;
+    print_warnings(input, machine, program_text::unreached_feed(program, machine.axes()));
+    let description = program_text::description(program, machine.axes());
+    Ok(format!("scenario for {}: {duration:.3} s\n{description}valid\n", escaped(machine.name())))
+}
+
+/// Validates setpoints by a simulation and audits them: rows of a CSV file, or setpoints of position cycles.
+fn setpoints(
+    arguments: &CheckArguments,
+    input: &CommandInput,
+    config: &MachineConfig,
+) -> Result<String, Box<dyn Error>> {
+    // Values beyond limits are results of the audit, not errors.
+    let machine = &config.without_trajectory_limits();
+    let trial = Trial {
+        machine,
+        program: None,
+        allow_nonzero_end_velocity: false,
+        record: false,
+        measures: Measures::AXES,
+    };
+    let setpoints = input.setpoints(machine, None)?;
+    let mut rows = match &setpoints {
+        SetpointSource::Grid(source) => Some(RowAudit::new(config, source.joints())),
+        SetpointSource::Requests(_) => None,
+    };
     let mut summary = SetpointSummary::default();
+    let mut audit = LimitAudit::new(config);
     let on_tick = |tick: Tick<'_>| {
         summary.add(&tick);
+        match &mut rows {
+            Some(audit) => input.take_rows().into_iter().flatten().for_each(|row| audit.add(row)),
+            None if tick.position_instant => {
+                audit.add(tick.time, None, tick.machine.axes().iter().map(|axis| axis.sample().psec));
+            }
+            None => {}
+        }
         interrupt::check()
     };
-    let outcome =
-        virtual_axes_core::trial::run(&trial, setpoints, on_tick).map_err(|error| input.name_error(error))?;
-    let axes = config.axes();
-    let (text, warning) = match &program {
-        Some(program) => {
-            (program_text::description(program, axes), program_text::unreached_feed(program, axes))
-        }
-        None => (summary.text(axes), summary.slow_warning(axes)),
-    };
-    let warnings = warning.into_iter().chain(input.notes_on_limits(&config));
-    let warnings = warnings.map(|warning| format!("{name}: {warning}")).chain(input.gap_warning());
+    let outcome = trial::run(&trial, setpoints, on_tick).map_err(|error| input.name_error(error))?;
+    let audit = rows.map_or(audit, RowAudit::finish);
+    print_warnings(input, config, summary.slow_warning(config.axes()));
+    let duration = outcome.figures.duration;
+    let text =
+        format!("setpoints for {}: {duration:.3} s\n{}", escaped(config.name()), summary.text(config.axes()));
+    AuditedInput { name: input.name(), machine: config.name(), duration, summary: text }
+        .result(audit, arguments.json)
+}
+
+fn print_warnings(input: &CommandInput, machine: &MachineConfig, warning: Option<String>) {
+    let warnings = warning.into_iter().chain(input.notes_on_limits(machine));
+    let warnings = warnings.map(|warning| format!("{}: {warning}", input.name())).chain(input.gap_warning());
     warnings.for_each(|warning| print_error(&format!("warning: {warning}")));
-    let (machine, duration) = (escaped(config.name()), outcome.figures.duration);
-    Ok(format!("{kind} for {machine}: {duration:.3} s\n{text}valid\n"))
+}
+
+/// Validates and plans a part program, and audits its setpoints.
+fn part_program(
+    arguments: &CheckArguments,
+    name: &str,
+    machine: &MachineConfig,
+) -> Result<String, Box<dyn Error>> {
+    let mut summary = part_program::check(&arguments.file, machine, &arguments.part_program.ignore)?;
+    let input = CommandInput::open(name, None)?.with_part_program(&arguments.part_program)?;
+    let SetpointSource::Grid(mut source) = input.setpoints(machine, None)? else {
+        return Err(format!("{name}: a part program without setpoints").into());
+    };
+    let joints = source.joints().to_vec();
+    let mut audit = LimitAudit::new(machine);
+    let (mut row, mut psec) = (vec![0.0; joints.len()], vec![0.0; machine.axes().len()]);
+    let mut progress = TrialProgress::new(name, None, arguments.json);
+    let mut time = 0;
+    while source.next(&mut row).map_err(|error| -> Box<dyn Error> { error })? {
+        interrupt::check()?;
+        progress.set_time(seconds(time));
+        for (&joint, &position) in joints.iter().zip(&row) {
+            if let Some(psec) = psec.get_mut(joint) {
+                *psec = position;
+            }
+        }
+        // The first setpoint is the start, of line 0.
+        let line = input.track().borrow_mut().lines.pop_front().filter(|line| *line > 0);
+        audit.add(time, line, psec.iter().copied());
+        time += machine.periods().position;
+    }
+    progress.finish();
+    input.print_program_notes();
+    let duration = input.track().borrow().cycle_time;
+    summary += &format!("cycle time {duration:.3} s\n");
+    AuditedInput { name, machine: machine.name(), duration, summary }.result(audit, arguments.json)
+}
+
+/// Input with audited setpoints.
+struct AuditedInput<'a> {
+    name: &'a str,
+    machine: &'a str,
+    /// Duration, s.
+    duration: f64,
+    /// Summary as text.
+    summary: String,
+}
+
+impl AuditedInput<'_> {
+    /// Returns the output of the command, in [`LimitExcess`] if a limit is exceeded.
+    fn result(&self, mut audit: LimitAudit, as_json: bool) -> Result<String, Box<dyn Error>> {
+        audit.finish();
+        let excess = limit_audit_output::excess(&audit);
+        let text = if as_json {
+            let object = json!({
+                "input": self.name,
+                "machine": self.machine,
+                "duration_s": self.duration,
+                "within_limits": excess.is_none(),
+                "axes": limit_audit_output::json(&audit),
+                "notes": limit_audit_output::notes(&audit),
+            });
+            format!("{object:#}\n")
+        } else {
+            let verdict = if excess.is_none() { "valid" } else { "beyond limits" };
+            format!("{}{}{verdict}\n", self.summary, limit_audit_output::text(&audit))
+        };
+        match excess {
+            None => Ok(text),
+            Some(excess) => Err(Box::new(LimitExcess { text, reason: format!("{}: {excess}", self.name) })),
+        }
+    }
 }
 
 /// Returns true for a built-in machine, false for a built-in scenario.

@@ -8,7 +8,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::part_program::is_part_program;
-use crate::part_program_source::{OverrideSchedule, PartProgramSource, ProgramTrack};
+use crate::part_program_arguments::PartProgramArguments;
+use crate::part_program_source::{PartProgramOptions, PartProgramSource, ProgramTrack};
+use crate::print_error;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::Scenario;
@@ -16,7 +18,9 @@ use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::trajectory::TrajectoryRequest;
 use virtual_axes_core::trial::{GridSource, ProgramSource, SetpointSource, SourceError, TrialError};
 use virtual_axes_core::units::Rounded;
-use virtual_axes_io::files::{self, FileKind, McapTrajectories, PsecCsvReader, TimeGap, read_psec_yaml};
+use virtual_axes_io::files::{
+    self, FileKind, McapTrajectories, PsecCsvReader, PsecRow, TimeGap, read_psec_yaml,
+};
 
 /// Scenario, part program or file with setpoints.
 #[derive(Debug)]
@@ -25,9 +29,10 @@ pub struct CommandInput {
     content: Content,
     /// Gap in the rows of a CSV file that was read.
     gap: Cell<Option<TimeGap>>,
-    /// Feed override of a part program.
-    schedule: OverrideSchedule,
+    options: PartProgramOptions,
     track: RefCell<ProgramTrack>,
+    /// Rows of a CSV file that were read and not taken; `None` if they are not kept.
+    rows: Option<RefCell<Vec<PsecRow>>>,
 }
 
 #[derive(Debug)]
@@ -66,25 +71,42 @@ impl CommandInput {
             name: name.to_owned(),
             content,
             gap: Cell::new(None),
-            schedule: OverrideSchedule::default(),
+            options: PartProgramOptions::default(),
             track: RefCell::default(),
+            rows: None,
         })
     }
 
-    /// Sets the feed override of a part program.
+    /// Sets the options of a part program.
     ///
     /// # Errors
     ///
-    /// Returns an error if the text is invalid, or if the input is not a part program.
-    pub fn with_override(mut self, text: Option<&str>) -> Result<Self, Box<dyn Error>> {
-        if let Some(text) = text {
-            if !self.is_part_program() {
-                return Err(format!("{}: --override requires a part program", self.name).into());
-            }
-            self.schedule =
-                OverrideSchedule::parse(text).map_err(|error| format!("--override {text}: {error}"))?;
+    /// Returns an error if an option is invalid, or if one is given and the input is not a part program.
+    pub fn with_part_program(mut self, arguments: &PartProgramArguments) -> Result<Self, Box<dyn Error>> {
+        if let (Some(option), false) = (arguments.given(), self.is_part_program()) {
+            return Err(format!("{}: {option} requires a part program", self.name).into());
         }
+        self.options = arguments.options()?;
         Ok(self)
+    }
+
+    /// Prints notes on words without effect of a part program that was read.
+    pub fn print_program_notes(&self) {
+        for (line, note) in self.track.borrow().notes() {
+            print_error(&format!("note: {}:{line}: {note}", self.name));
+        }
+    }
+
+    /// Keeps the rows of a CSV file for [`take_rows`](Self::take_rows).
+    #[must_use]
+    pub fn with_kept_rows(mut self) -> Self {
+        self.rows = matches!(self.content, Content::Csv(_)).then(RefCell::default);
+        self
+    }
+
+    /// Returns the rows of a CSV file that were read since the last call; `None` if they are not kept.
+    pub fn take_rows(&self) -> Option<Vec<PsecRow>> {
+        self.rows.as_ref().map(RefCell::take)
     }
 
     /// Returns true if the input is a part program.
@@ -162,7 +184,7 @@ impl CommandInput {
         match &self.content {
             Content::Scenario(_) => Err(format!("{}: a scenario without its program", self.name).into()),
             Content::PartProgram => {
-                let source = PartProgramSource::open(&self.name, machine, &self.schedule, &self.track)?;
+                let source = PartProgramSource::open(&self.name, machine, &self.options, &self.track)?;
                 Ok(SetpointSource::Grid(Box::new(source)))
             }
             Content::Csv(opened) => {
@@ -171,9 +193,11 @@ impl CommandInput {
                     None => files::Input::open(Path::new(&self.name))?,
                 };
                 let psec = PsecCsvReader::new(file.into_reader(), &self.name, period, &limits)?;
+                let psec = psec.with_start_at_first_row();
                 Ok(SetpointSource::Grid(Box::new(CsvSource {
-                    psec: psec.with_start_at_first_row(),
+                    psec: if self.rows.is_some() { psec.with_kept_rows() } else { psec },
                     gap: &self.gap,
+                    rows: self.rows.as_ref(),
                 })))
             }
             Content::Yaml(requests) => Ok(SetpointSource::Requests(Box::new(
@@ -233,6 +257,7 @@ fn content_of(file: files::Input, topic: Option<&str>) -> Result<Content, Box<dy
 struct CsvSource<'a, R> {
     psec: PsecCsvReader<R>,
     gap: &'a Cell<Option<TimeGap>>,
+    rows: Option<&'a RefCell<Vec<PsecRow>>>,
 }
 
 impl<R: Read> GridSource for CsvSource<'_, R> {
@@ -242,6 +267,9 @@ impl<R: Read> GridSource for CsvSource<'_, R> {
 
     fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
         let has_row = self.psec.next(row)?;
+        if let Some(rows) = self.rows {
+            rows.borrow_mut().extend(self.psec.take_rows());
+        }
         if !has_row {
             self.gap.set(self.psec.gap());
         }

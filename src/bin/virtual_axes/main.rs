@@ -19,11 +19,14 @@ mod input;
 mod interface;
 mod interrupt;
 mod json;
+mod limit_audit;
+mod limit_audit_output;
 mod list;
 mod machine_file;
 mod output_arguments;
 mod parameters;
 mod part_program;
+mod part_program_arguments;
 mod part_program_source;
 mod period;
 mod pose;
@@ -33,6 +36,7 @@ mod psec;
 mod recordings;
 mod report;
 mod robustness;
+mod row_audit;
 mod run;
 mod search;
 mod setpoint_summary;
@@ -57,6 +61,8 @@ use clap_complete::Shell;
 use virtual_axes_core::config::listing;
 use virtual_axes_core::text::{escaped_lines, is_control};
 
+/// Exit status of `check` if setpoints are beyond a limit.
+const BEYOND_LIMITS: u8 = 1;
 /// Exit status of a command that rejected its input or could not write its output.
 const BAD_INPUT: u8 = 2;
 /// Exit status of a command whose result must not be used.
@@ -84,7 +90,7 @@ enum Command {
     Robustness(Box<robustness::RobustnessArguments>),
     /// Identify the parameters of an axis from recordings and write a machine file.
     Identify(Box<identify::IdentifyArguments>),
-    /// Validate a machine file, a scenario, setpoints, or a part program.
+    /// Validate a machine file, a scenario, setpoints, or a part program, and compare setpoints with the limits.
     Check(check::CheckArguments),
     /// Print the URDF of a machine, for robot_state_publisher and RViz.
     Urdf(urdf::UrdfArguments),
@@ -140,6 +146,11 @@ fn main() -> ExitCode {
                 let _ = io::stdout().write_all(invalid.text.as_bytes());
                 print_error(invalid);
                 return ExitCode::from(INVALID_RESULT);
+            }
+            if let Some(excess) = error.downcast_ref::<limit_audit::LimitExcess>() {
+                let _ = io::stdout().write_all(excess.text.as_bytes());
+                print_error(excess);
+                return ExitCode::from(BEYOND_LIMITS);
             }
             print_error(&*error);
             return ExitCode::from(if interrupt::is_raised() { interrupt::INTERRUPTED } else { BAD_INPUT });

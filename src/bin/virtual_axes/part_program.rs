@@ -28,13 +28,7 @@ pub fn is_part_program(file: &Path) -> bool {
     extension.is_some_and(|extension| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
 
-/// Reads an M code with or without its letter.
-pub fn m_code(text: &str) -> Result<u32, String> {
-    let digits = text.strip_prefix(['M', 'm']).unwrap_or(text);
-    digits.parse().map_err(|_| "must be an M code, as 100 or M100".to_owned())
-}
-
-/// Validates a part program on a machine and returns a summary.
+/// Validates words, axes and travel limits of a part program on a machine and returns a summary.
 pub fn check(file: &Path, machine: &MachineConfig, ignored: &[u32]) -> Result<String, Box<dyn Error>> {
     let name = file.to_string_lossy();
     let source = BufReader::new(File::open(file).map_err(|error| format!("{name}: {error}"))?);
@@ -160,7 +154,7 @@ impl ProgramSummary {
         format!(
             "part program for {}: {:.3} s at the programmed feed, without rapid traverse and acceleration\n\
              motions: {rapid} rapid, {lines} lines, {arcs} arcs, {splines} splines; {} m at feed{shortest}\n\
-             {joints}valid\n",
+             {joints}",
             escaped(machine.name()),
             self.time,
             Rounded(*length),

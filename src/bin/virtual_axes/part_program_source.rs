@@ -1,7 +1,7 @@
 //! Setpoints of a part program, with the source line of each.
 
 use std::cell::RefCell;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::error::Error;
 use std::fs::File;
 use std::io::BufReader;
@@ -9,7 +9,8 @@ use std::io::BufReader;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::trial::{GridSource, SourceError};
 use virtual_axes_core::units::{Nanoseconds, seconds};
-use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
+use virtual_axes_nc::interpret::{IgnoredCode, Interpreter, InterpreterOptions, ProgramError};
+use virtual_axes_nc::motion::{Blend, PathControl, ProgramEvent, ProgramStep};
 use virtual_axes_nc::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
 
 /// Feed override over time: percent from a time on, s.
@@ -50,6 +51,17 @@ impl OverrideSchedule {
     }
 }
 
+/// Options of the interpretation of a part program.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PartProgramOptions {
+    /// Feed override.
+    pub schedule: OverrideSchedule,
+    /// M codes without effect.
+    pub ignored_m_codes: Vec<u32>,
+    /// Options of the feed planner.
+    pub plan: PlanOptions,
+}
+
 /// Lines of the setpoints that are not simulated yet, and the times of the program.
 #[derive(Debug, Clone, Default)]
 pub struct ProgramTrack {
@@ -59,11 +71,64 @@ pub struct ProgramTrack {
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
     pub programmed_time: f64,
+    /// Ignored M codes of the lines read.
+    pub ignored_codes: BTreeMap<u32, IgnoredCode>,
+    /// First line with a stop (M0, M1), which the simulation passes without a wait.
+    pub stop: Option<usize>,
+    /// First line of a motion with a tolerance of merged lines (G64 Q), which has no effect.
+    pub merge_tolerance: Option<usize>,
+}
+
+impl ProgramTrack {
+    /// Returns notes on words without effect: line and text.
+    pub fn notes(&self) -> Vec<(usize, String)> {
+        let codes = self.ignored_codes.iter().map(|(code, found)| {
+            let IgnoredCode { count, first_line } = found;
+            (*first_line, format!("M{code} is ignored, {count} in all"))
+        });
+        let stop = self.stop.map(|line| (line, "M0 and M1 stop the axes and do not wait".to_owned()));
+        let merging = "G64 Q has no effect: short lines are joined within P".to_owned();
+        let merging = self.merge_tolerance.map(|line| (line, merging));
+        let mut notes: Vec<_> = codes.chain(stop).chain(merging).collect();
+        notes.sort_by_key(|(line, _)| *line);
+        notes
+    }
+}
+
+/// Steps of a program that notes words without effect in its track.
+struct NotedSteps<'a> {
+    interpreter: Interpreter<BufReader<File>>,
+    track: &'a RefCell<ProgramTrack>,
+}
+
+impl Iterator for NotedSteps<'_> {
+    type Item = Result<ProgramStep, ProgramError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let step = self.interpreter.next();
+        let mut track = self.track.borrow_mut();
+        let codes = self.interpreter.ignored_codes();
+        if !codes.is_empty() {
+            track.ignored_codes.clone_from(codes);
+        }
+        match &step {
+            Some(Ok(ProgramStep::Motion(motion))) => {
+                if let PathControl::Blend(Blend { merge_tolerance: Some(_), .. }) = motion.path_control {
+                    track.merge_tolerance.get_or_insert(motion.line);
+                }
+            }
+            Some(Ok(ProgramStep::Event { line, event: ProgramEvent::Stop | ProgramEvent::OptionalStop })) => {
+                track.stop.get_or_insert(*line);
+            }
+            _ => {}
+        }
+        step
+    }
 }
 
 /// Source of the setpoints of a part program.
 pub struct PartProgramSource<'a> {
-    planner: PartProgramPlanner<Interpreter<BufReader<File>>>,
+    planner: PartProgramPlanner<NotedSteps<'a>>,
     name: &'a str,
     schedule: &'a OverrideSchedule,
     track: &'a RefCell<ProgramTrack>,
@@ -80,16 +145,24 @@ impl<'a> PartProgramSource<'a> {
     pub fn open(
         name: &'a str,
         machine: &MachineConfig,
-        schedule: &'a OverrideSchedule,
+        options: &'a PartProgramOptions,
         track: &'a RefCell<ProgramTrack>,
     ) -> Result<Self, Box<dyn Error>> {
         let file = File::open(name).map_err(|error| format!("{name}: {error}"))?;
-        let options = InterpreterOptions::for_machine(machine);
-        let steps = Interpreter::new(BufReader::new(file), name, options);
-        let planner = PartProgramPlanner::new(steps, machine, PlanOptions::default())
-            .map_err(|error| format!("{name}: {error}"))?;
+        let mut interpreter = InterpreterOptions::for_machine(machine);
+        interpreter.ignored_m_codes.clone_from(&options.ignored_m_codes);
         track.replace(ProgramTrack::default());
-        Ok(Self { planner, name, schedule, track, period: machine.periods().position, cycle: 0 })
+        let interpreter = Interpreter::new(BufReader::new(file), name, interpreter);
+        let planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
+            .map_err(|error| format!("{name}: {error}"))?;
+        Ok(Self {
+            planner,
+            name,
+            schedule: &options.schedule,
+            track,
+            period: machine.periods().position,
+            cycle: 0,
+        })
     }
 }
 

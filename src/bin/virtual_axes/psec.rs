@@ -9,6 +9,7 @@ use virtual_axes_core::trial::SetpointSource;
 use virtual_axes_io::files::psec_writer;
 
 use crate::input::{CommandInput, must_not_replace};
+use crate::part_program_arguments::PartProgramArguments;
 use crate::{campaign, interrupt, variant};
 
 /// Arguments of `virtual_axes psec`.
@@ -19,6 +20,9 @@ pub struct PsecArguments {
     kind: Option<PsecKind>,
     #[command(flatten)]
     scenario: Option<ScenarioPsecArguments>,
+    // Not in the optional group of the scenario: clap does not see the words of such a group if it contains another.
+    #[command(flatten)]
+    part_program: PartProgramArguments,
 }
 
 /// Source of the setpoints other than a scenario.
@@ -46,26 +50,25 @@ struct ScenarioPsecArguments {
     /// Override the feed of the scenario, m/min (rpm for a scenario of rotary moves).
     #[arg(long, allow_negative_numbers = true)]
     feed: Option<f64>,
-    /// Feed override of a part program, 0 to 200 %: constant, or from times on, as in `0:100,2.5:0,4:120`.
-    #[arg(long = "override", value_name = "PERCENT|S:PERCENT,…", allow_hyphen_values = true)]
-    feed_override: Option<String>,
 }
 
 /// Writes the setpoints of a scenario or of a campaign.
 pub fn run(arguments: &PsecArguments) -> Result<String, Box<dyn Error>> {
     match (&arguments.kind, &arguments.scenario) {
         (Some(PsecKind::Campaign(arguments)), _) => campaign::run(arguments),
-        (None, Some(arguments)) => write_scenario(arguments),
+        (None, Some(scenario)) => write_scenario(scenario, &arguments.part_program),
         (None, None) => Err("psec requires a scenario or the subcommand `campaign`".into()),
     }
 }
 
 /// Writes the setpoints of a scenario and returns an empty text.
-fn write_scenario(arguments: &ScenarioPsecArguments) -> Result<String, Box<dyn Error>> {
+fn write_scenario(
+    arguments: &ScenarioPsecArguments,
+    part_program: &PartProgramArguments,
+) -> Result<String, Box<dyn Error>> {
     let machine = Parameters::load(&arguments.machine)?;
     let config = variant::parameters(&machine, None, &arguments.set, &[])?.machine_config()?;
-    let input =
-        CommandInput::open(&arguments.scenario, None)?.with_override(arguments.feed_override.as_deref())?;
+    let input = CommandInput::open(&arguments.scenario, None)?.with_part_program(part_program)?;
     input.must_not_be(&arguments.out)?;
     must_not_replace(&arguments.out, Path::new(&arguments.machine))?;
     let program = input.program(&config, arguments.feed)?;
@@ -92,5 +95,6 @@ fn write_scenario(arguments: &ScenarioPsecArguments) -> Result<String, Box<dyn E
         time += config.periods().position;
     }
     writer.finish()?;
+    input.print_program_notes();
     Ok(String::new())
 }

@@ -99,6 +99,7 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
             outcome,
         });
     }
+    input.print_program_notes();
     let name = machine.machine_config()?.name().to_owned();
     if let Some(path) = &arguments.report {
         let machine = ReportMachine { title: name.clone(), source: arguments.trial.machine.clone() };

@@ -25,8 +25,10 @@ pub fn read_workload(
 ) -> Result<Workload, Box<dyn Error>> {
     let program = input.program(machine, feed)?;
     let setpoints = input.setpoints(machine, program.as_ref())?;
-    Workload::read(input.name(), program.clone(), setpoints, interrupt::check)
-        .map_err(|error| -> Box<dyn Error> { error })
+    let workload = Workload::read(input.name(), program.clone(), setpoints, interrupt::check)
+        .map_err(|error| -> Box<dyn Error> { error })?;
+    input.print_program_notes();
+    Ok(workload)
 }
 
 /// Adds the name of the path to an error that does not name a file.

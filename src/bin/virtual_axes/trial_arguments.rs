@@ -6,6 +6,7 @@ use std::path::Path;
 use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
 
 use crate::input::{CommandInput, must_not_replace};
+use crate::part_program_arguments::PartProgramArguments;
 use crate::variant;
 
 /// Machine and parameters.
@@ -52,9 +53,8 @@ pub struct TrialArguments {
     /// Override the feed of the scenario, m/min (rpm for a scenario of rotary moves).
     #[arg(long, allow_negative_numbers = true)]
     pub feed: Option<f64>,
-    /// Feed override of a part program, 0 to 200 %: constant, or from times on, as in `0:100,2.5:0,4:120`.
-    #[arg(long = "override", value_name = "PERCENT|S:PERCENT,…", allow_hyphen_values = true)]
-    feed_override: Option<String>,
+    #[command(flatten)]
+    part_program: PartProgramArguments,
     /// Topic to run, if a recording has several topics with a JointTrajectory.
     #[arg(long)]
     topic: Option<String>,
@@ -73,6 +73,6 @@ impl TrialArguments {
 
     /// Opens the scenario, the part program or the file with setpoints.
     pub fn input(&self) -> Result<CommandInput, Box<dyn Error>> {
-        CommandInput::open(&self.input, self.topic.as_deref())?.with_override(self.feed_override.as_deref())
+        CommandInput::open(&self.input, self.topic.as_deref())?.with_part_program(&self.part_program)
     }
 }

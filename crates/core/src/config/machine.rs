@@ -268,6 +268,17 @@ impl MachineConfig {
         }
     }
 
+    /// Returns the machine without velocity and travel limits of trajectories, for setpoints that may exceed them.
+    #[must_use]
+    pub fn without_trajectory_limits(&self) -> Self {
+        let mut machine = self.clone();
+        for axis in &mut machine.axes {
+            axis.limits.velocity = f64::INFINITY;
+            (axis.limits.travel_min, axis.limits.travel_max) = (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        machine
+    }
+
     /// Returns the name of the machine.
     pub fn name(&self) -> &str {
         &self.name

@@ -1,17 +1,11 @@
 //! Verification of sampled setpoints against the joint limits.
 
 use super::error::SetpointDerivative;
+use super::limit_use::LimitUse;
 use super::program::Program;
 use crate::config::LimitsConfig;
-use crate::trajectory::limits::SPEED_TOLERANCE;
 use crate::units::{Nanoseconds, seconds};
 
-/// Relative tolerance for acceleration and jerk, as documented at [`Program`].
-const TOLERANCE: f64 = 1e-6;
-/// Relative tolerance for speed: half of the tolerance of trajectory validation.
-const VELOCITY_TOLERANCE: f64 = 0.5 * SPEED_TOLERANCE;
-/// Rounding errors of position and time, in units of ε, that a difference may accumulate.
-const ROUNDINGS: f64 = 16.0;
 /// Number of instants up to which a program is checked completely: more than an hour and a half at 6 ms. In
 /// a longer program each span gets an equal share, half at its start and half at its end; in between, the
 /// feed is constant.
@@ -19,7 +13,7 @@ const MAX_INSTANTS: u64 = 1_000_000;
 /// Smallest share per span, instants.
 const MIN_SHARE: u64 = 64;
 /// Number of setpoints in the third difference.
-const WINDOW: usize = 4;
+const WINDOW: usize = LimitUse::WINDOW;
 
 /// Properties of a span and of the junction after it that the verification needs.
 #[derive(Debug, Clone, Copy, Default)]
@@ -141,19 +135,12 @@ impl Verifier<'_> {
     fn check_limits(&mut self, t: f64) {
         let period = seconds(self.period);
         for (joint, limits) in self.joints.iter().enumerate() {
-            let [a, b, c, d] = std::array::from_fn(|i| self.window[i].1[joint]);
-            let rounding = ROUNDINGS * f64::EPSILON * (a.abs().max(d.abs()) + t * ((d - a) / period).abs());
-            let orders = [
-                (SetpointDerivative::Speed, d - c, limits.velocity, 1, VELOCITY_TOLERANCE),
-                (SetpointDerivative::Acceleration, d - 2.0 * c + b, limits.acceleration, 2, TOLERANCE),
-                (SetpointDerivative::Jerk, d - 3.0 * (c - b) - a, limits.jerk, 3, TOLERANCE),
-            ];
-            for (quantity, difference, allowed, order, tolerance) in orders {
-                let found = (difference.abs() - rounding).max(0.0) / period.powi(order);
-                let ratio = found / allowed;
-                if ratio > 1.0 + tolerance {
+            let setpoints = std::array::from_fn(|i| self.window[i].1[joint]);
+            for (order, found) in (1..).zip(LimitUse::of_setpoints(setpoints, t, period, limits)) {
+                if found.is_exceeded() {
                     let (from, to) = (self.window[WINDOW - 1 - order as usize].0, self.window[WINDOW - 1].0);
-                    let excess = Excess { span: to, time: t, joint, quantity, ratio, allowed };
+                    let LimitUse { quantity, allowed, .. } = found;
+                    let excess = Excess { span: to, time: t, joint, quantity, ratio: found.ratio(), allowed };
                     self.attribute(from, to, order, excess);
                 }
             }

@@ -7,6 +7,8 @@ use std::path::Path;
 
 use super::lines::{Lines, fields};
 use super::psec_error::{MAX_TIME, PsecError, TIME};
+use super::psec_row::PsecRow;
+use super::psec_steps::{TimeGap, TimeSteps};
 use virtual_axes_core::text::nearest_name;
 use virtual_axes_core::trajectory::JointLimits;
 use virtual_axes_core::trajectory::spline::{KinematicState, Segment, SplineDegree};
@@ -22,55 +24,6 @@ struct Point {
     line: u64,
     /// Row index, from 0.
     index: usize,
-}
-
-/// Gap between two rows: a time step with motion that is far longer than the others.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TimeGap {
-    /// Line of the row after the gap.
-    pub line: u64,
-    /// Time step, s.
-    pub step: f64,
-    /// Median of the time steps, s.
-    pub median: f64,
-}
-
-/// Time steps between the rows read so far.
-#[derive(Debug, Default)]
-struct TimeSteps {
-    /// First steps, up to [`Self::MOST`].
-    first: Vec<Nanoseconds>,
-    /// Longest step with motion, and the line after it.
-    longest: Nanoseconds,
-    line: u64,
-}
-
-impl TimeSteps {
-    /// Number of steps from which the median is computed.
-    const MOST: usize = 1000;
-    /// Ratio to the median above which a step is a gap.
-    const GAP: i64 = 10;
-
-    fn add(&mut self, before: &Point, after: &Point) {
-        let step = after.time - before.time;
-        if self.first.len() < Self::MOST {
-            self.first.push(step);
-        }
-        if step > self.longest && before.positions != after.positions {
-            (self.longest, self.line) = (step, after.line);
-        }
-    }
-
-    fn gap(&self) -> Option<TimeGap> {
-        let mut first = self.first.clone();
-        first.sort_unstable();
-        let median = *first.get(first.len() / 2)?;
-        (self.longest > Self::GAP * median).then(|| TimeGap {
-            line: self.line,
-            step: seconds(self.longest),
-            median: seconds(median),
-        })
-    }
 }
 
 /// Streaming reader of the position setpoints of a CSV file at the times k·Tsp, k = 0, 1, …, with constant memory.
@@ -102,6 +55,8 @@ pub struct PsecCsvReader<R> {
     /// True if `after` is the last row.
     is_last_row: bool,
     is_done: bool,
+    /// Rows read since the last [`take_rows`](Self::take_rows), if they are kept.
+    rows: Option<Vec<PsecRow>>,
 }
 
 impl PsecCsvReader<File> {
@@ -141,6 +96,7 @@ impl<R: Read> PsecCsvReader<R> {
             steps: TimeSteps::default(),
             is_last_row: false,
             is_done: false,
+            rows: None,
         };
         psec.read_header(joints)?;
         if !psec.read_point()? {
@@ -173,6 +129,22 @@ impl<R: Read> PsecCsvReader<R> {
             self.before.positions.copy_from_slice(&self.after.positions);
         }
         self
+    }
+
+    /// Keeps rows for [`take_rows`](Self::take_rows), beginning with the start positions if the first row is later than
+    /// 0. Call it after the other `with` functions.
+    #[must_use]
+    pub fn with_kept_rows(mut self) -> Self {
+        let Point { line, time, positions, .. } = &self.after;
+        let start = (*time > 0).then(|| PsecRow::new(*line, 0, &self.before.positions));
+        self.rows = Some(start.into_iter().chain([PsecRow::new(*line, *time, positions)]).collect());
+        self
+    }
+
+    /// Returns the rows read since the last call; empty without [`with_kept_rows`](Self::with_kept_rows). The digits of
+    /// the first row are unknown.
+    pub fn take_rows(&mut self) -> Vec<PsecRow> {
+        self.rows.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// Returns the joint index in the machine of each value of a row.
@@ -229,7 +201,8 @@ impl<R: Read> PsecCsvReader<R> {
             std::mem::swap(&mut self.before, &mut self.after);
             self.is_last_row = true;
         } else {
-            self.steps.add(&self.before, &self.after);
+            let moves = self.before.positions != self.after.positions;
+            self.steps.add(self.after.time - self.before.time, self.after.line, moves);
         }
         Ok(())
     }
@@ -319,7 +292,7 @@ impl<R: Read> PsecCsvReader<R> {
 
     /// Reads and checks the next row into `after`; returns false at the end of the file.
     fn read_point(&mut self) -> Result<bool, PsecError> {
-        let PsecCsvReader { lines, name, columns, limits, before, after, .. } = self;
+        let PsecCsvReader { lines, name, columns, limits, before, after, rows, .. } = self;
         let found = lines.next().map_err(|(line, reason)| {
             let at = format!("{name}:{line}");
             PsecError::Unreadable { at, reason }
@@ -363,6 +336,9 @@ impl<R: Read> PsecCsvReader<R> {
             joint
                 .check_travel_limits(after.index, position)
                 .map_err(|rejection| PsecError::Point { at: at(), rejection })?;
+        }
+        if let Some(rows) = rows {
+            rows.push(PsecRow::new(line, after.time, &after.positions).with_digits_of(text));
         }
         Ok(true)
     }

@@ -20,8 +20,8 @@ pub(super) struct LineWords {
     pub g: Vec<u16>,
     /// M codes, without the ignored ones.
     pub m: Vec<u32>,
-    /// True if the line has an ignored M code, whose words have no effect.
-    has_ignored: bool,
+    /// Ignored M codes, whose words have no effect.
+    pub ignored: Vec<u32>,
     /// Parameter settings, in their order.
     pub settings: Vec<(Setting, f64)>,
 }
@@ -42,7 +42,7 @@ impl LineWords {
         self.g.clear();
         self.m.clear();
         self.settings.clear();
-        self.has_ignored = false;
+        self.ignored.clear();
         let mut scanner = Scanner::new(text, variables);
         while let Some(byte) = scanner.peek() {
             match byte {
@@ -84,11 +84,9 @@ impl LineWords {
             }
             b'm' => {
                 let code = integer(value).ok_or_else(|| format!("M{value} is not an M code"))?;
-                require_count(self.m.len(), "M codes")?;
-                match ignored.contains(&code) {
-                    true => self.has_ignored = true,
-                    false => self.m.push(code),
-                }
+                require_count(self.m.len() + self.ignored.len(), "M codes")?;
+                let codes = if ignored.contains(&code) { &mut self.ignored } else { &mut self.m };
+                codes.push(code);
             }
             b'n' => return Err("word N: the line number stands at the start of the line".to_owned()),
             b'o' => return Err(format!("{word}: an O-word stands at the start of the line")),
@@ -142,7 +140,7 @@ impl LineWords {
 
     /// Rejects words that no code has used.
     pub(super) fn require_used(&self) -> Outcome<()> {
-        if self.unused == 0 || self.has_ignored {
+        if self.unused == 0 || !self.ignored.is_empty() {
             return Ok(());
         }
         let letter = char::from(b'A' + self.unused.trailing_zeros() as u8);

@@ -24,6 +24,7 @@ mod spline;
 mod state;
 mod text;
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, Seek};
 
 pub use error::ProgramError;
@@ -49,6 +50,16 @@ pub struct Interpreter<R> {
     block: LineWords,
     state: State,
     flow: Flow,
+    ignored: BTreeMap<u32, IgnoredCode>,
+}
+
+/// Occurrences of an ignored M code in the lines executed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct IgnoredCode {
+    /// Number of executed lines with the code.
+    pub count: u64,
+    /// First source line with the code, from 1.
+    pub first_line: usize,
 }
 
 impl<R: BufRead + Seek> Interpreter<R> {
@@ -61,7 +72,13 @@ impl<R: BufRead + Seek> Interpreter<R> {
             block: LineWords::default(),
             state: State::new(options),
             flow: Flow::default(),
+            ignored: BTreeMap::new(),
         }
+    }
+
+    /// Returns the ignored M codes of the lines executed so far.
+    pub fn ignored_codes(&self) -> &BTreeMap<u32, IgnoredCode> {
+        &self.ignored
     }
 
     /// Returns true for an optional line that the options skip.
@@ -90,6 +107,10 @@ impl<R: BufRead + Seek> Interpreter<R> {
             return self.execute_o_word(place);
         }
         self.block.read(&self.line.text, &self.state, &self.state.options.ignored_m_codes)?;
+        for &code in &self.block.ignored {
+            let first = IgnoredCode { count: 0, first_line: self.state.line };
+            self.ignored.entry(code).or_insert(first).count += 1;
+        }
         self.state.execute(&mut self.block)?;
         self.execute_jump()
     }

@@ -1,6 +1,8 @@
 //! Invalid programs: one line with file, line, word and what is allowed.
 
-use virtual_axes_nc::interpret::InterpreterOptions;
+use std::io::Cursor;
+
+use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
 
 use crate::common::{error, events, motions, steps};
 
@@ -215,7 +217,13 @@ fn endless_and_huge_programs_are_rejected() {
 fn ignored_m_codes_have_no_effect() {
     let options = InterpreterOptions { ignored_m_codes: vec![100, 6], ..InterpreterOptions::default() };
     assert_eq!(motions("G0 X1 M100\nM100 P5 Q2\nG0 X2", options.clone()).len(), 2);
-    assert_eq!(events("T1 M6", options).len(), 2, "selection and end, no change");
+    assert_eq!(events("T1 M6", options.clone()).len(), 2, "selection and end, no change");
+    let program = "G0 X1\nM6\nO1 repeat [3]\nM100 P5 M6\nO1 endrepeat\n";
+    let mut interpreter = Interpreter::new(Cursor::new(program), "part.nc", options);
+    assert!(interpreter.by_ref().all(|step| step.is_ok()));
+    let codes: Vec<_> =
+        interpreter.ignored_codes().iter().map(|(m, code)| (*m, code.count, code.first_line)).collect();
+    assert_eq!(codes, [(6, 4, 2), (100, 3, 4)]);
 }
 
 #[test]
